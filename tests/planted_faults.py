@@ -12,13 +12,16 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 ROOT = Path(__file__).parents[1]
 
@@ -471,23 +474,46 @@ def copied_tree(folder: Path) -> Path:
     return folder
 
 
-def is_noticed(tree: Path, fault: Fault, tests: list[str]) -> bool:
-    """Tell whether tests fail with the fault planted in a copy of the tree."""
+class Planted(Protocol):
+    """A fault that can be planted in the text of a file."""
+
+    @property
+    def file(self) -> str: ...  # from the root of the tree
+
+    def planted(self, text: str) -> str: ...
+
+
+def first_failure(tree: Path, tests: list[str], seconds: float | None = None) -> str:
+    """Return the first test that fails in a copy of the tree, "" if none does."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider",
+         *(["-n", "0"] if tests else []), *tests],
+        cwd=tree, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True,
+        env={**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"},
+    ) as run:  # fmt: skip
+        try:
+            said = run.communicate(timeout=seconds)[0].decode(errors="replace")
+        except BaseException:
+            os.killpg(run.pid, signal.SIGKILL)  # with what the tests started
+            raise
+    if run.returncode in (0, 5):  # 5: no tests were found
+        return ""
+    if named := re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", said, re.M):
+        return str(named[-1])
+    if "while loading conftest" in said:
+        return "conftest.py"
+    raise RuntimeError(f"pytest ended with {run.returncode}: {said[-2000:]}")
+
+
+def noticed_by(tree: Path, fault: Planted, tests: list[str], seconds: float | None = None) -> str:
+    """Return the first test that fails with the fault planted in a copy of the tree, or ""."""
     path = tree / fault.file
     right = path.read_text(encoding="utf-8")
     path.write_text(fault.planted(right), encoding="utf-8")
     try:
-        ended = subprocess.run(
-            [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider",
-             *(["-n", "0"] if tests else []), *tests],
-            cwd=tree, capture_output=True, check=False,
-            env={**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"},
-        )  # fmt: skip
+        return first_failure(tree, tests, seconds)
     finally:
         path.write_text(right, encoding="utf-8")
-    if ended.returncode not in (0, 1):
-        raise RuntimeError(f"pytest ended with {ended.returncode}: {ended.stdout.decode()[-2000:]}")
-    return ended.returncode == 1
 
 
 def _say(line: str) -> None:
@@ -507,9 +533,9 @@ def main() -> int:
         tree = copied_tree(Path(folder))
         for number in numbers:
             fault, begin = FAULTS[number - 1], time.monotonic()
-            noticed = is_noticed(tree, fault, fault.tests.split())
+            noticed = noticed_by(tree, fault, fault.tests.split())
             if not noticed and given.whole:
-                noticed = is_noticed(tree, fault, [])
+                noticed = noticed_by(tree, fault, [])
             seconds = time.monotonic() - begin
             word = "noticed " if noticed else "SURVIVES"
             _say(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from photocore import cli as console
@@ -23,3 +25,8 @@ def test_short_and_quiet_jobs_print_nothing(monkeypatch, capsys, silent, quiet):
         for part in range(101):
             progress(part, 100)
     assert capsys.readouterr().err == ""
+
+
+def test_files_that_were_written_are_told_and_no_others(capsys):
+    console.tell_written(None, Path("wall.xlsx"))
+    assert capsys.readouterr().err == "Written: wall.xlsx\n"

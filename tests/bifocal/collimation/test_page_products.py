@@ -396,3 +396,19 @@ def test_remarks_on_an_orientation_name_no_option_of_the_command_line(tmp_path) 
         state = client_of(session).get("/api/state").json()
         session.proposal = None
     assert state["pair"]["remarks"] == ["CHECK THE WALL: +12 mm. Give control points."]
+
+
+def test_the_precision_of_a_place_is_that_of_its_pixel_up_to_the_rim(tmp_path) -> None:
+    folder = sample_folder(tmp_path)
+    sigma = np.arange(1, 13, dtype=np.float32).reshape(3, 4) / 1000
+    metres = [[1.0, 0, 0], [0, -1.0, 2], [0, 0, 1]]
+    relief = ReliefMap.from_relief(np.zeros((3, 4), np.float32), plane_from_pixel=metres)
+    write_relief(folder / "facade.relief.tif", replace(relief, sigma=sigma))
+    with opened(folder) as session:
+        session.note_made("relief", ["facade.relief.tif"])
+        told = session.products
+        for row in range(-1, 4):
+            for column in range(-1, 5):
+                found = told.value(column + 0.3, 2 - row - 0.2)["sigma"]
+                there = 0 <= row < 3 and 0 <= column < 4
+                assert found == (pytest.approx(sigma[row, column]) if there else None)

@@ -216,6 +216,23 @@ def test_a_rendered_street_under_water_is_adjusted_by_the_command(tmp_path, lean
         assert np.median(np.abs(found[:, 2])) < 0.03
 
 
+def adjustment(cameras, media, covariances):
+    """Return an adjustment of pairs without a point, of covariances (14, 14)."""
+    count = len(cameras)
+    return JointAdjustment(
+        cameras=tuple(cameras), xyz=np.zeros((0, 3)), covariance=np.zeros((0, 3, 3)), sigma0=1.0,
+        redundancy=1, iterations=1, residuals=np.zeros((0, 2)), control=np.zeros((0, 3)),
+        blunders=(), left_in=(),
+        by_camera=np.stack([part for c in covariances for part in (c[:7, :7], c[7:, 7:])]),
+        between=np.stack([c[:7, 7:] for c in covariances]),
+        observations=JointObservations(
+            names=("far", "near") * (count // 2), camera=np.zeros(0, int), point=np.zeros(0, int),
+            pixels=np.zeros((0, 2)), sigma=np.zeros(0), ids=(), known=np.zeros((0, 3)),
+            sigma_known=np.zeros((0, 3)), sigma_focal=np.zeros(count), media=tuple(media),
+        ),
+    )  # fmt: skip
+
+
 @pytest.mark.parametrize("name", ["tank", "port", "leaning port"])
 def test_an_adjusted_pair_tells_every_point_what_its_cameras_are_worth(name, tmp_path):
     """By hand: each camera moved alone, z0 and the port following it as they do."""
@@ -224,17 +241,7 @@ def test_an_adjusted_pair_tells_every_point_what_its_cameras_are_worth(name, tmp
     media, rng = media_of(pair), np.random.default_rng(4)
     mixed = rng.normal(size=(14, 14)) * 1e-4
     whole = mixed @ mixed.T
-    adjusted = JointAdjustment(
-        cameras=tuple(cameras), xyz=np.zeros((0, 3)), covariance=np.zeros((0, 3, 3)), sigma0=1.0,
-        redundancy=1, iterations=1, residuals=np.zeros((0, 2)), control=np.zeros((0, 3)),
-        blunders=(), left_in=(), by_camera=np.stack([whole[:7, :7], whole[7:, 7:]]),
-        between=whole[None, :7, 7:],
-        observations=JointObservations(
-            names=("far", "near"), camera=np.zeros(0, int), point=np.zeros(0, int),
-            pixels=np.zeros((0, 2)), sigma=np.zeros(0), ids=(), known=np.zeros((0, 3)),
-            sigma_known=np.zeros((0, 3)), sigma_focal=np.zeros(2), media=media,
-        ),
-    )  # fmt: skip
+    adjusted = adjustment(cameras, media, [whole])
     made = _adjusted_pair(pair, adjusted, 0)
     made.write(tmp_path / "made.pair.json")
     again = Pair.read(tmp_path / "made.pair.json")
@@ -278,3 +285,20 @@ def test_glass_that_stays_and_leans_is_refused_before_any_work(tmp_path):
     square = {key: data[key] | {"interface_normal": [0, 0, 1.0]} for key in ("image1", "image2")}
     told = media_of(Pair.from_dict({**data, **square}))
     assert [one.axes for one in told] == [None, None]
+
+
+def test_the_covariance_of_a_pair_is_its_own_whatever_pairs_stand_beside_it():
+    rng = np.random.default_rng(5)
+    camera = camera_at(rng, 0.0, 7.0, 6000.0)
+    kinds = ("leaning", "port", "port", "leaning", "tank", "tank")
+    media = [wet(camera, kind)[1] for kind in kinds]
+    mixed = rng.normal(size=(3, 14, 14)) * 1e-4
+    covariances = mixed @ mixed.transpose(0, 2, 1)
+    together = adjustment([camera] * 6, media, covariances)
+    found = [together.orientation(k) for k in range(3)]
+    for k, own in enumerate(found):
+        alone = adjustment([camera] * 2, media[2 * k : 2 * k + 2], covariances[k : k + 1])
+        np.testing.assert_array_equal(own, alone.orientation(0))
+    # Only a port that leans turns with its camera.
+    moves = [(own**2).sum(axis=1) > 0 for own in found[:2]]
+    assert (moves[0] != moves[1]).any()

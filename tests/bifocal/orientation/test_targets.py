@@ -2,8 +2,10 @@
 
 import cv2
 import numpy as np
+import pytest
 
-from bifocal.orientation.features import spread_evenly
+from bifocal.orientation.area_points import _trusted
+from bifocal.orientation.features import Features, match_along_lines, spread_evenly
 from bifocal.orientation.targets import find_targets
 
 
@@ -75,3 +77,43 @@ def test_points_are_spread_evenly_best_first() -> None:
     crowd = (pixels[chosen] < 100).all(axis=1).mean()
     assert crowd < 0.5
     assert sigma[chosen][(pixels[chosen] < 100).all(axis=1)].mean() < 0.1
+
+
+def test_a_feature_has_a_partner_on_its_line_that_is_alike_and_has_no_rival():
+    """Of three features on lines of their own: unlike, with a rival, and hardly without."""
+    alike = np.array([(0.6, 0.0), (0.95, 0.94), (0.95, 0.935)])
+    angle = np.radians([10.0, 40.0, 70.0])
+    away = np.column_stack([np.cos(angle), np.sin(angle)])
+    first, second = np.eye(128)[:3], np.zeros((6, 128))
+    for k, both in enumerate(alike):
+        for j, value in enumerate(both):
+            second[2 * k + j, k], second[2 * k + j, 10 + 2 * k + j] = value, np.sqrt(1 - value**2)
+    places = (away[:, None] * np.array([[150.0], [250.0]])).reshape(6, 2)
+
+    def features(pixels, descriptors):
+        return Features(
+            pixels=pixels, size=np.ones(len(pixels)), turn=np.zeros(len(pixels)),
+            descriptors=descriptors.astype(np.float32), reduction=1.0,
+        )  # fmt: skip
+
+    rows = match_along_lines(
+        features(100 * away, first), features(places, second), np.zeros(2),
+        (100 * away, 300 * away), across=3.0,
+    )  # fmt: skip
+    assert [part.tolist() for part in rows] == [[2], [4]]
+
+
+@pytest.mark.parametrize("turned", [1, -1])
+def test_flow_is_trusted_along_the_radius_only(turned):
+    x, y = np.arange(-50, 50) / 10, np.arange(50, -50, -1) / 10
+    grid = np.stack(np.meshgrid(x, y), axis=-1)
+    centre = np.array([0.3, -0.2])
+    right, up = np.moveaxis(grid - centre, -1, 0)
+    grey = np.full(grid.shape[:2], 90, np.uint8)
+    # Rows run down: a flow away from the centre has the sign of up turned.
+    along = turned * np.stack([right, -up], axis=-1)
+    across = turned * np.stack([up, right], axis=-1)
+    far = np.hypot(right, up) > 2.0
+    assert _trusted(grey, grey, along, grid, centre)[far].all()
+    assert not _trusted(grey, grey, across, grid, centre).any()
+    assert not _trusted(grey, grey, along, grid, centre)[np.hypot(right, up) < 1.5].any()

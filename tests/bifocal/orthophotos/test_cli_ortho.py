@@ -131,6 +131,13 @@ def test_one_to_fifty_at_254_dpi_is_five_millimetres_in_every_file(wall: Path) -
     assert picture.image_def.dxf.filename == f"{name}.png"
     layers = {entity.dxf.layer for entity in drawing.modelspace()}
     assert {"BIFOCAL_GRID", "BIFOCAL_SCALEBAR", "BIFOCAL_CONTROL"} <= layers
+    # Crosses of the grid: 4 mm on paper either way.
+    arms = [
+        (line.dxf.end - line.dxf.start).xyz
+        for line in drawing.modelspace().query('LINE[layer=="BIFOCAL_GRID"]')
+    ]
+    assert np.round(arms[0::2], 9).tolist() == [[0.2, 0, 0]] * (len(arms) // 2)
+    assert np.round(arms[1::2], 9).tolist() == [[0, 0.2, 0]] * (len(arms) // 2)
     relief = ezdxf.readfile(folder / f"{name}_relief.dxf")
     levels = {line.dxf.elevation for line in relief.query('LWPOLYLINE[layer=="BIFOCAL_CONTOURS"]')}
     assert any(0.02 < level < 0.3 for level in levels)

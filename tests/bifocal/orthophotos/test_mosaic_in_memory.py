@@ -90,3 +90,21 @@ def test_unlike_or_single_rasters_are_refused() -> None:
             bifocal.mosaic(rasters)
     with pytest.raises(InputError, match="none of the rasters"):
         bifocal.mosaic([flat, flat], bounds=(10, 10, 11, 11))
+
+
+def test_white_tells_nothing_of_the_exposure() -> None:
+    white = [ortho(box, factor=9.0) for box in ((0, 0, 2, 1), (1, 0, 3, 1))]
+    for part in white:
+        part.image[:] = 255
+    whole = bifocal.mosaic(white)
+    np.testing.assert_allclose(whole.gains, 1.0)
+    assert (whole.image == 255).all()
+
+
+@pytest.mark.parametrize("clipped", [0, 1])
+@pytest.mark.parametrize("value", [2, 254])
+def test_the_exposure_is_told_by_what_is_neither_white_nor_black(clipped: int, value: int) -> None:
+    parts = [ortho((0, 0, 2, 1)), ortho((1, 0, 3, 1), factor=0.5)]
+    parts[clipped].image[:35] = value  # 0.7 of the common part
+    gains = bifocal.mosaic(parts).gains
+    assert gains[1, 0] / gains[0, 0] == pytest.approx(2.0, rel=0.01)

@@ -74,3 +74,10 @@ def test_a_complete_orthophoto_has_no_gap_and_lists_what_is_not_measured():
     assert (whole.source[seen] == Source.IMAGE_1).all()
     # On the plane the photo comes back as it is, square to the wall and pixel on pixel.
     np.testing.assert_array_equal(whole.image[100:300, 398], photo[100:300, 398])
+
+
+def test_what_no_photo_shows_is_not_told_as_estimated():
+    photo = np.full((400, 260, 3), 90, np.uint8)
+    whole = orthophoto(PAIR, photo, wall_with_a_gap(), options=OrthoOptions(complete=True))
+    assert (whole.source[104:126, 104:126] == Source.INTERPOLATED).all()
+    assert (whole.source[:, 270:] == Source.NONE).all()

@@ -25,7 +25,7 @@ from bifocal.reports.workflow import ReportTask, find_pairs
 from photocore.reports.document import Document
 from photocore.reports.words import LANGUAGES, texts_of, words_of
 from photocore.reports.writing import write_document
-from tests.bifocal.campaigns.sample_tables import CONTROL, write_tables
+from tests.bifocal.campaigns.sample_tables import CONTROL, FAR, NEAR, write_tables
 from tests.web_page import Page
 
 PAIR = SAMPLE / "facade.pair.json"
@@ -257,3 +257,17 @@ def test_a_text_is_given_in_the_language_asked_for():
         words_of("bifocal.reports", "it")("good_for", scale=50)
         == "Adatto a disegni in scala 1:50 e minori."
     )
+
+
+def test_tables_that_name_the_photos_the_other_way_round_give_the_same_points(tables, tmp_path):
+    with tables[1].open(encoding="utf-8") as file:
+        rows = [line.rstrip("\n").split(",") for line in file]
+    turned = tmp_path / "turned.csv"
+    lines = [",".join(r[:4] + r[6:] + r[4:6]) for r in rows[1:]]
+    turned.write_text("\n".join([",".join(rows[0]), *lines]), encoding="utf-8")
+    found = [
+        read_content(PAIR, ReportTask(check=check, far=far)).solution.table.columns["r"]
+        for check, far in ((tables[1], FAR), (turned, NEAR), (tables[1], None))
+    ]
+    np.testing.assert_array_equal(found[0], found[2])
+    np.testing.assert_array_equal(found[1], found[2])

@@ -105,6 +105,10 @@ def test_a_form_filled_in_by_hand_shows_where_shot_rays_meet(tank, tmp_path):
     assert tuple(row["flag"] for row in rows) == table.flags
     assert named(book, "check_scale").value == "OK"
     assert book["Setup"]["A3"].value == "The set-up is complete."
+    for image, d in enumerate(TANK["d"], 1):
+        seen = d - TANK["depth"] - 0.01 + 0.01 / 1.49 + TANK["depth"] / 1.337
+        assert named(book, f"seen_{image}").value == pytest.approx(seen, rel=1e-12)
+        assert named(book, f"reach_{image}").value == pytest.approx(1.337 * seen, rel=1e-12)
 
 
 def test_unequal_scales_are_told_as_seen_through_the_media(form):

@@ -300,3 +300,13 @@ def test_photos_of_several_cameras_are_told_apart_by_name(tmp_path, monkeypatch)
     result = CliRunner().invoke(main, [*words, "cam1_7.png", "cam10_7.png"])
     assert result.exit_code == 1
     assert "camera cam1: the board was found in 0" in result.stderr
+
+
+def test_a_plate_behind_a_pane_is_placed_from_any_height_over_it() -> None:
+    camera = replace(rig().cameras[0], centre=np.array([-120.0, 35.0, 48.0]))
+    pane = FlatInterface(layers=PORT.layers, point=(10.0, 20.0, -60.0), normal=(0.1, -0.05, 1.0))
+    for turn, shift in placed(3):
+        image = project(camera, (BOARD * 30.0) @ turn.T + shift, pane)
+        rotation, place = plate_pose(camera, BOARD * 30.0, image, pane)
+        assert np.abs(rotation - turn).max() < 1e-7
+        assert np.abs(place - shift).max() < 1e-4

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -226,3 +227,33 @@ def test_the_plot_holds_no_empty_panel_and_no_curve_beyond_its_rim(monkeypatch, 
         assert values.max() < 0.9 * high
     assert precision.get_ylabel() == "[µm]"
     np.testing.assert_allclose(precision.lines[2].get_ydata(), 60.0)
+
+
+def test_noise_in_water_is_a_multiple_of_that_in_air():
+    costs = calibration_costs(
+        RIG, TANK, object_grid((0.3, 0.2), (0.02, 0.2), count=6), rng=np.random.default_rng(1),
+        sigma_image=0.0005, index_error=0.0, tilt_error=0.0, water_noise=3.0,
+    )  # fmt: skip
+    np.testing.assert_allclose(costs.sigma0, (0.0005, 0.0015, 0.0015), rtol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("depths", "told"),
+    [
+        ([k // 2 for k in range(48)], [2 * k + 0.5 for k in range(12)]),  # 24 levels, by twos
+        ([0] * 20 + [*range(12)], [*range(12)]),  # 12, most of the points in the first
+        ([0] * 20 + [*range(13)], [1 / 22, 2.5, 5, 8, 11]),  # 13: equal counts, 32 k / 12 points
+    ],
+)
+def test_precision_is_told_for_at_most_twelve_depths(tmp_path, depths, told):
+    across = np.linspace(-0.05, 0.05, len(depths))
+    xyz = np.column_stack([across, 0.4 * across, -0.02 - 0.01 * np.array(depths)])
+    content = Project(
+        cameras=tuple(replace(c, name=f"cam{k}") for k, c in enumerate(RIG)), media={"tank": TANK},
+        media_of=("tank",) * len(RIG), unit="m",
+        object_points=ObjectPoints(ids=tuple(map(str, range(len(xyz)))), xyz=xyz),
+    )  # fmt: skip
+    write_project(tmp_path / "tank.toml", content)
+    done = CliRunner().invoke(main, ["design", str(tmp_path / "tank.toml"), "--json"])
+    found = [100 * row["depth"] - 2 for row in json.loads(done.stdout)["by_depth"]]
+    np.testing.assert_allclose(found, told, atol=1e-9)

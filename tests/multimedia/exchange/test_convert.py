@@ -465,3 +465,10 @@ def test_the_command_converts_and_says_what(tmp_path):
     lost = CliRunner().invoke(main, ["convert", str(path), str(tmp_path / "out.json")])
     assert lost.exit_code == 1
     assert "--to" in lost.stderr
+
+
+def test_two_cameras_fit_no_single_file_of_opencv(tmp_path):
+    source = save(tmp_path, made(cameras(k3=1e-8)[:2]))
+    with pytest.raises(InputError, match="hold one camera, the project has 2; name a folder"):
+        convert(source, tmp_path / "lens.yml", form="opencv")
+    assert not (tmp_path / "lens.yml").exists()

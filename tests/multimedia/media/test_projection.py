@@ -268,3 +268,14 @@ def test_points_at_infinity_have_no_image_and_no_warning():
     # Three points and one take other roads through linear algebra: 1 ulp apart on some processors.
     np.testing.assert_allclose(image[2], project(camera, POINTS[0], layers), rtol=16 * EPS)
     assert projection_status(camera, far, layers) == ["not a number", "not a number", "ok"]
+
+
+def test_a_point_seen_from_afar_is_where_a_far_camera_sees_it():
+    normal = np.array([0.2, -0.1, 1.0])
+    layers = Layers(indices=(1.0, 1.5, 1.1, 1.337), thicknesses=(0.3, 0.2))
+    wall = FlatInterface(layers=layers, point=(0.1, 0.2, -0.3), normal=normal)
+    points = np.array([(-0.1, 0.05, -1.2), (0.12, -0.08, -0.9), (0.0, 0.1, -2.3)])
+    away = 1e5 * wall.normal
+    far = Camera.looking_at(away, (0, 0, 0), principal_distance=25.0)
+    apparent = far.centre + wall.apparent_vectors(far, points) @ far.rotation.T
+    np.testing.assert_allclose(wall.seen_from_afar(points), apparent, atol=1e-8)

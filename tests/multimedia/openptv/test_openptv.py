@@ -374,3 +374,19 @@ def test_a_stored_frame_without_particles_is_said(tank_project, tmp_path):
     experiment = read_experiment(folder)
     assert particle_points(experiment)[0].ids == ()
     assert "rt_is.10001: holds no particles." in experiment.project.remarks
+
+
+@pytest.mark.parametrize("columns", [3, 5])
+def test_particles_have_a_target_number_for_each_camera(tank_project, tmp_path, columns):
+    folder = tmp_path / "exp"
+    write_experiment(folder, tank_project)
+    (folder / "res").mkdir()
+    (folder / "img").mkdir()
+    (folder / "res" / "rt_is.1").write_text(f"1\n1 0.0 0.0 -9.0{' 0' * columns}\n")
+    for k in range(4):
+        (folder / "img" / f"cam{k + 1}.1_targets").write_text("1\n0 640 512 9 3 3 99 0\n")
+    if columns < 4:
+        with pytest.raises(InputError, match=r"rt_is\.1: 3 target columns for 4 cameras"):
+            read_experiment(folder)
+    else:
+        assert len(particle_points(read_experiment(folder))[1].ids) == 4

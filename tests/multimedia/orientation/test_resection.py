@@ -233,6 +233,14 @@ def test_pixels_for_millimetres_are_named():
         resect(truth, points, pixels, LAYERS)
 
 
+def test_where_no_sensor_is_known_no_lens_sees_farther_than_four_principal_distances():
+    truth, points = replace(cameras()[1], sensor=None), control(30)
+    seen = project(truth, points, LAYERS)
+    seen[0, 0] = 4.1 * truth.principal_distance
+    with pytest.raises(InputError, match="Are these pixels"):
+        resect(truth, points, seen, LAYERS)
+
+
 def test_an_unknown_parameter_is_named():
     with pytest.raises(InputError, match="focal"):
         resect(cameras()[0], control(9), np.zeros((9, 2)), LAYERS, estimate=("focal",))
@@ -247,3 +255,14 @@ def test_points_that_do_not_belong_together_do_not_pass_silently():
     except (ConvergenceError, GeometryError):
         return
     assert found.sigma0 > 0.5
+
+
+@pytest.mark.parametrize("number", [2, 3])
+def test_a_start_from_three_points_stays_with_its_own_pose(number):
+    """Three points fit up to four poses; apparent points better the one that they come from."""
+    truth = cameras(Brown())[number]
+    points = np.array([(-60.0, -50.0, -100.0), (60.0, -40.0, -60.0), (10.0, 55.0, -150.0)])
+    tank = FlatInterface(layers=LAYERS)
+    seen = project(truth, points, tank)
+    starts = pose_starts.pose_starts(nothing_known(truth), points, seen, tank)
+    assert min(np.abs(start.rotation - truth.rotation).max() for start in starts) < 2e-3

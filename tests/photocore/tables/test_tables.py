@@ -270,6 +270,14 @@ def test_a_format_with_a_unit_is_not_taken_for_a_date(book):
     assert table.numbers("s1").tolist() == [12.5]
 
 
+def test_a_name_that_its_format_makes_is_read_as_it_is_shown(book):
+    def style(workbook):
+        workbook.worksheets[0]["A2"].number_format = '"P"000'
+
+    table = read_table(book([("id", "s1", "s2"), (7, 1, 2)], edit=style), POLAR)
+    assert list(table.texts("id")) == ["P007"]
+
+
 def test_all_bad_cells_are_reported_at_once_in_the_order_of_the_sheet(book):
     path = book([("id", "s1", "s2"), ("P1", "a", "b"), ("P2", 1, "c")])
     with pytest.raises(WorkbookError) as caught:

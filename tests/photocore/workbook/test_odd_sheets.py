@@ -10,6 +10,7 @@ from photocore.errors import InputError
 from photocore.workbook.changes import replaced_outside_cells
 from photocore.workbook.editor import WorkbookEditor
 from photocore.workbook.ods import open_ods
+from photocore.workbook.result_columns import head_row
 from photocore.workbook.xlsx import open_xlsx
 from tests.bare_workbook import write
 
@@ -124,3 +125,10 @@ def test_what_is_drawn_upon_a_cell_of_an_ods_is_no_text_of_it(tmp_path):
     with zipfile.ZipFile(tmp_path / "s.ods", "w") as package:
         package.writestr("content.xml", content)
     assert open_ods(tmp_path / "s.ods", max_rows=99).grid("S").rows == {1: {2: "P1"}}
+
+
+def test_headings_are_found_above_blank_rows_and_below_other_words():
+    cells = {1: {2: "A survey"}, 2: {1: 5.0, 2: " r [m] "}, 3: {2: "metres"}}
+    columns, headings = {"id": 1, "r": 2}, {"id": "id", "r": "r [m]"}
+    assert head_row(cells, columns, headings, 6) == 2
+    assert head_row({1: cells[1]}, columns, headings, 6) == 5
