@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from bifocal.collimation.job_tasks import task_of
-from bifocal.orientation import absolute_orientation
+from bifocal.orientation import approximate_orientation
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.align_workflow import AlignOptions, KnownLens, _way, align_photos
 from bifocal.orientation.control_points import Control, SiteMeasures
@@ -86,14 +86,14 @@ def test_photos_in_the_wrong_order_keep_the_sign_of_relief(views) -> None:
 
 @pytest.mark.acceptance
 def test_an_order_that_nothing_tells_is_asked(views, monkeypatch) -> None:
-    monkeypatch.setattr(absolute_orientation, "first_is_far", lambda *_: -2.0)
+    monkeypatch.setattr(approximate_orientation, "first_is_far", lambda *_: -2.0)
     made = orient_pair(inputs(views.far, views.near), control=Control(), site=SITE)
     assert not made.exchanged
     assert "cannot be told" in made.remarks[0]
 
 
 def test_missing_focal_lengths_are_found_before_the_work(views, monkeypatch) -> None:
-    monkeypatch.setattr(absolute_orientation, "find_features", lambda *_: pytest.fail("worked"))
+    monkeypatch.setattr(approximate_orientation, "find_features", lambda *_: pytest.fail("worked"))
     unknown = [
         replace(photo, interior=Interior.unknown(SIZE)) for photo in inputs(views.far, views.near)
     ]
