@@ -21,7 +21,7 @@ from bifocal.orientation.approximate_orientation import (
     ties_of,
 )
 from bifocal.orientation.as_set_up import check_room
-from bifocal.orientation.bend import STRONGLY_BENT, WallBend, bend_in_words, bend_of_wall
+from bifocal.orientation.bend import WallBend, bend_of_wall
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.interior_orientation import with_one_lens
 from bifocal.orientation.media_report import media_remarks, refuse_impossible_media
@@ -30,6 +30,7 @@ from bifocal.orientation.orientation_remarks import (
     assumptions,
     control_remarks,
     distance_remarks,
+    hopeless_bend,
     model_remarks,
     order_remarks,
     wall_remarks,
@@ -85,95 +86,72 @@ def orient_pair(
     GeometryError
         If the photos and measurements do not make a pair; the message says why and what to do.
     """
+    given = Given(photos=photos, control=control, site=site, media=media)
+    lacking = validation.unknown_lenses(given.interiors, given.names)
     if media is not None:
-        given = Given(photos=photos, control=control, site=site, media=media)
-        lacking = validation.unknown_lenses(given.interiors, given.names)
         try:
             return _through_media(given, media, lacking)
         except GeometryError as error:
-            if not lacking or "--focal1" in str(error):
-                raise
-            raise GeometryError(f"{error} The likely reason: {lacking}.") from error
-    interiors, one_lens = with_one_lens((photos[0].interior, photos[1].interior))
-    first, second = (replace(p, interior=i) for p, i in zip(photos, interiors, strict=True))
-    photos = (first, second)
-    given = Given(photos=photos, control=control, site=site)
+            raise _with_lacking(error, lacking) from error
+    interiors, one_lens = with_one_lens(given.interiors)
+    given = given.with_interiors(interiors)
     enough = given.enough
-    lacking = validation.unknown_lenses(interiors, given.names)
     if lacking and not enough and None in site.distances:
         raise GeometryError(f"{lacking}, or both distances, or four control points.")
     ties, remarks = ties_of(given, needed=not enough)
-    if ties is not None and not enough:
-        order = order_of(given, ties)
-        if order < -SURE:
-            return _with_photos_exchanged(given, typed_stay=True)
-        remarks = (*remarks, *order_remarks(order, given.names))
-    stated = site
     if enough:
         right = _typed_right(given, lambda one: _by_control(one, ties), by_control=True)
         if right is not None:
             return right
+    elif ties is not None:
+        order = order_of(given, ties)
+        if order < -SURE:
+            return _with_photos_exchanged(given, typed_stay=True)
+        remarks = (*remarks, *order_remarks(order, given.names))
     cameras, agree, interiors = approximate_cameras(given, ties, enough)
     if enough and ties is not None:
         check_picks(cameras, ties, interiors)
     if cameras[0].centre[2] < cameras[1].centre[2]:
         return _with_photos_exchanged(given)
-    if site.distance1 and site.distance2 and site.distance1 < site.distance2:
-        turned = replace(site, distance1=site.distance2, distance2=site.distance1)
+    if site.far_first is not site:
         note = (
             f"--distance1 {site.distance1:g} m is less than --distance2 {site.distance2:g} m, but "
-            f"{photos[0].name} is the far photo; the two distances were exchanged."
+            f"{given.names[0]} is the far photo; the two distances were exchanged."
         )
-        return _told(replace(given, site=turned), note)
+        return _told(replace(given, site=site.far_first), note)
     if enough:
         validation.check_units(cameras, site)
     elif ties is not None:
         flat = validation.is_flat(ties, interiors, given.names, flat_is_fine=site.parallel)
         # What stands out shows how the cameras stood; a flat wall does not.
-        site = replace(site, parallel=flat)
-        given = replace(given, site=site)
+        given = replace(given, site=replace(site, parallel=flat))
     observations = observations_of(given, interiors, ties, agree)
     if one_lens:
         observations = replace(observations, sigma_zoom=ONE_LENS)
     start = PairUnknowns(cameras=cameras)
     if ties is not None:
         start = replace(start, radial=np.array([[ties.radial, 0.0]] * 2))
-
-    def mended(seen: PairObservations) -> OrientedPair | None:
-        if ties is None or enough:
-            return None
-        return _typed_right(given, lambda one: _by_ties(one, ties, seen), by_control=False)
-
     try:
-        pair = oriented_in_stages(observations, start, photos, stated, with_control=enough)
+        pair = oriented_in_stages(observations, start, given.photos, site, with_control=enough)
     except (GeometryError, ConvergenceError) as error:
-        right = mended(observations)
+        right = _mended_by_ties(given, ties, observations)
         if right is not None:
             return right
         # Photos through glass or water may fit no cameras at all: then that is the reason.
         raise _reason(error, observations, start, lacking) from error
     pair = without_gross(replace(pair, bend=_bend(pair.observations, pair.adjusted)))
-    doubts = model_remarks(pair, site)
-    right = mended(pair.observations) if doubts else None
-    if right is not None:
-        return right
+    if model_remarks(pair, given.site):
+        right = _mended_by_ties(given, ties, pair.observations)
+        if right is not None:
+            return right
     likely = likely_on_wall(pair.observations, pair.adjusted)
-    if not enough and pair.bend.px > STRONGLY_BENT and likely < FEWEST_ON_WALL:
-        # What holds a bent wall by small chances only is none.
-        known = any(i.is_calibrated or i.sigma_radial > 0 for i in interiors)
-        raise GeometryError(bend_in_words(pair.bend, with_lens=known))
-    validation.check_determined(pair.adjusted)
-    validation.check_movement(pair.adjusted)
-    told = (
-        *remarks,
-        *doubts,
-        *pair.remarks,
-        *wall_remarks(pair),
-        *control_remarks(control, pair),
-        *distance_remarks(pair),
-    )
-    assumed = (*pair.assumed, *assumptions(pair.observations, site))
-    return replace(pair, remarks=told, assumed=assumed)
+    if (
+        not enough
+        and likely < FEWEST_ON_WALL
+        and (hopeless := hopeless_bend(pair.observations, pair.bend))
+    ):
+        raise GeometryError(hopeless)  # what holds a bent wall by small chances only is none
+    return _with_words(pair, given, remarks)
 
 
 def _through_media(given: Given, media: PairMedia, lacking: str) -> OrientedPair:
@@ -210,19 +188,26 @@ def _through_media(given: Given, media: PairMedia, lacking: str) -> OrientedPair
         pair, note = with_bent_ties(pair, ties), "the media as given"
         bend = refracted_bend(pair.adjusted, ties.seen1, ties.seen2, interiors[0].image_size)
         pair = replace(pair, bend=bend)
-    pair = without_gross(pair)
+    pair = without_gross(replace(pair, assumed=(*pair.assumed, note)))
     refuse_impossible_media(pair.adjusted, media)
     check_room(pair.adjusted.media, pair.adjusted.cameras)
+    return _with_words(pair, given, remarks)
+
+
+def _with_words(pair: OrientedPair, given: Given, remarks: tuple[str, ...]) -> OrientedPair:
+    """Return the pair with all that is to be told of it, doubts first; refuse what is none."""
     validation.check_determined(pair.adjusted)
     validation.check_movement(pair.adjusted)
     told = (
-        *remarks,
         *model_remarks(pair, given.site),
-        *media_remarks(pair.adjusted, media),
-        *control_remarks(control, pair),
+        *remarks,
+        *pair.remarks,
+        *wall_remarks(pair),
+        *(media_remarks(pair.adjusted, given.media) if given.media else ()),
+        *control_remarks(given.control, pair),
         *distance_remarks(pair),
     )
-    assumed = (*pair.assumed, note, *assumptions(pair.observations, given.site))
+    assumed = (*pair.assumed, *assumptions(pair.observations, given.site))
     return replace(pair, remarks=told, assumed=assumed)
 
 
@@ -242,15 +227,24 @@ def _reason(
 ) -> PhotogrammetryError:
     """Return why no cameras were found: that the wall is bent where it strongly is, or the error.
 
-    With what is ``lacking`` of the lenses.
-
     Features as first found are good to a pixel; only a bend beyond `STRONGLY_BENT` counts.
     """
-    bend = _bend(observations, state)
-    if not bend.px > STRONGLY_BENT:
-        return GeometryError(f"{error} The likely reason: {lacking}.") if lacking else error
-    known = any(i.is_calibrated or i.sigma_radial > 0 for i in observations.interiors)
-    return GeometryError(bend_in_words(bend, with_lens=known))
+    bent = hopeless_bend(observations, _bend(observations, state))
+    return GeometryError(bent) if bent else _with_lacking(error, lacking)
+
+
+def _with_lacking(error: PhotogrammetryError, lacking: str) -> PhotogrammetryError:
+    """Return an error with what is ``lacking`` of the lenses, unless it says so itself."""
+    if not lacking or "--focal1" in str(error):
+        return error
+    return GeometryError(f"{error} The likely reason: {lacking}.")
+
+
+def _mended_by_ties(given: Given, ties: Ties | None, seen: PairObservations) -> OrientedPair | None:
+    """Return the pair with the slip mended that common points show; None with control."""
+    if ties is None or given.enough:
+        return None
+    return _typed_right(given, lambda one: _by_ties(one, ties, seen), by_control=False)
 
 
 def _typed_right(
@@ -265,9 +259,8 @@ def _typed_right(
     """
 
     def meant(typed: Typed) -> Given:
-        both = zip(given.photos, typed.interiors, strict=True)
-        first, second = (replace(photo, interior=interior) for photo, interior in both)
-        return replace(given, photos=(first, second), control=typed.control, site=typed.site)
+        changed = given.with_interiors(typed.interiors)
+        return replace(changed, control=typed.control, site=typed.site)
 
     typed = Typed(interiors=given.interiors, control=given.control, site=given.site)
     slip = slip_of(typed, lambda one: fitted(meant(one)), by_control=by_control)
@@ -347,18 +340,16 @@ def _with_photos_exchanged(given: Given, *, typed_stay: bool = False) -> Oriente
             f"{near} is the near photo. --wall is a spot of the far photo: give {far} first, and "
             "the spot in it."
         )
-    if site.distance1 and site.distance2 and site.distance1 < site.distance2:
-        site = replace(site, distance1=site.distance2, distance2=site.distance1)
-    media = given.media and given.media.exchanged()
-    photos = given.photos[::-1]
+    own = " with their distances" if site.far_first is not site else ""
+    site, media = site.far_first, given.media and given.media.exchanged()
+    turned = replace(given, photos=given.photos[::-1])
     if typed_stay:
-        first, second = given.interiors
-        photos = replace(photos[0], interior=first), replace(photos[1], interior=second)
-        site = replace(site, ordered=True)
-    pair = orient_pair(photos, control=given.control.exchanged(), site=site, media=media)
+        turned, site = turned.with_interiors(given.interiors), replace(site, ordered=True)
+    control = given.control.exchanged()
+    pair = orient_pair(turned.photos, control=control, site=site, media=media)
     note = (
-        f"{near} is the near photo; the two were exchanged. Image 1 of the pair file is {far}, and "
-        "--distance1 means its distance"
+        f"{near} is the near photo; the two were exchanged{own}. Image 1 of the pair file is "
+        f"{far}, and --distance1 means its distance"
         + (", --focal1 its lens; if it is not so, measure control points." if typed_stay else ".")
     )
     return replace(pair, exchanged=True, remarks=(note, *pair.remarks))

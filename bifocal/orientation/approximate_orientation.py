@@ -57,6 +57,12 @@ class Given:
         """Interior orientations of the photos."""
         return self.photos[0].interior, self.photos[1].interior
 
+    def with_interiors(self, interiors: Interiors) -> Given:
+        """Return the same with other interior orientations."""
+        both = zip(self.photos, interiors, strict=True)
+        first, second = (replace(photo, interior=interior) for photo, interior in both)
+        return replace(self, photos=(first, second))
+
     @property
     def enough(self) -> bool:
         """Whether control points alone orient both cameras."""
@@ -71,10 +77,15 @@ def order_of(given: Given, ties: Ties) -> float:
     """Return by how many standard deviations the first photo is the far one.
 
     Focal lengths and distances that were typed tell nothing of the photos' order, unless the scale
-    on the wall fits them in one order only.
+    on the wall fits them in one order only, or both lenses are alike; unknown lenses neither.
     """
     first, second = given.interiors
-    typed = (first.is_typed or second.is_typed) and first.image_size == second.image_size
+    assumed = first.is_assumed or second.is_assumed
+    alike = first.image_size == second.image_size and first.focal != second.focal
+    silent = assumed or (alike and (first.is_typed or second.is_typed))
+    far, near = (photo.grey for photo in given.photos)
+    if given.site.ordered or not silent or far is None or near is None:
+        return np.inf
     # Logarithms of the distances' ratio by lenses and scale in either order, against the taped one.
     ratio, scale = first.focal / second.focal, plane_scale(ties, first.image_size)
     d1, d2 = given.site.distances
@@ -82,9 +93,8 @@ def order_of(given: Given, ties: Ties) -> float:
     either = (np.log([ratio * scale, ratio / scale]) - taped).tolist()
     if not (d1 and d2):  # the far camera is any farther
         either = [min(off, 0.0) for off in either]
-    as_given, turned = (abs(off) < UNLIKE for off in either)
-    far, near = (photo.grey for photo in given.photos)
-    if given.site.ordered or not (typed and turned) or far is None or near is None:
+    as_given, turned = (assumed or abs(off) < UNLIKE for off in either)
+    if not turned:
         return np.inf
     return first_is_far((far, near), ties) if as_given else -np.inf
 
