@@ -86,7 +86,12 @@ def orient_pair(
     GeometryError
         If the photos and measurements do not make a pair; the message says why and what to do.
     """
-    given = Given(photos=photos, control=control, site=site, media=media)
+    return _oriented(Given(photos=photos, control=control, site=site, media=media))
+
+
+def _oriented(given: Given) -> OrientedPair:
+    """Return the cameras of a pair; what was mended or exchanged comes here again."""
+    site, media = given.site, given.media
     lacking = validation.unknown_lenses(given.interiors, given.names)
     if media is not None:
         try:
@@ -99,11 +104,12 @@ def orient_pair(
     if lacking and not enough and None in site.distances:
         raise GeometryError(f"{lacking}, or both distances, or four control points.")
     ties, remarks = ties_of(given, needed=not enough)
-    if enough:
+    if enough and not given.settled:
         right = _typed_right(given, lambda one: _by_control(one, ties), by_control=True)
         if right is not None:
             return right
-    elif ties is not None:
+        given = replace(given, settled=True)
+    if ties is not None and not enough:
         order = order_of(given, ties)
         if order < -SURE:
             return _with_photos_exchanged(given, typed_stay=True)
@@ -144,13 +150,9 @@ def orient_pair(
         right = _mended_by_ties(given, ties, pair.observations)
         if right is not None:
             return right
-    likely = likely_on_wall(pair.observations, pair.adjusted)
-    if (
-        not enough
-        and likely < FEWEST_ON_WALL
-        and (hopeless := hopeless_bend(pair.observations, pair.bend))
-    ):
-        raise GeometryError(hopeless)  # what holds a bent wall by small chances only is none
+    bent = "" if enough else hopeless_bend(pair.observations, pair.bend)
+    if bent and likely_on_wall(pair.observations, pair.adjusted) < FEWEST_ON_WALL:
+        raise GeometryError(bent)  # what holds a bent wall by small chances only is none
     return _with_words(pair, given, remarks)
 
 
@@ -241,8 +243,8 @@ def _with_lacking(error: PhotogrammetryError, lacking: str) -> PhotogrammetryErr
 
 
 def _mended_by_ties(given: Given, ties: Ties | None, seen: PairObservations) -> OrientedPair | None:
-    """Return the pair with the slip mended that common points show; None with control."""
-    if ties is None or given.enough:
+    """Return the pair with the slip mended that common points show; None without one."""
+    if ties is None or given.settled:
         return None
     return _typed_right(given, lambda one: _by_ties(one, ties, seen), by_control=False)
 
@@ -266,12 +268,12 @@ def _typed_right(
     slip = slip_of(typed, lambda one: fitted(meant(one)), by_control=by_control)
     if slip is not None and not slip.mended:
         raise GeometryError(slip.words)
-    return None if slip is None else _told(meant(slip.meant), slip.words)
+    return None if slip is None else _told(replace(meant(slip.meant), settled=True), slip.words)
 
 
 def _told(given: Given, note: str) -> OrientedPair:
     """Return the pair of what is given instead of what was typed, saying so."""
-    pair = orient_pair(given.photos, control=given.control, site=given.site)
+    pair = _oriented(given)
     return replace(pair, remarks=(note, *pair.remarks))
 
 
@@ -340,16 +342,16 @@ def _with_photos_exchanged(given: Given, *, typed_stay: bool = False) -> Oriente
             f"{near} is the near photo. --wall is a spot of the far photo: give {far} first, and "
             "the spot in it."
         )
-    own = " with their distances" if site.far_first is not site else ""
+    its = 1 if site.far_first is site else 2
     site, media = site.far_first, given.media and given.media.exchanged()
     turned = replace(given, photos=given.photos[::-1])
     if typed_stay:
         turned, site = turned.with_interiors(given.interiors), replace(site, ordered=True)
     control = given.control.exchanged()
-    pair = orient_pair(turned.photos, control=control, site=site, media=media)
+    pair = _oriented(replace(turned, control=control, site=site, media=media))
     note = (
-        f"{near} is the near photo; the two were exchanged{own}. Image 1 of the pair file is "
-        f"{far}, and --distance1 means its distance"
+        f"{near} is the near photo; the two were exchanged. Image 1 of the pair file is {far}, and "
+        f"--distance{its} means its distance"
         + (", --focal1 its lens; if it is not so, measure control points." if typed_stay else ".")
     )
     return replace(pair, exchanged=True, remarks=(note, *pair.remarks))

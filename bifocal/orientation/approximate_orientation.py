@@ -40,12 +40,13 @@ UNLIKE = 0.15
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Given:
-    """What `orient_pair` is given."""
+    """What `orient_pair` is given; ``settled`` where no slip is to be looked for any more."""
 
     photos: Photos
     control: Control
     site: SiteMeasures
     media: PairMedia | None = None
+    settled: bool = False
 
     @property
     def names(self) -> tuple[str, str]:

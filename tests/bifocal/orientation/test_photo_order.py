@@ -15,6 +15,7 @@ from bifocal.collimation.job_tasks import task_of
 from bifocal.orientation import approximate_orientation
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.align_workflow import AlignOptions, KnownLens, _way, align_photos
+from bifocal.orientation.approximate_orientation import Given, order_of
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.orientation_stages import PhotoInput
@@ -68,6 +69,24 @@ def test_what_is_hidden_shows_which_photo_is_the_far_one(views) -> None:
 def test_a_flat_wall_shows_no_order() -> None:
     flat = take(FAR, NEAR, boards=())
     assert abs(first_is_far((flat.far, flat.near), ties(FAR, NEAR))) < SURE
+
+
+def test_lenses_alike_leave_no_order_to_ask(views, monkeypatch) -> None:
+    """What was typed for one photo fits the other as well: the scale on the wall tells."""
+    monkeypatch.setattr(approximate_orientation, "first_is_far", lambda *_: pytest.fail("asked"))
+    photos = tuple(replace(p, interior=typed(FAR)) for p in inputs(views.far, views.near))
+    given = Given(photos=(photos[0], photos[1]), control=Control(), site=SITE)
+    assert order_of(given, ties(FAR, NEAR)) == np.inf
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_the_order_is_asked_where_a_lens_is_unknown(views, known) -> None:
+    """Both distances then make up for the lens, whichever photo they belong to."""
+    first, second = inputs(views.near, views.far)
+    lens = replace(first.interior, is_typed=False) if known else Interior.unknown(SIZE)
+    photos = replace(first, interior=lens), replace(second, interior=Interior.unknown(SIZE))
+    given = Given(photos=photos, control=Control(), site=SITE)
+    assert order_of(given, ties(NEAR, FAR)) < -SURE
 
 
 @pytest.mark.acceptance
