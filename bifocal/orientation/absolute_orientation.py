@@ -37,11 +37,12 @@ from bifocal.orientation.orientation_remarks import (
 )
 from bifocal.orientation.orientation_stages import (
     ONE_LENS,
+    WALL_LIMIT,
     OrientedPair,
     Photos,
     control_alone,
+    lines_tested,
     oriented_in_stages,
-    without_gross,
 )
 from bifocal.orientation.pair_media import THROUGH_MEDIA, PairMedia
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
@@ -58,6 +59,7 @@ from bifocal.orientation.tie_points import (
     likely_on_wall,
     tie_positions,
 )
+from photocore.adjustment import OUTLIER_LIMIT
 from photocore.errors import ConvergenceError, GeometryError, PhotogrammetryError, located
 
 #: Distances that control through media leaves so uncertain are not found from common points either,
@@ -145,8 +147,8 @@ def _oriented(given: Given) -> OrientedPair:
             return right
         # Photos through glass or water may fit no cameras at all: then that is the reason.
         raise _reason(error, observations, start, lacking) from error
-    pair = without_gross(replace(pair, bend=_bend(pair.observations, pair.adjusted)))
-    if model_remarks(pair, given.site):
+    pair = _without_gross(replace(pair, bend=_bend(pair.observations, pair.adjusted)))
+    if model_remarks(pair, given.site) or pair.lines_off:
         right = _mended_by_ties(given, ties, pair.observations)
         if right is not None:
             return right
@@ -190,7 +192,7 @@ def _through_media(given: Given, media: PairMedia, lacking: str) -> OrientedPair
         pair, note = with_bent_ties(pair, ties), "the media as given"
         bend = refracted_bend(pair.adjusted, ties.seen1, ties.seen2, interiors[0].image_size)
         pair = replace(pair, bend=bend)
-    pair = without_gross(replace(pair, assumed=(*pair.assumed, note)))
+    pair = _without_gross(replace(pair, assumed=(*pair.assumed, note)))
     refuse_impossible_media(pair.adjusted, media)
     check_room(pair.adjusted.media, pair.adjusted.cameras)
     return _with_words(pair, given, remarks)
@@ -249,6 +251,32 @@ def _mended_by_ties(given: Given, ties: Ties | None, seen: PairObservations) -> 
     return _typed_right(given, lambda one: _by_ties(one, ties, seen), by_control=False)
 
 
+def _without_gross(pair: OrientedPair) -> OrientedPair:
+    """Return the pair without gross control points, the worst first, tested without it."""
+    count = len(pair.observations.control.ids)
+    dropped: list[int] = list(np.flatnonzero(~pair.observations.pick_used))
+    for _ in range(max(count // 3, 1) if count > 4 else 0):
+        used = pair.observations.pick_used.copy()
+        test = np.where(used, pair.adjusted.control_test, 0.0)
+        worst = int(test.argmax())
+        if test[worst] < OUTLIER_LIMIT or used.sum() <= 4:
+            break
+        used[worst] = False
+        without = pair.readjusted(pick_used=used)
+        usual = max(1.0, float(np.median(without.adjusted.control_test[used])))
+        if test[worst] < OUTLIER_LIMIT * usual:
+            break
+        dropped.append(worst)
+        pair = without
+    # A point thrown out by the first, rough fit may be good after all.
+    back = [i for i in dropped if pair.adjusted.control_test[i] < OUTLIER_LIMIT]
+    if back:
+        used = pair.observations.pick_used.copy()
+        used[back] = True
+        pair = pair.readjusted(pick_used=used)
+    return pair
+
+
 def _typed_right(
     given: Given, fitted: Callable[[Given], Fitted | None], *, by_control: bool
 ) -> OrientedPair | None:
@@ -296,7 +324,7 @@ def _by_control(given: Given, ties: Ties | None) -> Fitted | None:
             given = replace(given, site=replace(given.site, distance1=None, distance2=None))
         observations = observations_of(given, interiors, None, agree)
         pair = control_alone(observations, PairUnknowns(cameras=cameras), named=False)
-        pair = without_gross(pair)
+        pair = _without_gross(pair)
     except (GeometryError, ConvergenceError):
         return None
     adjusted, used = pair.adjusted, pair.observations.pick_used
@@ -309,8 +337,14 @@ def _by_control(given: Given, ties: Ties | None) -> Fitted | None:
 
 
 def _by_ties(given: Given, ties: Ties, seen: PairObservations) -> Fitted | None:
-    """Return how well common points as matched meet, as a share of what they may miss by."""
+    """Return how well common points as matched meet, as a share of what they may miss by.
+
+    With how far the façade's lines come out of the wall.
+    """
     first, second = (replace(photo, grey=None) for photo in given.photos)
+    far, near = (photo.grey for photo in given.photos)
+    assert far is not None
+    assert near is not None
     try:
         cameras, _, interiors = approximate_cameras(given, ties, False)
         tilt = seen.sigma_tilt if given.site.parallel else None
@@ -320,7 +354,9 @@ def _by_ties(given: Given, ties: Ties, seen: PairObservations) -> Fitted | None:
     except (GeometryError, ConvergenceError):
         return None
     fine = WORST_FIT / 3 * max(interiors[0].image_size) / 3000
-    misfit = float(np.hypot(pair.observations.sigma_tie / fine, np.sqrt(_pulled(pair) / 2)))
+    lines = max((test for _, test in lines_tested(pair, (far, near))), default=0.0) / WALL_LIMIT
+    squares = (pair.observations.sigma_tie / fine) ** 2, _pulled(pair) / 2, min(lines, MOST) ** 2
+    misfit = float(np.sqrt(sum(squares)))
     return Fitted(misfit=misfit, cameras=pair.adjusted.cameras, lost=~pair.observations.pick_used)
 
 
