@@ -50,15 +50,9 @@ from bifocal.orientation.photo_order import SURE
 from bifocal.orientation.refracted_bend import refracted_bend
 from bifocal.orientation.refracted_resection import resect_through
 from bifocal.orientation.refracted_stage import with_bent_ties
-from bifocal.orientation.relative_orientation import (
-    Ties,
-)
+from bifocal.orientation.relative_orientation import Ties
 from bifocal.orientation.slips import MOST, Fitted, Typed, slip_of
-from bifocal.orientation.tie_points import (
-    FEWEST_ON_WALL,
-    likely_on_wall,
-    tie_positions,
-)
+from bifocal.orientation.tie_points import FEWEST_ON_WALL, likely_on_wall, tie_positions
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.errors import ConvergenceError, GeometryError, PhotogrammetryError, located
 
@@ -289,8 +283,8 @@ def _typed_right(
     """
 
     def meant(typed: Typed) -> Given:
-        changed = given.with_interiors(typed.interiors)
-        return replace(changed, control=typed.control, site=typed.site)
+        lens = given.with_interiors(typed.interiors)
+        return replace(lens, control=typed.control, site=typed.site)
 
     typed = Typed(interiors=given.interiors, control=given.control, site=given.site)
     slip = slip_of(typed, lambda one: fitted(meant(one)), by_control=by_control)
@@ -316,12 +310,10 @@ def _by_control(given: Given, ties: Ties | None) -> Fitted | None:
         cameras, agree, interiors = approximate_cameras(given, None, True)
         z1, z2 = (float(camera.centre[2]) for camera in cameras)
         if d1 and d2 and (d1 < d2) != (z1 < z2):
-            given = replace(given, site=replace(given.site, distance1=d2, distance2=d1))
-        if any(
-            known and not 0.5 < known / z < 2
-            for known, z in zip((given.site.distance1, given.site.distance2), (z1, z2), strict=True)
-        ):  # another unit: `validation.check_units` says so
-            given = replace(given, site=replace(given.site, distance1=None, distance2=None))
+            d1, d2 = d2, d1
+        if any(known and not 0.5 < known / z < 2 for known, z in ((d1, z1), (d2, z2))):
+            d1 = d2 = None  # another unit: `validation.check_units` says so
+        given = replace(given, site=replace(given.site, distance1=d1, distance2=d2))
         observations = observations_of(given, interiors, None, agree)
         pair = control_alone(observations, PairUnknowns(cameras=cameras), named=False)
         pair = _without_gross(pair)
@@ -341,10 +333,7 @@ def _by_ties(given: Given, ties: Ties, seen: PairObservations) -> Fitted | None:
 
     With how far the façade's lines come out of the wall.
     """
-    first, second = (replace(photo, grey=None) for photo in given.photos)
-    far, near = (photo.grey for photo in given.photos)
-    assert far is not None
-    assert near is not None
+    (far, first), (near, second) = ((p.grey, replace(p, grey=None)) for p in given.photos)
     try:
         cameras, _, interiors = approximate_cameras(given, ties, False)
         tilt = seen.sigma_tilt if given.site.parallel else None
@@ -354,6 +343,8 @@ def _by_ties(given: Given, ties: Ties, seen: PairObservations) -> Fitted | None:
     except (GeometryError, ConvergenceError):
         return None
     fine = WORST_FIT / 3 * max(interiors[0].image_size) / 3000
+    assert far is not None
+    assert near is not None
     lines = max((test for _, test in lines_tested(pair, (far, near))), default=0.0) / WALL_LIMIT
     squares = (pair.observations.sigma_tie / fine) ** 2, _pulled(pair) / 2, min(lines, MOST) ** 2
     misfit = float(np.sqrt(sum(squares)))

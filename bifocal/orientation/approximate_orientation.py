@@ -10,10 +10,7 @@ from bifocal.orientation import validation
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.features import find_features
 from bifocal.orientation.interior_orientation import Cameras, Interiors
-from bifocal.orientation.orientation_stages import (
-    SIGMA_PARALLEL,
-    Photos,
-)
+from bifocal.orientation.orientation_stages import SIGMA_PARALLEL, Photos
 from bifocal.orientation.pair_media import PairMedia
 from bifocal.orientation.pair_observations import PairObservations
 from bifocal.orientation.photo_order import first_is_far
@@ -25,9 +22,7 @@ from bifocal.orientation.relative_orientation import (
     plane_scale,
 )
 from bifocal.orientation.space_resection import resect
-from bifocal.orientation.tie_points import (
-    robust_sigma,
-)
+from bifocal.orientation.tie_points import robust_sigma
 from photocore.arrays import BoolArray
 from photocore.camera import fundamental, ray_on_plane
 from photocore.errors import GeometryError, located

@@ -16,12 +16,7 @@ from bifocal.orientation.area_points import even_points
 from bifocal.orientation.bend import WallBend
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.interior_orientation import SIGMA_RADIAL, Cameras, Images, Interior
-from bifocal.orientation.pair_adjustment import (
-    AdjustedPair,
-    adjust,
-    evaluated,
-    line_test,
-)
+from bifocal.orientation.pair_adjustment import AdjustedPair, adjust, evaluated, line_test
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns, at
 from bifocal.orientation.reference_plane import (
     STEEPEST,
@@ -102,8 +97,8 @@ class OrientedPair:
         How far the wall may lie from the reference plane [m] and slope against it [m/m].
     bend : WallBend
         How far the wall is from a plane between the photos.
-    lines_off : float
-        By how many times what they may the façade's lines come out of the wall; 0 if they fit.
+    lines_off : bool
+        Whether lines of the façade come out of the wall by more than they may.
     """
 
     observations: PairObservations
@@ -115,7 +110,7 @@ class OrientedPair:
     wall_named: bool = False
     tolerance: tuple[float, float] = FREE
     bend: WallBend = field(default_factory=WallBend)
-    lines_off: float = 0.0
+    lines_off: bool = False
 
     def readjusted(self, start: PairUnknowns | None = None, **changes: Any) -> OrientedPair:
         """Return the pair adjusted with changed observations, from here or another start."""
@@ -375,7 +370,7 @@ def _with_lines(pair: OrientedPair, images: Images) -> OrientedPair:
     for line, test in tested:
         if test > WALL_LIMIT:
             words = facade_lines.contradiction_in_words(line, adjusted.cameras, test)
-            pair = replace(pair.told(words), lines_off=max(pair.lines_off, test / WALL_LIMIT))
+            pair = replace(pair.told(words), lines_off=True)
     kept = tuple(line for line, test in tested if test <= WALL_LIMIT)
     try:
         turned = pair.readjusted(lines=kept).settled() if kept else pair
