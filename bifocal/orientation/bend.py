@@ -195,7 +195,7 @@ def bend_in_words(
     sure = "" if bend.px > STRONGLY_BENT else " probably"
     reason = (
         "refraction (photos taken through glass or water: give --indices with --port or --depth), "
-        "a lens file of another camera or focus, wrong distances, or no plane wall there (--wall)"
+        "a lens file of another camera or focus, wrong distances, or no plane wall there"
         if with_lens
         else "lens distortion (calibrate with `bifocal calibrate`, give --lens), or refraction "
         "(photos taken through glass or water: give --indices with --port or --depth)"
