@@ -16,6 +16,8 @@ MOST_BENT, CERTAIN = 0.2, 2.0
 #: Root mean square bend at 3000 px of width, over a photo of 3 to 2, by k of x (1 + k rho²), rho
 #: over half the diagonal, and what of k a scale takes up, the mean of rho². [px, -]
 BEND_BY_K, MEAN_SQUARE = 205.0, 1 / 3
+#: How a doubt begins that leaves no word of how good relief is.
+MISFIT = "THE MODEL DOES NOT FIT"
 #: What free diagnostics may lack or hold instead of numbers.
 NO_NUMBER = (LookupError, TypeError, ValueError, ZeroDivisionError)
 
@@ -30,7 +32,7 @@ def doubts_in_words(setup: Any) -> tuple[str, ...]:
     told = setup.get("doubts") if isinstance(setup, dict) else ()
     if told is None and (bend := _bend(setup)):
         told = [
-            f"THE MODEL DOES NOT FIT: the wall is bent by {bend:.2f} px between the photos (an "
+            f"{MISFIT}: the wall is bent by {bend:.2f} px between the photos (an "
             f"honest pair: at most {MOST_BENT:g}). Set the pair up again (`bifocal align`)."
         ]
     return tuple(map(str, told)) if isinstance(told, list | tuple) else ()

@@ -21,7 +21,7 @@ from bifocal.orientation.approximate_orientation import (
     ties_of,
 )
 from bifocal.orientation.as_set_up import check_room
-from bifocal.orientation.bend import STRONGLY_BENT, WallBend, bend_in_words, bend_of_wall
+from bifocal.orientation.bend import WallBend, bend_of_wall
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.interior_orientation import with_one_lens
 from bifocal.orientation.media_report import media_remarks, refuse_impossible_media
@@ -30,17 +30,19 @@ from bifocal.orientation.orientation_remarks import (
     assumptions,
     control_remarks,
     distance_remarks,
+    hopeless_bend,
     model_remarks,
     order_remarks,
     wall_remarks,
 )
 from bifocal.orientation.orientation_stages import (
     ONE_LENS,
+    WALL_LIMIT,
     OrientedPair,
     Photos,
     control_alone,
+    lines_tested,
     oriented_in_stages,
-    without_gross,
 )
 from bifocal.orientation.pair_media import THROUGH_MEDIA, PairMedia
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
@@ -48,15 +50,10 @@ from bifocal.orientation.photo_order import SURE
 from bifocal.orientation.refracted_bend import refracted_bend
 from bifocal.orientation.refracted_resection import resect_through
 from bifocal.orientation.refracted_stage import with_bent_ties
-from bifocal.orientation.relative_orientation import (
-    Ties,
-)
+from bifocal.orientation.relative_orientation import Ties
 from bifocal.orientation.slips import MOST, Fitted, Typed, slip_of
-from bifocal.orientation.tie_points import (
-    FEWEST_ON_WALL,
-    likely_on_wall,
-    tie_positions,
-)
+from bifocal.orientation.tie_points import FEWEST_ON_WALL, likely_on_wall, tie_positions
+from photocore.adjustment import OUTLIER_LIMIT
 from photocore.errors import ConvergenceError, GeometryError, PhotogrammetryError, located
 
 #: Distances that control through media leaves so uncertain are not found from common points either,
@@ -85,95 +82,74 @@ def orient_pair(
     GeometryError
         If the photos and measurements do not make a pair; the message says why and what to do.
     """
+    return _oriented(Given(photos=photos, control=control, site=site, media=media))
+
+
+def _oriented(given: Given) -> OrientedPair:
+    """Return the cameras of a pair; what was mended or exchanged comes here again."""
+    site, media = given.site, given.media
+    lacking = validation.unknown_lenses(given.interiors, given.names)
     if media is not None:
-        given = Given(photos=photos, control=control, site=site, media=media)
-        lacking = validation.unknown_lenses(given.interiors, given.names)
         try:
             return _through_media(given, media, lacking)
         except GeometryError as error:
-            if not lacking or "--focal1" in str(error):
-                raise
-            raise GeometryError(f"{error} The likely reason: {lacking}.") from error
-    interiors, one_lens = with_one_lens((photos[0].interior, photos[1].interior))
-    first, second = (replace(p, interior=i) for p, i in zip(photos, interiors, strict=True))
-    photos = (first, second)
-    given = Given(photos=photos, control=control, site=site)
+            raise _with_lacking(error, lacking) from error
+    interiors, one_lens = with_one_lens(given.interiors)
+    given = given.with_interiors(interiors)
     enough = given.enough
-    lacking = validation.unknown_lenses(interiors, given.names)
     if lacking and not enough and None in site.distances:
         raise GeometryError(f"{lacking}, or both distances, or four control points.")
     ties, remarks = ties_of(given, needed=not enough)
+    if enough and not given.settled:
+        right = _typed_right(given, lambda one: _by_control(one, ties), by_control=True)
+        if right is not None:
+            return right
+        given = replace(given, settled=True)
     if ties is not None and not enough:
         order = order_of(given, ties)
         if order < -SURE:
             return _with_photos_exchanged(given, typed_stay=True)
         remarks = (*remarks, *order_remarks(order, given.names))
-    stated = site
-    if enough:
-        right = _typed_right(given, lambda one: _by_control(one, ties), by_control=True)
-        if right is not None:
-            return right
     cameras, agree, interiors = approximate_cameras(given, ties, enough)
     if enough and ties is not None:
         check_picks(cameras, ties, interiors)
     if cameras[0].centre[2] < cameras[1].centre[2]:
         return _with_photos_exchanged(given)
-    if site.distance1 and site.distance2 and site.distance1 < site.distance2:
-        turned = replace(site, distance1=site.distance2, distance2=site.distance1)
+    if site.far_first is not site:
         note = (
             f"--distance1 {site.distance1:g} m is less than --distance2 {site.distance2:g} m, but "
-            f"{photos[0].name} is the far photo; the two distances were exchanged."
+            f"{given.names[0]} is the far photo; the two distances were exchanged."
         )
-        return _told(replace(given, site=turned), note)
+        return _told(replace(given, site=site.far_first), note)
     if enough:
         validation.check_units(cameras, site)
     elif ties is not None:
         flat = validation.is_flat(ties, interiors, given.names, flat_is_fine=site.parallel)
         # What stands out shows how the cameras stood; a flat wall does not.
-        site = replace(site, parallel=flat)
-        given = replace(given, site=site)
+        given = replace(given, site=replace(site, parallel=flat))
     observations = observations_of(given, interiors, ties, agree)
     if one_lens:
         observations = replace(observations, sigma_zoom=ONE_LENS)
     start = PairUnknowns(cameras=cameras)
     if ties is not None:
         start = replace(start, radial=np.array([[ties.radial, 0.0]] * 2))
-
-    def mended(seen: PairObservations) -> OrientedPair | None:
-        if ties is None or enough:
-            return None
-        return _typed_right(given, lambda one: _by_ties(one, ties, seen), by_control=False)
-
     try:
-        pair = oriented_in_stages(observations, start, photos, stated, with_control=enough)
+        pair = oriented_in_stages(observations, start, given.photos, site, with_control=enough)
     except (GeometryError, ConvergenceError) as error:
-        right = mended(observations)
+        right = _mended_by_ties(given, ties, observations)
         if right is not None:
             return right
         # Photos through glass or water may fit no cameras at all: then that is the reason.
         raise _reason(error, observations, start, lacking) from error
-    pair = without_gross(replace(pair, bend=_bend(pair.observations, pair.adjusted)))
-    doubts = model_remarks(pair, site)
-    right = mended(pair.observations) if doubts else None
-    if right is not None:
-        return right
-    likely = likely_on_wall(pair.observations, pair.adjusted)
-    if not enough and pair.bend.px > STRONGLY_BENT and likely < FEWEST_ON_WALL:
-        # What holds a bent wall by small chances only is none.
-        known = any(i.is_calibrated or i.sigma_radial > 0 for i in interiors)
-        raise GeometryError(bend_in_words(pair.bend, with_lens=known))
-    validation.check_determined(pair.adjusted)
-    validation.check_movement(pair.adjusted)
-    told = (
-        *remarks,
-        *doubts,
-        *pair.remarks,
-        *wall_remarks(pair),
-        *control_remarks(control, pair),
-        *distance_remarks(pair),
-    )
-    assumed = (*pair.assumed, *assumptions(pair.observations, site))
-    return replace(pair, remarks=told, assumed=assumed)
+    pair = _without_gross(replace(pair, bend=_bend(pair.observations, pair.adjusted)))
+    if model_remarks(pair, given.site) or pair.lines_off:
+        right = _mended_by_ties(given, ties, pair.observations)
+        if right is not None:
+            return right
+    bent = "" if enough else hopeless_bend(pair.observations, pair.bend)
+    if bent and likely_on_wall(pair.observations, pair.adjusted) < FEWEST_ON_WALL:
+        raise GeometryError(bent)  # what holds a bent wall by small chances only is none
+    return _with_words(pair, given, remarks)
 
 
 def _through_media(given: Given, media: PairMedia, lacking: str) -> OrientedPair:
@@ -210,19 +186,26 @@ def _through_media(given: Given, media: PairMedia, lacking: str) -> OrientedPair
         pair, note = with_bent_ties(pair, ties), "the media as given"
         bend = refracted_bend(pair.adjusted, ties.seen1, ties.seen2, interiors[0].image_size)
         pair = replace(pair, bend=bend)
-    pair = without_gross(pair)
+    pair = _without_gross(replace(pair, assumed=(*pair.assumed, note)))
     refuse_impossible_media(pair.adjusted, media)
     check_room(pair.adjusted.media, pair.adjusted.cameras)
+    return _with_words(pair, given, remarks)
+
+
+def _with_words(pair: OrientedPair, given: Given, remarks: tuple[str, ...]) -> OrientedPair:
+    """Return the pair with all that is to be told of it, doubts first; refuse what is none."""
     validation.check_determined(pair.adjusted)
     validation.check_movement(pair.adjusted)
     told = (
-        *remarks,
         *model_remarks(pair, given.site),
-        *media_remarks(pair.adjusted, media),
-        *control_remarks(control, pair),
+        *remarks,
+        *pair.remarks,
+        *wall_remarks(pair),
+        *(media_remarks(pair.adjusted, given.media) if given.media else ()),
+        *control_remarks(given.control, pair),
         *distance_remarks(pair),
     )
-    assumed = (*pair.assumed, note, *assumptions(pair.observations, given.site))
+    assumed = (*pair.assumed, *assumptions(pair.observations, given.site))
     return replace(pair, remarks=told, assumed=assumed)
 
 
@@ -242,15 +225,50 @@ def _reason(
 ) -> PhotogrammetryError:
     """Return why no cameras were found: that the wall is bent where it strongly is, or the error.
 
-    With what is ``lacking`` of the lenses.
-
     Features as first found are good to a pixel; only a bend beyond `STRONGLY_BENT` counts.
     """
-    bend = _bend(observations, state)
-    if not bend.px > STRONGLY_BENT:
-        return GeometryError(f"{error} The likely reason: {lacking}.") if lacking else error
-    known = any(i.is_calibrated or i.sigma_radial > 0 for i in observations.interiors)
-    return GeometryError(bend_in_words(bend, with_lens=known))
+    bent = hopeless_bend(observations, _bend(observations, state))
+    return GeometryError(bent) if bent else _with_lacking(error, lacking)
+
+
+def _with_lacking(error: PhotogrammetryError, lacking: str) -> PhotogrammetryError:
+    """Return an error with what is ``lacking`` of the lenses, unless it says so itself."""
+    if not lacking or "--focal1" in str(error):
+        return error
+    return GeometryError(f"{error} The likely reason: {lacking}.")
+
+
+def _mended_by_ties(given: Given, ties: Ties | None, seen: PairObservations) -> OrientedPair | None:
+    """Return the pair with the slip mended that common points show; None without one."""
+    if ties is None or given.settled:
+        return None
+    return _typed_right(given, lambda one: _by_ties(one, ties, seen), by_control=False)
+
+
+def _without_gross(pair: OrientedPair) -> OrientedPair:
+    """Return the pair without gross control points, the worst first, tested without it."""
+    count = len(pair.observations.control.ids)
+    dropped: list[int] = list(np.flatnonzero(~pair.observations.pick_used))
+    for _ in range(max(count // 3, 1) if count > 4 else 0):
+        used = pair.observations.pick_used.copy()
+        test = np.where(used, pair.adjusted.control_test, 0.0)
+        worst = int(test.argmax())
+        if test[worst] < OUTLIER_LIMIT or used.sum() <= 4:
+            break
+        used[worst] = False
+        without = pair.readjusted(pick_used=used)
+        usual = max(1.0, float(np.median(without.adjusted.control_test[used])))
+        if test[worst] < OUTLIER_LIMIT * usual:
+            break
+        dropped.append(worst)
+        pair = without
+    # A point thrown out by the first, rough fit may be good after all.
+    back = [i for i in dropped if pair.adjusted.control_test[i] < OUTLIER_LIMIT]
+    if back:
+        used = pair.observations.pick_used.copy()
+        used[back] = True
+        pair = pair.readjusted(pick_used=used)
+    return pair
 
 
 def _typed_right(
@@ -265,20 +283,19 @@ def _typed_right(
     """
 
     def meant(typed: Typed) -> Given:
-        both = zip(given.photos, typed.interiors, strict=True)
-        first, second = (replace(photo, interior=interior) for photo, interior in both)
-        return replace(given, photos=(first, second), control=typed.control, site=typed.site)
+        lens = given.with_interiors(typed.interiors)
+        return replace(lens, control=typed.control, site=typed.site)
 
     typed = Typed(interiors=given.interiors, control=given.control, site=given.site)
     slip = slip_of(typed, lambda one: fitted(meant(one)), by_control=by_control)
     if slip is not None and not slip.mended:
         raise GeometryError(slip.words)
-    return None if slip is None else _told(meant(slip.meant), slip.words)
+    return None if slip is None else _told(replace(meant(slip.meant), settled=True), slip.words)
 
 
 def _told(given: Given, note: str) -> OrientedPair:
     """Return the pair of what is given instead of what was typed, saying so."""
-    pair = orient_pair(given.photos, control=given.control, site=given.site)
+    pair = _oriented(given)
     return replace(pair, remarks=(note, *pair.remarks))
 
 
@@ -293,15 +310,13 @@ def _by_control(given: Given, ties: Ties | None) -> Fitted | None:
         cameras, agree, interiors = approximate_cameras(given, None, True)
         z1, z2 = (float(camera.centre[2]) for camera in cameras)
         if d1 and d2 and (d1 < d2) != (z1 < z2):
-            given = replace(given, site=replace(given.site, distance1=d2, distance2=d1))
-        if any(
-            known and not 0.5 < known / z < 2
-            for known, z in zip((given.site.distance1, given.site.distance2), (z1, z2), strict=True)
-        ):  # another unit: `validation.check_units` says so
-            given = replace(given, site=replace(given.site, distance1=None, distance2=None))
+            d1, d2 = d2, d1
+        if any(known and not 0.5 < known / z < 2 for known, z in ((d1, z1), (d2, z2))):
+            d1 = d2 = None  # another unit: `validation.check_units` says so
+        given = replace(given, site=replace(given.site, distance1=d1, distance2=d2))
         observations = observations_of(given, interiors, None, agree)
         pair = control_alone(observations, PairUnknowns(cameras=cameras), named=False)
-        pair = without_gross(pair)
+        pair = _without_gross(pair)
     except (GeometryError, ConvergenceError):
         return None
     adjusted, used = pair.adjusted, pair.observations.pick_used
@@ -314,8 +329,11 @@ def _by_control(given: Given, ties: Ties | None) -> Fitted | None:
 
 
 def _by_ties(given: Given, ties: Ties, seen: PairObservations) -> Fitted | None:
-    """Return how well common points as matched meet, as a share of what they may miss by."""
-    first, second = (replace(photo, grey=None) for photo in given.photos)
+    """Return how well common points as matched meet, as a share of what they may miss by.
+
+    With how far the façade's lines come out of the wall.
+    """
+    (far, first), (near, second) = ((p.grey, replace(p, grey=None)) for p in given.photos)
     try:
         cameras, _, interiors = approximate_cameras(given, ties, False)
         tilt = seen.sigma_tilt if given.site.parallel else None
@@ -325,7 +343,11 @@ def _by_ties(given: Given, ties: Ties, seen: PairObservations) -> Fitted | None:
     except (GeometryError, ConvergenceError):
         return None
     fine = WORST_FIT / 3 * max(interiors[0].image_size) / 3000
-    misfit = float(np.hypot(pair.observations.sigma_tie / fine, np.sqrt(_pulled(pair) / 2)))
+    assert far is not None
+    assert near is not None
+    lines = max((test for _, test in lines_tested(pair, (far, near))), default=0.0) / WALL_LIMIT
+    squares = (pair.observations.sigma_tie / fine) ** 2, _pulled(pair) / 2, min(lines, MOST) ** 2
+    misfit = float(np.sqrt(sum(squares)))
     return Fitted(misfit=misfit, cameras=pair.adjusted.cameras, lost=~pair.observations.pick_used)
 
 
@@ -347,18 +369,16 @@ def _with_photos_exchanged(given: Given, *, typed_stay: bool = False) -> Oriente
             f"{near} is the near photo. --wall is a spot of the far photo: give {far} first, and "
             "the spot in it."
         )
-    if site.distance1 and site.distance2 and site.distance1 < site.distance2:
-        site = replace(site, distance1=site.distance2, distance2=site.distance1)
-    media = given.media and given.media.exchanged()
-    photos = given.photos[::-1]
+    its = 1 if site.far_first is site else 2
+    site, media = site.far_first, given.media and given.media.exchanged()
+    turned = replace(given, photos=given.photos[::-1])
     if typed_stay:
-        first, second = given.interiors
-        photos = replace(photos[0], interior=first), replace(photos[1], interior=second)
-        site = replace(site, ordered=True)
-    pair = orient_pair(photos, control=given.control.exchanged(), site=site, media=media)
+        turned, site = turned.with_interiors(given.interiors), replace(site, ordered=True)
+    control = given.control.exchanged()
+    pair = _oriented(replace(turned, control=control, site=site, media=media))
     note = (
         f"{near} is the near photo; the two were exchanged. Image 1 of the pair file is {far}, and "
-        "--distance1 means its distance"
+        f"--distance{its} means its distance"
         + (", --focal1 its lens; if it is not so, measure control points." if typed_stay else ".")
     )
     return replace(pair, exchanged=True, remarks=(note, *pair.remarks))

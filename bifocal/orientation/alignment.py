@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from bifocal import rays
+from bifocal.model.doubts import MISFIT
 from bifocal.model.homography import apply_homography
 from bifocal.model.lens import Lens
 from bifocal.model.orientation_precision import CAMERA, NAMES, moved
@@ -116,8 +117,9 @@ def make_alignment(
     used = observations.tie_used
     sigma_tie = robust_sigma(adjusted.tie_misfit[used]) if used.any() else observations.sigma_pick
     words = orientation_in_words(
-        cameras, deviations, sigma_px=max(sigma_tie, 0.05), media=adjusted.media
-    )
+        cameras, deviations, sigma_px=max(sigma_tie, 0.05), media=adjusted.media,
+        fits=not any(text.startswith(MISFIT) for text in oriented.remarks),
+    )  # fmt: skip
     words = (*words, *media_in_words(adjusted, observations.media))
     first, second = observations.interiors
     return Alignment(

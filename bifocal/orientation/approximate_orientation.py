@@ -10,10 +10,7 @@ from bifocal.orientation import validation
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.features import find_features
 from bifocal.orientation.interior_orientation import Cameras, Interiors
-from bifocal.orientation.orientation_stages import (
-    SIGMA_PARALLEL,
-    Photos,
-)
+from bifocal.orientation.orientation_stages import SIGMA_PARALLEL, Photos
 from bifocal.orientation.pair_media import PairMedia
 from bifocal.orientation.pair_observations import PairObservations
 from bifocal.orientation.photo_order import first_is_far
@@ -25,9 +22,7 @@ from bifocal.orientation.relative_orientation import (
     plane_scale,
 )
 from bifocal.orientation.space_resection import resect
-from bifocal.orientation.tie_points import (
-    robust_sigma,
-)
+from bifocal.orientation.tie_points import robust_sigma
 from photocore.arrays import BoolArray
 from photocore.camera import fundamental, ray_on_plane
 from photocore.errors import GeometryError, located
@@ -40,12 +35,13 @@ UNLIKE = 0.15
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Given:
-    """What `orient_pair` is given."""
+    """What `orient_pair` is given; ``settled`` where no slip is to be looked for any more."""
 
     photos: Photos
     control: Control
     site: SiteMeasures
     media: PairMedia | None = None
+    settled: bool = False
 
     @property
     def names(self) -> tuple[str, str]:
@@ -56,6 +52,12 @@ class Given:
     def interiors(self) -> Interiors:
         """Interior orientations of the photos."""
         return self.photos[0].interior, self.photos[1].interior
+
+    def with_interiors(self, interiors: Interiors) -> Given:
+        """Return the same with other interior orientations."""
+        both = zip(self.photos, interiors, strict=True)
+        first, second = (replace(photo, interior=interior) for photo, interior in both)
+        return replace(self, photos=(first, second))
 
     @property
     def enough(self) -> bool:
@@ -71,10 +73,15 @@ def order_of(given: Given, ties: Ties) -> float:
     """Return by how many standard deviations the first photo is the far one.
 
     Focal lengths and distances that were typed tell nothing of the photos' order, unless the scale
-    on the wall fits them in one order only.
+    on the wall fits them in one order only, or both lenses are alike; unknown lenses neither.
     """
     first, second = given.interiors
-    typed = (first.is_typed or second.is_typed) and first.image_size == second.image_size
+    assumed = first.is_assumed or second.is_assumed
+    alike = first.image_size == second.image_size and first.focal != second.focal
+    silent = assumed or (alike and (first.is_typed or second.is_typed))
+    far, near = (photo.grey for photo in given.photos)
+    if given.site.ordered or not silent or far is None or near is None:
+        return np.inf
     # Logarithms of the distances' ratio by lenses and scale in either order, against the taped one.
     ratio, scale = first.focal / second.focal, plane_scale(ties, first.image_size)
     d1, d2 = given.site.distances
@@ -82,9 +89,8 @@ def order_of(given: Given, ties: Ties) -> float:
     either = (np.log([ratio * scale, ratio / scale]) - taped).tolist()
     if not (d1 and d2):  # the far camera is any farther
         either = [min(off, 0.0) for off in either]
-    as_given, turned = (abs(off) < UNLIKE for off in either)
-    far, near = (photo.grey for photo in given.photos)
-    if given.site.ordered or not (typed and turned) or far is None or near is None:
+    as_given, turned = (assumed or abs(off) < UNLIKE for off in either)
+    if not turned:
         return np.inf
     return first_is_far((far, near), ties) if as_given else -np.inf
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from bifocal.model.doubts import MOST_BENT, bend_is_certain
+from bifocal.model.doubts import MISFIT, MOST_BENT, bend_is_certain
 from bifocal.model.homography import apply_homography
 from bifocal.orientation.reference_plane import faces
 from photocore.arrays import BoolArray, FloatArray
@@ -195,7 +195,7 @@ def bend_in_words(
     sure = "" if bend.px > STRONGLY_BENT else " probably"
     reason = (
         "refraction (photos taken through glass or water: give --indices with --port or --depth), "
-        "a lens file of another camera or focus, or wrong distances"
+        "a lens file of another camera or focus, wrong distances, or no plane wall there"
         if with_lens
         else "lens distortion (calibrate with `bifocal calibrate`, give --lens), or refraction "
         "(photos taken through glass or water: give --indices with --port or --depth)"
@@ -207,7 +207,7 @@ def bend_in_words(
             "stays with the wall), or lens distortion (--lens)"
         )
     return (
-        f"THE MODEL DOES NOT FIT: between the photos the wall is bent by {bend.px:.2f} ± "
+        f"{MISFIT}: between the photos the wall is bent by {bend.px:.2f} ± "
         f"{bend.sigma:.2f} px (an honest pair: at most {MOST_BENT:g}). The likely reason is"
         f"{sure} {reason}. Relief may be wrong by many times the precision of the picks, although "
         "every point lies on its line: sigma_r counts the bend; "

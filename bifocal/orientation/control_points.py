@@ -108,6 +108,12 @@ class SiteMeasures:
             d1, d2 = d1 or (d2 + delta if d2 else None), d2 or (d1 - delta if d1 else None)
         return d1, d2
 
+    @property
+    def far_first(self) -> SiteMeasures:
+        """These, with the longer of both taped distances as the far camera's."""
+        d1, d2 = self.distance1, self.distance2
+        return replace(self, distance1=d2, distance2=d1) if d1 and d2 and d1 < d2 else self
+
 
 def read_control(
     path: Path | str,

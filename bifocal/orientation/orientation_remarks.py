@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from bifocal.model.doubts import MISFIT
 from bifocal.orientation.alignment import standard_deviations, wall_relief
-from bifocal.orientation.bend import bend_in_words
+from bifocal.orientation.bend import STRONGLY_BENT, WallBend, bend_in_words
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair
 from bifocal.orientation.pair_observations import PairObservations
@@ -26,16 +27,12 @@ CONTRADICTS = 3.0
 def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
     """Return where photos and what was given contradict each other, with the likely reason."""
     observations, adjusted = pair.observations, pair.adjusted
-    known = any(i.is_calibrated or i.sigma_radial > 0 for i in observations.interiors)
-    wet = observations.media is not None
-    lost = not observations.pick_used.all()
-    bend = bend_in_words(pair.bend, with_lens=known, through_media=wet, left_out=lost)
-    remarks = [bend]
+    remarks = [_bend_of(observations, pair.bend)]
     unit = max(observations.interiors[0].image_size) / 3000
     sigma = observations.sigma_tie
     if observations.tie_used.sum() >= 20 and sigma > WORST_FIT * unit:
         remarks.append(
-            f"THE MODEL DOES NOT FIT: common points miss their lines by {sigma:.2f} px, good pairs "
+            f"{MISFIT}: common points miss their lines by {sigma:.2f} px, good pairs "
             "by 0.1 to 0.2. The likely reason is lens distortion (calibrate, give --lens), motion "
             "in the scene, or two photos of different states."
         )
@@ -60,6 +57,21 @@ def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
                 "tape, the plane it was measured to, the focal lengths and the lens distortion."
             )
     return [remark for remark in remarks if remark]
+
+
+def _bend_of(observations: PairObservations, bend: WallBend) -> str:
+    """Return that the wall is bent, if it certainly is."""
+    return bend_in_words(
+        bend,
+        with_lens=any(i.is_calibrated or i.sigma_radial > 0 for i in observations.interiors),
+        through_media=observations.media is not None,
+        left_out=not observations.pick_used.all(),
+    )
+
+
+def hopeless_bend(observations: PairObservations, bend: WallBend) -> str:
+    """Return that the wall is bent, if that is certainly by more than an honest lens does."""
+    return _bend_of(observations, bend) if bend.px > STRONGLY_BENT else ""
 
 
 def order_remarks(order: float, names: tuple[str, str]) -> list[str]:

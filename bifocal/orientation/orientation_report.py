@@ -18,6 +18,7 @@ def orientation_in_words(
     *,
     sigma_px: float,
     media: PairMedia | None = None,
+    fits: bool = True,
 ) -> tuple[str, ...]:
     """Return the orientation in sentences.
 
@@ -32,6 +33,8 @@ def orientation_in_words(
         Expected precision of a homologous point, for the precision of relief. [px]
     media : PairMedia, optional
         What lies between cameras and wall.
+    fits : bool
+        Whether the model does; else nothing is said of how good relief is.
     """
     far, near = cameras
     d1, d2 = float(far.centre[2]), float(near.centre[2])
@@ -50,7 +53,7 @@ def orientation_in_words(
         *(_turn(name, camera) for name, camera in (("Far", far), ("Near", near))),
         _roll(far, near),
         _scale(scales[1] / scales[0], base, deviations.get("scale", 0.0)),
-        _zone(d1, pixel, base, sigma_px, deviations.get("relief_scale", 0.0)),
+        _zone(d1, pixel, base, sigma_px, deviations.get("relief_scale", 0.0)) if fits else "",
         _plane(deviations.get("relief_offset", 0.0)),
     ]
     return tuple(word for word in words if word)

@@ -1,4 +1,4 @@
-"""The stages of a pair's orientation: control, ties, lens, wall, refinement, gross errors.
+"""The stages of a pair's orientation: control, ties, lens, wall, refinement.
 
 Each stage takes the pair as oriented so far and returns it better, with what is to be told of it.
 """
@@ -16,12 +16,7 @@ from bifocal.orientation.area_points import even_points
 from bifocal.orientation.bend import WallBend
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.interior_orientation import SIGMA_RADIAL, Cameras, Images, Interior
-from bifocal.orientation.pair_adjustment import (
-    AdjustedPair,
-    adjust,
-    evaluated,
-    line_test,
-)
+from bifocal.orientation.pair_adjustment import AdjustedPair, adjust, evaluated, line_test
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns, at
 from bifocal.orientation.reference_plane import (
     STEEPEST,
@@ -45,7 +40,6 @@ from bifocal.orientation.wall_planes import (
     planes_of_any_direction,
     steep_rivals_in_words,
 )
-from photocore.adjustment import OUTLIER_LIMIT
 from photocore.arrays import ByteArray
 from photocore.camera import plane_transfer
 from photocore.errors import GeometryError
@@ -103,6 +97,8 @@ class OrientedPair:
         How far the wall may lie from the reference plane [m] and slope against it [m/m].
     bend : WallBend
         How far the wall is from a plane between the photos.
+    lines_off : bool
+        Whether lines of the façade come out of the wall by more than they may.
     """
 
     observations: PairObservations
@@ -114,6 +110,7 @@ class OrientedPair:
     wall_named: bool = False
     tolerance: tuple[float, float] = FREE
     bend: WallBend = field(default_factory=WallBend)
+    lines_off: bool = False
 
     def readjusted(self, start: PairUnknowns | None = None, **changes: Any) -> OrientedPair:
         """Return the pair adjusted with changed observations, from here or another start."""
@@ -353,19 +350,28 @@ def _on_the_wall(pair: OrientedPair, images: Images, site: SiteMeasures) -> Orie
     return replace(pair, observations=ties).readjusted(start).settled()
 
 
+def lines_tested(
+    pair: OrientedPair, images: Images
+) -> list[tuple[facade_lines.FacadeDirection, float]]:
+    """Return the façade's lines, each with how far it comes out of the wall, in sigma."""
+    ties, adjusted = pair.observations, pair.adjusted
+    bent = ties.radial_models(adjusted.radial)
+    lines = facade_lines.lines_of_photos(images, adjusted.cameras, ties.interiors, bent)
+    return [(line, line_test(line, adjusted)) for line in lines]
+
+
 def _with_lines(pair: OrientedPair, images: Images) -> OrientedPair:
     """Return the pair with the façade's uprights and levels lying along the wall.
 
     Those that contradict the wall found by the ties are told of and not used.
     """
     old, adjusted = pair.observations, pair.adjusted
-    bent = old.radial_models(adjusted.radial)
-    lines = facade_lines.lines_of_photos(images, adjusted.cameras, old.interiors, bent)
-    tests = [line_test(line, adjusted) for line in lines]
-    for line, test in zip(lines, tests, strict=True):
+    tested = lines_tested(pair, images)
+    for line, test in tested:
         if test > WALL_LIMIT:
-            pair = pair.told(facade_lines.contradiction_in_words(line, adjusted.cameras, test))
-    kept = tuple(x for x, test in zip(lines, tests, strict=True) if test <= WALL_LIMIT)
+            words = facade_lines.contradiction_in_words(line, adjusted.cameras, test)
+            pair = replace(pair.told(words), lines_off=True)
+    kept = tuple(line for line, test in tested if test <= WALL_LIMIT)
     try:
         turned = pair.readjusted(lines=kept).settled() if kept else pair
     except GeometryError:  # no tie was left on the wall
@@ -470,29 +476,3 @@ def _care(cameras: Cameras) -> float:
     if keystone > UNEVEN:
         return SIGMA_PARALLEL
     return float(np.clip(1.5 * turn, np.deg2rad(0.02), SIGMA_PARALLEL))
-
-
-def without_gross(pair: OrientedPair) -> OrientedPair:
-    """Return the pair without gross control points, the worst first, tested without it."""
-    count = len(pair.observations.control.ids)
-    dropped: list[int] = list(np.flatnonzero(~pair.observations.pick_used))
-    for _ in range(max(count // 3, 1) if count > 4 else 0):
-        used = pair.observations.pick_used.copy()
-        test = np.where(used, pair.adjusted.control_test, 0.0)
-        worst = int(test.argmax())
-        if test[worst] < OUTLIER_LIMIT or used.sum() <= 4:
-            break
-        used[worst] = False
-        without = pair.readjusted(pick_used=used)
-        usual = max(1.0, float(np.median(without.adjusted.control_test[used])))
-        if test[worst] < OUTLIER_LIMIT * usual:
-            break
-        dropped.append(worst)
-        pair = without
-    # A point thrown out by the first, rough fit may be good after all.
-    back = [i for i in dropped if pair.adjusted.control_test[i] < OUTLIER_LIMIT]
-    if back:
-        used = pair.observations.pick_used.copy()
-        used[back] = True
-        pair = pair.readjusted(pick_used=used)
-    return pair

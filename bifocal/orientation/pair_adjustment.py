@@ -118,7 +118,7 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
     except GeometryError:
         raise GeometryError(
             "the observations do not determine the cameras. Measure more control points, spread "
-            "over the photo and off the wall plane, or give the distances."
+            "over the photo and off the wall plane, or give lens files and distances."
         ) from None
     redundancy = max(fit.redundancy, 1)
     sigma0 = float(np.sqrt((fit.residuals @ fit.residuals) / redundancy))

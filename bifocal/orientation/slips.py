@@ -135,9 +135,8 @@ def _of_lenses(typed: Typed, *, free: bool) -> Iterator[Slip]:
             "former fits as a part cut out of a photo as large as the latter, and was taken so."
         )
         yield Slip(meant=replace(typed, interiors=(both[0], both[1])), words=words)
-    if (
-        free and len(typed.control.ids) > 5 and typed.site.distances == (None, None)
-    ):  # a wrong tape is not the lens
+    # A wrong tape is not the lens.
+    if free and len(typed.control.ids) > 5 and typed.site.distances == (None, None):
         loose = replace(first, sigma_focal=0.5), replace(second, sigma_focal=0.5)
         words = (
             f"The focal lengths ({first.source}, {second.source}) contradict the control points "
@@ -173,7 +172,7 @@ def _of_control(typed: Typed, now: Fitted | None) -> Iterator[Slip]:
     ):  # fmt: skip
         words = f"the control points do not fit as typed; they fit with {words}."
         yield Slip(meant=replace(typed, control=meant), words=words, mended=False)
-    words = "col1, row1 and col2, row2 of the control points are exchanged; they were put right."
+    words = "col1, row1 of the control points belong to the second photo; the picks were exchanged."
     yield Slip(meant=replace(typed, control=control.exchanged()), words=words)
     few = list(range(count)) if now is None else np.flatnonzero(now.lost).tolist()
     for a, b in combinations(few, 2) if len(few) <= 7 else ():

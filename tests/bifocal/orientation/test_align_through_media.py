@@ -564,7 +564,7 @@ def test_unknown_lenses_are_named_where_control_does_not_make_up_for_them(
 ):
     """Before photos are matched: control off the wall by 2 to 5 cm, picked to 0.3 px."""
     monkeypatch.setattr(absolute_orientation, "HOPELESS", 0.3)
-    monkeypatch.setattr(absolute_orientation, "_ties", lambda *_, **__: pytest.fail("matched"))
+    monkeypatch.setattr(absolute_orientation, "ties_of", lambda *_, **__: pytest.fail("matched"))
     rng = np.random.default_rng(seed)
     taken, media, placed = cameras(kind)
     xyz = points(rng, count, relief)

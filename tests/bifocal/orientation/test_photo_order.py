@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from bifocal.collimation.job_tasks import task_of
-from bifocal.orientation import absolute_orientation
+from bifocal.orientation import approximate_orientation
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.align_workflow import AlignOptions, KnownLens, _way, align_photos
+from bifocal.orientation.approximate_orientation import Given, order_of
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.orientation_stages import PhotoInput
@@ -70,6 +71,24 @@ def test_a_flat_wall_shows_no_order() -> None:
     assert abs(first_is_far((flat.far, flat.near), ties(FAR, NEAR))) < SURE
 
 
+def test_lenses_alike_leave_no_order_to_ask(views, monkeypatch) -> None:
+    """What was typed for one photo fits the other as well: the scale on the wall tells."""
+    monkeypatch.setattr(approximate_orientation, "first_is_far", lambda *_: pytest.fail("asked"))
+    photos = tuple(replace(p, interior=typed(FAR)) for p in inputs(views.far, views.near))
+    given = Given(photos=(photos[0], photos[1]), control=Control(), site=SITE)
+    assert order_of(given, ties(FAR, NEAR)) == np.inf
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_the_order_is_asked_where_a_lens_is_unknown(views, known) -> None:
+    """Both distances then make up for the lens, whichever photo they belong to."""
+    first, second = inputs(views.near, views.far)
+    lens = replace(first.interior, is_typed=False) if known else Interior.unknown(SIZE)
+    photos = replace(first, interior=lens), replace(second, interior=Interior.unknown(SIZE))
+    given = Given(photos=photos, control=Control(), site=SITE)
+    assert order_of(given, ties(NEAR, FAR)) < -SURE
+
+
 @pytest.mark.acceptance
 def test_photos_in_the_wrong_order_keep_the_sign_of_relief(views) -> None:
     made = orient_pair(inputs(views.near, views.far), control=Control(), site=SITE)
@@ -86,14 +105,14 @@ def test_photos_in_the_wrong_order_keep_the_sign_of_relief(views) -> None:
 
 @pytest.mark.acceptance
 def test_an_order_that_nothing_tells_is_asked(views, monkeypatch) -> None:
-    monkeypatch.setattr(absolute_orientation, "first_is_far", lambda *_: -2.0)
+    monkeypatch.setattr(approximate_orientation, "first_is_far", lambda *_: -2.0)
     made = orient_pair(inputs(views.far, views.near), control=Control(), site=SITE)
     assert not made.exchanged
     assert "cannot be told" in made.remarks[0]
 
 
 def test_missing_focal_lengths_are_found_before_the_work(views, monkeypatch) -> None:
-    monkeypatch.setattr(absolute_orientation, "find_features", lambda *_: pytest.fail("worked"))
+    monkeypatch.setattr(approximate_orientation, "find_features", lambda *_: pytest.fail("worked"))
     unknown = [
         replace(photo, interior=Interior.unknown(SIZE)) for photo in inputs(views.far, views.near)
     ]

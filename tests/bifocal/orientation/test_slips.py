@@ -5,10 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifocal.orientation.absolute_orientation import orient_pair
+from bifocal.orientation import absolute_orientation
+from bifocal.orientation.absolute_orientation import _with_words, orient_pair
+from bifocal.orientation.alignment import make_alignment
+from bifocal.orientation.approximate_orientation import Given
+from bifocal.orientation.bend import WallBend
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.orientation_remarks import hopeless_bend
 from bifocal.orientation.orientation_stages import PhotoInput
+from bifocal.orientation.pair_observations import PairObservations
+from bifocal.orientation.slips import slip_of
 from photocore.camera import project
 from photocore.errors import GeometryError
 from tests.bifocal.orientation.layered_wall import SIZE, camera
@@ -59,7 +66,9 @@ def off(made, cameras=OBLIQUE) -> float:
     ("times", "said"),
     [
         ((36 / SENSOR, 36 / SENSOR), r"35-mm equivalent: 29.1 and 16.4 mm on this sensor"),
-        ((1.5, 1.5), "probably its height: 34.1 mm was taken"),
+        pytest.param(
+            (1.5, 1.5), "probably its height: 34.1 mm was taken", marks=pytest.mark.acceptance
+        ),
         ((1.35, 1.0), "contradict the control points and were left out"),
     ],
 )
@@ -74,6 +83,7 @@ def focals() -> str:
     return " and ".join(f"{cam.matrix[0, 0] * SENSOR / SIZE[0]:.3g}" for cam in OBLIQUE)
 
 
+@pytest.mark.acceptance
 def test_a_crop_factor_left_out_of_the_sensor_is_named() -> None:
     made = orient_pair(photos(times=(1 / 1.6,) * 2), control=control(), site=SiteMeasures())
     assert "(crop factor 1.6) and was taken" in made.remarks[0]
@@ -109,7 +119,10 @@ def from_bottom(pixels: np.ndarray) -> np.ndarray:
          "row1, row2 seem to count from the bottom"),
         (lambda c: replace(c, xyz=c.xyz * [1, -1, 1]), "the sign of Y changed"),
         (lambda c: replace(c, xyz=c.xyz[:, [1, 0, 2]]), "with X and Y exchanged"),
-        (lambda c: replace(c, xyz=c.xyz * [1, 1, -1]), "with the sign of r changed"),
+        pytest.param(
+            lambda c: replace(c, xyz=c.xyz * [1, 1, -1]), "with the sign of r changed",
+            marks=pytest.mark.acceptance,
+        ),
     ],
 )  # fmt: skip
 def test_a_control_table_that_counts_otherwise_is_refused_by_name(slip, said) -> None:
@@ -133,9 +146,49 @@ def test_distances_in_the_wrong_order_are_exchanged() -> None:
     made = orient_pair(photos(), control=control(), site=site)
     assert "the two distances were exchanged" in made.remarks[0]
     assert off(made) < 0.002
+    assert not made.exchanged
 
 
-@pytest.mark.parametrize("seed", range(4))
+def test_the_near_photo_first_takes_its_own_distance_along(monkeypatch) -> None:
+    """And slips are looked for once, before the photos are exchanged."""
+    asked = []
+    monkeypatch.setattr(
+        absolute_orientation, "slip_of", lambda *given, **how: asked.append(slip_of(*given, **how))
+    )
+    far, near = photos()
+    site = SiteMeasures(distance1=9.0, distance2=16.0)
+    made = orient_pair((near, far), control=control().exchanged(), site=site)
+    assert made.exchanged
+    assert "Image 1 of the pair file is far.jpg, and --distance2 means its" in made.remarks[0]
+    assert off(made) < 0.002
+    assert asked == [None]
+
+
+def test_a_doubt_comes_first_and_leaves_nothing_called_good() -> None:
+    """A wall bent by 3 px, control that fits."""
+    pair = orient_pair(photos(), control=control(), site=SiteMeasures())
+    given = Given(photos=photos(), control=control(), site=SiteMeasures())
+    told = [
+        _with_words(replace(pair, remarks=(), bend=bend), given, ("Something else.",))
+        for bend in (WallBend(0.1, 0.01), WallBend(3.0, 0.1))
+    ]
+    fine, bent = (make_alignment(one, photos(), way="control") for one in told)
+    assert "relief is good to" in " ".join(fine.words)
+    assert "relief is good to" not in " ".join((*bent.words, *bent.setup["words"]))
+    assert bent.remarks[0].startswith("THE MODEL DOES NOT FIT")
+    assert bent.setup["doubts"] == [bent.remarks[0]]
+
+
+def test_a_bend_that_is_not_certain_refuses_nothing() -> None:
+    """The refusal was empty then."""
+    seen = PairObservations(interiors=(photos()[0].interior, photos()[1].interior))
+    assert not hopeless_bend(seen, WallBend(1.2, 0.6))
+    assert hopeless_bend(seen, WallBend(3.0, 0.6)).startswith("THE MODEL DOES NOT FIT")
+
+
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.acceptance) for seed in (1, 2, 3))]
+)
 def test_clean_control_is_charged_with_no_slip(seed) -> None:
     for cameras in (OBLIQUE, SQUARE):
         rng = np.random.default_rng(seed)
