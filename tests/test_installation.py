@@ -49,7 +49,7 @@ def test_nobody_is_told_to_install_what_is_not_ours():
     [
         ("opencv-python-headless", "4.10.0.84", "opencv-python-headless 4.10.0.84 is too old, 5.0"),
         ("opencv-python", "4.9.0", "pip uninstall -y opencv-python; "),
-        ("numpy", "1.25.2", '-m pip install --force-reinstall "numpy>=1.26"'),
+        ("numpy", "1.25.2", '-m pip install --force-reinstall "numpy>=2.0"'),
     ],
 )
 @pytest.mark.parametrize("program", [main, multimedia])

@@ -192,7 +192,10 @@ def _level_points(xyz: FloatArray, steepest: float) -> BoolArray:
                 break
         else:
             rise = float(np.std(design[kept, 1:] @ plane[1:]))
-            steep = float(np.hypot(*plane[1:])) > steepest and rise > scatter
+            # Surface and bottom lie on a plane as well where each is a line of points: a step.
+            heights = np.sort(around[kept, 2])
+            is_step = np.diff(heights)[3:-3].max(initial=0.0) > 0.6 * (heights[-1] - heights[0])
+            steep = float(np.hypot(*plane[1:])) > steepest and rise > scatter and not is_step
             level[row] = not (steep and abs(plane[0]) <= 3.0 * scatter)
     return level
 

@@ -222,7 +222,7 @@ def test_control_points_and_tapes_are_typed_and_mended(page: Driver) -> None:
     page.click("dialog-yes")
     state = page.settled("state.control.length === 2")
     assert [state["control"][0][key] for key in ("X", "Y", "r")] == [0.5, 1.25, None]
-    page.tab.get_by_label("r A").fill("0,1")
+    page.tab.get_by_label("r A", exact=True).fill("0,1")
     page.keys("Enter")
     page.settled("state.control[0].r === 0.1")
     for index, text in enumerate(("A", "B", "3,002", "0.005")):
@@ -230,10 +230,10 @@ def test_control_points_and_tapes_are_typed_and_mended(page: Driver) -> None:
     page.click("tape-add")
     tape = page.settled("state.tapes.length === 1")["tapes"][0]
     assert (tape["length"], tape["sigma"]) == (3.002, 0.005)
-    page.tab.get_by_label("r A").fill("ten")
+    page.tab.get_by_label("r A", exact=True).fill("ten")
     page.keys("Enter")
     # No number: said at the field, and nothing sent.
-    assert page.tab.get_by_label("r A").evaluate("(field) => !field.validity.valid")
+    assert page.tab.get_by_label("r A", exact=True).evaluate("(field) => !field.validity.valid")
     assert page.state["control"][0]["r"] == 0.1
     page.tab.get_by_role("button", name="Delete A", exact=True).click()
     page.settled("state.control.length === 1 && state.tapes.length === 0")
