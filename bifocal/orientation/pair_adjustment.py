@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.stats import chi2, norm
 
 from bifocal.model.orientation_precision import CAMERA, NAMES, names_of, place_by_media
 from bifocal.model.refracted_view import RefractedView
@@ -456,7 +457,8 @@ def _control_test(
     """Return each control point's misfit in standard deviations, as if it had been left out.
 
     With residual block w, its Jacobian A and the cofactor Q of the parameters,
-    ``T² = wᵀ (I - A Q Aᵀ)⁻¹ w`` per coordinate; unused points are tested against the others.
+    ``T² = wᵀ (I - A Q Aᵀ)⁻¹ w``, of as many values as are seen, and the standard deviations of one
+    value that are as unlikely; unused points are tested against the others.
     """
     control, out = observations.control, np.zeros(len(observations.control.ids))
     if not control.ids:
@@ -466,7 +468,7 @@ def _control_test(
     missing = np.isnan(np.concatenate([control.pixels1, control.pixels2], axis=1)).sum(axis=1)
     for index in np.flatnonzero(missing < 4):
         if not observations.pick_used[index]:
-            out[index] = np.linalg.norm(others[index]) / np.sqrt(4 - missing[index])
+            out[index] = _as_one(float((others[index] ** 2).sum()), int(4 - missing[index]))
             continue
         block = adjusted.by_unknowns[index]
         # A point that alone determines something has no redundancy: its test says nothing.
@@ -475,8 +477,14 @@ def _control_test(
         usable = values > 0.02
         count = int(usable.sum() - missing[index])
         if count > 0:
-            out[index] = np.sqrt((parts[usable] / values[usable]).sum() / count)
+            out[index] = _as_one(float((parts[usable] / values[usable]).sum()), count)
     return out
+
+
+def _as_one(square: float, count: int) -> float:
+    """Return how many standard deviations of one value are as unlikely as a square sum of many."""
+    chance = float(chi2.sf(square, count))
+    return float(norm.isf(chance / 2)) if chance > 1e-300 else float(np.sqrt(square))
 
 
 #: Where the cameras' `PARAMETERS` and the distortions stand in `NAMES`.
