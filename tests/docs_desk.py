@@ -151,7 +151,7 @@ def _pair(folder: Path, name: str, part: tuple[int, int], files: tuple[str, str]
         small.save(folder / file, quality=95, exif=exif)
         sides.append(replace(
             photo, file=file, plane_from_pixel=photo.plane_from_pixel @ whole,
-            principal_distance=focal,
+            principal_distance=focal, image_size=(last - first, SIZE[1]),
         ))  # fmt: skip
     replace(pair, image1=sides[0], image2=sides[1]).write(folder / f"{name}.pair.json")
 

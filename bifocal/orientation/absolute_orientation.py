@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bifocal.model.doubts import CERTAIN
 from bifocal.orientation import validation
 from bifocal.orientation.approximate_orientation import (
     Given,
@@ -21,7 +22,7 @@ from bifocal.orientation.approximate_orientation import (
     ties_of,
 )
 from bifocal.orientation.as_set_up import check_room
-from bifocal.orientation.bend import WallBend, bend_of_wall
+from bifocal.orientation.bend import STRONGLY_BENT, WallBend, bend_of_wall
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.interior_orientation import with_one_lens
 from bifocal.orientation.media_report import media_remarks, refuse_impossible_media
@@ -146,7 +147,8 @@ def _oriented(given: Given) -> OrientedPair:
         right = _mended_by_ties(given, ties, pair.observations)
         if right is not None:
             return right
-    bent = "" if enough else hopeless_bend(pair.observations, pair.bend)
+    certain = pair.bend.px - CERTAIN * pair.bend.sigma > STRONGLY_BENT
+    bent = hopeless_bend(pair.observations, pair.bend) if certain and not enough else ""
     if bent and likely_on_wall(pair.observations, pair.adjusted) < FEWEST_ON_WALL:
         raise GeometryError(bent)  # what holds a bent wall by small chances only is none
     return _with_words(pair, given, remarks)

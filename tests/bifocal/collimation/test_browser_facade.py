@@ -20,6 +20,7 @@ from tests.browser import (
     tab_of,
     true_pixel,
 )
+from tests.page_session import opened
 
 CHECKED = {"T17": (-1.62, 1.6, 0.08332), "T18": (1.62, 1.6, 0.08282)}
 
@@ -108,8 +109,10 @@ def test_a_thousand_points_pan_nearly_as_smoothly_as_none(browser: Any, tmp_path
     with sample_survey(tmp_path) as server, tab_of(browser, server) as page:
         page.tab.wait_for_timeout(800)
         empty = page.frames()
-        points = [{"name": f"Q{k:04d}", "picks": [at, at]} for k, at in enumerate(places)]
-        page.command("points.add", points=points)
+    points = [{"name": f"Q{k:04d}", "picks": [at, at]} for k, at in enumerate(places)]
+    with opened(tmp_path / "facade.pair.json") as session:
+        session.command({"op": "points.add", "points": points})
+    with served(tmp_path, "facade.pair.json") as server, tab_of(browser, server) as page:
         page.settled("state.points.length === 1000")
         assert page.tab.get_by_test_id("point-list").locator("tbody tr").count() == 1000
         page.tab.wait_for_timeout(500)

@@ -12,7 +12,6 @@ from bifocal.files.images import as_grey, read_grey, write_image
 from bifocal.orientation import homologous_points, photo_alignment
 from bifocal.orientation.matching import match_pair
 from bifocal.orientation.orientation_stages import OrientedPair
-from bifocal.relief_maps import dense_matching
 from photocore.errors import GeometryError, InputError
 from tests.scenes import RICH, Scene, bifocal_cameras, render
 from tests.scenes.rendering import Haze
@@ -138,7 +137,7 @@ def test_relief_and_points_in_turbid_water_are_better_for_it(monkeypatch):
     assert error < 0.06
     ours = errors()
     monkeypatch.setattr(
-        dense_matching, "greys_through_water",
+        "bifocal.files.haze.greys_through_water",
         lambda one, two: (as_grey(one, "image1"), as_grey(two, "image2")),
     )  # fmt: skip
     mean_of_channels = errors()
