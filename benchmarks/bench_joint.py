@@ -11,8 +11,8 @@ import time
 
 import numpy as np
 
-from bifocal.orientation.joint_adjustment import adjust_jointly
-from photocore.camera import project_with_jacobian
+from bifocal.networks.joint_adjustment import adjust_jointly
+from photocore.camera.pinhole import project_with_jacobian
 from tests.bifocal.orientation.many_pairs import many_pairs
 
 

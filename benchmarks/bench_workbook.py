@@ -66,7 +66,7 @@ def write_openpyxl(path, rows=ROWS):
 
 
 def write_ours(path, rows=ROWS):
-    from photocore.workbook.editor import WorkbookEditor
+    from photocore.workbook.changing.editor import WorkbookEditor
 
     first = path.with_name("first.xlsx")
     start(1, rows).save(first)
@@ -116,7 +116,7 @@ def child(job, path):
     import openpyxl  # noqa: F401
 
     import photocore.tables
-    import photocore.workbook.editor  # noqa: F401
+    import photocore.workbook.changing.editor  # noqa: F401
 
     base, begin = memory(), time.process_time()
     JOBS[job](path)

@@ -9,6 +9,9 @@ from .equations import (
     relief_from_displacement,
 )
 from .files.provenance import recording
+from .matching.homologous_points import match
+from .matching.matching import Matches, MatchSettings
+from .model.interior_orientation import Interior
 from .model.intersection import Intersection
 from .model.lens import Lens
 from .model.pair import Pair
@@ -16,9 +19,6 @@ from .model.photo import Photo
 from .model.relief_map import Quality, ReliefMap
 from .orientation.alignment import Alignment
 from .orientation.control_points import Control, SiteMeasures
-from .orientation.homologous_points import match
-from .orientation.interior_orientation import Interior
-from .orientation.matching import Matches, MatchSettings
 from .orientation.pair_media import PairMedia
 from .orientation.photo_alignment import align
 from .orthophotos.compose import orthophoto

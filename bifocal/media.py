@@ -24,7 +24,7 @@ import numpy as np
 
 from multimedia import Layers, radial_shift_ratio
 from photocore.arrays import BoolArray, FloatArray
-from photocore.rotation import rotation_from_vector
+from photocore.camera.rotation import rotation_from_vector
 
 #: Step of the derivatives by the media; central differences are then right to 1e-9. [-, m, rad]
 _STEP = 1e-5

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from bifocal.equations import relief_displacement
 from bifocal.media import MediaPath, ObjectRays
 from photocore.arrays import BoolArray, FloatArray
-from photocore.distortion import inverse_2x2
+from photocore.camera.distortion import inverse_2x2
 
 
 class Foot(NamedTuple):

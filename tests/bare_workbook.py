@@ -6,7 +6,7 @@ import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from photocore.workbook.xmltext import escaped
+from photocore.workbook.reading.xmltext import escaped
 
 
 def relations(*items: tuple[str, str]) -> str:

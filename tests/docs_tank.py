@@ -22,7 +22,7 @@ from multimedia.openptv.experiment import write_experiment
 from multimedia.projects.model import ImagePoints, ObjectPoints, Project
 from multimedia.projects.project_file import read_project, write_project
 from multimedia.refraction.layers import Layers
-from photocore.distortion import Brown, Convention
+from photocore.camera.distortion import Brown, Convention
 from tests.multimedia.rendered_boards import Housing, chessboard, photo, poses
 from tests.multimedia.tank import LAYERS, SENSOR, cameras, control
 

@@ -32,7 +32,7 @@ from multimedia.openptv.experiment import read_experiment
 from multimedia.projects.dem import Dem
 from multimedia.projects.project_file import read_project
 from multimedia.projects.surface_files import read_water_surface
-from photocore.boards import detect_board
+from photocore.camera.boards import detect_board
 from photocore.cloud import open_cloud
 from photocore.errors import PhotogrammetryError
 from photocore.raster import Window

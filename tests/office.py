@@ -13,10 +13,10 @@ from pathlib import Path
 import openpyxl
 import pytest
 
-from photocore.workbook.changes import SheetChanges
-from photocore.workbook.package import open_package, read_part, rewrite_package
-from photocore.workbook.splice import splice_sheet
-from photocore.workbook.xlsx import read_directory
+from photocore.workbook.changing.changes import SheetChanges
+from photocore.workbook.changing.splice import splice_sheet
+from photocore.workbook.reading.package import open_package, read_part, rewrite_package
+from photocore.workbook.reading.xlsx import read_directory
 
 
 def strip_results(source: Path, target: Path) -> Path:

@@ -113,7 +113,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         ),
     ),
     (
-        "bifocal/orientation/joint_media.py",
+        "bifocal/networks/joint_media.py",
         "tests/bifocal/orientation/test_adjustment_through_media.py",
         (
             ("by_camera[:, :, 4:7] += view.by_media", "by_camera[:, :, 4:7] -= view.by_media"),
@@ -318,21 +318,21 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     ),
     # The common ground
     (
-        "photocore/camera.py",
-        "tests/photocore/test_camera.py",
+        "photocore/camera/pinhole.py",
+        "tests/photocore/camera/test_pinhole.py",
         (("scale = scale / -distance", "scale = scale / distance"),),
     ),
     (
-        "photocore/rotation.py",
-        "tests/photocore/test_rotation.py",
+        "photocore/camera/rotation.py",
+        "tests/photocore/camera/test_rotation.py",
         (
             ("[0.0, co, -so * cp], [0.0, so, co * cp]", "[0.0, co, so * cp], [0.0, so, co * cp]"),
             ("y * c - z * b", "z * b - y * c"),
         ),
     ),
     (
-        "photocore/similarity.py",
-        "tests/photocore/test_similarity.py",
+        "photocore/camera/similarity.py",
+        "tests/photocore/camera/test_similarity.py",
         (("(length + (p[:, 1] * q[:, 2]).sum()) / total", "length / total"),),
     ),
     (
@@ -355,8 +355,8 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         ),
     ),
     (
-        "photocore/workbook/cells.py",
-        "photocore/workbook/cells.py tests/photocore/workbook/test_editor.py",
+        "photocore/workbook/changing/cells.py",
+        "photocore/workbook/changing/cells.py tests/photocore/workbook/test_editor.py",
         (("{piece}{row + offset}", "{piece}{row - offset}"),),
     ),
     # Through water

@@ -13,9 +13,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from photocore.workbook.grid import TableArea, cell_name, split_area, split_cell
-from photocore.workbook.package import local, new_parser, open_package, read_part
-from photocore.workbook.xlsx import (
+from photocore.workbook.reading.grid import TableArea, cell_name, split_area, split_cell
+from photocore.workbook.reading.package import local, new_parser, open_package, read_part
+from photocore.workbook.reading.xlsx import (
     SheetPart,
     Workbook,
     read_directory,

@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.peers.comparison import Comparison, Task, Tool
 from benchmarks.peers.images import width_of
 from bifocal import Interior, SiteMeasures, align
-from photocore.similarity import fit_similarity
+from photocore.camera.similarity import fit_similarity
 from tests.scenes import SetupErrors, bifocal_cameras, facade, render
 
 

@@ -13,7 +13,7 @@ from scipy.stats import f as f_distribution
 
 from bifocal.model.lens import Lens
 from photocore.arrays import FloatArray, IntArray
-from photocore.boards import BoardView
+from photocore.camera.boards import BoardView
 from photocore.errors import GeometryError, InputError
 
 #: A photo whose RMS is this many times the median is named; beyond the second it is left out.

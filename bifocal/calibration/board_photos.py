@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bifocal.calibration.board_calibration import Calibration, lens_of_views
 from bifocal.files.images import as_grey
 from photocore.arrays import ByteArray
-from photocore.boards import (
+from photocore.camera.boards import (
     BoardView,
     checked_board,
     detect_board,

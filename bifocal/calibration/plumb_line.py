@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 
 from bifocal.model.lens import Lens
 from photocore.arrays import ByteArray, FloatArray, as_points
-from photocore.camera import camera_matrix
+from photocore.camera.pinhole import camera_matrix
 from photocore.errors import GeometryError, InputError
 
 #: A line must be this share of the photo's width to tell anything of distortion.

@@ -13,7 +13,7 @@ import numpy as np
 
 from bifocal.campaigns.survey_file import FORMAT
 from bifocal.files.images import ImageInfo, image_info, read_grey
-from bifocal.orientation.features import Features, find_features, match_features
+from bifocal.matching.features import Features, find_features, match_features
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable, relative_name

@@ -12,7 +12,7 @@ from typing import Any
 from bifocal.campaigns.pair_job import FILES, JOINT_OPTIONS, PRODUCTS, PairJob, tables_of
 from photocore.errors import InputError
 from photocore.textfile import file_name, read_toml
-from photocore.workbook.words import LANGUAGES
+from photocore.workbook.making.words import LANGUAGES
 
 FORMAT = "bifocal-survey/1"
 

@@ -43,7 +43,7 @@ def joint_step(jobs: Sequence[PairJob]) -> Step:
     options = {name: said[name] for name in JOINT_OPTIONS if name in said}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
-        from bifocal.orientation.joint_workflow import JointTask, adjust_pairs
+        from bifocal.networks.joint_workflow import JointTask, adjust_pairs
 
         task = JointTask(
             control=tuple(job.files.get("control") for job in jobs),

@@ -49,7 +49,7 @@ def command(
     for each PAIR, and points.csv with coordinates, precision and misfits. What contradicts the
     rest takes no part and is named. Fewer than three control points: the first pair is held.
     """
-    from bifocal.orientation.joint_workflow import JointTask, adjust_pairs
+    from bifocal.networks.joint_workflow import JointTask, adjust_pairs
 
     task = JointTask(control=_tables(control), check=_tables(check), unit=unit or "", **sigmas)
     with progress_bar("adjust", quiet=as_json) as progress:

@@ -56,8 +56,8 @@ def command(
     Discs, chequers and coded markers are found and measured by their centres; natural detail is
     matched along the radial lines. Every point is checked by how far off its line it fits.
     """
+    from bifocal.matching.matching import MatchSettings
     from bifocal.orientation.match_workflow import match_photos, match_summary
-    from bifocal.orientation.matching import MatchSettings
     from bifocal.survey.pair_workflow import is_workbook, read_pair
 
     if relief_min is not None and relief_max is not None and relief_min >= relief_max:

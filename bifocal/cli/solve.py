@@ -9,7 +9,7 @@ import click
 
 from photocore.cli import print_json, remark, text_table
 from photocore.options import FILE, FOCAL, NEW_TABLE, TABLE, as_json, choice, number, overwrite
-from photocore.workbook.words import LANGUAGES
+from photocore.workbook.making.words import LANGUAGES
 
 EXAMPLE = """\b
 Examples:
@@ -104,7 +104,7 @@ def command(
     )
     from bifocal.survey.workflow import solve
     from photocore.output import check_not_input
-    from photocore.workbook.newbook import check_new_workbook
+    from photocore.workbook.making.newbook import check_new_workbook
 
     if out is not None:
         if out.suffix.lower() == ".csv":

@@ -8,7 +8,7 @@ import click
 
 from photocore.cli import remark
 from photocore.options import FILE, overwrite
-from photocore.workbook.words import LANGUAGES
+from photocore.workbook.making.words import LANGUAGES
 
 EXAMPLE = """\b
 Examples:

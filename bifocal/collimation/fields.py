@@ -8,7 +8,7 @@ from typing import Any
 from bifocal.collimation.records import CODES, Pixel
 from bifocal.collimation.stated_media import INDICES, MEDIA, check_index
 from photocore.errors import InputError
-from photocore.workbook.words import LANGUAGES
+from photocore.workbook.making.words import LANGUAGES
 
 Fields = Mapping[str, Any]
 #: Takes a command and a key; returns the value, or raises `FieldError`.

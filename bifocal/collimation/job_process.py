@@ -11,6 +11,7 @@ from typing import Any
 
 from bifocal.collimation.stated_media import media_from_dict
 from bifocal.files.geotiff import gsd_at_scale
+from bifocal.matching.matching import MatchSettings
 from bifocal.orientation.align_workflow import (
     AlignOptions,
     KnownLens,
@@ -19,7 +20,6 @@ from bifocal.orientation.align_workflow import (
 )
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.match_workflow import match_pair_file
-from bifocal.orientation.matching import MatchSettings
 from bifocal.orthophotos.deliver_workflow import DPI, DeliverTask, default_title, deliver
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
 from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair

@@ -11,6 +11,7 @@ from bifocal.collimation.records import PickedControl, SurveyState
 from bifocal.collimation.stated_media import lacking, media_of
 from bifocal.collimation.wording import say, without_options
 from bifocal.files.images import ImageInfo
+from bifocal.model.interior_orientation import Interior
 from bifocal.model.orientation_precision import CAMERA, names_of, place_by_media
 from bifocal.model.pair import Pair
 from bifocal.model.refracted_view import RefractedView, foot_of
@@ -18,13 +19,12 @@ from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.align_workflow import SIGMA_ON_WALL, KnownLens, interior_of_photo
 from bifocal.orientation.alignment import standard_deviations
 from bifocal.orientation.control_points import Control, SiteMeasures
-from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
 from bifocal.orientation.pair_observations import at
 from bifocal.orientation.refracted_observations import views_of
 from bifocal.rays import object_rays
 from photocore.arrays import FloatArray
-from photocore.camera import PARAMETERS, ProjectedPoints, ray_on_plane
+from photocore.camera.pinhole import PARAMETERS, ProjectedPoints, ray_on_plane
 from photocore.errors import PhotogrammetryError
 
 #: Points that stand out or lie back by this part of the near distance are thought of.

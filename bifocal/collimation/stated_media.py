@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.model.pair import Pair
-from bifocal.orientation.joint_media import media_of as media_of_cameras
+from bifocal.networks.joint_media import media_of as media_of_cameras
 from bifocal.orientation.pair_media import PairMedia
 from multimedia import Layers
 from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX

@@ -33,10 +33,10 @@ from photocore.output import (
     relative_name,
     scratch_beside,
 )
-from photocore.workbook.cells import CellValue, name_cell
-from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.grid import TableArea
-from photocore.workbook.named_cells import place_of
+from photocore.workbook.changing.cells import CellValue, name_cell
+from photocore.workbook.changing.editor import WorkbookEditor
+from photocore.workbook.changing.named_cells import place_of
+from photocore.workbook.reading.grid import TableArea
 
 #: Rows added at once where the prepared ones are used up.
 MORE_ROWS = 50

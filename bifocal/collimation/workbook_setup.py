@@ -10,7 +10,7 @@ from bifocal.survey.pair_workflow import read_pair
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.workbook.reader import read_survey
 from photocore.errors import InputError
-from photocore.workbook.cells import CellValue
+from photocore.workbook.changing.cells import CellValue
 
 
 def pair_of(files: SurveyFiles) -> Pair | None:

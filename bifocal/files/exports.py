@@ -16,7 +16,7 @@ from photocore.cloud import write_cloud
 from photocore.errors import InputError
 from photocore.output import atomic_path
 from photocore.tables import write_csv
-from photocore.workbook.newbook import new_workbook, plain_cell, save_book
+from photocore.workbook.making.newbook import new_workbook, plain_cell, save_book
 
 #: Point lists as surveyors name them: P point, N north, E east, Z height, D description.
 ORDERS = ("PNEZD", "PENZD")

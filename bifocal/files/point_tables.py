@@ -11,7 +11,7 @@ from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, Table, open_tables, read_named_values, read_table
 from photocore.tables.convert import NOT_CALCULATED
-from photocore.workbook.grid import SheetFile
+from photocore.workbook.reading.grid import SheetFile
 
 _COLUMNS = (
     Column("id", aliases=("Point", "Punto", "Punkt", "Name"), kind="text", required=True),

@@ -10,7 +10,7 @@ import numpy as np
 from bifocal import rays
 from bifocal.model.flags import FlagLimits, point_flags
 from photocore.arrays import FloatArray
-from photocore.distortion import inverse_2x2
+from photocore.camera.distortion import inverse_2x2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -17,9 +17,9 @@ from photocore.arrays import (
     not_negative,
     read_only,
 )
+from photocore.camera.lensformats import read_foreign_lens
 from photocore.errors import InputError, located
 from photocore.jsonfile import read_object, write_object
-from photocore.lensformats import read_foreign_lens
 
 FORMAT = "bifocal-lens/1"
 #: Key of `Lens.extra`: relative standard deviation of a principal distance that was assumed.

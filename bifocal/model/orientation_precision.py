@@ -20,7 +20,7 @@ from bifocal.model.refracted_view import (
 )
 from multimedia import Layers
 from photocore.arrays import FloatArray, as_floats, read_only
-from photocore.camera import (
+from photocore.camera.pinhole import (
     PARAMETERS,
     Pinhole,
     ProjectedPoints,

@@ -26,7 +26,7 @@ from photocore.arrays import (
     positive,
     read_only,
 )
-from photocore.distortion import inverse_2x2
+from photocore.camera.distortion import inverse_2x2
 from photocore.errors import GeometryError, InputError, located
 
 #: No wall is photographed from further away, nor has coordinates beyond. [m]

@@ -14,8 +14,8 @@ from bifocal import rays
 from bifocal.media import PLACING, MediaPath
 from multimedia import Layers
 from photocore.arrays import FloatArray
-from photocore.camera import Pinhole, project, project_with_jacobian
-from photocore.distortion import inverse_2x2
+from photocore.camera.distortion import inverse_2x2
+from photocore.camera.pinhole import Pinhole, project, project_with_jacobian
 
 
 class RefractedView(NamedTuple):

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from bifocal.model.doubts import CERTAIN
+from bifocal.model.interior_orientation import with_one_lens
 from bifocal.orientation import validation
 from bifocal.orientation.approximate_orientation import (
     Given,
@@ -24,7 +25,6 @@ from bifocal.orientation.approximate_orientation import (
 from bifocal.orientation.as_set_up import check_room
 from bifocal.orientation.bend import STRONGLY_BENT, WallBend, bend_of_wall
 from bifocal.orientation.control_points import Control, SiteMeasures
-from bifocal.orientation.interior_orientation import with_one_lens
 from bifocal.orientation.media_report import media_remarks, refuse_impossible_media
 from bifocal.orientation.orientation_remarks import (
     WORST_FIT,

@@ -12,6 +12,7 @@ import numpy as np
 from bifocal.files.haze import read_greys
 from bifocal.files.images import WRITTEN, ImageInfo, image_info
 from bifocal.model.basis import rests_on
+from bifocal.model.interior_orientation import Interior, lens_of_photo
 from bifocal.model.lens import Lens
 from bifocal.model.photo import FARTHEST_WALL
 from bifocal.orientation.absolute_orientation import orient_pair
@@ -19,7 +20,6 @@ from bifocal.orientation.alignment import Alignment, make_alignment, with_files
 from bifocal.orientation.alignment_picture import write_alignment_picture
 from bifocal.orientation.as_set_up import pair_as_set_up
 from bifocal.orientation.control_points import Control, SiteMeasures, read_control, read_lengths
-from bifocal.orientation.interior_orientation import Interior, lens_of_photo
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.pair_media import THROUGH_MEDIA, PairMedia, media_of
 from photocore.arrays import FloatArray

@@ -11,12 +11,12 @@ import numpy as np
 from bifocal import rays
 from bifocal.model.doubts import MISFIT
 from bifocal.model.homography import apply_homography
+from bifocal.model.interior_orientation import Cameras, Interior
 from bifocal.model.lens import Lens
 from bifocal.model.orientation_precision import CAMERA, NAMES, moved
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.orientation.facade_lines import LEAST_IN_LINE, facade_turn
-from bifocal.orientation.interior_orientation import Cameras, Interior
 from bifocal.orientation.media_report import media_in_words, straight_distance
 from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput, Photos
@@ -24,10 +24,13 @@ from bifocal.orientation.pair_adjustment import AdjustedPair
 from bifocal.orientation.pair_media import PairMedia
 from bifocal.orientation.pair_observations import PairObservations, at
 from bifocal.orientation.reference_plane import zero_sigma
-from bifocal.orientation.tie_points import robust_sigma, tie_positions
+from bifocal.orientation.tie_points import (
+    tie_positions,
+)
+from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera import Pinhole, camera_matrix, plane_from_pixel
-from photocore.distortion import RadialDivision
+from photocore.camera.distortion import RadialDivision
+from photocore.camera.pinhole import Pinhole, camera_matrix, plane_from_pixel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.files.images import write_image
+from bifocal.model.interior_orientation import Images
 from bifocal.model.photo import Photo
 from bifocal.orientation.alignment import Alignment
 from bifocal.orientation.area_points import resampled
-from bifocal.orientation.interior_orientation import Images
 from photocore.arrays import ByteArray, FloatArray
 
 #: Longer side of the picture. [px]

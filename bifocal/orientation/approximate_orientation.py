@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bifocal.matching.features import find_features
+from bifocal.model.interior_orientation import Cameras, Interiors
 from bifocal.orientation import validation
 from bifocal.orientation.control_points import Control, SiteMeasures
-from bifocal.orientation.features import find_features
-from bifocal.orientation.interior_orientation import Cameras, Interiors
 from bifocal.orientation.orientation_stages import SIGMA_PARALLEL, Photos
 from bifocal.orientation.pair_media import PairMedia
 from bifocal.orientation.pair_observations import PairObservations
@@ -22,11 +22,11 @@ from bifocal.orientation.relative_orientation import (
     plane_scale,
 )
 from bifocal.orientation.space_resection import resect
-from bifocal.orientation.tie_points import robust_sigma
+from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import BoolArray
-from photocore.camera import fundamental, ray_on_plane
+from photocore.camera.pinhole import fundamental, ray_on_plane
+from photocore.camera.similarity import Similarity, fit_plane
 from photocore.errors import GeometryError, located
-from photocore.similarity import Similarity, fit_plane
 
 #: Logarithms of a ratio of distances so far apart contradict each other; tilted cameras change the
 #: scale over the wall.

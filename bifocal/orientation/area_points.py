@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 
 from bifocal import rays
-from bifocal.orientation.interior_orientation import Images
+from bifocal.model.interior_orientation import Images
 from bifocal.orientation.pair_adjustment import AdjustedPair
 from bifocal.orientation.pair_observations import PairObservations
 from photocore.arrays import BoolArray, ByteArray, FloatArray
-from photocore.camera import project, ray_on_plane
+from photocore.camera.pinhole import project, ray_on_plane
 
 #: Pixels of the rectified photos.
 AREA = 1.0e6

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from bifocal.model.interior_orientation import Cameras
 from bifocal.model.orientation_precision import NAMES, of_distances
 from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orientation.interior_orientation import Cameras
 from bifocal.orientation.orientation_stages import OrientedPair, Photos
 from bifocal.orientation.pair_adjustment import AdjustedPair
 from bifocal.orientation.pair_media import PairMedia
 from bifocal.orientation.pair_observations import PairObservations, at
 from photocore.arrays import FloatArray
-from photocore.camera import Pinhole
+from photocore.camera.pinhole import Pinhole
 from photocore.errors import InputError
 
 

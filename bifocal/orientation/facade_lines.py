@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 
 from bifocal.model.homography import apply_homography
-from bifocal.orientation.interior_orientation import Cameras, Images, Interior, Interiors
+from bifocal.model.interior_orientation import Cameras, Images, Interior, Interiors
 from photocore.arrays import ByteArray, FloatArray
-from photocore.camera import Pinhole, plane_from_pixel
-from photocore.distortion import RadialDivision
+from photocore.camera.distortion import RadialDivision
+from photocore.camera.pinhole import Pinhole, plane_from_pixel
 
 #: Lines farther than this from the photo's own upright are not asked for the axes. [deg]
 WIDEST = 20.0

@@ -9,14 +9,14 @@ import numpy as np
 
 from bifocal.files.haze import read_greys
 from bifocal.files.images import photo_info
+from bifocal.matching.matching import Matches, MatchSettings, match_pair, precision
 from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
-from bifocal.orientation.matching import Matches, MatchSettings, match_pair, precision
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.template_workflow import write_survey
 from photocore.output import check_ending
 from photocore.tables import write_csv
-from photocore.workbook.newbook import check_new_workbook
+from photocore.workbook.making.newbook import check_new_workbook
 
 
 def match_photos(

@@ -16,7 +16,7 @@ from photocore.adjustment.priors import (
     is_possible,
     typical_sigma,
 )
-from photocore.camera import Pinhole
+from photocore.camera.pinhole import Pinhole
 from photocore.errors import GeometryError
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from bifocal import rays
-from bifocal.orientation.interior_orientation import Cameras
+from bifocal.model.interior_orientation import Cameras
 from bifocal.orientation.media_report import straight_distance
 from bifocal.orientation.pair_media import PairMedia
 from bifocal.precision import base_factor
-from photocore.camera import Pinhole
+from photocore.camera.pinhole import Pinhole
 
 
 def orientation_in_words(

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.model.interior_orientation import SIGMA_RADIAL, Cameras, Images, Interior
 from bifocal.model.orientation_precision import NAMES
 from bifocal.orientation import facade_lines, validation
 from bifocal.orientation.area_points import even_points
 from bifocal.orientation.bend import WallBend
 from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orientation.interior_orientation import SIGMA_RADIAL, Cameras, Images, Interior
 from bifocal.orientation.pair_adjustment import AdjustedPair, adjust, evaluated, line_test
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns, at
 from bifocal.orientation.reference_plane import (
@@ -27,7 +27,6 @@ from bifocal.orientation.reference_plane import (
 )
 from bifocal.orientation.tie_points import (
     refine_ties,
-    robust_sigma,
     tie_positions,
     wall_roughness,
     wall_test,
@@ -40,8 +39,9 @@ from bifocal.orientation.wall_planes import (
     planes_of_any_direction,
     steep_rivals_in_words,
 )
+from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import ByteArray
-from photocore.camera import plane_transfer
+from photocore.camera.pinhole import plane_transfer
 from photocore.errors import GeometryError
 
 #: "Image plane parallel to the wall" when nothing contradicts it. [rad]

@@ -31,14 +31,14 @@ from bifocal.orientation.refracted_observations import (
 from bifocal.orientation.refracted_ties import bent_equations, bent_misfit
 from photocore import adjustment
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera import (
+from photocore.camera.pinhole import (
     PARAMETERS,
     fundamental_with_jacobian,
     homogeneous,
     plane_transfer_with_jacobian,
 )
+from photocore.camera.rotation import skew
 from photocore.errors import GeometryError
-from photocore.rotation import skew
 
 #: Rounding error of pixels and metres, as a share of their standard deviations.
 ROUNDING = 1e-9

@@ -21,9 +21,9 @@ from bifocal.model.refracted_view import common_names
 from multimedia import Layers
 from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX, parse_prior, typical_sigma
 from photocore.arrays import FloatArray, not_negative, positive
-from photocore.camera import Pinhole
+from photocore.camera.pinhole import Pinhole
+from photocore.camera.rotation import rotation_from_vector
 from photocore.errors import InputError
-from photocore.rotation import rotation_from_vector
 
 #: Normal of one camera's interfaces: a direction in the plane frame, square to the optical axis, or
 #: None where they are parallel to the reference plane.

@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from bifocal.files.haze import greys_through_water
 from bifocal.files.images import as_grey
+from bifocal.model.interior_orientation import Interior
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import Alignment, make_alignment
 from bifocal.orientation.as_set_up import pair_as_set_up
 from bifocal.orientation.control_points import Control, SiteMeasures
-from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.pair_media import PairMedia
 from photocore.arrays import as_points

@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 
 from bifocal.model.homography import apply_homography
-from bifocal.orientation.interior_orientation import Images
+from bifocal.model.interior_orientation import Images
 from bifocal.orientation.relative_orientation import Ties
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera import homogeneous
+from photocore.camera.pinhole import homogeneous
 
 #: Longer side of the pictures that are compared, and blocks a side for the scatter. [px]
 SIDE, BLOCKS = 1500, 10

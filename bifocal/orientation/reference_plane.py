@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bifocal.model.interior_orientation import Cameras, Interior, Interiors
 from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orientation.interior_orientation import Cameras, Interior, Interiors
 from photocore.arrays import BoolArray, FloatArray, IntArray
+from photocore.camera.rotation import rotation_from_vector
 from photocore.errors import GeometryError
-from photocore.rotation import rotation_from_vector
 
 #: Half the thickness of a face, as a share of the far distance.
 BAND = 0.0012

@@ -13,7 +13,7 @@ from bifocal.orientation.pair_adjustment import AdjustedPair
 from bifocal.orientation.pair_observations import PairUnknowns
 from bifocal.orientation.refracted_observations import guessed_points, pixels_of
 from photocore.arrays import FloatArray
-from photocore.camera import project, ray_on_plane
+from photocore.camera.pinhole import project, ray_on_plane
 
 #: Draws of the cameras and media as uncertain as they are, and the bend that counts, in what they
 #: bend the wall by.

@@ -9,7 +9,7 @@ from bifocal.model.refracted_view import RefractedView, foot_of, seen_through, v
 from bifocal.orientation.pair_media import PairMedia
 from bifocal.orientation.pair_observations import Equations, PairObservations, PairUnknowns
 from photocore.arrays import FloatArray
-from photocore.camera import (
+from photocore.camera.pinhole import (
     ProjectedPoints,
     project,
     project_with_jacobian,

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from bifocal import rays
+from bifocal.model.interior_orientation import Interior
 from bifocal.model.refracted_view import foot_of
-from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.pair_media import PairMedia
 from bifocal.orientation.space_resection import resect
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera import Pinhole
+from photocore.camera.pinhole import Pinhole
 from photocore.errors import GeometryError
 
 #: Rounds in which points are put where they seem to be; it settles in three to six. Then the

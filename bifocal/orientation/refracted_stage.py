@@ -10,7 +10,11 @@ from bifocal.orientation.bend import BAND
 from bifocal.orientation.orientation_stages import OrientedPair
 from bifocal.orientation.pair_adjustment import adjust, evaluated
 from bifocal.orientation.relative_orientation import Ties
-from bifocal.orientation.tie_points import robust_sigma, tie_positions, without_gross_ties
+from bifocal.orientation.tie_points import (
+    tie_positions,
+    without_gross_ties,
+)
+from photocore.adjustment.outliers import robust_sigma
 
 #: Common points that take part, where each costs more than in air; fewer say nothing.
 MOST_BENT_TIES, FEWEST_TIES = 1000, 20

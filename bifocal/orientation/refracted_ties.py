@@ -9,7 +9,7 @@ from bifocal.model.homography import homography_jacobian
 from bifocal.model.refracted_view import foot_of
 from bifocal.orientation.pair_observations import Equations, PairObservations, PairUnknowns
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera import plane_from_pixel, ray_on_plane
+from photocore.camera.pinhole import plane_from_pixel, ray_on_plane
 
 #: Steps of the derivatives: pixels, and everything else (logarithms, radians, metres, indices).
 STEP_PIXEL, STEP = 1e-3, 1e-6

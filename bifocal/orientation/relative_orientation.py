@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from bifocal.model.homography import apply_homography
-from bifocal.orientation.features import (
+from bifocal.matching.features import (
     Features,
     alike,
     drop_repeated,
@@ -22,9 +21,10 @@ from bifocal.orientation.features import (
     match_features,
     spread_evenly,
 )
-from bifocal.orientation.interior_orientation import Cameras, Interiors
+from bifocal.model.homography import apply_homography
+from bifocal.model.interior_orientation import Cameras, Interiors
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera import Pinhole, fundamental, homogeneous, triangulate
+from photocore.camera.pinhole import Pinhole, fundamental, homogeneous, triangulate
 from photocore.errors import GeometryError
 
 #: Fewer common points than this and any two photos may seem to match by chance.

@@ -8,8 +8,8 @@ from itertools import combinations
 
 import numpy as np
 
+from bifocal.model.interior_orientation import Cameras, Interiors
 from bifocal.orientation.control_points import Control, SiteMeasures
-from bifocal.orientation.interior_orientation import Cameras, Interiors
 from photocore.arrays import BoolArray
 
 #: What was typed is doubted where it misses by so many times what it may: with clean control

@@ -5,9 +5,9 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from bifocal.orientation.interior_orientation import Interior
+from bifocal.model.interior_orientation import Interior
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera import Pinhole, camera_matrix, cameras_seeing, project
+from photocore.camera.pinhole import Pinhole, camera_matrix, cameras_seeing, project
 from photocore.errors import GeometryError
 
 #: Picks that miss by more than this share of the image width are gross, whatever the lens.

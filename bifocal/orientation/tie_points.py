@@ -6,17 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from bifocal.matching.patches import refine, same_scale
 from bifocal.model.homography import apply_homography
-from bifocal.orientation.interior_orientation import Cameras, Images, Interiors
+from bifocal.model.interior_orientation import Cameras, Images, Interiors
 from bifocal.orientation.pair_adjustment import AdjustedPair, wall_equations
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
-from bifocal.orientation.patches import refine, same_scale
 from bifocal.orientation.reference_plane import NarrowFace, narrow_face
 from bifocal.orientation.refracted_observations import guessed_points
 from bifocal.orientation.relative_orientation import supported
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera import (
+from photocore.camera.pinhole import (
     fundamental,
     homogeneous,
     plane_transfer,
@@ -31,12 +31,6 @@ BEST_TIE = 0.03
 FEWEST_ON_WALL, FEWEST_CELLS = 20, 6
 #: Half the band, as a share of the far distance, in which the wall's own face is looked for.
 WALL_BAND = 0.005
-
-
-def robust_sigma(values: FloatArray) -> float:
-    """Return 1.4826 times the median absolute value: the sigma of the honest majority."""
-    finite = np.abs(values[np.isfinite(values)])
-    return float(1.4826 * np.median(finite)) if len(finite) else np.inf
 
 
 def relief_rate(cameras: Cameras, xyz: FloatArray) -> FloatArray:

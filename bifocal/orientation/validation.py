@@ -5,11 +5,11 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from bifocal.matching.features import sharpness
 from bifocal.model.homography import apply_homography
+from bifocal.model.interior_orientation import Cameras, Images, Interior, Interiors
 from bifocal.model.photo import FARTHEST_WALL
 from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orientation.features import sharpness
-from bifocal.orientation.interior_orientation import Cameras, Images, Interior, Interiors
 from bifocal.orientation.pair_adjustment import AdjustedPair
 from bifocal.orientation.relative_orientation import Ties, rotation_only
 from photocore.arrays import ByteArray, FloatArray

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bifocal.media import media_words
-from photocore.workbook.newbook import new_workbook, save_book
+from photocore.workbook.making.newbook import new_workbook, save_book
 
 if TYPE_CHECKING:
     from bifocal.planning.camera_plan import Plan

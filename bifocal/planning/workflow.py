@@ -13,7 +13,7 @@ from bifocal.planning.planned_media import PlannedMedia
 from bifocal.planning.stations import plan_stations
 from multimedia import Layers
 from photocore.output import check_ending
-from photocore.workbook.newbook import check_new_workbook
+from photocore.workbook.making.newbook import check_new_workbook
 
 
 def make_plan(

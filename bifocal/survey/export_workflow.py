@@ -9,7 +9,7 @@ from bifocal.files.point_tables import read_survey_points
 from bifocal.survey.pair_workflow import is_survey, is_workbook, points_of
 from photocore.errors import InputError, located
 from photocore.output import check_not_input
-from photocore.workbook.newbook import check_new_workbook
+from photocore.workbook.making.newbook import check_new_workbook
 
 
 def export(

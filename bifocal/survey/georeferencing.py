@@ -14,8 +14,14 @@ from bifocal.survey.space_similarity import SpaceSums, fit_of_space, space_sums
 from bifocal.survey.transformation_precision import TransformationPrecision, precision_of
 from bifocal.survey.weighted_similarity import WeightedSums, fit_of_sums, weighted_sums, weights_of
 from photocore.arrays import BoolArray, FloatArray, as_floats
+from photocore.camera.similarity import (
+    Similarity,
+    fit_levelled,
+    fit_plane,
+    fit_similarity,
+    round_origin,
+)
 from photocore.errors import GeometryError, InputError
-from photocore.similarity import Similarity, fit_levelled, fit_plane, fit_similarity, round_origin
 
 #: Chance of calling an upright wall leaning.
 ALPHA = 0.01

@@ -29,7 +29,7 @@ from photocore.jsonfile import to_text
 from photocore.output import check_not_input, relative_name
 from photocore.tables import write_csv
 from photocore.tables.headings import bare
-from photocore.workbook.newbook import check_new_workbook
+from photocore.workbook.making.newbook import check_new_workbook
 
 #: Sheets of a survey workbook, as `bare` writes them.
 _OURS = {

@@ -13,9 +13,9 @@ from bifocal.survey.tolerances import Verdict
 from bifocal.survey.transformation_precision import TransformationPrecision
 from bifocal.survey.weighted_similarity import WeightedSums
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_floats
+from photocore.camera.similarity import Similarity
 from photocore.errors import InputError
 from photocore.series import check_index
-from photocore.similarity import Similarity
 
 
 class NamedPoints(Protocol):

@@ -13,9 +13,9 @@ import numpy as np
 
 from bifocal.survey.weighted_similarity import inverse_symmetric
 from photocore.arrays import FloatArray
+from photocore.camera.rotation import skew
+from photocore.camera.similarity import Similarity
 from photocore.errors import GeometryError
-from photocore.rotation import skew
-from photocore.similarity import Similarity
 
 #: Turns of Gauss-Newton: from the unweighted fit five reach rounding on walls that lean or lie.
 SPACE_TURNS = 6

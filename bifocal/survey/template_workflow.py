@@ -14,10 +14,10 @@ from bifocal.survey.workbook.words import LANGUAGES
 from photocore.errors import InputError
 from photocore.output import check_ending, relative_name
 from photocore.provenance import file_hash, program, today
-from photocore.workbook.newbook import check_new_workbook
+from photocore.workbook.making.newbook import check_new_workbook
 
-#: With more points a workbook would unpack to more than `photocore.workbook.package` reads again: a
-#: row of `Points` and `Results` takes up to 12 kB together.
+#: With more points a workbook would unpack to more than is read again (`reading.package`): a row
+#: of `Points` and `Results` takes up to 12 kB together.
 MOST_ROWS = 30_000
 LogRow = tuple[str, str, str, str, str]
 

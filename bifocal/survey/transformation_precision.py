@@ -10,8 +10,8 @@ import numpy as np
 from bifocal.survey.space_similarity import SpaceSums
 from bifocal.survey.weighted_similarity import WeightedSums
 from photocore.arrays import FloatArray
-from photocore.rotation import skew
-from photocore.similarity import Similarity
+from photocore.camera.rotation import skew
+from photocore.camera.similarity import Similarity
 
 #: Which of rotations about the wall's X, Y, Z and logarithm of the scale a model has.
 _UNKNOWNS: Mapping[str, tuple[int, ...]] = {"2D": (2, 3), "levelled": (1, 3), "3D": (0, 1, 2, 3)}

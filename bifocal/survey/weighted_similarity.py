@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from photocore.arrays import FloatArray
+from photocore.camera.similarity import Similarity
 from photocore.errors import GeometryError
-from photocore.similarity import Similarity
 
 #: Turns of the direction, each some 1e-3 as far as the one before: six reach rounding.
 TURNS = 6

@@ -31,9 +31,9 @@ from multimedia.orientation.plate_poses import FEWEST, plate_pose
 from multimedia.projects.model import ObjectPoints, Project
 from photocore.adjustment import Fit, huber_weights
 from photocore.arrays import BoolArray, FloatArray, IntArray
+from photocore.camera.rotation import skew
+from photocore.camera.similarity import fit_similarity
 from photocore.errors import ConvergenceError, GeometryError, InputError
-from photocore.rotation import skew
-from photocore.similarity import fit_similarity
 
 #: Robust weights settle in a few rounds; more change nothing that matters.
 ROBUST_ROUNDS = 8

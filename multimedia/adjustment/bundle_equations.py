@@ -18,8 +18,8 @@ from multimedia.media.projection import project_with_jacobian
 from multimedia.projects.model import Project
 from photocore.adjustment import LARGEST, BlockEquations, Fit, fit
 from photocore.arrays import BoolArray, FloatArray, IntArray
+from photocore.camera.rotation import by_turn, rotation_from_vector, skew
 from photocore.errors import GeometryError, InputError
-from photocore.rotation import by_turn, rotation_from_vector, skew
 
 #: A motion of everything is a datum defect if it moves image points by less than this share of
 #: what its parts would move them on their own.

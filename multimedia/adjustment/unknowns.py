@@ -11,8 +11,8 @@ from multimedia.media.camera import ANY_INTERIOR, EXTERIOR
 from multimedia.projects.model import Project
 from photocore.adjustment import OUTLIER_LIMIT, correlations, standardised
 from photocore.arrays import FloatArray, positive
+from photocore.camera.fisheye import TERMS, Fisheye
 from photocore.errors import InputError
-from photocore.fisheye import TERMS, Fisheye
 
 #: How control points enter: error-free, with their sigmas, or as a free network.
 CONTROL = ("fixed", "weighted", "free")

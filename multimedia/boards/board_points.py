@@ -11,7 +11,7 @@ import numpy as np
 from multimedia.orientation.plate_poses import plate_pose
 from multimedia.projects.model import ImagePoints, ObjectPoints, Project
 from photocore.arrays import FloatArray
-from photocore.boards import BoardView
+from photocore.camera.boards import BoardView
 from photocore.errors import ConvergenceError, GeometryError, InputError
 
 

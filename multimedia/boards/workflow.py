@@ -12,7 +12,7 @@ from multimedia.projects.model import Project
 from multimedia.projects.photos import read_photo
 from multimedia.projects.project_file import project_files, read_project, write_project
 from photocore.arrays import ByteArray, positive
-from photocore.boards import BoardView, checked_board, detect_board, find_board_size
+from photocore.camera.boards import BoardView, checked_board, detect_board, find_board_size
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import check_ending, check_not_input, check_writable
@@ -75,7 +75,7 @@ def find_boards(
     out : path
         The project with the board's points: one group of object points for each pose.
     pattern : str
-        One of `photocore.boards.PATTERNS`.
+        One of `photocore.camera.boards.PATTERNS`.
     board : (int, int)
         Inner corners, circles, or squares (ChArUco) across and up.
     square : float

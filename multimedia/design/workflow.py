@@ -30,7 +30,7 @@ from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
 from photocore.output import all_or_none, check_all_writable, check_ending
-from photocore.workbook.newbook import check_new_workbook
+from photocore.workbook.making.newbook import check_new_workbook
 
 #: A millimetre in the units that projects use.
 MILLIMETRE = {"m": 1e-3, "cm": 0.1, "mm": 1.0}

@@ -19,10 +19,10 @@ from multimedia.projects.model import Project
 from multimedia.projects.point_tables import METRES
 from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray, as_floats, is_finite_number
+from photocore.camera.lensformats import LensData
+from photocore.camera.rotation import checked_rotation
 from photocore.errors import InputError
 from photocore.jsonfile import read_object, write_object
-from photocore.lensformats import LensData
-from photocore.rotation import checked_rotation
 
 VERSION = "1.0"
 #: What its reader insists on and a project does not have; kept from a file that was imported.

@@ -24,10 +24,10 @@ from multimedia.projects.camera_poses import FLIP
 from multimedia.projects.model import ImagePoints, ObjectPoints, Project
 from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray
+from photocore.camera.lensformats import LensData, colmap_lens
+from photocore.camera.rotation import quaternion_from_rotation, rotation_from_quaternion
 from photocore.errors import LARGEST, InputError
-from photocore.lensformats import LensData, colmap_lens
 from photocore.output import atomic_folder
-from photocore.rotation import quaternion_from_rotation, rotation_from_quaternion
 from photocore.textfile import read_text
 
 _KIND = "file of a COLMAP model"

@@ -16,10 +16,10 @@ from multimedia.exchange.opencv_camera import OpencvCamera, camera_of, inexact, 
 from multimedia.media.camera import Camera
 from multimedia.projects.model import Project
 from photocore.arrays import FloatArray
+from photocore.camera.lensformats import LensData, metashape_lens, xml_root
+from photocore.camera.rotation import checked_rotation, nearest_rotation
 from photocore.errors import LARGEST, InputError
-from photocore.lensformats import LensData, metashape_lens, xml_root
 from photocore.output import atomic_path
-from photocore.rotation import checked_rotation, nearest_rotation
 from photocore.textfile import read_text
 
 _KIND = "Metashape file"
@@ -113,7 +113,7 @@ def _add_sensor(parent: ElementTree.Element, number: int, name: str, view: Openc
     ElementTree.SubElement(node, "resolution", size)
     fx, fy = view.matrix[0, 0], view.matrix[1, 1]
     cx, cy = view.matrix[:2, 2] + 0.5 - np.array(view.size) / 2
-    # p1 and p2 are exchanged against OpenCV's, see `photocore.lensformats`.
+    # p1 and p2 are exchanged against OpenCV's, see `photocore.camera.lensformats`.
     values = {"f": fy, "cx": cx, "cy": cy, "b1": fx - fy}
     keys, terms = ["k1", "k2", "k3", "p1", "p2"], d
     if view.fisheye:

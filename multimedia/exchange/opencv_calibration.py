@@ -18,10 +18,10 @@ from multimedia.exchange.opencv_camera import OpencvCamera, camera_of, inexact, 
 from multimedia.media.camera import Camera
 from multimedia.projects.model import Project
 from photocore.arrays import FloatArray
+from photocore.camera.lensformats import FISHEYE_KEY, LensData, opencv_values
+from photocore.camera.rotation import checked_rotation, rotation_from_vector
 from photocore.errors import InputError
-from photocore.lensformats import FISHEYE_KEY, LensData, opencv_values
 from photocore.output import atomic_folder, atomic_path
-from photocore.rotation import checked_rotation, rotation_from_vector
 from photocore.textfile import check_name
 
 ENDINGS = (".yml", ".yaml", ".json", ".xml")

@@ -1,9 +1,9 @@
 """Cameras in OpenCV's terms, which COLMAP, Metashape and AquaCal share.
 
 OpenCV counts in pixels with y down and z forwards: x_camera = R X + t, with the distortion of
-`photocore.distortion` about the principal point in units of the focal length. Pixels have integers
-at pixel centres; formats that count from the corner of the image are half a pixel off, which is
-mended where they are read and written.
+`photocore.camera.distortion` about the principal point in units of the focal length. Pixels have
+integers at pixel centres; formats that count from the corner of the image are half a pixel
+off, which is mended where they are read and written.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from multimedia.media.camera import Camera, Distortion, Sensor
 from multimedia.media.lens_conversion import farthest_miss, nearest_camera, sensor_rays
 from multimedia.projects.camera_poses import FLIP
 from photocore.arrays import FloatArray
-from photocore.distortion import Brown, Convention
+from photocore.camera.distortion import Brown, Convention
+from photocore.camera.fisheye import TERMS, Fisheye
+from photocore.camera.lensformats import LensData
+from photocore.camera.rotation import nearest_rotation
 from photocore.errors import InputError
-from photocore.fisheye import TERMS, Fisheye
-from photocore.lensformats import LensData
-from photocore.rotation import nearest_rotation
 
 #: Size of a pixel where the file does not say, as these files never do. [mm]
 PITCH = 0.005

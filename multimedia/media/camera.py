@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photocore.arrays import FloatArray, as_floats, as_points, positive, read_only
-from photocore.distortion import NAMES as DISTORTION
-from photocore.distortion import Brown as Brown
-from photocore.errors import GeometryError, InputError
-from photocore.fisheye import Fisheye as Fisheye
-from photocore.rotation import (
+from photocore.camera.distortion import NAMES as DISTORTION
+from photocore.camera.distortion import Brown as Brown
+from photocore.camera.fisheye import Fisheye as Fisheye
+from photocore.camera.rotation import (
     angles_from_rotation,
     checked_rotation,
     rotation_from_vector,
     rotation_vector_from_angle_rates,
     world_from_camera,
 )
+from photocore.errors import GeometryError, InputError
 
 #: Parameters of the exterior orientation; angles in rad.
 EXTERIOR = ("X0", "Y0", "Z0", "omega", "phi", "kappa")

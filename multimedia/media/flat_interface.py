@@ -21,8 +21,8 @@ from multimedia.media.optical_media import OpticalMedia, Sight, SightDerivatives
 from multimedia.media.surfaces import tangents_of, unit_vector
 from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray, as_floats, read_only
+from photocore.camera.rotation import rotation_from_vector
 from photocore.errors import GeometryError, InputError
-from photocore.rotation import rotation_from_vector
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

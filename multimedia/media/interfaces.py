@@ -18,8 +18,8 @@ from multimedia.media.surface_sequence import SurfaceSequence
 from multimedia.media.surfaces import Plane, RefractingSurface
 from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray, as_floats, read_only
+from photocore.camera.rotation import checked_rotation, skew
 from photocore.errors import InputError
-from photocore.rotation import checked_rotation, skew
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

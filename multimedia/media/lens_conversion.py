@@ -8,7 +8,7 @@ from multimedia.media.camera import Camera
 from multimedia.media.projection import Media, project, project_with_jacobian
 from photocore.adjustment import minimise
 from photocore.arrays import FloatArray
-from photocore.distortion import Brown
+from photocore.camera.distortion import Brown
 from photocore.errors import GeometryError, InputError
 
 #: Points along the sides of the sensor at which cameras are compared.

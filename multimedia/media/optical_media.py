@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from multimedia.media.camera import Camera
 from photocore.arrays import FloatArray
+from photocore.camera.rotation import by_turn
 from photocore.errors import InputError
-from photocore.rotation import by_turn
 
 
 class SightDerivatives(NamedTuple):

@@ -13,9 +13,9 @@ from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.optical_media import OpticalMedia, StraightRays
 from multimedia.refraction.layers import Layers
 from photocore.arrays import BoolArray, FloatArray, as_points
-from photocore.camera import central, central_with_jacobian
+from photocore.camera.fisheye import Fisheye
+from photocore.camera.pinhole import central, central_with_jacobian
 from photocore.errors import InputError
-from photocore.fisheye import Fisheye
 
 #: What may be given to look through: parallel layers whose last face is the plane Z = 0, the same
 #: anywhere else (`FlatInterface`), surfaces of any form (`Interfaces`, ray-traced), or nothing.

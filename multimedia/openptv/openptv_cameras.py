@@ -24,7 +24,7 @@ from multimedia.media.lens_conversion import (
 from multimedia.media.projection import project
 from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray
-from photocore.distortion import Brown, Convention
+from photocore.camera.distortion import Brown, Convention
 from photocore.errors import InputError
 
 #: What OpenPTV has and a direction-preserving change of the camera may use.

@@ -13,9 +13,9 @@ from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.lens_conversion import brown_of
 from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray, IntArray
-from photocore.distortion import Brown, Convention
+from photocore.camera.distortion import Brown, Convention
+from photocore.camera.rotation import checked_rotation, nearest_rotation, world_from_camera
 from photocore.errors import LARGEST, InputError
-from photocore.rotation import checked_rotation, nearest_rotation, world_from_camera
 from photocore.textfile import read_text
 
 #: A printed matrix has 7 decimals; angles and matrix of one camera differ by a few of the last.

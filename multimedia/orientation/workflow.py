@@ -27,7 +27,7 @@ from multimedia.projects.project_file import project_files, read_project, write_
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import InputError
 from photocore.output import all_or_none, check_all_writable, check_ending, check_not_input
-from photocore.workbook.newbook import check_new_workbook
+from photocore.workbook.making.newbook import check_new_workbook
 
 METHODS = ("rigorous", "rays", "pairs")
 

@@ -9,13 +9,13 @@ import numpy as np
 
 from multimedia.media.camera import EXTERIOR
 from photocore.arrays import FloatArray, is_finite_number
-from photocore.errors import InputError
-from photocore.rotation import (
+from photocore.camera.rotation import (
     checked_rotation,
     nearest_rotation,
     rotation_from_quaternion,
     world_from_camera,
 )
+from photocore.errors import InputError
 
 #: Keys of a pose beside ``centre``; one of the ways, or the three angles.
 WAYS = ("rotation", "quaternion", "pose", "camera_from_world")

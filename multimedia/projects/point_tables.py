@@ -197,7 +197,7 @@ def write_columns(
         raise InputError(f"{path}: tables are written as .csv or .xlsx; give one of these endings.")
     from openpyxl import Workbook
 
-    from photocore.workbook.newbook import new_workbook, save_book
+    from photocore.workbook.making.newbook import new_workbook, save_book
 
     book = Workbook()
     fill_sheet(book.active, list(columns), zip(*columns.values(), strict=True))
@@ -209,7 +209,7 @@ def fill_sheet(sheet: Any, headings: Sequence[str], rows: Iterable[Sequence[obje
     """Write a table into an empty sheet: bold headings that stay in sight, then the rows."""
     from openpyxl.styles import Font
 
-    from photocore.workbook.newbook import plain_cell
+    from photocore.workbook.making.newbook import plain_cell
 
     sheet.append(list(headings))
     for cell in sheet[1]:

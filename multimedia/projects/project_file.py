@@ -41,9 +41,9 @@ from multimedia.projects.surface_files import (
 )
 from multimedia.refraction.layers import Layers
 from photocore.arrays import is_finite_number, positive
-from photocore.distortion import NAMES, Brown, Convention
+from photocore.camera.distortion import NAMES, Brown, Convention
+from photocore.camera.fisheye import Fisheye
 from photocore.errors import GeometryError, InputError, located
-from photocore.fisheye import Fisheye
 from photocore.output import all_or_none, atomic_path, check_all_writable
 from photocore.textfile import check_name, read_toml
 

@@ -13,9 +13,9 @@ from multimedia.refraction.water import (
     water_index_derivatives,
     water_refractive_index,
 )
-from photocore.workbook.live_book import BookBuilder, SheetBuilder
-from photocore.workbook.live_charts import scatter
-from photocore.workbook.look import HEAD_FONT
+from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
+from photocore.workbook.making.live_charts import scatter
+from photocore.workbook.making.look import HEAD_FONT
 
 #: Name, value, unit and limits of the cells to fill in.
 _GIVEN = (

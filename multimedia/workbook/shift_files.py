@@ -13,7 +13,7 @@ from multimedia.workbook.shift_points import ShiftPoints, ShiftSetup
 from photocore.errors import CellError, InputError, WorkbookError, located
 from photocore.tables import Column, Table, open_tables, read_named_values, read_table
 from photocore.tables.csvread import CsvFile
-from photocore.workbook.grid import SheetFile
+from photocore.workbook.reading.grid import SheetFile
 
 #: Most layers a workbook is searched for.
 MOST_LAYERS = 9

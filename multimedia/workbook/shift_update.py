@@ -19,24 +19,24 @@ from multimedia.workbook.shift_workbook import (
 from multimedia.workbook.words import WORDS
 from photocore.errors import InputError
 from photocore.tables import Table
-from photocore.workbook.cells import CellValue
-from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.grid import (
+from photocore.workbook.changing.cells import CellValue
+from photocore.workbook.changing.editor import WorkbookEditor
+from photocore.workbook.changing.named_cells import make_numbers, place_of
+from photocore.workbook.changing.result_columns import (
+    OwnTable,
+    ResultColumn,
+    head_row,
+    put_result_columns,
+)
+from photocore.workbook.making.live_book import BookBuilder
+from photocore.workbook.making.newbook import finished_parts
+from photocore.workbook.reading.grid import (
     TableArea,
     column_letters,
     plain_title,
     quoted_title,
     split_area,
     split_cell,
-)
-from photocore.workbook.live_book import BookBuilder
-from photocore.workbook.named_cells import make_numbers, place_of
-from photocore.workbook.newbook import finished_parts
-from photocore.workbook.result_columns import (
-    OwnTable,
-    ResultColumn,
-    head_row,
-    put_result_columns,
 )
 
 #: Results that come first, and are taken over where a table has them already.
@@ -140,8 +140,9 @@ def add_columns(
     """Put live formulas of the shift beside the user's table, and a sheet with camera and media.
 
     The columns Rbar, dR, Xbar, Ybar and flag come first, those that they are calculated from after
-    them, to the right of everything on the sheet; see `photocore.workbook.result_columns`. On
-    the sheet of the media, values that stand in cells of the user's own refer to these.
+    them, to the right of everything on the sheet; see
+    `photocore.workbook.changing.result_columns`. On the sheet of the
+    media, values that stand in cells of the user's own refer to these.
 
     Parameters
     ----------

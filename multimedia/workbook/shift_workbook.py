@@ -21,11 +21,11 @@ from multimedia.workbook.words import WORDS
 from photocore.arrays import BoolArray
 from photocore.errors import InputError
 from photocore.output import check_ending
-from photocore.workbook.cells import CellValue
-from photocore.workbook.live_book import BookBuilder, SheetBuilder
-from photocore.workbook.live_charts import scatter
-from photocore.workbook.live_columns import LiveColumn
-from photocore.workbook.look import (
+from photocore.workbook.changing.cells import CellValue
+from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
+from photocore.workbook.making.live_charts import scatter
+from photocore.workbook.making.live_columns import LiveColumn
+from photocore.workbook.making.look import (
     DOUBT,
     FACE,
     GOOD,
@@ -35,7 +35,7 @@ from photocore.workbook.look import (
     LABEL_FONT,
     colour_words,
 )
-from photocore.workbook.newbook import check_new_workbook
+from photocore.workbook.making.newbook import check_new_workbook
 
 #: More rows make a workbook that is slow to open; text tables have no limit.
 MOST_ROWS = 20_000

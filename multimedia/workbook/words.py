@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from photocore.workbook.words import LANGUAGES, WordBook
+from photocore.workbook.making.words import LANGUAGES, WordBook
 
 __all__ = ["LANGUAGES", "WORDS"]
 

@@ -14,7 +14,7 @@ from multimedia.workbook.shift_workbook import write_shift_workbook
 from photocore.errors import InputError
 from photocore.output import check_ending, check_not_input
 from photocore.tables import write_csv
-from photocore.workbook.newbook import check_new_workbook
+from photocore.workbook.making.newbook import check_new_workbook
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -56,3 +56,9 @@ def huber_weights(residuals: FloatArray, bound: float) -> FloatArray:
     size = np.abs(residuals)
     spread = max(float(np.median(size)) / 0.6745, 1e-300)
     return np.minimum(1.0, bound * spread / np.maximum(size, 1e-300))
+
+
+def robust_sigma(values: FloatArray) -> float:
+    """Return 1.4826 times the median absolute value: the sigma of the honest majority."""
+    finite = np.abs(values[np.isfinite(values)])
+    return float(1.4826 * np.median(finite)) if len(finite) else np.inf

@@ -8,7 +8,7 @@ from functools import cache
 from importlib.resources import files
 
 from photocore.errors import InputError
-from photocore.workbook.words import LANGUAGES
+from photocore.workbook.making.words import LANGUAGES
 
 __all__ = ["LANGUAGES", "texts_of", "words_of"]
 

@@ -20,7 +20,7 @@ from photocore.tables.headings import Match, describe, find_columns, is_summary
 from photocore.tables.model import Column
 from photocore.tables.numbers import ArrowTexts, Decimal, is_clear, plain_numbers
 from photocore.textfile import readable
-from photocore.workbook.grid import CellGrid, SheetFile, Value, cell_name
+from photocore.workbook.reading.grid import CellGrid, SheetFile, Value, cell_name
 
 _DELIMITERS = (";", "\t", ",", "|", " ")
 #: The apostrophes of `photocore.tables.csvwrite.guarded`.

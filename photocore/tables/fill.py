@@ -11,7 +11,7 @@ from photocore.tables import convert
 from photocore.tables.headings import Match, unknown_unit
 from photocore.tables.model import Column, Table
 from photocore.tables.numbers import Decimal, unit_symbol
-from photocore.workbook.grid import CellDate, CellGrid, Value, cell_name, column_letters
+from photocore.workbook.reading.grid import CellDate, CellGrid, Value, cell_name, column_letters
 
 
 def fill(

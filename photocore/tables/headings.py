@@ -10,7 +10,13 @@ from functools import lru_cache
 
 from photocore.tables.model import Column
 from photocore.tables.numbers import UNITS, unit_symbol
-from photocore.workbook.grid import CellGrid, Value, cell_name, column_letters, column_number
+from photocore.workbook.reading.grid import (
+    CellGrid,
+    Value,
+    cell_name,
+    column_letters,
+    column_number,
+)
 
 _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
 _LOOSE_UNIT = re.compile(r"[\s_,]+(mm|cm|m|px|pixel|deg|°|gon|rad)$", re.IGNORECASE)

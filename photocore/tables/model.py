@@ -11,7 +11,7 @@ import numpy as np
 
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError
-from photocore.workbook.grid import cell_name, column_letters
+from photocore.workbook.reading.grid import cell_name, column_letters
 
 Kind = Literal["number", "integer", "flag", "text"]
 

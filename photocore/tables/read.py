@@ -27,8 +27,8 @@ from photocore.tables.model import Column, Table
 from photocore.tables.numbers import Decimal
 from photocore.tables.rows import DataRows, block_above, data_rows
 from photocore.textfile import check_name
-from photocore.workbook.grid import CellGrid, SheetFile, TableArea, Value, cell_name
-from photocore.workbook.package import check_header
+from photocore.workbook.reading.grid import CellGrid, SheetFile, TableArea, Value, cell_name
+from photocore.workbook.reading.package import check_header
 
 Source = Path | str | SheetFile | CsvFile
 
@@ -61,11 +61,11 @@ def open_tables(path: Path | str, *, max_rows: int = 100_000) -> SheetFile | Csv
     if ending in (".xls", ".xlsb", ".numbers", ".fods"):
         raise InputError(f"{path}: {ending} files cannot be read; save the workbook as .xlsx.")
     if ending in (".ods", ".ots"):
-        from photocore.workbook.ods import open_ods
+        from photocore.workbook.reading.ods import open_ods
 
         return open_ods(path, max_rows=max_rows + _MARGIN)
     if ending in (".xlsx", ".xlsm", ".xltx", ".xltm"):
-        from photocore.workbook.xlsx import open_xlsx
+        from photocore.workbook.reading.xlsx import open_xlsx
 
         return open_xlsx(path, max_rows=max_rows + _MARGIN)
     check_header(path)

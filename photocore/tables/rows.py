@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from photocore.tables.headings import Match, bare, is_summary
 from photocore.tables.model import Column
-from photocore.workbook.grid import CellGrid, Value
+from photocore.workbook.reading.grid import CellGrid, Value
 
 
 @dataclass(slots=True)

@@ -21,7 +21,7 @@ from multimedia.media.projection import project
 from multimedia.openptv.experiment import write_experiment
 from multimedia.projects.model import ImagePoints, ObjectPoints, Project
 from multimedia.projects.project_file import write_project
-from photocore.distortion import Brown, Convention
+from photocore.camera.distortion import Brown, Convention
 from tests.multimedia.tank import LAYERS, SENSOR, cameras, control
 
 PROGRAMS = {"bifocal": bifocal.cli.main.main, "multimedia": multimedia.cli.main.main}

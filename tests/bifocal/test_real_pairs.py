@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from benchmarks.bench_orientation import RealPair
 from bifocal import Pair
 from bifocal.files.images import image_info, read_grey
+from bifocal.matching.matching import MatchSettings, match_pair, precision
 from bifocal.model.orientation_precision import pinhole
 from bifocal.orientation.align_workflow import (
     AlignOptions,
@@ -20,7 +21,6 @@ from bifocal.orientation.align_workflow import (
 )
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.match_workflow import match_photos
-from bifocal.orientation.matching import MatchSettings, match_pair, precision
 from bifocal.orientation.photo_alignment import align
 
 pytestmark = pytest.mark.acceptance

@@ -9,7 +9,7 @@ import numpy as np
 from multimedia.media.camera import Camera, Sensor
 from multimedia.media.projection import project
 from multimedia.refraction.layers import Layers
-from photocore.distortion import Brown
+from photocore.camera.distortion import Brown
 
 SENSOR = Sensor(width=1280, height=1024, pitch=np.array([0.012, 0.012]))
 LAYERS = Layers(indices=(1.0, 1.5, 1.337), thicknesses=(10.0,))

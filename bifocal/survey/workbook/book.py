@@ -22,11 +22,10 @@ from bifocal.survey.workbook.reference_sheets import check, planning
 from bifocal.survey.workbook.results_columns import results_columns
 from bifocal.survey.workbook.setup_sheet import setup_sheet
 from bifocal.survey.workbook.words import WORDS, readme
-from photocore.workbook.cells import CellValue
-from photocore.workbook.grid import column_letters
-from photocore.workbook.live_book import BookBuilder, Cells, SheetBuilder
-from photocore.workbook.live_columns import LiveColumn
-from photocore.workbook.look import (
+from photocore.workbook.changing.cells import CellValue
+from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
+from photocore.workbook.making.live_columns import LiveColumn
+from photocore.workbook.making.look import (
     BODY_FONT,
     DOUBT,
     GOOD,
@@ -36,6 +35,7 @@ from photocore.workbook.look import (
     colour_words,
     strike_out,
 )
+from photocore.workbook.reading.grid import column_letters
 
 #: Row of the keys in `Points` and `Results`.
 HEAD = 4

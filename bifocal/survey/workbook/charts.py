@@ -10,12 +10,12 @@ from openpyxl.styles import Font
 from bifocal.survey.workbook.content import CHART_ROWS, SurveyContent
 from bifocal.survey.workbook.reference_sheets import CHECK_HEAD
 from bifocal.survey.workbook.words import word
-from photocore.workbook.cells import CellValue
-from photocore.workbook.grid import column_letters
-from photocore.workbook.live_book import BookBuilder, Cells
-from photocore.workbook.live_charts import COLOURS, scatter, titled
-from photocore.workbook.look import FACE, LABEL, LABEL_FONT
-from photocore.workbook.newbook import RowBlock
+from photocore.workbook.changing.cells import CellValue
+from photocore.workbook.making.live_book import BookBuilder, Cells
+from photocore.workbook.making.live_charts import COLOURS, scatter, titled
+from photocore.workbook.making.look import FACE, LABEL, LABEL_FONT
+from photocore.workbook.making.newbook import RowBlock
+from photocore.workbook.reading.grid import column_letters
 
 #: Row of the headings of the chart data; text would break a scatter chart, so blanks are #N/A.
 HEAD = 4

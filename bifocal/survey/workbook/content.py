@@ -27,8 +27,8 @@ from bifocal.survey.workbook.columns import (
 from bifocal.survey.workbook.media_formulas import setup_values
 from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS, PHOTOS, setup_checks
 from photocore.arrays import BoolArray, FloatArray
-from photocore.workbook.cells import CellValue, name_cell
-from photocore.workbook.live_columns import LiveColumn
+from photocore.workbook.changing.cells import CellValue, name_cell
+from photocore.workbook.making.live_columns import LiveColumn
 
 #: Rows of the tables of an empty template.
 POINT_ROWS, CHECK_ROWS, CONTROL_ROWS, SPARE_ROWS = 300, 25, 12, 10

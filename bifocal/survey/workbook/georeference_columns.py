@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bifocal.survey.workbook.columns import COVARIANCES, USED, look_up
-from photocore.workbook.live_columns import LiveColumn, formula_column
+from photocore.workbook.making.live_columns import LiveColumn, formula_column
 
 #: Entries of the weights and, after them, what each of the unknowns p, q, m is multiplied by on
 #: X, Y, Z; g_flat is 1 for the model 2D, where weights at Z are 0.

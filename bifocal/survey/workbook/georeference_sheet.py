@@ -17,10 +17,10 @@ from bifocal.survey.workbook.georeference_columns import entry, georeference_col
 from bifocal.survey.workbook.precision_lines import precision_lines, precision_values
 from bifocal.survey.workbook.space_block import STEP_FORM, SpaceBlock
 from photocore.arrays import FloatArray
-from photocore.workbook.cells import CellValue
-from photocore.workbook.grid import column_letters
-from photocore.workbook.live_book import BookBuilder, SheetBuilder
-from photocore.workbook.look import LABEL_FONT
+from photocore.workbook.changing.cells import CellValue
+from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
+from photocore.workbook.making.look import LABEL_FONT
+from photocore.workbook.reading.grid import column_letters
 
 #: Row of the keys of the control points; model and parameters stand above.
 CONTROL_HEAD = 12

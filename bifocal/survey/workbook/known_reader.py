@@ -16,8 +16,8 @@ from photocore.tables.csvread import CsvFile
 from photocore.tables.headings import bare
 from photocore.tables.model import Kind
 from photocore.tables.numbers import Decimal
-from photocore.workbook.grid import SheetFile
-from photocore.workbook.live_columns import TEXT_KEYS
+from photocore.workbook.making.live_columns import TEXT_KEYS
+from photocore.workbook.reading.grid import SheetFile
 
 #: No coordinate of a photo or a map is larger.
 LARGEST = 1e9

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from bifocal.survey.workbook.media_formulas import arm, bend
-from photocore.workbook.live_columns import LiveColumn, formula_column
+from photocore.workbook.making.live_columns import LiveColumn, formula_column
 
 _f = formula_column
 

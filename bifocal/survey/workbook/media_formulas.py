@@ -11,7 +11,7 @@ import re
 from bifocal.model.pair import Pair
 from bifocal.rays import seen_distance
 from bifocal.survey.survey_media import SurveyMedia, thickness_names
-from photocore.workbook.cells import CellValue
+from photocore.workbook.changing.cells import CellValue
 
 #: What may be typed as refractive index: vacuum to germanium.
 INDEX_LIMITS = (1.0, 4.1)

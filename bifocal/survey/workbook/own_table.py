@@ -28,17 +28,17 @@ from bifocal.survey.workbook.update import refuse_earlier, store_named_cells
 from bifocal.survey.workbook.words import term
 from photocore.errors import InputError
 from photocore.tables import Table
-from photocore.workbook.cells import CellValue
-from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.grid import column_letters, quoted_title, split_cell
-from photocore.workbook.live_columns import LiveColumn
-from photocore.workbook.named_cells import make_numbers, place_of
-from photocore.workbook.result_columns import (
+from photocore.workbook.changing.cells import CellValue
+from photocore.workbook.changing.editor import WorkbookEditor
+from photocore.workbook.changing.named_cells import make_numbers, place_of
+from photocore.workbook.changing.result_columns import (
     OwnTable,
     ResultColumn,
     head_row,
     put_result_columns,
 )
+from photocore.workbook.making.live_columns import LiveColumn
+from photocore.workbook.reading.grid import column_letters, quoted_title, split_cell
 
 #: Name of the headings of the results in a workbook of the user's own.
 MARK = "bifocal_results"

@@ -9,7 +9,7 @@ from bifocal.survey.weighted_similarity import TURNS
 from bifocal.survey.workbook.georeference_columns import entry
 from bifocal.survey.workbook.placed_formulas import SMALL, ordered
 from bifocal.survey.workbook.space_block import SpaceBlock
-from photocore.workbook.cells import CellValue
+from photocore.workbook.changing.cells import CellValue
 
 _PAIRS = tuple(one + other for i, one in enumerate(SMALL) for other in SMALL[i:])
 

@@ -35,8 +35,8 @@ from photocore.tables import (
 from photocore.tables.csvread import CsvFile
 from photocore.tables.headings import bare
 from photocore.tables.numbers import Decimal
-from photocore.workbook.grid import SheetFile
-from photocore.workbook.package import uncollected
+from photocore.workbook.reading.grid import SheetFile
+from photocore.workbook.reading.package import uncollected
 
 _XY, _POLAR = ("x1", "y1", "x2", "y2"), ("s1", "s2", "theta")
 _PIXELS = ("col1", "row1", "col2", "row2")

@@ -20,10 +20,10 @@ from bifocal.survey.workbook.columns import (
 from bifocal.survey.workbook.content import SurveyContent, check_cells, setup_cells
 from bifocal.survey.workbook.media_formulas import larger, planned
 from bifocal.survey.workbook.words import word
-from photocore.workbook.cells import CellValue
-from photocore.workbook.grid import column_letters
-from photocore.workbook.live_book import BookBuilder, Cells, SheetBuilder
-from photocore.workbook.look import GOOD, HEAD_FONT, WRONG, colour_words
+from photocore.workbook.changing.cells import CellValue
+from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
+from photocore.workbook.making.look import GOOD, HEAD_FONT, WRONG, colour_words
+from photocore.workbook.reading.grid import column_letters
 
 #: Row of the keys of the check table; statistics stand above.
 CHECK_HEAD = 12

@@ -7,7 +7,7 @@ from bifocal.survey.workbook.placed_formulas import (
     added_covariance,
     turned_covariance,
 )
-from photocore.workbook.live_columns import LiveColumn, formula_column
+from photocore.workbook.making.live_columns import LiveColumn, formula_column
 
 _AT = "ROW()-ROW(tblResults[[#Headers],[id]])"
 

@@ -8,7 +8,7 @@ from bifocal.model.flags import SIGMA_PIXEL, UNCERTAIN_SHARE
 from bifocal.survey.setup import SCALE_TOLERANCE, SIGMA_PRINT, SIGMA_RADIAL
 from bifocal.survey.survey_media import HEIGHTS, index_names, media_names
 from bifocal.survey.workbook.media_formulas import calculated_names, larger, setup_formulas
-from photocore.workbook.cells import CellValue
+from photocore.workbook.changing.cells import CellValue
 
 Groups = tuple[tuple[str, ...], ...]
 

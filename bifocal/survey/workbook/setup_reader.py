@@ -36,9 +36,9 @@ from photocore.errors import CellError
 from photocore.tables import Column, NamedValues, read_named_values
 from photocore.tables.model import Kind
 from photocore.tables.numbers import Decimal
-from photocore.workbook.grid import SheetFile
-from photocore.workbook.package import open_package
-from photocore.workbook.xlsx import read_directory
+from photocore.workbook.reading.grid import SheetFile
+from photocore.workbook.reading.package import open_package
+from photocore.workbook.reading.xlsx import read_directory
 
 _NUMBERS = (
     *("c_1", "c_2", *PRINTS, "d_1", "d_2", "delta_d", "pitch"),

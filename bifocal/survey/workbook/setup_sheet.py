@@ -21,10 +21,10 @@ from bifocal.survey.workbook.setup_cells import (
     state_formula,
 )
 from bifocal.survey.workbook.words import term, word
-from photocore.workbook.cells import CellValue
-from photocore.workbook.live_book import BookBuilder, SheetBuilder
-from photocore.workbook.look import GOOD, HEAD_FONT, WRONG, colour_words
-from photocore.workbook.words import Wording
+from photocore.workbook.changing.cells import CellValue
+from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
+from photocore.workbook.making.look import GOOD, HEAD_FONT, WRONG, colour_words
+from photocore.workbook.making.words import Wording
 
 #: What a typed number of the set-up may be, where it need not be above zero.
 _NUMBERS = (-1e7, 1e7)

@@ -12,12 +12,12 @@ from bifocal.survey.workbook.content import SurveyContent, setup_cells
 from bifocal.survey.workbook.setup_cells import TITLE_BLOCK, TYPED_FORMULAS, groups
 from bifocal.survey.workbook.words import word
 from photocore.errors import InputError
-from photocore.workbook.cells import CellValue
-from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.grid import cell_name, quoted_title
-from photocore.workbook.live_book import BookBuilder
-from photocore.workbook.named_cells import place_of
-from photocore.workbook.newbook import finished_parts
+from photocore.workbook.changing.cells import CellValue
+from photocore.workbook.changing.editor import WorkbookEditor
+from photocore.workbook.changing.named_cells import place_of
+from photocore.workbook.making.live_book import BookBuilder
+from photocore.workbook.making.newbook import finished_parts
+from photocore.workbook.reading.grid import cell_name, quoted_title
 
 #: The cell of each option; those of the distances depend on each other.
 _CELLS = {

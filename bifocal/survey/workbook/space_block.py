@@ -15,9 +15,9 @@ import numpy as np
 from bifocal.survey.space_similarity import SPACE_TURNS, SQUARINGS, SpaceSums
 from bifocal.survey.workbook.georeference_columns import entry
 from photocore.arrays import FloatArray
-from photocore.workbook.grid import column_letters
-from photocore.workbook.live_book import SheetBuilder
-from photocore.workbook.look import LABEL_FONT
+from photocore.workbook.making.live_book import SheetBuilder
+from photocore.workbook.making.look import LABEL_FONT
+from photocore.workbook.reading.grid import column_letters
 
 #: First column, right of the table of control points; first row, that nine stand above its keys.
 LEFT, TOP = 60, 3

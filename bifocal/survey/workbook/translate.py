@@ -9,10 +9,10 @@ from openpyxl import Workbook
 from bifocal.survey.workbook.book import build
 from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.words import word
-from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.grid import plain_title
-from photocore.workbook.live_book import BookBuilder
-from photocore.workbook.named_cells import place_of
+from photocore.workbook.changing.editor import WorkbookEditor
+from photocore.workbook.changing.named_cells import place_of
+from photocore.workbook.making.live_book import BookBuilder
+from photocore.workbook.reading.grid import plain_title
 
 #: Words in charts, footers and rules: they stand in no cell.
 _ELSEWHERE = ("chart_plan", "chart_sigma", "chart_error", "page", "holds", "fails", "Points")

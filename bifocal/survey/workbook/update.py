@@ -26,21 +26,21 @@ from bifocal.survey.workbook.translate import translate
 from bifocal.survey.workbook.words import word
 from photocore.errors import InputError
 from photocore.output import free_path
-from photocore.workbook.cells import CellValue, NewColumn, escape
-from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.grid import (
+from photocore.workbook.changing.cells import CellValue, NewColumn, escape
+from photocore.workbook.changing.editor import WorkbookEditor
+from photocore.workbook.changing.named_cells import place_of, type_column, type_value
+from photocore.workbook.making.live_book import BookBuilder, short_formula
+from photocore.workbook.making.live_columns import TEXT_KEYS, row_formula
+from photocore.workbook.making.newbook import RowBlock
+from photocore.workbook.making.print_area import move_print_area
+from photocore.workbook.reading.grid import (
     TableArea,
     column_letters,
     plain_title,
     split_area,
     split_cell,
 )
-from photocore.workbook.live_book import BookBuilder, short_formula
-from photocore.workbook.live_columns import TEXT_KEYS, row_formula
-from photocore.workbook.named_cells import place_of, type_column, type_value
-from photocore.workbook.newbook import RowBlock
-from photocore.workbook.package import uncollected
-from photocore.workbook.print_area import move_print_area
+from photocore.workbook.reading.package import uncollected
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,8 +17,8 @@ from bifocal.calibration.plumb_line import calibrate_from_lines, find_straight_e
 from bifocal.calibration.workflow import undistorted
 from bifocal.cli.main import main
 from bifocal.files.images import read_image, write_image
-from bifocal.orientation.interior_orientation import lens_of_photo
-from photocore.boards import BoardView, detect_board, find_board_size
+from bifocal.model.interior_orientation import lens_of_photo
+from photocore.camera.boards import BoardView, detect_board, find_board_size
 from photocore.errors import InputError
 
 MATRIX = np.array([[900.0, 0, 511.5], [0, 905.0, 383.5], [0, 0, 1]])

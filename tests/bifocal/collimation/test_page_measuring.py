@@ -13,10 +13,10 @@ from PIL import Image
 from bifocal import Lens, Pair
 from bifocal.collimation.measures import measure
 from bifocal.collimation.pyramids import TILE, level_size, max_level
-from bifocal.collimation.snapping import snap
-from bifocal.collimation.suggestions import radial_line, suggest
 from bifocal.demo import SAMPLE
 from bifocal.files.images import read_image
+from bifocal.matching.snapping import snap
+from bifocal.matching.suggestions import radial_line, suggest
 from photocore.errors import InputError
 from tests.bifocal.collimation.page_truth import SPOILT, true_pixels
 from tests.page_session import client_of, opened, sample_folder

@@ -8,10 +8,10 @@ import pytest
 
 from bifocal import Pair, Photo, georeference, solve
 from bifocal.model.orientation_precision import CAMERA, NAMES, moved, pinhole
-from photocore.camera import PARAMETERS, plane_from_pixel
-from photocore.distortion import RadialDivision
+from photocore.camera.distortion import RadialDivision
+from photocore.camera.pinhole import PARAMETERS, plane_from_pixel
+from photocore.camera.rotation import rotation_from_vector
 from photocore.errors import InputError
-from photocore.rotation import rotation_from_vector
 from tests.scenes import SetupErrors, bifocal_cameras
 
 CAMERAS = bifocal_cameras(errors=SetupErrors(tilt_deg=8.0), rng=np.random.default_rng(2))

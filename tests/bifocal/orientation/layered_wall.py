@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from photocore.camera import Pinhole, camera_matrix
-from photocore.rotation import rotation_from_vector
+from photocore.camera.pinhole import Pinhole, camera_matrix
+from photocore.camera.rotation import rotation_from_vector
 
 SIZE = (960, 640)
 #: Boards: x, y of the lower left corner, width, height, relief. [m]

@@ -4,11 +4,11 @@ import cv2
 import numpy as np
 import pytest
 
+from bifocal.model.interior_orientation import Interior
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.control_points import Control, SiteMeasures
-from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.orientation_stages import PhotoInput
-from photocore.camera import project, triangulate
+from photocore.camera.pinhole import project, triangulate
 from photocore.errors import GeometryError
 from tests.bifocal.orientation.layered_wall import BOARDS, SIZE, camera, photograph, relief_at, take
 

@@ -14,17 +14,17 @@ from PIL import Image
 from bifocal.cli.main import main
 from bifocal.model.orientation_precision import pinhole
 from bifocal.model.pair import Pair
-from bifocal.orientation.joint_adjustment import (
+from bifocal.networks.joint_adjustment import (
     JointAdjustment,
     JointUnknowns,
     adjust_jointly,
 )
-from bifocal.orientation.joint_media import CameraMedia, media_of, project_through
-from bifocal.orientation.joint_observations import JointObservations
-from bifocal.orientation.joint_workflow import _adjusted_pair, _adjusted_photo
+from bifocal.networks.joint_media import CameraMedia, media_of, project_through
+from bifocal.networks.joint_observations import JointObservations
+from bifocal.networks.joint_workflow import _adjusted_pair, _adjusted_photo
 from multimedia import Layers
-from photocore.camera import Pinhole, camera_matrix
-from photocore.rotation import rotation_from_vector
+from photocore.camera.pinhole import Pinhole, camera_matrix
+from photocore.camera.rotation import rotation_from_vector
 from tests.bifocal.model.test_pair_through_media import PAIRS, content
 from tests.bifocal.orientation.street import CONTROL, write_table
 from tests.scenes import SetupErrors, bifocal_cameras, demo_scene, render

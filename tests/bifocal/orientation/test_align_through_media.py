@@ -27,9 +27,9 @@ from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.refracted_stage import with_bent_ties
 from bifocal.orientation.relative_orientation import Ties
 from multimedia import Layers
-from photocore.camera import Pinhole, camera_matrix
+from photocore.camera.pinhole import Pinhole, camera_matrix
+from photocore.camera.rotation import rotation_from_vector
 from photocore.errors import GeometryError, InputError
-from photocore.rotation import rotation_from_vector
 from tests.scenes import SetupErrors, bifocal_cameras
 from tests.scenes.refracted import seen_at
 from tests.scenes.wet import under_water

@@ -11,11 +11,11 @@ from click.testing import CliRunner
 from bifocal import Pair
 from bifocal.cli import match as match_command
 from bifocal.cli.main import main
-from bifocal.orientation.interior_orientation import Interior
+from bifocal.matching.matching import Matches
+from bifocal.model.interior_orientation import Interior
 from bifocal.orientation.match_workflow import match_summary
-from bifocal.orientation.matching import Matches
 from bifocal.orientation.validation import check_distortion
-from photocore.camera import project
+from photocore.camera.pinhole import project
 from photocore.errors import GeometryError
 from tests.bifocal.orientation.layered_wall import camera, relief_at, take
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from bifocal.model.interior_orientation import Interior
 from bifocal.orientation.control_points import Control, SiteMeasures
-from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.orientation_stages import (
     OrientedPair,
     PhotoInput,
@@ -12,7 +12,7 @@ from bifocal.orientation.orientation_stages import (
     oriented_in_stages,
 )
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
-from photocore.camera import Pinhole, triangulate
+from photocore.camera.pinhole import Pinhole, triangulate
 from tests.scenes import SetupErrors, bifocal_cameras
 
 SIZE = (3072, 2048)

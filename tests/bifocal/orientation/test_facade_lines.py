@@ -4,15 +4,15 @@ import cv2
 import numpy as np
 import pytest
 
+from bifocal.model.interior_orientation import Interior
 from bifocal.orientation.facade_lines import (
     FacadeDirection,
     facade_turn,
     lines_of_photos,
 )
-from bifocal.orientation.interior_orientation import Interior
-from photocore.camera import Pinhole, camera_matrix, project
-from photocore.distortion import RadialDivision
-from photocore.rotation import rotation_from_vector
+from photocore.camera.distortion import RadialDivision
+from photocore.camera.pinhole import Pinhole, camera_matrix, project
+from photocore.camera.rotation import rotation_from_vector
 
 SIZE = (1200, 800)
 MATRIX = camera_matrix(1500.0, 1.0, 605.0, 396.0)

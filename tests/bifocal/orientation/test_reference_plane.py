@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bifocal.model.interior_orientation import Interior
 from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.reference_plane import (
     Face,
@@ -16,7 +16,7 @@ from bifocal.orientation.reference_plane import (
     rivals_in_words,
     zero_sigma,
 )
-from photocore.camera import project
+from photocore.camera.pinhole import project
 from photocore.errors import GeometryError
 from tests.bifocal.orientation.layered_wall import SIZE, camera
 

@@ -5,7 +5,7 @@ import pytest
 
 from bifocal import Control, Interior, SiteMeasures, align
 from bifocal.model.orientation_precision import pinhole
-from photocore.similarity import fit_similarity
+from photocore.camera.similarity import fit_similarity
 from tests.scenes import SetupErrors, bifocal_cameras, facade, render
 
 pytestmark = pytest.mark.acceptance

@@ -16,7 +16,7 @@ from bifocal.survey.observations import PointObservations
 from bifocal.survey.output import write_result
 from bifocal.survey.template_workflow import MOST_ROWS, write_survey, write_template
 from bifocal.survey.workbook import book, update
-from photocore.workbook import package
+from photocore.workbook.reading import package
 from tests.bifocal.survey.test_cli_solve import POINTS, SETUP, put, rows, run
 from tests.bifocal.survey.test_survey_workbook import assert_recalculated_equals_cached
 

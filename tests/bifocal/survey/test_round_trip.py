@@ -201,7 +201,7 @@ def outside_cells(data):
 
 
 def cells_of(path, title):
-    from photocore.workbook.editor import WorkbookEditor
+    from photocore.workbook.changing.editor import WorkbookEditor
 
     return WorkbookEditor(path).grid(title).rows
 

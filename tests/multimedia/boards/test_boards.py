@@ -24,7 +24,7 @@ from multimedia.orientation.plate_poses import plate_pose
 from multimedia.projects.model import Project
 from multimedia.projects.photos import read_photo
 from multimedia.refraction.layers import Layers
-from photocore.boards import BoardView, detect_board
+from photocore.camera.boards import BoardView, detect_board
 from photocore.errors import InputError
 from tests.multimedia.rendered_boards import Housing, chessboard, dots, drawn, photo, poses
 

@@ -22,7 +22,7 @@ from multimedia.media.projection import project
 from multimedia.media.surfaces import Plane, Sphere
 from multimedia.projects.model import ImagePoints, ObjectPoints, Project
 from multimedia.refraction.layers import Layers
-from photocore.distortion import Brown, Convention
+from photocore.camera.distortion import Brown, Convention
 from photocore.errors import InputError
 
 SENSOR = Sensor(width=1936, height=1216, pitch=np.array([0.00345, 0.00346]))

@@ -24,9 +24,9 @@ from multimedia.orientation.object_rays import image_rays
 from multimedia.orientation.resection import resect
 from multimedia.projects.model import ImagePoints, ObjectPoints, Project
 from multimedia.refraction.layers import Layers
-from photocore.distortion import Brown
+from photocore.camera.distortion import Brown
+from photocore.camera.fisheye import Fisheye
 from photocore.errors import InputError
-from photocore.fisheye import Fisheye
 from tests.rounding import EPS
 
 mp.mp.dps = 40

@@ -13,9 +13,9 @@ from multimedia.media.projection import project, project_with_jacobian, projecti
 from multimedia.media.surfaces import Sphere
 from multimedia.refraction.layers import Layers
 from multimedia.refraction.shifting import radial_shift
-from photocore.distortion import NAMES, Brown, Convention
+from photocore.camera.distortion import NAMES, Brown, Convention
+from photocore.camera.rotation import rotation_vector_from_angle_rates
 from photocore.errors import GeometryError, InputError
-from photocore.rotation import rotation_vector_from_angle_rates
 from tests.multimedia.mp_camera import derivative, image
 from tests.rounding import EPS
 

@@ -17,7 +17,7 @@ from multimedia.orientation.intersection import intersect
 from multimedia.projects.model import ImagePoints, ObjectPoints, Project
 from multimedia.projects.project_file import read_project, write_project
 from multimedia.refraction.layers import Layers
-from photocore.distortion import Brown, Convention
+from photocore.camera.distortion import Brown, Convention
 from photocore.errors import InputError
 from tests.multimedia.tank import SENSOR, cameras, control
 

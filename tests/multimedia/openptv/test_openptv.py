@@ -26,7 +26,7 @@ from multimedia.openptv.workflow import import_openptv
 from multimedia.orientation.intersection import intersect, intersect_pairs
 from multimedia.orientation.resection import resect
 from multimedia.projects.model import ImagePoints, ObjectPoints, Project
-from photocore.distortion import Brown, Convention
+from photocore.camera.distortion import Brown, Convention
 from photocore.errors import GeometryError, InputError
 from tests.multimedia.tank import LAYERS, SENSOR, cameras, control
 

@@ -19,7 +19,7 @@ from multimedia.openptv.workflow import import_openptv
 from multimedia.projects.model import Project
 from multimedia.projects.project_file import read_project
 from multimedia.refraction.layers import Layers
-from photocore.distortion import Brown, Convention
+from photocore.camera.distortion import Brown, Convention
 from tests.multimedia.tank import SENSOR
 
 NOISE = 0.3  # px

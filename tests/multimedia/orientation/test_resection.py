@@ -18,9 +18,9 @@ from multimedia.media.surfaces import Sphere
 from multimedia.orientation import pose_starts
 from multimedia.orientation.resection import resect
 from multimedia.refraction.layers import Layers
-from photocore.distortion import Brown
+from photocore.camera.distortion import Brown
+from photocore.camera.rotation import rotation_from_vector, world_from_camera
 from photocore.errors import ConvergenceError, GeometryError, InputError
-from photocore.rotation import rotation_from_vector, world_from_camera
 from tests.multimedia.tank import LAYERS, cameras, control, images
 
 CALIBRATION = ("c", "xh", "yh", "k1", "p1", "p2", "scale")

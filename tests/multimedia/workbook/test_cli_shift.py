@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 
 from multimedia import Layers, radial_shift
 from multimedia.cli.main import main
-from photocore.workbook.editor import WorkbookEditor
+from photocore.workbook.changing.editor import WorkbookEditor
 from tests.rounding import EPS
 
 TANK = ("--indices", "1,1.5,1.34", "--thicknesses", "0.01", "--camera", "0.2,0.1,0.51")

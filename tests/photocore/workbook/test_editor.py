@@ -11,11 +11,11 @@ import pytest
 
 from photocore.errors import InputError
 from photocore.tables import Column, read_table
-from photocore.workbook.changes import SheetChanges
-from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.newbook import finished_parts
-from photocore.workbook.package import open_package
-from photocore.workbook.splice import splice_sheet
+from photocore.workbook.changing.changes import SheetChanges
+from photocore.workbook.changing.editor import WorkbookEditor
+from photocore.workbook.changing.splice import splice_sheet
+from photocore.workbook.making.newbook import finished_parts
+from photocore.workbook.reading.package import open_package
 from tests import office
 from tests.golden import make_rich_workbook
 
@@ -362,7 +362,7 @@ def test_another_reader_sees_the_stored_results(rich, tmp_path):
 
 
 def test_blocks_and_typed_cells_meet_in_rows_that_exist_or_not():
-    from photocore.workbook.cells import NewColumn, NewRows, RowFormula
+    from photocore.workbook.changing.cells import NewColumn, NewRows, RowFormula
 
     before = '<w><sheetData><row r="3"><c r="A3" s="5"/><c r="C3"/></row></sheetData></w>'
     columns = [
@@ -392,7 +392,7 @@ def test_blocks_and_typed_cells_meet_in_rows_that_exist_or_not():
 def test_a_formula_copied_downwards_moves_its_relative_rows_only(formula, moved):
     from openpyxl.formula.translate import Translator
 
-    from photocore.workbook.cells import RowFormula
+    from photocore.workbook.changing.cells import RowFormula
 
     assert RowFormula(formula, 2).at(7) == moved
     if "_x" not in formula:
@@ -413,7 +413,7 @@ PLAIN_CHANGES = [
 
 @pytest.mark.parametrize("changes", PLAIN_CHANGES)
 def test_a_plain_sheet_changes_as_by_the_parser(changes):
-    from photocore.workbook.cells import NewCell, NewColumn, NewRows
+    from photocore.workbook.changing.cells import NewCell, NewColumn, NewRows
 
     cells = (
         '<row r="2" spans="1:4"><c r="A2" t="inlineStr"><is><t>P1 &amp; Ö</t></is></c>'

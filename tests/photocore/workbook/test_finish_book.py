@@ -8,7 +8,7 @@ import openpyxl
 import pytest
 
 from photocore.errors import InputError
-from photocore.workbook.newbook import RowBlock, finish_book
+from photocore.workbook.making.newbook import RowBlock, finish_book
 
 
 def book():

@@ -7,11 +7,11 @@ import zipfile
 import pytest
 
 from photocore.errors import InputError
-from photocore.workbook.changes import replaced_outside_cells
-from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.ods import open_ods
-from photocore.workbook.result_columns import head_row
-from photocore.workbook.xlsx import open_xlsx
+from photocore.workbook.changing.changes import replaced_outside_cells
+from photocore.workbook.changing.editor import WorkbookEditor
+from photocore.workbook.changing.result_columns import head_row
+from photocore.workbook.reading.ods import open_ods
+from photocore.workbook.reading.xlsx import open_xlsx
 from tests.bare_workbook import write
 
 #: What the plain form takes, and what is left to the XML parser.

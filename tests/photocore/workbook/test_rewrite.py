@@ -10,8 +10,8 @@ from click.testing import CliRunner
 from bifocal.cli.main import main as bifocal
 from multimedia.cli.main import main as multimedia
 from photocore.errors import InputError
-from photocore.workbook.package import rewrite_package
-from photocore.workbook.xlsx import open_xlsx
+from photocore.workbook.reading.package import rewrite_package
+from photocore.workbook.reading.xlsx import open_xlsx
 
 OFFICE = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
 PACKAGE = "http://schemas.openxmlformats.org/package/2006/relationships"

@@ -7,12 +7,12 @@ import random
 
 import pytest
 
-from photocore.workbook import plainsheet
-from photocore.workbook.cells import NewColumn, NewRows, result_texts, type_and_content
-from photocore.workbook.changes import SheetChanges
-from photocore.workbook.plainsheet import plain_rows, sheet_data
-from photocore.workbook.splice import splice_sheet
-from photocore.workbook.xlsx import open_xlsx
+from photocore.workbook.changing.cells import NewColumn, NewRows, result_texts, type_and_content
+from photocore.workbook.changing.changes import SheetChanges
+from photocore.workbook.changing.splice import splice_sheet
+from photocore.workbook.reading import plainsheet
+from photocore.workbook.reading.plainsheet import plain_rows, sheet_data
+from photocore.workbook.reading.xlsx import open_xlsx
 from tests.bare_workbook import write
 
 ROWS = 120

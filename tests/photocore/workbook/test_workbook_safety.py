@@ -9,8 +9,8 @@ import pytest
 
 from photocore.errors import InputError
 from photocore.tables import Column, read_named_values, read_table
-from photocore.workbook import package
-from photocore.workbook.editor import WorkbookEditor
+from photocore.workbook.changing.editor import WorkbookEditor
+from photocore.workbook.reading import package
 from tests.golden import make_rich_workbook
 
 COLUMNS = (Column("id", kind="text"), Column("s1", required=True), Column("s2"))

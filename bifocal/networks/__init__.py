@@ -1,0 +1,1 @@
+"""Pairs of one wall in one frame: ties between pairs, their control, one adjustment, its files."""

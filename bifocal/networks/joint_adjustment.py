@@ -1,0 +1,451 @@
+"""Least-squares adjustment of all pairs of a façade in one frame, from rays to common points.
+
+The unknowns are the exterior orientation of every camera (and its focal length, where that is not
+exactly known) and the coordinates of every point; interior orientation else is as the pair files
+state it. Points are eliminated, what remains is sparse: `photocore.adjustment.sparse`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from bifocal.model.orientation_precision import CAMERA
+from bifocal.networks.joint_media import media_with_cameras, project_through
+from bifocal.networks.joint_observations import JointObservations, with_enough_rays, with_rays
+from photocore import adjustment
+from photocore.adjustment import OUTLIER_LIMIT, Fit, huber_weights, standardised
+from photocore.adjustment.sparse import SparseEquations
+from photocore.arrays import BoolArray, FloatArray, IntArray
+from photocore.camera.pinhole import PARAMETERS, Pinhole
+from photocore.errors import GeometryError
+
+#: What is unknown of a camera, by its place in `PARAMETERS`; the focal length comes first.
+ESTIMATED = (0, 4, 5, 6, 7, 8, 9)
+#: Rounds in which gross errors are taken out, the worst of every point each time.
+ROUNDS = 8
+#: Rounds with Huber's weights before these, and rays dropped after them: so many usual misfits.
+COARSE, FAR_OFF = 3, 10.0
+#: In these rounds control weighs as if so many times less precise: else a wrong point bends the
+#: cameras, and the good rays around it look wrong. In `many_pairs` of the tests, with control of
+#: 2 mm of which one coordinate is wrong by 0.3 to 1 m, 8 to 22 rays are lost with 1, at most one
+#: with 10, 30 or 100, and the point is named.
+LOOSE = 100.0
+#: Rounding error of pixels and metres, as a share of their standard deviations.
+ROUNDING = 1e-9
+#: Redundancy from which rays of one stated precision tell how good they truly are.
+ENOUGH = 20.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JointUnknowns:
+    """Cameras, and the points' coordinates, shape (p, 3). [m]"""
+
+    cameras: tuple[Pinhole, ...]
+    xyz: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Blunder:
+    """A measurement that contradicts the others, and took no part in the end.
+
+    Attributes
+    ----------
+    point, where : str
+        Which point, and in which photo, or ``control``.
+    test : float
+        Residual over its own standard deviation.
+    """
+
+    point: str
+    where: str
+    test: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JointAdjustment(JointUnknowns):
+    """Adjusted cameras and points.
+
+    Attributes
+    ----------
+    observations : JointObservations
+        Those that took part.
+    covariance : ndarray, shape (p, 3, 3)
+        Of the points. NaN where too few rays were left. [m²]
+    sigma0 : float
+        Standard deviation of unit weight, after the gross errors.
+    redundancy, iterations : int
+    residuals : ndarray, shape (n, 2)
+        Computed minus measured. [px]
+    control : ndarray, shape (p, 3)
+        Adjusted minus known coordinates, also of what was taken out; NaN elsewhere. [m]
+    blunders : tuple of Blunder
+    left_in : tuple of Blunder
+        What the last round would have taken out: empty unless there were more than `ROUNDS`.
+    by_camera : ndarray, shape (m, 7, 7)
+        Covariance of the `ESTIMATED` of each camera.
+    between : ndarray, shape (m // 2, 7, 7)
+        Covariance between the far and the near camera of each pair.
+    """
+
+    observations: JointObservations
+    covariance: FloatArray
+    sigma0: float
+    redundancy: int
+    iterations: int
+    residuals: FloatArray
+    control: FloatArray
+    blunders: tuple[Blunder, ...]
+    left_in: tuple[Blunder, ...]
+    by_camera: FloatArray
+    between: FloatArray
+
+    def orientation(self, pair: int) -> FloatArray:
+        """Return the covariance of a pair's cameras as its file states it, shape (k, k).
+
+        24 in air. Through media, which are taken as given, what moves and turns with the cameras
+        follows them.
+        """
+        whole = np.zeros((2 * len(CAMERA), 2 * len(CAMERA)))
+        places = [[k * len(CAMERA) + e for e in ESTIMATED] for k in (0, 1)]
+        for k in (0, 1):
+            whole[np.ix_(places[k], places[k])] = self.by_camera[2 * pair + k]
+        whole[np.ix_(*places)] = self.between[pair]
+        whole[np.ix_(*places[::-1])] = self.between[pair].T
+        seen = self.observations
+        by = media_with_cameras((seen.media_of(2 * pair), seen.media_of(2 * pair + 1)))
+        return whole if by is None else by @ whole @ by.T
+
+
+def adjust_jointly(observations: JointObservations, start: JointUnknowns) -> JointAdjustment:
+    """Return all cameras and points of a façade, and what contradicts the rest.
+
+    Parameters
+    ----------
+    observations : JointObservations
+        Cameras 2 k and 2 k + 1 are the far and the near one of pair k.
+    start : JointUnknowns
+        Approximate cameras and points in one frame.
+
+    Raises
+    ------
+    GeometryError
+        If the measurements leave an orientation open; the message names it.
+    """
+    blunders: list[Blunder] = []
+    seen = with_enough_rays(observations)
+    # What was known before of the focal lengths, however often a round begins anew.
+    focal = np.array([camera.matrix[0, 0] for camera in start.cameras])
+    start, tests, control = _coarse(seen, start, focal)
+    blunders += [_of_ray(seen, k, tests[k]) for k in np.flatnonzero(tests >= FAR_OFF).tolist()]
+    # A wrong ray moves its own point: what is known of that is judged when the ray is gone.
+    control[seen.point[tests >= FAR_OFF]] = 0.0
+    blunders += [
+        _of_control(seen, k, control[k]) for k in np.flatnonzero(control >= FAR_OFF).tolist()
+    ]
+    known = np.where((control < FAR_OFF)[:, None], seen.known, np.nan)
+    seen = _without(seen, tests < FAR_OFF, known, blunders)
+    for left in range(ROUNDS, -1, -1):
+        system = _System(seen, start, focal)
+        fit = adjustment.fit(
+            start, system.equations, system.advance, names=system.unknown_names,
+            what="the pairs", rounding=ROUNDING, largest=0,
+        )  # fmt: skip
+        start = fit.state
+        sigma0 = _sigma0(fit, system)
+        keep, known, found = _gross(seen, system, fit, sigma0)
+        if not found or not left:
+            break
+        blunders += found
+        seen = _without(seen, keep, known, found)
+    return _adjusted(observations, seen, system, fit, sigma0, (tuple(blunders), tuple(found)))
+
+
+def _coarse(
+    seen: JointObservations, start: JointUnknowns, focal: FloatArray
+) -> tuple[JointUnknowns, FloatArray, FloatArray]:
+    """Return a state that most agree on, and misfits over the usual: of rays (n,), control (p,).
+
+    Huber's weights, renewed a few times: a match with the wrong window must not bend the whole, nor
+    a control point with a wrong coordinate. The misfit of a point that is no control is 0.
+    """
+    fixed = np.isfinite(seen.known).any(axis=1)
+    spread = LOOSE * seen.sigma_known
+    for number in range(COARSE):
+        away = np.linalg.norm(_System(seen, start, focal).rays(start)[0] - seen.pixels, axis=1)
+        away = np.nan_to_num(away, nan=1e6)
+        if number and fixed.any():  # before, the start is no better than any control point
+            off = _off_control(seen, start)[fixed]
+            spread[fixed] = LOOSE * seen.sigma_known[fixed]
+            spread[fixed] /= np.sqrt(huber_weights(off, 2.0))[:, None]
+        weighted = replace(
+            seen, sigma=seen.sigma / np.sqrt(huber_weights(away, 2.0)), sigma_known=spread
+        )
+        system = _System(weighted, start, focal)
+        start = adjustment.minimise(
+            start, system.equations, system.advance, what="the pairs", most=6, largest=0
+        ).state
+    away = np.linalg.norm(_System(seen, start, focal).rays(start)[0] - seen.pixels, axis=1)
+    away = away / seen.sigma
+    usual = max(float(np.median(away)) / 1.1774, 1.0)  # Rayleigh's median
+    off = _off_control(seen, start)
+    agreed = max(float(np.median(off[fixed])) / 1.5382, 1.0) if fixed.any() else 1.0  # Maxwell's
+    return start, np.nan_to_num(away / usual, nan=np.inf), off / agreed
+
+
+def _off_control(seen: JointObservations, state: JointUnknowns) -> FloatArray:
+    """Return how far points lie from what is known, in its standard deviations, shape (p,)."""
+    return np.linalg.norm(np.nan_to_num((state.xyz - seen.known) / seen.sigma_known), axis=1)
+
+
+def _of_ray(seen: JointObservations, ray: int, test: float) -> Blunder:
+    return Blunder(
+        point=seen.ids[seen.point[ray]], where=seen.names[seen.camera[ray]], test=float(test)
+    )
+
+
+def _of_control(seen: JointObservations, point: int, test: float) -> Blunder:
+    return Blunder(point=seen.ids[point], where="control", test=float(test))
+
+
+def _without(
+    seen: JointObservations, keep: BoolArray, known: FloatArray, found: list[Blunder]
+) -> JointObservations:
+    """Return what is left without gross errors.
+
+    Raises
+    ------
+    GeometryError
+        If too little control is left to hold the frame.
+    """
+    left = with_enough_rays(with_rays(replace(seen, known=known), keep))
+    if seen.frame_is_known and not left.frame_is_known:
+        control = {seen.ids[k] for k in np.flatnonzero(np.isfinite(seen.known).all(axis=1))}
+        raise GeometryError(
+            "the control points contradict each other or their picks: "
+            f"{', '.join(sorted(control & {b.point for b in found}))}. "
+            "Check their coordinates and names."
+        )
+    return left
+
+
+class _System:
+    """The equations: where each row and each column stands.
+
+    Rows: two for each ray, one for each known coordinate, one for the relief of each other point
+    (it lies before the cameras, a standard deviation of the nearest one's distance), one for each
+    focal length that is not held.
+    """
+
+    def __init__(self, seen: JointObservations, start: JointUnknowns, focal: FloatArray) -> None:
+        self.seen = seen
+        count = len(seen.names)
+        free = np.ones((count, len(ESTIMATED)), dtype=bool)
+        free[:, 0] = seen.sigma_focal > 0
+        if not seen.frame_is_known:
+            # Seven are free: the far camera, and for the scale the near one's distance.
+            free[0], free[1, -1] = False, False
+        self.column = np.where(free, np.cumsum(free.ravel()).reshape(free.shape) - 1, -1)
+        self.width = int(free.sum())
+        names = [PARAMETERS[e] for e in ESTIMATED]
+        self.camera_names = [f"{seen.names[i]}: {names[k]}" for i, k in np.argwhere(free).tolist()]
+        self.order = np.argsort(seen.camera, kind="stable")
+        self.slices = np.searchsorted(seen.camera[self.order], np.arange(count + 1))
+        self.fixed = np.argwhere(np.isfinite(seen.known))
+        rays = np.bincount(seen.point, minlength=len(seen.ids))
+        # A point without rays stays where it is, in all three coordinates.
+        self.used = rays > 0
+        self.loose = np.flatnonzero(self.used & ~np.isfinite(seen.known[:, 2]))
+        self.reach = float(min(camera.centre[2] for camera in start.cameras))
+        self.focal = np.flatnonzero(free[:, 0])
+        self.first_focal = np.log(focal)
+
+    @property
+    def unknown_names(self) -> list[str]:
+        """What is unknown, cameras first."""
+        used = np.flatnonzero(self.used).tolist()
+        return [
+            *self.camera_names,
+            *(f"{self.seen.ids[k]}: {axis}" for k in used for axis in "XYr"),
+        ]
+
+    def advance(self, state: JointUnknowns, step: FloatArray) -> JointUnknowns | None:
+        """Return the state after a step."""
+        cameras = []
+        for camera, columns in zip(state.cameras, self.column, strict=True):
+            whole = np.zeros(len(PARAMETERS))
+            own = columns >= 0
+            whole[np.array(ESTIMATED)[own]] = step[columns[own]]
+            cameras.append(camera.stepped(whole))
+        xyz = state.xyz.copy()
+        xyz[self.used] += step[self.width :].reshape(-1, 3)
+        return JointUnknowns(cameras=tuple(cameras), xyz=xyz)
+
+    def rays(self, state: JointUnknowns) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return pixels (n, 2), derivatives by the points (n, 2, 3) and the cameras (n, 2, 7)."""
+        count = len(self.seen.camera)
+        pixels, by_point = np.empty((count, 2)), np.empty((count, 2, 3))
+        by_camera = np.empty((count, 2, len(ESTIMATED)))
+        for number, camera in enumerate(state.cameras):
+            rows = self.order[self.slices[number] : self.slices[number + 1]]
+            media = self.seen.media_of(number)
+            view = project_through(camera, media, state.xyz[self.seen.point[rows]])
+            pixels[rows], by_point[rows] = view.pixels, view.by_point
+            by_camera[rows] = view.by_camera[:, :, ESTIMATED]
+        return pixels, by_point, by_camera
+
+    def equations(self, state: JointUnknowns) -> SparseEquations | None:
+        """Return weighted residuals and derivatives; None with a point behind a camera."""
+        seen = self.seen
+        pixels, by_point, by_camera = self.rays(state)
+        if not np.isfinite(pixels).all():
+            return None
+        weight = 1.0 / seen.sigma
+        point, axis = self.fixed.T
+        coordinate = 1.0 / seen.sigma_known[point, axis]
+        misfit = (state.xyz[point, axis] - seen.known[point, axis]) * coordinate
+        focal = np.log([state.cameras[k].matrix[0, 0] for k in self.focal])
+        drift = (focal - self.first_focal[self.focal]) / seen.sigma_focal[self.focal]
+        residuals = [((pixels - seen.pixels) * weight[:, None]).ravel(), misfit]
+        residuals += [state.xyz[self.loose, 2] / self.reach, drift]
+        rays, rows = 2 * len(weight), np.arange(2 * len(weight))
+        columns = np.repeat(self.column[seen.camera], 2, axis=0)
+        values = (by_camera * weight[:, None, None]).reshape(rays, -1)
+        own = columns >= 0
+        above = rays + len(misfit) + len(self.loose)
+        design = csr_matrix(
+            (
+                np.r_[values[own], 1.0 / seen.sigma_focal[self.focal]],
+                (
+                    np.r_[np.broadcast_to(rows[:, None], columns.shape)[own],
+                          above + np.arange(len(drift))],
+                    np.r_[columns[own], self.column[self.focal, 0]],
+                ),
+            ),
+            shape=(above + len(drift), self.width),
+        )  # fmt: skip
+        triple = 3 * np.repeat(seen.point, 2)[:, None] + np.arange(3)
+        eliminated = csr_matrix(
+            (
+                np.r_[(by_point * weight[:, None, None]).ravel(), coordinate,
+                      np.full(len(self.loose), 1.0 / self.reach)],
+                (
+                    np.r_[np.repeat(rows, 3), rays + np.arange(above - rays)],
+                    np.r_[triple.ravel(), 3 * point + axis, 3 * self.loose + 2],
+                ),
+            ),
+            shape=(above + len(drift), 3 * len(seen.ids)),
+        )  # fmt: skip
+        free = np.repeat(self.used[:, None], 3, axis=1)
+        return SparseEquations(
+            residuals=np.concatenate(residuals), design=design,
+            eliminated=eliminated @ _only(free), free=free,
+        )  # fmt: skip
+
+
+def _only(free: BoolArray) -> csr_matrix:
+    """Return the matrix that blanks the columns of what is not free."""
+    from scipy.sparse import diags
+
+    return diags(free.ravel().astype(float)).tocsr()
+
+
+def _sigma0(fit: Fit[JointUnknowns], system: _System) -> float:
+    """Return the standard deviation of unit weight of rays and control; 1 where nothing checks it.
+
+    The weak beliefs about relief have next to no residual and would make it look too good.
+    """
+    count = 2 * len(system.seen.camera) + len(system.fixed)
+    redundancy = float(fit.linear.redundancy_numbers[:count].sum())
+    return (
+        float(np.sqrt((fit.residuals[:count] ** 2).sum() / redundancy)) if redundancy > 1 else 1.0
+    )
+
+
+def _units(
+    residuals: FloatArray, redundancy: FloatArray, sigma: FloatArray, sigma0: float
+) -> FloatArray:
+    """Return the unit of each residual, by all rays of its stated precision, shape (n,).
+
+    Features that are better than was believed must not make gross errors of honest picks.
+    """
+    _, group = np.unique(sigma, return_inverse=True)
+    squares = np.bincount(group, weights=residuals**2)
+    free = np.bincount(group, weights=redundancy)
+    own = np.where(free >= ENOUGH, np.sqrt(squares / np.maximum(free, 1.0)), 1.0)
+    return np.maximum(own, sigma0)[group]
+
+
+def _gross(
+    seen: JointObservations, system: _System, fit: Fit[JointUnknowns], sigma0: float
+) -> tuple[BoolArray, FloatArray, list[Blunder]]:
+    """Return which rays stay, the coordinates that stay known, and what goes: the worst of each.
+
+    A ray is judged by the larger of its two coordinates, and by the rays of its own precision.
+    """
+    count = 2 * len(seen.camera)
+    tests = standardised(fit.residuals, fit.linear.redundancy_numbers)
+    tests = np.abs(np.nan_to_num(tests))
+    units = _units(fit.residuals[:count], fit.linear.redundancy_numbers[:count],
+                   np.repeat(seen.sigma, 2), sigma0)  # fmt: skip
+    rays = (tests[:count] / units).reshape(-1, 2).max(axis=1, initial=0.0)
+    # That rays are more precise than they were believed to be says nothing of control.
+    coordinates = tests[count:][: len(system.fixed)] / max(sigma0, 1.0)
+    worst = np.zeros(len(seen.ids))
+    np.maximum.at(worst, seen.point, rays)
+    np.maximum.at(worst, system.fixed[:, 0], coordinates)
+    limit = np.maximum(worst, OUTLIER_LIMIT)
+    bad = (rays >= limit[seen.point]) & (rays > OUTLIER_LIMIT)
+    wrong = (coordinates >= limit[system.fixed[:, 0]]) & (coordinates > OUTLIER_LIMIT)
+    # A wrong control point bends its neighbours: only the worst of them goes at a time.
+    wrong &= coordinates >= coordinates.max(initial=0.0)
+    # It bends rays of other points too, which are judged again without it.
+    if coordinates[wrong].max(initial=0.0) > rays.max(initial=0.0):
+        bad[:] = False
+    found = [_of_ray(seen, k, rays[k]) for k in np.flatnonzero(bad).tolist()]
+    known = seen.known.copy()
+    for k in np.flatnonzero(wrong).tolist():
+        point = int(system.fixed[k, 0])
+        known[point] = np.nan
+        found.append(_of_control(seen, point, coordinates[k]))
+    return ~bad, known, found
+
+
+def _adjusted(
+    given: JointObservations,
+    seen: JointObservations,
+    system: _System,
+    fit: Fit[JointUnknowns],
+    sigma0: float,
+    blunders: tuple[tuple[Blunder, ...], tuple[Blunder, ...]],
+) -> JointAdjustment:
+    """Return the result with its precision; blunders taken out, and left in."""
+    linear = fit.linear
+    assert isinstance(linear, SparseEquations)
+    factor = max(sigma0, 1.0) ** 2
+    count, size = len(seen.names), len(ESTIMATED)
+    by_camera, between = np.zeros((count, size, size)), np.zeros((count // 2, size, size))
+    cofactor = linear.cofactor.tocsr()
+
+    def part(first: IntArray, second: IntArray) -> FloatArray:
+        block = np.zeros((size, size))
+        a, b = np.flatnonzero(first >= 0), np.flatnonzero(second >= 0)
+        if len(a) and len(b):
+            block[np.ix_(a, b)] = cofactor[first[a]][:, second[b]].toarray()
+        return block
+
+    for k, columns in enumerate(system.column):
+        by_camera[k] = factor * part(columns, columns)
+        if k % 2 == 0 and k + 1 < count:
+            between[k // 2] = factor * part(columns, system.column[k + 1])
+    covariance = factor * linear.block_cofactor
+    covariance[~system.used] = np.nan
+    xyz = np.where(system.used[:, None], fit.state.xyz, np.nan)
+    return JointAdjustment(
+        cameras=fit.state.cameras, xyz=xyz, observations=seen, covariance=covariance,
+        sigma0=sigma0, redundancy=fit.redundancy - len(system.loose), iterations=fit.iterations,
+        residuals=system.rays(fit.state)[0] - seen.pixels, control=xyz - given.known,
+        blunders=blunders[0], left_in=blunders[1], by_camera=by_camera, between=between,
+    )  # fmt: skip

@@ -1,0 +1,84 @@
+"""Rays of many cameras to common points of a façade, and what is known of these."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bifocal.networks.joint_media import CameraMedia
+from photocore.arrays import BoolArray, FloatArray, IntArray
+
+#: Of fewer points with known coordinates no frame follows.
+FEWEST_KNOWN = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JointObservations:
+    """Rays of many cameras to common points, and what is known of the points.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the cameras, m.
+    camera, point : ndarray of int, shape (n,)
+        Of each ray.
+    pixels : ndarray, shape (n, 2)
+        Free of lens distortion.
+    sigma : ndarray, shape (n,)
+        Precision of a coordinate. [px]
+    ids : tuple of str
+        Of the points, p.
+    known : ndarray, shape (p, 3)
+        X, Y, r of control points; NaN where not known. [m]
+    sigma_known : ndarray, shape (p, 3)
+        Their standard deviations. [m]
+    sigma_focal : ndarray, shape (m,)
+        Relative standard deviation of the focal lengths; 0: held.
+    media : tuple of CameraMedia or None
+        What each camera looks through; empty where all are in air.
+    """
+
+    names: tuple[str, ...]
+    camera: IntArray
+    point: IntArray
+    pixels: FloatArray
+    sigma: FloatArray
+    ids: tuple[str, ...]
+    known: FloatArray
+    sigma_known: FloatArray
+    sigma_focal: FloatArray
+    media: tuple[CameraMedia | None, ...] = ()
+
+    def media_of(self, camera: int) -> CameraMedia | None:
+        """Return what a camera looks through; None in air."""
+        return self.media[camera] if self.media else None
+
+    @property
+    def frame_is_known(self) -> bool:
+        """Whether control points hold the frame; else the first pair's cameras do."""
+        return int(np.isfinite(self.known).all(axis=1).sum()) >= FEWEST_KNOWN
+
+
+def with_rays(observations: JointObservations, keep: BoolArray) -> JointObservations:
+    """Return the observations with some of their rays."""
+    o = observations
+    return replace(
+        o, camera=o.camera[keep], point=o.point[keep], pixels=o.pixels[keep], sigma=o.sigma[keep]
+    )
+
+
+def with_enough_rays(observations: JointObservations) -> JointObservations:
+    """Leave out the rays of points that have only one and are not known, and what holds nothing.
+
+    That is what is known of points without rays, and of all where they are too few for a frame: in
+    that of the first pair they would contradict what is held.
+    """
+    count = np.bincount(observations.point, minlength=len(observations.ids))
+    fixed = np.isfinite(observations.known).all(axis=1) & (count > 0)
+    if fixed.sum() < FEWEST_KNOWN:
+        fixed[:] = False
+    enough = (count >= 2) | fixed
+    held = enough & bool(fixed.any())
+    known = np.where(held[:, None], observations.known, np.nan)
+    return replace(with_rays(observations, enough[observations.point]), known=known)

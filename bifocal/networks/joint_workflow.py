@@ -1,0 +1,482 @@
+"""Pair files of one façade in, the same pairs adjusted in one frame out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bifocal.files.images import photo_info, read_grey
+from bifocal.matching.features import Features, find_features
+from bifocal.model.orientation_precision import NAMES, as_dict, exchanged, pinhole
+from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
+from bifocal.networks.joint_adjustment import Blunder, JointAdjustment, adjust_jointly
+from bifocal.networks.joint_media import CameraMedia, bent_again, media_of, straightened
+from bifocal.networks.joint_observations import JointObservations, with_rays
+from bifocal.networks.joint_ties import (
+    SharedPoints,
+    common_features,
+    into_one_frame,
+    near_each_other,
+)
+from bifocal.orientation.align_workflow import SIGMA_ON_WALL
+from bifocal.orientation.control_points import Control, read_control
+from photocore.arrays import BoolArray, FloatArray
+from photocore.camera.pinhole import Pinhole, plane_from_pixel
+from photocore.cli import Progress, no_progress
+from photocore.errors import InputError, located
+from photocore.jsonfile import write_object
+from photocore.output import (
+    atomic_folder,
+    check_all_writable,
+    check_not_input,
+    relative_name,
+)
+from photocore.tables import write_csv
+
+#: Precision of a feature's coordinate. [px of the searched photo]
+SIGMA_FEATURE = 0.5
+#: Features per photo, and pixels in which they are looked for: pairs share a part of their photos.
+FEATURES, PIXELS = 8000, 6e6
+#: Footprints that share this part of the smaller one may show common points.
+OVERLAP = 0.05
+#: What a pair's set-up says of a bend, which no other pair mends.
+BENT = ("wall_bend_px", "wall_bend_sigma_px", "focal_px", "principal_point_px")
+#: Blunders that are named one by one.
+NAMED = 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointTask:
+    """How pairs are adjusted.
+
+    Attributes
+    ----------
+    control, check : tuple of (Path or None)
+        Table of each pair, in their order; empty: none. Points of one name are one point, also
+        where only one table gives its coordinates. Check points take part without theirs.
+    sigma_control : float
+        Standard deviation of a coordinate where a table has none. [m]
+    sigma_pick, sigma_tie : float
+        Precision of control picks and of features. [px]
+    unit : str
+        Of the coordinates; empty: as the headings say, else metres.
+    """
+
+    control: tuple[Path | None, ...] = ()
+    check: tuple[Path | None, ...] = ()
+    sigma_control: float = 0.003
+    sigma_pick: float = 0.5
+    sigma_tie: float = SIGMA_FEATURE
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JointResult:
+    """Adjusted pairs.
+
+    Attributes
+    ----------
+    pairs : tuple of Pair
+        In the common frame.
+    names : tuple of str
+        Of the pairs.
+    adjustment : JointAdjustment
+    points : tuple of dict
+        Named points: id, kind (control, check, tie), X, Y, r, their sigmas, rays, and how far they
+        lie from what was known. [m]
+    """
+
+    pairs: tuple[Pair, ...]
+    names: tuple[str, ...]
+    adjustment: JointAdjustment
+    points: tuple[dict[str, Any], ...]
+
+    def check_rms(self, kind: str) -> tuple[int, FloatArray]:
+        """Return how many points of a kind were compared, and their RMS in X, Y, r. [m]
+
+        NaN for a coordinate that none of them has.
+        """
+        rows = [[p[f"d{axis}"] for axis in "XYr"] for p in self.points if p["kind"] == kind]
+        away = np.array([row for row in rows if np.isfinite(row).any()], float).reshape(-1, 3)
+        with np.errstate(invalid="ignore"):
+            rms = np.sqrt(np.nansum(away**2, axis=0) / np.isfinite(away).sum(axis=0))
+        return len(away), rms
+
+    def lines(self) -> list[str]:
+        """Return what was found, for people."""
+        a = self.adjustment
+        rms = np.sqrt((a.residuals**2).mean(axis=0))
+        rays = len(a.residuals)
+        lines = [
+            f"{len(self.pairs)} pairs, {len(np.unique(a.observations.point))} points, {rays} rays; "
+            f"sigma0 {a.sigma0:.2f}, redundancy {a.redundancy}, {a.iterations} iterations",
+            f"residuals RMS {rms[0]:.2f}, {rms[1]:.2f} px",
+        ]
+        for kind in ("control", "check"):
+            count, off = self.check_rms(kind)
+            if count:
+                said = ", ".join(f"{1000 * v:.1f}" if np.isfinite(v) else "-" for v in off)
+                lines.append(f"{count} {kind} points: RMS in X, Y, r {said} mm")
+        where: dict[str, int] = {}
+        for blunder in a.blunders:
+            where[blunder.where] = where.get(blunder.where, 0) + 1
+        named = [b for b in a.blunders if not b.point.startswith("tie ")]
+        for b in named[:NAMED]:
+            lines.append(f"gross error: {b.point} in {b.where}, {b.test:.1f} times its sigma")
+        ties = {k: n for k, n in where.items() if k != "control"}
+        if ties:
+            worst = sorted(ties.items(), key=lambda item: -item[1])[:5]
+            lines.append("rays taken out: " + ", ".join(f"{n} in {k}" for k, n in worst))
+        for b in a.left_in[:NAMED]:
+            lines.append(
+                f"gross error LEFT IN: {b.point} in {b.where}, {b.test:.1f} times its sigma"
+            )
+        return lines
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        a = self.adjustment
+        return {
+            "pairs": list(self.names),
+            "sigma0": a.sigma0,
+            "redundancy": a.redundancy,
+            "rays": len(a.residuals),
+            "rms_px": np.sqrt((a.residuals**2).mean(axis=0)),
+            "points": list(self.points),
+            "blunders": [_plain(b) for b in a.blunders],
+            "left_in": [_plain(b) for b in a.left_in],
+        }
+
+
+def _plain(blunder: Blunder) -> dict[str, Any]:
+    return {"point": blunder.point, "where": blunder.where, "test": blunder.test}
+
+
+def adjust_pairs(
+    paths: Sequence[Path],
+    out: Path,
+    task: JointTask = JointTask(),
+    *,
+    overwrite: bool = False,
+    progress: Progress = no_progress,
+) -> JointResult:
+    """Adjust all pairs of a façade in one frame and write their pair files and points.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Pair files, with their photos.
+    out : Path
+        Folder; gets a pair file of the same name for each, and ``points.csv``.
+
+    Raises
+    ------
+    InputError, GeometryError
+        If a file is unusable, two pair files have one name, pairs do not overlap, or control is
+        missing or contradictory.
+    """
+    names = [_name_of(path) for path in paths]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if len(paths) < 2:
+        raise InputError("an adjustment of several pairs needs two pair files or more.")
+    if twice:
+        raise InputError(f"{twice[0]}: two pair files have this name; rename one.")
+    pairs = [Pair.read(path) for path in paths]
+    for path, pair in zip(paths, pairs, strict=True):
+        with located(path):
+            media_of(pair)
+    tables = _tables(paths, pairs, task)
+    outputs = [out / "points.csv", *(out / path.name for path in paths)]
+    for output in outputs:
+        check_not_input(output, *paths, *task.control, *task.check)
+    if out.is_dir():
+        check_all_writable(*outputs, overwrite=overwrite)
+    result = joint_adjustment(pairs, names, tables, task, progress=progress)
+    columns = list(result.points[0]) if result.points else ["id"]
+    table = {name: [point[name] for point in result.points] for name in columns}
+    with atomic_folder(out, overwrite=overwrite) as folder:
+        for path, name, pair in zip(paths, names, result.pairs, strict=True):
+            _write_pair(pair, folder / path.name, name, out)
+        write_csv(folder / "points.csv", table)
+    return result
+
+
+def _name_of(path: Path) -> str:
+    return path.name.removesuffix(".json").removesuffix(".pair")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class NamedPositions:
+    """Picked points of all pairs: names, coordinates, rays; ``check`` are compared only."""
+
+    ids: tuple[str, ...]
+    xyz: FloatArray
+    sigma: FloatArray
+    is_check: BoolArray
+    shared: SharedPoints
+
+
+def joint_adjustment(
+    pairs: Sequence[Pair],
+    names: Sequence[str],
+    named: NamedPositions,
+    task: JointTask,
+    *,
+    progress: Progress = no_progress,
+) -> JointResult:
+    """Adjust pairs whose photos can be read; see `adjust_pairs`."""
+    photos = [photo for pair in pairs for photo in (pair.image1, pair.image2)]
+    features, shapes = [], []
+    for index, pair in enumerate(pairs):
+        for number in (1, 2):
+            progress(index, len(pairs), f"{names[index]}: features")
+            image = read_grey(photo_info(pair, number).path)
+            features.append(find_features(image, limit=FEATURES, budget=PIXELS))
+            shapes.append(image.shape)
+    progress(len(pairs), len(pairs), "matches")
+    straight = [straightened(p, f) for p, f in zip(photos, features, strict=True)]
+    ties = common_features(straight, shapes, _together(photos, shapes))
+    ties = _as_taken(photos, ties)
+    shared = SharedPoints(
+        photo=np.r_[named.shared.photo, ties.photo],
+        point=np.r_[named.shared.point, ties.point + named.shared.count],
+        pixels=np.concatenate([named.shared.pixels, ties.pixels]),
+        count=named.shared.count + ties.count,
+    )
+    cameras = [pinhole(photo) for photo in photos]
+    media = tuple(through for pair in pairs for through in media_of(pair))
+    ideal = _ideal(photos, shared)
+    observed = _observations(pairs, names, named, shared, ideal, features, task)
+    observed = replace(observed, media=media)
+    start = into_one_frame(cameras, shared, ideal, observed.known, names, media)
+    good = near_each_other(start.cameras, shared, ideal, media)
+    good |= shared.point < named.shared.count
+    observed = with_rays(observed, good & np.isfinite(ideal).all(axis=1))
+    adjusted = adjust_jointly(observed, start)
+    return JointResult(
+        pairs=tuple(_adjusted_pair(pair, adjusted, k) for k, pair in enumerate(pairs)),
+        names=tuple(names), adjustment=adjusted, points=_points(named, adjusted),
+    )  # fmt: skip
+
+
+def _tables(paths: Sequence[Path], pairs: Sequence[Pair], task: JointTask) -> NamedPositions:
+    """Return the points of all tables, joined by name."""
+    xyz: dict[str, tuple[FloatArray, FloatArray]] = {}
+    check: set[str] = set()
+    rays: list[tuple[int, str, FloatArray]] = []
+    for role, tables in (("control", task.control), ("check", task.check)):
+        if tables and len(tables) != len(paths):
+            raise InputError(
+                f"--{role}: {len(tables)} tables for {len(paths)} pairs; give one for each, in "
+                "their order, and none where a pair has no points."
+            )
+        for index, path in enumerate(tables):
+            if path is None:
+                continue
+            # That a check point without relief is on the wall is nothing to check by.
+            part = read_control(
+                path, sigma=task.sigma_control, unit=task.unit,
+                sigma_plane=None if role == "check" else SIGMA_ON_WALL,
+                unnamed=f"{_name_of(paths[index])}, {role} ",
+            )  # fmt: skip
+            if pairs[index].exchanged:
+                part = part.exchanged()
+            _add(part, path, index, xyz, rays)
+            check |= set(part.ids) if role == "check" else set()
+    ids = tuple(dict.fromkeys(name for _, name, _ in rays))
+    number = {name: k for k, name in enumerate(ids)}
+    blank = (np.full(3, np.nan), np.full(3, 1.0))
+    return NamedPositions(
+        ids=ids,
+        xyz=np.array([xyz.get(name, blank)[0] for name in ids]).reshape(-1, 3),
+        sigma=np.array([xyz.get(name, blank)[1] for name in ids]).reshape(-1, 3),
+        is_check=np.array([name in check for name in ids], dtype=bool),
+        shared=SharedPoints(
+            photo=np.array([photo for photo, _, _ in rays], dtype=np.int64),
+            point=np.array([number[name] for _, name, _ in rays], dtype=np.int64),
+            pixels=np.array([pixel for _, _, pixel in rays], dtype=float).reshape(-1, 2),
+            count=len(ids),
+        ),
+    )
+
+
+def _add(
+    part: Control,
+    path: Path,
+    pair: int,
+    xyz: dict[str, tuple[FloatArray, FloatArray]],
+    rays: list[tuple[int, str, FloatArray]],
+) -> None:
+    """Add a table's points; refuse one that two tables place differently."""
+    for k, name in enumerate(part.ids):
+        if part.positioned[k]:
+            before = xyz.get(name)
+            if before is not None and np.nanmax(np.abs(before[0] - part.xyz[k])) > 1e-6:
+                raise InputError(
+                    f"{path}: point {name} has other coordinates than in another pair's table; "
+                    "points of one name are one point."
+                )
+            if before is None or np.isnan(before[0][2]):
+                xyz[name] = part.xyz[k], part.sigma[k]
+        for side, pixels in enumerate((part.pixels1, part.pixels2)):
+            if np.isfinite(pixels[k]).all():
+                rays.append((2 * pair + side, name, pixels[k]))
+
+
+def _together(photos: Sequence[Photo], shapes: Sequence[tuple[int, ...]]) -> BoolArray:
+    """Return which photos may show the same part of the wall, judged by their footprints.
+
+    Both photos of a pair do. Where pairs are not in one frame yet, footprints say nothing: then
+    neighbours in the order given, and those that seem to overlap, are looked at.
+    """
+    boxes = np.array(
+        [_footprint(photo, shape) for photo, shape in zip(photos, shapes, strict=True)]
+    )
+    low = np.maximum(boxes[:, None, :2], boxes[None, :, :2])
+    high = np.minimum(boxes[:, None, 2:], boxes[None, :, 2:])
+    common = np.prod(np.maximum(high - low, 0.0), axis=2)
+    area = np.prod(boxes[:, 2:] - boxes[:, :2], axis=1)
+    together = common > OVERLAP * np.minimum(area[:, None], area[None, :])
+    index = np.arange(len(photos))
+    step = np.abs(index[:, None] // 2 - index[None, :] // 2)
+    same_side = index[:, None] % 2 == index[None, :] % 2
+    # Far with far and near with near between pairs: their scales are alike.
+    return np.asarray((step == 0) | ((together | (step == 1)) & same_side))
+
+
+def _footprint(photo: Photo, shape: tuple[int, ...]) -> FloatArray:
+    """Return the box of a photo's corners on the reference plane, shape (4,). [m]"""
+    height, width = shape[:2]
+    corners = np.array([[0, 0], [width, 0], [0, height], [width, height]], float)
+    plane = photo.plane_from_pixels(corners)
+    if not np.isfinite(plane).all():
+        return np.r_[photo.nadir - 1e3, photo.nadir + 1e3]
+    return np.r_[plane.min(axis=0), plane.max(axis=0)]
+
+
+def _as_taken(photos: Sequence[Photo], ties: SharedPoints) -> SharedPoints:
+    """Return features that were straightened for matching where the photos show them."""
+    pixels = ties.pixels.copy()
+    for index, photo in enumerate(photos):
+        rays = ties.photo == index
+        pixels[rays] = bent_again(photo, ties.pixels[rays])
+    return replace(ties, pixels=pixels)
+
+
+def _ideal(photos: Sequence[Photo], shared: SharedPoints) -> FloatArray:
+    """Return the pixels free of the lenses' distortion."""
+    ideal = shared.pixels.copy()
+    for index, photo in enumerate(photos):
+        rays = shared.photo == index
+        if photo.lens is not None and rays.any():
+            ideal[rays] = photo.lens.undistort(shared.pixels[rays])
+    return ideal
+
+
+def _observations(
+    pairs: Sequence[Pair],
+    names: Sequence[str],
+    named: NamedPositions,
+    shared: SharedPoints,
+    ideal: FloatArray,
+    features: Sequence[Features],
+    task: JointTask,
+) -> JointObservations:
+    """Return everything observed."""
+    reduction = np.array([part.reduction for part in features])
+    is_tie = shared.point >= named.shared.count
+    sigma = np.where(is_tie, task.sigma_tie * reduction[shared.photo], task.sigma_pick)
+    ties = shared.count - named.shared.count
+    known = np.full((shared.count, 3), np.nan)
+    known[: named.shared.count] = np.where(named.is_check[:, None], np.nan, named.xyz)
+    spread = np.ones((shared.count, 3))
+    spread[: named.shared.count] = named.sigma
+    focal = np.zeros(2 * len(pairs))
+    for k, pair in enumerate(pairs):
+        if pair.orientation is not None:
+            for side in (0, 1):
+                at = NAMES.index(f"focal length {side + 1}")
+                focal[2 * k + side] = np.sqrt(max(pair.orientation[at, at], 0.0))
+    return JointObservations(
+        names=tuple(f"{name}, {side}" for name in names for side in ("far", "near")),
+        camera=shared.photo, point=shared.point, pixels=ideal,
+        sigma=sigma,
+        ids=(*named.ids, *(f"tie {k + 1}" for k in range(ties))),
+        known=known, sigma_known=spread, sigma_focal=focal,
+    )  # fmt: skip
+
+
+def _adjusted_pair(pair: Pair, adjusted: JointAdjustment, index: int) -> Pair:
+    """Return a pair with its adjusted cameras."""
+    photos = [
+        _adjusted_photo(photo, adjusted.cameras[2 * index + side], through)
+        for side, (photo, through) in enumerate(
+            zip((pair.image1, pair.image2), media_of(pair), strict=True)
+        )
+    ]
+    extra = {key: value for key, value in pair.extra.items() if key != "setup"}
+    said = {"way": "joint adjustment", "sigma0": adjusted.sigma0}
+    if isinstance(before := pair.extra.get("setup"), dict):
+        said |= {key: before[key] for key in BENT if key in before}
+    return replace(
+        pair, image1=photos[0], image2=photos[1], orientation=adjusted.orientation(index),
+        extra={**extra, "setup": said}, remarks=(),
+    )  # fmt: skip
+
+
+def _adjusted_photo(photo: Photo, camera: Pinhole, media: CameraMedia | None = None) -> Photo:
+    stretch = float(camera.matrix[0, 0] / pinhole(photo).matrix[0, 0])
+    c = photo.principal_distance
+    distance = float(camera.centre[2])
+    return replace(
+        photo, plane_from_pixel=plane_from_pixel(camera), nadir=camera.centre[:2],
+        distance=distance, z0=photo.z0 if media is None else media.z0_at(distance),
+        interface_normal=photo.interface_normal if media is None else media.normal(camera),
+        principal_distance=None if c is None else stretch * c,
+    )  # fmt: skip
+
+
+def _points(named: NamedPositions, adjusted: JointAdjustment) -> tuple[dict[str, Any], ...]:
+    """Return the named points with their precision and what they are compared with."""
+    rays = np.bincount(adjusted.observations.point, minlength=len(named.ids))
+    out = []
+    wrong = {b.point for b in adjusted.blunders if b.where == "control"}
+    for k, name in enumerate(named.ids):
+        known = np.isfinite(named.xyz[k]).any()
+        kind = "check" if named.is_check[k] else "control" if known else "tie"
+        sigma = np.sqrt(np.diagonal(adjusted.covariance[k]))
+        away = adjusted.xyz[k] - named.xyz[k]
+        row: dict[str, Any] = {"id": name, "kind": kind, "rays": int(rays[k])}
+        row |= dict(zip(("X", "Y", "r"), adjusted.xyz[k].tolist(), strict=True))
+        row |= dict(zip(("sigma_X", "sigma_Y", "sigma_r"), sigma.tolist(), strict=True))
+        row |= dict(zip(("dX", "dY", "dr"), away.tolist(), strict=True))
+        out.append({**row, "flag": "GROSS" if name in wrong else "OK"})
+    return tuple(out)
+
+
+def _write_pair(pair: Pair, path: Path, name: str, folder: Path) -> None:
+    """Write a pair file whose photos and lenses are found from the folder it will lie in."""
+    photos = []
+    for number, photo in enumerate((pair.image1, pair.image2), start=1):
+        extra = dict(photo.extra)
+        if photo.lens is not None:
+            lens = f"{name}.lens{number}.json"
+            photo.lens.write(path.with_name(lens))
+            extra["lens"] = lens
+        file = relative_name(pair.photo_file(number), folder) if photo.file else ""
+        size = photo.image_size
+        if photo.file and pair.photo_file(number).is_file():
+            size = photo_info(pair, number).size
+        photos.append(replace(photo, file=file, image_size=size, extra=extra))
+    content = replace(pair, image1=photos[0], image2=photos[1]).to_dict()
+    if pair.exchanged:
+        # In the order given: that of its columns in the tables of points.
+        content["image1"], content["image2"] = content["image2"], content["image1"]
+        if pair.orientation is not None:
+            content["orientation"] = as_dict(exchanged(pair.orientation), pair.layers)
+    write_object(path, content)

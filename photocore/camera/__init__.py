@@ -1,0 +1,1 @@
+"""The camera: pinhole, lens models and their files, rotation, similarity, boards."""

@@ -1,0 +1,1 @@
+"""Workbooks changed in place: only the cells that change; everything else byte for byte."""

@@ -1,0 +1,132 @@
+"""What is to change in a sheet, and the places of its XML that do."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from operator import itemgetter
+
+from photocore.workbook.changing.cells import CellValue, NewCell, NewRows
+from photocore.workbook.reading.grid import cell_name, split_area
+
+_ROWS_END = re.compile(rb"</(?:\w+:)?sheetData\s*>")
+
+
+@dataclass(slots=True)
+class SheetChanges:
+    """What is to change in one sheet; rows and columns are counted from 1.
+
+    Parameters
+    ----------
+    inputs : dict
+        Row to (column to value): typed cells, made where they are missing. The cell's format
+        stays. A cell that holds a formula is never overwritten.
+    placed : dict
+        Row to (column to cell): cells with formulas, or that may take the place of one.
+    cached : dict
+        Row to (column to result): results of formulas that are there. Cells that hold no formula
+        (any more) are left as they are.
+    added : list of NewRows
+        Rows to be added, with formulas, formats and results.
+    restates : bool
+        Whether a number may be given among the results for a cell that holds one, to replace it.
+    """
+
+    inputs: dict[int, dict[int, CellValue]] = field(default_factory=dict)
+    cached: dict[int, dict[int, CellValue]] = field(default_factory=dict)
+    added: list[NewRows] = field(default_factory=list)
+    placed: dict[int, dict[int, NewCell]] = field(default_factory=dict)
+    restates: bool = False
+
+    def __bool__(self) -> bool:
+        return bool(self.inputs or self.cached or self.added or self.placed)
+
+    def rows(self) -> list[int]:
+        """Return the numbers of the rows with cells to be typed or added, in order."""
+        added = (range(block.first, block.first + block.size) for block in self.added)
+        return sorted(set(self.inputs).union(self.placed, *added))
+
+    def cells(self, row: int) -> dict[int, NewCell]:
+        """Return the cells to be typed or added in one row, in order."""
+        typed = self.inputs.get(row, {}).items()
+        cells = {column: NewCell(None if value == "" else value) for column, value in typed}
+        for block in self.added:
+            cells = block.cells(row) | cells
+        return dict(sorted((cells | self.placed.get(row, {})).items()))
+
+    def grown(self, reference: str) -> str:
+        """Return the stated extent of a sheet with the cells that are made."""
+        made = [(row, column) for row, own in self.inputs.items() for column in _ends(own)]
+        made += [(row, column) for row, own in self.placed.items() for column in _ends(own)]
+        for block in self.added:
+            numbers = [column.column for column in block.columns]
+            made += [(block.first, min(numbers)), (block.first + block.size - 1, max(numbers))]
+        if not made or not re.fullmatch(r"[A-Z]{1,3}\d+(:[A-Z]{1,3}\d+)?", reference):
+            return reference
+        area = top, left, bottom, right = split_area(reference)
+        top, left = min(top, *(r for r, _ in made)), min(left, *(c for _, c in made))
+        bottom, right = max(bottom, *(r for r, _ in made)), max(right, *(c for _, c in made))
+        if (top, left, bottom, right) == area:
+            return reference
+        return f"{cell_name(top, left)}:{cell_name(bottom, right)}"
+
+    def only_filled(self, row: int) -> NewRows | None:
+        """Return the block that fills a row to which nothing is added, None for other rows."""
+        if row in self.placed or row in self.cached:
+            return None
+        blocks = [block for block in self.added if 0 <= row - block.first < block.size]
+        return blocks[0] if len(blocks) == 1 and blocks[0].rule == "filled" else None
+
+
+@dataclass(slots=True)
+class Spliced:
+    """A sheet with its changes, ready to be joined with or without stale results.
+
+    Parameters
+    ----------
+    data : bytes
+        The sheet as it was.
+    edits, strips : list of (start, end, replacement)
+        The changes asked for; the results of all other formulas, to be taken out.
+    inputs_changed : bool
+        Whether any typed value differs from what was there.
+    formula_lost : bool
+        Whether a value took the place of a formula.
+    """
+
+    data: bytes
+    edits: list[tuple[int, int, bytes]] = field(default_factory=list)
+    strips: list[tuple[int, int, bytes]] = field(default_factory=list)
+    inputs_changed: bool = False
+    formula_lost: bool = False
+
+    def joined(self, *, strip: bool) -> bytes:
+        """Return the changed sheet, without results of other formulas if ``strip``; only once.
+
+        The changes, which may be as many bytes as the sheet, are let go.
+        """
+        edits, self.edits = self.edits, []
+        if strip and self.strips:
+            edits = sorted([*edits, *self.strips], key=itemgetter(0, 1))
+        if not edits:
+            return self.data
+        pieces: list[bytes | memoryview] = []
+        position = 0
+        view = memoryview(self.data)
+        for start, end, replacement in edits:
+            pieces += [view[position:start], replacement]
+            position = end
+        pieces.append(view[position:])
+        return b"".join(pieces)
+
+
+def _ends(columns: Collection[int]) -> tuple[int, ...]:
+    """Return the first and the last of some columns."""
+    return (min(columns), max(columns)) if columns else ()
+
+
+def replaced_outside_cells(data: bytes, old: bytes, new: bytes) -> bytes:
+    """Return a part with a text replaced; of a sheet only behind its rows."""
+    end = max((match.end() for match in _ROWS_END.finditer(data)), default=0)
+    return data[:end] + data[end:].replace(old, new)

@@ -1,0 +1,1 @@
+"""New workbooks: cells, live formulas, charts, looks."""

@@ -1,0 +1,400 @@
+"""New workbooks whose results are live formulas that already show their numbers."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from openpyxl import Workbook
+from openpyxl.styles import Alignment, Font, PatternFill, Protection
+from openpyxl.utils import absolute_coordinate, get_column_letter
+from openpyxl.workbook.defined_name import DefinedName
+from openpyxl.worksheet.datavalidation import DataValidation
+from openpyxl.worksheet.worksheet import Worksheet
+
+from photocore.workbook.changing.cells import CellValue
+from photocore.workbook.making.live_columns import TEXT_KEYS, LiveColumn, row_formula
+from photocore.workbook.making.look import (
+    BODY_FONT,
+    FORMULA_FONT,
+    HEAD_FILL,
+    HEAD_FONT,
+    INPUT_EDGE,
+    INPUT_FILL,
+    LABEL_FONT,
+    NOTE_FONT,
+    ROW_HEIGHT,
+    TITLE_FONT,
+    add_table,
+    break_columns,
+    guard,
+    new_book,
+    prepare_page,
+)
+from photocore.workbook.making.newbook import RowBlock, finish_book, new_workbook
+from photocore.workbook.making.words import WordBook
+
+#: The values of a table's columns, by key.
+Cells = Mapping[str, Sequence[CellValue]]
+#: What Excel takes: characters of a prompt and of its title.
+_PROMPT, _PROMPT_TITLE = 255, 32
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TableContent:
+    """A table as built: its columns and their values by key."""
+
+    columns: Sequence[LiveColumn]
+    cells: Cells
+
+
+@dataclass(slots=True, eq=False)
+class BookBuilder:
+    """A workbook under construction with the values its formula cells will show."""
+
+    language: str
+    words: WordBook
+    book: Workbook = field(default_factory=new_book)
+    results: dict[str, dict[str, CellValue]] = field(default_factory=dict)
+    blocks: dict[str, RowBlock] = field(default_factory=dict)
+    tables: dict[str, TableContent] = field(default_factory=dict)
+    drawings: dict[str, bytes] = field(default_factory=dict)
+
+    def word(self, key: str) -> str:
+        """Return a word in the language of the workbook."""
+        return self.words.word(key, self.language)
+
+    def sheet(self, name: str, note: str = "") -> SheetBuilder:
+        """Add a sheet with its title and, by its key, one line of help."""
+        first = len(self.book.sheetnames) == 1 and not self.results
+        sheet = self.book.active if first else self.book.create_sheet()
+        assert sheet is not None
+        sheet.title = name
+        self.results[name] = {}
+        sheet["A1"], sheet["A1"].font = self.word(name), TITLE_FONT
+        if note:
+            sheet["A2"], sheet["A2"].font = self.word(note), NOTE_FONT
+        sheet.sheet_view.showGridLines = False
+        sheet.sheet_view.zoomScale = 100
+        sheet.sheet_format.defaultRowHeight, sheet.sheet_format.customHeight = ROW_HEIGHT, True
+        return SheetBuilder(book=self, worksheet=sheet)
+
+    def define(self, name: str, place: str) -> None:
+        """Give a place a name."""
+        self.book.defined_names[name] = DefinedName(name, attr_text=place)
+
+    def open_at(self, title: str) -> None:
+        """Let the workbook open with one of its sheets."""
+        self.book.active = self.book.sheetnames.index(title)
+        for sheet in self.book.worksheets:
+            sheet.sheet_view.tabSelected = sheet.title == title
+        self.book.calculation.fullCalcOnLoad = True
+
+    def save(self, path: Path | str, *, overwrite: bool) -> None:
+        """Write the workbook, whole or not at all, with the values in its formula cells."""
+        with new_workbook(path, overwrite=overwrite) as temporary:
+            package = io.BytesIO()
+            self.book.save(package)
+            finish_book(
+                package,
+                temporary,
+                blocks=self.blocks,
+                results=self.results,
+                drawings=self.drawings,
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SheetBuilder:
+    """One sheet of a workbook under construction."""
+
+    book: BookBuilder
+    worksheet: Worksheet
+
+    def text(self, cell: str, value: str, font: Font | None = None) -> None:
+        """Write a text."""
+        self.worksheet[cell].value = value
+        self.worksheet[cell].data_type = "s"
+        self.worksheet[cell].font = font or BODY_FONT
+
+    def word(self, cell: str, key: str, font: Font | None = None) -> None:
+        """Write a word in the language of the workbook."""
+        self.text(cell, self.book.word(key), font)
+
+    def formula(
+        self, cell: str, text: str, value: CellValue, *, form: str = "", name: str = "",
+        editable: bool = False, font: Font = FORMULA_FONT,
+    ) -> None:  # fmt: skip
+        """Write a formula with its value."""
+        target = self.worksheet[cell]
+        target.value, target.font = "=" + text, font
+        self.book.results[self.worksheet.title][cell] = value
+        self._dress(cell, form, name, editable=editable)
+
+    def input(
+        self, cell: str, value: CellValue, *, form: str = "", name: str = "", editable: bool = True
+    ) -> None:
+        """Write a typed cell: the user's to fill in, or the program's where not editable."""
+        target = self.worksheet[cell]
+        if value is not None and value == value and value != "":
+            target.value = value
+            if isinstance(value, str):
+                target.data_type = "s"
+            else:
+                self.book.results[self.worksheet.title][cell] = float(value)
+        self._dress(cell, form, name, editable=editable)
+
+    def _dress(self, cell: str, form: str, name: str, *, editable: bool) -> None:
+        """Give a cell its number format, its name, and the look of one that may be changed."""
+        target = self.worksheet[cell]
+        if editable:
+            target.fill, target.border = INPUT_FILL, INPUT_EDGE
+            target.protection = Protection(locked=False)
+        if form:
+            target.number_format = form
+        if name:
+            self.book.define(name, f"'{self.worksheet.title}'!{absolute_coordinate(cell)}")
+
+    def describe(self, row: int, texts: Sequence[str], unit: str = "") -> None:
+        """Write the name and description before a value in column C, and its unit behind it."""
+        for letter, text in zip("AB", texts, strict=True):
+            self.text(f"{letter}{row}", text)
+        self.text(f"D{row}", unit, LABEL_FONT)
+        self.worksheet[f"D{row}"].alignment = _UNIT_PLACE
+
+    def headings(self, row: int, keys: Sequence[str], widths: Sequence[float] = ()) -> None:
+        """Write a row of headings from column A, in the language of the workbook."""
+        for i, key in enumerate(keys, start=1):
+            letter = get_column_letter(i)
+            self.word(f"{letter}{row}", key, HEAD_FONT)
+            self.worksheet[f"{letter}{row}"].fill = HEAD_FILL
+            place = {"value": Alignment(horizontal="right"), "unit": _UNIT_PLACE}
+            self.worksheet[f"{letter}{row}"].alignment = place.get(key, Alignment())
+        for i, width in enumerate(widths, start=1):
+            self.worksheet.column_dimensions[get_column_letter(i)].width = width
+
+    def table(
+        self,
+        name: str,
+        columns: Sequence[LiveColumn],
+        *,
+        at: tuple[int, int],
+        rows: int,
+        cells: Cells,
+        repeat: bool = False,
+        short: bool = False,
+    ) -> None:
+        """Write a table: labels, keys, rows, and of typed columns what may be typed.
+
+        Parameters
+        ----------
+        at : tuple of int
+            Row of the keys (labels stand above) and first column.
+        rows : int
+            Rows of the table.
+        cells : mapping
+            Key to values; shorter than ``rows`` where the rest is blank.
+        repeat : bool
+            Write one prototype row and leave the rest to `finish_book`; for a table that starts in
+            column A and has nothing beside it.
+        short : bool
+            Write formulas as A1 references.
+        """
+        head, left = at
+        sheet, self.book.tables[name] = self.worksheet, TableContent(columns=columns, cells=cells)
+        letters = {c.key: get_column_letter(left + i) for i, c in enumerate(columns)}
+        for i, column in enumerate(columns):
+            self._head((head, left + i), column)
+            for row in range(head + 1, head + 1 + (1 if repeat else rows)):
+                cell = sheet.cell(row, left + i)
+                value = None if repeat else _at(cells, column, row - head)
+                self._cell(cell.coordinate, name, column, value)
+            if column.kind == "input":
+                letter = letters[column.key]
+                self._validate_column(f"{letter}{head + 1}:{letter}{head + rows}", column)
+        sheet.row_dimensions[head - 1].height = 38
+        self._add_table(name, columns, at, rows)
+        if repeat:
+            block = _block(name, columns, head + 1, rows, cells, letters, short)
+            self.book.blocks[sheet.title] = block
+            for i, formula in block.formulas.items():
+                sheet.cell(head + 1, left + i).value = f"={formula(head + 1)}"
+
+    def _head(self, at: tuple[int, int], column: LiveColumn) -> None:
+        """Write label and key of a column, and set its width."""
+        sheet, (head, number) = self.worksheet, at
+        above, key = sheet.cell(head - 1, number), sheet.cell(head, number)
+        above.value = self.book.words.label(column.label or column.key, self.book.language)
+        above.font, above.alignment = LABEL_FONT, _LABEL_PLACE
+        key.value, key.font, key.fill = column.key, HEAD_FONT, HEAD_FILL
+        key.alignment = Alignment(horizontal="center")
+        letter = get_column_letter(number)
+        before = sheet.column_dimensions.get(letter)
+        width = sheet.column_dimensions[letter]
+        width.width = max(before.width if before else 0, column.width)
+        if column.folded:
+            width.outlineLevel, width.hidden = 1, True
+
+    def _cell(self, place: str, table: str, column: LiveColumn, value: CellValue) -> None:
+        """Write one cell of a table."""
+        form, cell = column.number_format, self.worksheet[place]
+        if column.kind == "formula":
+            self.formula(place, row_formula(table, column.formula)[1:], value, form=form)
+        else:
+            self.input(place, value, form=form)
+        if column.kind == "value":
+            cell.fill, cell.protection = PatternFill(), Protection(locked=True)
+        if column.key in ("flag", "use", "verdict"):
+            cell.alignment = Alignment(horizontal="center")
+        elif column.key == "id":
+            cell.alignment = Alignment(horizontal="left")
+
+    def _add_table(
+        self, name: str, columns: Sequence[LiveColumn], at: tuple[int, int], rows: int
+    ) -> None:
+        head, left = at
+        last = get_column_letter(left + len(columns) - 1)
+        reference = f"{get_column_letter(left)}{head}:{last}{head + rows}"
+        texts = [row_formula(name, c.formula)[1:] if c.kind == "formula" else "" for c in columns]
+        keyed = zip((column.key for column in columns), texts, strict=True)
+        add_table(self.worksheet, name, reference, keyed)
+
+    def _validate_column(self, area: str, column: LiveColumn) -> None:
+        prompt = self.book.words.prompt(column.key, self.book.language)
+        limits = None if column.key in TEXT_KEYS else column.limits
+        choices = column.choices
+        self.validate(area, title=column.key, prompt=prompt, choices=choices, limits=limits)
+
+    def validate(
+        self,
+        cells: str,
+        *,
+        title: str,
+        prompt: str,
+        choices: str = "",
+        limits: tuple[float, float] | None = None,
+        above_zero: bool = False,
+    ) -> None:
+        """Tell what a cell is for when it is chosen, and refuse what cannot be meant.
+
+        Parameters
+        ----------
+        title, prompt : str
+            What the cell says.
+        choices : str
+            What may be typed, with commas between.
+        limits : tuple of float, optional
+            The least and the largest number that can be meant.
+        above_zero : bool
+            Whether a number must be above zero. Without any of the three all may be typed.
+        """
+        rule = DataValidation(allow_blank=True, showInputMessage=True)
+        if choices:
+            rule.type, rule.formula1 = "list", f'"{choices}"'
+            error = self.book.word("error_choice").format(choices=choices.replace(",", ", "))
+        elif above_zero:
+            rule.type, rule.operator, rule.formula1 = "decimal", "greaterThan", "0"
+            error = self.book.word("error_above_zero")
+        elif limits:
+            low, high = limits
+            rule.type, rule.operator = "decimal", "between"
+            rule.formula1, rule.formula2 = f"{low:.10g}", f"{high:.10g}"
+            error = self.book.word("error_number").format(low=f"{low:g}", high=f"{high:g}")
+        else:
+            error = ""
+        if error:
+            rule.showErrorMessage, rule.errorTitle, rule.error = True, title[:_PROMPT_TITLE], error
+        rule.promptTitle, rule.prompt = title[:_PROMPT_TITLE], prompt[:_PROMPT]
+        rule.add(cells)
+        self.worksheet.add_data_validation(rule)
+
+    def finish(
+        self,
+        *,
+        landscape: bool = False,
+        freeze: str = "",
+        repeat: str = "",
+        guarded: bool = True,
+        scale: int = 0,
+        breaks: tuple[int, Sequence[int]] = (0, ()),
+    ) -> None:
+        """Prepare screen and page, and protect the sheet against slips, without a password.
+
+        Parameters
+        ----------
+        landscape, repeat, scale
+            As in `photocore.workbook.making.look.prepare_page`.
+        freeze : str
+            The first cell that scrolls.
+        breaks : tuple
+            With a scale: the last column printed, and columns that begin a page in any case.
+        """
+        sheet = self.worksheet
+        if freeze:
+            sheet.freeze_panes = freeze
+        page = self.book.word("page")
+        prepare_page(sheet, landscape=landscape, page=page, repeat=repeat, scale=scale)
+        if scale:
+            break_columns(sheet, breaks[0], scale=scale, before=breaks[1])
+        if guarded:
+            guard(sheet)
+
+
+# Programs indent nothing that has no side of its own.
+_UNIT_PLACE = Alignment(horizontal="left", indent=1)
+_LABEL_PLACE = Alignment(wrap_text=True, vertical="bottom", horizontal="center")
+
+
+def _at(cells: Cells, column: LiveColumn, row: int) -> CellValue:
+    values = cells.get(column.key, ())
+    return values[row - 1] if row <= len(values) else column.spare
+
+
+def _block(
+    table: str,
+    columns: Sequence[LiveColumn],
+    first: int,
+    rows: int,
+    cells: Cells,
+    letters: Mapping[str, str],
+    short: bool,
+) -> RowBlock:
+    """Return the rows that `finish_book` makes of the prototype."""
+    listed = [list(cells.get(column.key, ())) for column in columns]
+    listed = [values + [None] * (rows - len(values)) for values in listed]
+    formulas = {}
+    if short:
+        for i, column in enumerate(columns):
+            if column.kind == "formula":
+                formulas[i] = short_formula(table, column.formula, letters, first - 1)
+    return RowBlock(row=first, columns=listed, formulas=formulas)
+
+
+def short_formula(
+    table: str, text: str, letters: Mapping[str, str], head: int
+) -> Callable[[int], str]:
+    """Return a function of the row that writes a formula with A1 references.
+
+    Parameters
+    ----------
+    table : str
+        Name of the table.
+    text : str
+        The formula, with ``[@key]`` for the cell of the same row.
+    letters : mapping
+        Key to the letters of its column.
+    head : int
+        Row of the keys.
+    """
+    text = text.replace(f"ROW()-ROW({table}[[#Headers],[id]])", "\0")
+    parts = re.split(r"\[@(\w+)\]", text)
+    pieces = [letters[part] if i % 2 else part for i, part in enumerate(parts)]
+
+    def formula(row: int) -> str:
+        joined = "".join(f"{part}{row}" if i % 2 else part for i, part in enumerate(pieces))
+        return joined.replace("\0", str(row - head))
+
+    return formula

@@ -1,0 +1,56 @@
+"""Charts of new workbooks: dots or lines that Excel and LibreOffice draw alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from openpyxl.chart import Reference, ScatterChart, Series
+from openpyxl.chart.shapes import GraphicalProperties
+from openpyxl.chart.text import RichText, Text
+from openpyxl.chart.title import Title
+from openpyxl.drawing.text import (
+    CharacterProperties,
+    Paragraph,
+    ParagraphProperties,
+    RegularTextRun,
+)
+
+from photocore.workbook.making.look import BLUE
+
+#: Colours and markers of series, told apart without colour too.
+COLOURS = (BLUE, "C55A11")
+_MARKERS = ("circle", "triangle")
+_TITLE, _AXIS = 1200, 1000
+
+
+def titled(text: str, size: int = _TITLE) -> Title:
+    """Return a title in the scale of sizes of all sheets. [1/100 pt]"""
+    font = CharacterProperties(sz=size, b=size == _TITLE)
+    run = RegularTextRun(rPr=font, t=text)
+    paragraph = Paragraph(pPr=ParagraphProperties(defRPr=font), r=[run])
+    return Title(tx=Text(rich=RichText(p=[paragraph])), overlay=False)
+
+
+def scatter(
+    title: str, x_title: str, y_title: str, x: Reference, y: Mapping[str, Reference]
+) -> ScatterChart:
+    """Return a chart of dots: markers set one by one, or LibreOffice shows none."""
+    chart = ScatterChart()
+    chart.style, chart.scatterStyle = 13, "lineMarker"
+    chart.title = titled(title)
+    chart.x_axis.title, chart.y_axis.title = titled(x_title, _AXIS), titled(y_title, _AXIS)
+    if len(y) == 1:
+        chart.legend = None
+    else:
+        chart.legend.position = "b"
+    for name, colour, marker in zip(y, COLOURS, _MARKERS, strict=False):
+        series = Series(y[name], x, title=name)
+        series.marker.symbol, series.marker.size = marker, 5
+        series.marker.graphicalProperties = GraphicalProperties(solidFill=colour)
+        series.marker.graphicalProperties.line.solidFill = colour
+        series.graphicalProperties.line.noFill = True
+        chart.series.append(series)
+    for axis in (chart.x_axis, chart.y_axis):
+        axis.delete, axis.tickLblPos, axis.crosses = False, "low", "min"
+        axis.number_format = "0.00"
+    return chart

@@ -1,0 +1,1 @@
+"""Workbooks read: packages, sheets, cells, of .xlsx and .ods."""
