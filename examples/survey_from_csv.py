@@ -9,9 +9,10 @@ workbooks: bifocal solve targets.csv --pair facade.pair.json --out result.xlsx
 import numpy as np
 
 import bifocal
-from bifocal.demo import SAMPLE
 
-survey = bifocal.solve(SAMPLE / "targets.csv", pair=SAMPLE / "facade.pair.json", sigma_px=0.2)
+survey = bifocal.solve(
+    bifocal.SAMPLE / "targets.csv", pair=bifocal.SAMPLE / "facade.pair.json", sigma_px=0.2
+)
 points = survey.table
 for k in range(0, len(points), 8):
     x, y, r = points.xyz[k]

@@ -16,9 +16,8 @@ from click.testing import CliRunner
 from openpyxl.worksheet.worksheet import Worksheet
 from PIL import Image
 
-from bifocal import Pair
+from bifocal import SAMPLE, WATER_SAMPLE, Pair
 from bifocal.cli.main import main
-from bifocal.demo import SAMPLE, WATER_SAMPLE
 from photocore.arrays import ByteArray
 from tests.bifocal.campaigns import sample_tables
 from tests.scenes import demo_scene

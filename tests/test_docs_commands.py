@@ -18,9 +18,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from bifocal import SAMPLE, PageServer
 from bifocal.cli.main import main as bifocal
-from bifocal.collimation.workflow import PageServer
-from bifocal.demo import SAMPLE
 from multimedia.cli.main import main as multimedia
 from tests.docs_desk import make_desk
 from tests.docs_tank import make_bed, make_tank

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from bifocal import MissingExtraError
 from bifocal.cli.main import main
 from multimedia.cli.main import main as multimedia
 from photocore import installation, machine
-from photocore.errors import MissingExtraError
 
 ROOT = Path(__file__).parents[1]
 

@@ -13,8 +13,8 @@ import rasterio
 from click.testing import CliRunner
 
 import bifocal
+from bifocal import SAMPLE
 from bifocal.cli.main import main
-from bifocal.demo import SAMPLE
 from multimedia.cli.main import main as multimedia
 from photocore.provenance import note, provenance, recording
 

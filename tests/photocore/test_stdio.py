@@ -10,8 +10,8 @@ import zipfile
 import pytest
 from click.testing import CliRunner
 
+from bifocal import SAMPLE
 from bifocal.cli.main import main
-from bifocal.demo import SAMPLE
 from multimedia.cli.main import main as multimedia
 from tests.attack.site import ODS, ods_cell
 

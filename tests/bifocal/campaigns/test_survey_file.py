@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from bifocal import InputError
 from bifocal.campaigns import photo_pairing
 from bifocal.campaigns.pair_job import refusal, steps_of
 from bifocal.campaigns.survey_file import in_survey_words, read_survey_file
@@ -20,7 +21,6 @@ from bifocal.options import MEDIA_OF_PAIR, OF_PAIR, names_of
 from bifocal.orientation.align_workflow import AlignOptions
 from bifocal.orthophotos.ortho_workflow import OrthoTask
 from multimedia import Layers
-from photocore.errors import InputError
 from tests.bifocal.campaigns.sample_tables import FAR, NEAR
 
 GOOD = """

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import pytest
 
+from bifocal import InputError
 from bifocal.collimation.journal import Journal
 from bifocal.collimation.project import find_files
 from bifocal.collimation.server.access import Access
-from photocore.errors import InputError
 from tests.page_session import client_of, opened, pick, pick_both, sample_folder, sample_picks
 
 JOURNAL = "facade.journal.jsonl"

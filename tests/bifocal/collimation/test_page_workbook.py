@@ -8,10 +8,8 @@ import pytest
 from click.testing import CliRunner
 
 import bifocal
-from bifocal import Pair
+from bifocal import SAMPLE, InputError, Pair
 from bifocal.cli.main import main
-from bifocal.demo import SAMPLE
-from photocore.errors import InputError
 from tests.bifocal.collimation.page_truth import noisy_picks
 from tests.page_session import client_of, opened, pick, pick_both, sample_folder, sample_picks
 from tests.workbook_lint import lint

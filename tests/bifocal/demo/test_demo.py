@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner
 
 import bifocal
+from bifocal import SAMPLE, WATER_SAMPLE
 from bifocal.cli.main import main
-from bifocal.demo import SAMPLE, WATER_SAMPLE
 from bifocal.demo.samples import PICK_SIGMA, WATER
 from bifocal.files.geotiff import read_relief
 from tests.scenes import demo_scene

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bifocal.model.grid import Grid, cut
-from photocore.errors import InputError
+from bifocal import Grid, InputError
+from bifocal.model.grid import cut
 
 
 def test_bounds_are_the_outer_edges_and_pixels_count_from_their_centres() -> None:

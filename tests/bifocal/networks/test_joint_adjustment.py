@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from bifocal import GeometryError, InputError, Pair, Similarity, read_control
 from bifocal.cli.main import main
 from bifocal.model.orientation_precision import pinhole
-from bifocal.model.pair import Pair
 from bifocal.networks import joint_adjustment
 from bifocal.networks.joint_adjustment import adjust_jointly
 from bifocal.networks.joint_observations import with_rays
@@ -24,10 +24,7 @@ from bifocal.networks.joint_workflow import (
     _write_pair,
     adjust_pairs,
 )
-from bifocal.orientation.control_points import read_control
 from photocore.camera.rotation import rotation_from_vector
-from photocore.camera.similarity import Similarity
-from photocore.errors import GeometryError, InputError
 from tests.bifocal.orientation.many_pairs import many_pairs
 from tests.bifocal.orientation.street import write_street
 

@@ -15,9 +15,20 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bifocal import Control, Interior, Pair, PairMedia, SiteMeasures, align
+from bifocal import (
+    Control,
+    GeometryError,
+    InputError,
+    Interior,
+    MediaPath,
+    Pair,
+    PairMedia,
+    Pinhole,
+    SiteMeasures,
+    align,
+)
 from bifocal.cli.main import main
-from bifocal.media import MediaPath, interface_axes
+from bifocal.media import interface_axes
 from bifocal.model.orientation_precision import NAMES, from_dict, names_of
 from bifocal.model.refracted_view import seen_through, view_through
 from bifocal.orientation import absolute_orientation
@@ -27,9 +38,8 @@ from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.refracted_stage import with_bent_ties
 from bifocal.orientation.relative_orientation import Ties
 from multimedia import Layers
-from photocore.camera.pinhole import Pinhole, camera_matrix
+from photocore.camera.pinhole import camera_matrix
 from photocore.camera.rotation import rotation_from_vector
-from photocore.errors import GeometryError, InputError
 from tests.scenes import SetupErrors, bifocal_cameras
 from tests.scenes.refracted import seen_at
 from tests.scenes.wet import under_water

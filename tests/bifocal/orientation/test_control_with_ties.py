@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from bifocal.model.interior_orientation import Interior
-from bifocal.orientation.control_points import Control, SiteMeasures
+from bifocal import Control, Interior, Pinhole, SiteMeasures
 from bifocal.orientation.orientation_stages import (
     OrientedPair,
     PhotoInput,
@@ -12,7 +11,7 @@ from bifocal.orientation.orientation_stages import (
     oriented_in_stages,
 )
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
-from photocore.camera.pinhole import Pinhole, triangulate
+from photocore.camera.pinhole import triangulate
 from tests.scenes import SetupErrors, bifocal_cameras
 
 SIZE = (3072, 2048)

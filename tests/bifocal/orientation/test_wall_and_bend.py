@@ -6,17 +6,13 @@ import cv2
 import numpy as np
 import pytest
 
+from bifocal import Control, GeometryError, Interior, Pinhole, RadialDivision, SiteMeasures
 from bifocal.matching.features import Features, match_features
-from bifocal.model.interior_orientation import Interior
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.bend import WallBend, bend_in_words, bend_of_wall, wall_bend
-from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.reference_plane import narrow_face
 from bifocal.orientation.relative_orientation import supported
-from photocore.camera.distortion import RadialDivision
-from photocore.camera.pinhole import Pinhole
-from photocore.errors import GeometryError
 from tests.bifocal.orientation.layered_wall import SIZE as WALL_SIZE
 from tests.bifocal.orientation.layered_wall import camera as wall_camera
 from tests.bifocal.orientation.layered_wall import take

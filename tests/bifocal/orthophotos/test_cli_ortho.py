@@ -16,12 +16,9 @@ import rasterio
 from click.testing import CliRunner, Result
 from PIL import Image
 
-from bifocal import Pair, Photo
+from bifocal import Grid, Pair, Photo, ReliefMap, write_image
 from bifocal.cli.main import main
 from bifocal.files.geotiff import create_raster, read_relief, write_relief
-from bifocal.files.images import write_image
-from bifocal.model.grid import Grid
-from bifocal.model.relief_map import ReliefMap
 
 SIZE = (420, 300)
 GSD = 0.01

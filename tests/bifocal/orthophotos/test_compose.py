@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 
 import bifocal
-from bifocal import Lens, OrthoOptions, Pair, Photo
-from bifocal.model.grid import Grid
-from bifocal.model.relief_map import ReliefMap
-from photocore.errors import GeometryError, InputError
+from bifocal import GeometryError, Grid, InputError, Lens, OrthoOptions, Pair, Photo, ReliefMap
 from tests.bifocal.orthophotos.wall_scene import (
     colour_at,
     hidden_at,

@@ -11,9 +11,9 @@ import pytest
 import rasterio
 from click.testing import CliRunner, Result
 
+from bifocal import Grid
 from bifocal.cli.main import main
 from bifocal.files.geotiff import create_raster
-from bifocal.model.grid import Grid
 
 GSD = 0.005
 

@@ -12,11 +12,9 @@ import pytest
 from click.testing import CliRunner
 
 import bifocal
+from bifocal import SAMPLE, Grid, InputError
 from bifocal.cli.main import main
-from bifocal.demo import SAMPLE
 from bifocal.files.geotiff import read_relief
-from bifocal.model.grid import Grid
-from photocore.errors import InputError
 from tests.browser import launched
 from tests.web_page import Page
 

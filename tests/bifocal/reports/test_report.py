@@ -14,10 +14,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from bifocal import SAMPLE, Grid
 from bifocal.cli.main import main
-from bifocal.demo import SAMPLE
 from bifocal.files.geotiff import create_raster
-from bifocal.model.grid import Grid
 from bifocal.reports.accuracy import accuracy_blocks
 from bifocal.reports.content import read_content
 from bifocal.reports.pair_report import _provenance, report_document

@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
+from bifocal import Pair
 from bifocal.cli.main import main
-from bifocal.model.pair import Pair
 from bifocal.reports.content import ReportTask, read_content
 from bifocal.reports.refraction import plane_errors
 from tests.bifocal.model.test_pair_through_media import PAIRS, POINTS, content

@@ -13,8 +13,8 @@ import openpyxl
 import pytest
 from click.testing import CliRunner
 
+from bifocal import Pair
 from bifocal.cli.main import main
-from bifocal.model.pair import Pair
 
 SETUP = {"c_1": 35, "c_2": 19, "d_2": 9.5, "delta_d": 8}
 

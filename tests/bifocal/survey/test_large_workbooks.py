@@ -10,9 +10,8 @@ import numpy as np
 import openpyxl
 import pytest
 
-from bifocal import Pair
+from bifocal import Pair, PointObservations
 from bifocal.survey import workflow
-from bifocal.survey.observations import PointObservations
 from bifocal.survey.output import write_result
 from bifocal.survey.template_workflow import MOST_ROWS, write_survey, write_template
 from bifocal.survey.workbook import book, update

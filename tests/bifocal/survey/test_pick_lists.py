@@ -10,12 +10,10 @@ import openpyxl
 import pytest
 from click.testing import CliRunner
 
+from bifocal import InputError, Pair, solve
 from bifocal.cli.main import main
-from bifocal.model.pair import Pair
 from bifocal.survey.pair_workflow import read_pair
 from bifocal.survey.pick_lists import read_picks
-from bifocal.survey.workflow import solve
-from photocore.errors import InputError
 from tests.papers.test_midulla_layout import NADIR, SIZE, fill, pixels, truth
 
 XYZ = truth(3)[[0, 5, 12, 18, 22]]

@@ -19,8 +19,8 @@ from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.table import Table
 from PIL import Image as Picture
 
+from bifocal import solve
 from bifocal.survey.output import write_result
-from bifocal.survey.workflow import solve
 from tests.bifocal.survey.test_cli_solve import POINTS, rows
 from tests.bifocal.survey.test_survey_workbook import parts
 

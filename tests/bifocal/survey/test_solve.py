@@ -10,11 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bifocal import Pair, relief
+from bifocal import GeometryError, InputError, Pair, georeference, relief, solve
 from bifocal.survey.basis import basis
-from bifocal.survey.georeferencing import georeference
-from bifocal.survey.workflow import solve
-from photocore.errors import GeometryError, InputError
 
 LENSES = {"d1": 17.5, "d2": 9.5, "c1": 35.0, "c2": 19.0}
 

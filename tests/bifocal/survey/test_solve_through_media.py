@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bifocal import solve
+from bifocal import Pair, solve
 from bifocal.cli.main import main
-from bifocal.model.pair import Pair
 from tests.bifocal.model.test_pair_through_media import PAIRS, POINTS, content
 from tests.scenes.refracted import pixels_of
 

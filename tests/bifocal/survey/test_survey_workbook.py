@@ -11,22 +11,24 @@ import numpy as np
 import openpyxl
 import pytest
 
-from bifocal.model.lens import Lens
-from bifocal.model.pair import Pair
-from bifocal.model.photo import Photo
+from bifocal import (
+    InputError,
+    KnownPoints,
+    Lens,
+    Pair,
+    Photo,
+    PointObservations,
+    SurveySetup,
+    georeference,
+)
 from bifocal.survey.check_points import check_points
-from bifocal.survey.georeferencing import georeference
-from bifocal.survey.observations import PointObservations
 from bifocal.survey.point_survey import solve_points
-from bifocal.survey.reference import KnownPoints
-from bifocal.survey.setup import SurveySetup
 from bifocal.survey.template_workflow import write_template
 from bifocal.survey.workbook.book import write_book
 from bifocal.survey.workbook.columns import IDEAL_POINTS, pair_points
 from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.georeference_columns import georeference_columns
 from bifocal.survey.workbook.results_columns import results_columns
-from photocore.errors import InputError
 from tests.recalculate import recalculated, rows_of
 from tests.workbook_lint import lint
 

@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner
 from openpyxl.utils import range_boundaries
 
+from bifocal import SurveySetup
 from bifocal.cli.main import main
-from bifocal.survey.setup import SurveySetup
 from bifocal.survey.template_workflow import write_template
 from bifocal.survey.workbook.book import write_book
 from bifocal.survey.workbook.content import SurveyContent

@@ -11,20 +11,24 @@ import openpyxl
 import pytest
 from click.testing import CliRunner
 
-from bifocal import solve
+from bifocal import (
+    GeometryError,
+    InputError,
+    Pair,
+    PointObservations,
+    SurveyMedia,
+    SurveySetup,
+    WorkbookError,
+    georeference,
+    solve,
+)
 from bifocal.cli.main import main
-from bifocal.model.pair import Pair
 from bifocal.survey.check_points import check_points
-from bifocal.survey.georeferencing import georeference
-from bifocal.survey.observations import PointObservations
 from bifocal.survey.output import write_result
 from bifocal.survey.pair_workflow import read_pair
 from bifocal.survey.point_survey import solve_points
-from bifocal.survey.setup import SurveySetup
-from bifocal.survey.survey_media import SurveyMedia
 from bifocal.survey.template_workflow import write_survey, write_template
 from bifocal.survey.workbook.book import write_book
-from photocore.errors import GeometryError, InputError, WorkbookError
 from tests.bifocal.model.test_pair_through_media import AQUARIUM, POINTS, SURFACE, content
 from tests.bifocal.survey.test_solve_through_media import measured
 from tests.bifocal.survey.test_survey_workbook import (

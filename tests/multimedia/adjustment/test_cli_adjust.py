@@ -11,9 +11,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from multimedia import read_project, write_project
+from multimedia import InputError, read_project, write_project
 from multimedia.cli.main import main
-from photocore.errors import InputError
 from tests.web_page import Page
 
 

@@ -7,9 +7,9 @@ import openpyxl
 import pytest
 from click.testing import CliRunner
 
+from bifocal import InputError
 from bifocal.cli.main import main as bifocal
 from multimedia.cli.main import main as multimedia
-from photocore.errors import InputError
 from photocore.workbook.reading.package import rewrite_package
 from photocore.workbook.reading.xlsx import open_xlsx
 
