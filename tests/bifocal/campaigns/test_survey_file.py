@@ -16,7 +16,7 @@ from bifocal.campaigns.survey_file import OPTIONS, in_survey_words, read_survey_
 from bifocal.cli.main import main
 from bifocal.files.images import ImageInfo
 from bifocal.orientation.align_workflow import AlignOptions
-from bifocal.orientation.pair_media import _WITH_INDICES
+from bifocal.orientation.media_options import _WITH_INDICES
 from multimedia import Layers
 from photocore.errors import InputError
 from tests.bifocal.campaigns.sample_tables import FAR, NEAR
