@@ -176,13 +176,16 @@ def rates_of(seen: View, radial: FloatArray, number: int) -> FloatArray:
         By its two terms of radial distortion.
     number : int
     """
-    rows, placing = len(seen.pixels), len(PLACING) if seen.by_media.shape[2] else 0
-    split = seen.by_media.shape[2] - placing
-    common, own = seen.by_media[..., :split], seen.by_media[..., split:]
-    parts = [seen.by_camera, radial], [own]
-    other = [np.zeros((rows, 2, len(CAMERA)))], [np.zeros((rows, 2, placing))]
-    both = (parts, other) if number == 0 else (other, parts)
-    return np.concatenate([*both[0][0], *both[1][0], common, *both[0][1], *both[1][1]], axis=2)
+    own = len(PLACING)
+    common = max(seen.by_media.shape[2] - own, 0)
+    count = len(NAMES) + seen.by_media.shape[2] + (own if common else 0)
+    rates = np.zeros((*seen.pixels.shape, count))
+    first, last = number * len(CAMERA), len(NAMES) + common + number * own
+    rates[..., first : first + len(PARAMETERS)] = seen.by_camera
+    rates[..., first + len(PARAMETERS) : first + len(CAMERA)] = radial
+    rates[..., len(NAMES) : len(NAMES) + common] = seen.by_media[..., :common]
+    rates[..., last : last + own] = seen.by_media[..., common:]
+    return rates
 
 
 def of_distances(d1: float, d2: float, sigma: float) -> FloatArray:

@@ -288,6 +288,10 @@ class PairMedia:
             "interface_normal": self.normal(number, camera),
         }
 
+    def rates_by_unknowns(self, rates: FloatArray) -> FloatArray:
+        """Return rates by what `counted` names, (..., k), by the unknowns `names`, (..., u)."""
+        return rates @ self.by_unknowns() if self else rates
+
     def by_unknowns(self) -> FloatArray:
         """Return how what `names_of` counts moves with the unknowns `names`, shape (k, u).
 

@@ -390,7 +390,7 @@ def _control(
         rates_of(seen_by, -model.undistorted_by_k(x), number)
         for number, (seen_by, model, x) in enumerate(zip(views, models, raw, strict=True))
     ]
-    by = -np.concatenate(rates, axis=1) @ state.media.by_unknowns()
+    by = state.media.rates_by_unknowns(-np.concatenate(rates, axis=1))
     split_by = turn[:, :, :4] @ np.where(seen[:, :, None], np.nan_to_num(by / sigma_pick), 0.0)
     return _AdjustedControl(
         misfit=split[:, 3:, 0],

@@ -44,5 +44,5 @@ def meeting_equations(
         for number, (seen, model, x) in enumerate(zip(views, models, raw, strict=True))
     ]
     across = base[:, None, :, 3]
-    by = -(across @ np.concatenate(rates, axis=1))[:, 0] @ state.media.by_unknowns()
+    by = state.media.rates_by_unknowns(-(across @ np.concatenate(rates, axis=1))[:, 0])
     return along[:, 3, 0], by

@@ -24,8 +24,9 @@ def on_the_plane(state: PairUnknowns, number: int, pixels: FloatArray) -> FloatA
     """Return where the rays of camera 0's or 1's ideal pixels meet the plane, shape (n, 3). [m]"""
     camera = state.cameras[number]
     place = ray_on_plane(camera, pixels)
-    foot = state.media.foot(number, camera)
-    place[:, :2] = rays.object_rays(place[:, :2], foot).position
+    if state.media:
+        foot = state.media.foot(number, camera)
+        place[:, :2] = rays.object_rays(place[:, :2], foot).position
     return place
 
 
