@@ -13,7 +13,7 @@ import numpy as np
 
 from bifocal.collimation.live_results import observations
 from bifocal.collimation.records import Known, PickedPoint, Picks, Pixel
-from bifocal.collimation.workbook_setup import typed_setup
+from bifocal.collimation.workbook.setup import typed_setup
 from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.survey.output import as_typed, result_content

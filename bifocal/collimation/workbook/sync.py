@@ -8,9 +8,9 @@ from typing import Protocol
 
 from bifocal.collimation.project import SurveyFiles
 from bifocal.collimation.records import SurveyState
-from bifocal.collimation.workbook_process import FROM as LARGE
-from bifocal.collimation.workbook_process import change_in_process
-from bifocal.collimation.workbook_rows import (
+from bifocal.collimation.workbook.process import FROM as LARGE
+from bifocal.collimation.workbook.process import change_in_process
+from bifocal.collimation.workbook.rows import (
     PointRow,
     ReadBook,
     change_rows,
