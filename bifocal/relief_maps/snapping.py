@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from bifocal.model.grid import Grid
-from bifocal.relief_maps.forward_projection import shown_by_first
+from bifocal.relief_maps.forward_projection import MapBands, shown_by_first
 from bifocal.relief_maps.frame import Frame, offsets, values_at
 from photocore.arrays import Float32Array, FloatArray, IntArray
 
@@ -50,24 +50,20 @@ class _Steps(NamedTuple):
     place: Float32Array
 
 
-def snapped(
-    frame: Frame, relief: Float32Array, grid: Grid, bounds: tuple[Float32Array, Float32Array]
-) -> Float32Array:
-    """Return a relief map whose steps lie at the edges of photo 1 beside them.
+def snapped(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
+    """Return a map whose steps lie at the edges of photo 1 beside them.
 
     Parameters
     ----------
     frame : Frame
-    relief : ndarray of float32, shape (height, width)
-        Relief map. [m]
+    bands : MapBands
     grid : Grid
         Of the map.
-    bounds : tuple of ndarray
-        Greatest and least relief of the 5 x 5 pixels around each: the surfaces of a step. [m]
     """
+    relief, bounds = bands.r, surroundings(bands.r)
     steps = _steps(relief, bounds, grid.pixel_of(frame.foot(1).nadir), grid.gsd)
     if not len(steps.row):
-        return relief
+        return bands
     here = (steps.row, steps.column)
     upper, lower = (bound[here] for bound in bounds)
     contrast = _along(steps, relief.shape, _contrast(frame, grid, steps, upper))
@@ -77,7 +73,16 @@ def snapped(
     result = relief.copy()
     at = (steps.row[moved], steps.column[moved])
     result[at] = np.where(above, upper, lower)[moved]
-    return result
+    return bands._replace(r=result)
+
+
+def surroundings(relief: Float32Array) -> tuple[Float32Array, Float32Array]:
+    """Return the greatest and the least known relief of 5 x 5 pixels: the surfaces of a step."""
+    known = np.isfinite(relief)
+    square = np.ones((5, 5), np.uint8)
+    high = cv2.dilate(np.where(known, relief, np.float32(-1e3)), square)
+    low = cv2.erode(np.where(known, relief, np.float32(1e3)), square)
+    return high, low
 
 
 def _steps(
