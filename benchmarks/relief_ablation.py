@@ -91,7 +91,8 @@ def shots(name: str):
 
 def figures(shot) -> dict[str, float]:
     """Return the figures of a relief map and of the mask of its orthophoto."""
-    found = dense_relief(shot.pair, shot.image1, shot.image2)
+    grid = shot.truth.grid
+    found = dense_relief(shot.pair, shot.image1, shot.image2, gsd=grid.gsd, bounds=grid.bounds)
     picture = orthophoto(shot.pair, shot.image1, found)
     both = shot.visible1 & shot.visible2
     covered = {"covered %": 100 * float(np.isfinite(found.r)[both].mean())}

@@ -52,6 +52,12 @@ def validated(
     return np.asarray(valid & (sigma < SIGMA_SHARE * distance))
 
 
+def supported(support: BoolArray) -> BoolArray:
+    """Return the pixels to be believed that lie in 3 x 3 such ones: single ones are chance."""
+    square = np.ones((3, 3), np.uint8)
+    return np.asarray(cv2.morphologyEx(support.astype(np.uint8), cv2.MORPH_OPEN, square) > 0)
+
+
 class _Range(NamedTuple):
     """Least and greatest supported relief of blocks, infinite the wrong way where none is."""
 

@@ -152,6 +152,8 @@ STAGES = (
     # In photo 1.
     Stage("evidence", _believed,
           "frame matched relief_range backing", "relief sigma valid support typical", needed=True),
+    Stage("single pixels not believed", evidence.supported,
+          "support", "support"),
     Stage("unsupported relief held back", evidence.held_back,
           "relief support distance", "relief"),
     Stage("occluded regions", occluded_regions.put_behind,
