@@ -26,8 +26,6 @@ BLOCK = 8
 NARROWEST = 2 * (2 * edges.REACH) // BLOCK + 1
 #: A part that camera 2 cannot see counts from so many blocks a side on.
 FEWEST_BLOCKS = 3
-#: How much higher what is moved must be: parallax [px] and share of d2.
-STANDS_OUT = (0.7, 0.0005)
 #: A block with fewer supported pixels says nothing.
 FEWEST = 6
 
@@ -55,7 +53,7 @@ def put_behind(
     between both. All lost regions moved would tear the colonettes of church_2 (1.0 to 1.1 % beyond
     10 cm, empty 5.1 to 5.3 %).
     """
-    least = forward_projection.covering(frame, STANDS_OUT)
+    least = forward_projection.covering(frame, forward_projection.COVERS)
     lost = ((matched.loop > LOST_LOOP) & ~support & frame.seen1).astype(np.uint8)
     blocks = _block_means(lost) > 0.5
     square = np.ones((NARROWEST, NARROWEST), np.uint8)

@@ -7,7 +7,6 @@ of it, at one plane after the other, and segments that no edge parts hold togeth
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -37,14 +36,13 @@ TIE, FREE, CONTRAST, JUMP = 2.0, 0.1, 2.5, 0.08
 SLOPE, STEEPEST = 0.05, 0.02
 #: Rounds, planes of neighbours tried in each, and the share of segments that may change at a time.
 ROUNDS, NEIGHBOURS, AT_A_TIME = 4, 4, 0.6
-#: Weight of no slope in fits to flow and to neighbours. [px²]
-RIDGE_FLOW, RIDGE = 40.0, 4.0
+#: Weight of no slope in fits to flow. [px²]
+RIDGE = 40.0
 #: A pixel is hidden in photo 2 by what is so much higher. [px of parallax, m]
 COVERS = (1.0, 0.02)
 
 #: Derivatives along columns and rows.
 _WAYS = ((1, 0), (0, 1))
-_Proposal = Callable[[FloatArray], FloatArray]
 
 
 def on_plain_walls(
@@ -86,37 +84,6 @@ def _added(segment: IntArray, values: FloatArray | Float32Array, count: int) -> 
     return np.asarray(np.bincount(segment, values, count), dtype=np.float64)
 
 
-def _planes(
-    sums: Callable[[FloatArray | Float32Array], FloatArray],
-    away: tuple[Float32Array, Float32Array] | FloatArray,
-    relief: FloatArray | Float32Array,
-    ridge: float,
-) -> FloatArray:
-    """Return planes by least squares, (3, segments): height, slopes along rows and columns.
-
-    Parameters
-    ----------
-    sums : callable
-        Adds weighted values up by segment.
-    away : pair of ndarray
-        Rows and columns from the middle of the segment. [px]
-    relief : ndarray
-        What the planes run through. [m]
-    ridge : float
-        Weight of no slope. [px²]
-    """
-    y, x = away
-    count, sum_y, sum_x = sums(np.ones_like(y)) + 1e-3, sums(y), sums(x)
-    squares = sums(y * y) + ridge, sums(x * y), sums(x * x) + ridge
-    matrix = np.stack(
-        [count, sum_y, sum_x, sum_y, squares[0], squares[1], sum_x, squares[1], squares[2]], axis=-1
-    ).reshape(-1, 3, 3)
-    right = np.stack([sums(relief), sums(relief * y), sums(relief * x)], axis=-1)
-    planes = np.linalg.solve(matrix, right[..., None])[..., 0].T
-    planes[1:] = np.clip(planes[1:], -STEEPEST, STEEPEST)
-    return np.asarray(planes)
-
-
 @dataclass(slots=True, eq=False)
 class _Problem:
     """Photos, segments and borders at half the resolution; places in its pixels."""
@@ -130,7 +97,6 @@ class _Problem:
     second: Float32Array
     weight: Float32Array
     tie: FloatArray
-    per_pixel: FloatArray
     covers: Float32Array
     top: Float32Array
     #: From the middles of the owner and of the neighbour to that of their border, (2, n): rows,
@@ -159,11 +125,9 @@ class _Problem:
         at = np.stack([borders.row, borders.column]) / 2 - 0.25
         x0, y0 = half.from_centre()
         parallax = np.float32(half.pair.base_factor) / np.maximum(np.sqrt(x0 * x0 + y0 * y0), 2)
-        size = np.maximum(np.bincount(label.ravel(), minlength=segments.number), 1)
         return cls(
             half=half, segments=segments, label=label, down=y - row, across=x - column, first=first,
             second=second, weight=1 / (2 * (variance + slack)), tie=tie,
-            per_pixel=np.bincount(label.ravel(), parallax.ravel(), segments.number) / size,
             covers=(COVERS[0] * parallax + np.float32(COVERS[1])).astype(np.float32),
             top=np.zeros((height, width), np.float32),
             from_own=at - middle[:, borders.own], from_other=at - middle[:, borders.other],
@@ -178,8 +142,9 @@ class _Problem:
         for number in range(ROUNDS):
             self._hide(planes)
             misfit = self._misfit(planes)
-            for proposal in self._proposals(number, rng):
-                tried = measured if proposal is None else proposal(planes)
+            # Neighbours' planes, one neighbour's height, every other time the fit to flow.
+            for share in (*(1.0,) * NEIGHBOURS, 0.0, *(None,) * (1 - number % 2)):
+                tried = measured if share is None else self._of_neighbours(planes, share, rng)
                 worse = self._misfit(tried)
                 better = worse + self._jumps(tried, planes) < misfit + self._jumps(planes, planes)
                 better &= rng.random(self.segments.number) < AT_A_TIME
@@ -262,48 +227,30 @@ class _Problem:
         return np.asarray(least + (ordered[middle] & (2**32 - 1)) * 1e-4)
 
     def _fit(self, relief: Float32Array) -> FloatArray:
-        """Return planes through relief, (3, segments)."""
-        count, flat = self.segments.number, self.label.ravel()
-        return _planes(
-            lambda values: _added(flat, values.ravel(), count),
-            (self.down, self.across), relief, RIDGE_FLOW,
-        )  # fmt: skip
+        """Return planes through relief by least squares, (3, segments)."""
 
-    def _continued(self, planes: FloatArray) -> FloatArray:
-        """Return planes through those of the neighbours at the borders, of those near by."""
-        borders, count = self.segments.borders, self.segments.number
-        own, other = self._at_borders(planes, planes)
-        weight = self.tie * (np.abs(own - other) < 1.5 * JUMP)
-        return _planes(
-            lambda values: _added(borders.own, weight * values, count),
-            self.from_own, other, RIDGE,
-        )  # fmt: skip
+        def sums(values: Float32Array) -> FloatArray:
+            return _added(self.label.ravel(), values.ravel(), self.segments.number)
 
-    def _proposals(self, number: int, rng: np.random.Generator) -> list[_Proposal | None]:
-        """Return ways to propose planes in a round; None is the fit to measured relief."""
+        y, x = self.down, self.across
+        count, sum_y, sum_x = sums(np.ones_like(y)) + 1e-3, sums(y), sums(x)
+        squares = sums(y * y) + RIDGE, sums(x * y), sums(x * x) + RIDGE
+        rows = [count, sum_y, sum_x, sum_y, *squares[:2], sum_x, *squares[1:]]
+        matrix = np.stack(rows, axis=-1).reshape(-1, 3, 3)
+        right = np.stack([sums(relief), sums(relief * y), sums(relief * x)], axis=-1)
+        planes = np.linalg.solve(matrix, right[..., None])[..., 0].T
+        planes[1:] = np.clip(planes[1:], -STEEPEST, STEEPEST)
+        return np.asarray(planes)
+
+    def _of_neighbours(
+        self, planes: FloatArray, share: float, rng: np.random.Generator
+    ) -> FloatArray:
+        """Return the planes of a neighbour each, continued with a share of their slopes."""
         count, borders = self.segments.number, self.segments.borders
-        alone = np.diff(borders.first) == 0
-        fine = np.minimum(self.per_pixel, 0.1)
-
-        def neighbour(planes: FloatArray, share: float) -> FloatArray:
-            number = rng.random(count) * np.diff(borders.first)
-            at = np.minimum(borders.first[:-1] + number.astype(np.int64), len(borders.own) - 1)
-            height, slope, lean = planes[:, borders.other[at]]
-            away = self.from_other[:, at] - share * self.from_own[:, at]
-            there = height + slope * away[0] + lean * away[1]
-            found = np.stack([there, share * slope, share * lean])
-            return np.where(alone, planes, found)
-
-        def shifted(planes: FloatArray) -> FloatArray:
-            step = 0.5 ** (number % 3 + 1) * fine * rng.standard_normal(count)
-            return planes + np.stack([step, 0 * step, 0 * step])
-
-        def turned(planes: FloatArray) -> FloatArray:
-            slopes = fine * rng.standard_normal((2, count)) / (SPACING / 2)
-            return np.vstack([planes[:1], planes[1:] + slopes])
-
-        ways: list[_Proposal | None] = [lambda planes: neighbour(planes, 1.0)] * NEIGHBOURS
-        ways.append(lambda planes: neighbour(planes, 0.0))
-        if number % 2 == 0:
-            ways.append(None)
-        return [*ways, self._continued, shifted, turned]
+        several = np.diff(borders.first)
+        at = borders.first[:-1] + (rng.random(count) * several).astype(np.int64)
+        at = np.minimum(at, len(borders.own) - 1)
+        height, slope, lean = planes[:, borders.other[at]]
+        away = self.from_other[:, at] - share * self.from_own[:, at]
+        there = height + slope * away[0] + lean * away[1]
+        return np.where(several == 0, planes, np.stack([there, share * slope, share * lean]))

@@ -11,11 +11,10 @@ from bifocal.relief_maps.frame import Frame
 from photocore.arrays import BoolArray, Float32Array
 from photocore.shrinkage import WINDOWS, shrink_noise
 
-#: Error across the radius that counts as noise rather than as an edge: what is typical of the
-#: frame, and more near the zoom centre, where noise is all there is; within limits. A fixed 0.25 px
-#: took small steps for noise (façade 83, 35/28: 2.44 to 2.15 % beyond 3 cm; less near the centre
-#: than 20 px²/distance left noise: loggia 201). [px², px]
-NOISE_AT_CENTRE, NOISE_CLIP = 20.0, (0.05, 0.25)
+#: Limits of the error across the radius that counts as noise rather than as an edge, else what is
+#: typical of the frame: a fixed 0.25 px took small steps for noise (façade 83, 35/28: 2.44 to
+#: 2.15 % beyond 3 cm). [px]
+NOISE_CLIP = (0.05, 0.25)
 #: Share of the error across the radius that smoothing takes for noise where matching is precise:
 #: the rest stems from edges within its window, or is wider than the windows (façade 83, 35/28,
 #: beyond 3 cm: 1.93 to 1.89 %, loggia 94 1.19 to 1.15; 35/19 as before). Of imprecise matching it
@@ -37,16 +36,11 @@ def without_noise(
         return relief
     precise = edges.precision(typical)
     share = precise * NOISE_SHARE + (1 - precise)
-    quiet = np.float32(share) * np.minimum(matched.sigma_px, most_noise(frame, typical))
+    quiet = np.float32(share) * np.minimum(
+        matched.sigma_px, np.float32(np.clip(typical, *NOISE_CLIP))
+    )
     windows = REFINED_WINDOWS if matched.refined else WINDOWS
     return shrink_noise(relief, flow.sigma_of_relief(frame, relief, quiet), windows)
-
-
-def most_noise(frame: Frame, typical: float) -> Float32Array:
-    """Return the most error across the radius that counts as noise. [px]"""
-    x, y = frame.from_centre()
-    near = np.float32(NOISE_AT_CENTRE) / np.maximum(np.sqrt(x * x + y * y), np.float32(1))
-    return np.clip(np.maximum(near, np.float32(typical)), *NOISE_CLIP)
 
 
 def straightened(bands: MapBands) -> MapBands:

@@ -22,13 +22,9 @@ STEP = 0.03
 #: How far a step is moved at most, how finely, and across how much of it grey values are compared.
 #: [px]
 REACH, FINE, ACROSS = 2.0, 0.5, 1.5
-#: Pixels on either side along the step whose edges are averaged.
-ALONG = 1
 #: Grey values that an edge must differ by; weaker ones are texture and shadow (façades 81 / 83: of
 #: the pixels moved at fainter edges one half was right before). [grey levels]
 CONTRAST = 20.0
-#: Share of its strength that an edge loses per pixel of distance.
-DISTANCE_COST = 0.15
 
 
 class _Steps(NamedTuple):
@@ -66,8 +62,7 @@ def snapped(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
         return bands
     here = (steps.row, steps.column)
     upper, lower = (bound[here] for bound in bounds)
-    contrast = _along(steps, relief.shape, _contrast(frame, grid, steps, upper))
-    shift, clear = _strongest(contrast)
+    shift, clear = _strongest(_contrast(frame, grid, steps, upper))
     above = steps.place > shift
     moved = clear & (above != (steps.place > 0))
     result = relief.copy()
@@ -125,29 +120,13 @@ def _contrast(frame: Frame, grid: Grid, steps: _Steps, upper: Float32Array) -> F
     greys = np.stack(
         [values_at(image, first + t * (beyond - first), cv2.INTER_LINEAR) for t in shifts]
     )
-    return np.nan_to_num(greys[count:] - greys[:-count])
-
-
-def _along(steps: _Steps, shape: tuple[int, ...], values: Float32Array) -> Float32Array:
-    """Return values averaged over pixels of the same step, along it."""
-    number = np.full(shape, -1, dtype=np.int32)
-    number[steps.row, steps.column] = np.arange(len(steps.row), dtype=np.int32)
-    total, count = values.copy(), np.ones(len(steps.row), dtype=np.float32)
-    for t in (t for t in range(-ALONG, ALONG + 1) if t):
-        row = np.clip(np.rint(steps.row + t * steps.across).astype(int), 0, shape[0] - 1)
-        column = np.clip(np.rint(steps.column - t * steps.down).astype(int), 0, shape[1] - 1)
-        beside = number[row, column]
-        known = np.flatnonzero(beside >= 0)
-        total[:, known] += values[:, beside[known]]
-        count[known] += 1
-    return np.asarray(np.abs(total) / count)
+    return np.abs(np.nan_to_num(greys[count:] - greys[:-count]))
 
 
 def _strongest(contrast: Float32Array) -> tuple[Float32Array, FloatArray]:
     """Return the shift to the strongest edge [px], and where there is one within reach."""
     shifts = np.arange(len(contrast), dtype=np.float32) * np.float32(FINE) - np.float32(REACH)
-    cost = np.float32(DISTANCE_COST) * np.abs(shifts)[:, None] * contrast.max(0)
-    best = (contrast - cost).argmax(0)
+    best = contrast.argmax(0)
     peak = np.take_along_axis(contrast, best[None], 0)[0]
     clear = (peak > CONTRAST) & (best > 0) & (best < len(contrast) - 1)
     inner = np.clip(best, 1, len(contrast) - 2)

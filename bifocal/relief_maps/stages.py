@@ -178,7 +178,7 @@ STAGES = (
     Stage("pixels of photo 1", _of_photo_1,
           "frame relief matched measured", "source", needed=True),
     Stage("occluded in photo 2", forward_projection.put_behind,
-          "frame source valid", "source behind"),
+          "frame source valid support", "source behind"),
     # On the map.
     Stage("forward projection", _to_plane,
           "frame grid source valid behind side_face", "bands", needed=True),

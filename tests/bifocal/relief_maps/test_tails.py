@@ -19,7 +19,6 @@ from bifocal.relief_maps import (
     levels,
     occluded_regions,
     occluding_edges,
-    smoothing,
     snapping,
     stages,
 )
@@ -230,16 +229,6 @@ def test_a_step_stays_where_its_edge_is_not_sure(difference, off, below, above):
     found = snapped_row(frame, 40.3 + off, below, above)
     kept = np.where(np.arange(200) - 99.5 > 40.3 + off, above, below)
     np.testing.assert_allclose(found, np.broadcast_to(kept, found.shape), atol=1e-6)
-
-
-def test_what_counts_as_noise_follows_the_frame_and_grows_towards_the_zoom_centre():
-    frame = frame_of(Pair(image1=FAR, image2=NEAR))
-    reach = np.hypot(*(axis - 99.5 for axis in np.mgrid[:200, :200]))
-    for typical, elsewhere in ((0.02, 0.05), (0.16, 0.16), (0.6, 0.25)):
-        noise = smoothing.most_noise(frame, typical)
-        # 20 px² over the distance from the centre, 0.25 px at most, never below what is typical.
-        expected = np.clip(20 / reach, elsewhere, 0.25)
-        np.testing.assert_allclose(noise, expected, rtol=1e-4)
 
 
 def test_a_ramp_counts_by_its_parallax_a_pixel():
