@@ -12,7 +12,7 @@ from typing import Any
 from starlette.testclient import TestClient
 
 from bifocal.collimation.project import find_files
-from bifocal.collimation.server import application
+from bifocal.collimation.server.application import application
 from bifocal.collimation.session import Session
 from bifocal.demo import SAMPLE
 

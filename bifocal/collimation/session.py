@@ -23,9 +23,9 @@ from bifocal.collimation.pictures import Pictures
 from bifocal.collimation.products import Products, accept_pair
 from bifocal.collimation.project import SurveyFiles
 from bifocal.collimation.records import Change, PickedPoint, Picks, SurveyState
-from bifocal.collimation.workbook_rows import PointRow, row_of
-from bifocal.collimation.workbook_setup import ideal_setup, pair_of
-from bifocal.collimation.workbook_sync import WorkbookSync
+from bifocal.collimation.workbook.rows import PointRow, row_of
+from bifocal.collimation.workbook.setup import ideal_setup, pair_of
+from bifocal.collimation.workbook.sync import WorkbookSync
 from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
 from photocore.errors import InputError, PhotogrammetryError

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import uvicorn
 
-from bifocal.collimation.access import Access
 from bifocal.collimation.project import find_files
-from bifocal.collimation.server import application
+from bifocal.collimation.server.access import Access
+from bifocal.collimation.server.application import application
 from bifocal.collimation.session import Session
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.interrupts import raising

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bifocal.collimation.assets import WEB
+from bifocal.collimation.server.assets import WEB
 from bifocal.model.lens import Lens
 from tests.browser import Driver, Served, tab_of
 

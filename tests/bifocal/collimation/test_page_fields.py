@@ -9,7 +9,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from bifocal.collimation.fields import COMMANDS
-from bifocal.collimation.server import application
+from bifocal.collimation.server.application import application
 from tests.page_session import (
     BASE,
     TOKEN,

@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pytest
 
-from bifocal.collimation.access import Access
 from bifocal.collimation.journal import Journal
 from bifocal.collimation.project import find_files
+from bifocal.collimation.server.access import Access
 from photocore.errors import InputError
 from tests.page_session import client_of, opened, pick, pick_both, sample_folder, sample_picks
 

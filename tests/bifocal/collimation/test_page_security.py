@@ -12,8 +12,8 @@ import pytest
 from PIL import Image
 from starlette.testclient import TestClient
 
-from bifocal.collimation.assets import WEB
-from bifocal.collimation.server import application
+from bifocal.collimation.server.application import application
+from bifocal.collimation.server.assets import WEB
 from tests.page_session import BASE, TOKEN, client_of, entries, opened, sample_folder
 
 PATHS = ["/", "/api/state", "/api/events", "/tiles/photo/1/info", "/tiles/photo/1/0/0_0.jpg",

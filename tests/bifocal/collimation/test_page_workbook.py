@@ -256,7 +256,7 @@ def test_another_orientation_reaches_the_formulas(tmp_path) -> None:
 
 @pytest.mark.acceptance
 def test_many_points_are_written_by_a_process_of_its_own(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr("bifocal.collimation.workbook_sync.LARGE", 8)
+    monkeypatch.setattr("bifocal.collimation.workbook.sync.LARGE", 8)
     folder, picks = sample_folder(tmp_path), sample_picks()
     with opened(folder) as session:
         for name in list(picks)[:9]:

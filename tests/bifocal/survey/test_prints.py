@@ -8,7 +8,7 @@ import openpyxl
 import pytest
 
 from bifocal import solve
-from bifocal.collimation.workbook_setup import completed, typed_setup
+from bifocal.collimation.workbook.setup import completed, typed_setup
 from bifocal.model.pair import Pair
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.setup import SurveySetup

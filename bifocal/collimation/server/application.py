@@ -13,14 +13,14 @@ from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 from starlette.routing import Route
 
-from bifocal.collimation.assets import KEEP, Assets
 from bifocal.collimation.fields import COMMANDS, FieldError, fields_of
-from bifocal.collimation.measuring_routes import ROUTES as MEASURING
-from bifocal.collimation.product_routes import ROUTES as PRODUCTS
-from bifocal.collimation.requests import answer, in_thread, json_body, session_of
-from bifocal.collimation.security import Guard, TooLarge, cookie_of
+from bifocal.collimation.server.assets import KEEP, Assets
+from bifocal.collimation.server.measuring_routes import ROUTES as MEASURING
+from bifocal.collimation.server.product_routes import ROUTES as PRODUCTS
+from bifocal.collimation.server.requests import answer, in_thread, json_body, session_of
+from bifocal.collimation.server.security import Guard, TooLarge, cookie_of
+from bifocal.collimation.server.state_view import state_of
 from bifocal.collimation.session import Session
-from bifocal.collimation.state_view import state_of
 from photocore.errors import PhotogrammetryError
 
 #: Seconds after which an idle stream of events says that it is alive.

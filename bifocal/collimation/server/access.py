@@ -9,7 +9,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from bifocal.collimation.security import new_token
+from bifocal.collimation.server.security import new_token
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from bifocal.collimation.fields import FieldError, image_of, pixel_of, positive_of
-from bifocal.collimation.requests import answer, in_thread, json_body, session_of
+from bifocal.collimation.server.requests import answer, in_thread, json_body, session_of
 from photocore.arrays import as_points
 from photocore.jsonfile import plain
 

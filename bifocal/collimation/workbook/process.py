@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.collimation.records import PickedPoint
-from bifocal.collimation.workbook_rows import change_rows, read_rows
+from bifocal.collimation.workbook.rows import change_rows, read_rows
 from bifocal.survey.pair_workflow import read_pair
 from photocore.errors import InputError, PhotogrammetryError
 
@@ -24,7 +24,7 @@ _LONGEST = 600
 def change_in_process(
     path: Path, points: Sequence[PickedPoint], pair_path: Path, *, keep: bool
 ) -> None:
-    """Change the points of a workbook in place; as `workbook_rows.change_rows`.
+    """Change the points of a workbook in place; as `rows.change_rows`.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def change_in_process(
         "keep": keep,
         "points": [asdict(point) for point in points],
     }
-    command = [sys.executable, "-m", "bifocal.collimation.workbook_process"]
+    command = [sys.executable, "-m", "bifocal.collimation.workbook.process"]
     try:
         done = subprocess.run(
             command, input=json.dumps(task), capture_output=True, text=True, encoding="utf-8",

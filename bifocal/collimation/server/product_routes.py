@@ -13,11 +13,11 @@ from starlette.routing import Route
 from bifocal.collimation.drawing import points_drawing
 from bifocal.collimation.fields import FieldError, number_of
 from bifocal.collimation.job_tasks import start_job
-from bifocal.collimation.requests import answer, in_thread, json_body, session_of
+from bifocal.collimation.server.requests import answer, in_thread, json_body, session_of
+from bifocal.collimation.server.state_view import state_of
+from bifocal.collimation.server.uploads import take_photos
 from bifocal.collimation.session import Session
-from bifocal.collimation.state_view import state_of
 from bifocal.collimation.uncertainty import precision_contours, uncertainty_picture
-from bifocal.collimation.uploads import take_photos
 from photocore.arrays import FloatArray, as_points
 
 _FRESH = {"cache-control": "no-store"}

@@ -10,7 +10,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 #: The page itself.
-WEB = Path(__file__).parent / "web"
+WEB = Path(__file__).parents[1] / "web"
 #: What a name with its version or digest shows never changes.
 KEEP = "private, max-age=31536000, immutable"
 _TYPES = {

@@ -1,0 +1,1 @@
+"""The page's server: who may talk to it, its routes, the state it shows."""

@@ -1,0 +1,1 @@
+"""The survey workbook kept in step with the page."""
