@@ -14,7 +14,7 @@ from photocore.arrays import FloatArray
 #: how many standard deviations it is certain. [px]
 MOST_BENT, CERTAIN = 0.2, 2.0
 #: Root mean square bend at 3000 px of width by k of x (1 + k rho²), rho over half the diagonal, and
-#: what of k the scale takes up, certainly and by chance: so that errors of r over sigma_r are 0.8 to
+#: what of k the scale takes up, certainly and by chance: errors of r over sigma_r are 0.8 to
 #: 1.4 on simulated pairs of nearly one axis whose lens bends the wall by 1 to 7 px. [px, -]
 BEND_BY_K, TAKEN_UP, OR_MORE = 144.0, 0.2, 0.1
 #: How a doubt begins that leaves no word of how good relief is.
