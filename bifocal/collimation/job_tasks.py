@@ -164,7 +164,7 @@ def _through_media(session: Session, way: str, given: list[float | None]) -> str
     setup, language = session.state.setup, session.state.language or session.language
     if missing := lacking(setup):
         raise InputError(say("media", missing, language))
-    if media_of(setup, session.pictures.pair) is None or way == "control":
+    if not media_of(setup, session.pictures.pair) or way == "control":
         return way
     if None in given[:2]:
         raise InputError(say("media", "control", language))
