@@ -28,7 +28,8 @@ from .equations import (
 from .files.images import read_image, write_image
 from .files.provenance import recording
 from .matching.homologous_points import match
-from .matching.matching import Matches, MatchSettings
+from .matching.matches import Matches
+from .matching.matching import MatchSettings
 from .media import MediaPath
 from .model.flags import FlagLimits
 from .model.grid import Bounds, Grid, Window

@@ -17,9 +17,9 @@ from openpyxl.worksheet.worksheet import Worksheet
 from PIL import Image
 
 from bifocal import SAMPLE, WATER_SAMPLE, Pair
-from bifocal.cli.main import main
 from photocore.arrays import ByteArray
 from tests.bifocal.campaigns import sample_tables
+from tests.builders.commands import bifocal_command as main
 from tests.scenes import demo_scene
 from tests.scenes.make_sample import PIXEL
 

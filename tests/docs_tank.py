@@ -28,8 +28,8 @@ from multimedia import (
     write_project,
 )
 from multimedia.boards.workflow import find_boards
-from multimedia.cli.main import main
 from photocore.camera.distortion import Brown
+from tests.builders.commands import multimedia_command as main
 from tests.multimedia.rendered_boards import Housing, chessboard, photo, poses
 from tests.multimedia.tank import LAYERS, SENSOR, cameras, control
 

@@ -12,9 +12,9 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal import MissingExtraError
-from bifocal.cli.main import main
-from multimedia.cli.main import main as multimedia
 from photocore import installation, machine
+from tests.builders.commands import bifocal_command as main
+from tests.builders.commands import multimedia_command as multimedia
 
 ROOT = Path(__file__).parents[1]
 

@@ -14,9 +14,9 @@ from click.testing import CliRunner
 
 import bifocal
 from bifocal import SAMPLE
-from bifocal.cli.main import main
-from multimedia.cli.main import main as multimedia
 from photocore.provenance import note, provenance, recording
+from tests.builders.commands import bifocal_command as main
+from tests.builders.commands import multimedia_command as multimedia
 
 PAIR = SAMPLE / "facade.pair.json"
 DAY = "2019-03-04"

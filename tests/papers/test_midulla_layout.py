@@ -18,10 +18,10 @@ import rasterio
 from click.testing import CliRunner
 
 from bifocal import KnownPoints, PointObservations, SurveySetup, georeference
-from bifocal.cli.main import main
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
 from bifocal.survey.pair_workflow import points_of, read_pair
 from bifocal.survey.point_survey import solve_points
+from tests.builders.commands import bifocal_command as main
 
 PITCH, SIZE = 0.00739, (3072, 2048)
 NADIR = (1535.5, 1023.5)

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 import bifocal
 from bifocal import InputError, page_server
-from bifocal.cli.main import main
+from tests.builders.commands import bifocal_command as main
 from tests.page_session import (
     client_of,
     entries,

@@ -14,9 +14,9 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal import InputError
-from bifocal.cli.main import main
 from bifocal.files.exports import export_points
 from bifocal.model.points import SurveyPoints
+from tests.builders.commands import bifocal_command as main
 
 POINTS = SurveyPoints(
     ids=("001", "=HYPERLINK(1)", "C", "lost"),

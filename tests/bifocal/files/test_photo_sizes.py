@@ -11,9 +11,9 @@ from click.testing import CliRunner
 from PIL import Image
 
 from bifocal import SAMPLE, InputError, Pair, dense_relief, match, orthophoto, read_image
-from bifocal.cli.main import main
 from bifocal.collimation.pictures import Pictures
 from bifocal.survey.pair_workflow import read_pair
+from tests.builders.commands import bifocal_command as main
 
 CHANGES = {
     "reduced": (lambda image: image.resize((768, 512)), "768 x 512", "a copy reduced to 0.5"),

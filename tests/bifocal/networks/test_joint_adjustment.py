@@ -10,7 +10,6 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal import GeometryError, InputError, Pair, Similarity, read_control
-from bifocal.cli.main import main
 from bifocal.model.orientation_precision import pinhole
 from bifocal.networks import joint_adjustment
 from bifocal.networks.joint_adjustment import adjust_jointly
@@ -31,6 +30,7 @@ from bifocal.networks.joint_workflow import (
 from photocore.camera.rotation import rotation_from_vector
 from tests.bifocal.orientation.many_pairs import many_pairs
 from tests.bifocal.orientation.street import write_street
+from tests.builders.commands import bifocal_command as main
 
 
 @pytest.mark.acceptance

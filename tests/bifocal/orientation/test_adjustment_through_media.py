@@ -12,7 +12,6 @@ from click.testing import CliRunner
 from PIL import Image
 
 from bifocal import Pair, Pinhole
-from bifocal.cli.main import main
 from bifocal.model.orientation_precision import pinhole
 from bifocal.networks.joint_adjustment import (
     JointAdjustment,
@@ -27,6 +26,7 @@ from photocore.camera.pinhole import camera_matrix
 from photocore.camera.rotation import rotation_from_vector
 from tests.bifocal.model.test_pair_through_media import PAIRS, content
 from tests.bifocal.orientation.street import CONTROL, write_table
+from tests.builders.commands import bifocal_command as main
 from tests.scenes import SetupErrors, bifocal_cameras, demo_scene, render
 from tests.scenes.wet import WetCamera, under_water
 

@@ -27,7 +27,6 @@ from bifocal import (
     SiteMeasures,
     align,
 )
-from bifocal.cli.main import main
 from bifocal.media import interface_axes, view
 from bifocal.model.orientation_precision import NAMES, from_dict, names_of
 from bifocal.orientation import absolute_orientation
@@ -39,6 +38,7 @@ from bifocal.orientation.relative_orientation import Ties
 from multimedia import Layers
 from photocore.camera.pinhole import camera_matrix, project
 from photocore.camera.rotation import rotation_from_vector
+from tests.builders.commands import bifocal_command as main
 from tests.scenes import SetupErrors, bifocal_cameras
 from tests.scenes.refracted import seen_at
 from tests.scenes.wet import under_water

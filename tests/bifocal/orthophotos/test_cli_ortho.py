@@ -17,8 +17,8 @@ from click.testing import CliRunner, Result
 from PIL import Image
 
 from bifocal import Grid, Pair, Photo, ReliefMap, write_image
-from bifocal.cli.main import main
 from bifocal.files.geotiff import create_raster, read_relief, write_relief
+from tests.builders.commands import bifocal_command as main
 
 SIZE = (420, 300)
 GSD = 0.01

@@ -12,8 +12,8 @@ import rasterio
 from click.testing import CliRunner, Result
 
 from bifocal import Grid
-from bifocal.cli.main import main
 from bifocal.files.geotiff import create_raster
+from tests.builders.commands import bifocal_command as main
 
 GSD = 0.005
 

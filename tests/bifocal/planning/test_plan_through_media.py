@@ -8,11 +8,11 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal import GeometryError, InputError
-from bifocal.cli.main import main
 from bifocal.planning.camera_plan import CameraSensor
 from bifocal.planning.planned_media import PlannedMedia
 from bifocal.planning.stations import plan_stations
 from multimedia import Layers
+from tests.builders.commands import bifocal_command as main
 from tests.scenes.refracted import seen_at
 from tests.workbook_lint import lint
 

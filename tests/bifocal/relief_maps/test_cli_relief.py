@@ -12,8 +12,8 @@ import rasterio
 from click.testing import CliRunner
 
 from bifocal import Pair, write_image
-from bifocal.cli.main import main
 from bifocal.files.geotiff import read_relief
+from tests.builders.commands import bifocal_command as main
 from tests.scenes import bifocal_cameras, facade, render
 
 

@@ -15,7 +15,6 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal import SAMPLE, Grid
-from bifocal.cli.main import main
 from bifocal.files.geotiff import create_raster
 from bifocal.reports.accuracy import accuracy_blocks
 from bifocal.reports.content import read_content
@@ -25,6 +24,7 @@ from photocore.reports.document import Document
 from photocore.reports.words import LANGUAGES, texts_of, words_of
 from photocore.reports.writing import write_document
 from tests.bifocal.campaigns.sample_tables import CONTROL, FAR, NEAR, write_tables
+from tests.builders.commands import bifocal_command as main
 from tests.web_page import Page
 
 PAIR = SAMPLE / "facade.pair.json"

@@ -11,9 +11,9 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal import InputError, Pair, solve
-from bifocal.cli.main import main
 from bifocal.survey.pair_workflow import read_pair
 from bifocal.survey.pick_lists import read_picks
+from tests.builders.commands import bifocal_command as main
 from tests.papers.test_midulla_layout import NADIR, SIZE, fill, pixels, truth
 
 XYZ = truth(3)[[0, 5, 12, 18, 22]]

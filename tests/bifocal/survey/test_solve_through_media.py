@@ -7,8 +7,8 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal import Pair, solve
-from bifocal.cli.main import main
 from tests.bifocal.model.test_pair_through_media import PAIRS, POINTS, content
+from tests.builders.commands import bifocal_command as main
 from tests.scenes.refracted import pixels_of
 
 NAMES = ("port", "tank", "surface", "oblique", "leaning port")

@@ -12,11 +12,11 @@ from click.testing import CliRunner
 from openpyxl.utils import range_boundaries
 
 from bifocal import SurveySetup
-from bifocal.cli.main import main
 from bifocal.survey.template_workflow import write_template
 from bifocal.survey.workbook.book import write_book
 from bifocal.survey.workbook.content import SurveyContent
 from tests.bifocal.survey.test_survey_workbook import ideal_content, named, pair_content
+from tests.builders.commands import bifocal_command as main
 from tests.recalculate import recalculated
 from tests.workbook_page import dimension, printed_columns, scale_of, sizes_of
 

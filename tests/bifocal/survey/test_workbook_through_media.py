@@ -22,7 +22,6 @@ from bifocal import (
     georeference,
     solve,
 )
-from bifocal.cli.main import main
 from bifocal.survey.check_points import check_points
 from bifocal.survey.output import write_result
 from bifocal.survey.pair_workflow import read_pair
@@ -36,6 +35,7 @@ from tests.bifocal.survey.test_survey_workbook import (
     ideal_content,
     named,
 )
+from tests.builders.commands import bifocal_command as main
 from tests.recalculate import recalculated, rows_of
 from tests.scenes.refracted import seen_at
 from tests.workbook_lint import lint

@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from multimedia import InputError, read_project, write_project
-from multimedia.cli.main import main
+from tests.builders.commands import multimedia_command as main
 from tests.web_page import Page
 
 

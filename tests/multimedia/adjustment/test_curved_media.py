@@ -27,8 +27,8 @@ from multimedia import (
     read_project,
     write_project,
 )
-from multimedia.cli.main import main
 from multimedia.media.camera import EXTERIOR
+from tests.builders.commands import multimedia_command as main
 from tests.multimedia.curved_world import (
     image_of,
     through_dome,

@@ -15,7 +15,7 @@ from click.testing import CliRunner
 from rasterio.errors import NotGeoreferencedWarning
 
 import multimedia as mm
-from multimedia.cli.main import main
+from tests.builders.commands import multimedia_command as main
 
 N = 1.34
 LEVEL = 102.5

@@ -19,7 +19,7 @@ from scipy.optimize import minimize
 
 from multimedia import GeometryError, Plane, WaveSurface, read_project
 from multimedia.bathymetry.correction_job import Outcome
-from multimedia.cli.main import main
+from tests.builders.commands import multimedia_command as main
 
 INDEX = 1.34
 RNG = np.random.default_rng(12)

@@ -25,10 +25,10 @@ from multimedia import (
     read_project,
 )
 from multimedia.boards.board_points import PosedView, with_boards
-from multimedia.cli.main import main
 from multimedia.orientation.plate_poses import plate_pose
 from multimedia.projects.photos import read_photo
 from photocore.camera.boards import BoardView, detect_board
+from tests.builders.commands import multimedia_command as main
 from tests.multimedia.rendered_boards import Housing, chessboard, dots, drawn, photo, poses
 
 EYE = Housing(width=480, height=360, pitch=0.008, c=2.8, k1=-4e-3)

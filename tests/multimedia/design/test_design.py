@@ -30,9 +30,9 @@ from multimedia import (
     study_setup,
     write_project,
 )
-from multimedia.cli.main import main
 from multimedia.design import design_files
 from multimedia.design.design_files import write_design_plot
+from tests.builders.commands import multimedia_command as main
 
 TANK = FlatInterface(layers=Layers(indices=(1.0, 1.5, 1.337), thicknesses=(0.01,)))
 POINTS = object_grid((0.3, 0.2), (0.02, 0.2), count=5)

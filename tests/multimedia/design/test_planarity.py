@@ -11,10 +11,10 @@ from click.testing import CliRunner
 from scipy.optimize import least_squares, root
 
 from multimedia import Camera, FlatInterface, InputError, Interfaces, Layers, Placement
-from multimedia.cli.main import main
 from multimedia.design import planarity
 from multimedia.design.planarity import SAG, SLOPE, WEDGE, planarity_study
 from multimedia.design.studies import best_placement
+from tests.builders.commands import multimedia_command as main
 
 C, N, GLASS = 24.0, (1.0, 1.5, 1.337), 0.01
 TANK = FlatInterface(layers=Layers(indices=N, thicknesses=(GLASS,)))

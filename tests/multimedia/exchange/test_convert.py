@@ -31,8 +31,8 @@ from multimedia import (
     read_project,
     write_project,
 )
-from multimedia.cli.main import main
 from photocore.camera.distortion import Brown
+from tests.builders.commands import multimedia_command as main
 
 SENSOR = Sensor(width=1936, height=1216, pitch=np.array([0.00345, 0.00346]))
 RNG = np.random.default_rng(31)

@@ -32,11 +32,11 @@ from multimedia import (
     write_experiment,
     write_project,
 )
-from multimedia.cli.main import main
 from multimedia.media.camera import EXTERIOR
 from multimedia.media.projection import project_with_jacobian
 from photocore.camera.distortion import Brown
 from photocore.camera.fisheye import Fisheye
+from tests.builders.commands import multimedia_command as main
 from tests.rounding import EPS
 
 mp.mp.dps = 40

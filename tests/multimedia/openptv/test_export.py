@@ -24,8 +24,8 @@ from multimedia import (
     write_experiment,
     write_project,
 )
-from multimedia.cli.main import main
 from photocore.camera.distortion import Brown
+from tests.builders.commands import multimedia_command as main
 from tests.multimedia.tank import SENSOR, cameras, control
 
 HALF = np.array([SENSOR.width, SENSOR.height]) / 2

@@ -26,7 +26,6 @@ from multimedia import (
     resect,
     write_experiment,
 )
-from multimedia.cli.main import main
 from multimedia.openptv.experiment import particle_points
 from multimedia.openptv.openptv_files import (
     glass_interface,
@@ -37,6 +36,7 @@ from multimedia.openptv.openptv_files import (
 )
 from multimedia.openptv.workflow import import_openptv
 from photocore.camera.distortion import Brown
+from tests.builders.commands import multimedia_command as main
 from tests.multimedia.tank import LAYERS, SENSOR, cameras, control
 
 CALIBRATION = ("c", "xh", "yh", "k1", "p1", "p2", "scale")

@@ -12,13 +12,13 @@ import pytest
 from click.testing import CliRunner
 
 from multimedia import FlatInterface, InputError, Project, correspondences, project, write_project
-from multimedia.cli.main import main
 from multimedia.openptv.openptv_files import (
     glass_interface,
     read_camera,
     read_control,
     read_correspondences,
 )
+from tests.builders.commands import multimedia_command as main
 from tests.multimedia.tank import LAYERS, SENSOR, cameras
 
 WALL = FlatInterface(layers=LAYERS)

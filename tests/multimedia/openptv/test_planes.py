@@ -20,9 +20,9 @@ from multimedia import (
     read_project,
     write_experiment,
 )
-from multimedia.cli.main import main
 from multimedia.openptv.workflow import import_openptv
 from photocore.camera.distortion import Brown
+from tests.builders.commands import multimedia_command as main
 from tests.multimedia.tank import SENSOR
 
 NOISE = 0.3  # px

@@ -21,8 +21,8 @@ from multimedia import (
     read_project,
     write_project,
 )
-from multimedia.cli.main import main
 from multimedia.orientation.calibration_covariance import KEY, with_calibration
+from tests.builders.commands import multimedia_command as main
 from tests.multimedia.tank import LAYERS, cameras, control, images
 
 NOISE = 0.003

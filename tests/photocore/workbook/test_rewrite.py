@@ -8,10 +8,10 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal import InputError
-from bifocal.cli.main import main as bifocal
-from multimedia.cli.main import main as multimedia
 from photocore.workbook.reading.package import rewrite_package
 from photocore.workbook.reading.xlsx import open_xlsx
+from tests.builders.commands import bifocal_command as bifocal
+from tests.builders.commands import multimedia_command as multimedia
 
 OFFICE = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
 PACKAGE = "http://schemas.openxmlformats.org/package/2006/relationships"
