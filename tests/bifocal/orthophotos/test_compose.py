@@ -231,4 +231,5 @@ def test_an_orthophoto_is_written_with_its_source_and_place(tmp_path) -> None:
     ortho.write(tmp_path / "ortho.tif")
     with rasterio.open(tmp_path / "ortho.tif") as file:
         np.testing.assert_array_equal(file.read()[:3].transpose(1, 2, 0), colours)
-        assert (file.read(4) == Source.IMAGE_1).all() and file.transform == ortho.transform
+        assert (file.read(4) == Source.IMAGE_1).all()
+        assert file.transform == ortho.transform
