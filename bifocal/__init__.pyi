@@ -28,7 +28,8 @@ from .relief_maps.dense_matching import DenseRelief, dense_relief
 from .reports.relief_view import relief_view
 from .survey.georeferencing import georeference
 from .survey.reference import Georeference
-from .survey.workflow import SolvedSurvey, solve
+from .survey.solved_survey import SolvedSurvey
+from .survey.workflow import solve
 
 __version__: str
 

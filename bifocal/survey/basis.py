@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bifocal.model.basis import rests_on
-from bifocal.survey.workflow import SolvedSurvey
+from bifocal.survey.solved_survey import SolvedSurvey
 
 
 def basis(solution: SolvedSurvey) -> str:
@@ -27,8 +27,7 @@ def _picks(solution: SolvedSurvey) -> str:
         return f"picks of {solution.setup.precision:.3g} mm {how}"
     photo = solution.pair.image1
     how = "assumed"
-    given = solution.given.get("sigma_px") or solution.survey.setup.sigma_px
-    if given is not None or photo.sigma_pixel is not None:
+    if solution.survey.setup.sigma_px is not None or photo.sigma_pixel is not None:
         how = "given"
     elif solution.sigma_px is not None:
         how = "found from the misfits"

@@ -17,13 +17,13 @@ from bifocal.survey.observations import PointObservations
 from bifocal.survey.point_survey import solve_points
 from bifocal.survey.reference import KnownPoints
 from bifocal.survey.setup import SurveySetup
+from bifocal.survey.solved_survey import SolvedSurvey
 from bifocal.survey.template_workflow import MOST_ROWS, log_row
 from bifocal.survey.tolerances import RULES, sentence
 from bifocal.survey.workbook.book import write_book
 from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.own_table import add_results
 from bifocal.survey.workbook.update import check_kind, is_same_kind, update_book
-from bifocal.survey.workflow import SolvedSurvey
 from photocore.errors import InputError
 from photocore.jsonfile import to_text
 from photocore.output import check_not_input, relative_name
@@ -114,7 +114,7 @@ def check_target(path: Path, solution: SolvedSurvey, *, overwrite: bool) -> None
         As `write_result`.
     """
     if _is_survey_book(solution) and _is_same_file(path, solution.source):
-        check_kind(solution.source, solution.survey, solution)
+        check_kind(solution.source, solution.survey, SurveyContent.of(solution))
     check_new_workbook(path, overwrite=overwrite, source=solution.source)
 
 
@@ -242,8 +242,8 @@ def result_content(solution: SolvedSurvey, path: Path, language: str | None) -> 
     what = "solved" + (", set-up corrected by plane points" if solution.adjusted else "")
     pair_path = solution.pair_path
     return replace(
-        solution,
-        language=language or solution.language,
+        SurveyContent.of(solution),
+        language=language or solution.survey.language,
         pair_file="" if pair_path is None else relative_name(pair_path, path.parent),
         setup=_moved(solution.setup, solution.source.parent, path.parent),
         photo_files=_photo_files(solution, path.parent),

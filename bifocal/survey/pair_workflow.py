@@ -13,9 +13,10 @@ from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.model.points import SurveyPoints
 from bifocal.survey.setup import SurveySetup
+from bifocal.survey.solved_survey import SolvedSurvey
 from bifocal.survey.sources import BOOKS, described_pair
 from bifocal.survey.workbook.reader import read_survey
-from bifocal.survey.workflow import SolvedSurvey, solve
+from bifocal.survey.workflow import solve
 from photocore.arrays import FloatArray, not_negative
 from photocore.errors import InputError, located
 from photocore.output import all_or_none, check_all_writable, check_ending, relative_name
@@ -213,7 +214,7 @@ def survey_points(solution: SolvedSurvey) -> SurveyPoints:
     if covariance is not None:
         mixed = covariance[:, 0, 1]
         if world is not None:
-            placed = solution.world_covariance
+            placed = solution.placed.covariance
             mixed_world = None if placed is None else placed[:, 0, 1]
     points = SurveyPoints(
         ids=table.ids,

@@ -13,9 +13,9 @@ from bifocal.model.photo import Photo
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.pick_lists import joined, left_over, read_picks
 from bifocal.survey.setup import SurveySetup
+from bifocal.survey.survey_input import SurveyInput, with_measured
 from bifocal.survey.units import refuse_far_stations
-from bifocal.survey.workbook.known_reader import with_measured
-from bifocal.survey.workbook.reader import ReadOptions, SurveyInput, read_survey
+from bifocal.survey.workbook.reader import ReadOptions, read_survey
 from photocore.errors import GeometryError, InputError
 
 Lists = tuple[Path | str, Path | str]

@@ -18,10 +18,11 @@ from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.survey.output import as_typed, result_content
 from bifocal.survey.pair_workflow import is_survey
+from bifocal.survey.survey_input import SurveyInput
 from bifocal.survey.survey_media import MOST, SurveyMedia, media_names
 from bifocal.survey.template_workflow import write_survey
 from bifocal.survey.workbook.content import SurveyContent, setup_cells
-from bifocal.survey.workbook.reader import SurveyInput, read_survey
+from bifocal.survey.workbook.reader import read_survey
 from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS
 from bifocal.survey.workbook.update import update_book
 from bifocal.survey.workflow import solve

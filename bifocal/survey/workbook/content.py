@@ -15,6 +15,7 @@ from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable, entries
 from bifocal.survey.setup import SurveySetup
+from bifocal.survey.solved_survey import SolvedSurvey, WorldPoints
 from bifocal.survey.survey_media import SurveyMedia
 from bifocal.survey.tolerances import RULES, ToleranceRule
 from bifocal.survey.weighted_similarity import weights_of
@@ -108,6 +109,18 @@ class SurveyContent:
     rows: int = POINT_ROWS
     media: SurveyMedia | None = None
 
+    @classmethod
+    def of(cls, solved: SolvedSurvey) -> SurveyContent:
+        """Return what the workbook shows of a solved survey."""
+        survey, setup = solved.survey, solved.survey.setup
+        return cls(
+            language=survey.language, setup=solved.setup, pair=solved.pair,
+            sigma_px=solved.sigma_px, points=solved.points, table=solved.table,
+            known=survey.known, check=solved.check, control=survey.control,
+            georeference=solved.georeference, model=survey.model, rules=solved.rules,
+            sensor=setup.sensor, limits=setup.limits, media=solved.media,
+        )  # fmt: skip
+
     @property
     def bent(self) -> SurveyMedia | None:
         """What the cells of media hold; None in a workbook that has none."""
@@ -151,43 +164,10 @@ class SurveyContent:
         )
 
     @property
-    def near(self) -> FloatArray:
-        """E, N, H about a whole-metre origin, shape (n, 3); NaN without control points. [m]"""
-        geo, table = self.georeference, self.table
-        if geo is None or table is None:
-            return np.full((0 if table is None else len(table), 3), np.nan)
-        return geo.near_of(table.xyz)
-
-    @property
-    def world_covariance(self) -> FloatArray | None:
-        """Covariance of E, N, H, shape (n, 3, 3); None where it is not known. [m²]"""
-        geo, table = self.georeference, self.table
-        if geo is None or table is None or table.covariance is None:
-            return None
-        own = table.own_covariance
-        if geo.precision is None or own is None:
-            return geo.covariance_of(table.xyz, table.covariance)
-        effect = table.effect_of_orientation(table.xyz)
-        return geo.covariance_of(table.xyz, own, ids=table.ids, effect=effect)
-
-    @property
-    def world_sigma(self) -> FloatArray:
-        """Standard deviations of E, N, H, shape (n, 3); NaN without control points. [m]"""
-        if self.world_covariance is None:
-            return np.full((0 if self.table is None else len(self.table), 3), np.nan)
-        variances = np.diagonal(self.world_covariance, axis1=1, axis2=2)
-        # Where points without redundancy are placed exactly, rounding is left.
-        return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
-
-    @property
-    def common_covariance(self) -> FloatArray:
-        """What the orientation still adds to E, N, H once placed, shape (n, 3, 3). [m²]"""
-        geo, table = self.georeference, self.table
-        assert table is not None
-        effect = table.effect_of_orientation(table.xyz)
-        if geo is None or effect is None or geo.precision is None:
-            return np.full((len(table), 3, 3), np.nan)
-        return geo.common(self.near, effect)
+    def placed(self) -> WorldPoints:
+        """The points in the world."""
+        assert self.table is not None
+        return WorldPoints(self.table, self.georeference)
 
     @property
     def point_rows(self) -> int:
@@ -252,11 +232,12 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     cells |= {key: inputs(values) for key, values in table.carried.items()}
     for key in {"g1", "g2"} & table.carried.keys():
         cells[key] = _unless(incomplete, table.carried[key])
-    cells |= {key: inputs(content.near[:, i]) for i, key in enumerate(NEAR[:3])}
-    placed = content.world_covariance
-    cells[NEAR[3]] = [None] * len(table) if placed is None else inputs(placed[:, 0, 1])
+    placed = content.placed
+    cells |= {key: inputs(placed.near[:, i]) for i, key in enumerate(NEAR[:3])}
+    mixed = placed.covariance
+    cells[NEAR[3]] = [None] * len(table) if mixed is None else inputs(mixed[:, 0, 1])
     if content.is_pair:
-        common = content.common_covariance
+        common = placed.common
         cells |= {f"o_{axis}": inputs(np.sqrt(common[:, i, i])) for i, axis in enumerate("ENH")}
         cells["o_EN"] = inputs(common[:, 0, 1])
     else:
@@ -306,10 +287,7 @@ def result_cells(
     """Return every column of `Results` by key."""
     if content.table is None:
         return {}
-    xyz = content.table.xyz
-    world, sigma = np.full_like(xyz, np.nan), content.world_sigma
-    if content.georeference is not None:
-        world = content.georeference.world_from_wall(xyz)
+    world, sigma = content.placed.xyz, content.placed.sigma
     return {
         "id": cells["id"],
         **{key: inputs(content.table[key]) for key in ("X", "Y", "Z")},

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import KnownPoints
 from bifocal.survey.workbook.words import headings
 from photocore.errors import CellError
@@ -97,24 +96,6 @@ def understood(
     kind: Kind = "text" if key in TEXT_KEYS else "flag" if key == "use" else "number"
     names = dict.fromkeys((*headings("columns", key), *more))
     return Column(key, tuple(names), kind=kind, unit=unit, required=required)
-
-
-def with_measured(known: KnownPoints, points: PointObservations) -> KnownPoints:
-    """Add relief measured on site, given beside the points, to the check points."""
-    rows = [
-        i
-        for i in np.flatnonzero(~np.isnan(points.r_measured) & points.use)
-        if points.ids[i] not in known.ids
-    ]
-    if not rows:
-        return known
-    nothing = np.full(len(rows), np.nan)
-    more = np.stack([nothing, nothing, points.r_measured[rows]], axis=-1)
-    return KnownPoints(
-        ids=(*known.ids, *(points.ids[i] for i in rows)),
-        xyz=np.vstack([known.xyz, more]),
-        use=np.concatenate([known.used, np.ones(len(rows), dtype=bool)]),
-    )
 
 
 def refuse_absurd(table: Table, keys: Sequence[str], errors: list[CellError]) -> None:

@@ -12,12 +12,13 @@ import numpy as np
 
 from bifocal.survey.reference import Georeference
 from bifocal.survey.relief_table import ENTRIES
+from bifocal.survey.survey_input import SurveyInput
 from bifocal.survey.workbook.book import build
 from bifocal.survey.workbook.columns import NEAR, ideal_points, pair_points
 from bifocal.survey.workbook.content import SurveyContent, point_cells, result_cells
 from bifocal.survey.workbook.placed_formulas import added_covariance
 from bifocal.survey.workbook.precision_lines import precision_values
-from bifocal.survey.workbook.reader import TO_DEGREES, TO_MM, SurveyInput
+from bifocal.survey.workbook.reader import TO_DEGREES, TO_MM
 from bifocal.survey.workbook.setup_cells import OPTION_CELLS, TITLE_BLOCK
 from bifocal.survey.workbook.setup_update import (
     add_sheets,

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.survey.observations import PointObservations
-from bifocal.survey.reference import KnownPoints
-from bifocal.survey.setup import SurveySetup
+from bifocal.survey.survey_input import SurveyInput, where_of, with_measured
 from bifocal.survey.workbook.known_reader import (
     TO_M,
     factor_of,
@@ -18,7 +17,6 @@ from bifocal.survey.workbook.known_reader import (
     refuse_absurd,
     understood,
     unit_error,
-    with_measured,
 )
 from bifocal.survey.workbook.setup_reader import is_general, read_setup
 from bifocal.survey.workbook.words import LANGUAGES, word
@@ -52,71 +50,6 @@ TO_DEGREES = {"deg": 1.0, "gon": 0.9, "rad": float(np.degrees(1.0))}
 TO_MM = {"mm": 1.0, "cm": 10.0, "um": 1e-3, "m": 1000.0}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SurveyInput:
-    """What a survey file holds, checked cell by cell.
-
-    Attributes
-    ----------
-    points : PointObservations
-        Measured points.
-    setup : SurveySetup
-        The cells of `Setup` that were found.
-    unit : str
-        Unit of x1..y2 that the headings say; empty where they say none.
-    known, control : KnownPoints
-        Check points and control points.
-    model : str
-        Georeference model asked for.
-    language : str
-        Of the workbook; ``en`` for other files.
-    is_ours : bool
-        Whether it is a survey workbook with live formulas.
-    table : Table
-        The table of points, with the way back to its cells.
-    book : SheetFile or None
-        The workbook as read; None for a text table.
-    titles : tuple of str
-        The sheets of the file; empty for a text table.
-    known_rows, control_rows : tuple of int
-        Rows of the sheets `Check` and `Georeference`; check points given beside the points follow
-        after these.
-    remarks : tuple of str
-        What the user should know.
-    """
-
-    points: PointObservations
-    setup: SurveySetup
-    unit: str = ""
-    known: KnownPoints
-    control: KnownPoints = field(default_factory=KnownPoints)
-    model: str = "auto"
-    language: str = "en"
-    is_ours: bool = False
-    table: Table
-    book: SheetFile | None = None
-    titles: tuple[str, ...] = ()
-    known_rows: tuple[int, ...] = ()
-    control_rows: tuple[int, ...] = ()
-    remarks: tuple[str, ...] = ()
-
-    @classmethod
-    def of_points(cls, points: PointObservations) -> SurveyInput:
-        """Return a survey that holds nothing but measured points."""
-        table = Table(file="points", sheet="", values={}, present=frozenset(), rows=[], columns={})
-        return cls(
-            points=points,
-            setup=SurveySetup(where="points"),
-            known=with_measured(KnownPoints(), points),
-            table=table,
-        )
-
-    @property
-    def where(self) -> str:
-        """File and sheet of the points, for messages."""
-        return where_of(self.table)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadOptions:
     """How to read: columns by hand, sheet, decimal separator, hidden rows.
@@ -140,11 +73,6 @@ class ReadOptions:
     decimal: Decimal | None = None
     visible_only: bool = False
     given: Collection[str] = ()
-
-
-def where_of(table: Table) -> str:
-    """Return file and sheet of a table, for messages."""
-    return f"{table.file} › {table.sheet}" if table.sheet else table.file
 
 
 def point_columns(*, shared: Sequence[str] = ()) -> list[Column]:

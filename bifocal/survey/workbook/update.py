@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from bifocal.survey.survey_input import SurveyInput
 from bifocal.survey.workbook.book import build, unprinted_formula
 from bifocal.survey.workbook.charts import HEAD, LEFT
 from bifocal.survey.workbook.content import STRUCTURED_ROWS, SurveyContent
-from bifocal.survey.workbook.reader import SurveyInput
 from bifocal.survey.workbook.setup_cells import TYPED_FORMULAS
 from bifocal.survey.workbook.setup_reader import media_count
 from bifocal.survey.workbook.setup_update import (

@@ -12,8 +12,9 @@ from bifocal.collimation.workbook.setup import completed, typed_setup
 from bifocal.model.pair import Pair
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.setup import SurveySetup
+from bifocal.survey.survey_input import SurveyInput
 from bifocal.survey.survey_media import SurveyMedia
-from bifocal.survey.workbook.reader import SurveyInput, read_survey
+from bifocal.survey.workbook.reader import read_survey
 from tests.bifocal.survey.test_cli_solve import POINTS, fill, put, refused, rows, run, write_csv
 from tests.bifocal.survey.test_survey_workbook import assert_recalculated_equals_cached
 from tests.bifocal.survey.test_workbooks_are_kept import DISTANCES

@@ -262,7 +262,7 @@ def test_sigmas_in_the_world_of_an_uncertain_pair_equal_the_library(tmp_path):
     column = keys.index("sigma_H") + 1
     found = [shown.cell(5 + i, column).value for i in range(len(content.table))]
     known = np.array([np.nan if value in (None, "") else value for value in found])
-    np.testing.assert_allclose(known, content.world_sigma[:, 2], rtol=1e-9)
+    np.testing.assert_allclose(known, content.placed.sigma[:, 2], rtol=1e-9)
 
 
 @pytest.mark.acceptance
