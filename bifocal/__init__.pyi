@@ -29,7 +29,7 @@ from .reports.relief_view import relief_view
 from .survey.georeferencing import georeference
 from .survey.reference import Georeference
 from .survey.solved_survey import SolvedSurvey
-from .survey.workflow import solve
+from .workbook.workflow import solve
 
 __version__: str
 

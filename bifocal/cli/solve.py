@@ -94,15 +94,9 @@ def command(
     Or give two lists of picks, of photo 1 and of photo 2 (.csv, .xlsx, .dxf), joined by the names
     of the points, with --pair: a pair file, or a survey workbook for its set-up.
     """
-    from bifocal.survey.output import (
-        check_target,
-        length_unit,
-        point_rows,
-        solution_json,
-        summary,
-        write_result,
-    )
-    from bifocal.survey.workflow import solve
+    from bifocal.survey.results import length_unit, point_rows, solution_json, summary
+    from bifocal.workbook.output import check_target, write_result
+    from bifocal.workbook.workflow import solve
     from photocore.output import check_not_input
     from photocore.workbook.making.newbook import check_new_workbook
 

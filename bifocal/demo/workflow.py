@@ -20,8 +20,8 @@ from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
 from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
-from bifocal.survey.output import write_result
-from bifocal.survey.workflow import solve
+from bifocal.workbook.output import write_result
+from bifocal.workbook.workflow import solve
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError

@@ -20,7 +20,7 @@ from bifocal.model.relief_map import Quality, ReliefMap
 from bifocal.model.surface import MapSurface
 from bifocal.reports.control_survey import is_exchanged, solve_control
 from bifocal.survey.solved_survey import SolvedSurvey
-from bifocal.survey.workflow import solve
+from bifocal.workbook.workflow import solve
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.errors import InputError, located
 

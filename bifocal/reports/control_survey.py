@@ -13,7 +13,7 @@ from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import KnownPoints
 from bifocal.survey.solved_survey import SolvedSurvey
 from bifocal.survey.survey_input import SurveyInput
-from bifocal.survey.workflow import solve
+from bifocal.workbook.workflow import solve
 from photocore.errors import InputError
 
 #: Code of points that the orientation rests on, and of independent ones.

@@ -21,10 +21,10 @@ from bifocal.cli.main import main
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
 from bifocal.survey.georeferencing import georeference
 from bifocal.survey.observations import PointObservations
-from bifocal.survey.pair_workflow import points_of, read_pair
 from bifocal.survey.point_survey import solve_points
 from bifocal.survey.reference import KnownPoints
 from bifocal.survey.setup import SurveySetup
+from bifocal.workbook.pair_workflow import points_of, read_pair
 
 PITCH, SIZE = 0.00739, (3072, 2048)
 NADIR = (1535.5, 1023.5)

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from bifocal.collimation.project import SurveyFiles
 from bifocal.model.pair import Pair
-from bifocal.survey.pair_workflow import read_pair
 from bifocal.survey.setup import SurveySetup
-from bifocal.survey.workbook.reader import read_survey
+from bifocal.workbook.pair_workflow import read_pair
+from bifocal.workbook.reading.reader import read_survey
 from photocore.errors import InputError
 from photocore.workbook.changing.cells import CellValue
 

@@ -225,7 +225,7 @@ def test_a_wrong_cell_is_named_and_nothing_overwritten(tmp_path) -> None:
 def test_a_survey_of_the_command_line_opens_on_the_page(tmp_path) -> None:
     folder = sample_folder(tmp_path)
     solved = bifocal.solve(SAMPLE / "targets.csv", pair=folder / "facade.pair.json", sigma_px=0.2)
-    from bifocal.survey.output import write_result
+    from bifocal.workbook.output import write_result
 
     write_result(folder / "mine.xlsx", solved)
     with opened(folder / "mine.xlsx") as session:
