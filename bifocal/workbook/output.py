@@ -13,6 +13,7 @@ from bifocal.survey.georeferencing import georeference
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.point_survey import solve_points
 from bifocal.survey.reference import KnownPoints
+from bifocal.survey.results import csv_columns
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.solved_survey import SolvedSurvey
 from bifocal.survey.tolerances import RULES
