@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import shlex
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import redirect_stdout, suppress
 from pathlib import Path
 from typing import Any, TypeVar
@@ -25,8 +25,105 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 STREAMS = ("photocore.stdin", "photocore.stdout")
 FILE = click.Path(path_type=Path)
 
-overwrite = click.option("--overwrite", is_flag=True, help="Replace existing files.")
-as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+
+class Option:
+    """An option, said once: on the command line, as a key of files, as an argument in Python.
+
+    Parameters
+    ----------
+    *names : str
+        As `click.option` takes them: the flag, and the argument where that has another name.
+    **attributes
+        As `click.option` takes them.
+    """
+
+    def __init__(self, *names: str, **attributes: Any) -> None:
+        self.names, self.attributes = names, attributes
+
+    @property
+    def flag(self) -> str:
+        """What stands on the command line, e.g. ``--sigma-pick``."""
+        return self.names[0].partition("/")[0]
+
+    @property
+    def name(self) -> str:
+        """The key in files and the argument in Python, e.g. ``sigma_pick``."""
+        return self.names[-1] if len(self.names) > 1 else self.flag[2:].replace("-", "_")
+
+    @property
+    def is_switch(self) -> bool:
+        """Whether it is true or false."""
+        return "/" in self.names[0] or "is_flag" in self.attributes
+
+    @property
+    def is_file(self) -> bool:
+        """Whether it names a file."""
+        return isinstance(self.attributes.get("type"), click.Path)
+
+    def __call__(self, command: Command) -> Command:
+        """Give a command the option."""
+        return click.option(*self.names, **self.attributes)(command)
+
+    def but(self, *names: str, **changes: Any) -> Option:
+        """Return it with other names or attributes."""
+        return Option(*(names or self.names), **{**self.attributes, **changes})
+
+    def unset(self) -> Option:
+        """Return it without a value where it is not given; its help still tells the default."""
+        default, said = self.attributes.get("default"), self.attributes["help"]
+        if self.attributes.get("show_default"):
+            shown = default if not self.is_switch else self.flag[2:]
+            said = f"{said}  [default: {shown}]"
+        return self.but(default=None, show_default=False, help=said)
+
+    def is_said(self, value: object) -> bool:
+        """Whether a value is more than that of an option left out; zero is a number."""
+        by_default = "/" not in self.names[0] and value is False
+        return not (value is None or value == () or by_default)
+
+    def read(self, value: object) -> Any:
+        """Return what a file holds, checked as on the command line.
+
+        Raises
+        ------
+        ValueError
+            With what was expected.
+        """
+        kind = self.attributes.get("type", click.STRING)
+        if self.is_switch:
+            if not isinstance(value, bool):
+                raise ValueError("true or false")
+            return value
+        if self.attributes.get("multiple") or isinstance(kind, Names):
+            if not isinstance(value, list) or not all(isinstance(word, str) for word in value):
+                raise ValueError("a list of texts")
+            return tuple(value)
+        if isinstance(kind, Number):
+            return kind.read(value)
+        if isinstance(kind, click.Choice):
+            try:
+                return kind.convert(str(value), None, None)
+            except click.BadParameter:
+                raise ValueError(f"one of {', '.join(kind.choices)}") from None
+        if not isinstance(value, str):
+            raise ValueError("a text")
+        return value
+
+
+def takes(*options: Option) -> Callable[[Command], Command]:
+    """Return what gives a command options, in their order."""
+
+    def decorate(command: Command) -> Command:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorate
+
+
+overwrite = Option("--overwrite", is_flag=True, help="Replace existing files.")
+as_json = Option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+COG = Option("--cog", is_flag=True, help="Write rasters as cloud-optimised GeoTIFF.")
 
 
 def _enter_cog(ctx: click.Context, param: click.Parameter, value: bool) -> None:  # noqa: ARG001
@@ -36,10 +133,7 @@ def _enter_cog(ctx: click.Context, param: click.Parameter, value: bool) -> None:
         ctx.with_resource(cloud_optimised())
 
 
-cog = click.option(
-    "--cog", is_flag=True, expose_value=False, callback=_enter_cog,
-    help="Write rasters as cloud-optimised GeoTIFF.",
-)  # fmt: skip
+cog = COG.but(expose_value=False, callback=_enter_cog)
 
 
 class TableFile(click.Path):
@@ -129,7 +223,8 @@ class Number(click.ParamType):  # type: ignore[type-arg,unused-ignore]
 
     name = "number"
     described = "a number; the unit is in the help."
-    is_single = True
+    in_files = "a number"
+    is_single, takes_text = True, False
 
     def __init__(
         self,
@@ -170,15 +265,44 @@ class Number(click.ParamType):  # type: ignore[type-arg,unused-ignore]
             return f"must be a finite number, not beyond {LARGEST:g}"
         if self.to is int and number != int(number):
             return "must be a whole number"
+        for limit, outside, words in self._limits():
+            if outside(number, limit):
+                return f"must be {words}"
+        return None
+
+    def _limits(self) -> Iterator[tuple[float, Callable[[float, float], bool], str]]:
+        """Yield each limit, what tells that a number is beyond it, and what it must be."""
         for limit, outside, words in (
             (self.above, float.__le__, "above {}"),
             (self.below, float.__ge__, "below {}"),
             (self.least, float.__lt__, "{} or more"),
             (self.most, float.__gt__, "{} or less"),
         ):
-            if limit is not None and outside(number, float(limit)):
-                return f"must be {words.format('zero' if limit == 0 else f'{limit:g}')}"
-        return None
+            if limit is not None:
+                yield float(limit), outside, words.format("zero" if limit == 0 else f"{limit:g}")
+
+    def read(self, value: object) -> Any:
+        """Return what a file holds, in the unit of the program; ValueError says what it must be."""
+        if isinstance(value, str) and self.takes_text:
+            with suppress(ValueError):
+                value = self.parse(value)[0]
+        return self._checked([value])[0]
+
+    def _checked(self, values: Sequence[object]) -> tuple[float, ...]:
+        numbers = [v for v in values if isinstance(v, int | float) and not isinstance(v, bool)]
+        # A whole number may be too large for a float.
+        if len(numbers) < len(values) or any(
+            not abs(v) <= LARGEST or self.fault(float(v)) for v in numbers
+        ):
+            raise ValueError(self.wanted)
+        return tuple(self.to(float(v)) for v in numbers)
+
+    @property
+    def wanted(self) -> str:
+        """What a file must hold."""
+        return " and ".join([self.in_files, *(words for *_, words in self._limits())]).replace(
+            " and", "", 1
+        )
 
 
 #: Takes the place of click's FLOAT in every command.
@@ -190,27 +314,23 @@ FOCAL = Number(least=0.1, most=1e5)
 THOUSANDTHS = Number(above=0, to=lambda value: value / 1000)
 
 
-def number(
-    name: str, unit: str, text: str, *, type: Number = POSITIVE, **more: Any
-) -> Callable[[Command], Command]:
+def number(name: str, unit: str, text: str, *, type: Number = POSITIVE, **more: Any) -> Option:
     """Return an option that takes one number: its unit, its help, and a default that is shown."""
-    return click.option(
-        name, type=type, metavar=unit, help=text, show_default="default" in more, **more
-    )
+    return Option(name, type=type, metavar=unit, help=text, show_default="default" in more, **more)
 
 
-def choice(name: str, words: str, text: str, **more: Any) -> Callable[[Command], Command]:
+def choice(name: str, words: str, text: str, **more: Any) -> Option:
     """Return an option that takes one of ``"these|words"``, its help, a default that is shown."""
     kind = click.Choice(words.split("|"), case_sensitive=more.pop("case_sensitive", True))
-    return click.option(name, type=kind, help=text, show_default="default" in more, **more)
+    return Option(name, type=kind, help=text, show_default="default" in more, **more)
 
 
-def switch(name: str, text: str) -> Callable[[Command], Command]:
+def switch(name: str, text: str) -> Option:
     """Return an option that holds unless its ``--no-`` form is given."""
-    return click.option(f"--{name}/--no-{name}", default=True, show_default=True, help=text)
+    return Option(f"--{name}/--no-{name}", default=True, show_default=True, help=text)
 
 
-def sigma(name: str, unit: str, text: str) -> Callable[[Command], Command]:
+def sigma(name: str, unit: str, text: str) -> Option:
     """Return the option of a standard deviation, 0 where it is not given."""
     return number(name, unit, text, type=NOT_NEGATIVE, default=0.0)
 
@@ -222,6 +342,8 @@ class Numbers(Number):
     ----------
     count : int, optional
         How many; any number of them when None.
+    word : str
+        That may stand in their place.
     limits
         As for `Number`; they hold for each.
     """
@@ -229,11 +351,25 @@ class Numbers(Number):
     name = "numbers"
     is_single = False
 
-    def __init__(self, count: int | None = None, **limits: Any) -> None:
+    def __init__(self, count: int | None = None, *, word: str = "", **limits: Any) -> None:
         super().__init__(**limits)
-        self.count = count
+        self.count, self.word = count, word
         many = "a list of" if count is None else count
-        self.described = f"{many} numbers with commas between them"
+        self.described = f"{word and word + ' or '}{many} numbers with commas between them"
+        quoted = f'"{word}", or ' if word else ""
+        self.in_files = f"{quoted}a list of {'' if count is None else f'{count} '}numbers"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return a tuple of numbers, or the word."""
+        return value if self.word and value == self.word else super().convert(value, param, ctx)
+
+    def read(self, value: object) -> Any:
+        """Return what a file holds: a list, or the word."""
+        if self.word and value == self.word:
+            return value
+        if not isinstance(value, list) or self.count not in (None, len(value)):
+            raise ValueError(self.wanted)
+        return self._checked(value)
 
     def parse(self, text: str) -> list[float]:
         """Split at the separators; a list may end in one."""
@@ -263,6 +399,12 @@ class Scale(Number):
 
     name = "1:N"
     described = "a scale, e.g. 1:500"
+    takes_text = True
+
+    @property
+    def wanted(self) -> str:
+        """What a file must hold."""
+        return 'a scale, "1:50" or 50'
 
     def __init__(self) -> None:
         super().__init__(above=0)
@@ -277,6 +419,8 @@ class Length(Number):
 
     name = "M"
     described = "a length, e.g. 0.005 or 5mm"
+    in_files = 'a length [m] or "5mm",'
+    takes_text = True
 
     def parse(self, text: str) -> list[float]:
         """Return metres."""
@@ -300,8 +444,3 @@ class Names(click.ParamType):  # type: ignore[type-arg,unused-ignore]
         if isinstance(value, tuple):
             return value
         return tuple(part.strip() for part in value.split(",") if part.strip())
-
-
-def bounds(text: str) -> Callable[[Command], Command]:
-    """Return the option for a part of the plane: its four limits in metres."""
-    return number("--bounds", "XMIN,YMIN,XMAX,YMAX", text, type=Numbers(4))

@@ -21,8 +21,21 @@ from bifocal.campaigns.step_store import (
     run_step,
     step_key,
 )
+from bifocal.options import (
+    ALIGN,
+    CONTROL,
+    DRAWING,
+    GSD,
+    LANGUAGE,
+    PICTURE,
+    RELIEF,
+    SCALE,
+    UNIT,
+    names_of,
+)
 from photocore.cli import Progress, no_progress, unforeseen_message
 from photocore.errors import InputError, PhotogrammetryError
+from photocore.options import COG, Option
 from photocore.provenance import FileHashes, recording
 from photocore.raster_places import cloud_optimised
 from photocore.textfile import file_name, odd_name
@@ -35,18 +48,12 @@ PRODUCTS = ("relief", "points", "ortho", "drawing", "view", "report")
 #: What is made where nothing else is said: the drawing has the orthophoto.
 MOST_PRODUCTS = ("relief", "points", "drawing", "view", "report")
 #: The first step of every pair.
-ALIGN = "align"
-#: Files of a pair besides its photos.
-FILES = ("control", "check", "lengths", "lens", "lens1", "lens2")
-#: Options that hold for all pairs where these are adjusted in one frame.
-JOINT_OPTIONS = ("sigma_control", "sigma_pick", "unit")
+FIRST_STEP = "align"
 #: Share of a pair's time that each step takes, measured on church_2.
 WEIGHTS = {
     "align": 0.22, "relief": 0.36, "points": 0.02, "ortho": 0.07, "drawing": 0.15, "view": 0.02,
     "report": 0.16,
 }  # fmt: skip
-#: What every orthophoto of a pair is made by.
-_PICTURE = ("image", "bounds", "fill", "complete", "any_size")
 #: Memory of a pair in work: of the program, and for each pixel of its larger photo; 6.3 MP took
 #: 1.55 GB on church_2, 2.04 GB on a church with more relief. [bytes]
 BASE_MEMORY, MEMORY_PER_PIXEL = 300 << 20, 290
@@ -65,9 +72,9 @@ class PairJob:
     far, near : Path
         Photos.
     files : mapping of str to Path
-        ``control``, ``check``, ``lengths``, ``lens``, ``lens1``, ``lens2``, where given.
+        By the names of `bifocal.options.FILES`, where given.
     options : mapping
-        By the names of `bifocal.campaigns.survey_file.OPTIONS`; absent: default.
+        By the names of `bifocal.options.OF_PAIR`; absent: default.
     products : tuple of str
         Of `PRODUCTS`.
     overwrite : bool
@@ -288,8 +295,8 @@ def _part_of(progress: Progress, start: float, share: float, step: str) -> Progr
     return report
 
 
-def _some(job: PairJob, *names: str) -> dict[str, Any]:
-    return {name: job.options[name] for name in names if name in job.options}
+def _some(job: PairJob, *options: Option) -> dict[str, Any]:
+    return {name: job.options[name] for name in names_of(*options) if name in job.options}
 
 
 def refusal(job: PairJob) -> str:
@@ -305,13 +312,13 @@ def refusal(job: PairJob) -> str:
 
 
 def _align_files(job: PairJob) -> dict[str, Path]:
-    return {role: path for role, path in job.files.items() if role != "check"}
+    names = names_of(CONTROL, *ALIGN)
+    return {role: path for role, path in job.files.items() if role in names}
 
 
 def _align_step(job: PairJob) -> Step:
-    names = [key for key in job.options if key in ALIGN_OPTIONS]
     files = _align_files(job)
-    options = _some(job, *names)
+    options = _some(job, *ALIGN)
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
         from bifocal.orientation.align_workflow import AlignOptions, align_photos
@@ -324,17 +331,7 @@ def _align_step(job: PairJob) -> Step:
         return tuple(dict.fromkeys((*made.pair.remarks, *made.remarks)))
 
     photos = {"far": job.far, "near": job.near}
-    return Step(name=ALIGN, files={**photos, **files}, options=options, make=make)
-
-
-#: Options that go to the alignment.
-ALIGN_OPTIONS = (
-    "auto", "distance1", "distance2", "delta_d", "focal1", "focal2", "sensor_width",
-    "sensor_width1", "sensor_width2", "pixel_size", "pixel_size1", "pixel_size2", "wall", "length",
-    "horizontal", "vertical", "unit", "sigma_pick", "sigma_control", "sigma_distance", "as_set_up",
-    "indices", "thicknesses", "port", "port1", "port2", "depth", "port_normal", "port_normal1",
-    "port_normal2", "estimate", "prior",
-)  # fmt: skip
+    return Step(name=FIRST_STEP, files={**photos, **files}, options=options, make=make)
 
 
 def _photos(job: PairJob) -> dict[str, Path]:
@@ -344,7 +341,7 @@ def _photos(job: PairJob) -> dict[str, Path]:
 
 
 def _relief_step(job: PairJob) -> Step:
-    options = _some(job, "quality", "bounds", "relief_gsd", "relief_range", "cog")
+    options = _some(job, *RELIEF, COG)
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
@@ -352,17 +349,12 @@ def _relief_step(job: PairJob) -> Step:
         out = place / job.relief_path.name
         task = ReliefJob(
             out=out, preview=out.with_suffix(".png"), gsd=options.get("relief_gsd"),
-            bounds=_tuple(options.get("bounds")), quality=options.get("quality", "standard"),
-            relief_range=_tuple(options.get("relief_range")),
+            **_some(job, *RELIEF[1:]),
         )  # fmt: skip
         _, remarks = relief_of_pair(job.pair_path, task, progress=progress)
         return remarks
 
     return Step(name="relief", files=_photos(job), after=("align",), options=options, make=make)
-
-
-def _tuple(value: Any) -> Any:
-    return None if value is None else tuple(value)
 
 
 def tables_of(job: PairJob) -> dict[str, Path]:
@@ -371,7 +363,7 @@ def tables_of(job: PairJob) -> dict[str, Path]:
 
 
 def _points_step(job: PairJob) -> Step:
-    options = _some(job, "language", "unit")
+    options = _some(job, LANGUAGE, UNIT)
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
         from bifocal.model.pair import Pair
@@ -405,18 +397,16 @@ def _points_step(job: PairJob) -> Step:
 
 
 def _ortho_task(job: PairJob, options: Mapping[str, Any]) -> OrthoTask:
-    from bifocal.orthophotos.ortho_image import OrthoOptions
     from bifocal.orthophotos.ortho_workflow import OrthoTask
 
-    return OrthoTask(
-        relief=job.relief_path, image=options.get("image", "1"), gsd=options.get("gsd"),
-        bounds=_tuple(options.get("bounds")), any_size=options.get("any_size", False),
-        options=OrthoOptions(**{key: options.get(key, False) for key in ("fill", "complete")}),
-    )  # fmt: skip
+    return OrthoTask.from_given(
+        {key: options[key] for key in names_of(*PICTURE, GSD) if key in options},
+        relief=job.relief_path,
+    )
 
 
 def _ortho_step(job: PairJob) -> Step:
-    options = _some(job, "gsd", "cog", *_PICTURE)
+    options = _some(job, *PICTURE, GSD, COG)
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.orthophotos.ortho_workflow import make_ortho
@@ -431,28 +421,25 @@ def _ortho_step(job: PairJob) -> Step:
 
 
 def _drawing_step(job: PairJob) -> Step:
-    options = _some(job, "scale", "dpi", "paper", "sections", "contours", "cog", *_PICTURE)
-    control = {k: v for k, v in tables_of(job).items() if k == "control"}
+    options = _some(job, *DRAWING, *PICTURE, COG)
+    tables = {role: job.files[role] for role in ("control", "mark") if role in job.files}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver
 
-        wish = DeliverTask(
-            scale=options.get("scale", 50.0), title=job.name, paper=options.get("paper"),
-            sections=tuple(options.get("sections", ())), interval=options.get("contours"),
-            **({"dpi": options["dpi"]} if "dpi" in options else {}),
-        )  # fmt: skip
+        drawing = {"scale": 50.0} | _some(job, *DRAWING)
+        wish = DeliverTask(title=job.name, **drawing, mark=job.files.get("mark"))
         task = _ortho_task(job, options)
         return deliver(job.pair_path, place, task, wish, progress=progress).ortho.remarks
 
     return Step(
-        name="drawing", files={**_photos(job), **control}, after=("align", "relief"),
+        name="drawing", files={**_photos(job), **tables}, after=("align", "relief"),
         options=options, make=make,
     )  # fmt: skip
 
 
 def _view_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
-    options = {"title": job.name} | _some(job, "language")
+    options = {"title": job.name} | _some(job, LANGUAGE)
     ortho = job.ortho_path(earlier)
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
@@ -466,7 +453,7 @@ def _view_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
 
 
 def _report_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
-    options = {"title": job.name} | _some(job, "language", "unit", "scale")
+    options = {"title": job.name} | _some(job, LANGUAGE, UNIT, SCALE)
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.reports.workflow import ReportTask, write_report

@@ -3,129 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from bifocal.campaigns.pair_job import FILES, JOINT_OPTIONS, PRODUCTS, PairJob, tables_of
+from bifocal.campaigns.pair_job import PRODUCTS, PairJob, tables_of
+from bifocal.options import FILES, JOINT, OF_PAIR, names_of
 from photocore.errors import InputError
 from photocore.textfile import file_name, read_toml
-from photocore.workbook.making.words import LANGUAGES
 
 FORMAT = "bifocal-survey/1"
-
-
-def _number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < 1e9:
-        raise ValueError("a number above zero")
-    return float(value)
-
-
-def _not_negative(value: Any) -> float:
-    if value == 0 and not isinstance(value, bool):
-        return 0.0
-    try:
-        return _number(value)
-    except ValueError:
-        raise ValueError("a number not below zero") from None
-
-
-def _numbers(count: int | None = None) -> Callable[[Any], tuple[float, ...]]:
-    def check(value: Any) -> tuple[float, ...]:
-        good = isinstance(value, list) and count in (None, len(value))
-        if not good or not all(
-            isinstance(v, int | float) and not isinstance(v, bool) and abs(v) < 1e9 for v in value
-        ):
-            raise ValueError(f"a list of {'' if count is None else f'{count} '}numbers")
-        return tuple(float(v) for v in value)
-
-    return check
-
-
-def _scale(value: Any) -> float:
-    if isinstance(value, str):
-        try:
-            value = float(value.removeprefix("1:"))
-        except ValueError:
-            value = None
-    try:
-        return _number(value)
-    except ValueError:
-        raise ValueError('a scale, "1:50" or 50') from None
-
-
-def _choice(*words: str) -> Callable[[Any], str]:
-    def check(value: Any) -> str:
-        if str(value) not in words:
-            raise ValueError(f"one of {', '.join(words)}")
-        return str(value)
-
-    return check
-
-
-def _truth(value: Any) -> bool:
-    if not isinstance(value, bool):
-        raise ValueError("true or false")
-    return value
-
-
-def _words(value: Any) -> tuple[str, ...]:
-    if not isinstance(value, list) or not all(isinstance(word, str) for word in value):
-        raise ValueError("a list of texts")
-    return tuple(value)
-
-
-def _normal(value: Any) -> str:
-    """Return the normal of a port as the commands take it."""
-    if value == "axis":
-        return "axis"
-    try:
-        return ",".join(map(str, _numbers(3)(value)))
-    except ValueError:
-        raise ValueError('"axis", or a list of 3 numbers: X, Y, r') from None
-
-
-#: Every option of a pair, and what reads it; lengths in metres, picks in pixels.
-OPTIONS: Mapping[str, Callable[[Any], Any]] = {
-    "scale": _scale,
-    "dpi": _number,
-    "paper": _choice("A4", "A3", "A2", "A1", "A0"),
-    "language": _choice(*LANGUAGES),
-    "image": _choice("1", "2", "both"),
-    "quality": _choice("fast", "standard", "best"),
-    "bounds": _numbers(4),
-    "relief_range": _numbers(2),
-    "relief_gsd": _number,
-    "gsd": _number,
-    "fill": _truth,
-    "complete": _truth,
-    "any_size": _truth,
-    "cog": _truth,
-    "sections": _words,
-    "contours": _number,
-    "auto": _truth,
-    "unit": _choice("m", "cm", "mm"),
-    "wall": _numbers(2),
-    "length": _numbers(5),
-    "horizontal": _numbers(4),
-    "vertical": _numbers(4),
-    "as_set_up": _truth,
-    "indices": _numbers(),
-    "thicknesses": _numbers(),
-    "estimate": _words,
-    "prior": _words,
-} | dict.fromkeys(("port", "port1", "port2", "depth"), _not_negative) | dict.fromkeys(
-    ("port_normal", "port_normal1", "port_normal2"), _normal
-) | dict.fromkeys(
-    (
-        "distance1", "distance2", "delta_d", "focal1", "focal2", "sensor_width", "sensor_width1",
-        "sensor_width2", "pixel_size", "pixel_size1", "pixel_size2", "sigma_pick", "sigma_control",
-        "sigma_distance",
-    ),
-    _number,
-)  # fmt: skip
 
 
 #: An option of the command line with its value.
@@ -208,16 +97,18 @@ def in_survey_words(text: str) -> str:
     >>> in_survey_words("name a spot with --wall COL,ROW, or --auto with one of --distance1.")
     'name a spot with wall = [COL, ROW], or auto = true with one of distance1.'
     """
+    flags = {option.flag[2:]: option for option in OF_PAIR.values()}
 
     def key_of(match: re.Match[str]) -> str:
-        key, value = match[1].replace("-", "_"), match[2]
-        if key not in OPTIONS and key not in FILES:
+        option, value = flags.get(match[1]), match[2]
+        if option is None:
             return match[0]
-        if OPTIONS.get(key) is _truth:
+        key = option.name
+        if option.is_switch:
             return f"{key} = true" + (f" {value}" if value else "")
         if value is None:
             return key
-        if key == "prior":
+        if option.attributes.get("multiple"):
             return f'{key} = ["{value}"]'
         listed = f"[{value.replace(',', ', ')}]" if "," in value else value
         return f'{key} = "{value}"' if key in FILES else f"{key} = {listed}"
@@ -234,7 +125,7 @@ def _faults_of_whole(jobs: Sequence[PairJob], whole: Mapping[str, Any]) -> list[
         for job in jobs
         if job.folder.name.casefold() in WHOLE
     ]
-    for key in JOINT_OPTIONS if whole["joint"] else ():
+    for key in names_of(*JOINT) if whole["joint"] else ():
         if len({job.options.get(key) for job in jobs if tables_of(job)}) > 1:
             faults.append(
                 f"{key}: the pairs say different things of their tables, and joint = true "
@@ -273,13 +164,13 @@ def _entries(
                 faults.append(f"{where}: products: expected some of {', '.join(PRODUCTS)}.")
             else:
                 found["products"][key] = tuple(name for name in PRODUCTS if name in value)
-        elif key in OPTIONS:
+        elif key in OF_PAIR:
             try:
-                found["options"][key] = OPTIONS[key](value)
+                found["options"][key] = OF_PAIR[key].read(value)
             except ValueError as error:
                 faults.append(f"{where}: {key} = {value!r}: expected {error}.")
         else:
-            near = get_close_matches(key, [*OPTIONS, *FILES, "products"], n=1)
+            near = get_close_matches(key, [*OF_PAIR, "products"], n=1)
             hint = f" Did you mean {near[0]}?" if near else ""
             faults.append(f"{where}: there is no key {key!r}.{hint}")
     return found

@@ -8,7 +8,6 @@ from contextlib import suppress
 from pathlib import Path
 
 from bifocal.campaigns.pair_job import (
-    JOINT_OPTIONS,
     PairJob,
     PairOutcome,
     failure_message,
@@ -22,6 +21,8 @@ from bifocal.campaigns.step_store import (
     run_step,
     step_key,
 )
+from bifocal.options import JOINT as JOINT_OPTIONS
+from bifocal.options import names_of
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.provenance import FileHashes, recording
@@ -40,7 +41,7 @@ def joint_step(jobs: Sequence[PairJob]) -> Step:
         files |= {f"{job.title} {role}": path for role, path in parts.items()}
     # One unit and precision of the tables for all: the survey file holds no two.
     said = next((job for job in jobs if tables_of(job)), jobs[0]).options
-    options = {name: said[name] for name in JOINT_OPTIONS if name in said}
+    options = {name: said[name] for name in names_of(*JOINT_OPTIONS) if name in said}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.networks.joint_workflow import JointTask, adjust_pairs

@@ -14,8 +14,7 @@ from typing import Any
 
 from bifocal.campaigns.inputs import check_files
 from bifocal.campaigns.pair_job import (
-    ALIGN,
-    FILES,
+    FIRST_STEP,
     MOST_PRODUCTS,
     PRODUCTS,
     PairJob,
@@ -34,6 +33,7 @@ from bifocal.campaigns.whole_wall import (
     run_whole,
 )
 from bifocal.campaigns.worker_pool import Listener, run_here
+from bifocal.options import FILES, OF_PAIR
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.interrupts import raising
@@ -187,8 +187,8 @@ def plan_survey(jobs: Sequence[PairJob], *, mosaic: bool = False) -> list[tuple[
             plan = plan_of(replace(job, products=(), joint=None), hashes)
             if plan[-1][1] in ("keep", "make"):
                 plan += [(step.name, "make") for step in steps_of(job)[1:]]
-        if plan[0] == (ALIGN, "make"):
-            plan[0] = ALIGN, refusal(job) or "make"
+        if plan[0] == (FIRST_STEP, "make"):
+            plan[0] = FIRST_STEP, refusal(job) or "make"
         rows += [(job.name, step, what) for step, what in plan]
     if frame:
         rows.append((_ALL, JOINT, frame))
@@ -459,12 +459,7 @@ def facade_job(
     unknown = [product for product in products or () if product not in PRODUCTS]
     if unknown:
         raise InputError(f"--products: {unknown[0]!r} is none of {', '.join(PRODUCTS)}.")
-    # A port may begin at the camera's centre: zero is a number, not nothing.
-    said = {
-        key: value
-        for key, value in (given or {}).items()
-        if not (value is None or value is False or value == ())
-    }
+    said = {key: value for key, value in (given or {}).items() if OF_PAIR[key].is_said(value)}
     return PairJob(
         name=name or out.resolve().name,
         folder=out,

@@ -7,8 +7,9 @@ from typing import Any
 
 import click
 
+from bifocal.options import JOINT
 from photocore.cli import print_result, progress_bar, tell_written
-from photocore.options import FILE, as_json, choice, number, overwrite
+from photocore.options import FILE, as_json, overwrite, takes
 
 EXAMPLE = """\b
 Examples:
@@ -32,10 +33,7 @@ Examples:
     "--check", type=FILE, multiple=True,
     help="The same for independent check points: they are compared, and hold nothing.",
 )  # fmt: skip
-@choice("--unit", "m|cm|mm", "Unit of the coordinates.  [default: the headings', else m]")
-@number("--sigma-control", "M", "Precision of a control coordinate [m].", default=0.003)
-@number("--sigma-pick", "PX", "Precision of a pick [px].", default=0.5)
-@number("--sigma-tie", "PX", "Precision of a point found automatically [px].", default=0.5)
+@takes(*JOINT)
 @overwrite
 @as_json
 def command(

@@ -9,18 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from bifocal.cli.media_options import media_of_pair
+from bifocal.options import ALIGN, CONTROL
 from photocore.cli import print_result, remark
-from photocore.options import (
-    FILE,
-    FOCAL,
-    TABLE,
-    Numbers,
-    as_json,
-    choice,
-    number,
-    overwrite,
-)
+from photocore.options import FILE, TABLE, as_json, overwrite, takes
 
 if TYPE_CHECKING:
     from bifocal.orientation.alignment import Alignment
@@ -47,58 +38,13 @@ points.csv, one line per control point; r blank = on the wall; pixels in both ph
 @click.argument("far", type=FILE)
 @click.argument("near", type=FILE, required=False)
 @click.option("--out", type=FILE, required=True, help="Pair file to write (*.pair.json).")
-@click.option("--control", type=TABLE, help="Table of control points: id, X, Y, r [m] and pixels.")
+@CONTROL.but(type=TABLE)
 @click.option(
     "--columns", metavar="MAP",
     help='Which column of --control is which: "id=A,X=East" or "id,X,Y,r,col1,row1,col2,row2" for '
     "tables without headings.  [default: found by heading]",
 )  # fmt: skip
-@click.option(
-    "--as-set-up", is_flag=True,
-    help="Take the set-up exactly as typed (distances, focal lengths, nadir in the photo's middle, "
-    "square to the wall); nothing is registered anew.",
-)  # fmt: skip
-@click.option("--auto", is_flag=True, help="From the photos alone; needs one distance or length.")
-@number("--distance1", "M", "Far camera to the wall [m].")
-@number("--distance2", "M", "Near camera to the wall [m].")
-@number("--delta-d", "M", "Difference of the two distances [m].")
-@number("--focal1", "MM", "Focal length, far photo [mm].  [default: EXIF]", type=FOCAL)
-@number("--focal2", "MM", "Focal length, near photo [mm].  [default: EXIF]", type=FOCAL)
-@number("--sensor-width", "MM", "Longer side of the sensor, both photos [mm].")
-@number("--sensor-width1", "MM", "The same, far photo only [mm].")
-@number("--sensor-width2", "MM", "The same, near photo only [mm].")
-@number("--pixel-size", "MM", "Instead of the sensor width: one pixel, both photos [mm].")
-@number("--pixel-size1", "MM", "The same, far photo only [mm].")
-@number("--pixel-size2", "MM", "The same, near photo only [mm].")
-@click.option("--lens", type=FILE, help="Lens file of both photos.")
-@click.option("--lens1", type=FILE, help="Lens file of the far photo.")
-@click.option("--lens2", type=FILE, help="Lens file of the near photo.")
-@click.option(
-    "--lengths",
-    type=FILE,
-    help="Table of lengths between control points: from, to, length, sigma [m].",
-)
-@click.option(
-    "--length", type=Numbers(5), metavar="COL,ROW,COL,ROW,M",
-    help="A length on the wall: two points of the far photo [px] and metres.",
-)  # fmt: skip
-@click.option(
-    "--wall", type=Numbers(2), metavar="COL,ROW",
-    help="A spot of the wall in the far photo, where several planes compete [px].",
-)  # fmt: skip
-@click.option(
-    "--horizontal", type=Numbers(4), metavar="COL,ROW,COL,ROW",
-    help="Two points of the far photo on a level line of the wall [px].",
-)  # fmt: skip
-@click.option(
-    "--vertical", type=Numbers(4), metavar="COL,ROW,COL,ROW",
-    help="Two points of the far photo on an upright line of the wall [px].",
-)  # fmt: skip
-@media_of_pair
-@choice("--unit", "m|cm|mm", "Unit of the control coordinates.  [default: the headings', else m]")
-@number("--sigma-pick", "PX", "Precision of a pick [px].", default=0.5)
-@number("--sigma-control", "M", "Precision of a control coordinate [m].", default=0.003)
-@number("--sigma-distance", "M", "Precision of the measured distances [m].", default=0.02)
+@takes(*ALIGN)
 @click.option("--picture", type=FILE, help="Picture of the set-up.  [default: beside OUT, .png]")
 @click.option("--no-picture", is_flag=True, help="Do not draw the picture.")
 @overwrite

@@ -7,20 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bifocal.cli.media_options import media_of_pair
+from bifocal.options import ALIGN, CHECK, CONTROL, DRAWING, GSD, LANGUAGE, PICTURE, RELIEF, SCALE
 from photocore.cli import print_result, progress_bar
-from photocore.options import (
-    FILE,
-    Length,
-    Names,
-    Numbers,
-    Scale,
-    as_json,
-    bounds,
-    choice,
-    number,
-    overwrite,
-)  # fmt: skip
+from photocore.options import COG, FILE, Names, as_json, overwrite, takes
 
 if TYPE_CHECKING:
     from bifocal.campaigns.pair_job import PairJob, PairOutcome
@@ -36,62 +25,27 @@ Examples:
 
 #: What to look at first.
 _TO_OPEN = ("report/*.html", "drawing/*.pdf", "points/*.xlsx", "relief/*.png", "ortho/*.tif")
+_GSD = GSD.but(help="Pixel of the product ortho [m].  [default: that of the relief map]")
+#: Those of its steps; the scale has a value here.
+_OF_STEPS = dict.fromkeys((*ALIGN, *RELIEF, *PICTURE, _GSD, *DRAWING[1:]))
 
 
 @click.command(epilog=EXAMPLE)
 @click.argument("far", type=FILE)
 @click.argument("near", type=FILE)
 @click.option("--out", type=FILE, required=True, metavar="DIR", help="Folder of the results.")
-@click.option("--control", type=FILE, help="Table of control points: id, X, Y, r [m] and pixels.")
-@click.option(
-    "--check", type=FILE,
-    help="Table of independent check points, like --control: the accuracy is judged by them.",
-)  # fmt: skip
-@click.option("--scale", type=Scale(), default="1:50", show_default=True, help="Of the drawing.")
+@CONTROL
+@CHECK
+@SCALE.but(default="1:50", show_default=True)
 @click.option("--name", default="", help="Title.  [default: the folder's name]")
-@choice("--language", "en|it|de", "Of report and workbook.", default="en")
-@click.option("--lens", type=FILE, help="Lens file of both photos.")
-@click.option("--lens1", type=FILE, help="Lens file of the far photo.")
-@click.option("--lens2", type=FILE, help="Lens file of the near photo.")
-@click.option("--lengths", type=FILE, help="Table of taped lengths: from, to, length [m].")
-@click.option("--auto", is_flag=True, help="Without control points: from the photos alone.")
-@click.option(
-    "--as-set-up",
-    is_flag=True,
-    help="Take the set-up exactly as typed, square to the wall; nothing is registered anew.",
-)
-@number("--distance1", "M", "Far camera to the wall [m].")
-@number("--distance2", "M", "Near camera to the wall [m].")
-@number("--focal1", "MM", "Focal length, far photo [mm].  [default: EXIF]")
-@number("--focal2", "MM", "Focal length, near photo [mm].  [default: EXIF]")
-@number("--sensor-width", "MM", "Longer side of the sensor, both photos [mm].")
-@number("--delta-d", "M", "Difference of the two distances [m].")
-@number("--pixel-size", "MM", "Instead of the sensor width: one pixel, both photos [mm].")
-@click.option(
-    "--length", type=Numbers(5), metavar="COL,ROW,COL,ROW,M",
-    help="A length on the wall: two points of the far photo [px] and metres.",
-)  # fmt: skip
-@click.option(
-    "--wall", type=Numbers(2), metavar="COL,ROW",
-    help="A spot of the wall in the far photo, where several planes compete [px].",
-)  # fmt: skip
-@media_of_pair
-@choice("--unit", "m|cm|mm", "Unit of the coordinates.  [default: the headings', else m]")
-@choice("--quality", "fast|standard|best", "Of the relief map.  [default: standard]")
-@bounds("Part of the wall [m].  [default: all that is known]")
-@click.option("--relief-gsd", type=Length(above=0), help="Pixel of the relief map [m].")
-@click.option("--gsd", type=Length(above=0), help="Pixel of the product ortho [m].")
-@click.option("--any-size", is_flag=True, help="Make an orthophoto of an unusual size.")
-@choice("--image", "1|2|both", "Photo that gives the colours.  [default: 1]")
-@click.option("--fill", is_flag=True, help="Close holes with the colours around them.")
-@click.option("--complete", is_flag=True, help="A whole picture; what is not measured is marked.")
-@choice("--paper", "A4|A3|A2|A1|A0", "Sheet of paper.  [default: the smallest that fits]")
+@LANGUAGE
+@takes(*(option.unset() for option in _OF_STEPS))
 @click.option(
     "--products", type=Names(), metavar="NAME,NAME,...",
     help="Of relief, points, ortho, drawing, view, report.  [default: all but ortho, which the "
     "drawing has]",
 )  # fmt: skip
-@click.option("--cog", is_flag=True, help="Write rasters as cloud-optimised GeoTIFF.")
+@COG
 @overwrite
 @as_json
 def command(

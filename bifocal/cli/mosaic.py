@@ -7,8 +7,9 @@ from typing import Any
 
 import click
 
+from bifocal.options import BOUNDS
 from photocore.cli import print_result, progress_bar
-from photocore.options import FILE, Length, as_json, bounds, cog, overwrite, switch
+from photocore.options import FILE, Length, as_json, cog, overwrite, switch
 
 EXAMPLE = """\b
 Examples:
@@ -26,7 +27,7 @@ The last band of the result says which input every pixel comes from: 1, 2, ... i
 @click.option(
     "--gsd", type=Length(above=0), help="Pixel [m] or 5mm.  [default: that of the finest]"
 )
-@bounds("Part of the wall [m].  [default: all of it]")
+@BOUNDS.but(help="Part of the wall [m].  [default: all of it]")
 @click.option(
     "--relief", multiple=True, type=FILE,
     help="Relief map: seams keep away from its edges; repeat it.",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bifocal.cli.media_options import media
+from bifocal.options import MEDIA
 from photocore.cli import print_result, remark, text_table
 from photocore.options import (
     FILE,
@@ -19,6 +19,7 @@ from photocore.options import (
     as_json,
     number,
     overwrite,
+    takes,
 )
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ Examples:
     "[default: 3 x that of the best pair]", type=THOUSANDTHS,
 )  # fmt: skip
 @number("--free-space", "M", "Room in front of the wall [m].")
-@media
+@takes(*MEDIA)
 @click.option("--out", type=FILE, help="Also write the plan as .xlsx.")
 @overwrite
 @as_json

@@ -8,18 +8,9 @@ from typing import Any
 
 import click
 
+from bifocal.options import BOUNDS, RELIEF
 from photocore.cli import print_result, progress_bar
-from photocore.options import (
-    FILE,
-    Length,
-    Numbers,
-    as_json,
-    bounds,
-    choice,
-    cog,
-    number,
-    overwrite,
-)
+from photocore.options import FILE, as_json, cog, overwrite, takes
 
 EXAMPLE = """\b
 Examples:
@@ -36,22 +27,9 @@ photos, 2 interpolated, 3 hidden from a camera, 0 unknown).
 @click.command(epilog=EXAMPLE)
 @click.argument("pair_file", metavar="PAIR.pair.json", type=FILE)
 @click.option("--out", required=True, type=FILE, help="Relief map to write (.tif).")
-@number(
-    "--gsd", "M",
-    "Side of a pixel of the map on the plane [m] or 5mm, 0.2 at most; a coarse one is also "
-    "matched more coarsely.  [default: that of the far photo]", type=Length(above=0),
-)  # fmt: skip
-@bounds("Part of the plane [m].  [default: all that both photos see]")
-@choice(
-    "--quality", "fast|standard|best",
-    "fast: a quarter of the time, from half the resolution; best: full resolution also above "
-    "9 megapixels.",
-    default="standard",
-)  # fmt: skip
-@number(
-    "--relief-range", "LOW,HIGH",
-    "Least and greatest relief to expect [m].  [default: -36 % and +22 % of d2]", type=Numbers(2),
-)  # fmt: skip
+@RELIEF[0].but("--gsd")
+@BOUNDS.but(help="Part of the wall [m].  [default: all that both photos see]")
+@takes(*RELIEF[2:])
 @click.option("--preview", type=FILE, help="Also a shaded picture (.png).")
 @click.option("--cloud", type=FILE, help="Also a coloured point cloud (.ply, .las, .laz).")
 @cog

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import click
 
+from bifocal.options import LANGUAGE, SCALE, UNIT
 from photocore.cli import progress_bar, remark, tell_written
-from photocore.options import FILE, Scale, choice, overwrite
+from photocore.options import FILE, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -25,10 +26,10 @@ Examples:
 @click.option("--check", type=FILE, help="Table of independent check points of a PAIR file.")
 @click.option("--relief", type=FILE, help="Relief map of `bifocal relief`.")
 @click.option("--ortho", type=FILE, help="Orthophoto of `bifocal ortho`.")
-@click.option("--scale", type=Scale(), help="Scale asked for, to be judged.")
+@SCALE.but(help="Scale asked for, to be judged.")
 @click.option("--title", default="", help="Title.  [default: the file's name]")
-@choice("--language", "en|it|de", "Of the report.", default="en")
-@choice("--unit", "m|cm|mm", "Unit of the coordinates.  [default: the headings', else m]")
+@LANGUAGE.but(help="Of the report.")
+@UNIT
 @overwrite
 def command(
     source: Path, out: Path, control: Path | None, check: Path | None, relief: Path | None,

@@ -146,7 +146,7 @@ def _deliver(task: Task, progress: Progress) -> dict[str, Any]:
         dpi=task["dpi"] or DPI,
         title=task["title"] or default_title(pair, path),
         paper=task["paper"],
-        marked=_path(task["marked"]),
+        mark=_path(task["marked"]),
         sections=task["sections"],
     )
     made = deliver(

@@ -18,6 +18,7 @@ from bifocal.media import MediaPath, interface_axes
 from bifocal.model.orientation_precision import NAMES, names_of
 from bifocal.model.photo import AXIS
 from bifocal.model.refracted_view import common_names
+from bifocal.options import MEDIA_OF_PAIR
 from multimedia import Layers
 from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX, parse_prior, typical_sigma
 from photocore.arrays import FloatArray, not_negative, positive
@@ -321,10 +322,10 @@ def media_of(given: Mapping[str, Any]) -> PairMedia | None:
         If they do not describe media.
     """
     if given.get("indices") is None:
-        lost = [name for name in _WITH_INDICES if given.get(name) not in (None, ())]
+        lost = [option for option in MEDIA_OF_PAIR if given.get(option.name) not in (None, ())]
         if lost:
             raise InputError(
-                f"--{lost[0].replace('_', '-')} goes with --indices: give the refractive indices "
+                f"{lost[0].flag} goes with --indices: give the refractive indices "
                 "from the camera to the wall, e.g. --indices 1,1.49,1.337 --thicknesses 0.01."
             )
         return None
@@ -350,24 +351,14 @@ def _own(given: Mapping[str, Any], name: str, number: int) -> Any:
     return given.get(name) if own is None else own
 
 
-def _normal(stated: str | None) -> Normal:
-    """Return the normal that an option states: "axis", or X,Y,r towards the camera."""
-    if stated is None or stated == AXIS:
+def _normal(stated: tuple[float, ...] | str | None) -> Normal:
+    """Return the normal that an option states: "axis", or X, Y, r towards the camera."""
+    if stated is None or isinstance(stated, str):
         return stated
-    try:
-        normal = np.array([float(part) for part in stated.split(",")])
-    except ValueError:
-        normal = np.zeros(0)
-    if normal.shape != (3,) or not normal[2] > 0.1 * np.linalg.norm(normal):
+    normal = np.array(stated)
+    if not normal[2] > 0.1 * np.linalg.norm(normal):
         raise InputError(
-            f"--port-normal {stated}: expected axis (square to the camera's optical axis) or X,Y,r "
-            "in the plane frame, towards the camera: 0,0,1 is parallel to the wall."
+            f"--port-normal {','.join(map(str, stated))}: expected X,Y,r in the plane frame, "
+            "towards the camera: 0,0,1 is parallel to the wall."
         )
     return normal
-
-
-#: Options that say nothing without the indices.
-_WITH_INDICES = (
-    "thicknesses", "port", "port1", "port2", "depth", "port_normal", "port_normal1", "port_normal2",
-    "estimate", "prior",
-)  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -82,10 +82,30 @@ def slip_of(
     fits = now is not None and now.misfit < DOUBTED
     if fits and not by_control:
         return None
-    found: list[tuple[float, Slip]] = []
-    slips = [*_of_lenses(typed, free=by_control and not fits)]
+    lenses, tables = [*_of_lenses(typed, free=by_control and not fits)], list[Slip]()
     if not fits:
-        slips += _of_control(typed, now) if by_control else _of_site(typed)
+        tables += _of_control(typed, now) if by_control else _of_site(typed)
+    found = _explaining([*lenses, *tables], fitted, now)
+    if not found and tables and by_control and len(typed.control.ids) > 5:
+        # Two at once, of a lens and of the table.
+        both = (
+            replace(two, words=f"{one.words} {two.words}", handicap=one.handicap)
+            for one in lenses
+            for two in _of_control(one.meant, now or fitted(one.meant))
+        )
+        found = _explaining(both, fitted, now)
+    if not found:
+        return None
+    least, best = min(found, key=lambda one: one[0])
+    alike = [s.words for misfit, s in found if misfit < CLEARLY * least and not s.mended]
+    return best if best.mended else replace(best, words=" Or: ".join(alike))
+
+
+def _explaining(
+    slips: Iterable[Slip], fitted: Callable[[Typed], Fitted | None], now: Fitted | None
+) -> list[tuple[float, Slip]]:
+    """Return the slips that explain a misfit, each with what is left of it."""
+    found: list[tuple[float, Slip]] = []
     for slip in slips:
         tried = fitted(slip.meant)
         if tried is not None and tried.explains(now):
@@ -94,11 +114,7 @@ def slip_of(
             words = slip.words.replace("<tilts>", " and ".join(f"{tilt:.0f}" for tilt in tilts))
             misfit = tried.misfit * slip.handicap * (CLEARLY**2 if lying else 1.0)
             found.append((misfit, replace(slip, words=words)))
-    if not found:
-        return None
-    least, best = min(found, key=lambda one: one[0])
-    alike = [s.words for misfit, s in found if misfit < CLEARLY * least and not s.mended]
-    return best if best.mended else replace(best, words=" Or: ".join(alike))
+    return found
 
 
 def _of_lenses(typed: Typed, *, free: bool) -> Iterator[Slip]:
@@ -170,7 +186,7 @@ def _of_control(typed: Typed, now: Fitted | None) -> Iterator[Slip]:
         ("the sign of r changed: r counts towards the cameras",
          replace(control, xyz=xyz * [1, 1, -1])),
     ):  # fmt: skip
-        words = f"the control points do not fit as typed; they fit with {words}."
+        words = f"The control points do not fit as typed; they fit with {words}."
         yield Slip(meant=replace(typed, control=meant), words=words, mended=False)
     words = "col1, row1 of the control points belong to the second photo; the picks were exchanged."
     yield Slip(meant=replace(typed, control=control.exchanged()), words=words)

@@ -81,11 +81,11 @@ class DeliverTask:
         Empty: `default_title`.
     paper : str, optional
         ``A4`` to ``A0``; None: the smallest that holds the picture.
-    marked, control : Path, optional
+    mark, control : Path, optional
         Tables of points to draw.
     sections : sequence of str
         ``x=1.5``, ``y=2`` or corners.
-    interval : float, optional
+    contours : float, optional
         Between contour lines; None: about 1/25 of the relief. [m]
     """
 
@@ -93,10 +93,10 @@ class DeliverTask:
     dpi: float = DPI
     title: str = ""
     paper: str | None = None
-    marked: Path | None = None
+    mark: Path | None = None
     control: Path | None = None
     sections: Sequence[str] = ()
-    interval: float | None = None
+    contours: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,7 +150,7 @@ def deliver(
     title = wish.title or default_title(pair_path)
     name = file_name(title)
     _check_outputs(out, folder, name, (task.relief, *pair.photo_files))
-    points, remarks = _points(wish.marked or task.points)
+    points, remarks = _points(wish.mark or task.points)
     control, notes_on_control = _points(wish.control)
     remarks += notes_on_control
     with ExitStack() as stack:
@@ -301,7 +301,7 @@ def _prepared(
     # A phantom far off a flat wall must not make more levels than can be drawn.
     span = float(np.ptp(whole[np.isfinite(whole)])) if np.isfinite(whole).any() else 0.0
     least = max((limits[1] - limits[0]) / 12, span / _MOST_AUTOMATIC, 0.001)
-    interval = wish.interval or round_step(least)
+    interval = wish.contours or round_step(least)
     lines = contours(
         surface, drawing.grid, interval=interval, scale=drawing.scale,
         sigma=_band(reader, 2), guessed=unmeasured(surface, measured, coarse, scale=drawing.scale),

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -95,6 +96,15 @@ class OrthoTask:
     chromatic: bool = False
     any_size: bool = False
     overviews: bool | None = None
+
+    @classmethod
+    def from_given(cls, given: Mapping[str, Any], **more: Any) -> OrthoTask:
+        """Return the task of options by the names of the command's; absent ones by default."""
+        own = {key: value for key, value in given.items() if value is not None}
+        if "mask" in own:
+            own["mask_hidden"] = own.pop("mask")
+        how = {item.name: own.pop(item.name) for item in fields(OrthoOptions) if item.name in own}
+        return cls(options=OrthoOptions(**how), **own, **more)
 
 
 def make_ortho(

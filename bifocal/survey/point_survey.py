@@ -139,10 +139,12 @@ def solve_points(
 def _doubted(radii: Radii, points: PointObservations, d1: float, sigma: float) -> Radii:
     """Return radii whose doubtful points may lie anywhere on the ray of the far photo. [m]"""
     spread = np.where(points.in_doubt, sigma, 0.0)
-    angle, rate = np.radians(radii.own_theta), -radii.own1 * radii.scale_number / (1000 * d1)
-    along = np.stack([rate * np.sin(angle), rate * np.cos(angle), np.ones(len(rate))], axis=-1)
-    along *= spread[:, None]
-    own, carried = along[:, :, None] * along[:, None, :], dict(radii.carried)
+    carried, angle = dict(radii.carried), np.radians(radii.own_theta)
+    slope = carried.get("t1", radii.own1 / d1)  # through media, of the bent ray
+    outwards = carried.get("t1x", slope * np.sin(angle)), carried.get("t1y", slope * np.cos(angle))
+    rate = [-part * radii.scale_number / 1000 for part in outwards]
+    along = np.stack([*rate, np.ones(len(angle))], axis=-1) * spread[:, None]
+    own = along[:, :, None] * along[:, None, :]
     if radii.sigma_px is not None:
         carried["k_r"] = np.hypot(carried["k_r"], spread / radii.sigma_px)
         for key, value in entries(own / radii.sigma_px**2, "k_").items():

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bifocal.model.flags import FlagLimits
+from bifocal.model.flags import DOUBTFUL_SHARE, FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.survey.georeferencing import residuals
@@ -266,6 +266,8 @@ def _radial_variances(content: SurveyContent, blank: BoolArray) -> dict[str, lis
             near, far, g1, g2 = (table.carried[key] for key in ("t2", "t1", "g1", "g2"))
             aside = table["s_c"] / (table.carried["tan1"] * (first.principal_distance or d1))
         v1, v2 = (g1 * sigma / den) ** 2, (g2 * sigma / den) ** 2
+    if content.points is not None:
+        v2 += np.where(content.points.in_doubt, DOUBTFUL_SHARE * min(d1, d2), 0.0) ** 2
     found = {
         "v_1": v1,
         "v_2": v2,

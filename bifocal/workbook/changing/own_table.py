@@ -162,6 +162,7 @@ def _columns(table: OwnTable, content: SurveyContent) -> list[ResultColumn]:
             xy="x1" in table.columns or bool(images),
             polar="s1" in table.columns,
             theta="theta" in table.columns,
+            code="code" in table.columns,
             adjusted=images,
             media=content.media_cells,
         )

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from bifocal.model.flags import FlagLimits
+from bifocal.model.flags import DOUBTFUL_SHARE, FlagLimits
+from bifocal.survey.observations import DOUBT_CODES
 from bifocal.workbook.formulas.media_columns import bent_ideal_points, bent_pair_points
 from bifocal.workbook.formulas.placed_formulas import (
     IS_CONTROL,
@@ -117,13 +118,20 @@ def _sigmas(
     )
 
 
-def _ideal_covariances() -> tuple[LiveColumn, ...]:
+#: What the variance of r gains where a pick was accepted in doubt: r is any on the ray of photo 1.
+_DOUBT = "+IF(OR({}),({!r}*MIN(d_1,d_2))^2,0)".format(
+    ",".join(f'LEFT(UPPER(TRIM([@code])),{len(word)})="{word}"' for word in DOUBT_CODES),
+    DOUBTFUL_SHARE,
+)
+
+
+def _ideal_covariances(doubt: str) -> tuple[LiveColumn, ...]:
     """Return variances by each photo, along and across the radius; then those of X, Y, Z."""
     sin, cos = "SIN(RADIANS([@theta_used]))", "COS(RADIANS([@theta_used]))"
     near, far = "([@s2_used]/d_2)", "([@s1_used]/d_1)"
     return (
         _of_x("v_1", "((1-[@r]/d_1)*sigma_s/[@den])^2"),
-        _of_x("v_2", "((1-[@r]/d_2)*k_12*sigma_s/[@den])^2"),
+        _of_x("v_2", f"((1-[@r]/d_2)*k_12*sigma_s/[@den])^2{doubt}"),
         _of_x("v_s", f"([@v_1]*{near}^2+[@v_2]*{far}^2)*(m_1/1000)^2"),
         _of_x("v_t", "((1-[@r]/d_1)*sigma_s*m_1/1000)^2"),
         _of_x("v_sr", f"-([@v_1]*{near}+[@v_2]*{far})*m_1/1000"),
@@ -141,6 +149,7 @@ def ideal_points(
     xy: bool = True,
     polar: bool = True,
     theta: bool = True,
+    code: bool = True,
     adjusted: Collection[int] = (),
     media: int = 0,
 ) -> tuple[LiveColumn, ...]:
@@ -148,15 +157,16 @@ def ideal_points(
 
     Parameters
     ----------
-    xy, polar, theta : bool
-        Whether the table has the columns x1 y1 x2 y2, s1 s2, and theta; formulas name no others.
+    xy, polar, theta, code : bool
+        Whether the table has the columns x1 y1 x2 y2, s1 s2, theta, and code; formulas name no
+        others.
     adjusted : collection of int
         Images whose coordinates are corrected by the cells a1_11 ..., a2_11 ... of `Setup`.
     media : int
         How many media `Setup` has cells for; 0 in air.
     """
     (x1, y1), (x2, y2) = (_millimetres(image, adjusted=image in adjusted) for image in (1, 2))
-    kinds = {"has_xy": xy, "has_polar": polar}
+    kinds, doubt = {"has_xy": xy, "has_polar": polar}, _DOUBT if code else ""
     measured = ",".join(([_XY] if xy else []) + (["[@s1],[@s2]"] if polar else []))
     of_theta = 'IF(COUNT([@theta])=1,[@theta],"")' if theta else '""'
     if xy:
@@ -199,8 +209,8 @@ def ideal_points(
             for _ in range(1 if xy else 0)
         ),
         *_sigmas(
-            "sigma_s*SQRT((1-[@r]/d_1)^2+(k_12*(1-[@r]/d_2))^2)/ABS([@den])",
-            _ideal_covariances(),
+            f"SQRT((sigma_s/[@den])^2*((1-[@r]/d_1)^2+(k_12*(1-[@r]/d_2))^2){doubt})",
+            _ideal_covariances(doubt),
             is_pair=False,
         ),
         _f("flag", _flag(measured, off), width=13),
@@ -212,6 +222,7 @@ def ideal_points(
         columns,
         media,
         lambda image, per: _radius(*typed[image], per, has_xy=xy, has_polar=polar),
+        doubt,
     )
 
 

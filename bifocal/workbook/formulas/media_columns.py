@@ -23,7 +23,7 @@ def _of(image: int, key: str, formula: str, needed: str) -> LiveColumn:
 
 
 def bent_ideal_points(
-    columns: Sequence[LiveColumn], media: int, radius: Callable[[int, str], str]
+    columns: Sequence[LiveColumn], media: int, radius: Callable[[int, str], str], doubt: str
 ) -> tuple[LiveColumn, ...]:
     """Return the `Points` table of an ideal pair through media.
 
@@ -35,6 +35,8 @@ def bent_ideal_points(
         How many there are cells for.
     radius : callable
         Image and what follows a radial distance as measured to the formula of that distance.
+    doubt : str
+        What the variance of r gains where the code says that a pick was accepted in doubt.
 
     Notes
     -----
@@ -65,9 +67,9 @@ def bent_ideal_points(
         "r": _relief("AND([@s1_used]>0,[@den]<>0)"),
         "e1": 'IF([@r]="","",[@t1]*[@r])',
         "e2": 'IF([@r]="","",[@t2]*[@r])',
-        "sigma_r": 'IF([@r]="","",sigma_s*SQRT([@g1]^2+[@g2]^2)/ABS([@den]))',
+        "sigma_r": f'IF([@r]="","",SQRT((sigma_s/[@den])^2*([@g1]^2+[@g2]^2){doubt}))',
         "v_1": _where_x("([@g1]*sigma_s/[@den])^2"),
-        "v_2": _where_x("([@g2]*sigma_s/[@den])^2"),
+        "v_2": _where_x(f"([@g2]*sigma_s/[@den])^2{doubt}"),
         "v_s": _where_x("([@v_1]*[@t2]^2+[@v_2]*[@t1]^2)*(m_1/1000)^2"),
         "v_t": _where_x(f"([@s_c]/({raw1})*sigma_s*m_1/1000)^2"),
         "v_sr": _where_x("-([@v_1]*[@t2]+[@v_2]*[@t1])*m_1/1000"),

@@ -14,12 +14,11 @@ import rasterio
 from click.testing import CliRunner
 
 import bifocal
-from bifocal.campaigns.pair_job import FILES
-from bifocal.campaigns.survey_file import OPTIONS
 from bifocal.cli.facade import command
 from bifocal.cli.main import main
 from bifocal.demo import WATER_SAMPLE
 from bifocal.model.pair import Pair
+from bifocal.options import OF_PAIR
 from tests.bifocal.campaigns.sample_tables import FAR, NEAR, write_tables
 
 
@@ -77,9 +76,7 @@ def test_every_option_that_its_steps_advise_is_one_of_its_own_and_a_key_of_surve
         for option in set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]*", path.read_text("utf-8"))):
             if option not in others:
                 assert option in own, (path.name, option)
-                assert option[2:].replace("-", "_") in {*OPTIONS, *FILES, "overwrite", "out"}, (
-                    option
-                )
+                assert option[2:].replace("-", "_") in {*OF_PAIR, "overwrite", "out"}, option
 
 
 def test_it_ends_with_where_the_results_are_and_what_to_open(tmp_path):

@@ -11,12 +11,14 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal.campaigns import photo_pairing
-from bifocal.campaigns.pair_job import ALIGN_OPTIONS, refusal, steps_of
-from bifocal.campaigns.survey_file import OPTIONS, in_survey_words, read_survey_file
+from bifocal.campaigns.pair_job import refusal, steps_of
+from bifocal.campaigns.survey_file import in_survey_words, read_survey_file
+from bifocal.campaigns.workflow import facade_job
 from bifocal.cli.main import main
 from bifocal.files.images import ImageInfo
+from bifocal.options import MEDIA_OF_PAIR, OF_PAIR, names_of
 from bifocal.orientation.align_workflow import AlignOptions
-from bifocal.orientation.pair_media import _WITH_INDICES
+from bifocal.orthophotos.ortho_workflow import OrthoTask
 from multimedia import Layers
 from photocore.errors import InputError
 from tests.bifocal.campaigns.sample_tables import FAR, NEAR
@@ -64,7 +66,7 @@ def test_common_entries_hold_for_every_pair_that_does_not_say_otherwise(tmp_path
         ('quality = "superb"', "expected one of fast, standard, best"),
         ('products = ["poster"]', "expected some of relief, points"),
         ("control = 7", "expected the name of a file"),
-        ("port = -1", "port = -1: expected a number not below zero"),
+        ("port = -1", "port = -1: expected a number zero or more"),
         ("indices = 1.337", "expected a list of numbers"),
         ('port_normal = "up"', 'expected "axis", or a list of 3 numbers'),
         ('prior = "index3=0.1"', "expected a list of texts"),
@@ -112,11 +114,26 @@ def test_media_are_keys_of_the_file_and_reach_the_set_up(tmp_path):
     assert 'control = "FILE"' in told
     assert "as_set_up = true" in told
     assert not re.search(r"--[a-z]", told)
-    for key in (*_WITH_INDICES, "indices", "as_set_up"):
-        assert key in OPTIONS
-        assert key in ALIGN_OPTIONS
+    for key in (*names_of(*MEDIA_OF_PAIR), "as_set_up"):
+        assert key in OF_PAIR
         for command in ("align", "facade"):
             assert key in {p.name for p in main.get_command(None, command).params}
+
+
+def test_what_a_step_may_be_told_is_a_key_of_the_file_and_an_option_of_facade(tmp_path):
+    own = {parameter.name for parameter in main.get_command(None, "facade").params}
+    assert {*OF_PAIR} - {"sigma_tie"} <= own  # that is of all pairs together
+    said = 'mask = false\nfeather = 0\nmark = "p.csv"\nrelief_gsd = "5mm"\npaper = "A3"\n'
+    (tmp_path / "s.toml").write_text(f'{said}[[pair]]\nfar = "a.jpg"\nnear = "b.jpg"\n')
+    (job,) = read_survey_file(tmp_path / "s.toml")
+    steps = {step.name: step for step in steps_of(job)}
+    assert steps["relief"].options == {"relief_gsd": 0.005}
+    drawn = steps["drawing"]
+    assert drawn.files["mark"] == tmp_path / "p.csv"
+    task = OrthoTask.from_given({k: v for k, v in drawn.options.items() if k != "paper"})
+    assert (task.options.mask_hidden, task.options.feather) == (False, 0.0)
+    given = {"mask": False, "fill": False, "port": 0.0, "sections": (), "paper": None}
+    assert facade_job(FAR, NEAR, tmp_path / "o", given=given).options == {"mask": False, "port": 0}
 
 
 def test_all_faults_are_told_at_once(tmp_path):

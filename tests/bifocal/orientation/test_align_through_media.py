@@ -489,7 +489,7 @@ def test_a_set_up_as_typed_goes_through_media_with_what_is_uncertain_of_it(place
         (["--indices", "1,1.337", "--port", "2"], "--port: the last interface would lie"),
         (["--indices", "1,1.337", "--port", "0.05", "--prior", "index9=1"], "possible are index1"),
         (["--indices", "1,1.337", "--depth", "0.6", "--port-normal", "axis"], "goes with --port"),
-        (["--indices", "1,1.337", "--port", "0.05", "--port-normal", "up"], "expected axis"),
+        (["--indices", "1,1.337", "--port", "0.05", "--port-normal", "0,0,-1"], "expected X,Y,r"),
         (["--indices", "1,1.337", "--port", "0.05", "--prior", "index2"], "label=sigma"),
         (["--indices", "1,1.337", "--port", "0.05", "--prior", "index2=0"], "above zero"),
         (["--indices", "1,1.337", "--depth", "0.6", "--estimate", "lean1"], "possible are index1"),
@@ -500,6 +500,12 @@ def test_options_that_do_not_describe_media_are_refused(desk, options, message):
     result = run(desk, *options)
     assert result.exit_code == 1
     assert message in result.output
+
+
+def test_a_normal_that_is_neither_numbers_nor_the_axis_is_wrong_usage(desk):
+    result = run(desk, "--indices", "1,1.337", "--port", "0.05", "--port-normal", "up")
+    assert result.exit_code == 2
+    assert "'up' is not axis or 3 numbers" in result.output
 
 
 @pytest.fixture

@@ -141,6 +141,18 @@ def test_two_points_exchanged_are_put_right() -> None:
     assert off(made) < 0.01
 
 
+def test_two_slips_at_once_are_both_named() -> None:
+    typed, points = photos(times=(36 / SENSOR,) * 2), control()
+    turned = replace(points, xyz=points.xyz[:, [1, 0, 2]])
+    with pytest.raises(GeometryError, match=r"35-mm equivalent: .* with X and Y exchanged"):
+        orient_pair(typed, control=turned, site=SiteMeasures())
+    exchanged = replace(points, xyz=points.xyz[[0, 1, 5, 3, 4, 2, 6, 7, 8]])
+    made = orient_pair(typed, control=exchanged, site=SiteMeasures())
+    assert "35-mm equivalent" in made.remarks[0]
+    assert "P2 and P5 are exchanged" in made.remarks[0]
+    assert off(made) < 0.01
+
+
 def test_distances_in_the_wrong_order_are_exchanged() -> None:
     site = SiteMeasures(distance1=9.0, distance2=16.0)
     made = orient_pair(photos(), control=control(), site=site)

@@ -27,7 +27,7 @@ from bifocal.workbook.formulas.results_columns import results_columns
 from bifocal.workbook.making.book import write_book
 from bifocal.workbook.template_workflow import write_template
 from photocore.errors import InputError
-from tests.recalculate import recalculated
+from tests.recalculate import recalculated, rows_of
 from tests.workbook_lint import lint
 
 ROOT = Path(__file__).parents[3]
@@ -94,7 +94,7 @@ def test_nothing_in_a_workbook_makes_excel_repair_it(language):
 def test_only_functions_of_excel_2007_are_used():
     text = (
         "IF COUNT SQRT AND OR SIN COS RADIANS DEGREES ATAN2 ABS N NA ISERROR ISNUMBER INDEX MATCH "
-        "ROW ROWS IFERROR SUM SUMSQ SUMIF SUMPRODUCT AVERAGE MAX MIN ROUND"
+        "ROW ROWS IFERROR SUM SUMSQ SUMIF SUMPRODUCT AVERAGE MAX MIN ROUND LEFT TRIM UPPER"
     )
     allowed = set(text.split())
     used = set()
@@ -130,8 +130,10 @@ def ideal_content(rows=40, model="levelled", **more):
     polar[10:13] = [[13, 13.05, 200], [4, 6, 340], [14, 7, np.nan]]
     ids = [f"P{i}" for i in range(rows)]
     ids[:3] = ["7", "007", '=HYPERLINK("http://x")']
+    code = [""] * rows
+    code[14:17] = ["DOUBTFUL 2", " dubbio 1", "doubtless"]  # the first two were accepted in doubt
     points = PointObservations(
-        ids=tuple(ids), xy1=xy1, xy2=xy2, polar=polar, note=("café\nline <&>",) * rows
+        ids=tuple(ids), xy1=xy1, xy2=xy2, polar=polar, code=code, note=("café\nline <&>",) * rows
     )
     table = solve_points(setup.pair(), setup.in_millimetres(points))
     nothing = np.nan
@@ -240,6 +242,9 @@ def assert_recalculated_equals_cached(path, folder):
 def test_every_formula_recalculated_by_libreoffice_equals_the_library(model, tmp_path):
     write_book(tmp_path / "ideal.xlsx", ideal_content(model=model))
     assert assert_recalculated_equals_cached(tmp_path / "ideal.xlsx", tmp_path) > 1500
+    shown = rows_of(recalculated(tmp_path / "ideal.xlsx", tmp_path), "Points", 4)
+    assert [row["flag"] == "UNCERTAIN" for row in shown[14:17]] == [True, True, False]
+    assert all(row["sigma_r"] > 0.25 * 9.5 for row in shown[14:16])
 
 
 @pytest.mark.office
