@@ -23,11 +23,11 @@ def _setup(solution: SolvedSurvey) -> str:
 
 def _picks(solution: SolvedSurvey) -> str:
     if solution.setup is not None:
-        how = "assumed" if solution.setup.sigma_s is None else "given"
+        how = "assumed" if solution.setup.measuring.sigma_s is None else "given"
         return f"picks of {solution.setup.precision:.3g} mm {how}"
     photo = solution.pair.image1
     how = "assumed"
-    if solution.survey.setup.sigma_px is not None or photo.sigma_pixel is not None:
+    if solution.survey.setup.measuring.sigma_px is not None or photo.sigma_pixel is not None:
         how = "given"
     elif solution.sigma_px is not None:
         how = "found from the misfits"

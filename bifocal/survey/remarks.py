@@ -71,17 +71,18 @@ def georeference_remarks(
 
 def exchanged_remark(setup: SurveySetup) -> str:
     """Return what is said of a set-up whose image 1 has the shorter distance."""
-    camera = "" if setup.c1 is None else f" with c = {setup.c1:g} mm"
+    taking = setup.taking
+    camera = "" if taking.c1 is None else f" with c = {taking.c1:g} mm"
     nothing = (
         " Neither c_1 nor c_2 is given, so nothing else tells which photo is the far one."
-        if setup.c1 is None
+        if taking.c1 is None
         else ""
     )
     return (
-        f"d_1 = {setup.d1:g} m is shorter than d_2 = {setup.d2:g} m, so image 1 was taken for the "
-        "near photo (swapped images): photos 1 and 2 were exchanged together with their distances."
+        f"d_1 = {taking.d1:g} m is shorter than d_2 = {taking.d2:g} m, so image 1 was taken for "
+        "the near photo (swapped images): photos 1 and 2 were exchanged together with their distances."
         f"{nothing} This is right only if image 1 (x1 y1, s1) was measured on the photo taken from "
-        f"{setup.d1:g} m{camera}; if only the distances were typed the wrong way round, exchange "
+        f"{taking.d1:g} m{camera}; if only the distances were typed the wrong way round, exchange "
         "d_1 and d_2, else all relief is wrong."
     )
 
@@ -135,8 +136,8 @@ def point_remarks(
     misses, unit = table["q"], "mm"
     if "misfit_px" in table.carried:
         misses, unit = table.carried["misfit_px"], "px"
-    elif setup is not None and setup.pitch is not None:
-        misses, unit = table["q"] / setup.pitch, "px"
+    elif setup is not None and setup.taking.pitch is not None:
+        misses, unit = table["q"] / setup.taking.pitch, "px"
     remarks = [
         f"{points.ids[i]}: the two picks miss each other by {abs(misses[i]):.3g} {unit} across the "
         f"radius ({abs(table.standardised[i]):.1f} sigma); measure it again."
@@ -152,7 +153,7 @@ def wide_remarks(setup: SurveySetup, points: PointObservations) -> list[str]:
     measured = setup.in_millimetres(points)
     x, y = np.array([measured.xy1, measured.xy2]).transpose(2, 0, 1)
     s = np.where(measured.is_cartesian, np.hypot(x, y), measured.polar[:, :2].T)
-    c = np.array([[c or np.inf] for c in setup.c_used])
+    c = np.array([[c or np.inf] for c in setup.taking.c_used])
     angles = np.nan_to_num(np.degrees(np.arctan(s / c))) * measured.use
     image, worst = np.unravel_index(angles.argmax(), angles.shape)
     if angles[image, worst] <= WIDEST_ANGLE:

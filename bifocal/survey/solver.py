@@ -79,7 +79,7 @@ def solve_survey(
         arranged = _general(pair, survey, adjust=adjust)
     points, pair, sigma_px = arranged.points, arranged.pair, arranged.sigma_px
     measured = points if arranged.measured is None else arranged.measured
-    table = solve_points(pair, measured, sigma_px=sigma_px, limits=survey.setup.limits)
+    table = solve_points(pair, measured, sigma_px=sigma_px, limits=survey.setup.measuring.limits)
     refuse_contradiction(points, table, survey.where)
     unused = points.unused
     known, control = survey.known.without(unused), survey.control.without(unused)
@@ -134,7 +134,7 @@ def _general(pair: Pair, survey: SurveyInput, *, adjust: bool) -> _Arranged:
     setup = survey.setup
     points = as_pixels(pair, points, survey.where, setup.unit)
     refuse_millimetres(pair, points, survey.where)
-    sigma = setup.sigma_px
+    sigma = setup.measuring.sigma_px
     remarks: tuple[str, ...] = ()
     if sigma is None and not any(photo.sigma_pixel for photo in (pair.image1, pair.image2)):
         sigma, remarks = _sigma_from_misfits(pair, points)
@@ -233,13 +233,13 @@ def _ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -> _Arr
     """Arrange image coordinates or radial distances for the ideal pair of the set-up."""
     points, setup = survey.points, survey.setup
     if points.has_pixels.any() and not points.is_cartesian.any():
-        if setup.pitch is None:
+        if setup.taking.pitch is None:
             raise InputError(
                 f"{survey.where}: raw pixels (col1 row1 col2 row2) need a pair file: --pair "
                 "PAIR.pair.json."
             )
         points = replace(points, xy1=points.pixels1, xy2=points.pixels2)
-        setup = replace(setup, unit="px")
+        setup = setup.but(unit="px")
     pair = setup.pair()
     remarks = [*setup.remarks, setup.check_scales(scale_tolerance)]
     refuse_wrong_unit(setup, points, survey.where, said=survey.unit)
@@ -255,7 +255,7 @@ def _ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -> _Arr
     )  # fmt: skip
     if check is not None and adjust:
         arranged = _corrected(arranged, setup, measured, check)
-    if setup.c1 is None:
+    if setup.taking.c1 is None:
         said = "c_1 and c_2 are not given: relief is solved, X and Y are not."
         arranged = replace(arranged, remarks=(*arranged.remarks, said))
     return arranged
@@ -280,9 +280,9 @@ def _corrected(
     )  # fmt: skip
     corrections = _with_corrections(setup, correction, centre)
     if not bent:
-        c2 = None if setup.c1 is None else setup.c1 * pair.d2 / pair.d1
-        setup = replace(setup, enlargement2=setup.enlargement1, c2=c2)
-    setup = replace(setup, unit="mm", adjusted=(None, None))
+        c2 = None if setup.taking.c1 is None else setup.taking.c1 * pair.d2 / pair.d1
+        setup = setup.but(enlargement2=setup.taking.enlargement1, c2=c2)
+    setup = replace(setup.but(unit="mm"), adjusted=(None, None))
     remarks = [*arranged.remarks, *said]
     if said:
         remarks.append("Set-up: coordinates count from the centre of zoom found.")

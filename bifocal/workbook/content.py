@@ -118,7 +118,7 @@ class SurveyContent:
             sigma_px=solved.sigma_px, points=solved.points, table=solved.table,
             known=survey.known, check=solved.check, control=survey.control,
             georeference=solved.georeference, model=survey.model, rules=solved.rules,
-            sensor=setup.sensor, limits=setup.limits, media=solved.media,
+            sensor=setup.sensor, limits=setup.measuring.limits, media=solved.media,
         )  # fmt: skip
 
     @property
@@ -391,16 +391,17 @@ def _setup_cells(content: SurveyContent) -> dict[str, CellValue]:
     if first.scale_number is not None and second.scale_number is not None:
         cells["k_12"] = second.scale_number / first.scale_number
     cells |= {"photo_1": setup.photo1 or None, "photo_2": setup.photo2 or None}
-    cells |= {"c_1": setup.c1, "enlargement_1": setup.enlargement1}
-    cells |= {"c_2": setup.c2, "enlargement_2": setup.enlargement2}
+    enlargement1, enlargement2 = setup.taking.enlargements
+    cells |= {"c_1": setup.taking.c1, "enlargement_1": enlargement1}
+    cells |= {"c_2": setup.taking.c2, "enlargement_2": enlargement2}
     cells |= setup.title_block
-    cells |= {"pitch": setup.pitch, "input_unit": setup.unit, "sigma_s": setup.precision}
-    if setup.unit == "px" and setup.pitch is not None:
-        cells |= {"unit_x": setup.pitch, "unit_y": -setup.pitch}
+    cells |= {"pitch": setup.taking.pitch, "input_unit": setup.unit, "sigma_s": setup.precision}
+    if setup.unit == "px" and setup.taking.pitch is not None:
+        cells |= {"unit_x": setup.taking.pitch, "unit_y": -setup.taking.pitch}
     for image, matrix in enumerate(setup.adjusted, start=1):
         if matrix is not None:
             cells |= dict(zip(adjustment_names(image), matrix.ravel().tolist(), strict=True))
-    for image, nadir in ((1, setup.nadir1), (2, setup.nadir2)):
+    for image, nadir in ((1, setup.taking.nadir1), (2, setup.taking.nadir2)):
         column, row = nadir or (0.0, 0.0)
         cells |= {f"nadir_{image}_col": column, f"nadir_{image}_row": row}
         if setup.unit == "px":

@@ -188,7 +188,10 @@ def as_typed(solution: SolvedSurvey, content: SurveyContent) -> SurveyContent:
     if exchanged and setup is not None:
         setup, points = setup.exchanged(), points.exchanged()
         table = solve_points(
-            solution.pair, setup.in_millimetres(points), limits=setup.limits, as_given=True
+            solution.pair,
+            setup.in_millimetres(points),
+            limits=setup.measuring.limits,
+            as_given=True,
         )
         if world is not None:
             world = georeference(table, control, model=world.model)
@@ -220,14 +223,15 @@ def _uncorrected(
         typed, points = typed.exchanged(), points.exchanged()
     rows = (points.is_polar & ~points.is_cartesian)[:, None]
     polar = points.polar_xy()
-    if typed.unit == "px" and typed.pitch is not None:
-        flip = np.array([1, -1]) / typed.pitch
-        nadirs = [np.array(nadir or (0.0, 0.0)) for nadir in (typed.nadir1, typed.nadir2)]
+    taking = typed.taking
+    if typed.unit == "px" and taking.pitch is not None:
+        flip = np.array([1, -1]) / taking.pitch
+        nadirs = [np.array(nadir or (0.0, 0.0)) for nadir in (taking.nadir1, taking.nadir2)]
         polar = (nadirs[0] + polar[0] * flip, nadirs[1] + polar[1] * flip)
     points = replace(
         points, xy1=np.where(rows, polar[0], points.xy1), xy2=np.where(rows, polar[1], points.xy2)
     )
-    return replace(setup, unit=typed.unit, adjusted=solution.corrections), points
+    return replace(setup.but(unit=typed.unit), adjusted=solution.corrections), points
 
 
 def result_content(solution: SolvedSurvey, path: Path, language: str | None) -> SurveyContent:

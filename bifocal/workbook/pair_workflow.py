@@ -120,7 +120,7 @@ def _general(setup: SurveySetup, path: Path) -> Pair:
         )
     if not all(typed):
         raise InputError(NO_PHOTOS)
-    sigma = setup.sigma_px
+    sigma = setup.measuring.sigma_px
     return replace(
         pair,
         image1=replace(first, file=typed[0], sigma_pixel=sigma or first.sigma_pixel),
@@ -150,13 +150,14 @@ def _ideal(setup: SurveySetup, folder: Path) -> Pair:
     names = _photo_files(setup, folder)
     if not all(names):
         raise InputError(NO_PHOTOS)
-    if setup.c1 is None or setup.c2 is None:
+    taking = setup.taking
+    if taking.c1 is None or taking.c2 is None:
         raise InputError("c_1 and c_2, the principal distances [mm], are needed to use the photos.")
     setup.check_scales()
-    setup = replace(setup, enlargement1=1.0, enlargement2=1.0)  # of prints; these are the photos
+    setup = setup.but(enlargement1=1.0, enlargement2=1.0)  # of prints; these are the photos
     sizes = [image_info(folder / name).size for name in names]
     remarks = [*setup.remarks]
-    pitch = setup.pitch
+    pitch = taking.pitch
     if pitch is None:
         if setup.sensor is None:
             raise InputError(
@@ -166,7 +167,9 @@ def _ideal(setup: SurveySetup, folder: Path) -> Pair:
         pitch = max(setup.sensor) / max(sizes[0])
         remarks.append(f"assumed: a pixel of {1000 * pitch:.3g} um, from the sensor's width.")
     nadirs = []
-    for number, nadir, size in zip((1, 2), (setup.nadir1, setup.nadir2), sizes, strict=True):
+    for number, nadir, size in zip(
+        (1, 2), (setup.taking.nadir1, setup.taking.nadir2), sizes, strict=True
+    ):
         if nadir is None:
             nadir = ((size[0] - 1) / 2, (size[1] - 1) / 2)
             remarks.append(
@@ -174,7 +177,7 @@ def _ideal(setup: SurveySetup, folder: Path) -> Pair:
             )
         nadirs.append(nadir)
     pair = Pair.ideal(
-        d1=setup.d1 or np.nan, d2=setup.d2 or np.nan, c1=setup.c1, c2=setup.c2, pitch=pitch,
+        d1=taking.d1 or np.nan, d2=taking.d2 or np.nan, c1=taking.c1, c2=taking.c2, pitch=pitch,
         nadir1=nadirs[0], nadir2=nadirs[1], sigma=setup.precision / pitch,
     )  # fmt: skip
     photos = [
@@ -235,7 +238,7 @@ def survey_points(solution: SolvedSurvey) -> SurveyPoints:
 def is_survey(path: Path | str) -> bool:
     """Tell whether a workbook is taken as a pair: it states distances and names its photos."""
     setup = read_survey(path).setup
-    return None not in (setup.d1, setup.d2) and bool(setup.photo1 and setup.photo2)
+    return None not in (setup.taking.d1, setup.taking.d2) and bool(setup.photo1 and setup.photo2)
 
 
 def points_of(path: Path | str) -> SurveyPoints | None:

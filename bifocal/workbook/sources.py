@@ -54,17 +54,16 @@ def set_up(
     survey: SurveyInput,
     pair: Pair | Path | str | None,
     given: Mapping[str, Any],
-    unit: str | None,
     options: ReadOptions,
 ) -> tuple[SurveyInput, Pair | Path | str | None]:
     """Return the points with the set-up that holds for them, and the pair where it is not that."""
     if isinstance(pair, Path | str) and Path(pair).suffix.lower() in BOOKS:
         survey, pair = _with_setup_of(Path(pair), survey, options.given), None
-    setup = replace(survey.setup, **given, unit=unit or survey.unit or survey.setup.unit)
+    setup = survey.setup.but(**{"unit": survey.unit or survey.setup.unit, **given})
     if not len(survey.points):
         raise InputError(f"{survey.where}: there is no point. Fill in the measured points.")
     if pair is None:
-        refuse_far_stations(setup.d1, setup.d2, setup.where, options=given)
+        refuse_far_stations(setup.taking.d1, setup.taking.d2, setup.where, options=given)
     return replace(survey, setup=setup), pair
 
 
@@ -114,7 +113,8 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
     are those of the workbook, where it has cells for them (`UNBENT` where these are blank), else
     those of the file.
     """
-    if setup.matrices is None or setup.d1 is None or setup.d2 is None:
+    taking = setup.taking
+    if setup.matrices is None or taking.d1 is None or taking.d2 is None:
         return None
     lenses: list[Lens | None] = [None, None]
     sizes: list[tuple[int, int] | None] = [None, None]
@@ -147,7 +147,7 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
             image_size=size, **through,
         )
         for matrix, nadir, d, lens, c, size, through in zip(
-            setup.matrices, setup.nadirs, (setup.d1, setup.d2), lenses, (setup.c1, setup.c2),
+            setup.matrices, setup.nadirs, (taking.d1, taking.d2), lenses, (taking.c1, taking.c2),
             sizes, media, strict=True,
         )
     ]  # fmt: skip

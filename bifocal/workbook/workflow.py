@@ -7,41 +7,28 @@ from dataclasses import replace
 from pathlib import Path
 
 from bifocal.model.pair import Pair
-from bifocal.survey.setup import SCALE_TOLERANCE
+from bifocal.survey.setup import SCALE_TOLERANCE, Measuring, Taking, given_of
 from bifocal.survey.solved_survey import SolvedSurvey
 from bifocal.survey.solver import solve_survey
 from bifocal.survey.survey_media import SurveyMedia
 from bifocal.survey.tolerances import RULES, ToleranceRule, as_rule
-from bifocal.survey.units import given_above_zero
-from bifocal.workbook.formulas.setup_cells import OPTION_CELLS
-from bifocal.workbook.reading.reader import ReadOptions, column_map
+from bifocal.survey.units import refuse_not_above_zero
+from bifocal.workbook.formulas.setup_cells import cells_of
+from bifocal.workbook.reading.reader import ReadOptions
 from bifocal.workbook.sources import Source, given_pair, measured, set_up
-from photocore.tables.numbers import Decimal
 
 
 def solve(
     source: Source,
     *,
     pair: Pair | Path | str | None = None,
-    d1: float | None = None,
-    d2: float | None = None,
-    c1: float | None = None,
-    c2: float | None = None,
-    enlargement1: float | None = None,
-    enlargement2: float | None = None,
-    pitch: float | None = None,
-    unit: str | None = None,
-    sigma_s: float | None = None,
-    sigma_px: float | None = None,
-    sigma_r_max: float | None = None,
+    taking: Taking | None = None,
+    measuring: Measuring | None = None,
     adjust_setup: bool = False,
     model: str | None = None,
     scale_tolerance: float = SCALE_TOLERANCE,
     rules: Sequence[str | ToleranceRule] = (),
-    columns: str | None = None,
-    sheet: str | None = None,
-    decimal: Decimal | None = None,
-    visible_only: bool = False,
+    reading: ReadOptions | None = None,
 ) -> SolvedSurvey:
     r"""Solve measured points: relief, displacements, coordinates, precision, check, world.
 
@@ -55,22 +42,10 @@ def solve(
     pair : Pair or path, optional
         Pair or pair file, for raw pixels, or a survey workbook whose set-up, check and control
         points are taken; default the workbook's own set-up.
-    d1, d2 : float, optional
-        Distances of the projection centres to the reference plane, d1 > d2, in place of those of
-        `Setup`, as all that follow. [m]
-    c1, c2 : float, optional
-        Principal distances; without them X and Y stay NaN. [mm]
-    enlargement1, enlargement2 : float, optional
-        How many times larger than on the sensor the images are on the prints that were measured.
-    pitch : float, optional
-        Size of a pixel. [mm/px]
-    unit : {"mm", "px"}, optional
-        Of ``x1 y1 x2 y2``; default as headings or `Setup` say, else mm.
-    sigma_s, sigma_px : float, optional
-        Precision of an image coordinate [mm], default 0.5 px, of prints 0.2 mm, and of a raw pixel
-        [px], default the pair's, else found from the misfits of 20 or more points, else 0.5.
-    sigma_r_max : float, optional
-        Points of less precise relief are UNCERTAIN; default 2 % of d2. [m]
+    taking : Taking, optional
+        Distances [m], principal distances [mm] and the like, in place of those of `Setup`.
+    measuring : Measuring, optional
+        Unit and precision of what was measured, in place of those of `Setup`.
     adjust_setup : bool
         Correct the orientation by points of the reference plane (code PLANE, r = 0).
     model : {"auto", "levelled", "3D", "2D"}, optional
@@ -79,11 +54,8 @@ def solve(
         Share by which the scales of both photos may differ.
     rules : sequence of str or ToleranceRule
         For the verdict on drawing scales: names, ``"0.2mm"`` at scale, ``"2cm"`` on the wall.
-    columns, sheet, decimal : str, optional
-        Which column is which (``"id=A,s1=My heading"``), the sheet of the points, the separator
-        (``point`` or ``comma``) of numbers typed as text; all found by default.
-    visible_only : bool
-        Leave out hidden and filtered rows.
+    reading : ReadOptions, optional
+        Which column is which, the sheet of the points, the decimal separator; found by default.
 
     Returns
     -------
@@ -111,24 +83,17 @@ def solve(
     A point 2 m right of the nadir and 1 m before the wall, 35 mm / 17.5 m and 19 mm / 9.5 m:
 
     >>> picks = {"id": ["P1"], "s1": [35 * 2 / 16.5], "s2": [19 * 2 / 8.5], "theta": [90]}
-    >>> survey = solve(picks, d1=17.5, d2=9.5, c1=35, c2=19)
+    >>> survey = solve(picks, taking=Taking(d1=17.5, d2=9.5, c1=35, c2=19))
     >>> survey.table.xyz.round(9).tolist(), survey.table.flags
     ([[2.0, 0.0, 1.0]], ('OK',))
     """
-    lengths = {"d1": d1, "d2": d2, "c1": c1, "c2": c2, "pitch": pitch}
-    lengths |= {"enlargement1": enlargement1, "enlargement2": enlargement2}
-    sigmas = {"sigma_s": sigma_s, "sigma_r_max": sigma_r_max, "sigma_px": sigma_px}
-    given = given_above_zero(**lengths, **sigmas)
-    given_above_zero(scale_tolerance=scale_tolerance)
+    given = given_of(taking) | given_of(measuring)
+    refuse_not_above_zero(**given, scale_tolerance=scale_tolerance)
     judged = tuple(as_rule(rule) for rule in rules) or RULES
-    asked = {**given, "unit": unit, "pair": pair, "model": model}
-    asked = {name: value for name, value in asked.items() if value is not None}
-    options = ReadOptions(
-        columns=column_map(columns), sheet=sheet, decimal=decimal, visible_only=visible_only,
-        given=[OPTION_CELLS.get(option, option) for option in asked],
-    )  # fmt: skip
-    survey, path = measured(source, options, unit)
-    survey, pair = set_up(survey, pair, given, unit, options)
+    asked = given | {n: v for n, v in (("pair", pair), ("model", model)) if v is not None}
+    options = replace(reading or ReadOptions(), given=tuple(cells_of(asked)))
+    survey, path = measured(source, options, given.get("unit"))
+    survey, pair = set_up(survey, pair, given, options)
     general, pair_path, pair_remarks = given_pair(survey, path, pair)
     # What is wrong with the pair comes first.
     survey = replace(survey, model=model or survey.model, remarks=(*pair_remarks, *survey.remarks))

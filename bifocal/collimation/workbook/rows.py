@@ -135,7 +135,7 @@ def read_rows(path: Path) -> ReadBook:
             known.get(name),
         )
     return ReadBook(
-        rows=rows, sigma_px=survey.setup.sigma_px, limits=survey.setup.limits,
+        rows=rows, sigma_px=survey.setup.measuring.sigma_px, limits=survey.setup.measuring.limits,
         language=survey.language, survey=survey,
     )  # fmt: skip
 

@@ -23,7 +23,7 @@ from bifocal.workbook.content import SurveyContent, point_cells, result_cells
 from bifocal.workbook.formulas.columns import NEAR, ideal_points, pair_points
 from bifocal.workbook.formulas.placed_formulas import added_covariance
 from bifocal.workbook.formulas.precision_lines import precision_values
-from bifocal.workbook.formulas.setup_cells import OPTION_CELLS, TITLE_BLOCK
+from bifocal.workbook.formulas.setup_cells import TITLE_BLOCK, cells_of
 from bifocal.workbook.making.book import build
 from bifocal.workbook.reading.reader import TO_DEGREES, TO_MM
 from bifocal.workbook.words import term
@@ -115,7 +115,7 @@ def add_results(
 
 def _links(editor: WorkbookEditor, survey: SurveyInput, given: Mapping[str, Any]) -> dict[str, str]:
     """Return where values of `Setup` stand in sheets of the user's own, to refer to them."""
-    replaced = {OPTION_CELLS.get(option, option) for option in given}
+    replaced = cells_of(given)
     links = {}
     for key, (sheet, cell) in survey.setup.places.items():
         row, column = split_cell(cell)

@@ -8,7 +8,7 @@ from typing import Any
 
 from bifocal.workbook.content import SurveyContent, setup_cells
 from bifocal.workbook.formulas.columns import adjustment_names
-from bifocal.workbook.formulas.setup_cells import TITLE_BLOCK, TYPED_FORMULAS, groups
+from bifocal.workbook.formulas.setup_cells import TITLE_BLOCK, TYPED_FORMULAS, cells_of, groups
 from bifocal.workbook.making.charts import HEAD, KEYS, LEFT
 from bifocal.workbook.words import word
 from photocore.errors import InputError
@@ -19,12 +19,8 @@ from photocore.workbook.making.live_book import BookBuilder
 from photocore.workbook.making.newbook import finished_parts
 from photocore.workbook.reading.grid import cell_name, quoted_title
 
-#: The cell of each option; those of the distances depend on each other.
-_CELLS = {
-    "enlargement1": "enlargement_1", "enlargement2": "enlargement_2", "c1": "c_1", "c2": "c_2",
-    "pitch": "pitch", "sigma_s": "sigma_s", "sigma_px": "sigma_px",
-    "sigma_r_max": "sigma_r_max", "unit": "input_unit", "model": "g_model",
-}  # fmt: skip
+#: Options that have no cell of their own; those of the distances depend on each other.
+_OTHERS = {"d1", "d2", "pair", "rules", "adjust_setup"}
 #: The table by which a sheet is known, whatever it is called now.
 _TABLES = {
     "Results": "tblResults",
@@ -76,7 +72,7 @@ def write_options(editor: WorkbookEditor, content: SurveyContent, given: Mapping
         If a cell has lost its name.
     """
     cells = {**setup_cells(content), "g_model": content.model}
-    wanted = {name for option, name in _CELLS.items() if option in given}
+    wanted = cells_of(given.keys() - _OTHERS)
     if content.is_pair:
         wanted.discard("sigma_s")  # follows from sigma_px
         if content.sigma_px is not None:

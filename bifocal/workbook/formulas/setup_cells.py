@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from bifocal.model.flags import SIGMA_PIXEL, UNCERTAIN_SHARE
 from bifocal.survey.setup import SCALE_TOLERANCE, SIGMA_PRINT, SIGMA_RADIAL
@@ -54,9 +54,11 @@ PAIR_GROUPS: Groups = (
     (*_CHECKS[:2], "m_1", "b_lever", "e_x", "e_y", "sigma_s"),
 )
 #: The cells of options that are not called as these.
-OPTION_CELLS = {
-    **{f"{name}{k}": f"{name}_{k}" for name in ("d", "c", "enlargement") for k in "12"},
-    "unit": "input_unit",
+_OPTION_CELLS = {
+    **{f"{name}{k}": (f"{name}_{k}",) for name in ("d", "c", "enlargement") for k in "12"},
+    **{f"nadir{k}": (f"nadir_{k}_col", f"nadir_{k}_row") for k in "12"},
+    "unit": ("input_unit",),
+    "model": ("g_model",),
 }
 #: Number formats.
 FORMS: Mapping[str, str] = {
@@ -86,6 +88,11 @@ _NEEDED = (
     ("nadir_1_col ... nadir_2_row", IDEAL_NADIRS, "px"),
 )
 _IDEAL_NEEDED, _PAIR_NEEDED = _NEEDED, _NEEDED[:2]
+
+
+def cells_of(options: Iterable[str]) -> set[str]:
+    """Return the cells that options take the place of, by their names."""
+    return {cell for option in options for cell in _OPTION_CELLS.get(option, (option,))}
 
 
 def _missing_formula(

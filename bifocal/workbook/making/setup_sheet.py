@@ -83,7 +83,7 @@ def _setup_cell(
     live = formulas(is_pair=content.is_pair, media=content.media_cells)
     is_default = {
         "d_1": content.pair is None,
-        "sigma_s": content.setup is None or content.setup.sigma_s is None,
+        "sigma_s": content.setup is None or content.setup.measuring.sigma_s is None,
         "sigma_r_max": content.limits.sigma_r_max is None,
     }
     if not typed or (name in live and is_default.get(name, False)):

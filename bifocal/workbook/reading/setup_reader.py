@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.model.flags import FlagLimits
-from bifocal.survey.setup import SurveySetup
+from bifocal.survey.setup import Measuring, SurveySetup, Taking
 from bifocal.survey.survey_media import (
     FEWEST,
     HEIGHTS,
@@ -98,24 +97,27 @@ def read_setup(
     is_idle = "pair" in given and "d_1" not in book.names
     errors += [] if is_idle else [error for error in told if error.column not in given]
     matrices, nadirs = _general(values)
-    limits = FlagLimits()
     return SurveySetup(
-        c1=number["c_1"],
-        c2=number["c_2"],
-        enlargement1=number["enlargement_1"] or 1.0,
-        enlargement2=number["enlargement_2"] or 1.0,
-        d1=d1,
-        d2=_near(number, d1),
-        pitch=number["pitch"],
-        sigma_s=number.get("sigma_s"),
-        sigma_px=number["sigma_px"],
-        sigma_r_max=number.get("sigma_r_max"),
-        nadir1=_place(number["nadir_1_col"], number["nadir_1_row"]),
-        nadir2=_place(number["nadir_2_col"], number["nadir_2_row"]),
-        k_off=number["k_off"] or limits.off_radial,
-        k_plane=number["k_plane"] or limits.on_plane,
+        taking=Taking(
+            d1=d1,
+            d2=_near(number, d1),
+            c1=number["c_1"],
+            c2=number["c_2"],
+            enlargement1=number["enlargement_1"],
+            enlargement2=number["enlargement_2"],
+            pitch=number["pitch"],
+            nadir1=_place(number["nadir_1_col"], number["nadir_1_row"]),
+            nadir2=_place(number["nadir_2_col"], number["nadir_2_row"]),
+        ),
+        measuring=Measuring(
+            unit=unit,
+            sigma_s=number.get("sigma_s"),
+            sigma_px=number["sigma_px"],
+            sigma_r_max=number.get("sigma_r_max"),
+            k_off=number["k_off"],
+            k_plane=number["k_plane"],
+        ),
         sensor=_place(number["sensor_w"], number["sensor_h"]),
-        unit=unit,
         pair_file=_text(values, "pair_file"),
         photo1=_text(values, "photo_1").strip(),
         photo2=_text(values, "photo_2").strip(),

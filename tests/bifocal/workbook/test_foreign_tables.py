@@ -102,7 +102,7 @@ def test_options_win_over_cells_that_hold_texts(book, title):
     assert not any("label" in remark for remark in solved.remarks)
     if title == "Setup":
         with pytest.raises(WorkbookError, match=r"Setup!B2 \(d_1\): found \"Bianchi\""):
-            bifocal.solve(path, d2=9.5, c1=35, c2=19)
+            bifocal.solve(path, taking=bifocal.Taking(d2=9.5, c1=35, c2=19))
 
 
 @pytest.mark.parametrize("heading", ["Winkel [gon]", "Angolo", "angle [deg]"])

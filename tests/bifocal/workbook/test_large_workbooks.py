@@ -12,6 +12,7 @@ import pytest
 
 from bifocal import Pair
 from bifocal.survey.observations import PointObservations
+from bifocal.survey.setup import Measuring
 from bifocal.workbook import workflow
 from bifocal.workbook.changing import update
 from bifocal.workbook.making import book
@@ -74,7 +75,7 @@ def test_twenty_thousand_rows_are_changed_in_place_in_seconds(tmp_path):
     xyz = write_many(path, 20_000)
     begin = time.process_time()
     # Another precision changes every sigma of every row.
-    solution = workflow.solve(path, sigma_px=0.7)
+    solution = workflow.solve(path, measuring=Measuring(sigma_px=0.7))
     write_result(path, solution, overwrite=True)
     # 8 s on an idle machine; on a busy one a second of processor does half the work.
     assert time.process_time() - begin < 16

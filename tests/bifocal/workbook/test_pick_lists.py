@@ -12,6 +12,7 @@ from click.testing import CliRunner
 
 from bifocal.cli.main import main
 from bifocal.model.pair import Pair
+from bifocal.survey.setup import Taking
 from bifocal.workbook.pair_workflow import read_pair
 from bifocal.workbook.reading.pick_lists import read_picks
 from bifocal.workbook.workflow import solve
@@ -98,7 +99,7 @@ def test_a_drawing_about_the_nadir_is_in_millimetres(tmp_path):
         dxf(tmp_path / name, NAMES, (places - NADIR) * flip, shift=(0.01, 0.02))
         for name, places in (("far.dxf", FAR), ("near.dxf", NEAR))
     )
-    solved = solve(lists, d1=17.5, d2=9.5, c1=35, c2=19)
+    solved = solve(lists, taking=Taking(d1=17.5, d2=9.5, c1=35, c2=19))
     assert solved.table.xyz == pytest.approx(XYZ, abs=1e-9)
 
 

@@ -11,7 +11,7 @@ from bifocal import solve
 from bifocal.collimation.workbook.setup import completed, typed_setup
 from bifocal.model.pair import Pair
 from bifocal.survey.observations import PointObservations
-from bifocal.survey.setup import SurveySetup
+from bifocal.survey.setup import Measuring, SurveySetup, Taking
 from bifocal.survey.survey_input import SurveyInput
 from bifocal.survey.survey_media import SurveyMedia
 from bifocal.workbook.reading.reader import read_survey
@@ -52,8 +52,11 @@ def xyz_of(path, *options):
 
 
 def test_prints_give_what_the_sensors_give_as_precisely_as_the_ruler_reads():
-    on_sensor = solve(columns(rows(POINTS)), **CAMERAS, sigma_s=0.02).table
-    found = solve(columns(on_prints(10, 10)), **CAMERAS, enlargement1=10, enlargement2=10)
+    on_sensor = solve(
+        columns(rows(POINTS)), taking=Taking(**CAMERAS), measuring=Measuring(sigma_s=0.02)
+    ).table
+    taking = Taking(**CAMERAS, enlargement1=10, enlargement2=10)
+    found = solve(columns(on_prints(10, 10)), taking=taking)
     np.testing.assert_allclose(found.table.xyz, TRUTH, atol=1e-12)
     for key in ("sigma_X", "sigma_Y", "sigma_r"):
         np.testing.assert_allclose(found.table[key], on_sensor[key], rtol=1e-12)
@@ -61,16 +64,16 @@ def test_prints_give_what_the_sensors_give_as_precisely_as_the_ruler_reads():
     assert found.table.flags == on_sensor.flags
     assert found.remarks == ()
     # The larger print is read the better: 0.2 mm are 1/60 mm on its sensor.
-    larger = solve(columns(on_prints()), **CAMERAS, **SIZES)
+    larger = solve(columns(on_prints()), taking=Taking(**CAMERAS, **SIZES))
     np.testing.assert_allclose(larger.table.xyz, TRUTH, atol=1e-12)
     assert (larger.table["sigma_r"] < on_sensor["sigma_r"]).all()
 
 
 def test_the_photos_themselves_must_have_one_scale_not_their_prints():
-    said = solve(columns(on_prints()), **CAMERAS, **SIZES).remarks
+    said = solve(columns(on_prints()), taking=Taking(**CAMERAS, **SIZES)).remarks
     assert any("-16.67%" in text and "enlargement" in text for text in said)
     with pytest.raises(Exception, match="differ by 10"):
-        solve(columns(on_prints()), **{**CAMERAS, "c2": 19 / 1.1}, **SIZES)
+        solve(columns(on_prints()), taking=Taking(**CAMERAS | SIZES | {"c2": 19 / 1.1}))
 
 
 def test_an_angle_no_lens_sees_is_named_with_the_way_out(tmp_path):
@@ -95,9 +98,9 @@ def test_pixels_and_enlargements_exclude_each_other(tmp_path):
 
 def test_the_page_picks_on_the_photos_whatever_was_measured_on_prints():
     pair = Pair.ideal(d1=17.5, d2=9.5, c1=35, c2=19, pitch=0.005)
-    lenses = SurveySetup(**CAMERAS, pitch=0.005)
-    prints = replace(lenses, **SIZES)
-    assert completed(prints, pair).c_used == (35, 19)
+    lenses = SurveySetup(taking=Taking(**CAMERAS, pitch=0.005))
+    prints = lenses.but(**SIZES)
+    assert completed(prints, pair).taking.c_used == (35, 19)
     assert typed_setup(prints, pair).items() - typed_setup(lenses, pair).items() == {
         ("enlargement_1", 1),
         ("enlargement_2", 1),
@@ -125,7 +128,7 @@ def test_labels_and_options_of_an_own_table_are_honoured(tmp_path):
     path = own_book(tmp_path / "b.xlsx")
     assert run("solve", path, *OPTIONS, "--out", path, "--overwrite").exit_code == 0
     setup = read_survey(path).setup
-    assert (setup.enlargement1, setup.enlargement2, setup.sigma_s) == (10, 12, None)
+    assert (*setup.taking.enlargements, setup.measuring.sigma_s) == (10, 12, None)
     np.testing.assert_allclose(xyz_of(path), TRUTH, atol=1e-9)
 
 
@@ -137,7 +140,7 @@ def test_prints_through_water_are_bent_like_the_sensors():
         survey = SurveyInput.of_points(PointObservations.from_columns(columns(table)))
         setup = replace(survey.setup, media=media)
         survey = replace(survey, setup=setup)
-        return solve(survey, **CAMERAS, **more, scale_tolerance=0.1).table
+        return solve(survey, taking=Taking(**CAMERAS, **more), scale_tolerance=0.1).table
 
     found = through(on_prints(), **SIZES)
     np.testing.assert_allclose(found.xyz, through(rows(POINTS)).xyz, atol=1e-9)

@@ -19,6 +19,7 @@ from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.table import Table
 from PIL import Image as Picture
 
+from bifocal.survey.setup import Taking
 from bifocal.workbook.output import write_result
 from bifocal.workbook.workflow import solve
 from tests.bifocal.workbook.test_cli_solve import POINTS, rows
@@ -207,7 +208,7 @@ def cells_of(path, title):
 
 
 def put_in(path):
-    solution = solve(path, d1=17.5, d2=9.5, c1=35, c2=19)
+    solution = solve(path, taking=Taking(d1=17.5, d2=9.5, c1=35, c2=19))
     write_result(path, solution, overwrite=True)
     return solution
 

@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 from bifocal import Pair, relief
 from bifocal.survey.basis import basis
 from bifocal.survey.georeferencing import georeference
+from bifocal.survey.setup import Measuring, Taking
+from bifocal.workbook.reading.reader import column_map
 from bifocal.workbook.workflow import solve
 from photocore.errors import GeometryError, InputError
 
@@ -34,7 +36,7 @@ XYZ = np.array([[2.0, 0.0, 1.0], [-3.0, 2.0, 0.5], [4.0, -2.0, -0.4], [-4.0, -1.
 
 
 def test_columns_of_coordinates_give_the_points_back():
-    survey = solve({"id": ["A", "B", "C", "D"], **columns(XYZ)}, **LENSES)
+    survey = solve({"id": ["A", "B", "C", "D"], **columns(XYZ)}, taking=Taking(**LENSES))
     assert survey.table.xyz == pytest.approx(XYZ, abs=1e-12)
     assert survey.table.ids == ("A", "B", "C", "D")
     assert survey.pair.d1 == 17.5
@@ -79,7 +81,9 @@ def test_a_survey_says_whether_its_picks_are_given_found_or_assumed():
     assert re.search(
         r"picks of 0\.[345]\d* px found from the misfits;", basis(solve(picks, pair=pair))
     )
-    assert "picks of 0.7 px given;" in basis(solve(picks, pair=pair, sigma_px=0.7))
+    assert "picks of 0.7 px given;" in basis(
+        solve(picks, pair=pair, measuring=Measuring(sigma_px=0.7))
+    )
     assert "px assumed;" in basis(solve(few, pair=pair))
     # A remark is a text, which may be worded anew or translated.
     mute = replace(solve(picks, pair=pair), remarks=())
@@ -116,7 +120,7 @@ def test_picks_of_long_tails_are_as_good_as_those_kept():
 
 def test_the_error_of_a_transformation_is_claimed_only_where_it_is_known():
     ids = ["A", "B", "C", "D"]
-    survey = solve({"id": ids, **columns(XYZ)}, **LENSES)
+    survey = solve({"id": ids, **columns(XYZ)}, taking=Taking(**LENSES))
     wall = dict(zip(("id", "X", "Y", "Z"), (ids, *XYZ.T), strict=True))
     known = dict(zip(("id", "E", "N", "H"), (ids, *XYZ[:, [0, 2, 1]].T * [[1], [-1], [1]]),
                      strict=True))  # fmt: skip
@@ -132,7 +136,7 @@ def test_the_error_of_a_transformation_is_claimed_only_where_it_is_known():
 
 def test_a_unit_that_is_none_is_refused_with_a_pair_too():
     with pytest.raises(InputError, match="'cm' is neither mm nor px"):
-        solve(columns(XYZ), pair=Pair.ideal(**LENSES), unit="cm")
+        solve(columns(XYZ), pair=Pair.ideal(**LENSES), measuring=Measuring(unit="cm"))
 
 
 def test_plane_points_correct_the_orientation_from_python_too():
@@ -140,7 +144,7 @@ def test_plane_points_correct_the_orientation_from_python_too():
     picks = columns(np.vstack([XYZ, wall]))
     picks |= {"x2": picks["x2"] * 1.01, "y2": picks["y2"] * 1.01}
     picks |= {"code": [""] * 4 + ["PLANE"] * 4}
-    survey = solve(picks, **LENSES, adjust_setup=True)
+    survey = solve(picks, taking=Taking(**LENSES), adjust_setup=True)
     assert survey.table.xyz[:4] == pytest.approx(XYZ, abs=1e-6)
     assert any("scale: +1 %" in remark for remark in survey.remarks)
 
@@ -158,7 +162,7 @@ def test_table_intersection_and_equation_agree(radius, direction, r, base, d2):
     pair = Pair.ideal(d1=d1, d2=d2, c1=c1, c2=c2)
     table = solve(
         dict(zip(("x1", "y1", "x2", "y2"), np.hstack([first, second])[0][:, None], strict=True)),
-        d1=d1, d2=d2, c1=c1, c2=c2,
+        taking=Taking(d1=d1, d2=d2, c1=c1, c2=c2),
     ).table  # fmt: skip
     closed = relief(np.hypot(*first.T), np.hypot(*second.T), d1=d1, d2=d2)
     assert table["r"] == pytest.approx(closed, rel=1e-12, abs=1e-12)
@@ -175,16 +179,24 @@ def test_an_exchanged_ideal_pair_keeps_the_order_it_was_given_in():
 @pytest.mark.parametrize(
     ("changes", "error", "message"),
     [
-        ({"c2": None}, InputError, "both principal distances or none"),
-        ({"d2": 17.5}, GeometryError, "same"),
-        ({"d1": -1.0}, InputError, "above zero"),
+        (
+            {"taking": Taking(d1=17.5, d2=9.5, c1=35)},
+            InputError,
+            "both principal distances or none",
+        ),
+        ({"taking": Taking(d1=17.5, d2=17.5)}, GeometryError, "same"),
+        ({"taking": Taking(d1=-1.0, d2=9.5)}, InputError, "above zero"),
         ({"rules": ["three miles"]}, InputError, "nor a length"),
-        ({"columns": "id=A,q=B"}, InputError, "no column"),
     ],
 )
 def test_options_that_cannot_be_used_are_named(changes, error, message):
     with pytest.raises(error, match=message):
-        solve(columns(XYZ), **(LENSES | changes))
+        solve(columns(XYZ), **({"taking": Taking(**LENSES)} | changes))
+
+
+def test_a_column_that_is_none_is_named():
+    with pytest.raises(InputError, match="no column"):
+        column_map("id=A,q=B")
 
 
 @pytest.mark.parametrize(
@@ -200,11 +212,11 @@ def test_options_that_cannot_be_used_are_named(changes, error, message):
 )
 def test_columns_that_cannot_be_used_are_named(table, message):
     with pytest.raises(InputError, match=message):
-        solve(table, **LENSES)
+        solve(table, taking=Taking(**LENSES))
 
 
 def test_solved_points_are_placed_by_columns_of_control_points():
-    survey = solve({"id": ["A", "B", "C", "D"], **columns(XYZ)}, **LENSES)
+    survey = solve({"id": ["A", "B", "C", "D"], **columns(XYZ)}, taking=Taking(**LENSES))
     control = {"id": ["A", "B", "C"], "E": 100 + XYZ[:3, 0], "N": 200 - XYZ[:3, 2],
                "H": 50 + XYZ[:3, 1]}  # fmt: skip
     placed = georeference(survey.table, control)

@@ -9,6 +9,7 @@ from click.testing import CliRunner
 from bifocal import solve
 from bifocal.cli.main import main
 from bifocal.model.pair import Pair
+from bifocal.survey.setup import Measuring
 from tests.bifocal.model.test_pair_through_media import PAIRS, POINTS, content
 from tests.scenes.refracted import pixels_of
 
@@ -30,7 +31,7 @@ def measured(name, points=POINTS):
 @pytest.mark.parametrize("name", NAMES)
 def test_points_come_out_where_they_are(name):
     pair = Pair.from_dict(content(name))
-    table = solve(measured(name), pair=pair, sigma_px=0.3).table
+    table = solve(measured(name), pair=pair, measuring=Measuring(sigma_px=0.3)).table
     np.testing.assert_allclose(table.xyz, POINTS, atol=1e-9)
     # At the reference plane relief moves nothing, whatever the water does.
     assert abs(table["e1"][0]) < 1e-8
@@ -44,7 +45,7 @@ def test_the_table_is_the_intersection_of_the_pair(name):
     picks = measured(name)
     for key in ("col1", "row1", "col2", "row2"):
         picks[key] = picks[key] + rng.normal(0, 0.4, len(POINTS))
-    table = solve(picks, pair=pair, sigma_px=0.4).table
+    table = solve(picks, pair=pair, measuring=Measuring(sigma_px=0.4)).table
     pixels = [np.stack([picks[f"col{i}"], picks[f"row{i}"]], axis=-1) for i in (1, 2)]
     found = pair.intersect(*pixels, sigma_px=0.4)
     np.testing.assert_allclose(table.xyz, found.xyz, atol=1e-12)

@@ -19,7 +19,7 @@ from bifocal.survey.georeferencing import georeference
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.point_survey import solve_points
 from bifocal.survey.reference import KnownPoints
-from bifocal.survey.setup import SurveySetup
+from bifocal.survey.setup import Measuring, SurveySetup, Taking
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.formulas.columns import IDEAL_POINTS, pair_points
 from bifocal.workbook.formulas.georeference_columns import georeference_columns
@@ -109,10 +109,8 @@ def test_only_functions_of_excel_2007_are_used():
 def ideal_content(rows=40, model="levelled", **more):
     rng = np.random.default_rng(7)
     nadir1, nadir2 = (1536.25, 1023.75), (1530.0, 1020.5)
-    setup = SurveySetup(
-        d1=17.5, d2=9.5, c1=35.0, c2=19.01, pitch=0.00739, unit="px", nadir1=nadir1,
-        nadir2=nadir2, **more,
-    )  # fmt: skip
+    taking = Taking(d1=17.5, d2=9.5, c1=35.0, c2=19.01, pitch=0.00739, nadir1=nadir1, nadir2=nadir2)
+    setup = SurveySetup(taking=taking, measuring=Measuring(unit="px"), **more)
     xyz = np.column_stack(
         [rng.uniform(-5, 5, rows), rng.uniform(-3, 3, rows), rng.uniform(-1, 1, rows)]
     )

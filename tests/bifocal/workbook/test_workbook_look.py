@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from openpyxl.utils import range_boundaries
 
 from bifocal.cli.main import main
-from bifocal.survey.setup import SurveySetup
+from bifocal.survey.setup import SurveySetup, Taking
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.making.book import write_book
 from bifocal.workbook.template_workflow import write_template
@@ -193,7 +193,7 @@ STATES = [
 
 @pytest.mark.parametrize(("given", "told"), STATES)
 def test_setup_says_in_one_line_what_is_missing_or_wrong(given, told, tmp_path):
-    setup = SurveySetup(**given) if given else None
+    setup = SurveySetup(taking=Taking(**given)) if given else None
     content = SurveyContent(setup=setup, pair=setup and setup.pair(), rows=3)
     write_book(tmp_path / "s.xlsx", content)
     book = openpyxl.load_workbook(tmp_path / "s.xlsx", data_only=True)

@@ -18,7 +18,7 @@ from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.point_survey import solve_points
-from bifocal.survey.setup import SurveySetup
+from bifocal.survey.setup import Measuring, SurveySetup, Taking
 from bifocal.survey.survey_media import SurveyMedia
 from bifocal.workbook.making.book import write_book
 from bifocal.workbook.output import write_result
@@ -38,6 +38,7 @@ from tests.workbook_lint import lint
 
 #: Two lenses of equal scale near the axis, 0.9 m of water behind the glass of a tank.
 TANK = {"c": (35.0, 19.0), "d": (3.733, 2.131), "depth": 0.9}
+PICKS = Measuring(sigma_px=0.3)
 
 
 def tank_points(points=POINTS):
@@ -168,7 +169,7 @@ def test_a_workbook_of_raw_pixels_equals_the_library(name, tmp_path):
     pixels[0][5] += [8, -6]
     ids = tuple(map(str, range(12)))
     points = PointObservations(ids=ids, pixels1=pixels[0], pixels2=pixels[1])
-    write_survey(tmp_path / "p.xlsx", points, pair=pair, sigma_px=0.3)
+    write_survey(tmp_path / "p.xlsx", points, pair=pair, measuring=PICKS)
     assert lint(tmp_path / "p.xlsx") == []
     assert assert_recalculated_equals_cached(tmp_path / "p.xlsx", tmp_path) > 800
     rows = rows_of(recalculated(tmp_path / "p.xlsx", tmp_path), "Points", 4)[:12]
@@ -188,7 +189,7 @@ def test_the_set_up_of_a_pair_comes_back_from_its_workbook(name, tmp_path):
     """Written beside its pair file and without it: media stand in the cells of `Setup`."""
     points = POINTS * ([0.3, 0.3, 0.2] if name == "diver" else 1.0)
     pair, picks = Pair.from_dict(content(name)), measured(name, points)
-    write_result(tmp_path / "p.xlsx", solve(picks, pair=pair, sigma_px=0.3))
+    write_result(tmp_path / "p.xlsx", solve(picks, pair=pair, measuring=PICKS))
     again = solve(tmp_path / "p.xlsx")
     np.testing.assert_allclose(again.table.xyz, points, atol=1e-9)
     assert again.pair.layers == pair.layers
@@ -201,7 +202,8 @@ def test_sigmas_of_an_ideal_pair_are_the_slopes_of_its_formulas():
     """By the derivatives of the solution with respect to each coordinate, numerically."""
     media = media_of_tank()
     (c1, c2), (d1, d2) = TANK["c"], TANK["d"]
-    setup = SurveySetup(c1=c1, c2=c2, d1=d1, d2=d2, sigma_s=0.002, media=media)
+    taking, measuring = Taking(c1=c1, c2=c2, d1=d1, d2=d2), Measuring(sigma_s=0.002)
+    setup = SurveySetup(taking=taking, measuring=measuring, media=media)
     xy = tank_points()
     ids = tuple(map(str, range(len(POINTS))))
 
@@ -232,9 +234,9 @@ def test_media_cells_that_cannot_be_meant_are_named(tank, tmp_path):
     for said in ("13.37", "z0_1", "index_2", "-1 m"):
         assert said in str(caught.value)
     with pytest.raises(InputError, match="c_1 and c_2"):
-        SurveySetup(d1=3.7, d2=2.1, media=media_of_tank()).pair()
+        SurveySetup(taking=Taking(d1=3.7, d2=2.1), media=media_of_tank()).pair()
     with pytest.raises(GeometryError, match="scale-tolerance"):
-        solve(tank, c1=40.0)
+        solve(tank, taking=Taking(c1=40.0))
 
 
 @pytest.mark.acceptance
@@ -279,7 +281,7 @@ def test_plane_points_check_and_correct_a_set_up_through_media(tmp_path):
 def test_plane_points_of_a_true_pair_find_nothing_to_correct():
     picks = measured("oblique", np.column_stack([POINTS[:, :2] * [1, 1.3], np.zeros(5)]))
     pair = Pair.from_dict(content("oblique"))
-    check = solve(picks | {"code": ["PLANE"] * 5}, pair=pair, sigma_px=0.3).orientation_check
+    check = solve(picks | {"code": ["PLANE"] * 5}, pair=pair, measuring=PICKS).orientation_check
     assert check.points == 5
     np.testing.assert_allclose(check.residuals, 0, atol=1e-9)
     assert not any(p.is_significant for p in check.parameters)
@@ -289,7 +291,7 @@ def test_plane_points_of_a_true_pair_find_nothing_to_correct():
 def test_workbooks_of_air_and_media_are_not_changed_into_each_other(tmp_path):
     air, wet = tmp_path / "air.xlsx", tmp_path / "tank.pair.json"
     picks, pair = measured("tank"), Pair.from_dict(content("tank"))
-    write_result(air, solve(picks, pair=pair.in_air(), sigma_px=0.3))
+    write_result(air, solve(picks, pair=pair.in_air(), measuring=PICKS))
     wet.write_text(json.dumps(content("tank")))
     solution = solve(air, pair=wet)
     np.testing.assert_allclose(solution.table.xyz, POINTS, atol=1e-9)
@@ -380,7 +382,7 @@ def test_options_and_languages_are_written_into_a_form_with_media(tank, tmp_path
     assert named(book, "index_3").value == 1.337
     assert named(book, "d_2").value == 2.1
     again = solve(out, scale_tolerance=0.1)
-    assert again.setup.d2 == 2.1
+    assert again.setup.taking.d2 == 2.1
     assert again.pair.layers.indices == (1.0, 1.49, 1.337)
 
 
