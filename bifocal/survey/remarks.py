@@ -82,8 +82,8 @@ def exchanged_remark(setup: SurveySetup) -> str:
         f"d_1 = {taking.d1:g} m is shorter than d_2 = {taking.d2:g} m, so image 1 was taken for "
         "the near photo (swapped images): photos 1 and 2 were exchanged together with their "
         f"distances.{nothing} This is right only if image 1 (x1 y1, s1) was measured on the photo "
-        f"taken from {taking.d1:g} m{camera}; if only the distances were typed the wrong way round, exchange "
-        "d_1 and d_2, else all relief is wrong."
+        f"taken from {taking.d1:g} m{camera}; if only the distances were typed the wrong way "
+        "round, exchange d_1 and d_2, else all relief is wrong."
     )
 
 
