@@ -194,12 +194,9 @@ class SurveySetup:
 
     def but(self, **values: Any) -> SurveySetup:
         """Return the set-up with other values of how photos were taken and points measured."""
-        parts = {}
-        for name in ("taking", "measuring"):
-            part = getattr(self, name)
-            own = {f.name: values[f.name] for f in fields(part) if f.name in values}
-            parts[name] = replace(part, **own)
-        return replace(self, **parts)
+        names = values.keys() & {f.name for f in fields(Taking)}
+        taking = replace(self.taking, **{name: values.pop(name) for name in names})
+        return replace(self, taking=taking, measuring=replace(self.measuring, **values))
 
     def pair(self) -> Pair:
         """Return the ideal pair, whose image coordinates are millimetres from the nadir, y up.
