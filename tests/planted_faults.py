@@ -202,7 +202,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         ),
     ),
     (
-        "bifocal/workbook/output.py",
+        "bifocal/survey/results.py",
         "tests/bifocal/workbook/test_solve.py tests/bifocal/workbook/test_cli_solve.py "
         "tests/bifocal/workbook/test_cli_solve_refusals.py",
         (
