@@ -81,6 +81,22 @@ class Option:
         by_default = "/" not in self.names[0] and value is False
         return not (value is None or value == () or by_default)
 
+    def typed(self, value: object) -> Any:
+        """Return what a field of a page holds: a number may also be typed as on the command line.
+
+        Raises
+        ------
+        ValueError
+            With what was expected.
+        """
+        kind = self.attributes.get("type")
+        if not isinstance(kind, Number) or not isinstance(value, str):
+            return self.read(value)
+        try:
+            return kind.convert(value, None, None)
+        except click.BadParameter:
+            raise ValueError(kind.wanted) from None
+
     def read(self, value: object) -> Any:
         """Return what a file holds, checked as on the command line.
 

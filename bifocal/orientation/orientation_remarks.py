@@ -64,7 +64,7 @@ def _bend_of(observations: PairObservations, bend: WallBend) -> str:
     return bend_in_words(
         bend,
         with_lens=any(i.is_calibrated or i.sigma_radial > 0 for i in observations.interiors),
-        through_media=observations.media is not None,
+        through_media=bool(observations.media),
         left_out=not observations.pick_used.all(),
     )
 
@@ -86,7 +86,7 @@ def order_remarks(order: float, names: tuple[str, str]) -> list[str]:
 
 def wall_remarks(pair: OrientedPair) -> list[str]:
     """Return where the wall was found, if not all over the photo; where no plane is given."""
-    if not pair.observations.free_datum or pair.observations.media is not None:
+    if not pair.observations.free_datum or pair.observations.media:
         return []
     zones = sorted(wall_relief(pair), key=lambda zone: -zone["points"])
     if not zones:

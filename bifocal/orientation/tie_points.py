@@ -12,8 +12,8 @@ from bifocal.model.interior_orientation import Cameras, Images, Interiors
 from bifocal.orientation.pair_adjustment import AdjustedPair, wall_equations
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
 from bifocal.orientation.reference_plane import NarrowFace, narrow_face
-from bifocal.orientation.refracted_observations import guessed_points
 from bifocal.orientation.relative_orientation import supported
+from bifocal.orientation.seen_points import meeting_points
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import (
@@ -22,7 +22,6 @@ from photocore.camera.pinhole import (
     plane_transfer,
     project_with_jacobian,
     ray_on_plane,
-    triangulate,
 )
 
 #: Ties are never believed to be more precise than this. [px]
@@ -104,9 +103,7 @@ def with_support(observations: PairObservations, adjusted: AdjustedPair) -> Pair
 
 def tie_positions(observations: PairObservations, state: PairUnknowns) -> FloatArray:
     """Return where the rays of the ties meet, shape (m, 3). [m]"""
-    if state.media is not None:
-        return guessed_points(state, np.hstack(observations.straight_ties(state.radial)))[0]
-    return triangulate(*state.cameras, *observations.straight_ties(state.radial))
+    return meeting_points(state, *observations.straight_ties(state.radial))
 
 
 def relief_per_pixel(observations: PairObservations, state: PairUnknowns) -> FloatArray:

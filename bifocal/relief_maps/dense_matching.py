@@ -149,7 +149,7 @@ def dense_relief(
         raise InputError(f"quality: expected {', '.join(QUALITIES)}, got {quality!r}.")
     if relief_range is not None:
         _check_range(relief_range, pair.image2.distance)
-    if pair.layers is not None:  # nothing stands out of the water, or through the glass
+    if pair.refracted:  # nothing stands out of the water, or through the glass
         low, high = relief_range or seed.usual_range(pair.image2.distance)
         relief_range = (low, min(high, 0.999 * pair.highest_relief))
         if not low < relief_range[1]:

@@ -59,7 +59,7 @@ def stretch(frame: Frame, relief: Float32Array) -> Float32Array:
     across = cv2.Sobel(relief, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
     down = cv2.Sobel(relief, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
     distance = np.float32(foot.distance)
-    if frame.fields is not None:
+    if frame.pair.refracted:
         x, y = frame.slopes(1, *offsets(frame.grid.shape))
         return np.asarray(reduction(relief, distance) + across * x + down * y)
     x, y = offsets(frame.grid.shape, frame.grid.pixel_of(foot.nadir))
@@ -115,7 +115,7 @@ def _scatter(
     A spike that nothing validates would otherwise win against the wall that it is a mismatch of.
     """
     x, y = offsets(frame.grid.shape, frame.grid.pixel_of(foot.nadir))
-    if frame.fields is None:
+    if not frame.pair.refracted:
         # Eq. (1): s' = s - e = s (1 - r / d)
         share = reduction(relief, np.float32(foot.distance))
         x, y = x * share, y * share
@@ -176,7 +176,7 @@ def shown_by_first(frame: Frame, away: Float32Array, relief: Float32Array) -> Fl
     """
     foot = frame.foot(1)
     nadir = frame.grid.pixel_of(foot.nadir).astype(np.float32)
-    if frame.fields is None:
+    if not frame.pair.refracted:
         return np.asarray(
             nadir + away * magnification(relief, np.float32(foot.distance))[..., None]
         )

@@ -115,7 +115,7 @@ def _guard(frame: Frame, bands: MapBands, grid: Grid) -> None:
     """Call nothing measured that camera 2 cannot see, or hardly (in place)."""
     vague = ~(bands.sigma < evidence.SIGMA_SHARE * frame.distances[1])
     bands.quality[vague & (bands.quality == Quality.MEASURED)] = Quality.INTERPOLATED
-    rays = None if frame.fields is None else frame.fields[1]
+    rays = frame.fields and frame.fields[1]
     hidden = forward_projection.hidden_on_map(bands.r, grid, frame.foot(2), rays)
     near = _spread_inwards(hidden, grid.pixel_of(frame.foot(2).nadir), GUARD)
     bands.quality[near & (bands.quality == Quality.MEASURED)] = Quality.HIDDEN

@@ -142,7 +142,7 @@ def _falls_away(
     quiet = cv2.GaussianBlur(cv2.medianBlur(relief, 5), (0, 0), 1.0)
     across = cv2.Sobel(quiet, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
     down = cv2.Sobel(quiet, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
-    if frame.fields is None:
+    if not frame.pair.refracted:
         x, y = offsets(frame.grid.shape, frame.grid.pixel_of(foot.nadir))
         falls = -(across * x + down * y) / (np.float32(foot.distance) - relief)
     else:

@@ -242,9 +242,9 @@ class SurveySetup:
                 positive(value, name)
         c1, c2 = own.c_used
         pair = Pair.ideal(d1=own.d1, d2=own.d2, c1=c1, c2=c2, sigma=self.precision)
-        if self.media is None:
+        if not self.media:
             return pair
-        if self.media.layers is not None and own.c1 is None:
+        if self.refracted and own.c1 is None:
             raise InputError(
                 "c_1 and c_2, the principal distances [mm], are needed: how far a ray is bent "
                 "follows from its angle, s / c."
@@ -254,6 +254,11 @@ class SurveySetup:
             layers, z0 = self.media.through(number)
             photos.append(replace(photo, layers=layers, z0=z0))
         return Pair(image1=photos[0], image2=photos[1])
+
+    @property
+    def refracted(self) -> bool:
+        """Whether media are typed in the cells there are for them."""
+        return bool(self.media and self.media.layers)
 
     def in_millimetres(self, points: PointObservations) -> PointObservations:
         """Return the points as image coordinates of `pair`, without raw pixels."""
@@ -278,7 +283,7 @@ class SurveySetup:
         return replace(
             self, taking=self.taking.exchanged(), adjusted=self.adjusted[::-1],
             photo1=self.photo2, photo2=self.photo1,
-            media=None if self.media is None else self.media.exchanged(),
+            media=self.media and self.media.exchanged(),
         )  # fmt: skip
 
     def check_scales(self, tolerance: float = SCALE_TOLERANCE) -> str:
@@ -292,16 +297,15 @@ class SurveySetup:
         own = self.taking
         if own.c1 is None or own.c2 is None or own.d1 is None or own.d2 is None:
             return ""
-        media = None if self.media is None else self.media.layers
         # Apart are the prints' scales by it too.
         enlarged = own.enlargements[1] / own.enlargements[0]
         share = (1000.0 * own.d2 / own.c2) / (1000.0 * own.d1 / own.c1) / enlarged - 1.0
-        if media is not None:
+        if self.refracted:
             share = scale_ratio(*self.pair().as_given) - 1.0
         apart = abs(share * enlarged + enlarged - 1.0)
         if apart > tolerance:
             place = f"{self.where}: " if self.where else ""
-            if media is not None:
+            if self.refracted:
                 raise GeometryError(
                     f"{place}the scales of the photos, as seen through the media near the axis, "
                     f"differ by {apart:.1%}: a bifocal pair has the same scale in both "
@@ -316,7 +320,7 @@ class SurveySetup:
         if abs(share) < 1e-4:
             return ""
         far, near = max(own.d1, own.d2), min(own.d1, own.d2)
-        if media is not None:
+        if self.refracted:
             far, near = self.pair().straight_distances
         return (
             f"the scales of the photos differ by {share:+.2%}; image 2 is brought to the scale of "

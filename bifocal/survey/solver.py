@@ -268,7 +268,7 @@ def _corrected(
     pair, points = arranged.pair, arranged.points
     xy1, xy2 = measured.all_xy()
     # Through media image 2 keeps its own scale: what the wall seems is not c / d.
-    bent = setup.media is not None and setup.media.layers is not None
+    bent = setup.refracted
     scale = (pair.image2 if bent else pair.image1).plane_from_pixel[0, 0]
     correction = check.matrix @ pair.image2.plane_from_pixel / [[scale], [scale], [1.0]]
     found, said = _with_centre(check.corrected, points, (xy1, xy2), None)

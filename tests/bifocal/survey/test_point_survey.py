@@ -16,7 +16,7 @@ from photocore.errors import GeometryError, InputError
 
 
 def solve_ideal(setup, points):
-    return solve_points(setup.pair(), setup.in_millimetres(points), limits=setup.limits)
+    return solve_points(setup.pair(), setup.in_millimetres(points), limits=setup.measuring.limits)
 
 
 SETUP = SurveySetup(taking=Taking(d1=17.5, d2=9.5, c1=35.0, c2=19.0))

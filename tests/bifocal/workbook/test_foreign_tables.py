@@ -10,7 +10,7 @@ from photocore.errors import InputError, WorkbookError
 
 #: Name, X, Y and r [m] of points seen by 35 mm at 17.5 m and 19 mm at 9.5 m.
 WALL = {"A": (2.0, 1.0, 0.5), "B": (-1.5, 2.0, -0.1), "C": (1.0, -2.0, 0.3), "D": (3.0, 2.5, 0.2)}
-OPTIONS = {"d1": 17.5, "d2": 9.5, "c1": 35.0, "c2": 19.0}
+OPTIONS = {"taking": bifocal.Taking(d1=17.5, d2=9.5, c1=35.0, c2=19.0)}
 LABELS = [("c_1", 35), ("c_2", 19), ("d_1", 17.5), ("d_2", 9.5)]
 DOORS = [("D1", 2.10), ("D2", 0.90)]
 XY = ("x1", "y1", "x2", "y2")
