@@ -6,11 +6,12 @@ import numpy as np
 
 from bifocal.model.doubts import MISFIT
 from bifocal.orientation.alignment import standard_deviations, wall_relief
-from bifocal.orientation.bend import STRONGLY_BENT, WallBend, bend_in_words
+from bifocal.orientation.bend import WallBend, bend_in_words
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair
 from bifocal.orientation.pair_observations import PairObservations
 from bifocal.orientation.photo_order import SURE
+from bifocal.orientation.tuning import TUNING
 
 #: Common points that fit their lines no better than this, at 3000 px of width, do not fit. Clean
 #: pairs reach 0.19, a phone pair with its lens estimated 0.4. [px]
@@ -71,7 +72,7 @@ def _bend_of(observations: PairObservations, bend: WallBend) -> str:
 
 def hopeless_bend(observations: PairObservations, bend: WallBend) -> str:
     """Return that the wall is bent, if that is certainly by more than an honest lens does."""
-    return _bend_of(observations, bend) if bend.px > STRONGLY_BENT else ""
+    return _bend_of(observations, bend) if bend.px > TUNING.strongly_bent else ""
 
 
 def order_remarks(order: float, names: tuple[str, str]) -> list[str]:
