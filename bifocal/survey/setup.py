@@ -12,6 +12,7 @@ from bifocal.model.flags import SIGMA_PIXEL, FlagLimits
 from bifocal.model.homography import apply_homography
 from bifocal.model.pair import Pair
 from bifocal.precision import false_relief_of_scale
+from bifocal.remarks import remark
 from bifocal.survey.bent_radii import scale_ratio
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.survey_media import SurveyMedia
@@ -322,9 +323,5 @@ class SurveySetup:
         far, near = max(own.d1, own.d2), min(own.d1, own.d2)
         if self.refracted:
             far, near = self.pair().straight_distances
-        return (
-            f"the scales of the photos differ by {share:+.2%}; image 2 is brought to the scale of "
-            "image 1 (k_12). If c, d or an enlargement is wrong instead, this is "
-            f"{float(false_relief_of_scale(abs(share), d1=far, d2=near)):.3f} m of false relief: "
-            "points of known relief tell."
-        )
+        relief = float(false_relief_of_scale(abs(share), d1=far, d2=near))
+        return remark("survey.scales_differ", share=share, relief=relief)

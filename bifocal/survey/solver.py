@@ -9,6 +9,7 @@ import numpy as np
 from bifocal.model.flags import FlagLimits
 from bifocal.model.homography import apply_homography
 from bifocal.model.pair import Pair
+from bifocal.remarks import remark
 from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
 from bifocal.survey.observations import PointObservations
@@ -174,12 +175,8 @@ def _with_centre(
         return pair, ()
     move = found[0] - pair.zoom_centre
     spread = float(np.sqrt(np.trace(found[1]) / 2))
-    remark = (
-        f"Set-up: relief spreads from a point {1000 * move[0]:+.0f} mm, {1000 * move[1]:+.0f} mm "
-        f"(sigma {1000 * spread:.0f} mm) from the one assumed, as the points off the plane show; "
-        "taken into account."
-    )
-    return with_zoom_centre(pair, found[0]), (remark,)
+    x, y, sigma = 1000 * np.array([*move, spread])
+    return with_zoom_centre(pair, found[0]), (remark("survey.centre_moved", x=x, y=y, sigma=sigma),)
 
 
 def _check_plane(
@@ -222,11 +219,7 @@ def _sigma_from_misfits(
         kept = away[away <= FlagLimits().off_radial * spread]
         spread = float(np.sqrt(np.mean(kept**2))) if len(kept) else spread
     sigma = max(spread, BEST_SIGMA_PX)
-    remark = (
-        f"sigma_px = {sigma:.3g} px, found from the misfits of {int(rows.sum())} points across the "
-        "radius; --sigma-px sets it."
-    )
-    return sigma, (remark,)
+    return sigma, (remark("survey.sigma_found", sigma=sigma, count=int(rows.sum())),)
 
 
 def _ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -> _Arranged:
@@ -256,7 +249,7 @@ def _ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -> _Arr
     if check is not None and adjust:
         arranged = _corrected(arranged, setup, measured, check)
     if setup.taking.c1 is None:
-        said = "c_1 and c_2 are not given: relief is solved, X and Y are not."
+        said = remark("survey.no_principal_distances")
         arranged = replace(arranged, remarks=(*arranged.remarks, said))
     return arranged
 
@@ -285,11 +278,8 @@ def _corrected(
     setup = replace(setup.but(unit="mm"), adjusted=(None, None))
     remarks = [*arranged.remarks, *said]
     if said:
-        remarks.append("Set-up: coordinates count from the centre of zoom found.")
-    remarks.append(
-        "Set-up: image 2 was corrected by the points of the reference plane; its "
-        f"coordinates are now in mm at the scale of image {2 if bent else 1}."
-    )
+        remarks.append(remark("survey.centre_found"))
+    remarks.append(remark("survey.image2_corrected", image=2 if bent else 1))
     return replace(
         arranged, points=measured, measured=measured, pair=setup.pair(), setup=setup,
         corrections=corrections, remarks=tuple(remarks),

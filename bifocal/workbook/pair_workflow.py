@@ -12,6 +12,7 @@ from bifocal.model.orientation_precision import of_distances
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.model.points import SurveyPoints
+from bifocal.remarks import remark
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.solved_survey import SolvedSurvey
 from bifocal.workbook.reading.reader import read_survey
@@ -165,16 +166,14 @@ def _ideal(setup: SurveySetup, folder: Path) -> Pair:
                 "by the columns of the photo), or the sensor's width on the sheet Planning."
             )
         pitch = max(setup.sensor) / max(sizes[0])
-        remarks.append(f"assumed: a pixel of {1000 * pitch:.3g} um, from the sensor's width.")
+        remarks.append(remark("survey.pixel_assumed", size=1000 * pitch))
     nadirs = []
     for number, nadir, size in zip(
         (1, 2), (setup.taking.nadir1, setup.taking.nadir2), sizes, strict=True
     ):
         if nadir is None:
             nadir = ((size[0] - 1) / 2, (size[1] - 1) / 2)
-            remarks.append(
-                f"assumed: the nadir point of photo {number} is the middle of the photo."
-            )
+            remarks.append(remark("survey.nadir_assumed", number=number))
         nadirs.append(nadir)
     pair = Pair.ideal(
         d1=taking.d1 or np.nan, d2=taking.d2 or np.nan, c1=taking.c1, c2=taking.c2, pitch=pitch,

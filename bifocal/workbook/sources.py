@@ -10,6 +10,7 @@ from typing import Any
 from bifocal.model.lens import Lens
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
+from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.survey_input import SurveyInput, with_measured
@@ -118,13 +119,13 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
         return None
     lenses: list[Lens | None] = [None, None]
     sizes: list[tuple[int, int] | None] = [None, None]
-    orientation, doubt, extra = None, "", {"setup": None}
+    orientation, remarks, extra = None, list[str](), {"setup": None}
     media: list[dict[str, Any]] = [{}, {}]
     if setup.media:
         through = [setup.media.through(number) for number in (1, 2)]
         media = [{"layers": layers, "z0": z0} for layers, z0 in through]
     if setup.pair_file and file is None:
-        doubt = f"{setup.pair_file} is not found"
+        remarks.append(remark("survey.no_lens", file=setup.pair_file))
     if file is not None:
         try:
             given = Pair.read(file)
@@ -139,8 +140,7 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
                     for photo in (given.image1, given.image2)
                 ]
         except (InputError, GeometryError) as error:
-            doubt = f"{setup.pair_file} cannot be used ({error})"
-    remarks = (f"{doubt}: pixels are taken as free of lens distortion.",) if doubt else ()
+            remarks.append(remark("survey.lens_unusable", file=setup.pair_file, why=error))
     photos = [
         Photo(
             plane_from_pixel=matrix, nadir=nadir, distance=d, lens=lens, principal_distance=c,
@@ -153,5 +153,5 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
     ]  # fmt: skip
     return Pair(
         image1=photos[0], image2=photos[1], folder=folder, orientation=orientation,
-        remarks=remarks, extra=extra,
+        remarks=tuple(remarks), extra=extra,
     )  # fmt: skip
