@@ -15,11 +15,11 @@ from .model.interior_orientation import Interior
 from .model.intersection import Intersection
 from .model.lens import Lens
 from .model.pair import Pair
+from .model.pair_media import PairMedia
 from .model.photo import Photo
 from .model.relief_map import Quality, ReliefMap
 from .orientation.alignment import Alignment
 from .orientation.control_points import Control, SiteMeasures
-from .orientation.pair_media import PairMedia
 from .orientation.photo_alignment import align
 from .orthophotos.compose import orthophoto
 from .orthophotos.mosaic_in_memory import Mosaic, MosaicOptions, mosaic

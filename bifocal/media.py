@@ -17,17 +17,16 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from multimedia import Layers, radial_shift_ratio
+from multimedia import Camera, FlatInterface, Layers, radial_shift_ratio
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera.rotation import rotation_from_vector
+from photocore.camera.pinhole import Pinhole, project_with_jacobian
+from photocore.camera.rotation import by_turn
 
-#: Step of the derivatives by the media; central differences are then right to 1e-9. [-, m, rad]
-_STEP = 1e-5
 #: What a path is differentiated by after its indices and thicknesses: the way to the first
 #: interface [m], a small turn of the interfaces about the axes of the plane frame [rad].
 PLACING = ("z0", "lean X", "lean Y", "lean Z")
@@ -67,6 +66,19 @@ class RadialWays(NamedTuple):
     bend: FloatArray
     pace: FloatArray
     turn: FloatArray
+
+
+class View(NamedTuple):
+    """Pixels (n, 2) with derivatives by point (n, 2, 3), camera (n, 2, 10) and media (n, 2, k).
+
+    The camera's `PARAMETERS`, its homography and z0 kept; of the media what
+    `bifocal.model.orientation_precision.names_of` counts of one photo, nothing in air.
+    """
+
+    pixels: FloatArray
+    by_point: FloatArray
+    by_camera: FloatArray
+    by_media: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -165,38 +177,6 @@ class MediaPath:
         # The ray depends on away / d; the way behind the last interface grows by what d does.
         turned = -(by_away @ away[..., None])[..., 0] / self.distance
         return by_away, turned - rays.slope
-
-    def moved_by_media(self, away: FloatArray, relief: FloatArray) -> FloatArray:
-        """Return how rays at a relief move with the media, at kept apparent positions, (n, 2, k).
-
-        By the indices and the thicknesses, from the camera to the object, and by `PLACING`.
-        """
-        count = len(self.layers.indices)
-        least = np.array([1.0] * count + [0.0] * (count - 1) + [-np.inf] * 3)
-        value = np.array([*self.layers.indices, *self.layers.thicknesses, self.z0, 0.0, 0.0, 0.0])
-        out = np.zeros((len(away), 2, len(value)))
-        for column in range(len(value)):
-            ends = np.maximum(value[column] + np.array([_STEP, -_STEP]), least[column])
-            places = []
-            for end in ends:
-                stepped = value.copy()
-                stepped[column] = end
-                rays = self._with(stepped).trace(away)
-                places.append(rays.position + relief[:, None] * rays.slope)
-            out[:, :, column] = (places[0] - places[1]) / (ends[0] - ends[1])
-        return out
-
-    def _with(self, values: FloatArray) -> MediaPath:
-        """Return the path with other indices, thicknesses and `PLACING`."""
-        count = len(self.layers.indices)
-        layers = Layers(
-            indices=tuple(values[:count]), thicknesses=tuple(values[count : 2 * count - 2])
-        )
-        turn = self.turn
-        if values[-3:].any():
-            turn = np.eye(3) if turn is None else turn
-            turn = turn @ rotation_from_vector(values[-3:])
-        return replace(self, layers=layers, z0=float(values[-4]), turn=turn)
 
     def _traced(
         self, away: FloatArray
@@ -354,3 +334,53 @@ def media_words(layers: Layers) -> str:
     first, *inner, last = layers.indices
     glass = [f"{n:g} ({1000 * t:g} mm)" for n, t in zip(inner, layers.thicknesses, strict=True)]
     return f"n = {', '.join([f'{first:g}', *glass, f'{last:g}'])}"
+
+
+def view(camera: Pinhole, path: MediaPath | None, xyz: FloatArray) -> View:
+    """Return the pixels of points, straight in air or bent on their path, with their derivatives.
+
+    Parameters
+    ----------
+    camera : Pinhole
+        Its centre stands over the reference plane.
+    path : MediaPath or None
+        What lies between it and the plane, of the camera's own distance; None in air.
+    xyz : ndarray, shape (n, 3)
+        Points. [m]
+
+    Returns
+    -------
+    View
+        All NaN where a point is before the last interface or behind the camera, no ray leads to it,
+        or the first interface begins behind the camera.
+
+    Notes
+    -----
+    `multimedia.FlatInterface` tells where a point seems to be: there a camera in air sees it. A
+    camera that moves keeps z0, a turn leaves the interfaces; what turns them alone is the
+    difference between a turn of all and of the camera. A layer grows away from the camera.
+    """
+    if path is None:
+        seen = project_with_jacobian(camera, xyz)
+        return View(*seen, np.zeros((len(xyz), 2, 0)))
+    normal = np.array([0.0, 0.0, 1.0]) if path.turn is None else path.turn[2]
+    if path.z0 < 0:
+        xyz = np.full_like(xyz, np.nan)
+    slack = _ROUNDING * path.distance
+    depth = max(path.depth, path.layers.thickness) + slack
+    interface = FlatInterface(
+        layers=path.layers, point=-depth * normal, normal=normal, moves_with_camera=True
+    )
+    over_plane = Camera(centre=camera.centre, rotation=np.eye(3), principal_distance=1.0)
+    thin, count = len(path.layers.thicknesses), len(path.layers.indices)
+    names = (*interface.parameter_names[-count - thin :], "offset")
+    sight = interface.sight(over_plane, xyz - 2 * slack * normal, exterior=False, names=names)
+    seen = project_with_jacobian(camera, camera.centre + sight.vectors)
+    moved = sight.derivatives(seen.by_point)
+    by_thickness, by_index = moved.by_media[..., :thin], moved.by_media[..., thin:-1]
+    nearer = moved.by_media[..., -1:]
+    by_camera = seen.by_camera
+    leaning = by_turn(moved.by_point, xyz - camera.centre) - by_camera[:, :, 4:7]
+    by_camera[:, :, 7:] = -moved.by_point
+    by_media = np.concatenate([by_index, by_thickness - nearer, -nearer, leaning], axis=2)
+    return View(seen.pixels, moved.by_point, by_camera, by_media)

@@ -23,6 +23,7 @@ from bifocal.equations import relief_displacement
 from bifocal.media import MediaPath, ObjectRays
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.distortion import inverse_2x2
+from photocore.camera.pinhole import Pinhole
 
 
 class Foot(NamedTuple):
@@ -34,6 +35,11 @@ class Foot(NamedTuple):
     nadir: FloatArray
     distance: float
     media: MediaPath | None = None
+
+
+def foot_of(camera: Pinhole, path: MediaPath | None = None) -> Foot:
+    """Return a camera and its path reduced to what relief needs."""
+    return Foot(camera.centre[:2], float(camera.centre[2]), path)
 
 
 #: Where two rays meet: positions (n, 2) to what must be zero and its gradients by both positions.

@@ -116,12 +116,12 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         "bifocal/networks/joint_media.py",
         "tests/bifocal/orientation/test_adjustment_through_media.py",
         (
-            ("by_camera[:, :, 4:7] += view.by_media", "by_camera[:, :, 4:7] -= view.by_media"),
+            ("by_camera[:, :, 4:7] += seen.by_media", "by_camera[:, :, 4:7] -= seen.by_media"),
             ("self.axes[2] @ camera.rotation)", "self.axes[2] @ camera.rotation.T)"),
         ),
     ),
     (
-        "bifocal/orientation/pair_media.py",
+        "bifocal/model/pair_media.py",
         "tests/bifocal/orientation/test_align_through_media.py",
         (
             ('if name[5] == "X" else 0.0 - aside', 'if name[5] == "X" else aside'),

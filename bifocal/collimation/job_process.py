@@ -105,29 +105,16 @@ def _match(task: Task, progress: Progress) -> dict[str, Any]:
 
 
 def _relief(task: Task, progress: Progress) -> dict[str, Any]:
-    job = ReliefJob(
-        out=Path(task["out"]),
-        gsd=task["gsd"],
-        bounds=_bounds(task),
-        quality=task["quality"],
-        overwrite=task["overwrite"],
-    )
+    job = ReliefJob(out=Path(task["out"]), overwrite=task["overwrite"], **task["options"])
     summary, remarks = relief_of_pair(read_pair(task["pair"]), job, progress=progress)
     return {"summary": summary, "remarks": remarks}
 
 
 def _ortho_task(task: Task) -> OrthoTask:
-    gsd = task["gsd"]
-    if gsd is None and task["scale"]:
-        gsd = gsd_at_scale(task["dpi"] or DPI, task["scale"])
-    return OrthoTask(
-        relief=_path(task["relief"]),
-        points=_path(task["points"]),
-        image=task["image"],
-        gsd=gsd,
-        bounds=_bounds(task),
-        scale=task["scale"],
-    )
+    said = dict(task["options"])
+    if "scale" in said:
+        said.setdefault("gsd", gsd_at_scale(task["dpi"] or DPI, said["scale"]))
+    return OrthoTask.from_given(said, relief=_path(task["relief"]), points=_path(task["points"]))
 
 
 def _ortho(task: Task, progress: Progress) -> dict[str, Any]:
@@ -141,14 +128,8 @@ def _ortho(task: Task, progress: Progress) -> dict[str, Any]:
 def _deliver(task: Task, progress: Progress) -> dict[str, Any]:
     path = Path(task["pair"])
     pair = read_pair(path)
-    wish = DeliverTask(
-        scale=task["scale"] or 50.0,
-        dpi=task["dpi"] or DPI,
-        title=task["title"] or default_title(pair, path),
-        paper=task["paper"],
-        mark=_path(task["marked"]),
-        sections=task["sections"],
-    )
+    title = task["title"] or default_title(pair, path)
+    wish = DeliverTask(title=title, mark=_path(task["mark"]), **{"scale": 50.0, **task["drawing"]})
     made = deliver(
         pair, Path(task["out"]), _ortho_task(task), wish,
         overwrite=task["overwrite"], progress=progress,
@@ -158,13 +139,6 @@ def _deliver(task: Task, progress: Progress) -> dict[str, Any]:
 
 def _path(name: str | None) -> Path | None:
     return Path(name) if name else None
-
-
-def _bounds(task: Task) -> tuple[float, float, float, float] | None:
-    if task["bounds"] is None:
-        return None
-    xmin, ymin, xmax, ymax = task["bounds"]
-    return xmin, ymin, xmax, ymax
 
 
 _WORKS: dict[str, Callable[[Task, Progress], dict[str, Any]]] = {

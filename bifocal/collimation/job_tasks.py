@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from bifocal.collimation.drawing import write_points_drawing
-from bifocal.collimation.fields import FieldError, number_of, positive_of
+from bifocal.collimation.fields import FieldError, positive_of
 from bifocal.collimation.jobs import PageJob
 from bifocal.collimation.live_orientation import control_of, lenses_of, site_of
 from bifocal.collimation.session import Session
 from bifocal.collimation.stated_media import lacking, media_as_dict, media_of
 from bifocal.collimation.wording import say, without_options
+from bifocal.options import OF_PAIR
 from bifocal.orientation.control_points import Control
 from photocore.errors import InputError
 from photocore.jsonfile import plain
@@ -58,45 +59,33 @@ def task_of(session: Session, kind: str, options: Options) -> dict[str, Any]:
     if kind == "match":
         count = positive_of(options, "count") or 500
         return pair | {"count": int(min(count, 5000)), "features": options.get("what") != "targets"}
-    task = pair | {"gsd": positive_of(options, "gsd"), "bounds": _bounds(options)}
     products = session.products
     if kind == "relief":
-        quality = options.get("quality", "standard")
-        if quality not in ("fast", "standard", "best"):
-            raise FieldError("quality: fast, standard or best.")
         out = products.place("relief", ".relief.tif")
-        return task | {"out": str(out), "quality": quality, "overwrite": products.is_own(out)}
-    task |= _ortho_options(session, options)
+        said = _said(options, "gsd", "bounds", "quality")
+        return pair | {"out": str(out), "overwrite": products.is_own(out), "options": said}
+    task = pair | _ortho_options(session, options)
     if kind == "ortho":
         out = products.place("ortho", ".ortho.tif")
         return task | {"out": str(out), "overwrite": products.is_own(out)}
     return task | _deliver_options(session, options)
 
 
-def _bounds(options: Options) -> list[float] | None:
-    bounds = options.get("bounds")
-    if bounds is None:
-        return None
-    if not isinstance(bounds, list) or len(bounds) != 4:
-        raise FieldError("bounds: xmin, ymin, xmax, ymax in metres.")
-    values = [number_of({"bounds": value}, "bounds") for value in bounds]
-    if None in values:
-        raise FieldError("bounds: xmin, ymin, xmax, ymax in metres.")
-    return [value for value in values if value is not None]
-
-
-def scale_of(options: Options) -> float | None:
-    """Return N of a scale given as ``"1:50"``, ``50`` or ``"50"``."""
-    scale = options.get("scale")
-    if isinstance(scale, str):
-        scale = scale.strip().removeprefix("1:")
-    return positive_of({"scale": scale}, "scale")
+def _said(options: Options, *keys: str) -> dict[str, Any]:
+    """Return options of a command that are typed on the page, by the command's names."""
+    said = {}
+    for key in keys:
+        option = OF_PAIR["paper" if key == "sheet" else key]
+        if options.get(key) in (None, ""):
+            continue
+        try:
+            said[option.name] = option.typed(options[key])
+        except ValueError as error:
+            raise FieldError(f"{key}: expected {error}.") from None
+    return said
 
 
 def _ortho_options(session: Session, options: Options) -> dict[str, Any]:
-    image = str(options.get("image", "1"))
-    if image not in ("1", "2", "both"):
-        raise FieldError("image: 1, 2 or both.")
     relief = session.products.current("relief")
     points = None
     if relief is None and options.get("surface") == "points":
@@ -104,9 +93,8 @@ def _ortho_options(session: Session, options: Options) -> dict[str, Any]:
     return {
         "relief": str(relief.resolve()) if relief else None,
         "points": str(points.resolve()) if points else None,
-        "image": image,
-        "scale": scale_of(options),
-        "dpi": positive_of(options, "dpi"),
+        "options": _said(options, "gsd", "bounds", "image", "scale"),
+        "dpi": _said(options, "dpi").get("dpi"),
     }
 
 
@@ -116,12 +104,6 @@ def _deliver_options(session: Session, options: Options) -> dict[str, Any]:
     own = any(kind == "deliver" for kind in products.made.values())
     if folder.exists() and not own:
         folder = free_path(products.folder, f"{products.stem}-delivered")
-    sheet = options.get("sheet")
-    if sheet is not None and sheet not in ("A4", "A3", "A2", "A1", "A0"):
-        raise FieldError("sheet: A4, A3, A2, A1, A0 or none.")
-    sections = options.get("sections", [])
-    if not isinstance(sections, list) or not all(isinstance(cut, str) for cut in sections):
-        raise FieldError('sections: a list like ["x=1.5"].')
     title = options.get("title") or ""
     if not isinstance(title, str) or len(title) > 120:
         raise FieldError("title: a line of text.")
@@ -129,9 +111,8 @@ def _deliver_options(session: Session, options: Options) -> dict[str, Any]:
         "out": str(folder),
         "overwrite": own,
         "title": title,
-        "paper": sheet,
-        "sections": sections,
-        "marked": None if not _solved_points(session) else str(session.files.workbook.resolve()),
+        "drawing": _said(options, "scale", "dpi", "sheet", "sections"),
+        "mark": None if not _solved_points(session) else str(session.files.workbook.resolve()),
     }
 
 
@@ -183,7 +164,7 @@ def _through_media(session: Session, way: str, given: list[float | None]) -> str
     setup, language = session.state.setup, session.state.language or session.language
     if missing := lacking(setup):
         raise InputError(say("media", missing, language))
-    if media_of(setup, session.pictures.pair) is None or way == "control":
+    if not media_of(setup, session.pictures.pair) or way == "control":
         return way
     if None in given[:2]:
         raise InputError(say("media", "control", language))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,19 +11,16 @@ from bifocal.collimation.stated_media import lacking, media_of
 from bifocal.collimation.wording import say, without_options
 from bifocal.files.images import ImageInfo
 from bifocal.model.interior_orientation import Interior
-from bifocal.model.orientation_precision import CAMERA, names_of, place_by_media
+from bifocal.model.orientation_precision import rates_of
 from bifocal.model.pair import Pair
-from bifocal.model.refracted_view import RefractedView, foot_of
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.align_workflow import SIGMA_ON_WALL, KnownLens, interior_of_photo
 from bifocal.orientation.alignment import standard_deviations
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
 from bifocal.orientation.pair_observations import at
-from bifocal.orientation.refracted_observations import views_of
-from bifocal.rays import object_rays
+from bifocal.orientation.seen_points import on_the_plane, views_of
 from photocore.arrays import FloatArray
-from photocore.camera.pinhole import PARAMETERS, ProjectedPoints, ray_on_plane
 from photocore.errors import PhotogrammetryError
 
 #: Points that stand out or lie back by this part of the near distance are thought of.
@@ -202,7 +198,7 @@ def _most_help(oriented: OrientedPair, language: str) -> list[str]:
         for across in range(3):
             for down in range(3):
                 pixel = np.array([[width * (0.1 + 0.4 * across), height * (0.1 + 0.4 * down)]])
-                place = _on_wall(oriented, pixel)
+                place = on_the_plane(oriented.adjusted, 0, pixel)
                 place[:, 2] = relief
                 design, noise = _control_rows(oriented, place)
                 after = _sigma_with(covariance, design, noise, watched)
@@ -228,28 +224,11 @@ def _most_help(oriented: OrientedPair, language: str) -> list[str]:
     ]  # fmt: skip
 
 
-def _on_wall(oriented: OrientedPair, pixel: FloatArray) -> FloatArray:
-    """Return where the ray of a far photo's pixel meets the reference plane, shape (1, 3). [m]"""
-    camera, media = oriented.adjusted.cameras[0], oriented.adjusted.media
-    place = ray_on_plane(camera, pixel)
-    if media is not None:
-        foot = foot_of(camera, media.path(0, camera))
-        place[:, :2] = object_rays(place[:, :2], foot).position
-    return place
-
-
 def _control_rows(oriented: OrientedPair, place: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the rates of a control point's four pixels by all `names_of`, and their covariance."""
     rows, by_points = [], []
-    layers = oriented.adjusted.layers
-    views: Sequence[ProjectedPoints | RefractedView] = views_of(oriented.adjusted, place)
-    for number, seen in enumerate(views):
-        design = np.zeros((2, len(names_of(layers))))
-        first = number * len(CAMERA)
-        design[:, first : first + len(PARAMETERS)] = seen.by_camera[0]
-        if isinstance(seen, RefractedView) and layers is not None:
-            place_by_media(design, seen.by_media[0], number, layers)
-        rows.append(design)
+    for number, seen in enumerate(views_of(oriented.adjusted, place)):
+        rows.append(rates_of(seen, np.zeros((1, 2, 2)), number)[0])
         by_points.append(seen.by_point[0])
     by_point = np.concatenate(by_points)
     noise = np.eye(4) * oriented.observations.sigma_pick**2

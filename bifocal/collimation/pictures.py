@@ -163,7 +163,7 @@ class Pictures:
 
 def _media_facts(photo: Photo) -> tuple[object, ...]:
     """Return what a photo on the wall depends on besides, through media."""
-    if photo.layers is None:
+    if not photo.layers:
         return ()
     lean = None if photo.interface_normal is None else photo.interface_normal.tolist()
     return photo.layers.as_dict(), photo.z0, lean, photo.nadir.tolist(), photo.distance

@@ -8,11 +8,9 @@ from typing import Any
 import numpy as np
 
 from bifocal.model.pair import Pair
+from bifocal.model.pair_media import PairMedia
 from bifocal.networks.joint_media import media_of as media_of_cameras
-from bifocal.orientation.pair_media import PairMedia
 from multimedia import Layers
-from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX
-from photocore.errors import InputError
 
 #: Fields of the set-up that say what lies between the cameras and the wall: indices of refraction,
 #: lengths in metres. Beginning with air; glass may be absent.
@@ -21,19 +19,6 @@ MEDIA = (*INDICES, "glass_thickness", "sigma_water_index", "port", "depth")
 AIR = 1.0
 
 Setup = Mapping[str, float | None]
-
-
-def check_index(name: str, value: float | None) -> None:
-    """Refuse what no medium bends.
-
-    Raises
-    ------
-    InputError
-    """
-    if value is not None and not LEAST_INDEX <= value <= MOST_INDEX:
-        raise InputError(
-            f"{name}: {value:g} is no refractive index; water has about 1.34, glass 1.46 to 1.6."
-        )
 
 
 def lacking(setup: Setup) -> str:
@@ -52,8 +37,8 @@ def lacking(setup: Setup) -> str:
     return "" if len(typed & {"port", "depth"}) == 1 else "place"
 
 
-def media_of(setup: Setup, pair: Pair | None = None) -> PairMedia | None:
-    """Return the media that are typed; None in air, and while something is lacking.
+def media_of(setup: Setup, pair: Pair | None = None) -> PairMedia:
+    """Return the media that are typed; none in air, and while something is lacking.
 
     With a sigma of its index the water's is an unknown, known so well beforehand. Where nothing was
     ever typed, those of the pair that is shown: it may have come with its file.
@@ -62,7 +47,7 @@ def media_of(setup: Setup, pair: Pair | None = None) -> PairMedia | None:
         return _of_pair(pair)
     water = setup.get("water_index")
     if water is None or lacking(setup):
-        return None
+        return PairMedia.none()
     glass, thickness = setup.get("glass_index"), setup.get("glass_thickness")
     indices, thicknesses = [AIR, water], []
     if glass is not None and thickness is not None:
@@ -74,11 +59,11 @@ def media_of(setup: Setup, pair: Pair | None = None) -> PairMedia | None:
     )
 
 
-def _of_pair(pair: Pair) -> PairMedia | None:
+def _of_pair(pair: Pair) -> PairMedia:
     """Return what a pair looks through: ports that move with it, or what stays with the object."""
     first, second = media_of_cameras(pair)
     if first is None or second is None:
-        return None
+        return PairMedia.none()
     if first.height is not None:
         return PairMedia(layers=first.layers, depth=first.height - first.layers.thickness)
     return PairMedia(
@@ -88,9 +73,9 @@ def _of_pair(pair: Pair) -> PairMedia | None:
     )
 
 
-def media_as_dict(media: PairMedia | None) -> dict[str, Any] | None:
+def media_as_dict(media: PairMedia) -> dict[str, Any] | None:
     """Return media as plain data, for the process of a job."""
-    if media is None:
+    if not media:
         return None
     normals = [None if normal is None else np.asarray(normal).tolist() for normal in media.normals]
     return {
@@ -99,10 +84,10 @@ def media_as_dict(media: PairMedia | None) -> dict[str, Any] | None:
     }  # fmt: skip
 
 
-def media_from_dict(data: Mapping[str, Any] | None) -> PairMedia | None:
+def media_from_dict(data: Mapping[str, Any] | None) -> PairMedia:
     """Return the media of `media_as_dict`."""
     if data is None:
-        return None
+        return PairMedia.none()
     layers = Layers(indices=tuple(data["indices"]), thicknesses=tuple(data["thicknesses"]))
     first, second = (None if n is None else np.array(n) for n in data["normals"])
     port = data["port"] and (data["port"][0], data["port"][1])

@@ -166,7 +166,7 @@ def _against_truth(relief: ReliefMap, sample: Sample) -> tuple[float, float, flo
 
 def _cost_of_neglect(pair: Pair, sample: Sample) -> float | None:
     """Return the median error of relief if the pair's media were left out; None in air. [m]"""
-    if pair.layers is None:
+    if not pair.refracted:
         return None
     places, true = (values[::_EVERY] for values in _seen_truth(sample))
     points = np.column_stack([places, true]).astype(np.float64)

@@ -83,7 +83,7 @@ def greys_of_pair(
     greys = as_grey(image1, "image1"), as_grey(image2, "image2")
     for number, grey in enumerate(greys, start=1):
         pair.photo(number).check_size(grey.shape[::-1], f"image{number}")
-    return greys if pair.layers is None else greys_through_water(image1, image2)
+    return greys if not pair.refracted else greys_through_water(image1, image2)
 
 
 def read_greys(

@@ -311,7 +311,7 @@ def pair_targets(
 
 def seen_at(pair: Pair, pixels1: FloatArray, relief: FloatArray | float) -> FloatArray:
     """Return where photo 2 sees the points of photo 1 if they have a given relief. [px]"""
-    if pair.layers is not None:
+    if pair.refracted:
         positions = pair.image1.apparent_from_pixels(pixels1)
         heights = np.broadcast_to(np.asarray(relief, dtype=np.float64), positions.shape[:-1])
         return pair.image2.project(point_on_ray(positions, heights, pair.image1.foot))
@@ -371,32 +371,20 @@ def local_zoom(pair: Pair, pixels1: FloatArray, relief: FloatArray) -> FloatArra
     factor = zoom_factor(relief, d1=pair.image1.distance, d2=pair.image2.distance)
     metres1 = _raw_metres(pair.image1, pixels1)
     metres2 = _raw_metres(pair.image2, seen_at(pair, pixels1, relief))
-    if pair.layers is not None:
-        metres1 = _metres_at(pair.image1, pixels1, relief)
-        metres2 = _metres_at(pair.image2, seen_at(pair, pixels1, relief), relief)
+    if pair.refracted:
+        metres1 = _raw_metres(pair.image1, pixels1, relief)
+        metres2 = _raw_metres(pair.image2, seen_at(pair, pixels1, relief), relief)
         factor = np.where(np.isfinite(metres2).all(axis=(1, 2)), 1.0, np.nan)
     bad = ~(np.abs(np.linalg.det(np.nan_to_num(metres2))) > 0) | ~np.isfinite(factor)
     metres2[bad] = np.eye(2)
     return np.nan_to_num(np.linalg.inv(metres2) @ metres1 * factor[:, None, None])
 
 
-def _raw_metres(photo: Photo, pixels: FloatArray) -> FloatArray:
-    """Return the derivative of the plane position by the raw pixel, lens included. [m/px]"""
-    metres = photo.metres_per_pixel(pixels)
+def _raw_metres(photo: Photo, pixels: FloatArray, relief: FloatArray | float = 0.0) -> FloatArray:
+    """Return the derivative of points at a relief by the raw pixel, lens included. [m/px]"""
+    metres = photo.metres_per_pixel(pixels, relief)
     if photo.lens is None:
         return np.array(metres)
-    return metres @ np.linalg.inv(photo.lens.distorted_by_ideal(_ideal(photo, pixels)))
-
-
-def _metres_at(photo: Photo, pixels: FloatArray, relief: FloatArray) -> FloatArray:
-    """Return the derivative of points at a relief by the raw pixel, through media. [m/px]"""
-    assert photo.media is not None
-    _, place, slope = photo.media.trace_with_jacobian(
-        photo.apparent_from_pixels(pixels) - photo.nadir
-    )
-    metres = (place + relief[:, None, None] * slope) @ photo.apparent_by_pixel(pixels)
-    if photo.lens is None:
-        return np.asarray(metres)
     return metres @ np.linalg.inv(photo.lens.distorted_by_ideal(_ideal(photo, pixels)))
 
 

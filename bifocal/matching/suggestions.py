@@ -112,7 +112,7 @@ def seen_in_other(pair: Pair, image: int, pixel: FloatArray, reliefs: FloatArray
     pixels = np.broadcast_to(pixel, (len(reliefs), 2))
     if image == 1:
         return seen_at(pair, pixels, reliefs)
-    if pair.layers is not None:
+    if pair.refracted:
         positions = pair.image2.apparent_from_pixels(pixels)
         return pair.image1.project(point_on_ray(positions, reliefs, pair.image2.foot))
     centre = pair.zoom_centre

@@ -11,21 +11,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from bifocal.media import PLACING, MediaPath
-from bifocal.model.refracted_view import (
-    RefractedView,
-    common_names,
-    media_names,
-    view_through,
-)
+from bifocal.media import PLACING, MediaPath, View, view
 from multimedia import Layers
 from photocore.arrays import FloatArray, as_floats, read_only
 from photocore.camera.pinhole import (
     PARAMETERS,
     Pinhole,
-    ProjectedPoints,
     camera_matrix,
-    project_with_jacobian,
 )
 from photocore.errors import InputError
 
@@ -54,9 +46,29 @@ class PlanePhoto(Protocol):
         """What lies between it and the plane; None in air."""
 
 
+def common_names(layers: Layers | None) -> tuple[str, ...]:
+    """Return the names of what both photos' media have in common, counted from the camera.
+
+    Examples
+    --------
+    >>> common_names(Layers(indices=(1.0, 1.49, 1.337), thicknesses=(0.01,)))
+    ('index1', 'index2', 'index3', 'thickness1')
+    """
+    return (
+        ()
+        if layers is None
+        else (
+            *(f"index{k}" for k in range(1, len(layers.indices) + 1)),
+            *(f"thickness{k}" for k in range(1, len(layers.thicknesses) + 1)),
+        )
+    )
+
+
 def names_of(layers: Layers | None) -> tuple[str, ...]:
     """Return what the covariance of a pair counts: `NAMES`, and through media those of them."""
-    return NAMES if layers is None else (*NAMES, *media_names(layers))
+    if not (common := common_names(layers)):
+        return NAMES
+    return (*NAMES, *common, *(f"{name} {number}" for number in (1, 2) for name in PLACING))
 
 
 def pinhole(photo: PlanePhoto) -> Pinhole:
@@ -136,48 +148,44 @@ def _by_orientation(photos: tuple[PlanePhoto, PlanePhoto], xyz: FloatArray) -> F
     The four pixels p of a point P in cameras c stay: ``A dP = -dp/dc dc`` by least squares with
     ``A = dp/dP``, so ``J = -(AᵀA)⁻¹Aᵀ dp/dc``.
     """
-    media = photos[0].media
-    count = len(names_of(None if media is None else media.layers))
-    by_point, by_camera = [], np.zeros((len(xyz), 4, count))
+    by_point, by_orientation = [], []
     for number, photo in enumerate(photos):
         camera = pinhole(photo)
-        rows, first = slice(2 * number, 2 * number + 2), number * len(CAMERA)
-        if photo.media is None:
-            view: ProjectedPoints | RefractedView = project_with_jacobian(camera, xyz)
-        else:
-            view = view_through(camera, photo.media, xyz)
-            place_by_media(by_camera[:, rows], view.by_media, number, photo.media.layers)
-        by_point.append(view.by_point)
-        by_camera[:, rows, first : first + len(PARAMETERS)] = view.by_camera
+        seen = view(camera, photo.media, xyz)
         # Straightened by 1 / (1 + k1 rho² + k2 rho⁴), ideal pixels move inwards.
-        away = view.pixels - camera.matrix[:2, 2]
+        away = seen.pixels - camera.matrix[:2, 2]
         square = (away**2).sum(axis=1, keepdims=True) / camera.matrix[0, 0] ** 2
-        by_camera[:, rows, first + len(PARAMETERS)] = away * square
-        by_camera[:, rows, first + len(PARAMETERS) + 1] = away * square**2
-    design = np.concatenate(by_point, axis=1)
+        radial = np.stack([away * square, away * square**2], axis=2)
+        by_point.append(seen.by_point)
+        by_orientation.append(rates_of(seen, radial, number))
+    design, by_camera = np.concatenate(by_point, axis=1), np.concatenate(by_orientation, axis=1)
     known = np.isfinite(design).all(axis=(1, 2))
-    out = np.full((len(xyz), 3, count), np.nan)
+    out = np.full((len(xyz), 3, by_camera.shape[2]), np.nan)
     out[known] = -np.linalg.pinv(design[known]) @ by_camera[known]
     return out
 
 
-def place_by_media(rows: FloatArray, by_media: FloatArray, number: int, layers: Layers) -> None:
-    """Put the derivatives of camera 0's or 1's pixels by its media where `names_of` has them.
+def rates_of(seen: View, radial: FloatArray, number: int) -> FloatArray:
+    """Return how the pixels of camera 0 or 1 move with all that `names_of` counts, (n, 2, k).
 
     Parameters
     ----------
-    rows : ndarray, shape (n, 2, len(names_of(layers)))
-        Changed in place.
-    by_media : ndarray, shape (n, 2, k)
-        As of `view_through`.
+    seen : View
+        Of that camera.
+    radial : ndarray, shape (n, 2, 2)
+        By its two terms of radial distortion.
     number : int
-    layers : Layers
     """
-    common = len(common_names(layers))
-    own = by_media.shape[-1] - common
-    first = len(NAMES) + common + number * own
-    rows[..., len(NAMES) : len(NAMES) + common] = by_media[..., :common]
-    rows[..., first : first + own] = by_media[..., common:]
+    own = len(PLACING)
+    common = max(seen.by_media.shape[2] - own, 0)
+    count = len(NAMES) + seen.by_media.shape[2] + (own if common else 0)
+    rates = np.zeros((*seen.pixels.shape, count))
+    first, last = number * len(CAMERA), len(NAMES) + common + number * own
+    rates[..., first : first + len(PARAMETERS)] = seen.by_camera
+    rates[..., first + len(PARAMETERS) : first + len(CAMERA)] = radial
+    rates[..., len(NAMES) : len(NAMES) + common] = seen.by_media[..., :common]
+    rates[..., last : last + own] = seen.by_media[..., common:]
+    return rates
 
 
 def of_distances(d1: float, d2: float, sigma: float) -> FloatArray:

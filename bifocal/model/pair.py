@@ -225,7 +225,7 @@ class Pair:
             "format": FORMAT,
             "image1": self.image1.to_dict(),
             "image2": self.image2.to_dict(),
-            **({} if self.layers is None else {"layers": self.layers.as_dict()}),
+            **({"layers": self.layers.as_dict()} if self.layers else {}),
             **self.extra,
         }
         if self.orientation is not None:
@@ -263,6 +263,11 @@ class Pair:
         """The media between cameras and object; None in air."""
         return self.image1.layers
 
+    @property
+    def refracted(self) -> bool:
+        """Whether its photos look through other media than air."""
+        return self.image1.refracted
+
     def in_air(self) -> Pair:
         """Return the pair with its media left out: what neglecting refraction makes of it."""
         photos = [replace(photo, layers=None, z0=None) for photo in (self.image1, self.image2)]
@@ -272,7 +277,7 @@ class Pair:
     @property
     def leans(self) -> bool:
         """Whether interfaces lean against the reference plane."""
-        return any(photo.media and photo.media.turn is not None for photo in self.as_given)
+        return self.image1.leans or self.image2.leans
 
     def refuse_ports_that_lean(self, what: str) -> None:
         """Raise where interfaces lean against the reference plane and the work asked for cannot.
@@ -321,7 +326,7 @@ class Pair:
     @property
     def highest_relief(self) -> float:
         """Relief at which the last interface lies over a nadir, the lower one's; in air d2. [m]"""
-        if self.layers is None:
+        if not self.refracted:
             return self.d2
         photos = (self.image1, self.image2)
         return min(photo.media.highest for photo in photos if photo.media)

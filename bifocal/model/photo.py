@@ -153,6 +153,16 @@ class Photo:
         return rays.Foot(self.nadir, self.distance, self.media)
 
     @property
+    def refracted(self) -> bool:
+        """Whether its rays cross other media than air."""
+        return self.media is not None
+
+    @property
+    def leans(self) -> bool:
+        """Whether its interfaces lean against the reference plane."""
+        return self.media is not None and self.media.turn is not None
+
+    @property
     def scale_number(self) -> float | None:
         """Scale number m = 1000 d / c of the photo; None without a principal distance."""
         c = self.principal_distance
@@ -223,13 +233,14 @@ class Photo:
             foot=self.foot,
         )
 
-    def metres_per_pixel(self, pixels: FloatArray) -> FloatArray:
-        """Return the derivative of the plane position by the pixel, shape (n, 2, 2). [m/px]"""
-        apparent = self.apparent_by_pixel(pixels)
+    def metres_per_pixel(self, pixels: FloatArray, relief: ArrayLike = 0.0) -> FloatArray:
+        """Return the derivative of points at a relief by the ideal pixel, (n, 2, 2). [m/px]"""
+        apparent, height = self.apparent_by_pixel(pixels), np.asarray(relief)[..., None, None]
         if self.media is None:
-            return apparent
+            return np.asarray(apparent * rays.reduction(height, self.distance))
         away = self.apparent_from_pixels(pixels) - self.nadir
-        return np.asarray(self.media.trace_with_jacobian(away)[1] @ apparent)
+        _, place, slope = self.media.trace_with_jacobian(away)
+        return np.asarray((place + height * slope) @ apparent)
 
     def apparent_by_pixel(self, pixels: FloatArray) -> FloatArray:
         """Return the derivative of the apparent position by the pixel, shape (n, 2, 2). [m/px]"""

@@ -86,7 +86,7 @@ class JointAdjustment(JointUnknowns):
         What the last round would have taken out: empty unless there were more than `ROUNDS`.
     by_camera : ndarray, shape (m, 7, 7)
         Covariance of the `ESTIMATED` of each camera.
-    between : ndarray, shape (m // 2, 7, 7)
+    between : ndarray, shape (k, 7, 7)
         Covariance between the far and the near camera of each pair.
     """
 
@@ -110,12 +110,13 @@ class JointAdjustment(JointUnknowns):
         """
         whole = np.zeros((2 * len(CAMERA), 2 * len(CAMERA)))
         places = [[k * len(CAMERA) + e for e in ESTIMATED] for k in (0, 1)]
-        for k in (0, 1):
-            whole[np.ix_(places[k], places[k])] = self.by_camera[2 * pair + k]
+        seen = self.observations
+        own = seen.pairs[pair]
+        for place, camera in zip(places, own, strict=True):
+            whole[np.ix_(place, place)] = self.by_camera[camera]
         whole[np.ix_(*places)] = self.between[pair]
         whole[np.ix_(*places[::-1])] = self.between[pair].T
-        seen = self.observations
-        by = media_with_cameras((seen.media_of(2 * pair), seen.media_of(2 * pair + 1)))
+        by = media_with_cameras((seen.media_of(own[0]), seen.media_of(own[1])))
         return whole if by is None else by @ whole @ by.T
 
 
@@ -125,7 +126,6 @@ def adjust_jointly(observations: JointObservations, start: JointUnknowns) -> Joi
     Parameters
     ----------
     observations : JointObservations
-        Cameras 2 k and 2 k + 1 are the far and the near one of pair k.
     start : JointUnknowns
         Approximate cameras and points in one frame.
 
@@ -425,8 +425,7 @@ def _adjusted(
     linear = fit.linear
     assert isinstance(linear, SparseEquations)
     factor = max(sigma0, 1.0) ** 2
-    count, size = len(seen.names), len(ESTIMATED)
-    by_camera, between = np.zeros((count, size, size)), np.zeros((count // 2, size, size))
+    size = len(ESTIMATED)
     cofactor = linear.cofactor.tocsr()
 
     def part(first: IntArray, second: IntArray) -> FloatArray:
@@ -436,10 +435,9 @@ def _adjusted(
             block[np.ix_(a, b)] = cofactor[first[a]][:, second[b]].toarray()
         return block
 
-    for k, columns in enumerate(system.column):
-        by_camera[k] = factor * part(columns, columns)
-        if k % 2 == 0 and k + 1 < count:
-            between[k // 2] = factor * part(columns, system.column[k + 1])
+    place = system.column
+    by_camera = factor * np.array([part(columns, columns) for columns in place])
+    between = factor * np.array([part(place[far], place[near]) for far, near in seen.pairs])
     covariance = factor * linear.block_cofactor
     covariance[~system.used] = np.nan
     xyz = np.where(system.used[:, None], fit.state.xyz, np.nan)

@@ -8,18 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bifocal.matching.features import Features
-from bifocal.media import MediaPath
+from bifocal.media import MediaPath, view
 from bifocal.model.homography import apply_homography
 from bifocal.model.orientation_precision import pinhole
 from bifocal.model.pair import Pair
+from bifocal.model.pair_media import by_cameras
 from bifocal.model.photo import Photo
-from bifocal.model.refracted_view import RefractedView, view_through
-from bifocal.orientation.pair_media import by_cameras
 from bifocal.rays import (
     Foot,
-    design_rows,
     object_rays,
-    plane_position,
     point_on_ray,
     relief_of_rays,
     seen_distance,
@@ -29,7 +26,6 @@ from photocore.arrays import FloatArray
 from photocore.camera.pinhole import (
     Pinhole,
     ProjectedPoints,
-    project_with_jacobian,
     ray_on_plane,
     triangulate,
 )
@@ -133,7 +129,7 @@ def media_with_cameras(
 ) -> FloatArray | None:
     """Return how what the covariance of a pair counts moves with its cameras alone, (k, 24).
 
-    `bifocal.orientation.pair_media.by_cameras`; None in air.
+    `bifocal.model.pair_media.by_cameras`; None in air.
     """
     first, second = media
     if first is None or second is None:
@@ -148,37 +144,15 @@ def media_with_cameras(
 def project_through(camera: Pinhole, media: CameraMedia | None, xyz: FloatArray) -> ProjectedPoints:
     """Return what `project_with_jacobian` does, through media; NaN where no ray leads.
 
-    Notes
-    -----
-    The camera looks at the apparent position q of a point on the reference plane, a straight ray
-    away. With t = (q - N) / d the derivative of q by d is ``t - dq/dr`` before a port, and
-    ``t - dq/d(X, Y) t`` where the interface keeps its place over the plane.
+    What stays with the object comes nearer to a camera that goes up; a port turns with its camera.
     """
-    if media is None:
-        return project_with_jacobian(camera, xyz)
-    if media.axes is not None:
-        return _through_leaning_port(view_through(camera, media.path(camera), xyz))
-    foot = media.foot(camera)
-    assert foot.media is not None
-    if foot.media.z0 < 0:
-        xyz = np.full_like(xyz, np.nan)
-    q = plane_position(xyz, foot)
-    rows = design_rows(xyz, foot)
-    view = project_with_jacobian(camera, np.column_stack([q, np.zeros(len(q))]))
-    by_q = view.by_point[:, :, :2]
-    by_camera = view.by_camera.copy()
-    tangent = ((q - foot.nadir) / foot.distance)[:, :, None]
-    along = rows[:, :, 2:] if media.height is None else rows[:, :, :2] @ tangent
-    moved = np.concatenate([np.eye(2) - rows[:, :, :2], tangent - along], axis=2)
-    by_camera[:, :, 7:] += by_q @ moved
-    return ProjectedPoints(view.pixels, by_q @ rows, by_camera)
-
-
-def _through_leaning_port(view: RefractedView) -> ProjectedPoints:
-    """Return a view with the derivatives by a camera whose port turns with it."""
-    by_camera = view.by_camera.copy()
-    by_camera[:, :, 4:7] += view.by_media[:, :, -3:]  # the leans are the last of `PLACING`
-    return ProjectedPoints(view.pixels, view.by_point, by_camera)
+    seen = view(camera, None if media is None else media.path(camera), xyz)
+    by_camera = seen.by_camera
+    if media is not None and media.height is not None:
+        by_camera[:, :, 9] += seen.by_media[:, :, -4]  # of `PLACING` the first is z0
+    if media is not None and media.axes is not None:
+        by_camera[:, :, 4:7] += seen.by_media[:, :, -3:]
+    return ProjectedPoints(seen.pixels, seen.by_point, by_camera)
 
 
 def place_on_plane(camera: Pinhole, media: CameraMedia | None, pixels: FloatArray) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +21,7 @@ class JointObservations:
     Attributes
     ----------
     names : tuple of str
-        Of the cameras, m.
+        Of the cameras, m. A photo is one camera, also where two pairs use it.
     camera, point : ndarray of int, shape (n,)
         Of each ray.
     pixels : ndarray, shape (n, 2)
@@ -37,6 +38,8 @@ class JointObservations:
         Relative standard deviation of the focal lengths; 0: held.
     media : tuple of CameraMedia or None
         What each camera looks through; empty where all are in air.
+    pairs : tuple of (int, int)
+        The far and the near camera of each pair; empty: 0 and 1, 2 and 3, and so on.
     """
 
     names: tuple[str, ...]
@@ -49,6 +52,12 @@ class JointObservations:
     sigma_known: FloatArray
     sigma_focal: FloatArray
     media: tuple[CameraMedia | None, ...] = ()
+    pairs: tuple[tuple[int, int], ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.pairs:
+            far = range(0, len(self.names) - 1, 2)
+            object.__setattr__(self, "pairs", tuple((k, k + 1) for k in far))
 
     def media_of(self, camera: int) -> CameraMedia | None:
         """Return what a camera looks through; None in air."""
@@ -68,13 +77,40 @@ def with_rays(observations: JointObservations, keep: BoolArray) -> JointObservat
     )
 
 
+def of_one_camera(observations: JointObservations, camera_of: Sequence[int]) -> JointObservations:
+    """Return the observations of photos that pairs share as those of one camera each.
+
+    Parameters
+    ----------
+    observations : JointObservations
+        Of the photos of all pairs, far and near in turn.
+    camera_of : sequence of int
+        Camera that took each of them, counted as they come; what is known of it, and what it looks
+        through, is what its first photo says.
+    """
+    o, first = observations, np.unique(camera_of, return_index=True)[1].tolist()
+    camera = np.asarray(camera_of)[o.camera]
+    _, once = np.unique(np.column_stack([camera, o.point, o.pixels]), axis=0, return_index=True)
+    once.sort()
+    return with_rays(
+        replace(
+            o, names=tuple(o.names[k] for k in first), camera=camera,
+            sigma_focal=o.sigma_focal[first],
+            media=tuple(o.media[k] for k in first) if o.media else (),
+            pairs=tuple((camera_of[far], camera_of[near]) for far, near in o.pairs),
+        ),
+        np.isin(np.arange(len(camera)), once),
+    )  # fmt: skip
+
+
 def with_enough_rays(observations: JointObservations) -> JointObservations:
-    """Leave out the rays of points that have only one and are not known, and what holds nothing.
+    """Leave out the rays of points that one camera sees and are not known, and what holds nothing.
 
     That is what is known of points without rays, and of all where they are too few for a frame: in
     that of the first pair they would contradict what is held.
     """
-    count = np.bincount(observations.point, minlength=len(observations.ids))
+    seen = np.unique(np.column_stack([observations.point, observations.camera]), axis=0)
+    count = np.bincount(seen[:, 0], minlength=len(observations.ids))
     fixed = np.isfinite(observations.known).all(axis=1) & (count > 0)
     if fixed.sum() < FEWEST_KNOWN:
         fixed[:] = False

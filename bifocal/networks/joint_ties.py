@@ -58,6 +58,14 @@ class SharedPoints:
     pixels: FloatArray
     count: int
 
+    def of_photos(self, which: Sequence[int]) -> SharedPoints:
+        """Return the rays of some photos, which are counted anew and may be named twice."""
+        rays = [np.flatnonzero(self.photo == photo) for photo in which]
+        photo, rows = np.repeat(range(len(rays)), [len(own) for own in rays]), np.concatenate(rays)
+        return SharedPoints(
+            photo=photo, point=self.point[rows], pixels=self.pixels[rows], count=self.count
+        )
+
 
 def common_features(
     features: Sequence[Features], shapes: Sequence[tuple[int, ...]], together: BoolArray

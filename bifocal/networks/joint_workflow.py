@@ -16,7 +16,7 @@ from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.networks.joint_adjustment import Blunder, JointAdjustment, adjust_jointly
 from bifocal.networks.joint_media import CameraMedia, bent_again, media_of, straightened
-from bifocal.networks.joint_observations import JointObservations, with_rays
+from bifocal.networks.joint_observations import JointObservations, of_one_camera, with_rays
 from bifocal.networks.joint_ties import (
     SharedPoints,
     common_features,
@@ -231,17 +231,22 @@ def joint_adjustment(
 ) -> JointResult:
     """Adjust pairs whose photos can be read; see `adjust_pairs`."""
     photos = [photo for pair in pairs for photo in (pair.image1, pair.image2)]
+    camera_of = _cameras_of(pairs)
+    once = [camera_of.index(camera) for camera in range(max(camera_of) + 1)]
     features, shapes = [], []
-    for index, pair in enumerate(pairs):
-        for number in (1, 2):
-            progress(index, len(pairs), f"{names[index]}: features")
-            image = read_grey(photo_info(pair, number).path)
-            features.append(find_features(image, limit=FEATURES, budget=PIXELS))
-            shapes.append(image.shape)
+    for k in once:
+        progress(k // 2, len(pairs), f"{names[k // 2]}: features")
+        image = read_grey(photo_info(pairs[k // 2], k % 2 + 1).path)
+        features.append(find_features(image, limit=FEATURES, budget=PIXELS))
+        shapes.append(image.shape)
     progress(len(pairs), len(pairs), "matches")
-    straight = [straightened(p, f) for p, f in zip(photos, features, strict=True)]
-    ties = common_features(straight, shapes, _together(photos, shapes))
-    ties = _as_taken(photos, ties)
+    together = np.zeros((len(once), len(once)), dtype=bool)
+    near = _together(photos, [shapes[camera] for camera in camera_of])
+    np.logical_or.at(together, np.ix_(camera_of, camera_of), near)
+    straight = [straightened(photos[k], f) for k, f in zip(once, features, strict=True)]
+    ties = common_features(straight, shapes, together)
+    ties = _as_taken([photos[k] for k in once], ties).of_photos(camera_of)
+    features = [features[camera] for camera in camera_of]
     shared = SharedPoints(
         photo=np.r_[named.shared.photo, ties.photo],
         point=np.r_[named.shared.point, ties.point + named.shared.count],
@@ -250,18 +255,32 @@ def joint_adjustment(
     )
     cameras = [pinhole(photo) for photo in photos]
     media = tuple(through for pair in pairs for through in media_of(pair))
-    ideal = _ideal(photos, shared)
+    ideal = _ideal([photos[once[camera]] for camera in camera_of], shared)
     observed = _observations(pairs, names, named, shared, ideal, features, task)
     observed = replace(observed, media=media)
     start = into_one_frame(cameras, shared, ideal, observed.known, names, media)
     good = near_each_other(start.cameras, shared, ideal, media)
     good |= shared.point < named.shared.count
     observed = with_rays(observed, good & np.isfinite(ideal).all(axis=1))
-    adjusted = adjust_jointly(observed, start)
+    start = replace(start, cameras=tuple(start.cameras[k] for k in once))
+    adjusted = adjust_jointly(of_one_camera(observed, camera_of), start)
+    taken = [photos[once[camera]] for camera in camera_of]
     return JointResult(
-        pairs=tuple(_adjusted_pair(pair, adjusted, k) for k, pair in enumerate(pairs)),
+        pairs=tuple(
+            _adjusted_pair(pair, adjusted, k, taken[2 * k : 2 * k + 2])
+            for k, pair in enumerate(pairs)
+        ),
         names=tuple(names), adjustment=adjusted, points=_points(named, adjusted),
     )  # fmt: skip
+
+
+def _cameras_of(pairs: Sequence[Pair]) -> list[int]:
+    """Return the camera of the far and the near photo of every pair: one file is one camera."""
+    number: dict[Path, int] = {}
+    return [
+        number.setdefault(pair.photo_file(k).resolve(), len(number))
+        for pair in pairs for k in (1, 2)
+    ]  # fmt: skip
 
 
 def _tables(paths: Sequence[Path], pairs: Sequence[Pair], task: JointTask) -> NamedPositions:
@@ -411,14 +430,23 @@ def _observations(
     )  # fmt: skip
 
 
-def _adjusted_pair(pair: Pair, adjusted: JointAdjustment, index: int) -> Pair:
-    """Return a pair with its adjusted cameras."""
+def _adjusted_pair(
+    pair: Pair,
+    adjusted: JointAdjustment,
+    index: int,
+    taken: Sequence[Photo],
+) -> Pair:
+    """Return a pair with its adjusted cameras, lenses and media as they were first stated."""
+    seen = adjusted.observations
     photos = [
-        _adjusted_photo(photo, adjusted.cameras[2 * index + side], through)
-        for side, (photo, through) in enumerate(
-            zip((pair.image1, pair.image2), media_of(pair), strict=True)
+        replace(
+            _adjusted_photo(photo, adjusted.cameras[camera], seen.media_of(camera)),
+            file=own.file, image_size=own.image_size, extra=own.extra,
         )
-    ]
+        for camera, own, photo in zip(
+            seen.pairs[index], (pair.image1, pair.image2), taken, strict=True
+        )
+    ]  # fmt: skip
     extra = {key: value for key, value in pair.extra.items() if key != "setup"}
     said = {"way": "joint adjustment", "sigma0": adjusted.sigma0}
     if isinstance(before := pair.extra.get("setup"), dict):

@@ -12,6 +12,7 @@ import numpy as np
 
 from bifocal.model.doubts import CERTAIN
 from bifocal.model.interior_orientation import with_one_lens
+from bifocal.model.pair_media import PairMedia
 from bifocal.orientation import validation
 from bifocal.orientation.approximate_orientation import (
     Given,
@@ -23,8 +24,9 @@ from bifocal.orientation.approximate_orientation import (
     ties_of,
 )
 from bifocal.orientation.as_set_up import check_room
-from bifocal.orientation.bend import STRONGLY_BENT, WallBend, bend_of_wall
+from bifocal.orientation.bend import WallBend, bend_of_wall
 from bifocal.orientation.control_points import Control, SiteMeasures
+from bifocal.orientation.media_options import THROUGH_MEDIA
 from bifocal.orientation.media_report import media_remarks, refuse_impossible_media
 from bifocal.orientation.orientation_remarks import (
     WORST_FIT,
@@ -45,7 +47,6 @@ from bifocal.orientation.orientation_stages import (
     lines_tested,
     oriented_in_stages,
 )
-from bifocal.orientation.pair_media import THROUGH_MEDIA, PairMedia
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
 from bifocal.orientation.photo_order import SURE
 from bifocal.orientation.refracted_bend import refracted_bend
@@ -53,7 +54,8 @@ from bifocal.orientation.refracted_resection import resect_through
 from bifocal.orientation.refracted_stage import with_bent_ties
 from bifocal.orientation.relative_orientation import Ties
 from bifocal.orientation.slips import MOST, Fitted, Typed, slip_of
-from bifocal.orientation.tie_points import FEWEST_ON_WALL, likely_on_wall, tie_positions
+from bifocal.orientation.tie_points import likely_on_wall, tie_positions
+from bifocal.orientation.tuning import TUNING
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.errors import ConvergenceError, GeometryError, PhotogrammetryError, located
 
@@ -83,16 +85,17 @@ def orient_pair(
     GeometryError
         If the photos and measurements do not make a pair; the message says why and what to do.
     """
+    media = media or PairMedia.none()
     return _oriented(Given(photos=photos, control=control, site=site, media=media))
 
 
 def _oriented(given: Given) -> OrientedPair:
     """Return the cameras of a pair; what was mended or exchanged comes here again."""
-    site, media = given.site, given.media
+    site = given.site
     lacking = validation.unknown_lenses(given.interiors, given.names)
-    if media is not None:
+    if given.media:
         try:
-            return _through_media(given, media, lacking)
+            return _through_media(given, lacking)
         except GeometryError as error:
             raise _with_lacking(error, lacking) from error
     interiors, one_lens = with_one_lens(given.interiors)
@@ -147,21 +150,21 @@ def _oriented(given: Given) -> OrientedPair:
         right = _mended_by_ties(given, ties, pair.observations)
         if right is not None:
             return right
-    certain = pair.bend.px - CERTAIN * pair.bend.sigma > STRONGLY_BENT
+    certain = pair.bend.px - CERTAIN * pair.bend.sigma > TUNING.strongly_bent
     bent = hopeless_bend(pair.observations, pair.bend) if certain and not enough else ""
-    if bent and likely_on_wall(pair.observations, pair.adjusted) < FEWEST_ON_WALL:
+    if bent and likely_on_wall(pair.observations, pair.adjusted) < TUNING.fewest_on_wall:
         raise GeometryError(bent)  # what holds a bent wall by small chances only is none
     return _with_words(pair, given, remarks)
 
 
-def _through_media(given: Given, media: PairMedia, lacking: str) -> OrientedPair:
+def _through_media(given: Given, lacking: str) -> OrientedPair:
     """Return the cameras of a pair that looks through media, from control and common points.
 
     Common points say that their bent rays meet; the plane is that of the control points.
     """
     if not given.enough:
         raise GeometryError(THROUGH_MEDIA)
-    control, interiors = given.control, given.interiors
+    control, interiors, media = given.control, given.interiors, given.media
     agree = np.ones(len(control.ids), dtype=bool)
     found = []
     seen_in = zip((control.pixels1, control.pixels2), given.photos, strict=True)
@@ -203,7 +206,7 @@ def _with_words(pair: OrientedPair, given: Given, remarks: tuple[str, ...]) -> O
         *remarks,
         *pair.remarks,
         *wall_remarks(pair),
-        *(media_remarks(pair.adjusted, given.media) if given.media else ()),
+        *media_remarks(pair.adjusted, given.media),
         *control_remarks(given.control, pair),
         *distance_remarks(pair),
     )
@@ -227,7 +230,7 @@ def _reason(
 ) -> PhotogrammetryError:
     """Return why no cameras were found: that the wall is bent where it strongly is, or the error.
 
-    Features as first found are good to a pixel; only a bend beyond `STRONGLY_BENT` counts.
+    Features as first found are good to a pixel; only a bend beyond `Tuning.strongly_bent` counts.
     """
     bent = hopeless_bend(observations, _bend(observations, state))
     return GeometryError(bent) if bent else _with_lacking(error, lacking)

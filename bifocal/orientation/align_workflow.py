@@ -14,14 +14,15 @@ from bifocal.files.images import WRITTEN, ImageInfo, image_info
 from bifocal.model.basis import rests_on
 from bifocal.model.interior_orientation import Interior, lens_of_photo
 from bifocal.model.lens import Lens
+from bifocal.model.pair_media import PairMedia
 from bifocal.model.photo import FARTHEST_WALL
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import Alignment, make_alignment, with_files
 from bifocal.orientation.alignment_picture import write_alignment_picture
 from bifocal.orientation.as_set_up import pair_as_set_up
 from bifocal.orientation.control_points import Control, SiteMeasures, read_control, read_lengths
+from bifocal.orientation.media_options import THROUGH_MEDIA, media_of
 from bifocal.orientation.orientation_stages import PhotoInput
-from bifocal.orientation.pair_media import THROUGH_MEDIA, PairMedia, media_of
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.output import (
@@ -79,7 +80,7 @@ class AlignOptions:
         A level or upright line of the wall in the far photo.
     unit : str
         Unit of the control coordinates; empty: as the headings say, else metres.
-    media : PairMedia or None
+    media : PairMedia
         What lies between cameras and wall.
     """
 
@@ -93,7 +94,7 @@ class AlignOptions:
     length: tuple[tuple[float, ...], float] | None = None
     line: tuple[tuple[float, ...], bool] | None = None
     unit: str = ""
-    media: PairMedia | None = None
+    media: PairMedia = field(default_factory=PairMedia.none)
 
     @classmethod
     def from_given(cls, given: Mapping[str, Any]) -> AlignOptions:
@@ -155,7 +156,7 @@ def align_photos(
     check_not_input(picture, far, near)
     check_all_writable(out, picture, overwrite=overwrite)
     infos = image_info(far), image_info(near)
-    greys = read_greys(far, near, in_water=options.media is not None)
+    greys = read_greys(far, near, in_water=bool(options.media))
     first, second = (
         PhotoInput(grey=grey, interior=interior_of_photo(info, known, number), name=info.path.name)
         for number, (info, known, grey) in enumerate(
@@ -248,7 +249,7 @@ def _way(options: AlignOptions) -> tuple[str, AlignOptions]:
     measured = [value for value in (site.distance1, site.distance2, site.delta_d) if value]
     if site.distance1 and site.distance2 and site.delta_d:
         raise InputError("give two of --distance1, --distance2 and --delta-d; the third follows.")
-    if options.media is not None and options.control is None and not options.as_set_up:
+    if options.media and options.control is None and not options.as_set_up:
         raise InputError(THROUGH_MEDIA)
     if options.as_set_up:
         if options.control is not None or options.auto:

@@ -15,13 +15,13 @@ from bifocal.model.interior_orientation import Cameras, Interior
 from bifocal.model.lens import Lens
 from bifocal.model.orientation_precision import CAMERA, NAMES, moved
 from bifocal.model.pair import Pair
+from bifocal.model.pair_media import PairMedia
 from bifocal.model.photo import Photo
 from bifocal.orientation.facade_lines import LEAST_IN_LINE, facade_turn
-from bifocal.orientation.media_report import media_in_words, straight_distance
+from bifocal.orientation.media_report import media_in_words
 from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput, Photos
 from bifocal.orientation.pair_adjustment import AdjustedPair
-from bifocal.orientation.pair_media import PairMedia
 from bifocal.orientation.pair_observations import PairObservations, at
 from bifocal.orientation.reference_plane import zero_sigma
 from bifocal.orientation.tie_points import (
@@ -200,7 +200,7 @@ def _lens_of(interior: Interior, radial: FloatArray) -> Lens | None:
 
 
 def _photo(
-    camera: Pinhole, interior: Interior, lens: Lens | None, seen: tuple[PairMedia | None, int]
+    camera: Pinhole, interior: Interior, lens: Lens | None, seen: tuple[PairMedia, int]
 ) -> Photo:
     """Return the photo of a camera; ``seen`` are the media and which of their cameras it is."""
     pitch = interior.pixel_size
@@ -213,9 +213,7 @@ def _photo(
         image_size=interior.image_size,
         principal_distance=None if pitch is None else float(camera.matrix[0, 0]) * pitch,
         pixel_size=pitch,
-        layers=None if media is None else media.layers,
-        z0=None if media is None else media.z0(number, camera),
-        interface_normal=None if media is None else media.normal(number, camera),
+        **media.of_photo(number, camera),
     )
 
 
@@ -235,15 +233,13 @@ def standard_deviations(adjusted: AdjustedPair) -> dict[str, float]:
         out[f"focal{number}"] = adjusted.sigma("focal length", number) * camera.matrix[0, 0]
         out[f"tilt{number}_deg"] = float(np.rad2deg(tilt / np.sqrt(2)))
         by_scale[at("focal length", number)] = sign
-        straight, rate = straight_distance(camera, adjusted.media, number - 1)
+        straight, rate = adjusted.media.near_axis(number - 1, camera)
         by_scale[at("Z", number)] = -sign * rate / straight
         by_relief[at("Z", number)] = -sign * rate / straight**2
-    d1, d2 = (
-        straight_distance(camera, adjusted.media, k)[0] for k, camera in enumerate(adjusted.cameras)
-    )
+    d1, d2 = (adjusted.media.near_axis(k, camera)[0] for k, camera in enumerate(adjusted.cameras))
     cameras = adjusted.covariance[: len(NAMES), : len(NAMES)]
     scale, relief = (float(np.sqrt(np.abs(row @ cameras @ row))) for row in (by_scale, by_relief))
-    if adjusted.media is not None and adjusted.of_unknowns.size:
+    if adjusted.of_unknowns.size:
         for row, name in enumerate(adjusted.media.sigmas, start=len(NAMES)):
             out[name] = float(np.sqrt(adjusted.of_unknowns[row, row]))
     return out | {"scale": scale, "relief_scale": relief / abs(1 / d2 - 1 / d1)}

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from bifocal.matching.features import find_features
 from bifocal.model.interior_orientation import Cameras, Interiors
+from bifocal.model.pair_media import PairMedia
 from bifocal.orientation import validation
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import SIGMA_PARALLEL, Photos
-from bifocal.orientation.pair_media import PairMedia
 from bifocal.orientation.pair_observations import PairObservations
 from bifocal.orientation.photo_order import first_is_far
 from bifocal.orientation.relative_orientation import (
@@ -40,7 +40,7 @@ class Given:
     photos: Photos
     control: Control
     site: SiteMeasures
-    media: PairMedia | None = None
+    media: PairMedia = field(default_factory=PairMedia.none)
     settled: bool = False
 
     @property

@@ -5,20 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from bifocal.model.interior_orientation import Cameras
-from bifocal.model.orientation_precision import NAMES, of_distances
+from bifocal.model.orientation_precision import NAMES
+from bifocal.model.pair_media import PairMedia
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair, Photos
 from bifocal.orientation.pair_adjustment import AdjustedPair
-from bifocal.orientation.pair_media import PairMedia
 from bifocal.orientation.pair_observations import PairObservations, at
 from photocore.arrays import FloatArray
 from photocore.camera.pinhole import Pinhole
 from photocore.errors import InputError
 
 
-def pair_as_set_up(
-    photos: Photos, site: SiteMeasures, media: PairMedia | None = None
-) -> OrientedPair:
+def pair_as_set_up(photos: Photos, site: SiteMeasures, media: PairMedia) -> OrientedPair:
     """Return the pair whose cameras stand square to the wall, one behind the other, as typed.
 
     Parameters
@@ -27,7 +25,7 @@ def pair_as_set_up(
         Far photo first; their interior orientations are taken as they are.
     site : SiteMeasures
         Both distances. [m]
-    media : PairMedia, optional
+    media : PairMedia
         What lies between cameras and wall; nothing of it is estimated, the sigmas of its unknowns
         go into the pair's covariance.
 
@@ -61,14 +59,11 @@ def pair_as_set_up(
         for photo, distance in zip(photos, (d1, d2), strict=True)
     )
     check_room(media, (first, second))
-    covariance = of_distances(d1, d2, site.sigma)
-    if media is not None:
-        covariance = _of_typed(media, (first, second), site.sigma)
     nothing = np.zeros((0, 4))
     adjusted = AdjustedPair(
         cameras=(first, second),
         media=media,
-        covariance=covariance,
+        covariance=_of_typed(media, (first, second), site.sigma),
         sigma0=1.0,
         control_residuals=nothing,
         control_test=np.zeros(0),
@@ -82,21 +77,22 @@ def pair_as_set_up(
         assumed=(
             "the set-up exactly as typed: square to the wall, nadirs in the principal points, both "
             f"photos at the typed scales; distances within {1000 * site.sigma:.0f} mm"
-            + ("" if media is None else "; media as typed"),
+            + ("; media as typed" if media else ""),
         ),
     )
 
 
-def check_room(media: PairMedia | None, cameras: Cameras) -> None:
+def check_room(media: PairMedia, cameras: Cameras) -> None:
     """Refuse media that begin before a camera, or end behind the wall.
 
     Raises
     ------
     InputError
     """
-    for number, camera in enumerate(cameras if media is not None else ()):
-        assert media is not None
+    for number, camera in enumerate(cameras):
         path = media.path(number, camera)
+        if not path:
+            return
         if path.z0 < 0:
             raise InputError(
                 f"--depth {media.depth:g} m: with {media.layers.thickness:g} m of media before it "
@@ -115,15 +111,15 @@ def check_room(media: PairMedia | None, cameras: Cameras) -> None:
 def _of_typed(media: PairMedia, cameras: Cameras, sigma: float) -> FloatArray:
     """Return the covariance of typed distances and media at scales that are exact.
 
-    The scale on the wall near the axis is the principal distance over `MediaPath.near_axis`: that
+    The scale on the wall near the axis is the principal distance over `PairMedia.near_axis`: that
     is what an error of the distance leaves as it is.
     """
     out = np.zeros((len(media.names), len(media.names)))
     for number, camera in enumerate(cameras):
         row = np.zeros(len(media.names))
         row[at("Z", number + 1)] = 1.0
-        apparent = media.path(number, camera).near_axis / media.near_axis_rate()
-        row[at("focal length", number + 1)] = 1.0 / apparent
+        apparent, rate = media.near_axis(number, camera)
+        row[at("focal length", number + 1)] = 1.0 / (apparent / rate)
         out += sigma**2 * np.outer(row, row)
     for place, name in enumerate(media.names[len(NAMES) :], start=len(NAMES)):
         known = media.sigmas[name]

@@ -72,7 +72,7 @@ def match_pair_file(pair_path: Pair | Path, settings: MatchSettings) -> tuple[Pa
     """
     pair = Pair.of(pair_path)
     paths = photo_info(pair, 1).path, photo_info(pair, 2).path
-    images = read_greys(*paths, in_water=pair.layers is not None)
+    images = read_greys(*paths, in_water=pair.refracted)
     return pair, match_pair(pair, images, settings)
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from bifocal.model.pair_media import PairMedia
 from bifocal.orientation.pair_adjustment import AdjustedPair
-from bifocal.orientation.pair_media import PairMedia
 from photocore.adjustment import correlations
 from photocore.adjustment.priors import (
     ALIKE,
@@ -16,31 +16,13 @@ from photocore.adjustment.priors import (
     is_possible,
     typical_sigma,
 )
-from photocore.camera.pinhole import Pinhole
 from photocore.errors import GeometryError
 
 
-def straight_distance(camera: Pinhole, media: PairMedia | None, number: int) -> tuple[float, float]:
-    """Return the distance of the straight camera that sees alike near the axis, and its rate.
-
-    Parameters
-    ----------
-    camera : Pinhole
-    media : PairMedia or None
-        None in air, where both are the camera's own distance and one.
-    number : int
-        0 for the far camera, 1 for the near one.
-    """
-    distance = float(camera.centre[2])
-    if media is None:
-        return distance, 1.0
-    return media.path(number, camera).near_axis, media.near_axis_rate()
-
-
-def media_in_words(adjusted: AdjustedPair, given: PairMedia | None) -> tuple[str, ...]:
+def media_in_words(adjusted: AdjustedPair, given: PairMedia) -> tuple[str, ...]:
     """Return what lies between cameras and wall, and what of it was estimated, in sentences."""
     media = adjusted.media
-    if media is None or given is None:
+    if not media:
         return ()
     indices = ", ".join(f"{n:.4g}" for n in media.layers.indices)
     layers = ", ".join(f"{1000 * t:.4g} mm" for t in media.layers.thicknesses)
@@ -59,11 +41,9 @@ def media_in_words(adjusted: AdjustedPair, given: PairMedia | None) -> tuple[str
     return tuple(words)
 
 
-def media_remarks(adjusted: AdjustedPair, given: PairMedia | None) -> tuple[str, ...]:
+def media_remarks(adjusted: AdjustedPair, given: PairMedia) -> tuple[str, ...]:
     """Return which unknowns of the media the data do not carry, or cannot tell from others."""
     media = adjusted.media
-    if media is None or given is None:
-        return ()
     told = []
     factor = max(adjusted.sigma0, 1.0)
     for row, name in _estimated(adjusted, media):
@@ -87,7 +67,6 @@ def refuse_impossible_media(adjusted: AdjustedPair, given: PairMedia) -> None:
         Naming the unknown, its value and what it cannot be told apart from.
     """
     media = adjusted.media
-    assert media is not None
     for row, name in _estimated(adjusted, media):
         start, value = given.value(name), media.value(name)
         sigma = given.sigmas[name]

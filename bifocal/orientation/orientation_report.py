@@ -6,8 +6,7 @@ import numpy as np
 
 from bifocal import rays
 from bifocal.model.interior_orientation import Cameras
-from bifocal.orientation.media_report import straight_distance
-from bifocal.orientation.pair_media import PairMedia
+from bifocal.model.pair_media import PairMedia
 from bifocal.precision import base_factor
 from photocore.camera.pinhole import Pinhole
 
@@ -36,14 +35,14 @@ def orientation_in_words(
     fits : bool
         Whether the model does; else nothing is said of how good relief is.
     """
-    far, near = cameras
+    (far, near), media = cameras, media or PairMedia.none()
     d1, d2 = float(far.centre[2]), float(near.centre[2])
     # Near the axis; in air the distances themselves.
     straight1, straight2 = (
-        straight_distance(camera, media, number)[0] for number, camera in enumerate(cameras)
+        media.near_axis(number, camera)[0] for number, camera in enumerate(cameras)
     )
     base = base_factor(d1=straight1, d2=straight2)
-    bent = 1.0 if media is None else media.layers.indices[0] / media.layers.indices[-1]
+    bent = media.layers.indices[0] / media.layers.indices[-1]
     scales = far.matrix[0, 0] / straight1, near.matrix[0, 0] / straight2
     pixel = max(straight1 / far.matrix[0, 0], straight2 / near.matrix[0, 0]) * bent
     words = [

@@ -13,8 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.stats import chi2, norm
 
-from bifocal.model.orientation_precision import CAMERA, NAMES, names_of, place_by_media
-from bifocal.model.refracted_view import RefractedView
+from bifocal.model.orientation_precision import NAMES, rates_of
 from bifocal.orientation.facade_lines import FacadeDirection
 from bifocal.orientation.pair_observations import (
     Equations,
@@ -22,13 +21,8 @@ from bifocal.orientation.pair_observations import (
     PairUnknowns,
     at,
 )
-from bifocal.orientation.refracted_observations import (
-    known_points,
-    pixels_of,
-    views_of,
-    with_media_priors,
-)
-from bifocal.orientation.refracted_ties import bent_equations, bent_misfit
+from bifocal.orientation.refracted_ties import meeting_equations
+from bifocal.orientation.seen_points import known_points, views_of, with_media_priors
 from photocore import adjustment
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import (
@@ -127,12 +121,12 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
     cofactor[np.ix_(free, free)] = fit.linear.cofactor
     state = fit.state
     covariance = cofactor * max(sigma0, 1.0) ** 2
-    by = None if state.media is None else state.media.by_unknowns()
+    by = state.media.by_unknowns()
     return AdjustedPair(
         cameras=state.cameras,
         radial=state.radial,
         media=state.media,
-        covariance=covariance if by is None else by @ covariance @ by.T,
+        covariance=by @ covariance @ by.T,
         of_unknowns=covariance,
         sigma0=sigma0,
         control_residuals=_control_residuals(observations, state),
@@ -144,9 +138,15 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
 
 def tie_misfit(observations: PairObservations, state: PairUnknowns) -> FloatArray:
     """Return the signed distance of all ties from their epipolar lines, shape (m,). [px]"""
-    if state.media is not None:
-        return bent_misfit(observations, state, np.ones(len(observations.tie1), dtype=bool))
-    return _epipolar(observations, state, np.ones(len(observations.tie1), dtype=bool))[0]
+    return _tie_equations(observations, state, np.ones(len(observations.tie1), dtype=bool))[0]
+
+
+def _tie_equations(
+    observations: PairObservations, state: PairUnknowns, which: BoolArray
+) -> Equations:
+    """Return by how much rays of ties miss each other: `_epipolar`, `meeting_equations`. [px]"""
+    rows_of = meeting_equations if state.media else _epipolar
+    return rows_of(observations, state, which)
 
 
 def wall_misfit(observations: PairObservations, state: PairUnknowns) -> FloatArray:
@@ -154,7 +154,7 @@ def wall_misfit(observations: PairObservations, state: PairUnknowns) -> FloatArr
 
     NaN through media, where the plane is no homography.
     """
-    if state.media is not None:
+    if state.media:
         return np.full(len(observations.tie1), np.nan)
     return _transfer(observations, state, np.ones(len(observations.tie1), dtype=bool))[0]
 
@@ -171,14 +171,11 @@ def evaluated(observations: PairObservations, adjusted: AdjustedPair) -> Adjuste
 def pair_equations(observations: PairObservations, state: PairUnknowns) -> Equations:
     """Return everything observed against computed in standard deviations, and derivatives."""
     used, wall = observations.tie_used, observations.wall
-    parts = [_priors(observations, state)]
-    if observations.media is not None and state.media is not None:
-        parts = [with_media_priors(parts[0], observations.media, state.media)]
+    parts = [with_media_priors(_priors(observations, state), observations.media, state.media)]
     if used.any():
-        rows_of = _epipolar if state.media is None else bent_equations
-        values, by = rows_of(observations, state, used)
+        values, by = _tie_equations(observations, state, used)
         parts.append((values / observations.sigma_ties, by / observations.sigma_ties))
-    if wall.any() and state.media is None:
+    if wall.any() and not state.media:
         parts.append(wall_equations(observations, state))
     if observations.lines:
         parts.append(line_equations(observations.lines, state))
@@ -389,16 +386,11 @@ def _control(
         turn, triangle = base.transpose(0, 2, 1), triangle[:, :3]
         split = turn @ np.concatenate([misfit, (known - xyz) / sigma], axis=1)[..., None]
         xyz = xyz + np.linalg.solve(triangle, split[:, :3])[..., 0]
-    by = np.zeros((len(xyz), 4, len(names_of(state.layers))))
-    for number, (model, x) in enumerate(zip(models, raw, strict=True)):
-        view = views[number]
-        half, first = slice(2 * number, 2 * number + 2), number * len(CAMERA)
-        by[:, half, first : first + len(PARAMETERS)] = -view.by_camera
-        by[:, half, first + len(PARAMETERS) : first + len(CAMERA)] = model.undistorted_by_k(x)
-        if isinstance(view, RefractedView) and state.layers is not None:
-            place_by_media(by[:, half], -view.by_media, number, state.layers)
-    if state.media is not None:
-        by = by @ state.media.by_unknowns()
+    rates = [
+        rates_of(seen_by, -model.undistorted_by_k(x), number)
+        for number, (seen_by, model, x) in enumerate(zip(views, models, raw, strict=True))
+    ]
+    by = state.media.rates_by_unknowns(-np.concatenate(rates, axis=1))
     split_by = turn[:, :, :4] @ np.where(seen[:, :, None], np.nan_to_num(by / sigma_pick), 0.0)
     return _AdjustedControl(
         misfit=split[:, 3:, 0],
@@ -415,10 +407,10 @@ def _control_residuals(observations: PairObservations, state: PairUnknowns) -> F
         return np.zeros((0, 4))
     xyz = np.where(np.isfinite(control.xyz), control.xyz, _control(observations, state).xyz)
     parts = [
-        model.undistort(pixels) - seen
+        model.undistort(pixels) - seen.pixels
         for model, pixels, seen in zip(
             observations.radial_models(state.radial), (control.pixels1, control.pixels2),
-            pixels_of(state, xyz), strict=True,
+            views_of(state, xyz), strict=True,
         )
     ]  # fmt: skip
     return np.concatenate(parts, axis=1)

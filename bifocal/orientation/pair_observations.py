@@ -8,10 +8,9 @@ import numpy as np
 
 from bifocal.model.interior_orientation import Cameras, Interiors
 from bifocal.model.orientation_precision import CAMERA, NAMES
+from bifocal.model.pair_media import PairMedia
 from bifocal.orientation.control_points import Control
 from bifocal.orientation.facade_lines import FacadeDirection
-from bifocal.orientation.pair_media import PairMedia
-from multimedia import Layers
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.distortion import RadialDivision
 
@@ -65,8 +64,8 @@ class PairObservations:
         Directions of the façade's lines, each along the wall.
     free_datum : bool
         Whether origin and turn of the plane frame are free and must be held.
-    media : PairMedia or None
-        What lies between cameras and object, as given, with its unknowns; None in air.
+    media : PairMedia
+        What lies between cameras and object, as given, with its unknowns.
     """
 
     interiors: Interiors
@@ -85,12 +84,12 @@ class PairObservations:
     sigma_tilt: float | None = None
     lines: tuple[FacadeDirection, ...] = ()
     free_datum: bool = False
-    media: PairMedia | None = None
+    media: PairMedia = field(default_factory=PairMedia.none)
 
     @property
     def names(self) -> tuple[str, ...]:
         """The unknowns: `NAMES`, and those of the media."""
-        return NAMES if self.media is None else self.media.names
+        return self.media.names
 
     @property
     def estimated(self) -> BoolArray:
@@ -128,23 +127,18 @@ class PairUnknowns:
     cameras : pair of Pinhole
     radial : ndarray, shape (2, 2)
         Radial distortion k1, k2 of either photo.
-    media : PairMedia or None
-        What lies between cameras and object; None in air.
+    media : PairMedia
+        What lies between cameras and object.
     """
 
     cameras: Cameras
     radial: FloatArray = field(default_factory=lambda: np.zeros((2, 2)))
-    media: PairMedia | None = None
-
-    @property
-    def layers(self) -> Layers | None:
-        """The media's indices and thicknesses; None in air."""
-        return None if self.media is None else self.media.layers
+    media: PairMedia = field(default_factory=PairMedia.none)
 
     def stepped(self, step: FloatArray) -> PairUnknowns | None:
         """Return the unknowns after a step of all names; None where media cannot be so."""
-        media = self.media and self.media.stepped(step[len(NAMES) :])
-        if media is None and self.media is not None:
+        media = self.media.stepped(step[len(NAMES) :])
+        if media is None:
             return None
         parts = step[: len(NAMES)].reshape(2, len(CAMERA))
         first, second = (c.stepped(p) for c, p in zip(self.cameras, parts, strict=True))

@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from bifocal.files.haze import greys_through_water
 from bifocal.files.images import as_grey
 from bifocal.model.interior_orientation import Interior
+from bifocal.model.pair_media import PairMedia
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import Alignment, make_alignment
 from bifocal.orientation.as_set_up import pair_as_set_up
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import PhotoInput
-from bifocal.orientation.pair_media import PairMedia
 from photocore.arrays import as_points
 from photocore.errors import InputError
 
@@ -101,8 +101,8 @@ def align(
     """
     if line is not None and line[0] not in ("level", "upright"):
         raise InputError(f"line: expected level or upright and two pixels, got {line[0]!r}.")
-    site = site or SiteMeasures()
-    if media is not None and image1 is not None and image2 is not None:
+    site, media = site or SiteMeasures(), media or PairMedia.none()
+    if media and image1 is not None and image2 is not None:
         image1, image2 = greys_through_water(image1, image2)
     photos = (_photo(image1, interiors[0], "image1"), _photo(image2, interiors[1], "image2"))
     direction = line and (as_points(line[1], "line", dimension=2), line[0] == "upright")

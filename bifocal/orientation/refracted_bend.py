@@ -5,15 +5,13 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from bifocal import rays
 from bifocal.model.homography import apply_homography
-from bifocal.model.refracted_view import foot_of
 from bifocal.orientation.bend import WallBend, bend_of_wall
 from bifocal.orientation.pair_adjustment import AdjustedPair
 from bifocal.orientation.pair_observations import PairUnknowns
-from bifocal.orientation.refracted_observations import guessed_points, pixels_of
+from bifocal.orientation.seen_points import meeting_points, on_the_plane, views_of
 from photocore.arrays import FloatArray
-from photocore.camera.pinhole import project, ray_on_plane
+from photocore.camera.pinhole import project
 
 #: Draws of the cameras and media as uncertain as they are, and the bend that counts, in what they
 #: bend the wall by.
@@ -42,7 +40,7 @@ def refracted_bend(
     """
     flat = straightened(adjusted, pixels1, pixels2)
     known = np.isfinite(np.concatenate(flat, axis=1)).all(axis=1)
-    xyz = guessed_points(adjusted, np.hstack([pixels1, pixels2])[known])[0]
+    xyz = meeting_points(adjusted, pixels1[known], pixels2[known])
     height = xyz[:, 2] / adjusted.cameras[0].centre[2]
     bend = bend_of_wall(flat[0][known], flat[1][known], size, height)
     return bend if bend.px > BEYOND * _open(adjusted, size) else WallBend()
@@ -55,24 +53,20 @@ def straightened(
 
     Between photos of a wall freed of refraction the wall is a plane again.
     """
-    assert state.media is not None
-    out = []
-    for number, (camera, pixels) in enumerate(zip(state.cameras, (pixels1, pixels2), strict=True)):
-        foot = foot_of(camera, state.media.path(number, camera))
-        place = rays.object_rays(ray_on_plane(camera, pixels)[:, :2], foot).position
-        out.append(project(camera, np.column_stack([place, np.zeros(len(place))])))
-    return out[0], out[1]
+    first, second = (
+        project(camera, on_the_plane(state, number, pixels))
+        for number, (camera, pixels) in enumerate(
+            zip(state.cameras, (pixels1, pixels2), strict=True)
+        )
+    )
+    return first, second
 
 
 def _open(adjusted: AdjustedPair, size: tuple[int, int]) -> float:
     """Return how much the uncertainty of cameras and media bends a flat wall, root mean square."""
     columns, rows = np.meshgrid(np.linspace(0, size[0], 12), np.linspace(0, size[1], 8))
     seen = np.column_stack([columns.ravel(), rows.ravel()])
-    camera, media = adjusted.cameras[0], adjusted.media
-    assert media is not None
-    foot = foot_of(camera, media.path(0, camera))
-    place = rays.object_rays(ray_on_plane(camera, seen)[:, :2], foot).position
-    seen1, seen2 = pixels_of(adjusted, np.column_stack([place, np.zeros(len(place))]))
+    seen1, seen2 = (view.pixels for view in views_of(adjusted, on_the_plane(adjusted, 0, seen)))
     values, vectors = np.linalg.eigh(adjusted.of_unknowns)
     factor = vectors * np.sqrt(np.maximum(values, 0.0))
     squares = []

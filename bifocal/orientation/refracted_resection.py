@@ -8,8 +8,7 @@ import numpy as np
 
 from bifocal import rays
 from bifocal.model.interior_orientation import Interior
-from bifocal.model.refracted_view import foot_of
-from bifocal.orientation.pair_media import PairMedia
+from bifocal.model.pair_media import PairMedia
 from bifocal.orientation.space_resection import resect
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import Pinhole
@@ -80,7 +79,7 @@ def resect_through(
 
 def _seeming(camera: Pinhole, media: PairMedia, number: int, xyz: FloatArray) -> FloatArray:
     """Return points moved along their heights onto the straight rays that show them, (n, 3)."""
-    foot = foot_of(camera, media.path(number, camera))
+    foot = media.foot(number, camera)
     away = rays.plane_position(xyz, foot) - foot.nadir
     reach = 1.0 - xyz[:, 2:] / foot.distance
     return np.concatenate([foot.nadir + away * reach, xyz[:, 2:]], axis=1)

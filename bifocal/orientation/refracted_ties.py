@@ -1,57 +1,48 @@
-"""Common points of photos taken through media: their bent rays meet, and nothing else is asked."""
+"""Common points of photos taken through media: their rays meet, and nothing else is asked."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from bifocal import rays
-from bifocal.model.homography import homography_jacobian
-from bifocal.model.refracted_view import foot_of
+from bifocal.model.orientation_precision import rates_of
 from bifocal.orientation.pair_observations import Equations, PairObservations, PairUnknowns
-from photocore.arrays import BoolArray, FloatArray
-from photocore.camera.pinhole import plane_from_pixel, ray_on_plane
+from bifocal.orientation.seen_points import meeting_points, views_of
+from photocore.arrays import BoolArray
 
-#: Steps of the derivatives: pixels, and everything else (logarithms, radians, metres, indices).
-STEP_PIXEL, STEP = 1e-3, 1e-6
+#: Steps to the point nearest to both rays; the first is good to a thousandth of the misfit.
+STEPS = 2
 
 
-def bent_misfit(
+def meeting_equations(
     observations: PairObservations, state: PairUnknowns, which: BoolArray
-) -> FloatArray:
-    """Return how far ties are from places where their bent rays meet, signed, shape (m,). [px]
+) -> Equations:
+    """Return how far ties are from pixels whose refracted rays meet, signed, shape (m,). [px]
+
+    With the derivatives by the unknowns, shape (m, u).
 
     Notes
     -----
-    With f = 0 where both rays meet (`bifocal.rays.meeting_of`), f over the length of its gradient
-    by the four pixels, as the Sampson distance from an epipolar line.
+    Four pixels and three unknown coordinates: what the nearest point leaves of the pixels has one
+    direction, square to all that moving the point can do. The point being nearest, neither it nor
+    that direction needs a derivative.
     """
-    assert state.media is not None
-    straight = observations.straight_ties(state.radial)
-    places, metres, feet = [], [], []
-    for number, (camera, pixels) in enumerate(zip(state.cameras, straight, strict=True)):
-        places.append(ray_on_plane(camera, pixels[which])[:, :2])
-        metres.append(homography_jacobian(plane_from_pixel(camera), pixels[which]))
-        feet.append(foot_of(camera, state.media.path(number, camera)))
-    value, *by_places = rays.meeting_of(feet[0], feet[1], np.zeros(2))(places[0], places[1])
-    by_pixels = [(g[:, None, :] @ j)[:, 0] for g, j in zip(by_places, metres, strict=True)]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(value / np.linalg.norm(np.hstack(by_pixels), axis=1))
-
-
-def bent_equations(
-    observations: PairObservations, state: PairUnknowns, which: BoolArray
-) -> Equations:
-    """Return `bent_misfit` and its derivatives by the unknowns, by central differences."""
-    names, free = observations.names, observations.estimated
-    by = np.zeros((int(which.sum()), len(names)))
-    for column in np.flatnonzero(free):
-        size = STEP_PIXEL if names[column].startswith(("column", "row")) else STEP
-        step = np.zeros(len(names))
-        step[column] = size
-        ahead, behind = state.stepped(step), state.stepped(-step)
-        # At the end of what can be, as a thickness of zero, one side only.
-        ends = [end or state for end in (ahead, behind)]
-        wide = size * ((ahead is not None) + (behind is not None))
-        parts = [bent_misfit(observations, end, which) for end in ends]
-        by[:, column] = (parts[0] - parts[1]) / wide
-    return bent_misfit(observations, state, which), by
+    models = observations.radial_models(state.radial)
+    raw = observations.tie1[which], observations.tie2[which]
+    straight = [model.undistort(x) for model, x in zip(models, raw, strict=True)]
+    pixels, xyz = np.concatenate(straight, axis=1), meeting_points(state, *straight)
+    for _ in range(STEPS):
+        views = views_of(state, xyz)
+        design = np.concatenate([seen.by_point for seen in views], axis=1)
+        lost = ~np.isfinite(design).all(axis=(1, 2))
+        design[lost] = np.eye(4, 3)
+        off = pixels - np.concatenate([seen.pixels for seen in views], axis=1)
+        base, triangle = np.linalg.qr(design, mode="complete")
+        along = base.transpose(0, 2, 1) @ off[..., None]
+        xyz = xyz + np.linalg.solve(triangle[:, :3], along[:, :3])[..., 0]
+    rates = [
+        rates_of(seen, -model.undistorted_by_k(x), number)
+        for number, (seen, model, x) in enumerate(zip(views, models, raw, strict=True))
+    ]
+    across = base[:, None, :, 3]
+    by = state.media.rates_by_unknowns(-(across @ np.concatenate(rates, axis=1))[:, 0])
+    return along[:, 3, 0], by

@@ -410,7 +410,7 @@ def _notes(pair: Pair, grid: Grid, wish: DeliverTask, task: OrthoTask) -> tuple[
     relief = task.relief or task.points
     dpi = dpi_at_scale(grid.gsd, wish.scale)
     image = {"1": "far photo", "2": "near photo", "both": "both photos"}[task.image]
-    media = () if pair.layers is None else (f"seen through {media_words(pair.layers)}",)
+    media = (f"seen through {media_words(pair.layers)}",) if pair.layers else ()
     return (
         f"pixel {grid.gsd * 1000:.4g} mm on the wall, {dpi:.4g} dpi on paper",
         f"{image}, camera distances {pair.image1.distance:.3f} m and {pair.image2.distance:.3f} m",

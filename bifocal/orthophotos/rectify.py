@@ -196,13 +196,13 @@ def _project(
     ``q = N + (P - N) k`` with ``k = d / (d - r)``, Midulla Eq. (1) on the plane; the homography
     is linear in (q, 1), so it becomes ``a + k (b (X - Nx) + c (Y - Ny))`` in each of its rows.
     """
-    if photo.media is not None and photo.media.turn is not None:
+    if photo.leans:
         return _project_leaning(photo, size, grid, relief)
     matrix = np.linalg.inv(photo.plane_from_pixel)
     nx, ny = photo.nadir
     x, y = grid.columns_x - nx, grid.rows_y - ny
     relief = relief.astype(np.float64)
-    radius = np.zeros(()) if photo.media is None else np.hypot(x[None, :], y[:, None])
+    radius = np.zeros(()) if not photo.refracted else np.hypot(x[None, :], y[:, None])
     k = apparent_magnification(radius, relief, photo.foot)  # Eq. (1), through media Maas Eq. (2)
     constant = matrix @ np.array([nx, ny, 1.0])
     reach = max(np.abs(x).max(), np.abs(y).max())

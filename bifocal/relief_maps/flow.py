@@ -155,7 +155,7 @@ def _is_plain(frame: Frame) -> bool:
 
 def split(frame: Frame, flow: Float32Array) -> tuple[Float32Array, Float32Array]:
     """Return relief [m] and the flow across the radius [px] of a flow from photo 1."""
-    if frame.pair.layers is not None:
+    if frame.pair.refracted:
         return _split_bent(frame, flow)
     x, y = frame.from_centre()
     square = x * x + y * y
@@ -196,7 +196,7 @@ def sigma_of_relief(frame: Frame, relief: Float32Array, sigma_px: Float32Array) 
     ``sigma_r = sigma_m B / s'`` at r = 0 with B = d1 d2 / (d1 - d2): `precision.sigma_relief`
     with all error in image 2.
     """
-    if frame.pair.layers is not None:
+    if frame.pair.refracted:
         rate_x, rate_y = _rates(frame, *zoom_map(frame, relief))
         away = np.maximum(np.hypot(rate_x, rate_y), np.float32(0.5 / frame.pair.base_factor))
         share = np.abs(rays.reduction(relief, np.float32(frame.distances[1])))

@@ -229,7 +229,7 @@ def working_grid(pair: Pair, shape1: tuple[int, ...], box: Bounds, gsd: float) -
     matrix = photo.plane_from_pixel / photo.plane_from_pixel[2, 2]
     ideal = np.array([[gsd, 0, matrix[0, 2]], [0, -gsd, matrix[1, 2]], [0, 0, 1.0]])
     span = max(shape1[:2])
-    straight = photo.lens is None and photo.media is None
+    straight = photo.lens is None and not photo.refracted
     if straight and np.abs((matrix - ideal)[:, :2]).max() * span < SAME_LATTICE * gsd:
         column, row = np.rint(np.linalg.inv(matrix)[:2] @ np.array([grid.x0, grid.y0, 1.0]))
         x0, y0 = matrix[:2] @ np.array([column, row, 1.0])
@@ -261,7 +261,7 @@ def make_frame(
             "photos show the same wall."
         )
     fields = None
-    if pair.layers is not None:
+    if pair.refracted:
         reliefs = relief_range or (0.0, 0.0)
         first_rays, second_rays = (
             RayField.over(photo.foot, grid.bounds, reliefs) for photo in (pair.image1, pair.image2)
@@ -282,7 +282,7 @@ def _on_grid(photo: Photo, image: ByteArray, grid: Grid) -> tuple[ByteArray, Boo
     matrix = np.linalg.inv(photo.plane_from_pixel) @ grid.plane_from_pixel
     matrix = matrix / matrix[2, 2]
     height, width = image.shape
-    straight = photo.lens is None and photo.media is None
+    straight = photo.lens is None and not photo.refracted
     shift = _whole_shift(matrix, grid) if straight else None
     if shift is not None:
         window = (*shift, grid.width, grid.height)
@@ -310,7 +310,7 @@ def _on_grid(photo: Photo, image: ByteArray, grid: Grid) -> tuple[ByteArray, Boo
         result[rows] = cv2.remap(
             image, maps, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
         )
-    if photo.media is None:
+    if not photo.refracted:
         result[~seen] = 0
     return result, seen
 
@@ -330,7 +330,7 @@ def zoom_map(frame: Frame, relief: Float32Array) -> tuple[Float32Array, Float32A
 
     Eq. (6) read the other way round, about the zoom centre: q2 - e = k(r) (q1 - e).
     """
-    if frame.pair.layers is not None:
+    if frame.pair.refracted:
         return shown_at(frame, *offsets(frame.grid.shape), relief)
     d1, d2 = frame.distances
     factor = rays.zoom_factor(relief, d1=d1, d2=d2).astype(np.float32)

@@ -112,7 +112,7 @@ def _cost_volume(
     content = inside.astype(np.float32)
     for i, zoom in enumerate(rays.zoom_factor(relief, d1=d1, d2=d2).astype(np.float32)):
         maps = (zoom * x + np.float32(centre[0]), zoom * y + np.float32(centre[1]))
-        if frame.pair.layers is not None:
+        if frame.pair.refracted:
             maps = _coarse_map(frame, (height, width), float(relief[i]))
         moved = cv2.remap(near, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         there = cv2.remap(content, *maps, cv2.INTER_LINEAR, borderValue=0.0)

@@ -79,7 +79,7 @@ def _way_to(photo: Photo, end: float) -> tuple[list[float], list[float]]:
     """Return X and distance along the ray of a photo to a place on the wall. [m]"""
     x, d = float(photo.nadir[0]), photo.distance
     media = photo.media
-    if media is None or media.turn is not None:
+    if not media or photo.leans:
         return [x, end], [d, 0.0]
     offset = np.array([end - x, 0.0])
     tangent = float(media.apparent(offset, np.zeros(()))[0]) / d
@@ -96,8 +96,7 @@ def _way_to(photo: Photo, end: float) -> tuple[list[float], list[float]]:
 
 def _draw_media(axes: Any, photo: Photo, ends: tuple[float, float]) -> None:
     """Draw the first and the last interface before a photo, as wide as its rays are there."""
-    media = photo.media
-    if media is None or media.turn is not None:
+    if not photo.refracted or photo.leans:
         return
     ways = [_way_to(photo, end) for end in ends]
     for row in {1, len(ways[0][0]) - 2}:

@@ -95,11 +95,11 @@ def _geometry(content: PairContent, say: Words) -> Iterator[Block]:
             say("tilt"),
             *(f"{figures.tilt_of(seen.photo, seen):.2f}°" for seen in content.photos),
         ])  # fmt: skip
-    layers = content.pair.layers
-    if layers is not None:
+    layers, key = content.pair.layers, "base"
+    if layers:
+        key = "base_media"
         rows.append([say("media"), media_words(layers), ""])
         rows.append([say("z0"), *(f"{photo.z0 or 0.0:.3f} m" for photo in photos)])
-    key = "base" if layers is None else "base_media"
     rows.append([say(key), f"{content.pair.base_factor:.2f} m", ""])
     yield TextTable(headings=[say("quantity"), say("far"), say("near")], rows=rows)
     yield from refraction_blocks(content, say)

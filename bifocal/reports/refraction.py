@@ -19,7 +19,7 @@ _GRID = 15
 
 def refraction_blocks(content: PairContent, say: Words) -> Iterator[Block]:
     """Yield the paragraph on neglected refraction; nothing in air."""
-    if content.pair.layers is None:
+    if not content.pair.refracted:
         return
     yield Paragraph(text=say("refraction", **_sizes(plane_errors(content))))
     if content.solution is not None:

@@ -50,7 +50,7 @@ def method_blocks(content: PairContent, say: Words) -> Iterator[Block]:
             f"N{k + 1} = ({photo.nadir[0]:.4f}, {photo.nadir[1]:.4f}) m, d{k + 1} = "
             f"{photo.distance:.4f} m    "
         )
-        if photo.media is not None:
+        if photo.refracted:
             tangent = (q[k] - photo.nadir) / photo.distance
             slope_lines[k] += f"z0 = {photo.z0:.4f} m    t{k + 1} = {_vector(tangent, 7)}    "
             q[k], slope = object_rays(q[k], photo.foot)
@@ -60,8 +60,8 @@ def method_blocks(content: PairContent, say: Words) -> Iterator[Block]:
             v[k] = (q[k] - photo.nadir) / photo.distance
         s[k] = photo.precision(solution.sigma_px) * _spacing(photo, raw, relief)
         slope_lines[k] += f"v{k + 1} = {_vector(v[k], 7)}"
-    bent = pair.layers is not None
-    if pair.layers is not None:
+    bent = pair.refracted
+    if pair.layers:
         slope_lines.insert(0, media_words(pair.layers))
     yield Paragraph(text=say("step_pixels"), lines=("   ".join(pixel_lines),))
     yield Paragraph(text=say("step_plane"), lines=tuple(plane_lines))
@@ -75,11 +75,7 @@ def _vector(values: FloatArray, digits: int) -> str:
 
 def _spacing(photo: Photo, raw: FloatArray, relief: float) -> float:
     """Return the pixel on the wall; through media by how much it moves the ray at a relief. [m]"""
-    if photo.media is None:
-        return float(np.sqrt(abs(np.linalg.det(photo.metres_per_pixel(raw[None])[0]))))
-    away = photo.apparent_from_pixels(raw[None]) - photo.nadir
-    _, place, slope = photo.media.trace_with_jacobian(away)
-    moved = (place + relief * slope) @ photo.apparent_by_pixel(raw[None])
+    moved = photo.metres_per_pixel(raw[None], relief if photo.refracted else 0.0)
     return float(np.sqrt(abs(np.linalg.det(moved[0]))))
 
 
@@ -90,7 +86,7 @@ def _solved(
     assert content.solution is not None
     q, v, s = rays
     table, pair = content.solution.table, content.pair
-    bent = pair.layers is not None
+    bent = pair.refracted
     shift, slope = q[0] - q[1], v[0] - v[1]
     square = float(slope @ slope)
     r = float(shift @ slope) / square

@@ -250,7 +250,7 @@ def _root_weights(pair: Pair, first: FloatArray, second: FloatArray, sigma: floa
     """Return matrices that make differences of apparent positions unit normal, (n, 2, 2)."""
     covariance = np.zeros((len(first), 2, 2))
     seen = pair.image1.metres_per_pixel(first)
-    if pair.layers is not None:
+    if pair.refracted:
         places = pair.image1.plane_from_pixels(first)
         on_plane = np.column_stack([places, np.zeros(len(places))])
         seen = rays.design_rows(on_plane, pair.image2.foot)[:, :, :2] @ seen

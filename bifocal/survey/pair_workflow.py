@@ -109,7 +109,7 @@ def _general(setup: SurveySetup, path: Path) -> Pair:
     pair = described_pair(setup, file, path.parent)
     if pair is None:
         raise InputError("the distances d_1 and d_2 are needed beside the homographies.")
-    if setup.media is not None and setup.media.layers is None:
+    if setup.media and not setup.refracted:
         pair = pair.in_air()
     first, second = pair.as_given
     typed = _photo_files(setup, path.parent)
@@ -181,7 +181,7 @@ def _ideal(setup: SurveySetup, folder: Path) -> Pair:
             pair.as_given, names, sizes, setup.adjusted, strict=True
         )
     ]
-    if setup.media is not None and setup.media.layers is not None:
+    if setup.media and setup.refracted:
         through = [setup.media.through(number) for number in (1, 2)]
         photos = [
             replace(photo, layers=layers, z0=z0)

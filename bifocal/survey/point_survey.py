@@ -165,7 +165,7 @@ def _measured_radii(
     k12 = 1.0
     if scale_number is not None and second.scale_number is not None:
         k12 = second.scale_number / scale_number  # brings image 2 to the scale of image 1
-        if first.media is not None:
+        if first.refracted:
             k12 = scale_ratio(first, second)
     (x1, y1), (x2, y2) = points.xy1.T, points.xy2.T
     cartesian = points.is_cartesian
@@ -201,7 +201,7 @@ def _measured_radii(
             sigma_2=k12 * sigma, metres=np.nan if scale_number is None else scale_number / 1000,
         ),
     )  # fmt: skip
-    if first.media is None:
+    if not first.refracted:
         return found
     return bent_radii(found, (first, second), (s1, s2 / k12), sigma)
 
@@ -249,7 +249,7 @@ def _adjusted_radii(
     names = ("x1", "y1", "x2", "y2", "g1x", "g1y", "g2x", "g2y")
     carried = dict(zip(names, np.hstack([x1, x2, gain1, gain2]).T, strict=True))
     bent = None
-    if pair.layers is not None:
+    if pair.refracted:
         bent = met_rays(fitted, (moved1, moved2), (own1, own2), to_mm, solved.xyz[:, 2])
         carried |= carried_rays(picks, places, fitted, q, to_mm)
     s1 = length(moved1)

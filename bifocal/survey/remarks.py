@@ -151,7 +151,7 @@ def refraction_remarks(pair: Pair, points: PointObservations) -> list[str]:
         in use are counted.
     """
     off = refraction_errors(pair, points)
-    if pair.layers is None or not len(off):
+    if not pair.layers or not len(off):
         return []
     return [
         remark(
@@ -174,7 +174,7 @@ def refraction_errors(pair: Pair, points: PointObservations) -> FloatArray:
     ndarray, shape (n, 3)
         Sizes of the errors of X, Y and r of points in use that both ways solve; none in air. [m]
     """
-    if pair.layers is None or len(set(pair.layers.indices)) == 1:
+    if not pair.layers or len(set(pair.layers.indices)) == 1:
         return np.zeros((0, 3))
     picks = points.all_xy()
     if points.has_pixels.any():

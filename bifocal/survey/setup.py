@@ -177,9 +177,9 @@ class SurveySetup:
                 positive(value, name)
         c1, c2 = self.c_used
         pair = Pair.ideal(d1=self.d1, d2=self.d2, c1=c1, c2=c2, sigma=self.precision)
-        if self.media is None:
+        if not self.media:
             return pair
-        if self.media.layers is not None and self.c1 is None:
+        if self.refracted and self.c1 is None:
             raise InputError(
                 "c_1 and c_2, the principal distances [mm], are needed: how far a ray is bent "
                 "follows from its angle, s / c."
@@ -189,6 +189,11 @@ class SurveySetup:
             layers, z0 = self.media.through(number)
             photos.append(replace(photo, layers=layers, z0=z0))
         return Pair(image1=photos[0], image2=photos[1])
+
+    @property
+    def refracted(self) -> bool:
+        """Whether media are typed in the cells there are for them."""
+        return bool(self.media and self.media.layers)
 
     def in_millimetres(self, points: PointObservations) -> PointObservations:
         """Return the points as image coordinates of `pair`, without raw pixels."""
@@ -216,7 +221,7 @@ class SurveySetup:
             for name in ("d", "c", "enlargement", "nadir", "photo")
             for image in "12"
         }
-        media = None if self.media is None else self.media.exchanged()
+        media = self.media and self.media.exchanged()
         return replace(self, **swapped, adjusted=self.adjusted[::-1], media=media)
 
     def check_scales(self, tolerance: float = SCALE_TOLERANCE) -> str:
@@ -229,15 +234,14 @@ class SurveySetup:
         """
         if self.c1 is None or self.c2 is None or self.d1 is None or self.d2 is None:
             return ""
-        media = None if self.media is None else self.media.layers
         enlarged = self.enlargement2 / self.enlargement1  # apart are the prints' scales by it too
         share = (1000.0 * self.d2 / self.c2) / (1000.0 * self.d1 / self.c1) / enlarged - 1.0
-        if media is not None:
+        if self.refracted:
             share = scale_ratio(*self.pair().as_given) - 1.0
         apart = abs(share * enlarged + enlarged - 1.0)
         if apart > tolerance:
             place = f"{self.where}: " if self.where else ""
-            if media is not None:
+            if self.refracted:
                 raise GeometryError(
                     f"{place}the scales of the photos, as seen through the media near the axis, "
                     f"differ by {apart:.1%}: a bifocal pair has the same scale in both "
@@ -252,7 +256,7 @@ class SurveySetup:
         if abs(share) < 1e-4:
             return ""
         far, near = max(self.d1, self.d2), min(self.d1, self.d2)
-        if media is not None:
+        if self.refracted:
             far, near = self.pair().straight_distances
         relief = float(false_relief_of_scale(abs(share), d1=far, d2=near))
         return remark("survey.scales_differ", share=share, relief=relief)

@@ -103,7 +103,7 @@ def given_pair(
     if described is None:
         return None, None, []
     said = described.remarks
-    if setup.media is not None and setup.media.layers is None:
+    if setup.media and not setup.refracted:
         said = tuple(remark for remark in said if not remark.startswith("layers:"))
     return described, file, [f"{setup.where}: {remark}" for remark in said]
 
@@ -121,7 +121,7 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
     sizes: list[tuple[int, int] | None] = [None, None]
     orientation, remarks, extra = None, list[str](), {"setup": None}
     media: list[dict[str, Any]] = [{}, {}]
-    if setup.media is not None:
+    if setup.media:
         through = [setup.media.through(number) for number in (1, 2)]
         media = [{"layers": layers, "z0": z0} for layers, z0 in through]
     if setup.pair_file and file is None:
@@ -132,9 +132,9 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
             extra = {"setup": given.extra.get("setup")}
             lenses = [given.image1.lens, given.image2.lens]
             sizes = [given.image1.image_size, given.image2.image_size]
-            if setup.media is None or setup.media.layers == given.layers:
+            if not setup.media or setup.media.layers == given.layers:
                 orientation = given.orientation  # it may count the media too
-            if setup.media is None:
+            if not setup.media:
                 media = [
                     {name: getattr(photo, name) for name in ("layers", "z0", "interface_normal")}
                     for photo in (given.image1, given.image2)

@@ -412,7 +412,7 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
         remarks += check.remarks
         if adjust:
             # Through media image 2 keeps its own scale: what the wall seems is not c / d.
-            bent = setup.media is not None and setup.media.layers is not None
+            bent = setup.refracted
             scale = (pair.image2 if bent else pair.image1).plane_from_pixel[0, 0]
             correction = check.matrix @ pair.image2.plane_from_pixel / [[scale], [scale], [1.0]]
             moved = apply_homography(correction, xy2)

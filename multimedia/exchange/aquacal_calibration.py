@@ -18,11 +18,11 @@ from multimedia.projects.camera_poses import FLIP
 from multimedia.projects.model import Project
 from multimedia.projects.point_tables import METRES
 from multimedia.refraction.layers import Layers
-from photocore.arrays import FloatArray, as_floats, is_finite_number
 from photocore.camera.lensformats import LensData
 from photocore.camera.rotation import checked_rotation
 from photocore.errors import InputError
 from photocore.jsonfile import read_object, write_object
+from photocore.sections import Section
 
 VERSION = "1.0"
 #: What its reader insists on and a project does not have; kept from a file that was imported.
@@ -53,27 +53,26 @@ def read_aquacal(path: Path, *, pitch: float) -> Project:
     data = read_object(path, what="AquaCal calibration")
     if not is_aquacal(data):
         raise InputError(f"{path}: has no cameras and interface; is it a calibration of AquaCal?")
-    surface = _section(data, "interface", path)
-    normal = _array(surface, "normal", (3,), f"{path}, interface")
-    indices = tuple(_number(surface, key, f"{path}, interface") for key in ("n_air", "n_water"))
+    surface = Section(data, str(path)).section("interface")
+    normal = surface.numbers("normal", (3,))
+    indices = tuple(surface.number(key) for key in ("n_air", "n_water"))
     cameras, media_of = [], []
     media: dict[str, FlatInterface] = {}
     for label in data["cameras"]:
         where = f"{path}, camera {label}"
-        node = _section(data["cameras"], label, path)
-        inner = _section(node, "intrinsics", where)
-        outer = _section(node, "extrinsics", where)
+        node = Section(data["cameras"][label], where)
+        inner, outer = node.section("intrinsics"), node.section("extrinsics")
         lens = LensData(
-            camera_matrix=_array(inner, "K", (3, 3), where),
-            coefficients=np.ravel(_array(inner, "dist_coeffs", None, where)),
+            camera_matrix=inner.numbers("K", (3, 3)),
+            coefficients=np.ravel(inner.numbers("dist_coeffs")),
             model="fisheye" if inner.get("is_fisheye") else "opencv",
-            image_size=tuple(_array(inner, "image_size", (2,), where).tolist()),
+            image_size=tuple(inner.numbers("image_size", (2,)).tolist()),
             source=f"AquaCal, {path.name}",
         )
-        turn = checked_rotation(_array(outer, "R", (3, 3), where), f"{where}: R")
-        t = np.ravel(_array(outer, "t", None, where))
+        turn = checked_rotation(outer.numbers("R", (3, 3)), f"{where}: R")
+        t = np.ravel(outer.numbers("t"))
         cameras.append(camera_of(lens, turn, t, pitch=pitch, name=str(node.get("name", label))))
-        level = _number(node, "water_z", where)
+        level = node.number("water_z")
         # Cameras that see one surface share it.
         name = next((k for k, m in media.items() if m.point[2] == level), f"water{len(media) + 1}")
         media.setdefault(
@@ -155,29 +154,3 @@ def _kept(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return what of a file the project does not use, without nulls, which TOML lacks."""
     kept = {key: dict(data[key]) for key in _NEEDED if isinstance(data.get(key), Mapping)}
     return {key: {k: v for k, v in part.items() if v is not None} for key, part in kept.items()}
-
-
-def _section(data: Mapping[str, Any], key: str, where: Path | str) -> Mapping[str, Any]:
-    value = data.get(key)
-    if not isinstance(value, Mapping):
-        raise InputError(f"{where}: {key} is missing, or is no object.")
-    return value
-
-
-def _number(data: Mapping[str, Any], key: str, where: str) -> float:
-    value = data.get(key)
-    if not is_finite_number(value):
-        raise InputError(f"{where}: {key} must be a number, found {value!r:.40}.")
-    return float(value)  # type: ignore[arg-type]
-
-
-def _array(
-    data: Mapping[str, Any], key: str, shape: tuple[int, ...] | None, where: str
-) -> FloatArray:
-    if key not in data:
-        raise InputError(f"{where}: {key} is missing.")
-    values = as_floats(data[key], f"{where}: {key}")
-    if (shape is not None and values.shape != shape) or not np.isfinite(values).all():
-        wanted = " x ".join(map(str, shape)) if shape else "finite"
-        raise InputError(f"{where}: {key} must be {wanted} numbers, found {data[key]!r:.60}.")
-    return values

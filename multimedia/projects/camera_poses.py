@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from multimedia.media.camera import EXTERIOR
-from photocore.arrays import FloatArray, is_finite_number
+from photocore.arrays import FloatArray
 from photocore.camera.rotation import (
     checked_rotation,
     nearest_rotation,
@@ -16,6 +13,7 @@ from photocore.camera.rotation import (
     world_from_camera,
 )
 from photocore.errors import InputError
+from photocore.sections import Section
 
 #: Keys of a pose beside ``centre``; one of the ways, or the three angles.
 WAYS = ("rotation", "quaternion", "pose", "camera_from_world")
@@ -27,7 +25,7 @@ _AXES = ("photogrammetric", "opencv")
 _PRINTED = 1e-5
 
 
-def read_pose(value: Mapping[str, Any], where: str) -> tuple[FloatArray, FloatArray]:
+def read_pose(value: Section) -> tuple[FloatArray, FloatArray]:
     """Return the projection centre and the world-from-camera rotation of a camera's section.
 
     Raises
@@ -37,6 +35,7 @@ def read_pose(value: Mapping[str, Any], where: str) -> tuple[FloatArray, FloatAr
     GeometryError
         If the numbers are no rotation.
     """
+    where = value.where
     ways = [key for key in WAYS if key in value]
     angles = [key for key in EXTERIOR[3:] if key in value]
     if len(ways) > 1 or (ways and angles):
@@ -49,31 +48,38 @@ def read_pose(value: Mapping[str, Any], where: str) -> tuple[FloatArray, FloatAr
     if not ways:
         if "axes" in value:
             raise InputError(f"{where}: axes belongs to a matrix or quaternion; angles have ours.")
-        return _numbers(value, "centre", where, (3,)), _from_angles(value, where)
-    centre, rotation = _from_matrix(value, ways[0], where)
+        return value.numbers("centre", (3,)), _from_angles(value)
+    centre, rotation = _from_matrix(value, ways[0])
     return centre, rotation @ FLIP if axes == "opencv" else rotation
 
 
-def _from_angles(value: Mapping[str, Any], where: str) -> FloatArray:
+def _from_angles(value: Section) -> FloatArray:
     """Return the rotation by omega, phi and kappa in degrees."""
-    angles = np.array([_number(value, key, where) for key in EXTERIOR[3:]])
+    if lost := [key for key in EXTERIOR[3:] if key not in value]:
+        raise InputError(
+            f"{value.where}: the key {lost[0]!r} is missing; a camera's rotation is omega, phi, "
+            f"kappa or one of {', '.join(WAYS)}."
+        )
+    angles = np.array([value.number(key) for key in EXTERIOR[3:]])
     if (np.abs(angles) > 720.0).any():
-        raise InputError(f"{where}: omega, phi, kappa are in degrees; found {angles.tolist()}.")
+        raise InputError(
+            f"{value.where}: omega, phi, kappa are in degrees; found {angles.tolist()}."
+        )
     # Whole turns do not matter.
     turns = np.radians(np.remainder(angles + 180.0, 360.0) - 180.0)
     return world_from_camera(*(float(a) for a in turns))
 
 
-def _from_matrix(value: Mapping[str, Any], way: str, where: str) -> tuple[FloatArray, FloatArray]:
+def _from_matrix(value: Section, way: str) -> tuple[FloatArray, FloatArray]:
     """Return centre and rotation as one of `WAYS` states them, in the file's camera axes."""
-    what = f"{where}, {way}"
+    what = f"{value.where}, {way}"
     if way == "quaternion":
-        parts = _numbers(value, way, where, (4,))
-        return _numbers(value, "centre", where, (3,)), rotation_from_quaternion(parts, what)
+        parts = value.numbers(way, (4,))
+        return value.numbers("centre", (3,)), rotation_from_quaternion(parts, what)
     if way == "rotation":
-        rotation = _rotation(_numbers(value, way, where, (3, 3)), what)
-        return _numbers(value, "centre", where, (3,)), rotation
-    matrix = _numbers(value, way, where, (3, 4), (4, 4))
+        rotation = _rotation(value.numbers(way, (3, 3)), what)
+        return value.numbers("centre", (3,)), rotation
+    matrix = value.numbers(way, (3, 4), (4, 4))
     if "centre" in value:
         raise InputError(f"{what}: has the place in its last column; leave centre out.")
     if len(matrix) == 4 and not np.allclose(matrix[3], [0, 0, 0, 1]):
@@ -88,34 +94,3 @@ def _rotation(matrix: FloatArray, what: str) -> FloatArray:
     """Return a matrix that is a rotation but for its printed decimals as one that is."""
     checked = checked_rotation(matrix, what, tolerance=_PRINTED)
     return nearest_rotation(checked)
-
-
-def _number(value: Mapping[str, Any], key: str, where: str) -> float:
-    if key not in value:
-        raise InputError(
-            f"{where}: the key {key!r} is missing; a camera's rotation is omega, phi, kappa or one "
-            f"of {', '.join(WAYS)}."
-        )
-    if not is_finite_number(value[key]):
-        raise InputError(f"{where}: {key} must be a number, found {value[key]!r:.40}.")
-    return float(value[key])
-
-
-def _numbers(
-    value: Mapping[str, Any], key: str, where: str, *shapes: tuple[int, ...]
-) -> FloatArray:
-    """Return a list of numbers, or of rows of numbers, of one of the shapes."""
-    if key not in value:
-        raise InputError(f"{where}: the key {key!r} is missing.")
-    given = value[key]
-    rows = given if isinstance(given, list) and given and isinstance(given[0], list) else [given]
-    good = all(isinstance(row, list) and all(map(is_finite_number, row)) for row in rows)
-    if good and len({len(row) for row in rows}) == 1:
-        table = np.array(given, dtype=np.float64)
-        if table.shape in shapes:
-            return table
-    wanted = " or ".join(
-        f"{shape[0]} numbers" if len(shape) == 1 else f"{shape[0]} rows of {shape[1]} numbers"
-        for shape in shapes
-    )
-    raise InputError(f"{where}: {key} must be {wanted}, found {given!r:.60}.")

@@ -45,6 +45,7 @@ from photocore.camera.distortion import NAMES, Brown, Convention
 from photocore.camera.fisheye import Fisheye
 from photocore.errors import GeometryError, InputError, located
 from photocore.output import all_or_none, atomic_path, check_all_writable
+from photocore.sections import Section
 from photocore.textfile import check_name, read_toml
 
 FORMAT = "multimedia-project/1"
@@ -228,7 +229,7 @@ def _project(data: dict[str, Any], folder: Path) -> Project:
 def _sigma(data: dict[str, Any], cameras: tuple[Camera, ...]) -> float:
     """Return the precision of an image coordinate: as given, else half a pixel. [mm]"""
     if "sigma_image" in data:
-        value = _number(data, "sigma_image", "project")
+        value = Section(data, "project").number("sigma_image")
         del data["sigma_image"]
         return positive(value, "sigma_image", unit="mm")
     pitches = [camera.sensor.pitch.mean() for camera in cameras if camera.sensor is not None]
@@ -239,14 +240,14 @@ def _media(value: Any, where: str, folder: Path) -> FlatInterface | Interfaces:
     if isinstance(value, Mapping) and "surfaces" in value:
         return _surfaces(value, where, folder)
     flat = ("indices", "thicknesses", "point", "normal", "moves_with_camera")
-    _only(value, where, (*flat, *_GRADED))
+    section = Section(value, where, (*flat, *_GRADED))
     layers = Layers.from_dict(value, where=where)
-    point = _vector(value, "point", where, (0.0, 0.0, 0.0))
-    normal = _vector(value, "normal", where, (0.0, 0.0, 1.0))
-    moves = _flag(value, "moves_with_camera", where)
+    point = section.numbers("point", (3,), default=(0, 0, 0))
+    normal = section.numbers("normal", (3,), default=(0, 0, 1))
+    moves = section.flag("moves_with_camera")
     if any(key in value for key in _GRADED):
         traced = Interfaces.parallel(layers, point=point, normal=normal, with_camera=moves)
-        gradient, level = _graded(value, where)
+        gradient, level = _graded(section)
         return replace(traced, gradient=gradient, level=level)
     return FlatInterface(layers=layers, point=point, normal=normal, moves_with_camera=moves)
 
@@ -255,16 +256,16 @@ def _media(value: Any, where: str, folder: Path) -> FlatInterface | Interfaces:
 _GRADED = {"gradient": "gradient", "gradient_level": "level"}
 
 
-def _graded(value: Mapping[str, Any], where: str) -> tuple[float, float]:
+def _graded(section: Section) -> tuple[float, float]:
     """Return by how much the index of the last medium grows with depth, and from which level."""
-    gradient, level = (_number(value, k, where) if k in value else 0.0 for k in _GRADED)
+    gradient, level = (section.number(k) if k in section else 0.0 for k in _GRADED)
     return gradient, level
 
 
 def _surfaces(value: Mapping[str, Any], where: str, folder: Path) -> Interfaces:
     """Return ray-traced surfaces of any form."""
-    _only(value, where, ("indices", "surfaces", *_GRADED))
-    listed = value["surfaces"]
+    section = Section(value, where, ("indices", "surfaces", *_GRADED))
+    listed = section["surfaces"]
     if not isinstance(listed, list) or not listed:
         raise InputError(f"{where}: surfaces must be a list of sections, camera side first.")
     surfaces: list[RefractingSurface] = []
@@ -272,11 +273,11 @@ def _surfaces(value: Mapping[str, Any], where: str, folder: Path) -> Interfaces:
     for number, item in enumerate(listed, start=1):
         place = f"{where}, surface {number}"
         surfaces.append(_surface(item, place, folder))
-        moving.append(_flag(item, "moves_with_camera", place))
-    indices = value.get("indices")
+        moving.append(Section(item, place).flag("moves_with_camera"))
+    indices = section.get("indices")
     if not isinstance(indices, list):
         raise InputError(f"{where}: indices must be a list of numbers, camera side first.")
-    gradient, level = _graded(value, where)
+    gradient, level = _graded(section)
     with located(where):
         return Interfaces(
             surfaces=tuple(surfaces), indices=tuple(indices), with_camera=tuple(moving),
@@ -288,13 +289,13 @@ def _surface(item: Any, place: str, folder: Path) -> RefractingSurface:
     """Return one ray-traced surface."""
     kind = str(item.get("kind", "")) if isinstance(item, Mapping) else ""
     if kind in _FILED:
-        _only(item, place, ("kind", "moves_with_camera", "file"))
-        name = _file_name(_given(item, "file", place), f"{place}, file")
+        section = Section(item, place, ("kind", "moves_with_camera", "file"))
+        name = _file_name(section["file"], f"{place}, file")
         surface: RefractingSurface = _FILED[kind][1](folder / name)
         return surface
     if kind == _WAVES:
-        _only(item, place, ("kind", "moves_with_camera", "level", "waves"))
-        rows = _given(item, "waves", place)
+        section = Section(item, place, ("kind", "moves_with_camera", "level", "waves"))
+        rows = section["waves"]
         if not isinstance(rows, list) or not all(
             isinstance(row, list) and all(is_finite_number(v) for v in row) for row in rows
         ):
@@ -302,14 +303,14 @@ def _surface(item: Any, place: str, folder: Path) -> RefractingSurface:
                 f"{place}: waves must be a list of [amplitude, length, direction, phase], found "
                 f"{rows!r:.60}."
             )
-        return waves_of(_number(item, "level", place), rows, place)
+        return waves_of(section.number("level"), rows, place)
     if kind not in _KINDS:
         known = ", ".join((*_KINDS, *_FILED, _WAVES))
         raise InputError(f"{place}: kind must be one of {known}, found {kind!r}.")
     form, keys = _KINDS[kind]
-    _only(item, place, ("kind", "moves_with_camera", *keys))
-    read = {key: _number if key == "radius" else _vector for key in keys}
-    return form(**{key: read[key](item, key, place) for key in keys})
+    section = Section(item, place, ("kind", "moves_with_camera", *keys))
+    values = {k: section.number(k) if k == "radius" else section.numbers(k, (3,)) for k in keys}
+    return form(**values)
 
 
 def _media_data(media: FlatInterface | Interfaces, folder: Path) -> dict[str, Any]:
@@ -351,13 +352,12 @@ _CAMERA_KEYS = ("name", "media", *POSE_KEYS, "c", "principal_point", "distortion
 
 
 def _camera(value: Any, number: int) -> tuple[Camera, str]:
-    where = f"camera {number}"
-    _only(value, where, _CAMERA_KEYS)
-    name = str(value.get("name", f"cam{number}"))
-    where = f"camera {name}"
-    centre, rotation = read_pose(value, where)
-    c = _number(value, "c", where)
-    sensor = _sensor(value["sensor"], where) if "sensor" in value else None
+    section = Section(value, f"camera {number}", _CAMERA_KEYS)
+    name = str(section.get("name", f"cam{number}"))
+    where = section.where = f"camera {name}"
+    centre, rotation = read_pose(section)
+    c = section.number("c")
+    sensor = _sensor(section["sensor"], where) if "sensor" in section else None
     if sensor is not None and c > 100.0 * sensor.half_diagonal:
         raise InputError(
             f"{where}: c = {c:g} but the sensor is only {2 * sensor.half_diagonal:.4g} mm across. "
@@ -367,7 +367,7 @@ def _camera(value: Any, number: int) -> tuple[Camera, str]:
         centre=centre,
         rotation=rotation,
         principal_distance=c,
-        principal_point=_vector(value, "principal_point", where, (0.0, 0.0)),
+        principal_point=section.numbers("principal_point", (2,), default=(0, 0)),
         distortion=_distortion(value.get("distortion", {}), where, c),
         sensor=sensor,
         name=name,
@@ -399,28 +399,27 @@ def _camera_data(camera: Camera, media: str) -> dict[str, Any]:
 
 def _sensor(value: Any, where: str) -> Sensor:
     where = f"{where}, sensor"
-    _only(value, where, ("width", "height", "pitch", "origin"))
-    pitch = value.get("pitch")
-    if isinstance(pitch, int | float):
-        value = {**value, "pitch": [pitch, pitch]}
-    size = _vector(value, "pitch", where)
+    section = Section(value, where, ("width", "height", "pitch", "origin"))
+    if isinstance(pitch := section.get("pitch"), int | float):
+        section = Section({**value, "pitch": [pitch, pitch]}, where)
+    size = section.numbers("pitch", (2,))
     if (size > 0.2).any():
         raise InputError(f"{where}: a pitch of {size.tolist()} mm? Typical are 0.002 to 0.03 mm.")
-    origin = _vector(value, "origin", where) if "origin" in value else None
-    width, height = (_number(value, key, where) for key in ("width", "height"))
+    origin = section.numbers("origin", (2,)) if "origin" in section else None
+    width, height = (section.number(key) for key in ("width", "height"))
     return Sensor(width=width, height=height, pitch=size, origin=origin)  # type: ignore[arg-type]
 
 
 def _distortion(value: Any, where: str, c: float) -> Distortion:
     where = f"{where}, distortion"
     fisheye = isinstance(value, Mapping) and value.get("convention") == _FISHEYE
-    _only(value, where, ("convention", *(Fisheye.names if fisheye else NAMES)))
+    names = Fisheye.names if fisheye else NAMES
+    section = Section(value, where, ("convention", *names))
+    terms = {name: section.number(name) for name in names if name in section}
     if fisheye:
         with located(where):
-            return Fisheye(**{name: _number(value, name, where) for name in Fisheye.names
-                              if name in value})  # fmt: skip
-    convention = str(value.get("convention", Convention.BROWN.value))
-    terms = {name: _number(value, name, where) for name in NAMES if name in value}
+            return Fisheye(**terms)
+    convention = str(section.get("convention", Convention.BROWN.value))
     if convention == "opencv":
         given = [terms.get(name, 0.0) for name in ("k1", "k2", "p1", "p2", "k3")]
         if "scale" in terms or "shear" in terms:
@@ -435,56 +434,7 @@ def _distortion(value: Any, where: str, c: float) -> Distortion:
     return Brown(**terms, convention=known[convention])
 
 
-def _only(value: Any, where: str, keys: tuple[str, ...]) -> None:
-    """Refuse keys that nothing reads: most are typing errors."""
-    if not isinstance(value, Mapping):
-        raise InputError(f"{where}: expected a section of keys, found {value!r:.40}.")
-    for key in value:
-        if key not in keys:
-            from difflib import get_close_matches
-
-            near = get_close_matches(key, keys, n=1)
-            hint = f" Did you mean {near[0]!r}?" if near else ""
-            raise InputError(f"{where}: unknown key {key!r}.{hint} Known: {', '.join(keys)}.")
-
-
 def _file_name(value: Any, key: str) -> str:
     if not isinstance(value, str):
         raise InputError(f"{key}: expected the name of a table, found {value!r:.40}.")
     return value
-
-
-def _given(value: Mapping[str, Any], key: str, where: str) -> Any:
-    if key not in value:
-        raise InputError(f"{where}: the key {key!r} is missing.")
-    return value[key]
-
-
-def _number(value: Mapping[str, Any], key: str, where: str) -> float:
-    number = _given(value, key, where)
-    if not is_finite_number(number):
-        raise InputError(f"{where}: {key} must be a number, found {number!r:.40}.")
-    return float(number)
-
-
-def _vector(
-    value: Mapping[str, Any], key: str, where: str, default: tuple[float, ...] | None = None
-) -> Any:
-    size = 2 if key in ("principal_point", "pitch", "origin") else 3
-    if key not in value and default is not None:
-        return np.array(default)
-    numbers = _given(value, key, where)
-    if (
-        not isinstance(numbers, list)
-        or len(numbers) != size
-        or not all(is_finite_number(v) for v in numbers)
-    ):
-        raise InputError(f"{where}: {key} must be {size} numbers, found {numbers!r:.60}.")
-    return np.array(numbers, dtype=np.float64)
-
-
-def _flag(value: Mapping[str, Any], key: str, where: str) -> bool:
-    flag = value.get(key, False)
-    if not isinstance(flag, bool):
-        raise InputError(f"{where}: {key} must be true or false, found {flag!r:.40}.")
-    return flag

@@ -242,8 +242,7 @@ def _edit(
             f"{'with' if has_lens else 'without'} lens distortion, the orientation is "
             "not; give another workbook with --workbook."
         )
-    bent = read.survey.setup.media is not None
-    if pair.layers is not None and not bent:
+    if pair.refracted and not read.survey.setup.media:
         raise InputError(
             f"{editor.path.name}: its formulas are made for photos in air, the orientation looks "
             "through media; give another workbook with --workbook."

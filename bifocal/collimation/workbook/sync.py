@@ -209,8 +209,7 @@ class WorkbookSync:
         if self.read is None or self.read.survey.setup.matrices is None:
             return False
         setup = self.read.survey.setup
-        stated = None if setup.media is None else setup.media.layers
-        heights = None if setup.media is None else setup.media.z0
+        stated, heights = setup.media and setup.media.layers, setup.media and setup.media.z0
         if stated != pair.layers or (stated and heights != (pair.image1.z0, pair.image2.z0)):
             return True
         known = zip(setup.matrices or (), setup.nadirs, (setup.d1, setup.d2), strict=True)

@@ -104,6 +104,16 @@ def test_what_is_at_fault_is_said_and_nothing_is_left(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def test_a_first_step_that_fails_leaves_no_folder(tmp_path):
+    control, _ = write_tables(tmp_path)
+    control.write_text("\n".join(control.read_text().splitlines()[:3]) + "\n")
+    words = ["facade", FAR, NEAR, "--control", control, "--out", tmp_path / "out"]
+    result = CliRunner().invoke(main, [str(word) for word in words])
+    assert result.exit_code == 1
+    assert "control points" in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [

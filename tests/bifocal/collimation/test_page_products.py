@@ -102,7 +102,7 @@ NO_FIELD = (
     [
         ({"op": "point.pick", "image": 3, "column": 1, "row": 1}, "image"),
         ({"op": "point.pick", "image": 1, "column": 1}, "column, row"),
-        ({"op": "point.pick", "image": 1, "column": 1e9, "row": 1}, "outside photo|reason"),
+        ({"op": "point.pick", "image": 1, "column": 1e9, "row": 1}, "outside photo|or less"),
         ({"op": "point.pick", "image": 1, "column": 1536.0, "row": 1}, "outside photo 1"),
         ({"op": "point.pick", "image": 1, "column": True, "row": 1}, "number"),
         ({"op": "point.pick", "name": "x" * 99, "image": 1, "column": 1, "row": 1}, "name"),
@@ -114,7 +114,7 @@ NO_FIELD = (
         ({"op": "tape.set", "from": "A", "to": "B", "length": -1}, "above zero"),
         ({"op": "tape.set", "from": "A", "to": "B", "length": 1}, "no control point"),
         ({"op": "setup.set", "d1": 0}, "above zero"),
-        ({"op": "setup.set", "d1": "far"}, "no number"),
+        ({"op": "setup.set", "d1": "far"}, "expected a number above zero"),
         ({"op": "stage.set", "stage": "roof"}, "stage"),
         ({"op": "language.set", "language": "fr"}, "language"),
         ({"op": "photos.exchange"}, "before they are oriented"),
@@ -241,7 +241,8 @@ def test_a_job_that_fails_says_why_and_one_that_is_cancelled_leaves_nothing(tmp_
         assert _wait(client, number)["state"] == "cancelled"
         for bad in ({"kind": "roof"}, {"kind": "deliver", "sheet": "../A3"}, {"kind": "relief",
                     "quality": "x"}, {"kind": "ortho", "gsd": -1}, {"kind": "deliver",
-                    "scale": "big"}, {"kind": "relief", "bounds": [1]}):  # fmt: skip
+                    "scale": "big"}, {"kind": "relief", "bounds": [1]}, {"kind": "ortho",
+                    "image": 3}, {"kind": "deliver", "sections": "x=1"}):  # fmt: skip
             assert client.post("/api/jobs", json=bad).status_code == 400
     assert not [name for name in entries(folder) if name.endswith(".tif")]
 
@@ -366,8 +367,13 @@ def test_a_drawing_without_title_is_called_as_its_pair_file(tmp_path, monkeypatc
 
     monkeypatch.setattr(job_process, "deliver", noted)
     monkeypatch.setattr(job_process, "_ortho_task", lambda task: task)
-    blank = dict.fromkeys(["scale", "dpi", "title", "paper", "marked", "sections", "overwrite"])
-    task = {**blank, "pair": str(sample_folder(tmp_path) / "facade.pair.json"), "out": "d"}
+    blank = dict.fromkeys(["title", "mark", "overwrite"])
+    task = {
+        **blank,
+        "drawing": {},
+        "pair": str(sample_folder(tmp_path) / "facade.pair.json"),
+        "out": "d",
+    }
     with pytest.raises(InputError, match="enough"):
         job_process._deliver(task, lambda *_: None)
     assert titles == ["facade"]

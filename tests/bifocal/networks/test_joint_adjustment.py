@@ -14,7 +14,11 @@ from bifocal.model.orientation_precision import pinhole
 from bifocal.model.pair import Pair
 from bifocal.networks import joint_adjustment
 from bifocal.networks.joint_adjustment import adjust_jointly
-from bifocal.networks.joint_observations import with_rays
+from bifocal.networks.joint_observations import (
+    of_one_camera,
+    with_enough_rays,
+    with_rays,
+)
 from bifocal.networks.joint_ties import SharedPoints, into_one_frame, near_each_other
 from bifocal.networks.joint_workflow import (
     JointResult,
@@ -67,6 +71,42 @@ def test_gross_errors_of_rays_and_of_control_are_named_and_do_no_harm():
     assert got.control[bad, 2] == pytest.approx(-0.4, abs=0.05)
     error = np.abs(got.xyz - case.truth)[:, 2]
     assert np.nanmedian(error) < 0.02
+
+
+def test_a_photo_that_two_pairs_use_is_one_camera():
+    """Taken for two cameras its rays would count twice, and sigmas come out too small."""
+    case = many_pairs(3, np.random.default_rng(4), control=8)
+    o, far = case.observations, case.observations.camera == 2
+    slots = replace(
+        o, names=(*o.names, "again, far", "again, near"), sigma_focal=np.zeros(8), pairs=(),
+        camera=np.r_[o.camera, np.full(far.sum(), 6), np.full((o.camera == 5).sum(), 7)],
+        point=np.r_[o.point, o.point[far], o.point[o.camera == 5]],
+        pixels=np.concatenate([o.pixels, o.pixels[far], o.pixels[o.camera == 5]]),
+        sigma=np.full(len(o.sigma) + far.sum() + (o.camera == 5).sum(), 0.4),
+    )  # fmt: skip
+    once = of_one_camera(slots, [0, 1, 2, 3, 4, 5, 2, 5])
+    assert once.names == o.names
+    assert once.pairs == ((0, 1), (2, 3), (4, 5), (2, 5))
+    got, plain = adjust_jointly(once, case.start), adjust_jointly(o, case.start)
+    np.testing.assert_array_equal(got.covariance, plain.covariance)
+    own, other = got.orientation(3), got.orientation(1)
+    np.testing.assert_array_equal(own[:12, :12], other[:12, :12])
+    assert own[9, 19] != 0.0  # far and near share points
+    start = replace(case.start, cameras=(*case.start.cameras, *case.start.cameras[2::3]))
+    twice = adjust_jointly(slots, start)
+    variances = [np.diagonal(a.by_camera[2])[1:] for a in (twice, got)]
+    assert np.sqrt(variances[0] / variances[1]).mean() < 0.95
+
+
+def test_a_point_picked_twice_in_one_photo_is_not_seen_by_two_cameras():
+    case = many_pairs(2, np.random.default_rng(4), control=6)
+    o = case.observations
+    alone = int(np.flatnonzero(np.bincount(o.point)[6:] == 1)[0]) + 6
+    ray = int(np.flatnonzero(o.point == alone)[0])
+    more = np.r_[np.arange(len(o.point)), ray]
+    twice = with_rays(o, more)
+    twice.pixels[-1] += 0.5
+    assert alone not in with_enough_rays(twice).point
 
 
 @pytest.mark.parametrize(("axis", "size"), [(0, 0.3), (1, 1.0), (2, 0.4)])
@@ -248,6 +288,18 @@ def test_a_rendered_street_is_adjusted_by_the_command(tmp_path):
     again = CliRunner().invoke(main, words)
     assert again.exit_code == 1
     assert "--overwrite" in again.stderr
+    # The middle pair once more by another name says nothing new.
+    Pair.read(paths[1]).write(tmp_path / "z.pair.json")
+    for role in ("control", "check"):
+        words += [f"--{role}", str(tmp_path / f"{paths[1].name[0]}_{role}.csv")]
+    words[words.index("--out") + 1] = str(tmp_path / "more")
+    more = CliRunner().invoke(main, [*words, str(tmp_path / "z.pair.json"), "--sigma-pick", "0.2"])
+    assert more.exit_code == 0, more.stderr
+    for one, other in zip(json.loads(more.stdout)["points"], said["points"], strict=True):
+        assert one["rays"] == other["rays"]
+        assert one["sigma_r"] == pytest.approx(other["sigma_r"], rel=0.05)
+    second = Pair.read(tmp_path / "more" / "z.pair.json")
+    assert second.image1.distance == Pair.read(tmp_path / "more" / paths[1].name).image1.distance
     one = CliRunner().invoke(main, ["adjust", str(paths[0]), "--out", str(tmp_path / "x")])
     assert "two pair files" in one.stderr
 

@@ -242,7 +242,7 @@ def test_an_adjusted_pair_tells_every_point_what_its_cameras_are_worth(name, tmp
     mixed = rng.normal(size=(14, 14)) * 1e-4
     whole = mixed @ mixed.T
     adjusted = adjustment(cameras, media, [whole])
-    made = _adjusted_pair(pair, adjusted, 0)
+    made = _adjusted_pair(pair, adjusted, 0, (pair.image1, pair.image2))
     made.write(tmp_path / "made.pair.json")
     again = Pair.read(tmp_path / "made.pair.json")
     assert not again.remarks

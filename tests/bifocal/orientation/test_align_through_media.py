@@ -17,9 +17,8 @@ from click.testing import CliRunner
 
 from bifocal import Control, Interior, Pair, PairMedia, SiteMeasures, align
 from bifocal.cli.main import main
-from bifocal.media import MediaPath, interface_axes
+from bifocal.media import MediaPath, interface_axes, view
 from bifocal.model.orientation_precision import NAMES, from_dict, names_of
-from bifocal.model.refracted_view import seen_through, view_through
 from bifocal.orientation import absolute_orientation
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.bend import WallBend, bend_in_words
@@ -27,7 +26,7 @@ from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.refracted_stage import with_bent_ties
 from bifocal.orientation.relative_orientation import Ties
 from multimedia import Layers
-from photocore.camera.pinhole import Pinhole, camera_matrix
+from photocore.camera.pinhole import Pinhole, camera_matrix, project
 from photocore.camera.rotation import rotation_from_vector
 from photocore.errors import GeometryError, InputError
 from tests.scenes import SetupErrors, bifocal_cameras
@@ -430,14 +429,21 @@ def test_the_derivatives_through_media_are_those_of_the_view(leans):
         ways = step * np.eye(count)
         return np.stack([(view(way) - view(-way)) / (2 * step) for way in ways], axis=-1)
 
-    def turned(way):
-        return seen_through(camera.stepped(way), path(camera.stepped(way)), xyz)
+    def shown(moved, placed, places):
+        """Return pixels by the radial shift (Maas 2015, Eqs. 1 and 2), not by the view."""
+        away = placed.apparent(places[:, :2] - moved.centre[:2], places[:, 2])
+        on_plane = np.column_stack([moved.centre[:2] + away, np.zeros(len(places))])
+        return project(moved, on_plane)
 
-    found = view_through(camera, path(camera), xyz)
+    def turned(way):
+        return shown(camera.stepped(way), path(camera.stepped(way)), xyz)
+
+    found = view(camera, path(camera), xyz)
+    np.testing.assert_allclose(found.pixels, shown(camera, path(camera), xyz), atol=1e-10)
     for stated, numeric in (
-        (found.by_point, by(3, lambda way: seen_through(camera, path(camera), xyz + way))),
+        (found.by_point, by(3, lambda way: shown(camera, path(camera), xyz + way))),
         (found.by_camera, by(10, turned)),
-        (found.by_media, by(8, lambda way: seen_through(camera, path(camera, way), xyz))),
+        (found.by_media, by(8, lambda way: shown(camera, path(camera, way), xyz))),
     ):
         scale = np.abs(numeric).max(axis=(0, 1)) + 1.0
         assert (np.abs(stated - numeric).max(axis=(0, 1)) / scale).max() < 1e-6

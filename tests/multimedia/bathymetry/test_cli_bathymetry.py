@@ -387,6 +387,17 @@ def test_lidar_echoes_use_the_trajectory(tmp_path: Path) -> None:
     np.testing.assert_allclose(after.xyz, expected, atol=0.000_51)
 
 
+@pytest.mark.parametrize("rows", ["99,0,20,400", "111,40,20,400\n99,0,20,400"])
+def test_a_trajectory_needs_times_that_increase(tmp_path: Path, rows: str) -> None:
+    write_las(tmp_path / "in.las", positions(5), crs=True)
+    (tmp_path / "flight.csv").write_text(f"time,X,Y,Z\n{rows}\n", encoding="utf-8")
+    code, _, said = bathymetry(
+        tmp_path / "in.las", tmp_path / "out.las", "--trajectory", tmp_path / "flight.csv"
+    )
+    assert code == 1
+    assert "flight.csv: needs at least two rows whose times increase" in said
+
+
 def test_a_raster_or_mesh_as_water_surface_gives_the_same_as_the_plane_it_samples(
     tmp_path: Path,
 ) -> None:

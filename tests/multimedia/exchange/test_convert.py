@@ -422,7 +422,7 @@ def test_other_conventions_of_distortion_are_met_and_the_rest_said(tmp_path):
     ("name", "text", "message"),
     [
         ("a.json", '{"cameras": {"c": {}}, "interface": {"normal": [0, 0, -1], "n_air": 1, '
-         '"n_water": 1.33}}', "camera c: intrinsics is missing"),
+         '"n_water": 1.33}}', "camera c: the key 'intrinsics' is missing"),
         ("a.json", '{"K": [[1, 0], [0, 1]]}', "lacks image_width"),
         ("a.json", '{"K": [["x"]], "image_size": [9, 9]}', "matrix K is damaged"),
         ("a.xml", "<document><chunk/></document>", "holds no aligned camera"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -88,6 +89,18 @@ def test_intersect_gives_the_points_by_every_method(tank, method):
     assert np.abs(xyz - POINTS).max() < 1e-9
     text = run("intersect", tank, "--method", method).output
     assert "against 30 known points" in text
+
+
+@pytest.mark.parametrize("wrong", [0, 2])
+def test_the_camera_of_a_wrong_match_is_named_in_the_table(tank, wrong):
+    project = read_project(tank)
+    points = project.image_points
+    image = points.image.copy()
+    image[wrong * 30 + 11] += (0.05, 0.03)
+    write_project(tank, replace(project, image_points=replace(points, image=image)), overwrite=True)
+    found = json.loads(run("intersect", tank, "--json").stdout)["points"]
+    suspects = {row["id"]: row["suspect"] for row in found if row.get("suspect")}
+    assert suspects == {"P11": project.cameras[wrong].name}
 
 
 def test_resect_orients_calibrates_and_writes_the_project(tank, tmp_path):

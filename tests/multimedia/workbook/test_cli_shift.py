@@ -143,7 +143,7 @@ def test_unseen_points_are_flagged(tmp_path: Path) -> None:
     data = json.loads(result.stdout)
     assert [point["flag"] for point in data["points"]] == ["OK", "NO-RAY"]
     assert data["points"][1]["Rbar"] is None
-    assert "1 points cannot be seen" in result.stderr
+    assert "1 points cannot be seen from the camera, no ray gets there: B." in result.stderr
 
 
 def test_headings_in_different_units_are_refused(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Plain walls put on facets: pieces between edges, and planes by the evidence of all of a piece."""
+"""Plain walls on plane patches: segments between edges, and planes by all that a segment shows."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 
 from bifocal import Pair, Photo
 from bifocal.model.grid import Grid
-from bifocal.relief_maps import coarse_level, facets
+from bifocal.relief_maps import coarse_level, plane_patches
 from bifocal.relief_maps.frame import Frame
-from bifocal.relief_maps.pieces import SPACING, Pieces
+from bifocal.relief_maps.segments import SPACING, Segments
 
 SIDE, PANEL = 320, 0.3
 #: Rows and columns of a panel before the wall, in photo 1.
@@ -52,16 +52,16 @@ def _plaster() -> tuple[Frame, np.ndarray]:
     return frame, (PANEL * on).astype(np.float32)
 
 
-def test_pieces_end_at_the_edges_of_the_photo():
+def test_segments_end_at_the_edges_of_the_photo():
     frame, truth = _plaster()
-    pieces = Pieces.of(frame.image1)
-    assert pieces.number == (SIDE // SPACING) ** 2
-    share = np.bincount(pieces.label.ravel(), (truth > 0).ravel()) / np.bincount(
-        pieces.label.ravel()
+    segments = Segments.of(frame.image1)
+    assert segments.number == (SIDE // SPACING) ** 2
+    share = np.bincount(segments.label.ravel(), (truth > 0).ravel()) / np.bincount(
+        segments.label.ravel()
     )
-    wrong = np.where(share > 0.5, 1 - share, share)[pieces.label].mean()
+    wrong = np.where(share > 0.5, 1 - share, share)[segments.label].mean()
     assert wrong < 0.003
-    borders = pieces.borders
+    borders = segments.borders
     parted = (share[borders.own] > 0.5) != (share[borders.other] > 0.5)
     assert np.median(borders.contrast[parted]) > 15
     assert np.percentile(borders.contrast[~parted], 95) < 4
@@ -69,10 +69,10 @@ def test_pieces_end_at_the_edges_of_the_photo():
     pairs = set(zip(borders.own.tolist(), borders.other.tolist(), strict=True))
     assert all((other, own) in pairs for own, other in pairs)
     np.testing.assert_array_equal(
-        borders.own, np.repeat(np.arange(pieces.number), np.diff(borders.first))
+        borders.own, np.repeat(np.arange(segments.number), np.diff(borders.first))
     )
     apart = np.hypot(
-        borders.row - pieces.row[borders.own], borders.column - pieces.column[borders.own]
+        borders.row - segments.row[borders.own], borders.column - segments.column[borders.own]
     )
     assert apart.max() < 3 * SPACING
 
@@ -83,7 +83,7 @@ def test_a_panel_on_plain_plaster_ends_at_its_edge_whatever_flow_made_of_it():
     rng = np.random.default_rng(6)
     wobble = cv2.GaussianBlur(rng.normal(0, 1, truth.shape), (0, 0), 8)
     relief = cv2.blur(truth, (25, 25)) + 0.04 * (wobble / wobble.std()).astype(np.float32)
-    found = facets.fitted(coarse_level.halved(frame), frame.image1, relief)
+    found = plane_patches.fitted(coarse_level.halved(frame), frame.image1, relief)
     off = np.abs(found - truth)
     parallax = np.hypot(*np.meshgrid(*[np.arange(SIDE) - (SIDE - 1) / 2] * 2)) > 60
     before, after = ((np.abs(r - truth) > 0.1)[parallax].mean() for r in (relief, found))
@@ -93,8 +93,8 @@ def test_a_panel_on_plain_plaster_ends_at_its_edge_whatever_flow_made_of_it():
     assert np.abs(np.median(found[ROWS, COLUMNS]) - PANEL) < 0.03
 
 
-def test_a_photo_of_few_pieces_is_left_as_it_was_measured():
+def test_a_photo_of_few_segments_is_left_as_it_was_measured():
     frame, truth = _plaster()
     small = frame.image1[: 3 * SPACING]
     relief = truth[: 3 * SPACING]
-    assert facets.fitted(coarse_level.halved(frame), small, relief) is relief
+    assert plane_patches.fitted(coarse_level.halved(frame), small, relief) is relief

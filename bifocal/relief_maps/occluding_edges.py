@@ -66,8 +66,8 @@ class _Rims(NamedTuple):
         return _Rims(*kept)
 
 
-def draw_in(frame: Frame, bands: MapBands, grid: Grid) -> None:
-    """Give what lies outside the rims that photo 1 shows the relief behind them (in place).
+def drawn_in(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
+    """Give what lies outside the edges that photo 1 shows the relief behind them (in place).
 
     Parameters
     ----------
@@ -81,10 +81,10 @@ def draw_in(frame: Frame, bands: MapBands, grid: Grid) -> None:
     rims, raised = _measured_inwards(bands, rims)
     across, down = _directions(bands.r, rims)
     clear = across * rims.u + down * rims.v > ALONG_RADIUS
-    if not clear.any():
-        return
-    rims, normal = rims.only(clear), (across[clear], down[clear])
-    _lower(bands, rims, _edges(frame, grid, rims, raised[clear], normal), normal)
+    if clear.any():
+        rims, normal = rims.only(clear), (across[clear], down[clear])
+        _lower(bands, rims, _edges(frame, grid, rims, raised[clear], normal), normal)
+    return bands
 
 
 def _falling(frame: Frame, bands: MapBands, grid: Grid) -> _Rims:

@@ -1,4 +1,4 @@
-"""What matching has lost altogether: regions too wide for a ramp, which nothing supports.
+"""Regions that camera 2 cannot see: too wide for a ramp, and nothing supports what flow found.
 
 Beside a step as deep as a porch camera 2 sees nothing of a strip that photo 1 shows: flow there is
 chance. A few lost pixels lie on ramps that the photos tell apart (`edges`); wide regions do not.
@@ -13,6 +13,7 @@ import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.relief_maps import edges, forward_projection
+from bifocal.relief_maps.flow import Measurement
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame
 from photocore.arrays import BoolArray, Float32Array
@@ -30,21 +31,19 @@ FEWEST = 6
 
 
 def put_behind(
-    frame: Frame, relief: Float32Array, loop: Float32Array, support: BoolArray, least: Float32Array
+    frame: Frame, relief: Float32Array, matched: Measurement, support: BoolArray
 ) -> Float32Array:
-    """Return relief whose lost regions stand on the lower of the surfaces beside them.
+    """Return relief whose occluded regions stand on the lower of the surfaces beside them.
 
     Parameters
     ----------
     frame : Frame
     relief : ndarray of float32, shape (height, width)
         Of the pixels of photo 1. [m]
-    loop : ndarray of float32
-        Distance between a pixel and itself after flow there and back. [px]
+    matched : Measurement
+        Flow between the photos.
     support : ndarray of bool
         Pixels to be believed; they are left alone.
-    least : ndarray of float32, broadcastable
-        What stands out by less is left alone. [m]
 
     Notes
     -----
@@ -54,7 +53,8 @@ def put_behind(
     between both. All lost regions moved would tear the colonettes of church_2 (1.0 to 1.1 % beyond
     10 cm, empty 5.1 to 5.3 %).
     """
-    lost = ((loop > LOST_LOOP) & ~support & frame.seen1).astype(np.uint8)
+    least = forward_projection.covering(frame, forward_projection.COVERS)
+    lost = ((matched.loop > LOST_LOOP) & ~support & frame.seen1).astype(np.uint8)
     blocks = _block_means(lost) > 0.5
     square = np.ones((NARROWEST, NARROWEST), np.uint8)
     wide = cv2.morphologyEx(blocks.astype(np.uint8), cv2.MORPH_OPEN, square)

@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 
 from bifocal.media import MediaPath, interface_axes
-from bifocal.model.orientation_precision import NAMES, names_of
+from bifocal.model.orientation_precision import NAMES, common_names, names_of
 from bifocal.model.photo import AXIS
-from bifocal.model.refracted_view import common_names
-from bifocal.options import MEDIA_OF_PAIR
+from bifocal.rays import Foot, foot_of, straight
 from multimedia import Layers
-from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX, parse_prior, typical_sigma
+from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX, typical_sigma
 from photocore.arrays import FloatArray, not_negative, positive
 from photocore.camera.pinhole import Pinhole
 from photocore.camera.rotation import rotation_from_vector
@@ -35,19 +34,13 @@ SIGMA_LEAN = float(np.radians(1.0))
 STEEPEST = 0.7
 #: What states the lean of the far and of the near camera's port as unknown.
 LEANS = ("lean1", "lean2")
-#: How a pair through media is set up, and how not.
-THROUGH_MEDIA = (
-    "through glass or water a pair is set up by control points, at least four with X, Y and pixels "
-    "in each photo (--control FILE; distances may be given with it), or exactly as typed "
-    "(--as-set-up). From the photos alone (--auto, or distances without control) pairs are set up "
-    "in air only: bent rays leave neither epipolar lines nor planes what they are. Measure points "
-    "of the wall and off it, or set the cameras up square to it and give --as-set-up."
-)
+#: The media of a pair that looks through none.
+AIR = Layers(indices=(1.0, 1.0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PairMedia:
-    """Plane-parallel media before both cameras of a pair.
+    """Plane-parallel media before both cameras of a pair; in air none (`PairMedia.none`).
 
     Attributes
     ----------
@@ -107,6 +100,20 @@ class PairMedia:
                 raise InputError(f"--prior {name}={sigma:g}: expected a number above zero, or inf.")
         if "port" in self.sigmas and ({"port1", "port2"} & set(self.sigmas)):
             raise InputError("media: estimate port (of both cameras alike), or port1 and port2.")
+
+    @classmethod
+    def none(cls) -> PairMedia:
+        """Return the media of a pair in air: nothing is refracted, nothing of them unknown."""
+        return cls(layers=AIR, port=(0.0, 0.0))
+
+    def __bool__(self) -> bool:
+        """Whether there are media at all."""
+        return self.layers is not AIR
+
+    @property
+    def counted(self) -> tuple[str, ...]:
+        """What the covariance of a pair through them counts: `names_of`."""
+        return names_of(self.layers if self else None)
 
     @classmethod
     def stated(
@@ -183,6 +190,8 @@ class PairMedia:
 
     def stepped(self, step: FloatArray) -> PairMedia | None:
         """Return the media after a step of their unknowns; None where it leaves what can be."""
+        if not self.sigmas:
+            return self
         by_name = dict(zip(self.sigmas, step.tolist(), strict=True))
         indices, thicknesses = (
             tuple(value + by_name.get(f"{kind}{k}", 0.0) for k, value in enumerate(values, start=1))
@@ -244,8 +253,10 @@ class PairMedia:
         """Tell whether the lean of camera 0's or 1's port is unknown."""
         return any(f"lean {axis} {number + 1}" in self.sigmas for axis in "XY")
 
-    def path(self, number: int, camera: Pinhole) -> MediaPath:
-        """Return what camera 0's or 1's rays cross."""
+    def path(self, number: int, camera: Pinhole) -> MediaPath | None:
+        """Return what camera 0's or 1's rays cross; None in air."""
+        if not self:
+            return None
         normal = self.normal(number, camera)
         return MediaPath(
             layers=self.layers,
@@ -254,13 +265,42 @@ class PairMedia:
             turn=None if normal is None else interface_axes(normal),
         )
 
+    def foot(self, number: int, camera: Pinhole) -> Foot:
+        """Return camera 0 or 1 with what its rays cross, reduced to what relief needs."""
+        return foot_of(camera, self.path(number, camera))
+
+    def near_axis(self, number: int, camera: Pinhole) -> tuple[float, float]:
+        """Return the distance of the straight camera that sees alike near the axis, and its rate.
+
+        By the camera's own distance, which it is in air. [m, -]
+        """
+        stays = self.depth is not None
+        rate = self.layers.indices[-1] / self.layers.indices[0] if stays else 1.0
+        return straight(self.foot(number, camera)).distance, rate
+
+    def of_photo(self, number: int, camera: Pinhole) -> dict[str, Any]:
+        """Return what the photo of camera 0 or 1 states of them; nothing in air."""
+        if not self:
+            return {}
+        return {
+            "layers": self.layers,
+            "z0": self.z0(number, camera),
+            "interface_normal": self.normal(number, camera),
+        }
+
+    def rates_by_unknowns(self, rates: FloatArray) -> FloatArray:
+        """Return rates by what `counted` names, (..., k), by the unknowns `names`, (..., u)."""
+        return rates @ self.by_unknowns() if self else rates
+
     def by_unknowns(self) -> FloatArray:
         """Return how what `names_of` counts moves with the unknowns `names`, shape (k, u).
 
         A port goes with its camera, and one square to the optical axis turns with it; what stays
         with the object is the farther from a camera that moves away.
         """
-        rows, names = list(names_of(self.layers)), self.names
+        rows, names = list(self.counted), self.names
+        if not self:
+            return np.eye(len(rows))
         out = np.zeros((len(rows), len(names)))
         first, second = (isinstance(normal, str) for normal in self.normals)
         stays = self.depth is not None
@@ -278,12 +318,6 @@ class PairMedia:
                 elif stays and (name == "depth" or name.startswith("thickness")):
                     out[z0, column] = -1.0
         return out
-
-    def near_axis_rate(self) -> float:
-        """Return how `bifocal.media.MediaPath.near_axis` grows with the camera's distance."""
-        if self.port is not None:
-            return 1.0
-        return self.layers.indices[-1] / self.layers.indices[0]
 
 
 def _unknowns(name: str) -> tuple[str, ...]:
@@ -311,54 +345,3 @@ def by_cameras(layers: Layers, *, stays: bool, turning: tuple[bool, bool]) -> Fl
             lean, turn = f"lean {axis} {number}", f"turn {axis} {number}"
             out[rows.index(lean), NAMES.index(turn)] = 1.0
     return out
-
-
-def media_of(given: Mapping[str, Any]) -> PairMedia | None:
-    """Return media as options name them (``indices``, ``thicknesses``, ``port`` ...); None in air.
-
-    Raises
-    ------
-    InputError
-        If they do not describe media.
-    """
-    if given.get("indices") is None:
-        lost = [option for option in MEDIA_OF_PAIR if given.get(option.name) not in (None, ())]
-        if lost:
-            raise InputError(
-                f"{lost[0].flag} goes with --indices: give the refractive indices "
-                "from the camera to the wall, e.g. --indices 1,1.49,1.337 --thicknesses 0.01."
-            )
-        return None
-    ports, normals = (
-        (_own(given, name, 1), _own(given, name, 2)) for name in ("port", "port_normal")
-    )
-    return PairMedia.stated(
-        given["indices"], given.get("thicknesses") or (), ports=ports, depth=given.get("depth"),
-        normals=(_normal(normals[0]), _normal(normals[1])), estimate=given.get("estimate") or (),
-        priors=dict(_prior(text) for text in given.get("prior") or ()),
-    )  # fmt: skip
-
-
-def _prior(text: str) -> tuple[str, float]:
-    """Return the name and standard deviation of an option: leans are typed in degrees."""
-    name, sigma = parse_prior(text)
-    return name, float(np.radians(sigma)) if name in LEANS else sigma
-
-
-def _own(given: Mapping[str, Any], name: str, number: int) -> Any:
-    """Return an option of one camera, or else that of both."""
-    own = given.get(f"{name}{number}")
-    return given.get(name) if own is None else own
-
-
-def _normal(stated: tuple[float, ...] | str | None) -> Normal:
-    """Return the normal that an option states: "axis", or X, Y, r towards the camera."""
-    if stated is None or isinstance(stated, str):
-        return stated
-    normal = np.array(stated)
-    if not normal[2] > 0.1 * np.linalg.norm(normal):
-        raise InputError(
-            f"--port-normal {','.join(map(str, stated))}: expected X,Y,r in the plane frame, "
-            "towards the camera: 0,0,1 is parallel to the wall."
-        )
-    return normal

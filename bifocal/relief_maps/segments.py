@@ -1,4 +1,4 @@
-"""A photo cut into small pieces along its edges, and the borders between them."""
+"""A photo cut into small segments along its edges, and the borders between them."""
 
 from __future__ import annotations
 
@@ -9,30 +9,30 @@ import numpy as np
 
 from photocore.arrays import ByteArray, Float32Array, FloatArray, IntArray
 
-#: Spacing of the pieces: with one exact relief a piece, 1.0 % of façade 84 would be off by more
+#: Spacing of the segments: with one exact relief a segment, 1.0 % of façade 84 would be off by more
 #: than 3 cm (16 px: 1.7 %, 24 px: 3.6 %). [px]
 SPACING = 12
 #: Edges are looked for in a photo smoothed between them. [px; grey levels, px]
 SMOOTHING, EDGE, REACH = 7, 8.0, 2.0
-#: How much less gradient a pixel must have to start a piece a pixel farther from its middle.
+#: How much less gradient a pixel must have to start a segment a pixel farther from its middle.
 OFF_MIDDLE = 0.02
 
 
 class Borders(NamedTuple):
-    """What separates pieces; every border is there twice, once for either side, by owner.
+    """What separates segments; every border is there twice, once for either side, by owner.
 
     Attributes
     ----------
     own, other : ndarray of int, shape (n,)
-        The pieces on both sides.
+        The segments on both sides.
     length : ndarray, shape (n,)
         In pixels of the photo.
     contrast : ndarray, shape (n,)
         Step of the smoothed photo from one side to the other. [grey levels]
     row, column : ndarray, shape (n,)
         Middle of the border. [px]
-    first : ndarray of int, shape (pieces + 1,)
-        Where the borders of a piece begin.
+    first : ndarray of int, shape (segments + 1,)
+        Where the borders of a segment begin.
     """
 
     own: IntArray
@@ -44,17 +44,17 @@ class Borders(NamedTuple):
     first: IntArray
 
 
-class Pieces(NamedTuple):
-    """A photo cut into pieces.
+class Segments(NamedTuple):
+    """A photo cut into segments.
 
     Attributes
     ----------
     label : ndarray of int32, shape (height, width)
-        Number of each pixel's piece, from 0.
+        Number of each pixel's segment, from 0.
     number : int
         How many they are.
     row, column : ndarray, shape (count,)
-        Middles of the pieces. [px]
+        Middles of the segments. [px]
     borders : Borders
     """
 
@@ -65,8 +65,8 @@ class Pieces(NamedTuple):
     borders: Borders
 
     @classmethod
-    def of(cls, image: ByteArray) -> Pieces:
-        """Cut a photo into pieces some `SPACING` pixels wide; it must be larger than one."""
+    def of(cls, image: ByteArray) -> Segments:
+        """Cut a photo into segments some `SPACING` pixels wide; it must be larger than one."""
         quiet = cv2.medianBlur(cv2.bilateralFilter(image, SMOOTHING, EDGE, REACH), 3)
         starts = _starts(quiet)
         label = _flooded(quiet, starts)
@@ -81,7 +81,7 @@ class Pieces(NamedTuple):
 
 
 def _starts(quiet: ByteArray) -> IntArray:
-    """Return the numbered starts of pieces, from 1: the flattest places of a raster of squares."""
+    """Return the numbered starts of segments, from 1: the flattest place of each square."""
     square = np.ones((3, 3), np.uint8)
     gradient = cv2.morphologyEx(quiet, cv2.MORPH_GRADIENT, square).astype(np.float32)
     gradient = cv2.blur(gradient, (3, 3))
@@ -99,7 +99,7 @@ def _starts(quiet: ByteArray) -> IntArray:
 
 
 def _flooded(quiet: ByteArray, starts: IntArray) -> IntArray:
-    """Return the pieces grown from their starts up to each other (Meyer's watershed), from 0.
+    """Return the segments grown from their starts up to each other (Meyer's watershed), from 0.
 
     Pixels of the watershed itself join the neighbour that is most like them.
     """
@@ -120,7 +120,7 @@ def _flooded(quiet: ByteArray, starts: IntArray) -> IntArray:
 
 
 def _borders(label: IntArray, quiet: ByteArray, count: int) -> Borders:
-    """Return the borders of all pieces."""
+    """Return the borders of all segments."""
     grey = cv2.blur(quiet.astype(np.float32), (3, 3))
     parts = [_along_rows(label, grey, count), _along_rows(label.T, grey.T, count)]
     (key, step, row, column), turned = parts
@@ -144,7 +144,7 @@ def _borders(label: IntArray, quiet: ByteArray, count: int) -> Borders:
 def _along_rows(
     label: IntArray, grey: Float32Array, count: int
 ) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
-    """Return pairs of pieces that meet along rows: number, step, row and column of each place."""
+    """Return pairs of segments that meet along rows: number, step, row and column of each place."""
     row, column = np.nonzero(label[:, 1:-2] != label[:, 2:-1])
     left, right = label[row, column + 1].astype(np.int64), label[row, column + 2].astype(np.int64)
     step = (grey[row, column] - grey[row, column + 3]).astype(float)

@@ -1,0 +1,73 @@
+"""What lies between cameras and wall, as options state it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from bifocal.model.pair_media import LEANS, Normal, PairMedia
+from bifocal.options import MEDIA_OF_PAIR
+from photocore.adjustment.priors import parse_prior
+from photocore.errors import InputError
+
+#: How a pair through media is set up, and how not.
+THROUGH_MEDIA = (
+    "through glass or water a pair is set up by control points, at least four with X, Y and pixels "
+    "in each photo (--control FILE; distances may be given with it), or exactly as typed "
+    "(--as-set-up). From the photos alone (--auto, or distances without control) pairs are set up "
+    "in air only: bent rays leave neither epipolar lines nor planes what they are. Measure points "
+    "of the wall and off it, or set the cameras up square to it and give --as-set-up."
+)
+
+
+def media_of(given: Mapping[str, Any]) -> PairMedia:
+    """Return media as options name them (``indices``, ``thicknesses``, ``port`` ...); none in air.
+
+    Raises
+    ------
+    InputError
+        If they do not describe media.
+    """
+    if given.get("indices") is None:
+        lost = [option for option in MEDIA_OF_PAIR if given.get(option.name) not in (None, ())]
+        if lost:
+            raise InputError(
+                f"{lost[0].flag} goes with --indices: give the refractive indices "
+                "from the camera to the wall, e.g. --indices 1,1.49,1.337 --thicknesses 0.01."
+            )
+        return PairMedia.none()
+    ports, normals = (
+        (_own(given, name, 1), _own(given, name, 2)) for name in ("port", "port_normal")
+    )
+    return PairMedia.stated(
+        given["indices"], given.get("thicknesses") or (), ports=ports, depth=given.get("depth"),
+        normals=(_normal(normals[0]), _normal(normals[1])), estimate=given.get("estimate") or (),
+        priors=dict(_prior(text) for text in given.get("prior") or ()),
+    )  # fmt: skip
+
+
+def _prior(text: str) -> tuple[str, float]:
+    """Return the name and standard deviation of an option: leans are typed in degrees."""
+    name, sigma = parse_prior(text)
+    return name, float(np.radians(sigma)) if name in LEANS else sigma
+
+
+def _own(given: Mapping[str, Any], name: str, number: int) -> Any:
+    """Return an option of one camera, or else that of both."""
+    own = given.get(f"{name}{number}")
+    return given.get(name) if own is None else own
+
+
+def _normal(stated: tuple[float, ...] | str | None) -> Normal:
+    """Return the normal that an option states: "axis", or X, Y, r towards the camera."""
+    if stated is None or isinstance(stated, str):
+        return stated
+    normal = np.array(stated)
+    if not normal[2] > 0.1 * np.linalg.norm(normal):
+        raise InputError(
+            f"--port-normal {','.join(map(str, stated))}: expected X,Y,r in the plane frame, "
+            "towards the camera: 0,0,1 is parallel to the wall."
+        )
+    return normal
