@@ -10,10 +10,13 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from bifocal import SAMPLE, InputError, Pair, dense_relief, match, orthophoto, read_image
+from bifocal import Pair, dense_relief, match, orthophoto
 from bifocal.cli.main import main
 from bifocal.collimation.pictures import Pictures
-from bifocal.survey.pair_workflow import read_pair
+from bifocal.demo import SAMPLE
+from bifocal.files.images import read_image
+from bifocal.workbook.pair_workflow import read_pair
+from multimedia import InputError
 
 CHANGES = {
     "reduced": (lambda image: image.resize((768, 512)), "768 x 512", "a copy reduced to 0.5"),
