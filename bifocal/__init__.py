@@ -40,7 +40,7 @@ What they take and give: Bounds, CheckResult, FlagLimits, FlatSurface, Foot, Gri
 Layers, MapSurface, MediaPath, NamedPoints, OrientationCheck, Pinhole, PlanePicks,
 PointObservations, Progress, RadialDivision, Registration, ReliefTable, Similarity, SpaceSums,
 Surface, SurveyInput, SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision,
-WeightedSums, Window.
+WeightedSums, Window, WorldPoints.
 
 Errors are one family with one message each that says what is wrong, where, and how to mend it:
 PhotogrammetryError > InputError (a ValueError) > CellError, WorkbookError, MissingExtraError;

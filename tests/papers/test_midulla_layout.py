@@ -17,13 +17,10 @@ import pytest
 import rasterio
 from click.testing import CliRunner
 
-from bifocal import Measuring, Taking, georeference
+from bifocal import KnownPoints, Measuring, PointObservations, SurveySetup, Taking, georeference
 from bifocal.cli.main import main
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
-from bifocal.survey.observations import PointObservations
 from bifocal.survey.point_survey import solve_points
-from bifocal.survey.reference import KnownPoints
-from bifocal.survey.setup import SurveySetup
 from bifocal.workbook.pair_workflow import points_of, read_pair
 
 PITCH, SIZE = 0.00739, (3072, 2048)

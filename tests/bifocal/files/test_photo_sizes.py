@@ -10,11 +10,9 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from bifocal import Pair, dense_relief, match, orthophoto
+from bifocal import SAMPLE, Pair, dense_relief, match, orthophoto, read_image
 from bifocal.cli.main import main
 from bifocal.collimation.pictures import Pictures
-from bifocal.demo import SAMPLE
-from bifocal.files.images import read_image
 from bifocal.workbook.pair_workflow import read_pair
 from multimedia import InputError
 

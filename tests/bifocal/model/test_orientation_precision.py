@@ -6,10 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifocal import Measuring, Pair, Photo, georeference, solve
+from bifocal import Measuring, Pair, Photo, RadialDivision, georeference, solve
 from bifocal.model.orientation_precision import CAMERA, NAMES, moved, pinhole
 from multimedia import InputError
-from photocore.camera.distortion import RadialDivision
 from photocore.camera.pinhole import PARAMETERS, plane_from_pixel
 from photocore.camera.rotation import rotation_from_vector
 from tests.scenes import SetupErrors, bifocal_cameras

@@ -8,9 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bifocal import Pair, Photo, Quality, dense_relief
+from bifocal import Grid, Pair, Photo, Quality, dense_relief
 from bifocal.files.images import as_grey
-from bifocal.model.grid import Grid
 from bifocal.orientation.pair_observations import at
 from bifocal.relief_maps import edges, flow, forward_projection, seed
 from bifocal.relief_maps.dense_matching import _resampled

@@ -7,10 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bifocal import Measuring, Pair, Photo, Taking
-from bifocal.survey.observations import PointObservations
+from bifocal import Measuring, Pair, Photo, PointObservations, SurveySetup, Taking
 from bifocal.survey.point_survey import solve_points
-from bifocal.survey.setup import SurveySetup
 from multimedia import GeometryError, InputError
 
 

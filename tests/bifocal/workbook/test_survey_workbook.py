@@ -11,12 +11,19 @@ import numpy as np
 import openpyxl
 import pytest
 
-from bifocal import Lens, Measuring, Pair, Photo, Taking, georeference
+from bifocal import (
+    KnownPoints,
+    Lens,
+    Measuring,
+    Pair,
+    Photo,
+    PointObservations,
+    SurveySetup,
+    Taking,
+    georeference,
+)
 from bifocal.survey.check_points import check_points
-from bifocal.survey.observations import PointObservations
 from bifocal.survey.point_survey import solve_points
-from bifocal.survey.reference import KnownPoints
-from bifocal.survey.setup import SurveySetup
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.formulas.columns import IDEAL_POINTS, pair_points
 from bifocal.workbook.formulas.georeference_columns import georeference_columns

@@ -11,9 +11,8 @@ import pytest
 from click.testing import CliRunner
 from openpyxl.utils import range_boundaries
 
-from bifocal import Taking
+from bifocal import SurveySetup, Taking
 from bifocal.cli.main import main
-from bifocal.survey.setup import SurveySetup
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.making.book import write_book
 from bifocal.workbook.template_workflow import write_template

@@ -11,13 +11,19 @@ import openpyxl
 import pytest
 from click.testing import CliRunner
 
-from bifocal import Measuring, Pair, Taking, georeference, solve
+from bifocal import (
+    Measuring,
+    Pair,
+    PointObservations,
+    SurveyMedia,
+    SurveySetup,
+    Taking,
+    georeference,
+    solve,
+)
 from bifocal.cli.main import main
 from bifocal.survey.check_points import check_points
-from bifocal.survey.observations import PointObservations
 from bifocal.survey.point_survey import solve_points
-from bifocal.survey.setup import SurveySetup
-from bifocal.survey.survey_media import SurveyMedia
 from bifocal.workbook.making.book import write_book
 from bifocal.workbook.output import write_result
 from bifocal.workbook.pair_workflow import read_pair
