@@ -218,6 +218,15 @@ DRAWING = (
     _file("--mark", "Table of points to draw.  [default: those that give the relief]"),
 )  # fmt: skip
 
+#: What the lens database is asked by.
+OF_DATABASE = (
+    Option("--camera-name", default="", help="With the database: camera, if EXIF lacks it."),
+    Option("--lens-name", default="", help="With the database: lens, if EXIF lacks it."),
+    number(
+        "--focal", "MM", "With the database: focal length [mm], if EXIF lacks it.", type=FOCAL
+    ).but("--focal", "focal_length"),
+)
+
 #: Every option of a pair, by the key that survey files know it by.
 OF_PAIR = {
     option.name: option

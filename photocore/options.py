@@ -90,12 +90,7 @@ class Option:
             With what was expected.
         """
         kind = self.attributes.get("type")
-        if not isinstance(kind, Number) or not isinstance(value, str):
-            return self.read(value)
-        try:
-            return kind.convert(value, None, None)
-        except click.BadParameter:
-            raise ValueError(kind.wanted) from None
+        return kind.typed(value) if isinstance(kind, Number) else self.read(value)
 
     def read(self, value: object) -> Any:
         """Return what a file holds, checked as on the command line.
@@ -235,6 +230,8 @@ class Number(click.ParamType):  # type: ignore[type-arg,unused-ignore]
         Refuse fractions, and return int.
     to : callable, optional
         Turns the number into the unit of the program, e.g. `math.radians`.
+    called : str
+        What a file or a field is said to lack, in place of "a number".
     """
 
     name = "number"
@@ -252,7 +249,9 @@ class Number(click.ParamType):  # type: ignore[type-arg,unused-ignore]
         finite: bool = True,
         whole: bool = False,
         to: Callable[[float], float] = float,
+        called: str = "",
     ) -> None:
+        self.in_files = called or self.in_files
         self.above, self.below, self.least, self.most = above, below, least, most
         self.finite = finite
         self.to = int if whole else to
@@ -303,6 +302,15 @@ class Number(click.ParamType):  # type: ignore[type-arg,unused-ignore]
             with suppress(ValueError):
                 value = self.parse(value)[0]
         return self._checked([value])[0]
+
+    def typed(self, value: object) -> Any:
+        """Return what a field of a page holds: as in a file, or as on the command line."""
+        if not isinstance(value, str):
+            return self.read(value)
+        try:
+            return self.convert(value.replace("\N{MINUS SIGN}", "-"), None, None)
+        except click.BadParameter:
+            raise ValueError(self.wanted) from None
 
     def _checked(self, values: Sequence[object]) -> tuple[float, ...]:
         numbers = [v for v in values if isinstance(v, int | float) and not isinstance(v, bool)]
@@ -408,6 +416,18 @@ class Size(Number):
         parts = text.lower().replace("*", "x").replace("×", "x").replace(",", ".").split("x")
         width, height = (float(part) for part in parts)
         return [width, height]
+
+
+#: A board for calibration: what is on it, and how many of it.
+PATTERN = choice(
+    "--pattern", "chessboard|circles|asymmetric-circles|charuco", "What is on the board.",
+    default="chessboard",
+)  # fmt: skip
+BOARD = Option(
+    "--board", type=Size(least=1, whole=True),
+    help="Inner corners of a chessboard, circles of a grid, squares of a ChArUco board, across x "
+    "up.",
+)  # fmt: skip
 
 
 class Scale(Number):

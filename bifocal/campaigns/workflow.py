@@ -35,7 +35,7 @@ from bifocal.campaigns.whole_wall import (
 from bifocal.campaigns.worker_pool import Listener, run_here
 from bifocal.options import FILES, OF_PAIR
 from photocore.cli import Progress, no_progress
-from photocore.errors import InputError
+from photocore.errors import InputError, PhotogrammetryError
 from photocore.interrupts import raising
 from photocore.output import check_writable
 from photocore.provenance import FileHashes, recording, today
@@ -188,13 +188,21 @@ def plan_survey(jobs: Sequence[PairJob], *, mosaic: bool = False) -> list[tuple[
             if plan[-1][1] in ("keep", "make"):
                 plan += [(step.name, "make") for step in steps_of(job)[1:]]
         if plan[0] == (FIRST_STEP, "make"):
-            plan[0] = FIRST_STEP, refusal(job) or "make"
+            plan[0] = FIRST_STEP, refusal(job) or _unreadable(job) or "make"
         rows += [(job.name, step, what) for step, what in plan]
     if frame:
         rows.append((_ALL, JOINT, frame))
     if mosaic:
         rows.append((_ALL, MOSAIC, _plan_of_mosaic(jobs, rows)))
     return rows
+
+
+def _unreadable(job: PairJob) -> str:
+    try:
+        check_files(job)
+    except PhotogrammetryError as error:
+        return str(error)
+    return ""
 
 
 def _plan_of_frame(jobs: Sequence[PairJob]) -> str:

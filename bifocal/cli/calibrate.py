@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from bifocal.options import OF_DATABASE
 from photocore.cli import print_result, progress_bar, remark, text_table
-from photocore.options import FILE, FOCAL, Size, as_json, choice, number, overwrite
+from photocore.options import BOARD, FILE, PATTERN, as_json, choice, number, overwrite, takes
 
 if TYPE_CHECKING:
     from bifocal.calibration.board_calibration import Calibration
@@ -28,15 +29,8 @@ One lens file holds for one lens at one focus and one zoom mark.
 @click.command(epilog=EXAMPLE)
 @click.argument("images", nargs=-1, required=True, metavar="IMAGE...", type=FILE)
 @click.option("--out", type=FILE, required=True, help="The lens file.")
-@choice(
-    "--pattern", "chessboard|circles|asymmetric-circles|charuco", "What is on the board.",
-    default="chessboard",
-)  # fmt: skip
-@click.option(
-    "--board", type=Size(least=1, whole=True),
-    help="Inner corners of a chessboard, circles of a grid, squares of a ChArUco board, across x "
-    "up.  [default: chessboard recognised by itself]",
-)  # fmt: skip
+@PATTERN
+@BOARD.but(help=f"{BOARD.attributes['help']}  [default: chessboard recognised by itself]")
 @choice(
     "--model", "auto|k1|k1k2|k1k2p|k1k2pk3|fisheye",
     "Distortion terms; auto takes in what an F test at 1 % asks for.", default="auto",
@@ -51,15 +45,13 @@ One lens file holds for one lens at one focus and one zoom mark.
 )  # fmt: skip
 @number("--focal-px", "PX", "With lines: principal distance [px].")
 @click.option("--database", is_flag=True, help="Take the lens database's data for this photo.")
-@click.option("--camera-name", default="", help="With --database: camera, if EXIF lacks it.")
-@click.option("--lens-name", default="", help="With --database: lens, if EXIF lacks it.")
-@number("--focal", "MM", "With --database: focal length [mm], if EXIF lacks it.", type=FOCAL)
+@takes(*OF_DATABASE)
 @overwrite
 @as_json
 def command(
     images: tuple[Path, ...], out: Path, pattern: str, board: tuple[int, int] | None,
     model: str, straight_edges: bool, lines: Path | None, focal_px: float | None, database: bool,
-    camera_name: str, lens_name: str, focal: float | None, overwrite: bool, as_json: bool,
+    overwrite: bool, as_json: bool, **of_database: Any,
 ) -> None:  # fmt: skip
     """Find principal distance, principal point and distortion of a lens.
 
@@ -71,10 +63,7 @@ def command(
     if sum([straight_edges or lines is not None, database]) > 1:
         raise click.UsageError("choose one of board photos, straight lines and --database.")
     if database:
-        lens, notes = lenses.write_database_lens(
-            images[0], out, overwrite=overwrite, camera_name=camera_name, lens_name=lens_name,
-            focal_length=focal,
-        )  # fmt: skip
+        lens, notes = lenses.write_database_lens(images[0], out, overwrite=overwrite, **of_database)
         data, text = lens.to_dict(), [f"Lens: {lens.source}"]
     elif straight_edges or lines is not None:
         found, notes = lenses.calibrate_from_edges(

@@ -94,6 +94,8 @@ def command(
             for (pair, step, why), (*_, what) in zip(plan, short, strict=True):
                 if what == "cannot":
                     click.echo(f"\n{pair}, {step}:\n  {why}")
+        if any(what not in ("keep", "make") for *_, what in plan):
+            ctx.exit(1)  # as the work would end
         return
     if ship and not scheduler:
         raise click.UsageError("--ship goes with --scheduler.")

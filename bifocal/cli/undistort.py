@@ -7,8 +7,9 @@ from typing import Any
 
 import click
 
+from bifocal.options import OF_DATABASE
 from photocore.cli import print_result, progress_bar
-from photocore.options import FILE, POSITIVE, as_json, overwrite
+from photocore.options import FILE, as_json, overwrite, takes
 
 EXAMPLE = """\b
 Examples:
@@ -28,12 +29,7 @@ photos beforehand only for other programs.
     "lens database.",
 )  # fmt: skip
 @click.option("--out-dir", type=FILE, help="Existing folder to write to.  [default: the photo's]")
-@click.option("--camera-name", default="", help="With exif: camera, if EXIF lacks it.")
-@click.option("--lens-name", default="", help="With exif: lens, if EXIF lacks it.")
-@click.option(
-    "--focal", "focal_length", type=POSITIVE,
-    help="With exif: focal length [mm], if EXIF lacks it.",
-)  # fmt: skip
+@takes(*OF_DATABASE)
 @overwrite
 @as_json
 def command(

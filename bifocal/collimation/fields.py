@@ -6,8 +6,10 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from bifocal.collimation.records import CODES, Pixel
-from bifocal.collimation.stated_media import INDICES, MEDIA, check_index
+from bifocal.collimation.stated_media import INDICES, MEDIA
+from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX
 from photocore.errors import InputError
+from photocore.options import Number
 from photocore.workbook.making.words import LANGUAGES
 
 Fields = Mapping[str, Any]
@@ -37,40 +39,28 @@ def text_of(command: Fields, key: str) -> str:
     return value
 
 
-def number_of(command: Fields, key: str) -> float | None:
-    """Return a number or None; text with a decimal comma counts."""
-    value = command.get(key)
-    if isinstance(value, str):
-        typed = value.strip().replace(",", ".").replace("\N{MINUS SIGN}", "-")
+def _number(**limits: Any) -> Reader:
+    """Return a reader of a number within limits, or None; text with a decimal comma counts."""
+    kind = Number(**limits)
+
+    def read(command: Fields, key: str) -> float | None:
+        value = command.get(key)
+        if value is None or (isinstance(value, str) and not value.strip()):
+            return None
         try:
-            value = float(typed) if typed else None
-        except ValueError:
-            raise FieldError(f"{key}: {typed[:30]!r} is no number.") from None
-    if value is None:
-        return None
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise FieldError(f"{key}: expected a number.")
-    if not abs(value) <= LARGEST:  # NaN too
-        raise FieldError(f"{key}: is beyond reason; numbers end at {LARGEST:g}.")
-    return float(value)
+            return float(kind.typed(value))
+        except ValueError as error:
+            raise FieldError(f"{key}: expected {error}, found {value!r:.40}.") from None
+
+    return read
 
 
-def positive_of(command: Fields, key: str) -> float | None:
-    """Return a number above zero or None."""
-    value = number_of(command, key)
-    if value is not None and not value > 0:
-        raise FieldError(f"{key}: must be above zero, got {value:g}.")
-    return value
-
-
-def _index(command: Fields, key: str) -> float | None:
-    """Return a refractive index or None."""
-    value = positive_of(command, key)
-    try:
-        check_index(key, value)
-    except InputError as error:
-        raise FieldError(str(error)) from None
-    return value
+number_of = _number(least=-LARGEST, most=LARGEST)
+positive_of = _number(above=0, most=LARGEST)
+_index = _number(
+    least=LEAST_INDEX, most=MOST_INDEX,
+    called="a refractive index (water has about 1.34, glass 1.46 to 1.6),",
+)  # fmt: skip
 
 
 def image_of(command: Fields, key: str = "image") -> int:

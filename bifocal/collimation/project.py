@@ -11,9 +11,10 @@ from typing import Any
 
 from bifocal.collimation.fields import NOTES, FieldError, fields_of
 from bifocal.files.images import image_info
-from bifocal.survey.pair_workflow import is_survey, read_pair
-from bifocal.survey.workbook.reader import read_survey
+from bifocal.workbook.pair_workflow import is_survey, read_pair
+from bifocal.workbook.reading.reader import read_survey
 from photocore.errors import InputError, PhotogrammetryError
+from photocore.workbook.reading.package import open_package
 
 #: Endings of photos looked for in a folder.
 PHOTOS = frozenset({".jpg", ".jpeg", ".png", ".tif", ".tiff"})
@@ -202,6 +203,9 @@ def _workbook(path: Path) -> Path:
         pass
     except OSError as error:  # links that lead in a circle
         raise InputError(f"{path}: cannot be used ({error.strerror}); name another one.") from None
+    else:
+        with open_package(path):  # refused before the page is there, if it is none
+            pass
     return path
 
 

@@ -11,8 +11,6 @@ import numpy as np
 from bifocal.model.pair import Pair
 from bifocal.model.pair_media import PairMedia
 from multimedia import Layers
-from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX
-from photocore.errors import InputError
 
 #: Fields of the set-up that say what lies between the cameras and the wall: indices of refraction,
 #: lengths in metres. Beginning with air; glass may be absent.
@@ -21,19 +19,6 @@ MEDIA = (*INDICES, "glass_thickness", "sigma_water_index", "port", "depth")
 AIR = 1.0
 
 Setup = Mapping[str, float | None]
-
-
-def check_index(name: str, value: float | None) -> None:
-    """Refuse what no medium bends.
-
-    Raises
-    ------
-    InputError
-    """
-    if value is not None and not LEAST_INDEX <= value <= MOST_INDEX:
-        raise InputError(
-            f"{name}: {value:g} is no refractive index; water has about 1.34, glass 1.46 to 1.6."
-        )
 
 
 def lacking(setup: Setup) -> str:

@@ -24,7 +24,7 @@ from bifocal.orientation.approximate_orientation import (
     ties_of,
 )
 from bifocal.orientation.as_set_up import check_room
-from bifocal.orientation.bend import STRONGLY_BENT, WallBend, bend_of_wall
+from bifocal.orientation.bend import WallBend, bend_of_wall
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.media_options import THROUGH_MEDIA
 from bifocal.orientation.media_report import media_remarks, refuse_impossible_media
@@ -54,7 +54,8 @@ from bifocal.orientation.refracted_resection import resect_through
 from bifocal.orientation.refracted_stage import with_bent_ties
 from bifocal.orientation.relative_orientation import Ties
 from bifocal.orientation.slips import MOST, Fitted, Typed, slip_of
-from bifocal.orientation.tie_points import FEWEST_ON_WALL, likely_on_wall, tie_positions
+from bifocal.orientation.tie_points import likely_on_wall, tie_positions
+from bifocal.orientation.tuning import TUNING
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.errors import ConvergenceError, GeometryError, PhotogrammetryError, located
 
@@ -149,9 +150,9 @@ def _oriented(given: Given) -> OrientedPair:
         right = _mended_by_ties(given, ties, pair.observations)
         if right is not None:
             return right
-    certain = pair.bend.px - CERTAIN * pair.bend.sigma > STRONGLY_BENT
+    certain = pair.bend.px - CERTAIN * pair.bend.sigma > TUNING.strongly_bent
     bent = hopeless_bend(pair.observations, pair.bend) if certain and not enough else ""
-    if bent and likely_on_wall(pair.observations, pair.adjusted) < FEWEST_ON_WALL:
+    if bent and likely_on_wall(pair.observations, pair.adjusted) < TUNING.fewest_on_wall:
         raise GeometryError(bent)  # what holds a bent wall by small chances only is none
     return _with_words(pair, given, remarks)
 
@@ -229,7 +230,7 @@ def _reason(
 ) -> PhotogrammetryError:
     """Return why no cameras were found: that the wall is bent where it strongly is, or the error.
 
-    Features as first found are good to a pixel; only a bend beyond `STRONGLY_BENT` counts.
+    Features as first found are good to a pixel; only a bend beyond `Tuning.strongly_bent` counts.
     """
     bent = hopeless_bend(observations, _bend(observations, state))
     return GeometryError(bent) if bent else _with_lacking(error, lacking)

@@ -14,26 +14,8 @@ import numpy as np
 from bifocal.model.doubts import MISFIT, MOST_BENT, bend_is_certain
 from bifocal.model.homography import apply_homography
 from bifocal.orientation.reference_plane import faces
+from bifocal.orientation.tuning import TUNING
 from photocore.arrays import BoolArray, FloatArray
-
-#: Beyond this it is refraction or a strong lens for certain. `MOST_BENT` is the limit of an honest
-#: pair: rendered façades reach 0.006 px, church_1 and church_2 0.10; rendered ones seen through
-#: half a metre of water in 17 m 0.22 and 0.43. Set after they were seen. [px]
-STRONGLY_BENT = 1.0
-#: A face is what lies within this share of the far distance from its plane; where it holds fewer
-#: ties, or a smaller part of what a bent surface through all ties would hold, the wall itself is
-#: bent. Of six rendered façades flat faces hold 1.03 to 1.4 times as many as the best bent surface,
-#: walls bent by 1.8 to 14 px 0.1 to 0.6.
-BAND, FEWEST, HOLDS = 0.0025, 100, 0.8
-#: Faces tried, and half the thickness of one when they are looked for, as a share of the distance.
-MOST_FACES, THIN = 3, 0.0012
-#: Residuals that count less and less, at 3000 px of width [px], and the prior of the bend. The last
-#: tell one bent wall from parallel faces, which a bent surface meets along lines only.
-WIDTHS, SIGMA_BEND = (8.0, 5.0, 3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.3), 0.05
-#: A bend so small that what it does is proportional to it.
-SMALL = 1e-3
-#: Ties used; side of the cells whose ties err alike, over half the diagonal.
-MOST_POINTS, CELL = 2500, 0.17
 
 
 class WallBend(NamedTuple):
@@ -87,7 +69,7 @@ def wall_bend(
     asked = np.flatnonzero(np.ones(len(pixels1), dtype=bool) if face is None else face)
     if len(asked) < 30:
         return WallBend(), 0.0
-    some = asked[np.linspace(0, len(asked) - 1, min(len(asked), MOST_POINTS)).astype(int)]
+    some = asked[np.linspace(0, len(asked) - 1, min(len(asked), TUNING.bend_ties)).astype(int)]
     middle, half = (np.array(size) - 1) / 2.0, float(np.hypot(*size)) / 2
     everywhere = (pixels1 - middle) / half
     x1, x2 = everywhere[some], pixels2[some]
@@ -105,10 +87,10 @@ def wall_bend(
                 continue
             held = support
             radii = (everywhere**2).sum(axis=1, keepdims=True)
-            seen = apply_homography(fitted, everywhere * (1.0 + SMALL * radii))
+            seen = apply_homography(fitted, everywhere * (1.0 + TUNING.small_bend * radii))
             flat, _ = cv2.findHomography(everywhere, seen, 0)
             apart = np.linalg.norm(seen - apply_homography(flat, everywhere), axis=1)
-            by_k = float(np.sqrt((apart**2).mean())) / unit / SMALL
+            by_k = float(np.sqrt((apart**2).mean())) / unit / TUNING.small_bend
             answer = WallBend(abs(k) * by_k, sigma * by_k)
     return answer, held * len(asked) / len(some)
 
@@ -133,12 +115,19 @@ def bend_of_wall(
     """
     whole, held = wall_bend(pixels1, pixels2, size)
     known = np.flatnonzero(np.isfinite(height))
-    known = known[:: len(known) // MOST_POINTS + 1]
-    found = faces(height[known], pixels1[known], band=THIN)[:MOST_FACES]
-    near = [np.abs(height - offset) < BAND for offset in (0.0, *(face.offset for face in found))]
-    own = [wall_bend(pixels1, pixels2, size, face) for face in near if face.sum() >= FEWEST]
+    known = known[:: len(known) // TUNING.bend_ties + 1]
+    found = faces(height[known], pixels1[known], band=TUNING.face_band)[: TUNING.most_faces]
+    near = [
+        np.abs(height - offset) < TUNING.bend_band
+        for offset in (0.0, *(face.offset for face in found))
+    ]
+    own = [
+        wall_bend(pixels1, pixels2, size, face)
+        for face in near
+        if face.sum() >= TUNING.fewest_on_face
+    ]
     bend, most = max(own, key=lambda one: one[1], default=(whole, 0.0))
-    return bend if most >= HOLDS * held else whole
+    return bend if most >= TUNING.face_holds * held else whole
 
 
 def _fitted(
@@ -146,9 +135,9 @@ def _fitted(
 ) -> tuple[FloatArray, float, float, float]:
     """Return homography, k, its sigma and the support of the robust x2 = H (x1 (1 + k rho²))."""
     square = (x1**2).sum(axis=1)
-    cell = np.unique(np.floor(x1 / CELL), axis=0, return_inverse=True)[1].ravel()
+    cell = np.unique(np.floor(x1 / TUNING.bend_cell), axis=0, return_inverse=True)[1].ravel()
     matrix = matrix / matrix[2, 2]
-    for width in np.repeat(WIDTHS, 2) * unit:
+    for width in np.repeat(TUNING.bend_widths, 2) * unit:
         bent = np.column_stack([x1 * (1.0 + k * square[:, None]), np.ones(len(x1))])
         carried = bent @ matrix.T
         seen = carried[:, :2] / carried[:, 2:]
@@ -164,8 +153,8 @@ def _fitted(
         normal = (rows * root[:, None]).T @ rows
         pulls = (rows * (root * left.ravel())[:, None]).reshape(-1, 2, 9).sum(axis=1)
         right = pulls.sum(axis=0)
-        normal[8, 8] += (unit / SIGMA_BEND) ** 2
-        right[8] -= k * (unit / SIGMA_BEND) ** 2
+        normal[8, 8] += (unit / TUNING.sigma_bend) ** 2
+        right[8] -= k * (unit / TUNING.sigma_bend) ** 2
         step = np.linalg.lstsq(normal, right, rcond=None)[0]
         matrix = matrix + np.append(step[:8], 0.0).reshape(3, 3)
         k += float(step[8])
@@ -192,7 +181,7 @@ def bend_in_words(
     """
     if not bend.is_certain:
         return ""
-    sure = "" if bend.px > STRONGLY_BENT else " probably"
+    sure = "" if bend.px > TUNING.strongly_bent else " probably"
     reason = (
         "refraction (photos taken through glass or water: give --indices with --port or --depth), "
         "a lens file of another camera or focus, wrong distances, or no plane wall there"

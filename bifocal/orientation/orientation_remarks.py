@@ -6,11 +6,12 @@ import numpy as np
 
 from bifocal.model.doubts import MISFIT
 from bifocal.orientation.alignment import standard_deviations, wall_relief
-from bifocal.orientation.bend import STRONGLY_BENT, WallBend, bend_in_words
+from bifocal.orientation.bend import WallBend, bend_in_words
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair
 from bifocal.orientation.pair_observations import PairObservations
 from bifocal.orientation.photo_order import SURE
+from bifocal.orientation.tuning import TUNING
 
 #: Common points that fit their lines no better than this, at 3000 px of width, do not fit. Clean
 #: pairs reach 0.19, a phone pair with its lens estimated 0.4. [px]
@@ -36,15 +37,21 @@ def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
             "by 0.1 to 0.2. The likely reason is lens distortion (calibrate, give --lens), motion "
             "in the scene, or two photos of different states."
         )
-    for number, (interior, camera) in enumerate(
-        zip(observations.interiors, adjusted.cameras, strict=True), start=1
-    ):
-        change = float(np.log(camera.matrix[0, 0] / interior.focal))
-        if not interior.is_assumed and abs(change) > CONTRADICTS * interior.sigma_focal:
+    lenses = list(zip(observations.interiors, adjusted.cameras, strict=True))
+    changes = [float(np.log(camera.matrix[0, 0] / interior.focal)) for interior, camera in lenses]
+    pulled = [
+        not interior.is_assumed and abs(change) > CONTRADICTS * interior.sigma_focal
+        for (interior, _), change in zip(lenses, changes, strict=True)
+    ]
+    for n, ((interior, _), change) in enumerate(zip(lenses, changes, strict=True)):
+        alone = 100 * np.expm1(change - changes[1 - n])
+        apart = all(pulled) and changes[0] * changes[1] < 0  # one wrong lens pulls both
+        if pulled[n]:
             remarks.append(
-                f"The focal length of photo {number} came out {100 * np.expm1(change):+.1f} % from "
+                f"The focal length of photo {n + 1} came out {100 * np.expm1(change):+.1f} % from "
                 f"the one given ({interior.source}), {abs(change) / interior.sigma_focal:.0f} of "
                 "its standard deviations: check it, the lens distortion and the distances."
+                + (f" If the other photo's is right, it is {alone:+.0f} % off." if apart else "")
             )
     for name, camera, given in zip(
         ("far", "near"), adjusted.cameras, (site.distance1, site.distance2), strict=True
@@ -71,7 +78,7 @@ def _bend_of(observations: PairObservations, bend: WallBend) -> str:
 
 def hopeless_bend(observations: PairObservations, bend: WallBend) -> str:
     """Return that the wall is bent, if that is certainly by more than an honest lens does."""
-    return _bend_of(observations, bend) if bend.px > STRONGLY_BENT else ""
+    return _bend_of(observations, bend) if bend.px > TUNING.strongly_bent else ""
 
 
 def order_remarks(order: float, names: tuple[str, str]) -> list[str]:

@@ -18,13 +18,7 @@ from bifocal.orientation.bend import WallBend
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.pair_adjustment import AdjustedPair, adjust, evaluated, line_test
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns, at
-from bifocal.orientation.reference_plane import (
-    STEEPEST,
-    Face,
-    choose_wall,
-    onto_plane,
-    rivals_in_words,
-)
+from bifocal.orientation.reference_plane import Face, choose_wall, onto_plane, rivals_in_words
 from bifocal.orientation.tie_points import (
     refine_ties,
     tie_positions,
@@ -34,6 +28,7 @@ from bifocal.orientation.tie_points import (
     with_wall,
     without_gross_ties,
 )
+from bifocal.orientation.tuning import TUNING
 from bifocal.orientation.wall_planes import (
     likely_wall,
     planes_of_any_direction,
@@ -293,7 +288,7 @@ def _facing_the_wall(pair: OrientedPair, site: SiteMeasures) -> OrientedPair:
         return pair
     question = steep_rivals_in_words(planes, wall, seen, site)
     pair = pair.told(question) if question else pair
-    if wall.slope <= STEEPEST:
+    if wall.slope <= TUNING.face_slope:
         return pair
     cameras = onto_plane(
         adjusted.cameras, np.array([wall.offset, *-wall.normal[:2]]) / wall.normal[2]

@@ -13,29 +13,10 @@ import numpy as np
 
 from bifocal.model.interior_orientation import Cameras, Interior, Interiors
 from bifocal.orientation.control_points import SiteMeasures
+from bifocal.orientation.tuning import TUNING
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.camera.rotation import rotation_from_vector
 from photocore.errors import GeometryError
-
-#: Half the thickness of a face, as a share of the far distance.
-BAND = 0.0012
-#: The present plane is a face of the same wall: others slope less than this against it. [m/m]
-STEEPEST = 0.02
-#: A face with this share of the chosen one's points may as well be the wall.
-RIVAL = 0.5
-#: A face whose chance by the measured distances is this share of the chosen one's is none.
-UNLIKELY = 0.01
-#: With this share of the largest face's points, a face at one scale is preferred to it.
-COMPARABLE = 0.5
-#: With this share of the largest face's points a face may be chosen by the measured distances; it
-#: fits them within so many standard deviations, and the next does not.
-FAIR, FITS = 0.25, 2.0
-#: Nominal scales this close mean that the photos were planned for one scale.
-ONE_SCALE = 0.02
-#: Faces nearer than this many bands are one face, unevenly built.
-APART = 3.0
-#: Shallow relief scatters by at least so many times the wall's own roughness.
-WIDER = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +67,7 @@ def faces(heights: FloatArray, pixels: FloatArray, *, band: float) -> list[Face]
         offset = float(np.median(heights[members]))
         if members.sum() < 0.05 * count:
             break
-        if all(abs(offset - other.offset) > APART * band for other in planes):
+        if all(abs(offset - other.offset) > TUNING.faces_apart * band for other in planes):
             planes.append(
                 Face(offset, float(members.sum() / count), _midst(pixels, np.flatnonzero(members)))
             )
@@ -136,7 +117,7 @@ def choose_wall(
     GeometryError
         If no point lies near the spot named.
     """
-    band = BAND * float(cameras[0].centre[2])
+    band = TUNING.face_band * float(cameras[0].centre[2])
     plane = largest_plane(xyz, band=band)
     heights = _heights(xyz, plane)
     offset = 0.0
@@ -148,7 +129,7 @@ def choose_wall(
         offset = by_ratio
     elif is_one_scale(interiors, site):
         planes = faces(heights, pixels, band=band)
-        fair = [f for f in planes if f.share >= COMPARABLE * planes[0].share]
+        fair = [f for f in planes if f.share >= TUNING.comparable * planes[0].share]
         if fair:
             offset = min(fair, key=lambda f: abs(scale_difference(cameras, plane, f.offset))).offset
     if offset:
@@ -183,14 +164,16 @@ def _face_by_ratio(
     sigma: float,
 ) -> float | None:
     """Return the offset of the face whose distances have the measured ratio; None: cannot tell."""
-    planes = faces(heights, pixels, band=BAND * float(cameras[0].centre[2]))
-    fair = [face for face in planes if face.share >= FAIR * planes[0].share]
+    planes = faces(heights, pixels, band=TUNING.face_band * float(cameras[0].centre[2]))
+    fair = [face for face in planes if face.share >= TUNING.fair * planes[0].share]
     tests = _ratio_tests(fair, cameras, plane, site, sigma)
     if len(fair) < 2 or not tests.any():
         return None
     order = np.argsort(tests)
     # The nearest must fit, and the next must not.
-    if tests[order[0]] > FITS or tests[order[1]] < max(FITS, 2 * tests[order[0]]):
+    if tests[order[0]] > TUNING.face_fits or tests[order[1]] < max(
+        TUNING.face_fits, 2 * tests[order[0]]
+    ):
         return None
     return fair[int(order[0])].offset
 
@@ -214,7 +197,7 @@ def largest_plane(xyz: FloatArray, *, band: float) -> FloatArray:
     extent = np.ptp(sample[:, :2], axis=0).prod()
     wide = np.abs(area) > 0.02 * extent
     planes = np.linalg.solve(design[wide], corners[wide][..., 2:])[..., 0]
-    planes = planes[np.abs(planes[:, 1:]).max(axis=1) < STEEPEST]
+    planes = planes[np.abs(planes[:, 1:]).max(axis=1) < TUNING.face_slope]
     planes = np.concatenate([np.zeros((1, 3)), planes])
     lifted = np.column_stack([np.ones(len(sample)), sample[:, :2]])
     scores = [
@@ -306,7 +289,7 @@ def narrow_face(xyz: FloatArray, sigma: FloatArray, *, band: float) -> NarrowFac
     design = some[triples]
     wide = np.abs(np.linalg.det(design)) > 0.02 * np.ptp(some[:, 1:], axis=0).prod()
     planes = np.linalg.solve(design[wide], height[triples][wide][..., None])[..., 0]
-    planes = planes[np.abs(planes[:, 1:]).max(axis=1) < STEEPEST]
+    planes = planes[np.abs(planes[:, 1:]).max(axis=1) < TUNING.face_slope]
     planes = np.concatenate([np.zeros((1, 3)), planes])
     tested = generator.choice(len(height), min(len(height), 2000), replace=False)
     away = height[tested] - planes @ some[tested].T
@@ -373,7 +356,7 @@ def _core(
         square = (away - offsets[:, None]) ** 2 - spread**2
         extra = (tell * square).sum(axis=1) / np.maximum(tell.sum(axis=1), 1e-300)
         widths[0] = np.sqrt(max(extra[0], least**2))
-        widths[1:] = np.sqrt(np.maximum(extra[1:], (WIDER * widths[0]) ** 2))
+        widths[1:] = np.sqrt(np.maximum(extra[1:], (TUNING.wider * widths[0]) ** 2))
     likelihood = float(np.log(density).sum()) - 1.5 * shallow * float(np.log(len(height)))
     return likelihood, plane, float(widths[0]), chance[0]
 
@@ -384,7 +367,7 @@ def is_one_scale(interiors: Interiors, site: SiteMeasures) -> bool:
     if not (site.parallel and d1 and d2) or any(interior.is_assumed for interior in interiors):
         return False
     ratio = interiors[1].focal / d2 * d1 / interiors[0].focal
-    return abs(float(np.log(ratio))) < ONE_SCALE
+    return abs(float(np.log(ratio))) < TUNING.one_scale
 
 
 def scale_difference(cameras: Cameras, plane: FloatArray, offset: float) -> float:
@@ -395,8 +378,8 @@ def scale_difference(cameras: Cameras, plane: FloatArray, offset: float) -> floa
 
 def rivals(planes: Sequence[Face]) -> list[Face]:
     """Return the faces that may as well be the wall."""
-    likely = [face for face in planes[1:] if face.chance >= UNLIKELY * planes[0].chance]
-    return [face for face in likely if face.share >= RIVAL * planes[0].share]
+    likely = [face for face in planes[1:] if face.chance >= TUNING.unlikely * planes[0].chance]
+    return [face for face in likely if face.share >= TUNING.comparable * planes[0].share]
 
 
 def zero_sigma(planes: Sequence[Face]) -> float:

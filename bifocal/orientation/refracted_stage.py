@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from bifocal.orientation.bend import BAND
 from bifocal.orientation.orientation_stages import OrientedPair
 from bifocal.orientation.pair_adjustment import adjust, evaluated
 from bifocal.orientation.relative_orientation import Ties
@@ -14,6 +13,7 @@ from bifocal.orientation.tie_points import (
     tie_positions,
     without_gross_ties,
 )
+from bifocal.orientation.tuning import TUNING
 from photocore.adjustment.outliers import robust_sigma
 
 #: Common points that take part, where each costs more than in air; fewer say nothing.
@@ -41,5 +41,5 @@ def with_bent_ties(pair: OrientedPair, ties: Ties) -> OrientedPair:
             return pair.told("Hardly any common point fits the control points through the media.")
         adjusted = adjust(base, adjusted)
     height = np.abs(tie_positions(base, adjusted)[:, 2])
-    on_wall = base.tie_used & (height < BAND * adjusted.cameras[0].centre[2])
+    on_wall = base.tie_used & (height < TUNING.bend_band * adjusted.cameras[0].centre[2])
     return replace(pair, observations=replace(base, wall=on_wall), adjusted=adjusted)

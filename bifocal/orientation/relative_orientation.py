@@ -23,27 +23,10 @@ from bifocal.matching.features import (
 )
 from bifocal.model.homography import apply_homography
 from bifocal.model.interior_orientation import Cameras, Interiors
+from bifocal.orientation.tuning import TUNING
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import Pinhole, fundamental, homogeneous, triangulate
 from photocore.errors import GeometryError
-
-#: Fewer common points than this and any two photos may seem to match by chance.
-FEWEST_MATCHES = 40
-#: A plane that holds a smaller share of the common points is not "the wall".
-FEWEST_ON_PLANE = 0.12
-#: So many of the strongest features are compared with each other first; all, if too few agree.
-FIRST_TRIED, ENOUGH = 8000, 400
-#: More ties than this, spread evenly, tell nothing more: their errors are common to stretches.
-MOST_TIES = 6000
-#: How far along its line a partner is looked for around the plane, as a share of the width.
-ALONG = 0.2
-#: Neighbours asked for support, and how many must move alike against the plane, within so many
-#: pixels at 3000 px of width. First try on six real pairs: of 22 to 54 wrong ties 0 to 22 stayed.
-NEIGHBOURS, SUPPORTERS, ALIKE = 8, 2, 4.0
-#: Radial distortions tried where the lens is unknown, and the truncation of their cost. [px]
-SCANNED, TRUNCATED = np.linspace(-0.25, 0.2, 10), 0.7
-#: A scanned distortion is believed if it lowers the cost to this share of that of none.
-BELIEVED = 0.9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -104,7 +87,7 @@ def find_ties(
     x1, x2 = straight[0].pixels[rows1], straight[1].pixels[rows2]
     agree, matrix = _one_geometry(x1, x2, tolerance)
     count = int(agree.sum())
-    if count < FEWEST_MATCHES or count < 0.08 * len(x1):
+    if count < TUNING.fewest_matches or count < 0.08 * len(x1):
         raise GeometryError(
             f"{names[0]} and {names[1]} have too little in common ({count} matching details of "
             f"{min(len(first.pixels), len(second.pixels))}): they show different walls, or one is "
@@ -120,15 +103,15 @@ def find_ties(
     width = max(interiors[0].image_size)
     kept = np.flatnonzero(drop_repeated(x1, x2))
     kept = kept[supported(x1[kept], x2[kept] - apply_homography(homography, x1[kept]), width)]
-    if len(kept) < FEWEST_MATCHES:
+    if len(kept) < TUNING.fewest_matches:
         kept = np.arange(len(x1))
     # Strongest first: rank serves as precision.
     shape = interiors[0].image_size[::-1]
-    kept = kept[spread_evenly(x1[kept], rows1[kept].astype(np.float64), shape, MOST_TIES)]
+    kept = kept[spread_evenly(x1[kept], rows1[kept].astype(np.float64), shape, TUNING.most_ties)]
     x1, x2, rows1, rows2 = x1[kept], x2[kept], rows1[kept], rows2[kept]
     homography, on_plane = _dominant_plane(x1, x2, 1.5 * tolerance, 8000)
     count = len(x1)
-    if on_plane.sum() < max(FEWEST_ON_PLANE * count, 20):
+    if on_plane.sum() < max(TUNING.fewest_on_plane * count, 20):
         raise GeometryError(
             f"no plane: only {int(on_plane.sum())} of {count} common points lie on one plane. The "
             "method needs a wall as reference. Frame the photos so that the wall fills them, or "
@@ -159,7 +142,7 @@ def _neighbours(
     first: Features, second: Features, interiors: Interiors
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], float]:
     """Return nearest neighbours: of the strongest features, or of all; the distortion scanned."""
-    for count in (FIRST_TRIED, max(len(first.pixels), len(second.pixels))):
+    for count in (TUNING.first_tried, max(len(first.pixels), len(second.pixels))):
         rows1, rows2 = match_features(first.strongest(count), second.strongest(count))
         ideal = interiors[0].ideal(first.pixels[rows1]), interiors[1].ideal(second.pixels[rows2])
         keep = drop_repeated(*ideal)
@@ -167,7 +150,7 @@ def _neighbours(
         radial = scanned_radial(*ideal, interiors)
         x1, x2 = (i.radial(radial).undistort(x) for i, x in zip(interiors, ideal, strict=True))
         agree, _ = _one_geometry(x1, x2, _tolerance(first, second, interiors))
-        if agree.sum() >= ENOUGH or count >= max(len(first.pixels), len(second.pixels)):
+        if agree.sum() >= TUNING.enough or count >= max(len(first.pixels), len(second.pixels)):
             break
     return rows1, rows2, radial
 
@@ -177,13 +160,16 @@ def scanned_radial(x1: FloatArray, x2: FloatArray, interiors: Interiors) -> floa
 
     Straightened by the right k, more points lie on epipolar lines; the truncated cost counts them.
     """
-    if not all(interior.sigma_radial > 0 for interior in interiors) or len(x1) < FEWEST_MATCHES:
+    if (
+        not all(interior.sigma_radial > 0 for interior in interiors)
+        or len(x1) < TUNING.fewest_matches
+    ):
         return 0.0
     some = np.linspace(0, len(x1) - 1, min(len(x1), 1500)).astype(int)
     x1, x2 = x1[some], x2[some]
-    wide = TRUNCATED * max(max(interiors[0].image_size) / 3000, 0.3)
+    wide = TUNING.truncated * max(max(interiors[0].image_size) / 3000, 0.3)
     costs = []
-    trials = np.concatenate([[0.0], SCANNED])
+    trials = np.concatenate([[0.0], np.linspace(*TUNING.scanned)])
     for k in trials:
         y1, y2 = (i.radial(k).undistort(x) for i, x in zip(interiors, (x1, x2), strict=True))
         cv2.setRNGSeed(7)
@@ -194,7 +180,7 @@ def scanned_radial(x1: FloatArray, x2: FloatArray, interiors: Interiors) -> floa
         misfit = epipolar_distance(matrix, y1, y2)
         costs.append(float(np.minimum(misfit, 3 * wide).sum()))
     best = int(np.argmin(costs))
-    return float(trials[best]) if costs[best] < BELIEVED * costs[0] else 0.0
+    return float(trials[best]) if costs[best] < TUNING.believed * costs[0] else 0.0
 
 
 def epipolar_distance(matrix: FloatArray, x1: FloatArray, x2: FloatArray) -> FloatArray:
@@ -219,7 +205,7 @@ def _along_lines(
         normal = line[:, :2] / length
         seen = apply_homography(homography, first.pixels)
         foot = seen - normal * ((seen * normal).sum(axis=1) + line[:, 2] / length[:, 0])[:, None]
-    reach = ALONG * float(np.ptp(second.pixels[:, 0]))
+    reach = TUNING.along * float(np.ptp(second.pixels[:, 0]))
     along = reach * np.column_stack([-normal[:, 1], normal[:, 0]])
     left = np.linalg.svd(matrix)[0][:, 2]
     scale = left[2] if abs(left[2]) > 1e-9 * np.abs(left[:2]).max() else 1e-9
@@ -247,12 +233,12 @@ def supported(pixels: FloatArray, parallax: FloatArray, width: int) -> BoolArray
     A wrong tie may satisfy its epipolar line by chance, a surface is smooth: fifty wrong ties of
     2200 turned a relative orientation by 0.5 to 1.4 degrees, and its covariance did not show it.
     """
-    count = min(NEIGHBOURS + 1, len(pixels))
+    count = min(TUNING.neighbours + 1, len(pixels))
     if count < 2:
         return np.zeros(len(pixels), dtype=bool)
     near = cKDTree(pixels).query(pixels, count)[1][:, 1:]
     apart = np.linalg.norm(parallax[near] - parallax[:, None], axis=2)
-    return np.asarray((apart < ALIKE * width / 3000).sum(axis=1) >= SUPPORTERS)
+    return np.asarray((apart < TUNING.alike * width / 3000).sum(axis=1) >= TUNING.supporters)
 
 
 def _one_geometry(

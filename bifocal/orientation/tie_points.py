@@ -14,6 +14,7 @@ from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
 from bifocal.orientation.reference_plane import NarrowFace, narrow_face
 from bifocal.orientation.relative_orientation import supported
 from bifocal.orientation.seen_points import meeting_points
+from bifocal.orientation.tuning import TUNING
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import (
@@ -23,13 +24,6 @@ from photocore.camera.pinhole import (
     project_with_jacobian,
     ray_on_plane,
 )
-
-#: Ties are never believed to be more precise than this. [px]
-BEST_TIE = 0.03
-#: Fewer ties than this, counted by their chances, or in fewer tenths of the photo, are no wall.
-FEWEST_ON_WALL, FEWEST_CELLS = 20, 6
-#: Half the band, as a share of the far distance, in which the wall's own face is looked for.
-WALL_BAND = 0.005
 
 
 def relief_rate(cameras: Cameras, xyz: FloatArray) -> FloatArray:
@@ -79,7 +73,7 @@ def without_gross_ties(
     sigma : float
         Precision of a tie's coordinate. [px]
     """
-    sigma = max(sigma, BEST_TIE)
+    sigma = max(sigma, TUNING.best_tie)
     used = np.abs(adjusted.tie_misfit) < OUTLIER_LIMIT * sigma
     xyz = tie_positions(observations, adjusted)
     lowest = min(camera.centre[2] for camera in adjusted.cameras)
@@ -96,7 +90,7 @@ def with_support(observations: PairObservations, adjusted: AdjustedPair) -> Pair
     width = max(observations.interiors[0].image_size)
     keep = np.zeros(len(seen1), dtype=bool)
     keep[used[supported(seen1[used], parallax, width)]] = True
-    if keep.sum() < FEWEST_ON_WALL:
+    if keep.sum() < TUNING.fewest_on_wall:
         return observations
     return replace(observations, tie_used=keep, wall=observations.wall & keep)
 
@@ -145,13 +139,13 @@ def with_wall(
     """
     xyz, metres, sigma, face = _wall_of(observations, state)
     if known:
-        rough = WALL_BAND * float(state.cameras[0].centre[2])
+        rough = TUNING.rough_band * float(state.cameras[0].centre[2])
         on_wall = observations.wall & np.isfinite(xyz).all(axis=1) & np.isfinite(metres)
         face = replace(face, roughness=rough, chance=on_wall.astype(float))
     seen = observations.tie1[face.members]
     cell = np.floor(seen / (0.1 * max(observations.interiors[0].image_size)))
     cells = len(np.unique(cell, axis=0))
-    if face.chance.sum() < FEWEST_ON_WALL or cells < FEWEST_CELLS:
+    if face.chance.sum() < TUNING.fewest_on_wall or cells < TUNING.fewest_cells:
         return replace(
             observations,
             wall=np.zeros_like(face.members),
@@ -185,7 +179,9 @@ def _wall_of(
     metres = relief_per_pixel(observations, state)
     known = observations.tie_used & np.isfinite(xyz).all(axis=1) & np.isfinite(metres)
     sigma = np.hypot(np.sqrt(2.0) * observations.sigma_tie * np.abs(metres), 1e-6)
-    face = narrow_face(xyz[known], sigma[known], band=WALL_BAND * float(state.cameras[0].centre[2]))
+    face = narrow_face(
+        xyz[known], sigma[known], band=TUNING.rough_band * float(state.cameras[0].centre[2])
+    )
     chance = np.zeros(len(xyz))
     chance[known] = face.chance
     return xyz, metres, sigma, replace(face, chance=chance)

@@ -12,21 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orientation.reference_plane import FAIR, FITS, RIVAL, STEEPEST
+from bifocal.orientation.tuning import TUNING
 from photocore.arrays import BoolArray, FloatArray
-
-#: Half the thickness of a plane, as a share of the far distance: real façades are rough.
-THICK = 0.005
-#: A plane of another direction is taken for the wall if it holds so many times as much as the
-#: fullest one of nearly the present direction.
-FULLER = 1.5
-#: One of nearly the present direction is given up for the measured distances' sake if it is off by
-#: so many standard deviations: those of the first, rough model are too small. On four rendered
-#: façades the wall was 1.0 to 2.3 of them off; on one a plane through plinth and cornices, with a
-#: quarter as many points, was only 0.8 off and 14.7 degrees wrong.
-CONTRADICTED = 4.0
-#: Planes looked for, triples tried for each.
-MOST_PLANES, TRIPLES = 5, 2000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,14 +60,14 @@ def planes_of_any_direction(
     centres : pair of ndarray, shape (3,)
         Projection centres. [m]
     """
-    band = THICK * float(centres[0][2])
+    band = TUNING.rough_band * float(centres[0][2])
     generator = np.random.default_rng(7)
     free, found = np.ones(len(xyz), dtype=bool), []
-    for _ in range(MOST_PLANES):
+    for _ in range(TUNING.most_planes):
         left = np.flatnonzero(free)
         if len(left) < 20:
             break
-        corners = xyz[generator.choice(left, (TRIPLES, 3))]
+        corners = xyz[generator.choice(left, (TUNING.triples, 3))]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         size = np.linalg.norm(normals, axis=1)
         normals = normals[size > 0] / size[size > 0, None]
@@ -147,7 +134,7 @@ def likely_wall(
     if not planes:
         return None
     d1, d2 = site.distances
-    fair = [p for p in planes if p.share >= FAIR * planes[0].share]
+    fair = [p for p in planes if p.share >= TUNING.fair * planes[0].share]
     if site.wall is not None:
         nearest = np.argsort(np.linalg.norm(pixels - np.array(site.wall), axis=1))[:15]
         chosen = max(planes, key=lambda p: int(p.members[nearest].sum()))
@@ -156,10 +143,15 @@ def likely_wall(
         sigma = float(np.hypot(sigma_ratio, np.hypot(site.sigma / d1, site.sigma / d2)))
         ratios = [np.log(p.distance(centres[0]) / p.distance(centres[1])) for p in fair]
         tests = np.abs(np.array(ratios) - np.log(d1 / d2)) / sigma
-        limits = [CONTRADICTED if p.slope <= STEEPEST else FITS for p in fair]
+        limits = [
+            TUNING.plane_contradicted if p.slope <= TUNING.face_slope else TUNING.face_fits
+            for p in fair
+        ]
         fair = [p for p, test, most in zip(fair, tests, limits, strict=True) if test < most] or fair
     best = max(fair, key=lambda p: p.share)
-    present = [p for p in fair if p.slope <= STEEPEST and FULLER * p.share >= best.share]
+    present = [
+        p for p in fair if p.slope <= TUNING.face_slope and TUNING.fuller * p.share >= best.share
+    ]
     return max(present, key=lambda p: p.share) if present else best
 
 
@@ -172,8 +164,8 @@ def steep_rivals_in_words(
         p
         for p in planes
         if p is not chosen
-        and p.share >= RIVAL * chosen.share
-        and float(p.normal @ chosen.normal) < np.cos(np.arctan(STEEPEST))
+        and p.share >= TUNING.comparable * chosen.share
+        and float(p.normal @ chosen.normal) < np.cos(np.arctan(TUNING.face_slope))
     ]
     if not others or site.wall is not None or (d1 and d2):
         return ""

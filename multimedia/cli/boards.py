@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from photocore.cli import print_result, progress_bar, text_table
-from photocore.options import FILE, Size, as_json, choice, number, overwrite
+from photocore.options import BOARD, FILE, PATTERN, as_json, number, overwrite
 
 if TYPE_CHECKING:
     from multimedia.boards.workflow import FoundBoards
@@ -27,15 +27,8 @@ The photos of several cameras are told apart by their names (left_003.png) or fo
 @click.command(epilog=EXAMPLE)
 @click.argument("project", type=FILE)
 @click.argument("photos", type=FILE, nargs=-1, required=True)
-@choice(
-    "--pattern", "chessboard|circles|asymmetric-circles|charuco", "What is on the board.",
-    default="chessboard",
-)  # fmt: skip
-@click.option(
-    "--board", type=Size(least=1, whole=True), required=True,
-    help="Inner corners of a chessboard, circles of a grid, squares of a ChArUco board, across x "
-    "up.",
-)  # fmt: skip
+@PATTERN
+@BOARD.but(required=True)
 @number(
     "--square", "L", "Side of a square, or distance of neighbouring circles [object unit].",
     required=True,

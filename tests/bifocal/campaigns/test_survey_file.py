@@ -185,7 +185,7 @@ def test_a_pair_that_nothing_controls_is_told_in_words_of_the_file_before_any_wo
     assert begun.exit_code == 0, begun.stderr
     survey = str(tmp_path / "survey.toml")
     planned = CliRunner().invoke(main, ["survey", survey, "--dry-run"])
-    assert planned.exit_code == 0, planned.stderr
+    assert planned.exit_code == 1  # as the work itself
     assert " align  cannot\n" in planned.stdout
     ran = CliRunner().invoke(main, ["survey", survey])
     assert ran.exit_code == 1
@@ -195,6 +195,19 @@ def test_a_pair_that_nothing_controls_is_told_in_words_of_the_file_before_any_wo
         assert "auto = true with one distance" in told
         assert not re.search(r"--[a-z]", told)
     assert CliRunner().invoke(main, ["survey"]).exit_code == 2
+
+
+def test_a_plan_with_a_file_that_cannot_be_read_ends_as_the_work_would(tmp_path):
+    for name, content in (("far.jpg", b"no photo"), ("near.jpg", b""), ("points.csv", b"id\n")):
+        (tmp_path / name).write_bytes(content)
+    survey = tmp_path / "survey.toml"
+    survey.write_text(
+        '[[pair]]\nname = "a"\nfar = "far.jpg"\nnear = "near.jpg"\ncontrol = "points.csv"\n'
+    )
+    for more in ([], ["--json"]):
+        planned = CliRunner().invoke(main, ["survey", str(survey), "--dry-run", *more])
+        assert planned.exit_code == 1
+        assert "near.jpg" in planned.output or "far.jpg" in planned.output
 
 
 def test_an_equivalent_and_a_true_focal_length_do_not_tell_which_photo_is_far():

@@ -102,7 +102,7 @@ NO_FIELD = (
     [
         ({"op": "point.pick", "image": 3, "column": 1, "row": 1}, "image"),
         ({"op": "point.pick", "image": 1, "column": 1}, "column, row"),
-        ({"op": "point.pick", "image": 1, "column": 1e9, "row": 1}, "outside photo|reason"),
+        ({"op": "point.pick", "image": 1, "column": 1e9, "row": 1}, "outside photo|or less"),
         ({"op": "point.pick", "image": 1, "column": 1536.0, "row": 1}, "outside photo 1"),
         ({"op": "point.pick", "image": 1, "column": True, "row": 1}, "number"),
         ({"op": "point.pick", "name": "x" * 99, "image": 1, "column": 1, "row": 1}, "name"),
@@ -114,7 +114,7 @@ NO_FIELD = (
         ({"op": "tape.set", "from": "A", "to": "B", "length": -1}, "above zero"),
         ({"op": "tape.set", "from": "A", "to": "B", "length": 1}, "no control point"),
         ({"op": "setup.set", "d1": 0}, "above zero"),
-        ({"op": "setup.set", "d1": "far"}, "no number"),
+        ({"op": "setup.set", "d1": "far"}, "expected a number above zero"),
         ({"op": "stage.set", "stage": "roof"}, "stage"),
         ({"op": "language.set", "language": "fr"}, "language"),
         ({"op": "photos.exchange"}, "before they are oriented"),

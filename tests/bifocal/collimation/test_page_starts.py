@@ -219,6 +219,16 @@ def test_other_photos_than_the_workbooks_are_refused(survey) -> None:
         pass
 
 
+def test_a_workbook_that_is_none_is_refused_before_the_page_is_there(survey) -> None:
+    photos, junk = survey.parent / "photos", survey.parent / "junk.xlsx"
+    junk.write_text("no workbook")
+    words = ["pick", str(photos / "far.jpg"), str(photos / "near.jpg"), "--workbook", str(junk)]
+    done = CliRunner().invoke(main, [*words, "--no-browser"])
+    assert done.exit_code == 1
+    assert "junk.xlsx: is not a workbook" in done.stderr
+    assert junk.read_text() == "no workbook"
+
+
 def test_the_command_alone_says_that_the_page_is_there() -> None:
     assert "bifocal pick    " in CliRunner().invoke(main, []).output
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import io
 import os
 import shutil
+from contextlib import suppress
 
+import cv2
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -16,7 +18,7 @@ from bifocal.demo import SAMPLE
 from bifocal.files import images
 from bifocal.files.images import read_image
 from multimedia.projects.photos import read_photo
-from photocore.decoding import decoders_words
+from photocore.decoding import decoded, decoders_words
 from photocore.errors import InputError
 
 FAR = (SAMPLE / "far.jpg").read_bytes()
@@ -68,6 +70,24 @@ def test_bytes_lost_anywhere_are_noticed_where_the_decoder_is_silent_too(tmp_pat
     (tmp_path / "far.jpg").write_bytes(FAR[:start] + bytes(40) + FAR[start + 40 :])
     with pytest.raises(InputError, match=r"damaged \((bytes lost at \d+%|JPEG data)"):
         read_image(tmp_path / "far.jpg")
+
+
+@pytest.mark.parametrize("options", [{}, {"optimize": True, "quality": 92}])
+def test_other_bytes_are_noticed_by_the_picture_where_the_decoder_is_silent(options):
+    rng, content, out = np.random.default_rng(2), FAR, io.BytesIO()
+    if options:
+        Image.open(io.BytesIO(FAR)).save(out, "JPEG", **options)
+        content = out.getvalue()
+    whole = decoded("a.jpg", np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR).astype(int)
+    spoiled = 0
+    for _ in range(40):
+        middle = int(len(content) * rng.uniform(0.3, 0.7))
+        data = np.frombuffer(content, np.uint8).copy()
+        data[middle : middle + 40] = rng.integers(0, 256, 40)
+        with suppress(InputError):
+            found = decoded("a.jpg", data, cv2.IMREAD_COLOR)
+            spoiled += (np.abs(found - whole).max(axis=2) > 8).mean() > 0.05
+    assert spoiled <= 1  # without the look at the picture, 3 and 9
 
 
 @pytest.mark.parametrize("options", [{}, {"optimize": True}, {"progressive": True}])

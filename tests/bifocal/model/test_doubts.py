@@ -25,18 +25,19 @@ def with_setup(**setup: object) -> Pair:
 
 
 def test_a_wall_bent_between_the_photos_is_in_every_sigma_and_said_first() -> None:
-    # Rendered façades bent by 6.1 to 6.3 px were 0.24 to 0.27 m wrong at a stated 0.03 m.
+    # Rendered façades bent by 6.1 to 6.3 px were 0.24 to 0.27 m wrong at a stated 0.03 m, in the
+    # corners more than in the middle (`test_sigma_of_a_bent_wall_is_what_relief_errs_by`).
     bent = with_setup(**BENT)
     assert bent.remarks[0].startswith("THE MODEL DOES NOT FIT")
     solved, honest = (pair.intersect(*PAIR.project(WALL)) for pair in (bent, PAIR))
     assert honest.flags == ("OK",) * 3
-    assert (solved.sigma[:, 2] > 0.15).all()
-    assert (solved.sigma[:, 2] < 0.8).all()
-    assert set(solved.flags) == {"UNCERTAIN"}
+    assert 0.2 < np.sqrt((solved.sigma[:, 2] ** 2).mean()) < 0.35
+    assert (solved.sigma[:, 2] > 0.08).all()
+    assert solved.flags == ("ON-PLANE", "WEAK", "UNCERTAIN")
     of_map = orientation_sigma(
         bent, np.zeros((4, 6), np.float32), Grid(x0=2.0, y0=2.0, gsd=0.5, width=6, height=4)
     )
-    assert of_map.min() > 0.15
+    assert of_map.min() > 0.08
     assert "orientation" not in bent.to_dict()  # what the file states stays as it was
 
 

@@ -12,7 +12,7 @@ from bifocal.orientation.alignment import make_alignment
 from bifocal.orientation.approximate_orientation import Given
 from bifocal.orientation.bend import WallBend
 from bifocal.orientation.control_points import Control, SiteMeasures
-from bifocal.orientation.orientation_remarks import hopeless_bend
+from bifocal.orientation.orientation_remarks import hopeless_bend, model_remarks
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.pair_observations import PairObservations
 from bifocal.orientation.slips import slip_of
@@ -189,6 +189,22 @@ def test_a_doubt_comes_first_and_leaves_nothing_called_good() -> None:
     assert "relief is good to" not in " ".join((*bent.words, *bent.setup["words"]))
     assert bent.remarks[0].startswith("THE MODEL DOES NOT FIT")
     assert bent.setup["doubts"] == [bent.remarks[0]]
+
+
+def test_one_wrong_lens_of_two_is_told_by_what_each_would_have_to_be() -> None:
+    """As two tapes and common points leave them: near 18 mm typed as 24 beside 36 mm."""
+    pair, site = orient_pair(photos(), control=control(), site=SiteMeasures()), SiteMeasures()
+    typed = [
+        replace(interior, focal=camera.matrix[0, 0] / factor)
+        for interior, camera, factor in zip(
+            pair.observations.interiors, pair.adjusted.cameras, (1.1534, 0.867), strict=True
+        )
+    ]
+    seen = replace(pair.observations, interiors=(typed[0], typed[1]))
+    far, near = model_remarks(replace(pair, observations=seen), site)
+    assert "photo 1 came out +15.3 %" in far
+    assert far.endswith("If the other photo's is right, it is +33 % off.")
+    assert near.endswith("If the other photo's is right, it is -25 % off.")
 
 
 def test_a_bend_that_is_not_certain_refuses_nothing() -> None:

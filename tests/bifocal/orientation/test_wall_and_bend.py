@@ -6,14 +6,17 @@ import cv2
 import numpy as np
 import pytest
 
+from bifocal import Pair
 from bifocal.matching.features import Features, match_features
 from bifocal.model.interior_orientation import Interior
+from bifocal.orientation import absolute_orientation
 from bifocal.orientation.absolute_orientation import orient_pair
+from bifocal.orientation.alignment import make_alignment
 from bifocal.orientation.bend import WallBend, bend_in_words, bend_of_wall, wall_bend
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.reference_plane import narrow_face
-from bifocal.orientation.relative_orientation import supported
+from bifocal.orientation.relative_orientation import Ties, supported
 from photocore.camera.distortion import RadialDivision
 from photocore.camera.pinhole import Pinhole
 from photocore.errors import GeometryError
@@ -95,6 +98,81 @@ def test_a_bent_wall_behind_another_face_is_told(seed: int) -> None:
     faced = lambda at: np.where(np.floor(1.1 * at[:, 0]) % 3 == 0, 0.13, 0.0)  # noqa: E731
     x1, x2, height = seen_in_both(faced, seed=seed, k=-0.02)
     assert bend_of_wall(x1, x2, SIZE, height).is_certain
+
+
+def bent_pair(k: tuple[float, float], way: str, seed: int, monkeypatch: pytest.MonkeyPatch):
+    """Return a pair set up as if its lenses bent nothing, and points with their pixels."""
+    rng = np.random.default_rng(seed)
+    cameras = bifocal_cameras(size=SIZE, errors=SetupErrors(tilt_deg=0.3), rng=rng)
+    both = (cameras.far, cameras.near)
+    interiors = [
+        Interior.from_focal(float(c.matrix[0, 0]), image_size=SIZE, sigma=0.02, source="--focal")
+        for c in both
+    ]
+
+    def seen(xyz: np.ndarray, noise: float) -> list[np.ndarray]:
+        views = [c.view_of(xyz) + rng.normal(0, noise, (len(xyz), 2)) for c in both]
+        return [
+            RadialDivision(own, c.matrix[:2, 2], float(c.matrix[0, 0])).distort(view)
+            for c, own, view in zip(both, k, views, strict=True)
+        ]
+
+    xyz = rng.uniform([-5, -3.2, -0.4], [5, 3.2, 0.4], (1500, 3))
+    wall = np.arange(1500) < 1050
+    xyz[wall, 2] = 0.0
+    first, second = seen(xyz, 0.1)
+    homography, _ = cv2.findHomography(first[wall], second[wall], 0)
+    ties = Ties(
+        pixels1=first, pixels2=second, seen1=first, seen2=second, homography=homography,
+        on_plane=wall, tolerance=0.3,
+    )  # fmt: skip
+    monkeypatch.setattr(absolute_orientation, "ties_of", lambda *_, **__: (ties, ()))
+    monkeypatch.setattr(absolute_orientation, "_mended_by_ties", lambda *_: None)
+    far, near = (round(float(camera.centre[2]), 3) for camera in both)
+    site = SiteMeasures(distance1=far, distance2=near)
+    control = Control()
+    if way == "control":
+        known = rng.uniform([-4.5, -2.8, -0.3], [4.5, 2.8, 0.3], (9, 3))
+        picks, site = seen(known, 0.4), SiteMeasures()
+        control = Control(
+            ids=tuple("ABCDEFGHI"), xyz=known, sigma=np.full((9, 3), 0.003), pixels1=picks[0],
+            pixels2=picks[1],
+        )  # fmt: skip
+    photos = [
+        PhotoInput(grey=None, interior=interior, name=name)
+        for interior, name in zip(interiors, ("far.jpg", "near.jpg"), strict=True)
+    ]
+    made = orient_pair((photos[0], photos[1]), control=control, site=site)
+    found = make_alignment(made, (photos[0], photos[1]), way=way)
+    points = rng.uniform([-4.5, -2.8, -0.3], [4.5, 2.8, 0.3], (300, 3))
+    points = points[np.hypot(points[:, 0], points[:, 1]) > 1.2]
+    return Pair.from_dict(found.pair.to_dict() | {"setup": found.setup}), points, seen(points, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("k", "way"),
+    [
+        ((-0.05, 0.0), "site"),
+        ((-0.15, -0.15), "control"),
+        pytest.param((-0.05, -0.05), "site", marks=pytest.mark.acceptance),
+        *(
+            pytest.param(k, "control", marks=pytest.mark.acceptance)
+            for k in ((0.0, -0.06), (-0.05, -0.05), (0.04, 0.06))
+        ),
+    ],
+)
+def test_sigma_of_a_bent_wall_is_what_relief_errs_by(
+    k: tuple[float, float], way: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ratios = []
+    for seed in range(2, 4):
+        pair, points, pixels = bent_pair(k, way, seed, monkeypatch)
+        solved = pair.intersect(*pixels)
+        error = (solved.xyz - points)[:, 2] / solved.sigma[:, 2]
+        ratios.append(float(np.sqrt((error**2).mean())))
+        assert set(solved.flags) <= {"OK", "ON-PLANE", "WEAK", "UNCERTAIN"}
+        assert np.mean(np.array(solved.flags) == "UNCERTAIN") < (0.4 if k[0] < -0.1 else 0.1)
+    assert 0.7 < np.sqrt(np.mean(np.square(ratios))) < 1.4
 
 
 def test_wrong_ties_on_their_lines_have_no_support() -> None:

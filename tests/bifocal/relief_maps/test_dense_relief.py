@@ -372,7 +372,8 @@ def test_relief_beyond_the_outermost_measured_is_forgotten_and_holes_are_kept():
     layer = forward_projection.MapBands(
         np.ones((200, 200), np.float32), np.ones((200, 200), np.float32), quality
     )
-    forward_projection.forget_outside(layer)
+    matched = flow.Measurement(r=layer.r, across=layer.r, loop=layer.r, sigma_px=layer.sigma)
+    forward_projection.forget_outside(layer, matched)
     assert np.isnan(layer.r[:30]).all()
     assert (layer.quality[:30] == 0).all()
     assert np.isnan(layer.sigma[:30]).all()
