@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bifocal.model.orientation_precision import CAMERA
-from bifocal.networks.joint_media import media_with_cameras, project_through
+from bifocal.model.pair_media import PairMedia
 from bifocal.networks.joint_observations import JointObservations, with_enough_rays, with_rays
 from photocore.adjustment import OUTLIER_LIMIT, Fit, huber_weights, minimise, standardised
 from photocore.adjustment.network import Network, Rows, State
@@ -115,8 +115,9 @@ class JointAdjustment(JointUnknowns):
             whole[np.ix_(place, place)] = self.by_camera[camera]
         whole[np.ix_(*places)] = self.between[pair]
         whole[np.ix_(*places[::-1])] = self.between[pair].T
-        by = media_with_cameras((seen.media_of(own[0]), seen.media_of(own[1])))
-        return whole if by is None else by @ whole @ by.T
+        media = PairMedia.of_cameras(*(seen.media_of(camera) for camera in own))
+        by = media.by_unknowns()
+        return by @ whole @ by.T if media else whole
 
 
 def adjust_jointly(observations: JointObservations, start: JointUnknowns) -> JointAdjustment:
@@ -286,8 +287,8 @@ class _System:
         by_camera = np.empty((count, 2, len(ESTIMATED)))
         for number, camera in state.blocks["camera"].items():
             rows = self.own[number]
-            media = self.seen.media_of(number)
-            view = project_through(camera, media, state.points[self.seen.point[rows]])
+            media, side = self.seen.media_of(number)
+            view = media.view(side, camera, state.points[self.seen.point[rows]])
             pixels[rows], by_point[rows] = view.pixels, view.by_point
             by_camera[rows] = view.by_camera[:, :, ESTIMATED]
         return pixels, by_point, by_camera
