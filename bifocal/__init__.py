@@ -19,6 +19,8 @@ The pair
     Control, Interior, SiteMeasures, PairMedia   what `align` is told
 Points
     solve, SolvedSurvey       relief, coordinates, precision, check of measured points
+    Taking, Measuring         distances and lenses, unit and precision that `solve` is told
+    ReadOptions               which column of a table is which
     georeference, Georeference   wall coordinates to world coordinates by control points
     match, Matches            homologous points found automatically, with their precision
     MatchSettings             what `match` looks for

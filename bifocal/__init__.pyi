@@ -28,7 +28,10 @@ from .relief_maps.dense_matching import DenseRelief, dense_relief
 from .reports.relief_view import relief_view
 from .survey.georeferencing import georeference
 from .survey.reference import Georeference
-from .survey.workflow import SolvedSurvey, solve
+from .survey.setup import Measuring, Taking
+from .survey.solved_survey import SolvedSurvey
+from .workbook.reading.reader import ReadOptions
+from .workbook.workflow import solve
 
 __version__: str
 
@@ -43,6 +46,7 @@ __all__ = [
     "Lens",
     "MatchSettings",
     "Matches",
+    "Measuring",
     "Mosaic",
     "MosaicOptions",
     "OrthoOptions",
@@ -52,9 +56,11 @@ __all__ = [
     "PairMedia",
     "Photo",
     "Quality",
+    "ReadOptions",
     "ReliefMap",
     "SiteMeasures",
     "SolvedSurvey",
+    "Taking",
     "align",
     "calibrate",
     "dense_relief",

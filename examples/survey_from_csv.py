@@ -11,7 +11,8 @@ import numpy as np
 import bifocal
 from bifocal.demo import SAMPLE
 
-survey = bifocal.solve(SAMPLE / "targets.csv", pair=SAMPLE / "facade.pair.json", sigma_px=0.2)
+picks = bifocal.Measuring(sigma_px=0.2)
+survey = bifocal.solve(SAMPLE / "targets.csv", pair=SAMPLE / "facade.pair.json", measuring=picks)
 points = survey.table
 for k in range(0, len(points), 8):
     x, y, r = points.xyz[k]

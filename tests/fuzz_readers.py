@@ -27,7 +27,7 @@ from bifocal.files.images import image_info, read_image
 from bifocal.files.point_tables import read_survey_points
 from bifocal.model.lens import Lens
 from bifocal.model.pair import Pair
-from bifocal.survey.workflow import solve
+from bifocal.workbook.workflow import solve
 from multimedia.openptv.experiment import read_experiment
 from multimedia.projects.dem import Dem
 from multimedia.projects.project_file import read_project

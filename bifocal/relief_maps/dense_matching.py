@@ -13,22 +13,20 @@ from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import Quality, ReliefMap
 from bifocal.rays import object_rays, plane_position
-from bifocal.relief_maps import coarse_level, flow, forward_projection, seed, smoothing
+from bifocal.relief_maps import coarse_level, flow, seed, smoothing
 from bifocal.relief_maps.exposure import match_exposure
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import (
     LONGEST_SIDE,
-    Frame,
     common_bounds,
     make_frame,
     working_grid,
     zoomed_box,
 )
-from bifocal.relief_maps.map_completion import complete
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
 from bifocal.relief_maps.registration import Registration, check_registration
-from bifocal.relief_maps.surfaces import surfaces
-from photocore.arrays import BoolArray, ByteArray
+from bifocal.relief_maps.stages import relief_map
+from photocore.arrays import ByteArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 
@@ -174,10 +172,13 @@ def dense_relief(
     registration = check_registration(frame, matched)
     progress(0.7, 1.0, "Relief map")
     if not fast and (matched.plain or coarse_level.is_unsure(matched)):
-        backed = coarse_level.backed(frame, matched, coarse)
-        bands = _backed_map(frame, backed, relief_range, target)
+        matched, backing, half = coarse_level.backed(frame, matched, coarse)
+        bands = relief_map(
+            frame, matched, relief_range, target, backing=backing,
+            half=half if matched.plain else None,
+        )  # fmt: skip
     else:
-        bands = _map_of(frame, matched, relief_range, target)
+        bands = relief_map(frame, matched, relief_range, target)
     progress(1.0, 1.0)
     bands = _resampled(bands, target, wanted)
     known = np.isfinite(bands.r)
@@ -193,38 +194,6 @@ def dense_relief(
         registration=registration,
         working_gsd=frame.grid.gsd,
     )
-
-
-def _map_of(
-    frame: Frame,
-    matched: flow.Measurement,
-    relief_range: tuple[float, float] | None,
-    grid: Grid,
-    known: BoolArray | None = None,
-    half: Frame | None = None,
-) -> MapBands:
-    """Return the relief map of a measurement; what another level knows is to be believed."""
-    source, usable = surfaces(frame, matched, relief_range, known, half)
-    bands = forward_projection.to_plane(frame, source, usable, grid)
-    return complete(frame, bands, grid, plain=matched.plain, refined=matched.refined)
-
-
-def _backed_map(
-    frame: Frame,
-    backed: coarse_level.Backed,
-    relief_range: tuple[float, float] | None,
-    grid: Grid,
-) -> MapBands:
-    """Return the relief map of a measurement that half the resolution backs."""
-    half = backed.half if backed.matched.plain else None
-    bands = _map_of(frame, backed.matched, relief_range, grid, backed.known, half)
-    if backed.matched.plain:
-        gsd = max(backed.half.grid.gsd, grid.gsd)
-        coarser = Grid.from_bounds(grid.bounds, gsd=gsd)
-        coarse = _map_of(backed.half, backed.coarse, relief_range, coarser)
-        scale = frame.grid.gsd / grid.gsd
-        coarse_level.take_over(bands, _resampled(coarse, coarser, grid), scale)
-    return bands
 
 
 def _grids(

@@ -44,7 +44,7 @@ IMPRECISE = 0.25
 
 
 def sharpen(
-    frame: Frame, relief: Float32Array, sigma_px: float = 0.0
+    frame: Frame, relief: Float32Array, typical: float = 0.0
 ) -> tuple[Float32Array, Float32Array]:
     """Return the relief of photo 1 with ramps at steps replaced by one of the two surfaces.
 
@@ -55,7 +55,7 @@ def sharpen(
     frame : Frame
     relief : ndarray of float32, shape (height, width)
         Measured relief. [m]
-    sigma_px : float
+    typical : float
         Precision of matching, typical of the frame. [px]
     """
     median = cv2.medianBlur(relief, 5)
@@ -64,11 +64,11 @@ def sharpen(
     x, y = frame.from_centre()
     per_relief = np.asarray(np.sqrt(x * x + y * y) / frame.pair.base_factor, dtype=np.float32)
     parallax = (upper - lower) * per_relief
-    band = parallax > max(LEAST_STEP, NOISE_STEPS * sigma_px)
+    band = parallax > max(LEAST_STEP, NOISE_STEPS * typical)
     result = relief.copy()
     far, near = _features(frame.image1), _features(frame.image2)
     guide = _Guide(far[..., 0])
-    precise = precision(sigma_px)
+    precise = precision(typical)
     limits = precise * np.array(LIMITS) + (1 - precise) * np.array(IMPRECISE_LIMITS)
     grey, gradient = limits.tolist()
     misfits = [

@@ -7,9 +7,11 @@ import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality
-from bifocal.relief_maps import evidence, forward_projection, levels, rims, smoothing, snapping
+from bifocal.relief_maps import evidence, forward_projection
+from bifocal.relief_maps.flow import Measurement
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame, offsets
+from bifocal.relief_maps.snapping import surroundings
 from photocore.arrays import BoolArray, Float32Array, FloatArray
 from photocore.shrinkage import shrink_noise
 
@@ -21,7 +23,7 @@ NOISE, NOISE_UNMEASURED = 0.05, 2.0
 MAP_WINDOWS = (2, 4)
 #: Pixels this far inwards of what camera 2 cannot see are not called measured: raised parts come
 #: out too fat. Three pixels took 0.2 % of the measured ones and no more wrong ones than one does,
-#: since relief that falls away is told by itself (`surfaces`; façade 62, loggia 301). [px]
+#: since relief that falls away is told by itself (`evidence`; façade 62, loggia 301). [px]
 GUARD = 1
 #: Share of a step within 5 x 5 px that is added to sigma: which side a pixel is on is uncertain.
 SIGMA_OF_STEP = 0.25
@@ -32,46 +34,30 @@ OUTLINE = 7
 SCRAP, SCRAP_SHARE, HOLE = 4000, 0.05, 25
 
 
-def complete(
-    frame: Frame, bands: MapBands, grid: Grid, *, plain: bool = False, refined: bool = False
-) -> MapBands:
-    """Return the map with hidden strips filled, noise taken out and its precision stated.
-
-    Parameters
-    ----------
-    frame : Frame
-    bands : MapBands
-        Map with holes.
-    grid : Grid
-        Of the map.
-    plain : bool
-        Walls without texture: relief is drawn to the levels around it. On texture sigma is up to
-        three times too large, and drawing costs detail (semireal church: 3.39 to 3.55 mm).
-    refined : bool
-        Measured at twice the resolution of the frame: there is half the noise to take out.
-    """
-    # Holes outside what both photos see stay unknown.
+def filled_from_behind(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
+    """Fill strips that nobody sees with the surface behind the step (in place)."""
     holes = ~np.isfinite(bands.r) & _cover(frame, grid)
     forward_projection.fill_from_behind(bands, holes, grid, frame.foot(1).nadir)
-    forward_projection.fill_small(bands, holes)
-    bands = bands._replace(r=smoothing.tidy_steps(bands.r))
-    rims.draw_in(frame, bands, grid)
-    per_pixel = _relief_per_pixel(frame, grid)
-    quiet = np.where(
-        bands.quality == Quality.MEASURED,
-        np.minimum(bands.sigma, np.float32(NOISE / 2 if refined else NOISE) * per_pixel),
-        np.minimum(bands.sigma, np.float32(NOISE_UNMEASURED) * per_pixel),
-    )
-    relief = shrink_noise(bands.r, quiet, MAP_WINDOWS)
-    if plain:
-        relief = levels.drawn_to_levels(relief, bands.sigma, bands.quality == Quality.MEASURED)
-    bounds = _around(relief)
-    relief = snapping.snapped(frame, relief, grid, bounds)
-    bands = bands._replace(r=relief, sigma=_sigma_at_steps(bands, per_pixel, bounds))
-    _guard(frame, bands, grid)
-    forward_projection.forget_outside(bands, plain=plain)
-    _tidy_outline(bands)
     return bands
+
+
+def filled(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
+    """Fill other holes within what both photos see; those outside stay unknown (in place)."""
+    holes = ~np.isfinite(bands.r) & _cover(frame, grid)
+    forward_projection.fill_small(bands, holes)
+    return bands
+
+
+def without_noise(frame: Frame, bands: MapBands, grid: Grid, matched: Measurement) -> MapBands:
+    """Return the map without noise, of which photos of twice the resolution leave half."""
+    per_pixel = _relief_per_pixel(frame, grid)
+    noise = np.where(
+        bands.quality == Quality.MEASURED,
+        np.float32(NOISE / 2 if matched.refined else NOISE),
+        np.float32(NOISE_UNMEASURED),
+    )
+    quiet = np.minimum(bands.sigma, noise * per_pixel)
+    return bands._replace(r=shrink_noise(bands.r, quiet, MAP_WINDOWS))
 
 
 def _cover(frame: Frame, grid: Grid) -> BoolArray:
@@ -93,25 +79,16 @@ def _relief_per_pixel(frame: Frame, grid: Grid) -> Float32Array:
     return np.float32(frame.pair.base_factor) / np.maximum(reach, np.float32(0.5))
 
 
-def _around(relief: Float32Array) -> tuple[Float32Array, Float32Array]:
-    """Return the greatest and the least known relief of 5 x 5 pixels."""
-    known = np.isfinite(relief)
-    square = np.ones((5, 5), np.uint8)
-    high = cv2.dilate(np.where(known, relief, np.float32(-1e3)), square)
-    low = cv2.erode(np.where(known, relief, np.float32(1e3)), square)
-    return high, low
+def with_sigma_of_steps(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
+    """Return a map whose sigma knows the doubt of which side of a step a pixel is on."""
+    high, low = surroundings(bands.r)
+    height = high - low
+    step = np.where(height > _relief_per_pixel(frame, grid), np.float32(SIGMA_OF_STEP) * height, 0)
+    sigma = np.where(np.isfinite(bands.r), np.hypot(bands.sigma, step), np.float32(np.nan))
+    return bands._replace(sigma=sigma)
 
 
-def _sigma_at_steps(
-    bands: MapBands, per_pixel: Float32Array, bounds: tuple[Float32Array, Float32Array]
-) -> Float32Array:
-    """Return sigma with the doubt of which side of a step a pixel is on."""
-    height = bounds[0] - bounds[1]
-    step = np.where(height > per_pixel, np.float32(SIGMA_OF_STEP) * height, 0)
-    return np.where(np.isfinite(bands.r), np.hypot(bands.sigma, step), np.float32(np.nan))
-
-
-def _guard(frame: Frame, bands: MapBands, grid: Grid) -> None:
+def guarded(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
     """Call nothing measured that camera 2 cannot see, or hardly (in place)."""
     vague = ~(bands.sigma < evidence.SIGMA_SHARE * frame.distances[1])
     bands.quality[vague & (bands.quality == Quality.MEASURED)] = Quality.INTERPOLATED
@@ -119,6 +96,7 @@ def _guard(frame: Frame, bands: MapBands, grid: Grid) -> None:
     hidden = forward_projection.hidden_on_map(bands.r, grid, frame.foot(2), rays)
     near = _spread_inwards(hidden, grid.pixel_of(frame.foot(2).nadir), GUARD)
     bands.quality[near & (bands.quality == Quality.MEASURED)] = Quality.HIDDEN
+    return bands
 
 
 def _spread_inwards(mask: BoolArray, middle: FloatArray, reach: int) -> BoolArray:
@@ -134,7 +112,7 @@ def _spread_inwards(mask: BoolArray, middle: FloatArray, reach: int) -> BoolArra
     return result
 
 
-def _tidy_outline(bands: MapBands) -> None:
+def tidied(bands: MapBands) -> MapBands:
     """Round the outline of what is known, drop pieces that float, close pinholes (in place)."""
     known = np.isfinite(bands.r)
     wanted = cv2.medianBlur(known.astype(np.uint8), OUTLINE)
@@ -154,3 +132,4 @@ def _tidy_outline(bands: MapBands) -> None:
     lost = wanted == 0
     bands.r[lost] = bands.sigma[lost] = np.nan
     bands.quality[lost] = Quality.UNKNOWN
+    return bands

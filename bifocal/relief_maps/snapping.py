@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from bifocal.model.grid import Grid
-from bifocal.relief_maps.forward_projection import shown_by_first
+from bifocal.relief_maps.forward_projection import MapBands, shown_by_first
 from bifocal.relief_maps.frame import Frame, offsets, values_at
 from photocore.arrays import Float32Array, FloatArray, IntArray
 
@@ -22,13 +22,9 @@ STEP = 0.03
 #: How far a step is moved at most, how finely, and across how much of it grey values are compared.
 #: [px]
 REACH, FINE, ACROSS = 2.0, 0.5, 1.5
-#: Pixels on either side along the step whose edges are averaged.
-ALONG = 1
 #: Grey values that an edge must differ by; weaker ones are texture and shadow (façades 81 / 83: of
 #: the pixels moved at fainter edges one half was right before). [grey levels]
 CONTRAST = 20.0
-#: Share of its strength that an edge loses per pixel of distance.
-DISTANCE_COST = 0.15
 
 
 class _Steps(NamedTuple):
@@ -50,34 +46,38 @@ class _Steps(NamedTuple):
     place: Float32Array
 
 
-def snapped(
-    frame: Frame, relief: Float32Array, grid: Grid, bounds: tuple[Float32Array, Float32Array]
-) -> Float32Array:
-    """Return a relief map whose steps lie at the edges of photo 1 beside them.
+def snapped(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
+    """Return a map whose steps lie at the edges of photo 1 beside them.
 
     Parameters
     ----------
     frame : Frame
-    relief : ndarray of float32, shape (height, width)
-        Relief map. [m]
+    bands : MapBands
     grid : Grid
         Of the map.
-    bounds : tuple of ndarray
-        Greatest and least relief of the 5 x 5 pixels around each: the surfaces of a step. [m]
     """
+    relief, bounds = bands.r, surroundings(bands.r)
     steps = _steps(relief, bounds, grid.pixel_of(frame.foot(1).nadir), grid.gsd)
     if not len(steps.row):
-        return relief
+        return bands
     here = (steps.row, steps.column)
     upper, lower = (bound[here] for bound in bounds)
-    contrast = _along(steps, relief.shape, _contrast(frame, grid, steps, upper))
-    shift, clear = _strongest(contrast)
+    shift, clear = _strongest(_contrast(frame, grid, steps, upper))
     above = steps.place > shift
     moved = clear & (above != (steps.place > 0))
     result = relief.copy()
     at = (steps.row[moved], steps.column[moved])
     result[at] = np.where(above, upper, lower)[moved]
-    return result
+    return bands._replace(r=result)
+
+
+def surroundings(relief: Float32Array) -> tuple[Float32Array, Float32Array]:
+    """Return the greatest and the least known relief of 5 x 5 pixels: the surfaces of a step."""
+    known = np.isfinite(relief)
+    square = np.ones((5, 5), np.uint8)
+    high = cv2.dilate(np.where(known, relief, np.float32(-1e3)), square)
+    low = cv2.erode(np.where(known, relief, np.float32(1e3)), square)
+    return high, low
 
 
 def _steps(
@@ -120,29 +120,13 @@ def _contrast(frame: Frame, grid: Grid, steps: _Steps, upper: Float32Array) -> F
     greys = np.stack(
         [values_at(image, first + t * (beyond - first), cv2.INTER_LINEAR) for t in shifts]
     )
-    return np.nan_to_num(greys[count:] - greys[:-count])
-
-
-def _along(steps: _Steps, shape: tuple[int, ...], values: Float32Array) -> Float32Array:
-    """Return values averaged over pixels of the same step, along it."""
-    number = np.full(shape, -1, dtype=np.int32)
-    number[steps.row, steps.column] = np.arange(len(steps.row), dtype=np.int32)
-    total, count = values.copy(), np.ones(len(steps.row), dtype=np.float32)
-    for t in (t for t in range(-ALONG, ALONG + 1) if t):
-        row = np.clip(np.rint(steps.row + t * steps.across).astype(int), 0, shape[0] - 1)
-        column = np.clip(np.rint(steps.column - t * steps.down).astype(int), 0, shape[1] - 1)
-        beside = number[row, column]
-        known = np.flatnonzero(beside >= 0)
-        total[:, known] += values[:, beside[known]]
-        count[known] += 1
-    return np.asarray(np.abs(total) / count)
+    return np.abs(np.nan_to_num(greys[count:] - greys[:-count]))
 
 
 def _strongest(contrast: Float32Array) -> tuple[Float32Array, FloatArray]:
     """Return the shift to the strongest edge [px], and where there is one within reach."""
     shifts = np.arange(len(contrast), dtype=np.float32) * np.float32(FINE) - np.float32(REACH)
-    cost = np.float32(DISTANCE_COST) * np.abs(shifts)[:, None] * contrast.max(0)
-    best = (contrast - cost).argmax(0)
+    best = contrast.argmax(0)
     peak = np.take_along_axis(contrast, best[None], 0)[0]
     clear = (peak > CONTRAST) & (best > 0) & (best < len(contrast) - 1)
     inner = np.clip(best, 1, len(contrast) - 2)

@@ -20,8 +20,8 @@ from bifocal.orientation.align_workflow import (
     interior_of_photo,
 )
 from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orientation.match_workflow import match_photos
 from bifocal.orientation.photo_alignment import align
+from bifocal.workbook.match_workflow import match_photos
 
 pytestmark = pytest.mark.acceptance
 #: Limits of the median error of relief. [m]

@@ -15,7 +15,7 @@ from bifocal.cli.main import main
 from bifocal.collimation.pictures import Pictures
 from bifocal.demo import SAMPLE
 from bifocal.files.images import read_image
-from bifocal.survey.pair_workflow import read_pair
+from bifocal.workbook.pair_workflow import read_pair
 from photocore.errors import InputError
 
 CHANGES = {

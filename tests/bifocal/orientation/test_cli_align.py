@@ -13,8 +13,8 @@ from bifocal.cli import match as match_command
 from bifocal.cli.main import main
 from bifocal.matching.matching import Matches
 from bifocal.model.interior_orientation import Interior
-from bifocal.orientation.match_workflow import match_summary
 from bifocal.orientation.validation import check_distortion
+from bifocal.workbook.match_workflow import match_summary
 from photocore.camera.pinhole import project
 from photocore.errors import GeometryError
 from tests.bifocal.orientation.layered_wall import camera, relief_at, take

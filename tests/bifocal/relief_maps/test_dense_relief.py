@@ -17,7 +17,7 @@ from bifocal.relief_maps.dense_matching import _resampled
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import common_bounds, make_frame, working_grid
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
-from bifocal.relief_maps.relief_files import hatched
+from bifocal.relief_maps.relief_files import hatched, shaded
 from photocore.errors import GeometryError, InputError
 from photocore.shrinkage import shrink_noise
 from tests.scenes import RICH, Rendering, Scene, SetupErrors, bifocal_cameras, facade, render
@@ -306,6 +306,15 @@ def test_the_precision_of_the_set_up_is_added_cell_by_cell_where_it_is_stated():
     assert not orientation_sigma(shot().pair, relief, grid).any()
 
 
+def test_light_falls_on_relief_from_the_upper_left():
+    """Slopes of 0.8 to either side, halved: n = (-+0.4, 0, 1) against the light, a wall being 1."""
+    roof = (0.8 * np.minimum(np.arange(40.0), np.arange(40.0)[::-1])).astype(np.float32)
+    shade = shaded(np.full((4, 40, 3), 0.5), np.tile(roof, (4, 1)), 1.0)[2, :, 0]
+    light, length = np.array([-0.45, 0.74]) / 0.74, np.hypot(0.4, 1)
+    expected = [0.5 * (np.dot((-s, 1.0), light) / length) ** 0.8 for s in (0.4, -0.4)]
+    np.testing.assert_allclose(shade[[5, 35]], expected, rtol=1e-6)
+
+
 def test_flow_of_a_known_zoom_gives_its_relief_and_nothing_across():
     frame = small_frame()
     x, y = frame.from_centre()
@@ -372,7 +381,8 @@ def test_relief_beyond_the_outermost_measured_is_forgotten_and_holes_are_kept():
     layer = forward_projection.MapBands(
         np.ones((200, 200), np.float32), np.ones((200, 200), np.float32), quality
     )
-    forward_projection.forget_outside(layer)
+    matched = flow.Measurement(r=layer.r, across=layer.r, loop=layer.r, sigma_px=layer.sigma)
+    forward_projection.forget_outside(layer, matched)
     assert np.isnan(layer.r[:30]).all()
     assert (layer.quality[:30] == 0).all()
     assert np.isnan(layer.sigma[:30]).all()

@@ -14,7 +14,7 @@ import pytest
 from bifocal import dense_relief, match, orthophoto
 from bifocal.files.images import as_grey
 from bifocal.rays import plane_position, point_on_ray, straight
-from bifocal.relief_maps import surfaces
+from bifocal.relief_maps import evidence
 from bifocal.relief_maps.frame import make_frame, offsets
 from photocore.errors import InputError
 from tests.scenes import RICH, Rendering, Scene, bifocal_cameras, render
@@ -173,7 +173,9 @@ def test_relief_falls_away_by_the_slope_of_the_bent_ray(name):
     ray = plane_position(np.append(place, r), foot)
     ends = [point_on_ray(ray, np.array(r + step), foot)[:2] for step in (-0.01, 0.01)]
     slope = np.linalg.norm(ends[1] - ends[0]) / 0.02
-    limit = np.sqrt(surfaces._most_falling(frame) / (steepness * slope))
+    limit = np.sqrt(evidence.most_falling(frame) / (steepness * slope))
     for factor, expected in ((1.02, True), (0.98, False)):
         misfit = np.full(grid.shape, factor * limit, np.float32)
-        assert surfaces._falls_away(frame, relief, misfit)[row, column] == expected
+        everywhere = np.ones(grid.shape, bool)
+        left = evidence.without_falling(frame, relief, misfit, 0.0, everywhere)
+        assert left[row, column] != expected

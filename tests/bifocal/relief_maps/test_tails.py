@@ -17,19 +17,14 @@ from bifocal.relief_maps import (
     flow,
     forward_projection,
     levels,
-    lost_regions,
-    rims,
+    occluded_regions,
+    occluding_edges,
     snapping,
-    surfaces,
+    stages,
 )
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame, radial_stretch
-from bifocal.relief_maps.map_completion import (
-    MAP_WINDOWS,
-    _around,
-    _spread_inwards,
-    _tidy_outline,
-)
+from bifocal.relief_maps.map_completion import MAP_WINDOWS, _spread_inwards, tidied
 from photocore.shrinkage import shrink_noise
 
 METRES = [[0.01, 0, -0.995], [0, -0.01, 0.995], [0, 0, 1]]
@@ -67,14 +62,6 @@ def test_where_nothing_far_and_wide_is_validated_relief_stays():
     relief = np.full((640, 640), 3.0, np.float32)
     nothing = np.zeros(relief.shape, bool)
     np.testing.assert_array_equal(evidence.held_back(relief, nothing, 9.5), relief)
-
-
-def test_a_single_validated_pixel_supports_nothing():
-    valid = np.zeros((20, 20), bool)
-    valid[5, 5] = valid[10:14, 10:14] = True
-    support = evidence.supported(valid)
-    assert not support[5, 5]
-    assert support[10:14, 10:14].all()
 
 
 def test_smoothing_survives_any_sigma():
@@ -157,7 +144,7 @@ def test_floating_pieces_go_and_pinholes_are_closed():
     r[100:130, 250:280] = 0.0  # 900 px by themselves
     r[50:54, 50:54] = np.nan
     bands = MapBands(r, np.full_like(r, 0.01), np.ones(r.shape, np.uint8))
-    _tidy_outline(bands)
+    tidied(bands)
     assert np.isnan(bands.r[:, 205:]).all()
     assert (bands.quality[:, 205:] == Quality.UNKNOWN).all()
     assert np.isfinite(bands.r[:, :195]).all()
@@ -174,6 +161,11 @@ def test_the_pixels_of_an_oblique_photo_are_longer_along_its_slant():
     assert abs(stretched[10, 100] - 0.5) < 0.01
 
 
+def falling(frame: Frame, relief: np.ndarray, misfit: np.ndarray) -> np.ndarray:
+    everywhere = np.ones(relief.shape, bool)
+    return ~evidence.without_falling(frame, relief, misfit, 0.0, everywhere)
+
+
 def test_what_falls_away_from_camera_2_where_the_photos_do_not_fit_is_not_measured():
     frame = frame_of(Pair(image1=FAR, image2=NEAR))
     x = np.arange(200) - 99.5
@@ -181,12 +173,11 @@ def test_what_falls_away_from_camera_2_where_the_photos_do_not_fit_is_not_measur
     profile = np.interp(x, [32, 40, 60, 68], [0.0, 0.5, 0.5, 0.0])
     relief = np.broadcast_to(profile, (200, 200)).astype(np.float32)
     # At 64 px a ray of camera 2 sinks by 9.25 m / 64 px = 145 mm a pixel, the outer flank by 62.5.
-    doubtful = surfaces._falls_away(frame, relief, np.full(relief.shape, 8.5, np.float32))
-    row = doubtful[99]
+    row = falling(frame, relief, np.full(relief.shape, 8.5, np.float32))[99]
     assert row[np.abs(x - 64) < 2].all()
     assert not row[x < 58].any()
     assert not row[x > 71].any()
-    assert not surfaces._falls_away(frame, relief, np.full(relief.shape, 2.0, np.float32)).any()
+    assert not falling(frame, relief, np.full(relief.shape, 2.0, np.float32)).any()
 
 
 def test_less_parallax_takes_less_misfit_to_doubt_what_falls_away():
@@ -197,7 +188,7 @@ def test_less_parallax_takes_less_misfit_to_doubt_what_falls_away():
     doubted = []
     for distance in (9.5, 14.0):
         frame = frame_of(Pair(image1=FAR, image2=replace(NEAR, distance=distance)))
-        doubted.append(surfaces._falls_away(frame, relief, misfit)[99, 158:169].any())
+        doubted.append(falling(frame, relief, misfit)[99, 158:169].any())
     assert doubted == [False, True]
 
 
@@ -215,7 +206,9 @@ def step_in_photo_1(edge: float, height: float, difference: float) -> Frame:
 def snapped_row(frame: Frame, steps_at: float, below: float, above: float) -> np.ndarray:
     x = np.arange(200) - 99.5
     relief = np.broadcast_to(np.where(x > steps_at, above, below), (200, 200)).astype(np.float32)
-    return snapping.snapped(frame, relief, frame.grid, _around(relief))[20:180]
+    nothing = np.zeros(relief.shape, np.float32)
+    bands = MapBands(relief, nothing, nothing.astype(np.uint8))
+    return snapping.snapped(frame, bands, frame.grid).r[20:180]
 
 
 @pytest.mark.parametrize("edge", [40.1, 40.3, 40.7, 40.9])
@@ -238,16 +231,6 @@ def test_a_step_stays_where_its_edge_is_not_sure(difference, off, below, above):
     np.testing.assert_allclose(found, np.broadcast_to(kept, found.shape), atol=1e-6)
 
 
-def test_what_counts_as_noise_follows_the_frame_and_grows_towards_the_zoom_centre():
-    frame = frame_of(Pair(image1=FAR, image2=NEAR))
-    reach = np.hypot(*(axis - 99.5 for axis in np.mgrid[:200, :200]))
-    for typical, elsewhere in ((0.02, 0.05), (0.16, 0.16), (0.6, 0.25)):
-        noise = surfaces._noise(frame, typical)
-        # 20 px² over the distance from the centre, 0.25 px at most, never below what is typical.
-        expected = np.clip(20 / reach, elsewhere, 0.25)
-        np.testing.assert_allclose(noise, expected, rtol=1e-4)
-
-
 def test_a_ramp_counts_by_its_parallax_a_pixel():
     relief = np.broadcast_to(0.02 * np.arange(40.0), (40, 40)).astype(np.float32)
     # 0.02 m a pixel are 0.15 px of parallax at 7.5 px/m: half of what makes a ramp.
@@ -266,12 +249,13 @@ def test_only_a_pixel_that_fits_and_has_texture_is_pardoned_for_not_coming_back(
     zero = np.zeros(texture.shape, np.float32)
     matched = flow.Measurement(r=zero, across=zero, loop=zero + 2, sigma_px=zero + 0.03)
     frame, sigma = replace(frame, image1=texture), zero + 0.001
-    pardoned = surfaces._pardoned(frame, matched, sigma, misfit)
+    nowhere = np.zeros(texture.shape, bool)
+    pardoned = evidence.with_pardoned(frame, matched, sigma, misfit, nowhere, None)
     assert pardoned[10:90, 10:90].all()
     assert not pardoned[:, 102:].any()
     assert not pardoned[112:].any()
     for worse in (replace(matched, loop=zero + 6), replace(matched, across=zero + 0.6)):
-        assert not surfaces._pardoned(frame, worse, sigma, misfit).any()
+        assert not evidence.with_pardoned(frame, worse, sigma, misfit, nowhere, None).any()
 
 
 def test_the_side_face_of_a_step_is_put_nowhere_and_the_step_stands_on_its_line():
@@ -288,9 +272,7 @@ def test_the_side_face_of_a_step_is_put_nowhere_and_the_step_stands_on_its_line(
     matched = flow.Measurement(
         r=relief, across=nothing, loop=nothing, sigma_px=nothing + np.float32(0.001)
     )
-    bands, usable = surfaces.surfaces(frame, matched, (-1.0, 3.0))
-    assert not usable[99, (x > 60) & (x < 68)].any()
-    found = forward_projection.to_plane(frame, bands, usable, frame.grid).r[99]
+    found = stages.relief_map(frame, matched, (-1.0, 3.0), frame.grid).r[99]
     assert np.abs(found[(x > 50) & (x < 59)]).max() < 1e-3
     assert np.abs(found[(x > 61) & (x < 79)] - 2.0).max() < 1e-3
 
@@ -327,34 +309,12 @@ def test_plaster_that_is_lost_in_noise_is_known_better_at_half_the_resolution():
     first = np.full((10, 10), 0.25, np.float32)
     fine = flow.measure(frame, first)
     assert coarse_level.is_unsure(fine)
-    both, known, _, _ = coarse_level.backed(frame, fine, first)
+    both, known, _ = coarse_level.backed(frame, fine, first)
     assert known.mean() > 0.1
     before, after = (np.abs(found.r[known] - 0.3).mean() for found in (fine, both))
     assert after < 0.85 * before
     valid = ~known & (np.abs(both.r - fine.r) < coarse_level.GROSS)
     np.testing.assert_array_equal(both.r[valid], fine.r[valid])
-
-
-def test_the_coarse_map_takes_over_where_nothing_around_was_measured():
-    def bands(relief: float, quality: Quality) -> MapBands:
-        shape = (80, 80)
-        r, sigma = np.full(shape, relief, np.float32), np.full(shape, 0.1, np.float32)
-        return MapBands(r, sigma, np.full(shape, quality, np.uint8))
-
-    fine, coarse = bands(0.0, Quality.INTERPOLATED), bands(0.5, Quality.MEASURED)
-    fine.quality[:, :20] = Quality.MEASURED
-    coarse.r[:10] = np.nan
-    fine.r[70:, 60:] = np.nan
-    fine.quality[70:, 60:] = Quality.UNKNOWN
-    coarse_level.take_over(fine, coarse)
-    # From 16 px on, 35, it begins, to 32 px, 52, it goes over; half of it at 43.
-    assert (fine.r[10:, 55:] == 0.5).all()
-    assert (fine.r[:, :35] == 0).all()
-    assert (np.diff(fine.r[20]) >= 0).all()
-    assert abs(np.interp(0.25, fine.r[20], np.arange(80)) - 43) < 2
-    assert (fine.r[:10] == 0).all()
-    # Half the resolution measures nothing by itself: the promise of "measured" is the whole one's.
-    assert (fine.quality[:, 20:] == Quality.INTERPOLATED).all()
 
 
 def test_a_wall_is_plain_by_its_plain_part_however_strong_the_edges_on_it():
@@ -375,7 +335,8 @@ def test_on_plain_walls_filled_relief_leans_on_what_is_interpolated():
         bands = MapBands(r, np.full_like(r, 0.1), np.full(r.shape, Quality.HIDDEN, np.uint8))
         bands.quality[:, :100] = Quality.MEASURED
         bands.quality[:, 100:140] = Quality.INTERPOLATED
-        forward_projection.forget_outside(bands, plain=plain)
+        matched = flow.Measurement(r=r, across=r, loop=r, sigma_px=r, plain=plain)
+        forward_projection.forget_outside(bands, matched)
         return int(np.isnan(bands.r[100]).sum())
 
     # Hidden is what lies beyond 140 px; OpenCV's distances run up to 5 % short.
@@ -403,7 +364,7 @@ def fat_slab() -> tuple[Frame, MapBands]:
 
 def test_a_rim_that_flow_made_too_fat_is_drawn_in_to_the_edge_of_the_photo():
     frame, bands = fat_slab()
-    rims.draw_in(frame, bands, frame.grid)
+    occluding_edges.drawn_in(frame, bands, frame.grid)
     x = np.arange(200) - 99.5
     middle = bands.r[80:120]
     np.testing.assert_array_equal(middle[:, (x > 20) & (x < 60)], 0.5)
@@ -414,11 +375,15 @@ def test_a_rim_that_flow_made_too_fat_is_drawn_in_to_the_edge_of_the_photo():
 def test_rims_stay_where_they_are_measured_and_where_the_photo_shows_no_edge():
     frame, bands = fat_slab()
     plain, fat = replace(frame, image1=np.full_like(frame.image1, 120)), bands.r.copy()
-    rims.draw_in(plain, bands, frame.grid)
+    occluding_edges.drawn_in(plain, bands, frame.grid)
     np.testing.assert_array_equal(bands.r, fat)
     bands.quality[:] = Quality.MEASURED
-    rims.draw_in(frame, bands, frame.grid)
+    occluding_edges.drawn_in(frame, bands, frame.grid)
     np.testing.assert_array_equal(bands.r, fat)
+
+
+def looping(loop: np.ndarray) -> flow.Measurement:
+    return flow.Measurement(r=loop, across=loop, loop=loop, sigma_px=loop)
 
 
 def test_a_door_of_which_camera_2_sees_half_stays_one_door():
@@ -433,11 +398,11 @@ def test_a_door_of_which_camera_2_sees_half_stays_one_door():
     found, loop = truth.copy(), np.zeros(truth.shape, np.float32)
     found[:, 160:240] = np.random.default_rng(3).uniform(-1.4, 0.0, (400, 80))
     loop[:, 160:240] = 60.0
-    mended = lost_regions.put_behind(frame, found, loop, loop == 0, np.float32(0.02))
+    mended = occluded_regions.put_behind(frame, found, looping(loop), loop == 0)
     assert (np.abs(mended - truth) < 0.05).mean() > 0.99
     # What a loop shorter than a ramp's explains is imprecise, not lost.
     np.testing.assert_array_equal(
-        lost_regions.put_behind(frame, found, loop / 15, loop == 0, np.float32(0.02)), found
+        occluded_regions.put_behind(frame, found, looping(loop / 15), loop == 0), found
     )
 
 
@@ -449,5 +414,5 @@ def test_a_lost_region_that_camera_2_would_see_is_left_alone():
     frame = frame_of(pair, side=400)
     relief, loop = np.zeros(frame.grid.shape, np.float32), np.zeros(frame.grid.shape, np.float32)
     relief[:, 160:240], loop[:, 160:240] = 0.3, 60.0
-    mended = lost_regions.put_behind(frame, relief, loop, loop == 0, np.float32(0.02))
+    mended = occluded_regions.put_behind(frame, relief, looping(loop), loop == 0)
     np.testing.assert_array_equal(mended, relief)

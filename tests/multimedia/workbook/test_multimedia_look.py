@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from multimedia.cli.main import main
-from tests.bifocal.survey.test_workbook_look import dimension, inputs
+from tests.bifocal.workbook.test_workbook_look import dimension, inputs
 from tests.workbook_lint import lint
 from tests.workbook_page import sizes_of
 
