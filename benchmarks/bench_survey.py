@@ -37,7 +37,7 @@ def observations(rows):
 def write_workbook(path, rows):
     from bifocal import Pair
     from bifocal.survey.observations import PointObservations
-    from bifocal.survey.template_workflow import write_survey
+    from bifocal.workbook.template_workflow import write_survey
 
     pair = Pair.ideal(d1=D1, d2=D2, c1=C1, c2=C2, pitch=0.004)
     pixels1, pixels2 = pair.project(truth(rows))
@@ -62,8 +62,8 @@ def write_openpyxl(path, rows):
 
 
 def solve(path, rows, out=None):
-    from bifocal.survey import workflow
-    from bifocal.survey.output import write_result
+    from bifocal.workbook import workflow
+    from bifocal.workbook.output import write_result
 
     options = {"d1": D1, "d2": D2, "c1": C1, "c2": C2} if path.suffix == ".csv" else {}
     begin = time.process_time()

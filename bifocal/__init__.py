@@ -20,6 +20,8 @@ The pair
     Control, Interior, SiteMeasures, PairMedia, read_control   what `align` is told
 Points
     solve, SolvedSurvey       relief, coordinates, precision, check of measured points
+    Taking, Measuring         distances and lenses, unit and precision that `solve` is told
+    ReadOptions               which column of a table is which
     georeference, Georeference   wall coordinates to world coordinates by control points
     match, Matches, MatchSettings   homologous points found automatically, with their precision
 The whole wall
@@ -38,7 +40,7 @@ What they take and give: Bounds, CheckResult, FlagLimits, FlatSurface, Foot, Gri
 Layers, MapSurface, MediaPath, NamedPoints, OrientationCheck, Pinhole, PlanePicks,
 PointObservations, Progress, RadialDivision, Registration, ReliefTable, Similarity, SpaceSums,
 Surface, SurveyInput, SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision,
-WeightedSums, Window.
+WeightedSums, Window, WorldPoints.
 
 Errors are one family with one message each that says what is wrong, where, and how to mend it:
 PhotogrammetryError > InputError (a ValueError) > CellError, WorkbookError, MissingExtraError;

@@ -56,14 +56,16 @@ from .survey.observations import PointObservations
 from .survey.orientation_check import OrientationCheck
 from .survey.reference import CheckResult, Georeference, KnownPoints, NamedPoints
 from .survey.relief_table import ReliefTable
-from .survey.setup import SurveySetup
+from .survey.setup import Measuring, SurveySetup, Taking
+from .survey.solved_survey import SolvedSurvey, WorldPoints
 from .survey.space_similarity import SpaceSums
+from .survey.survey_input import SurveyInput
 from .survey.survey_media import SurveyMedia
 from .survey.tolerances import ToleranceRule
 from .survey.transformation_precision import TransformationPrecision
 from .survey.weighted_similarity import WeightedSums
-from .survey.workbook.reader import SurveyInput
-from .survey.workflow import SolvedSurvey, solve
+from .workbook.reading.reader import ReadOptions
+from .workbook.workflow import solve
 
 __version__: str
 
@@ -91,6 +93,7 @@ __all__ = [
     "MapSurface",
     "MatchSettings",
     "Matches",
+    "Measuring",
     "MediaPath",
     "MissingExtraError",
     "Mosaic",
@@ -110,6 +113,7 @@ __all__ = [
     "Progress",
     "Quality",
     "RadialDivision",
+    "ReadOptions",
     "Registration",
     "ReliefMap",
     "ReliefTable",
@@ -124,12 +128,14 @@ __all__ = [
     "SurveyInput",
     "SurveyMedia",
     "SurveySetup",
+    "Taking",
     "ToleranceRule",
     "TransformationPrecision",
     "WATER_SAMPLE",
     "WeightedSums",
     "Window",
     "WorkbookError",
+    "WorldPoints",
     "align",
     "calibrate",
     "dense_relief",

@@ -10,8 +10,9 @@ import numpy as np
 
 import bifocal
 
+picks = bifocal.Measuring(sigma_px=0.2)
 survey = bifocal.solve(
-    bifocal.SAMPLE / "targets.csv", pair=bifocal.SAMPLE / "facade.pair.json", sigma_px=0.2
+    bifocal.SAMPLE / "targets.csv", pair=bifocal.SAMPLE / "facade.pair.json", measuring=picks
 )
 points = survey.table
 for k in range(0, len(points), 8):

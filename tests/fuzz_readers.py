@@ -22,11 +22,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from bifocal import Lens, Pair, PhotogrammetryError, read_image, solve
+from bifocal import Lens, Pair, read_image, solve
 from bifocal.files.geotiff import read_relief
 from bifocal.files.images import image_info
 from bifocal.files.point_tables import read_survey_points
-from multimedia import read_experiment, read_project
+from multimedia import PhotogrammetryError, read_experiment, read_project
 from multimedia.projects.dem import Dem
 from multimedia.projects.surface_files import read_water_surface
 from photocore.camera.boards import detect_board

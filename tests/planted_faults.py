@@ -113,11 +113,11 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         ),
     ),
     (
-        "bifocal/networks/joint_media.py",
+        "bifocal/model/pair_media.py",
         "tests/bifocal/orientation/test_adjustment_through_media.py",
         (
-            ("by_camera[:, :, 4:7] += seen.by_media", "by_camera[:, :, 4:7] -= seen.by_media"),
-            ("self.axes[2] @ camera.rotation)", "self.axes[2] @ camera.rotation.T)"),
+            ("NAMES.index(turn)] = 1.0", "NAMES.index(turn)] = -1.0"),
+            ("stated = stated @ camera.rotation", "stated = stated @ camera.rotation.T"),
         ),
     ),
     (
@@ -169,7 +169,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     # The survey
     (
         "bifocal/survey/point_survey.py",
-        "tests/bifocal/survey/test_point_survey.py tests/bifocal/survey/test_solve.py",
+        "tests/bifocal/survey/test_point_survey.py tests/bifocal/workbook/test_solve.py",
         (
             (
                 "scale_number = first.scale_number or 1000.0",
@@ -194,17 +194,17 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         (('(degrees * distance, "deg", -base', '(degrees, "deg", -base'),),
     ),
     (
-        "bifocal/survey/workbook/columns.py",
-        "tests/bifocal/survey/test_survey_workbook.py",
+        "bifocal/workbook/formulas/columns.py",
+        "tests/bifocal/workbook/test_survey_workbook.py",
         (
             ("(k_12*(1-[@r]/d_2))^2", "(k_12*(1-[@r]/d_1))^2"),
             ("(n{image}_{axis}-e_{axis})*1000", "n{image}_{axis}*1000"),
         ),
     ),
     (
-        "bifocal/survey/output.py",
-        "tests/bifocal/survey/test_solve.py tests/bifocal/survey/test_cli_solve.py "
-        "tests/bifocal/survey/test_cli_solve_refusals.py",
+        "bifocal/survey/results.py",
+        "tests/bifocal/workbook/test_solve.py tests/bifocal/workbook/test_cli_solve.py "
+        "tests/bifocal/workbook/test_cli_solve_refusals.py",
         (
             (
                 'dict.fromkeys(("e1", "e2", "s_c", "q"), length',
@@ -453,7 +453,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     (
         "multimedia/adjustment/bundle_equations.py",
         "tests/multimedia/adjustment/test_bundle.py",
-        (("by_turn(by_point[on], arm)", "by_turn(by_point[on], -arm)"),),
+        (("points[on] - pose.centre)", "pose.centre - points[on])"),),
     ),
 )
 

@@ -139,7 +139,7 @@ def test_solving_a_survey_imports_neither_scipy_nor_the_network() -> None:
         "http",
     )
     code = (
-        "import sys, bifocal.cli.solve, bifocal.survey.workflow, bifocal.survey.output\n"
+        "import sys, bifocal.cli.solve, bifocal.workbook.workflow, bifocal.workbook.output\n"
         f"print(*(m for m in {unused!r} if m in sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

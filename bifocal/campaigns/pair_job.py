@@ -368,7 +368,7 @@ def _points_step(job: PairJob) -> Step:
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
         from bifocal.model.pair import Pair
         from bifocal.reports.control_survey import is_exchanged, solve_control
-        from bifocal.survey.output import write_result
+        from bifocal.workbook.output import write_result
 
         pair = Pair.read(job.pair_path)
         tables = {"control": None, **tables_of(job)}

@@ -62,7 +62,7 @@ def command(
     control points or as they are, with --indices and --port or --depth. FAR alone may be a survey
     workbook that states distances, focal lengths and nadirs: they are taken as they are.
     """
-    from bifocal.survey.pair_workflow import is_workbook
+    from bifocal.workbook.pair_workflow import is_workbook
 
     if is_workbook(far):
         _align_workbook(far, near, out, given["sigma_distance"], overwrite, as_json)
@@ -93,7 +93,7 @@ def _align_workbook(
     book: Path, near: Path | None, out: Path, sigma: float, overwrite: bool, as_json: bool
 ) -> None:
     """Write the pair of a workbook's set-up as it is typed."""
-    from bifocal.survey.pair_workflow import write_pair
+    from bifocal.workbook.pair_workflow import write_pair
 
     context = click.get_current_context()
     given = [

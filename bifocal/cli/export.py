@@ -43,7 +43,7 @@ def command(
     overwrite: bool,
 ) -> None:  # fmt: skip
     """Write the points of a solved survey (RESULT: .xlsx, .ods or .csv) for other programs."""
-    from bifocal.survey.export_workflow import export
+    from bifocal.workbook.export_workflow import export
 
     for note in export(
         result, out, world=world, order=order, flavour=csv_flavour, ellipses=ellipses,

@@ -57,8 +57,8 @@ def command(
     matched along the radial lines. Every point is checked by how far off its line it fits.
     """
     from bifocal.matching.matching import MatchSettings
-    from bifocal.orientation.match_workflow import match_photos, match_summary
-    from bifocal.survey.pair_workflow import is_workbook, read_pair
+    from bifocal.workbook.match_workflow import match_photos, match_summary
+    from bifocal.workbook.pair_workflow import is_workbook, read_pair
 
     if relief_min is not None and relief_max is not None and relief_min >= relief_max:
         raise click.UsageError("--relief-min must be below --relief-max.")

@@ -70,7 +70,7 @@ def command(
     """
     from bifocal.orthophotos.deliver_workflow import DeliverTask, default_title, deliver
     from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho, not_measured
-    from bifocal.survey.pair_workflow import is_workbook, points_of, read_pair
+    from bifocal.workbook.pair_workflow import is_workbook, points_of, read_pair
 
     if out is None and folder is None:
         raise click.UsageError("Give --out FILE, --deliver DIR or both.")

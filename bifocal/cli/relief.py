@@ -42,7 +42,7 @@ def command(pair_file: Path, as_json: bool, **wishes: Any) -> None:
     photos themselves: points can only move along the radius, so what moves across it is error.
     """
     from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
-    from bifocal.survey.pair_workflow import read_pair
+    from bifocal.workbook.pair_workflow import read_pair
 
     with progress_bar("Relief", quiet=as_json) as progress:
         summary, remarks = relief_of_pair(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -94,15 +95,11 @@ def command(
     Or give two lists of picks, of photo 1 and of photo 2 (.csv, .xlsx, .dxf), joined by the names
     of the points, with --pair: a pair file, or a survey workbook for its set-up.
     """
-    from bifocal.survey.output import (
-        check_target,
-        length_unit,
-        point_rows,
-        solution_json,
-        summary,
-        write_result,
-    )
-    from bifocal.survey.workflow import solve
+    from bifocal.survey.results import length_unit, point_rows, solution_json, summary
+    from bifocal.survey.setup import Measuring, Taking
+    from bifocal.workbook.output import check_target, write_result
+    from bifocal.workbook.reading.reader import ReadOptions, column_map
+    from bifocal.workbook.workflow import solve
     from photocore.output import check_not_input
     from photocore.workbook.making.newbook import check_new_workbook
 
@@ -113,7 +110,13 @@ def command(
             check_new_workbook(out, overwrite=overwrite)
     if len(survey) > 2:
         raise click.UsageError("Give one survey, or two lists of picks: photo 1 and photo 2.")
-    solution = solve(survey[0] if len(survey) == 1 else (survey[0], survey[1]), **options)
+    options["columns"] = column_map(options["columns"])
+    values: dict[str, Any] = {
+        name: kind(**{f.name: options.pop(f.name) for f in fields(kind) if f.name in options})
+        for name, kind in (("taking", Taking), ("measuring", Measuring), ("reading", ReadOptions))
+    }
+    source = survey[0] if len(survey) == 1 else (survey[0], survey[1])
+    solution = solve(source, **values, **options)
     if out is not None:
         check_target(out, solution, overwrite=overwrite)
     for text in solution.remarks:

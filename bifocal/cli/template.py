@@ -40,7 +40,7 @@ def command(out: Path, language: str, rows: int, media: int | None, overwrite: b
 
     Every result is a live formula; the workbook needs neither this program nor macros.
     """
-    from bifocal.survey.template_workflow import write_template
+    from bifocal.workbook.template_workflow import write_template
 
     write_template(out, language=language, rows=rows, media=media, overwrite=overwrite)
     remark(f"{out}: fill in Setup and Points; then: bifocal solve {out} --out result.xlsx")

@@ -19,11 +19,11 @@ from bifocal.orientation.align_workflow import (
     alignment_as_dict,
 )
 from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orientation.match_workflow import match_pair_file
 from bifocal.orthophotos.deliver_workflow import DPI, DeliverTask, default_title, deliver
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
 from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
-from bifocal.survey.pair_workflow import read_pair
+from bifocal.workbook.match_workflow import match_pair_file
+from bifocal.workbook.pair_workflow import read_pair
 from photocore.cli import Progress
 from photocore.errors import PhotogrammetryError
 from photocore.interrupts import end_on_signals

@@ -11,8 +11,8 @@ from typing import Any
 
 from bifocal.collimation.fields import NOTES, FieldError, fields_of
 from bifocal.files.images import image_info
-from bifocal.survey.pair_workflow import is_survey, read_pair
-from bifocal.survey.workbook.reader import read_survey
+from bifocal.workbook.pair_workflow import is_survey, read_pair
+from bifocal.workbook.reading.reader import read_survey
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.workbook.reading.package import open_package
 

@@ -20,8 +20,9 @@ from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
 from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
-from bifocal.survey.output import write_result
-from bifocal.survey.workflow import solve
+from bifocal.survey.setup import Measuring
+from bifocal.workbook.output import write_result
+from bifocal.workbook.workflow import solve
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
@@ -136,7 +137,8 @@ def _survey(
     """Solve the targets into the workbook; return ids, true and found relief, sigma, flags."""
     with (folder / "targets.csv").open(encoding="utf-8", newline="") as file:
         true = np.array([float(row["r measured [m]"]) for row in csv.DictReader(file)])
-    solution = solve(folder / "targets.csv", pair=folder / "facade.pair.json", sigma_px=PICK_SIGMA)
+    picks = Measuring(sigma_px=PICK_SIGMA)
+    solution = solve(folder / "targets.csv", pair=folder / "facade.pair.json", measuring=picks)
     write_result(folder / "result.xlsx", solution, overwrite=True)
     table = solution.table
     return table.ids, true, table["r"], table["sigma_r"], table.flags

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.model.orientation_precision import NAMES
+from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 
 #: A wall bent by certainly more than this, at 3000 px of width, is not that of an honest pair; by
@@ -32,10 +33,7 @@ def doubts_in_words(setup: Any) -> tuple[str, ...]:
     """Return what is known to be wrong with a pair, from the ``setup`` of its file."""
     told = setup.get("doubts") if isinstance(setup, dict) else ()
     if told is None and (bend := _bend(setup)):
-        told = [
-            f"{MISFIT}: the wall is bent by {bend:.2f} px between the photos (an "
-            f"honest pair: at most {MOST_BENT:g}). Set the pair up again (`bifocal align`)."
-        ]
+        told = [remark("pair.bent", bend=bend, most=MOST_BENT)]
     return tuple(map(str, told)) if isinstance(told, list | tuple) else ()
 
 

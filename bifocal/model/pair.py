@@ -17,6 +17,7 @@ from bifocal.model.flags import FlagLimits
 from bifocal.model.intersection import Intersection, intersect
 from bifocal.model.photo import Photo
 from bifocal.precision import base_factor
+from bifocal.remarks import remark
 from multimedia import Layers
 from photocore.arrays import FloatArray, as_points, not_negative, positive
 from photocore.errors import GeometryError, InputError, located
@@ -84,7 +85,7 @@ class Pair:
             if self.orientation is not None:
                 turned = orientation_precision.exchanged(self.orientation)
                 object.__setattr__(self, "orientation", turned)
-            note = f"image1 was the near camera ({d1:g} m < {d2:g} m); the two were exchanged."
+            note = remark("pair.exchanged", d1=d1, d2=d2)
             object.__setattr__(self, "remarks", (*self.remarks, note))
         first, last = doubts_in_words(self.extra.get("setup")), self._doubts_about_media()
         if first or last:
@@ -97,15 +98,15 @@ class Pair:
         if self.layers is None:
             if all(photo.z0 is None for photo in photos):
                 return ()
-            return ("z0 is given but no layers: nothing is refracted, the pair is taken in air.",)
+            return (remark("pair.no_layers"),)
         z0 = [photo.z0 or 0.0 for photo in photos]
         beyond = [
             photo.distance - z - self.layers.thickness for photo, z in zip(photos, z0, strict=True)
         ]
-        found = self.layers.remarks_about(z0=z0, zp=beyond)
+        found = tuple(f"layers: {doubt}" for doubt in self.layers.remarks_about(z0=z0, zp=beyond))
         if self.orientation is not None and not self._knows_its_precision:
-            found += ("the covariance of the cameras, `orientation`, is in no sigma.",)
-        return tuple(f"layers: {doubt}" for doubt in found)
+            found += (remark("pair.no_covariance"),)
+        return found
 
     @classmethod
     def ideal(

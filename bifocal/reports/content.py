@@ -19,7 +19,8 @@ from bifocal.model.photo import Photo
 from bifocal.model.relief_map import Quality, ReliefMap
 from bifocal.model.surface import MapSurface
 from bifocal.reports.control_survey import is_exchanged, solve_control
-from bifocal.survey.workflow import SolvedSurvey, solve
+from bifocal.survey.solved_survey import SolvedSurvey
+from bifocal.workbook.workflow import solve
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.errors import InputError, located
 
@@ -130,7 +131,7 @@ class PairContent:
         """Return map minus known relief at measured pixels of the compared points. [m]"""
         if self.relief is None or self.solution is None:
             return np.zeros(0)
-        known = self.solution.known
+        known = self.solution.survey.known
         xyz = known.xyz[known.used]
         xyz = xyz[np.asarray(np.isfinite(xyz).all(axis=1))]
         inside = self._measured(xyz[:, :2])

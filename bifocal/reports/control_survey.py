@@ -11,8 +11,9 @@ from bifocal.model.pair import Pair
 from bifocal.orientation.control_points import Control, read_control
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import KnownPoints
-from bifocal.survey.workbook.reader import SurveyInput
-from bifocal.survey.workflow import SolvedSurvey, solve
+from bifocal.survey.solved_survey import SolvedSurvey
+from bifocal.survey.survey_input import SurveyInput
+from bifocal.workbook.workflow import solve
 from photocore.errors import InputError
 
 #: Code of points that the orientation rests on, and of independent ones.

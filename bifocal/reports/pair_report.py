@@ -11,6 +11,7 @@ import numpy as np
 
 from bifocal.media import media_words
 from bifocal.model.relief_map import Quality
+from bifocal.remarks import in_language
 from bifocal.reports import figures
 from bifocal.reports.accuracy import accuracy_blocks, millimetres
 from bifocal.reports.content import PairContent
@@ -223,7 +224,8 @@ def _foundations(content: PairContent, say: Words) -> Iterator[Block]:
         )  # fmt: skip
         assumed = [str(text) for text in setup.get("assumed", ())]
         for text in assumed:
-            yield Paragraph(text=say("rest_assumed", what=text))
+            what = in_language(text, content.task.language)
+            yield Paragraph(text=say("rest_assumed", what=what))
         if not assumed:
             yield Paragraph(text=say("rest_nothing"))
     remarks = [*content.pair.remarks, *(content.solution.remarks if content.solution else ())]
@@ -233,7 +235,7 @@ def _foundations(content: PairContent, say: Words) -> Iterator[Block]:
     if remarks:
         yield Heading(text=say("remarks"), level=3)
         for remark in dict.fromkeys(remarks):
-            yield Paragraph(text=remark, small=True)
+            yield Paragraph(text=in_language(remark, content.task.language), small=True)
 
 
 def _provenance(content: PairContent, say: Words) -> Iterator[Block]:

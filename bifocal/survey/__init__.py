@@ -1,1 +1,1 @@
-"""The point survey: measured points to relief, coordinates, precision, world coordinates."""
+"""The solver of a point survey: measured points to relief, coordinates, precision, world."""

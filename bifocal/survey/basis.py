@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bifocal.model.basis import rests_on
-from bifocal.survey.workflow import SolvedSurvey
+from bifocal.survey.solved_survey import SolvedSurvey
 
 
 def basis(solution: SolvedSurvey) -> str:
@@ -23,12 +23,11 @@ def _setup(solution: SolvedSurvey) -> str:
 
 def _picks(solution: SolvedSurvey) -> str:
     if solution.setup is not None:
-        how = "assumed" if solution.setup.sigma_s is None else "given"
+        how = "assumed" if solution.setup.measuring.sigma_s is None else "given"
         return f"picks of {solution.setup.precision:.3g} mm {how}"
     photo = solution.pair.image1
     how = "assumed"
-    given = solution.given.get("sigma_px") or solution.survey.setup.sigma_px
-    if given is not None or photo.sigma_pixel is not None:
+    if solution.survey.setup.measuring.sigma_px is not None or photo.sigma_pixel is not None:
         how = "given"
     elif solution.sigma_px is not None:
         how = "found from the misfits"

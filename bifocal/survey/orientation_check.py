@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from bifocal import rays
 from bifocal.model.homography import apply_homography
 from bifocal.model.pair import Pair
+from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import GeometryError, InputError
 
@@ -90,20 +91,16 @@ class OrientationCheck:
     def remarks(self) -> tuple[str, ...]:
         """The findings in words a surveyor acts on."""
         lines = [
-            f"{p.name}: {p.value:+.3g} {p.unit} (sigma {p.sigma:.2g}); "
-            + (
-                f"would read as up to {abs(p.false_relief) * 1000:.0f} mm of relief"
-                if p.is_significant
-                else "not significant"
+            remark(
+                f"survey.plane_parameter{'' if p.is_significant else '_nothing'}", name=p.name,
+                value=p.value, unit=p.unit, sigma=p.sigma, relief=abs(p.false_relief) * 1000,
             )
             for p in self.parameters
-        ]
+        ]  # fmt: skip
         if not any(p.name.startswith("tilt") for p in self.parameters):
-            lines.append(
-                f"tilt: not determined; mark at least {MINIMUM_FOR_TILT} plane points, well spread."
-            )
-        lines += [f"{name}: marked as on the plane, but does not fit it." for name in self.outliers]
-        return tuple(f"Set-up: {line}" for line in lines)
+            lines.append(remark("survey.no_tilt", count=MINIMUM_FOR_TILT))
+        lines += [remark("survey.off_plane", name=name) for name in self.outliers]
+        return tuple(lines)
 
 
 def check_orientation(

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from bifocal.remarks import remark
 from bifocal.survey.space_similarity import SpaceSums
 from bifocal.survey.tolerances import Verdict
 from bifocal.survey.transformation_precision import TransformationPrecision
@@ -149,7 +150,7 @@ class CheckResult:
         """What the user should know about the names."""
         if not self.missing:
             return ()
-        return (f"Check: no measured point is called {', '.join(self.missing[:10])}.",)
+        return (remark("survey.no_such_check", names=", ".join(self.missing[:10])),)
 
     @property
     def accuracy(self) -> float:

@@ -8,6 +8,7 @@ from collections.abc import Collection
 import numpy as np
 
 from bifocal.model.pair import Pair
+from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable
@@ -38,52 +39,31 @@ def georeference_remarks(
     is_auto : bool
         Whether the data chose the model.
     """
-    said = [f"{name} contradicts the other control points and was left out." for name in world.bad]
+    said: list[str] = [remark("survey.left_out", name=name) for name in world.bad]
     unknown = control.missing_in(table)
     if unknown:
-        said.append(f"no measured point is called {', '.join(unknown[:10])}; not used.")
+        said.append(remark("survey.no_such_control", names=", ".join(unknown[:10])))
     if is_auto and world.model == "2D":
-        said.append("no heights H are given: the model 2D was taken, H stays blank.")
+        said.append(remark("survey.no_heights"))
     elif is_auto and world.model != "levelled":
         lean = math.degrees(math.acos(min(1.0, float(world.world_from_wall.rotation[2, 1]))))
-        said.append(
-            f"auto took the model {world.model}, since levelled does not fit the control points as "
-            f"well; the wall's Y then leans {lean:.2f} deg from upright. If the photos were "
-            "levelled, check the control points, or say --georeference levelled."
-        )
+        said.append(remark("survey.model_taken", model=world.model, lean=lean))
     scale = world.world_from_wall.scale
     if abs(scale - 1.0) > SCALE_SHARE:
-        said.append(
-            f"WARNING: scale {scale:.4g} instead of 1: the control points lie {scale:.4g} times as "
-            "far apart as the survey says. Check the distances and principal distances in Setup, "
-            "that E, N, H are in metres, and that each name has its own coordinates."
-        )
+        said.append(remark("survey.wrong_scale", scale=scale))
     sizes = np.where(world.used, np.sqrt(np.nansum(world.residuals**2, axis=1)), 0.0)
     if sizes.size and sizes.max() > LARGEST_RESIDUAL:
-        worst = int(sizes.argmax())
-        said.append(
-            f"WARNING: residuals of up to {sizes[worst]:.2f} m, the largest at "
-            f"{world.ids[worst]}: the control points do not fit the survey. Check names and "
-            "coordinates; do not use E, N, H before."
-        )
-    return [f"Georeference: {text}" for text in said]
+        name = world.ids[int(sizes.argmax())]
+        said.append(remark("survey.large_residuals", size=sizes.max(), name=name))
+    return said
 
 
 def exchanged_remark(setup: SurveySetup) -> str:
     """Return what is said of a set-up whose image 1 has the shorter distance."""
-    camera = "" if setup.c1 is None else f" with c = {setup.c1:g} mm"
-    nothing = (
-        " Neither c_1 nor c_2 is given, so nothing else tells which photo is the far one."
-        if setup.c1 is None
-        else ""
-    )
-    return (
-        f"d_1 = {setup.d1:g} m is shorter than d_2 = {setup.d2:g} m, so image 1 was taken for the "
-        "near photo (swapped images): photos 1 and 2 were exchanged together with their distances."
-        f"{nothing} This is right only if image 1 (x1 y1, s1) was measured on the photo taken from "
-        f"{setup.d1:g} m{camera}; if only the distances were typed the wrong way round, exchange "
-        "d_1 and d_2, else all relief is wrong."
-    )
+    taking = setup.taking
+    if taking.c1 is None:
+        return remark("survey.exchanged_unsure", d1=taking.d1, d2=taking.d2)
+    return remark("survey.exchanged", d1=taking.d1, d2=taking.d2, c1=taking.c1)
 
 
 def unused_remarks(unused: Collection[str], **listed: KnownPoints) -> list[str]:
@@ -96,12 +76,13 @@ def unused_remarks(unused: Collection[str], **listed: KnownPoints) -> list[str]:
     **listed : KnownPoints
         What is typed, by the name of its sheet.
     """
-    said = []
+    said: list[str] = []
     for sheet, known in listed.items():
         names = [n for n, use in zip(known.ids, known.used, strict=True) if use and n in unused]
-        if names:
-            verb = "takes" if len(names) == 1 else "take"
-            said.append(f"{sheet}: {', '.join(names[:10])} {verb} no part: use = 0 in Points.")
+        if len(names) == 1:
+            said.append(remark("survey.unused", sheet=sheet, name=names[0]))
+        elif names:
+            said.append(remark("survey.unused_several", sheet=sheet, names=", ".join(names[:10])))
     return said
 
 
@@ -117,12 +98,8 @@ def opposite_signs_remark(table: ReliefTable, known: KnownPoints) -> list[str]:
         return []
     worst = opposite[np.abs(z[opposite]).argmax()]
     name = np.array(known.ids)[here][worst]
-    return [
-        f"WARNING: relief has the wrong sign at {len(opposite)} of {int(clear.sum())} points of "
-        f"known relief (at {name} {r[worst]:+.3f} m, measured {z[worst]:+.3f} m): photos 1 and 2 "
-        "look exchanged. x1 y1 belong to the far photo (d_1), x2 y2 to the near one; relief counts "
-        "+ towards the camera."
-    ]
+    count = {"count": len(opposite), "all": int(clear.sum())}
+    return [remark("survey.opposite_signs", name=name, found=r[worst], known=z[worst], **count)]
 
 
 def point_remarks(
@@ -135,15 +112,17 @@ def point_remarks(
     misses, unit = table["q"], "mm"
     if "misfit_px" in table.carried:
         misses, unit = table.carried["misfit_px"], "px"
-    elif setup is not None and setup.pitch is not None:
-        misses, unit = table["q"] / setup.pitch, "px"
-    remarks = [
-        f"{points.ids[i]}: the two picks miss each other by {abs(misses[i]):.3g} {unit} across the "
-        f"radius ({abs(table.standardised[i]):.1f} sigma); measure it again."
+    elif setup is not None and setup.taking.pitch is not None:
+        misses, unit = table["q"] / setup.taking.pitch, "px"
+    remarks: list[str] = [
+        remark(
+            "survey.off_radial", name=points.ids[i], miss=abs(misses[i]), unit=unit,
+            sigmas=abs(table.standardised[i]),
+        )
         for i in off[:10]
-    ]
+    ]  # fmt: skip
     if len(off) > 10:
-        remarks.append(f"... and {len(off) - 10} more OFF-RADIAL points.")
+        remarks.append(remark("survey.off_radial_more", count=len(off) - 10))
     return remarks
 
 
@@ -152,17 +131,13 @@ def wide_remarks(setup: SurveySetup, points: PointObservations) -> list[str]:
     measured = setup.in_millimetres(points)
     x, y = np.array([measured.xy1, measured.xy2]).transpose(2, 0, 1)
     s = np.where(measured.is_cartesian, np.hypot(x, y), measured.polar[:, :2].T)
-    c = np.array([[c or np.inf] for c in setup.c_used])
+    c = np.array([[c or np.inf] for c in setup.taking.c_used])
     angles = np.nan_to_num(np.degrees(np.arctan(s / c))) * measured.use
     image, worst = np.unravel_index(angles.argmax(), angles.shape)
     if angles[image, worst] <= WIDEST_ANGLE:
         return []
-    return [
-        f"WARNING: {points.ids[worst]} lies {angles.max():.0f} deg off the axis of image "
-        f"{image + 1}, further than lenses see. If prints were measured, give their enlargements "
-        "(enlargement_1, enlargement_2 in Setup; --enlargement1, --enlargement2; 1 = on the "
-        f"sensor); else check c_{image + 1}, the unit and the size of a pixel."
-    ]
+    name, angle = points.ids[worst], angles.max()
+    return [remark("survey.off_axis", name=name, angle=angle, image=int(image) + 1)]
 
 
 def refraction_remarks(pair: Pair, points: PointObservations) -> list[str]:
@@ -179,12 +154,12 @@ def refraction_remarks(pair: Pair, points: PointObservations) -> list[str]:
     off = refraction_errors(pair, points)
     if not pair.layers or not len(off):
         return []
-    aside = float(np.hypot(off[:, 0], off[:, 1]).max())
     return [
-        f"refraction in {len(pair.layers.indices)} media is taken into account; neglected it would "
-        f"falsify relief by up to {off[:, 2].max():.3f} m (median {np.median(off[:, 2]):.3f} m) "
-        f"and places by up to {aside:.3f} m."
-    ]
+        remark(
+            "survey.refraction", media=len(pair.layers.indices), most=off[:, 2].max(),
+            median=np.median(off[:, 2]), aside=np.hypot(off[:, 0], off[:, 1]).max(),
+        )
+    ]  # fmt: skip
 
 
 def refraction_errors(pair: Pair, points: PointObservations) -> FloatArray:

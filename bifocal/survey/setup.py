@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from bifocal.model.flags import SIGMA_PIXEL, FlagLimits
 from bifocal.model.homography import apply_homography
 from bifocal.model.pair import Pair
 from bifocal.precision import false_relief_of_scale
+from bifocal.remarks import remark
 from bifocal.survey.bent_radii import scale_ratio
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.survey_media import SurveyMedia
@@ -28,33 +29,118 @@ UNITS = ("mm", "px")
 Place = tuple[float, float]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Taking:
+    """How both photos were taken, by an ideal pair: distances, lenses, pixels, nadir points.
+
+    Attributes
+    ----------
+    d1, d2 : float or None
+        Distances of the projection centres to the reference plane, d1 > d2. [m]
+    c1, c2 : float or None
+        Principal distances; both or none. Without them there is relief but no X and Y. [mm]
+    enlargement1, enlargement2 : float or None
+        How many times larger the image is on the print that was measured; None or 1 = on the
+        sensor.
+    pitch : float or None
+        Size of a pixel; needed when coordinates are in pixels. [mm/px]
+    nadir1, nadir2 : tuple of float or None
+        (column, row) of the nadir points; needed when coordinates are in pixels. [px]
+    """
+
+    d1: float | None = None
+    d2: float | None = None
+    c1: float | None = None
+    c2: float | None = None
+    enlargement1: float | None = None
+    enlargement2: float | None = None
+    pitch: float | None = None
+    nadir1: Place | None = None
+    nadir2: Place | None = None
+
+    @property
+    def enlargements(self) -> tuple[float, float]:
+        """Those of both images, 1 for an image on the sensor."""
+        return self.enlargement1 or 1.0, self.enlargement2 or 1.0
+
+    @property
+    def c_used(self) -> tuple[float | None, ...]:
+        """Principal distances of the images as measured: those of prints are enlarged too. [mm]"""
+        own = zip((self.c1, self.c2), self.enlargements, strict=True)
+        return tuple(c and c * enlargement for c, enlargement in own)
+
+    def exchanged(self) -> Taking:
+        """Return the same with the images exchanged."""
+        other = {"1": "2", "2": "1"}
+        swapped: dict[str, Any] = {
+            f"{name}{image}": getattr(self, f"{name}{other[image]}")
+            for name in ("d", "c", "enlargement", "nadir")
+            for image in "12"
+        }
+        return replace(self, **swapped)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measuring:
+    """How points were measured: in which unit, how well, and which are flagged.
+
+    Attributes
+    ----------
+    unit : {"mm", "px"} or None
+        ``"mm"``: x, y from the nadir, y up. ``"px"``: (column, row) of the image. None: as
+        headings or `Setup` say, else mm.
+    sigma_s : float or None
+        Precision of a measured image coordinate; default 0.5 px, or 0.004 mm; of prints 0.2 mm,
+        there. [mm]
+    sigma_px : float or None
+        Precision of a raw pixel; default the pair's, else found from the misfits of 20 or more
+        points, else 0.5. [px]
+    sigma_r_max : float or None
+        Points of less precise relief are UNCERTAIN; default 2 % of the shorter distance. [m]
+    k_off, k_plane : float or None
+        Beyond how many sigma a point is OFF-RADIAL, below how many ON-PLANE; default those of
+        `bifocal.model.flags.FlagLimits`.
+    """
+
+    unit: str | None = None
+    sigma_s: float | None = None
+    sigma_px: float | None = None
+    sigma_r_max: float | None = None
+    k_off: float | None = None
+    k_plane: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.unit not in (None, *UNITS):
+            raise InputError(f"input unit: {self.unit!r} is neither mm nor px.")
+
+    @property
+    def limits(self) -> FlagLimits:
+        """Where the flags begin."""
+        return FlagLimits(
+            off_radial=self.k_off or FlagLimits().off_radial,
+            on_plane=self.k_plane or FlagLimits().on_plane,
+            sigma_r_max=self.sigma_r_max,
+        )
+
+
+def given_of(value: Taking | Measuring | None) -> dict[str, Any]:
+    """Return what is given of a value, by name."""
+    named = {} if value is None else {f.name: getattr(value, f.name) for f in fields(value)}
+    return {name: number for name, number in named.items() if number is not None}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SurveySetup:
     """Two cameras as the workbook's `Setup` sheet, or options in its place, describe them.
 
     Attributes
     ----------
-    d1, d2 : float or None
-        Distances of the projection centres to the reference plane. [m]
-    c1, c2 : float or None
-        Principal distances; both or none. Without them there is relief but no X and Y. [mm]
-    enlargement1, enlargement2 : float
-        How many times larger the image is on the print that was measured; 1 = on the sensor.
-    pitch : float or None
-        Size of a pixel; needed when coordinates are in pixels. [mm/px]
-    sigma_s : float or None
-        Precision of a measured image coordinate; default 0.5 px, or 0.004 mm; of prints 0.2 mm,
-        there. [mm]
-    sigma_px : float or None
-        Precision of a raw pixel. [px]
-    nadir1, nadir2 : tuple of float or None
-        (column, row) of the nadir points; needed when coordinates are in pixels. [px]
-    unit : str
-        ``"mm"``: x, y from the nadir, y up. ``"px"``: (column, row) of the image.
-    sigma_r_max : float or None
-        Points of less precise relief are UNCERTAIN; default 2 % of the shorter distance. [m]
-    k_off, k_plane : float
-        Beyond how many sigma a point is OFF-RADIAL, below how many ON-PLANE.
+    taking : Taking
+        Distances, lenses, pixels, nadir points.
+    measuring : Measuring
+        Unit and precision of what was measured.
+    media : SurveyMedia or None
+        What the photos look through, where the workbook has cells for it.
     sensor : tuple of float or None
         Width and height. [mm]
     pair_file : str
@@ -70,29 +156,15 @@ class SurveySetup:
         from points of the reference plane; None where there is no correction.
     places : mapping
         Where each value was found: key to sheet and cell.
-    media : SurveyMedia or None
-        What the photos look through, where the workbook has cells for it.
     where : str
         File and sheet, for messages.
     remarks, text_cells : tuple of str
         What the user should know; which numbers were typed as text.
     """
 
-    d1: float | None = None
-    d2: float | None = None
-    c1: float | None = None
-    c2: float | None = None
-    enlargement1: float = 1.0
-    enlargement2: float = 1.0
-    pitch: float | None = None
-    sigma_s: float | None = None
-    sigma_px: float | None = None
-    nadir1: Place | None = None
-    nadir2: Place | None = None
-    unit: str = "mm"
-    sigma_r_max: float | None = None
-    k_off: float = FlagLimits().off_radial
-    k_plane: float = FlagLimits().on_plane
+    taking: Taking = field(default_factory=Taking)
+    measuring: Measuring = field(default_factory=Measuring)
+    media: SurveyMedia | None = None
     sensor: Place | None = None
     pair_file: str = ""
     photo1: str = ""
@@ -102,36 +174,30 @@ class SurveySetup:
     nadirs: tuple[FloatArray, FloatArray] = (np.zeros(2), np.zeros(2))
     adjusted: tuple[FloatArray | None, FloatArray | None] = (None, None)
     places: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-    media: SurveyMedia | None = None
     where: str = ""
     remarks: tuple[str, ...] = ()
     text_cells: tuple[str, ...] = ()
 
-    def __post_init__(self) -> None:
-        if self.unit not in UNITS:
-            raise InputError(f"input unit: {self.unit!r} is neither mm nor px.")
-
     @property
-    def limits(self) -> FlagLimits:
-        """Where the flags begin."""
-        return FlagLimits(
-            off_radial=self.k_off, on_plane=self.k_plane, sigma_r_max=self.sigma_r_max
-        )
-
-    @property
-    def c_used(self) -> tuple[float | None, ...]:
-        """Principal distances of the images as measured: those of prints are enlarged too. [mm]"""
-        own = (self.c1, self.enlargement1), (self.c2, self.enlargement2)
-        return tuple(c and c * enlargement for c, enlargement in own)
+    def unit(self) -> str:
+        """Of the coordinates x1 y1 x2 y2."""
+        return self.measuring.unit or "mm"
 
     @property
     def precision(self) -> float:
         """Precision of an image coordinate. [mm]"""
-        if self.sigma_s is not None:
-            return self.sigma_s
-        if max(self.enlargement1, self.enlargement2) > 1.0:
+        if self.measuring.sigma_s is not None:
+            return self.measuring.sigma_s
+        if max(self.taking.enlargements) > 1.0:
             return SIGMA_PRINT
-        return SIGMA_PIXEL * self.pitch if self.pitch is not None else SIGMA_RADIAL
+        pitch = self.taking.pitch
+        return SIGMA_RADIAL if pitch is None else SIGMA_PIXEL * pitch
+
+    def but(self, **values: Any) -> SurveySetup:
+        """Return the set-up with other values of how photos were taken and points measured."""
+        names = values.keys() & {f.name for f in fields(Taking)}
+        taking = replace(self.taking, **{name: values.pop(name) for name in names})
+        return replace(self, taking=taking, measuring=replace(self.measuring, **values))
 
     def pair(self) -> Pair:
         """Return the ideal pair, whose image coordinates are millimetres from the nadir, y up.
@@ -145,40 +211,41 @@ class SurveySetup:
             return self._pair()
 
     def _pair(self) -> Pair:
-        missing = [name for name, value in (("d_1", self.d1), ("d_2", self.d2)) if value is None]
-        if self.d1 is None or self.d2 is None:
+        own = self.taking
+        missing = [name for name, value in (("d_1", own.d1), ("d_2", own.d2)) if value is None]
+        if own.d1 is None or own.d2 is None:
             raise InputError(
                 f"no value for {', '.join(missing)}. Fill in the sheet Setup (d_2 and delta_d, or "
                 "d_1), or give --d1 and --d2 in metres, or a pair file with --pair."
                 f"{''.join(f' {remark}' for remark in self.remarks)}"
             )
-        if self.unit == "px" and {self.enlargement1, self.enlargement2} != {1.0}:
+        if self.unit == "px" and own.enlargements != (1.0, 1.0):
             raise InputError(
                 "enlargement_1, enlargement_2: these are of prints measured in mm. Type 1 for "
                 "pixels, and as pitch their size on the sensor (of a scan: over its enlargement)."
             )
-        if self.unit == "px" and self.pitch is None:
+        if self.unit == "px" and own.pitch is None:
             raise InputError("pitch: the size of a pixel [mm/px] is needed to read pixels.")
-        if self.unit == "px" and (self.nadir1 is None or self.nadir2 is None):
+        if self.unit == "px" and (own.nadir1 is None or own.nadir2 is None):
             raise InputError(
                 "coordinates in pixels need the nadir points of both images (nadir_1_col, "
                 "nadir_1_row, nadir_2_col, nadir_2_row); fill them in."
             )
-        if self.d1 == self.d2:
+        if own.d1 == own.d2:
             raise GeometryError(
-                f"d_1 and d_2 are both {self.d1:g} m: relief cannot be told from two photos taken "
+                f"d_1 and d_2 are both {own.d1:g} m: relief cannot be told from two photos taken "
                 "at the same distance. Check d_1, d_2 and delta_d."
             )
-        if (self.c1 is None) != (self.c2 is None):
+        if (own.c1 is None) != (own.c2 is None):
             raise InputError("c_1 and c_2: give both principal distances or none.")
-        for name in ("pitch", "sigma_r_max"):
-            if (value := getattr(self, name)) is not None:
+        for name, value in (("pitch", own.pitch), ("sigma_r_max", self.measuring.sigma_r_max)):
+            if value is not None:
                 positive(value, name)
-        c1, c2 = self.c_used
-        pair = Pair.ideal(d1=self.d1, d2=self.d2, c1=c1, c2=c2, sigma=self.precision)
+        c1, c2 = own.c_used
+        pair = Pair.ideal(d1=own.d1, d2=own.d2, c1=c1, c2=c2, sigma=self.precision)
         if not self.media:
             return pair
-        if self.refracted and self.c1 is None:
+        if self.refracted and own.c1 is None:
             raise InputError(
                 "c_1 and c_2, the principal distances [mm], are needed: how far a ray is bent "
                 "follows from its angle, s / c."
@@ -196,14 +263,14 @@ class SurveySetup:
 
     def in_millimetres(self, points: PointObservations) -> PointObservations:
         """Return the points as image coordinates of `pair`, without raw pixels."""
-        first, second = self.adjusted
+        own, (first, second) = self.taking, self.adjusted
         is_plain = first is None and second is None
         if self.unit == "mm" and is_plain and not points.has_pixels.any():
             return points
         typed = (points.xy1, points.xy2)
-        if self.unit == "px" and self.pitch is not None:
-            flip = np.array([self.pitch, -self.pitch])
-            nadirs = (self.nadir1 or (0.0, 0.0), self.nadir2 or (0.0, 0.0))
+        if self.unit == "px" and own.pitch is not None:
+            flip = np.array([own.pitch, -own.pitch])
+            nadirs = (own.nadir1 or (0.0, 0.0), own.nadir2 or (0.0, 0.0))
             typed = ((typed[0] - nadirs[0]) * flip, (typed[1] - nadirs[1]) * flip)
         if first is not None:
             typed = (apply_homography(first, typed[0]), typed[1])
@@ -214,14 +281,11 @@ class SurveySetup:
 
     def exchanged(self) -> SurveySetup:
         """Return the same set-up with the images exchanged."""
-        other = {"1": "2", "2": "1"}
-        swapped: dict[str, Any] = {
-            f"{name}{image}": getattr(self, f"{name}{other[image]}")
-            for name in ("d", "c", "enlargement", "nadir", "photo")
-            for image in "12"
-        }
-        media = self.media and self.media.exchanged()
-        return replace(self, **swapped, adjusted=self.adjusted[::-1], media=media)
+        return replace(
+            self, taking=self.taking.exchanged(), adjusted=self.adjusted[::-1],
+            photo1=self.photo2, photo2=self.photo1,
+            media=self.media and self.media.exchanged(),
+        )  # fmt: skip
 
     def check_scales(self, tolerance: float = SCALE_TOLERANCE) -> str:
         """Return a remark on the scales of the photos; empty where they agree.
@@ -231,10 +295,12 @@ class SurveySetup:
         GeometryError
             If they differ by more than the tolerance: not a bifocal pair, or a wrong c or d.
         """
-        if self.c1 is None or self.c2 is None or self.d1 is None or self.d2 is None:
+        own = self.taking
+        if own.c1 is None or own.c2 is None or own.d1 is None or own.d2 is None:
             return ""
-        enlarged = self.enlargement2 / self.enlargement1  # apart are the prints' scales by it too
-        share = (1000.0 * self.d2 / self.c2) / (1000.0 * self.d1 / self.c1) / enlarged - 1.0
+        # Apart are the prints' scales by it too.
+        enlarged = own.enlargements[1] / own.enlargements[0]
+        share = (1000.0 * own.d2 / own.c2) / (1000.0 * own.d1 / own.c1) / enlarged - 1.0
         if self.refracted:
             share = scale_ratio(*self.pair().as_given) - 1.0
         apart = abs(share * enlarged + enlarged - 1.0)
@@ -248,18 +314,14 @@ class SurveySetup:
                     "--scale-tolerance (`bifocal plan` places cameras at equal scale)."
                 )
             raise GeometryError(
-                f"{place}c_1/d_1 = {self.c1 / self.d1:.4g} and c_2/d_2 = {self.c2 / self.d2:.4g} "
+                f"{place}c_1/d_1 = {own.c1 / own.d1:.4g} and c_2/d_2 = {own.c2 / own.d2:.4g} "
                 f"differ by {apart:.1%}: a bifocal pair has the same scale in both photos. "
                 f"Check c_1, c_2, d_1 and d_2 (tolerance {tolerance:.1%}, --scale-tolerance)."
             )
         if abs(share) < 1e-4:
             return ""
-        far, near = max(self.d1, self.d2), min(self.d1, self.d2)
+        far, near = max(own.d1, own.d2), min(own.d1, own.d2)
         if self.refracted:
             far, near = self.pair().straight_distances
-        return (
-            f"the scales of the photos differ by {share:+.2%}; image 2 is brought to the scale of "
-            "image 1 (k_12). If c, d or an enlargement is wrong instead, this is "
-            f"{float(false_relief_of_scale(abs(share), d1=far, d2=near)):.3f} m of false relief: "
-            "points of known relief tell."
-        )
+        relief = float(false_relief_of_scale(abs(share), d1=far, d2=near))
+        return remark("survey.scales_differ", share=share, relief=relief)

@@ -48,11 +48,12 @@ def refuse_wrong_unit(
     InputError
         Naming the unit that the numbers seem to be in.
     """
+    taking = setup.taking
     cartesian = points.use & points.is_cartesian
     place = "the headings" if said else "Setup (input_unit)"
     typed = np.hstack([points.xy1, points.xy2])[cartesian]
     if setup.unit == "mm":
-        limit = LARGEST_MM if setup.c1 is None else WIDEST * max(c or 0.0 for c in setup.c_used)
+        limit = LARGEST_MM if taking.c1 is None else WIDEST * max(c or 0.0 for c in taking.c_used)
         radial = points.polar[points.use & ~points.is_cartesian][:, :2]
         for values, what, mend in (
             (
@@ -69,17 +70,17 @@ def refuse_wrong_unit(
                     f"(limit {limit:.4g} mm): they look like pixels, while {place} says mm. {mend}"
                 )
         return
-    first, second = setup.nadir1 or (0.0, 0.0), setup.nadir2 or (0.0, 0.0)
+    first, second = taking.nadir1 or (0.0, 0.0), taking.nadir2 or (0.0, 0.0)
     nadir = max(abs(value) for value in (*first, *second))
     largest = float(np.nanmax(np.abs(typed))) if typed.size else np.inf
-    reach = largest * (setup.pitch or np.inf)
+    reach = largest * (taking.pitch or np.inf)
     sight = ""
     if nadir > 2 * CORNER_PX and largest < CORNER_PX:
         sight = (
             f"no coordinate exceeds {largest:.4g} px although the nadir points lie at "
             f"({first[0]:g}, {first[1]:g}) px: they"
         )
-    elif nadir == 0 and reach < 0.01 * (setup.c1 or 20.0):
+    elif nadir == 0 and reach < 0.01 * (taking.c1 or 20.0):
         sight = f"all points lie within {reach:.3g} mm of the nadir: the coordinates"
     if sight:
         raise InputError(
@@ -94,16 +95,16 @@ def _typical(values: FloatArray) -> float:
     return float(np.median(known)) if known.size else 0.0
 
 
-def given_above_zero(**numbers: float | None) -> dict[str, Any]:
-    """Return the options that are given, refusing what is not above zero."""
-    given = {name: value for name, value in numbers.items() if value is not None}
-    for name, value in given.items():
+def refuse_not_above_zero(**options: Any) -> None:
+    """Refuse an option that is one number but not above zero, or more than one."""
+    for name, value in options.items():
+        if name in ("unit", "nadir1", "nadir2"):
+            continue
         option = f"--{name.replace('_', '-')}"
         if as_floats(value, option).ndim:
             raise InputError(f"{option}: expected one number for the whole survey.")
         if not value > 0:
             raise InputError(f"{option}: must be a number above zero, got {value:g}.")
-    return given
 
 
 def refuse_far_stations(

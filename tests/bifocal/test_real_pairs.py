@@ -19,7 +19,7 @@ from bifocal.orientation.align_workflow import (
     align_photos,
     interior_of_photo,
 )
-from bifocal.orientation.match_workflow import match_photos
+from bifocal.workbook.match_workflow import match_photos
 
 pytestmark = pytest.mark.acceptance
 #: Limits of the median error of relief. [m]

@@ -17,10 +17,10 @@ import pytest
 import rasterio
 from click.testing import CliRunner
 
-from bifocal import KnownPoints, PointObservations, SurveySetup, georeference
+from bifocal import KnownPoints, Measuring, PointObservations, SurveySetup, Taking, georeference
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
-from bifocal.survey.pair_workflow import points_of, read_pair
 from bifocal.survey.point_survey import solve_points
+from bifocal.workbook.pair_workflow import points_of, read_pair
 from tests.builders.commands import bifocal_command as main
 
 PITCH, SIZE = 0.00739, (3072, 2048)
@@ -37,6 +37,11 @@ def truth(seed):
     rng = np.random.default_rng(seed)
     places = np.array(RING) + rng.uniform(-0.25, 0.25, (23, 2))
     return np.column_stack([places, rng.uniform(-0.5, 0.6, 23)])
+
+
+def set_up(d2, c2, sigma_px):
+    taking = Taking(d1=17.5, d2=d2, c1=35, c2=c2)
+    return SurveySetup(taking=taking, measuring=Measuring(sigma_s=sigma_px * PITCH))
 
 
 def pixels(xyz, c, d):
@@ -93,7 +98,7 @@ def test_relief_of_whole_pixel_picks_is_as_good_as_theory_says(c2, d2, limit):
     for seed in range(20):
         xyz = truth(seed)
         table = solve_points(
-            SurveySetup(d1=17.5, d2=d2, c1=35, c2=c2, sigma_s=0.29 * PITCH).pair(),
+            set_up(d2, c2, 0.29).pair(),
             PointObservations(
                 ids=tuple(map(str, range(23))),
                 xy1=(np.rint(pixels(xyz, 35, 17.5)) - NADIR) * [PITCH, -PITCH],
@@ -168,7 +173,7 @@ def placed(c2, d2, sigma_px, seed):
         (pixels(xyz, c, d) + rng.normal(0, sigma_px, (23, 2)) - NADIR) * [PITCH, -PITCH]
         for c, d in ((35, 17.5), (c2, d2))
     ]
-    setup = SurveySetup(d1=17.5, d2=d2, c1=35, c2=c2, sigma_s=sigma_px * PITCH)
+    setup = set_up(d2, c2, sigma_px)
     table = solve_points(setup.pair(), PointObservations(ids=ids, xy1=xy[0], xy2=xy[1]))
     rows = rng.choice(23, 6, replace=False)
     control = KnownPoints(ids=tuple(ids[i] for i in rows), xyz=world(xyz)[rows])

@@ -12,7 +12,7 @@ from typing import Any
 
 from bifocal.collimation.records import PickedPoint
 from bifocal.collimation.workbook.rows import change_rows, read_rows
-from bifocal.survey.pair_workflow import read_pair
+from bifocal.workbook.pair_workflow import read_pair
 from photocore.errors import InputError, PhotogrammetryError
 
 #: From so many points on a process of its own pays.

@@ -16,15 +16,16 @@ from bifocal.collimation.records import Known, PickedPoint, Picks, Pixel
 from bifocal.collimation.workbook.setup import typed_setup
 from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
-from bifocal.survey.output import as_typed, result_content
-from bifocal.survey.pair_workflow import is_survey
+from bifocal.survey.survey_input import SurveyInput
 from bifocal.survey.survey_media import MOST, SurveyMedia, media_names
-from bifocal.survey.template_workflow import write_survey
-from bifocal.survey.workbook.content import SurveyContent, setup_cells
-from bifocal.survey.workbook.reader import SurveyInput, read_survey
-from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS
-from bifocal.survey.workbook.update import update_book
-from bifocal.survey.workflow import solve
+from bifocal.workbook.changing.update import update_book
+from bifocal.workbook.content import SurveyContent, setup_cells
+from bifocal.workbook.formulas.setup_cells import MATRICES, NADIRS
+from bifocal.workbook.output import as_typed, result_content
+from bifocal.workbook.pair_workflow import is_survey
+from bifocal.workbook.reading.reader import read_survey
+from bifocal.workbook.template_workflow import write_survey
+from bifocal.workbook.workflow import solve
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.output import (
     atomic_path,
@@ -134,7 +135,7 @@ def read_rows(path: Path) -> ReadBook:
             known.get(name),
         )
     return ReadBook(
-        rows=rows, sigma_px=survey.setup.sigma_px, limits=survey.setup.limits,
+        rows=rows, sigma_px=survey.setup.measuring.sigma_px, limits=survey.setup.measuring.limits,
         language=survey.language, survey=survey,
     )  # fmt: skip
 

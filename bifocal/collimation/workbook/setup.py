@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from bifocal.collimation.project import SurveyFiles
 from bifocal.model.pair import Pair
-from bifocal.survey.pair_workflow import read_pair
 from bifocal.survey.setup import SurveySetup
-from bifocal.survey.workbook.reader import read_survey
+from bifocal.workbook.pair_workflow import read_pair
+from bifocal.workbook.reading.reader import read_survey
 from photocore.errors import InputError
 from photocore.workbook.changing.cells import CellValue
 
@@ -47,15 +45,14 @@ def completed(setup: SurveySetup, pair: Pair) -> SurveySetup:
     """Return an ideal set-up in pixels, with pitch and nadirs of its pair where it has none."""
     photos = (pair.image1, pair.image2)
     first, second = (tuple(p.pixels_from_plane(p.nadir).tolist()) for p in photos)
-    metres, c, d = pair.image1.plane_from_pixel[0, 0], setup.c1 or 1.0, pair.d1
-    return replace(
-        setup,
+    metres, c, d = pair.image1.plane_from_pixel[0, 0], setup.taking.c1 or 1.0, pair.d1
+    return setup.but(
         unit="px",
         enlargement1=1.0,
         enlargement2=1.0,
-        pitch=setup.pitch or float(metres * c / d),
-        nadir1=setup.nadir1 or first,
-        nadir2=setup.nadir2 or second,
+        pitch=setup.taking.pitch or float(metres * c / d),
+        nadir1=setup.taking.nadir1 or first,
+        nadir2=setup.taking.nadir2 or second,
     )
 
 
@@ -67,11 +64,11 @@ def typed_setup(setup: SurveySetup, pair: Pair) -> dict[str, CellValue]:
     """
     whole = completed(setup, pair)
     cells: dict[str, CellValue] = {"input_unit": whole.unit}
-    if setup.pitch is None:
-        cells["pitch"] = whole.pitch
-    if setup.c_used != whole.c_used:
+    if setup.taking.pitch is None:
+        cells["pitch"] = whole.taking.pitch
+    if setup.taking.c_used != whole.taking.c_used:
         cells |= {"enlargement_1": 1, "enlargement_2": 1}
-    known = ((setup.nadir1, whole.nadir1), (setup.nadir2, whole.nadir2))
+    known = ((setup.taking.nadir1, whole.taking.nadir1), (setup.taking.nadir2, whole.taking.nadir2))
     for number, (typed, nadir) in enumerate(known, start=1):
         if typed is None and nadir is not None:
             cells |= {f"nadir_{number}_col": nadir[0], f"nadir_{number}_row": nadir[1]}

@@ -212,7 +212,8 @@ class WorkbookSync:
         stated, heights = setup.media and setup.media.layers, setup.media and setup.media.z0
         if stated != pair.layers or (stated and heights != (pair.image1.z0, pair.image2.z0)):
             return True
-        known = zip(setup.matrices or (), setup.nadirs, (setup.d1, setup.d2), strict=True)
+        distances = (setup.taking.d1, setup.taking.d2)
+        known = zip(setup.matrices or (), setup.nadirs, distances, strict=True)
         return any(
             (matrix != photo.plane_from_pixel).any()
             or (nadir != photo.nadir).any()

@@ -222,8 +222,11 @@ def test_a_wrong_cell_is_named_and_nothing_overwritten(tmp_path) -> None:
 
 def test_a_survey_of_the_command_line_opens_on_the_page(tmp_path) -> None:
     folder = sample_folder(tmp_path)
-    solved = bifocal.solve(SAMPLE / "targets.csv", pair=folder / "facade.pair.json", sigma_px=0.2)
-    from bifocal.survey.output import write_result
+    picks = bifocal.Measuring(sigma_px=0.2)
+    solved = bifocal.solve(
+        SAMPLE / "targets.csv", pair=folder / "facade.pair.json", measuring=picks
+    )
+    from bifocal.workbook.output import write_result
 
     write_result(folder / "mine.xlsx", solved)
     with opened(folder / "mine.xlsx") as session:
@@ -308,7 +311,8 @@ def test_what_was_accepted_in_doubt_stays_so_in_page_workbook_and_export(tmp_pat
 
 def test_points_of_an_ideal_set_up_are_doubtful_too() -> None:
     points = {"id": ["A", "B"], "x1": [4.0] * 2, "y1": [3.0] * 2, "x2": [4.2] * 2, "y2": [3.15] * 2}
-    solved = bifocal.solve({**points, "code": ["", "dubbio"]}, d1=17.5, d2=9.5, c1=35, c2=19)
+    taking = bifocal.Taking(d1=17.5, d2=9.5, c1=35, c2=19)
+    solved = bifocal.solve({**points, "code": ["", "dubbio"]}, taking=taking)
     assert solved.table.flags == ("OK", "UNCERTAIN")
     sure, doubtful = solved.table.covariance
     assert doubtful[2, 2] - sure[2, 2] == pytest.approx((0.9 * 9.5) ** 2 / 12)

@@ -21,7 +21,8 @@ from bifocal.files.haze import greys_through_water, read_greys
 from bifocal.files.images import as_grey, read_grey
 from bifocal.matching import homologous_points
 from bifocal.matching.matching import match_pair
-from bifocal.orientation import photo_alignment
+from bifocal.orientation import align_workflow, photo_alignment
+from bifocal.orientation.align_workflow import AlignOptions, KnownLens
 from bifocal.orientation.orientation_stages import OrientedPair
 from tests.scenes import RICH, Scene, bifocal_cameras, render
 from tests.scenes.rendering import Haze
@@ -104,6 +105,28 @@ def test_points_and_pairs_through_media_are_looked_for_in_greys_of_their_own(mon
         for got, want in zip(greys, own, strict=True):
             np.testing.assert_array_equal(got, want)
     assert len(seen) == 2
+
+
+@pytest.mark.parametrize("media", [PairMedia.none(), PairMedia.stated((1.0, 1.337), depth=0.6)])
+def test_files_are_aligned_in_the_same_greys(tmp_path, monkeypatch, media):
+    paths = [tmp_path / name for name in ("far.png", "near.png")]
+    _, photo = pictured(np.random.default_rng(9), (0.1, 4.0, 2.0), (60, 90))
+    for path in paths:
+        write_image(path, photo)
+
+    class Seen(Exception):
+        """Carries what the orientation was handed."""
+
+    def pair_as_set_up(photos, *_):
+        raise Seen(*(taken.grey for taken in photos))
+
+    monkeypatch.setattr(align_workflow, "pair_as_set_up", pair_as_set_up)
+    lens = KnownLens(focal=35.0, pixel_size=0.01)
+    options = AlignOptions(lenses=(lens, lens), as_set_up=True, media=media)
+    with pytest.raises(Seen) as seen:
+        align_workflow.align_photos(*paths, tmp_path / "p.pair.json", options)
+    for got, want in zip(seen.value.args, read_greys(*paths, in_water=bool(media)), strict=True):
+        np.testing.assert_array_equal(got, want)
 
 
 @pytest.mark.acceptance

@@ -10,9 +10,10 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from bifocal import SAMPLE, InputError, Pair, dense_relief, match, orthophoto, read_image
+from bifocal import SAMPLE, Pair, dense_relief, match, orthophoto, read_image
 from bifocal.collimation.pictures import Pictures
-from bifocal.survey.pair_workflow import read_pair
+from bifocal.workbook.pair_workflow import read_pair
+from multimedia import InputError
 from tests.builders.commands import bifocal_command as main
 
 CHANGES = {

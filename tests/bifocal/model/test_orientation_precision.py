@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifocal import InputError, Pair, Photo, RadialDivision, georeference, solve
+from bifocal import Measuring, Pair, Photo, RadialDivision, georeference, solve
 from bifocal.model.orientation_precision import CAMERA, NAMES, moved, pinhole
+from multimedia import InputError
 from photocore.camera.pinhole import PARAMETERS, plane_from_pixel
 from photocore.camera.rotation import rotation_from_vector
 from tests.scenes import SetupErrors, bifocal_cameras
@@ -75,7 +76,7 @@ def test_control_points_take_up_most_of_it_and_the_rest_is_in_the_sigmas() -> No
     control = {"id": names[:8], **dict(zip("ENH", XYZ[:8].T + 1000.0, strict=True))}
     picked = {"id": names, **dict(zip(keys, np.hstack(seen).T, strict=True))}
     pair = replace(PAIR, orientation=loose)
-    survey = solve(picked, pair=pair, sigma_px=0.3)
+    survey = solve(picked, pair=pair, measuring=Measuring(sigma_px=0.3))
     placed = georeference(survey.table, control, model="3D")
     survey = replace(survey, georeference=placed)
     own, errors = survey.table.own_covariance, []
@@ -100,7 +101,7 @@ def test_intersection_and_survey_add_it_to_the_picks() -> None:
     np.testing.assert_allclose(added, pair.covariance_of_orientation(XYZ), rtol=1e-5, atol=1e-12)
     columns = dict(zip(("col1", "row1", "col2", "row2"), np.hstack(seen).T, strict=True))
     names = {"id": [str(i) for i in range(len(XYZ))]}
-    table = solve(names | columns, pair=pair, sigma_px=0.3).table
+    table = solve(names | columns, pair=pair, measuring=Measuring(sigma_px=0.3)).table
     np.testing.assert_allclose(table["sigma_r"], both.sigma[:, 2], rtol=1e-9)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bifocal import GeometryError, InputError, Pair, Similarity, read_control
+from bifocal import GeometryError, InputError, Pair, PairMedia, Similarity, read_control
 from bifocal.model.orientation_precision import pinhole
 from bifocal.networks import joint_adjustment
 from bifocal.networks.joint_adjustment import adjust_jointly
@@ -238,7 +238,7 @@ def test_a_longer_principal_distance_is_stated_in_millimetres_too():
     photo = replace(Pair.ideal(c1=35, d1=17.5, c2=19, d2=9.5).image1, sigma_pixel=0.4)
     camera = pinhole(photo)
     longer = camera._replace(matrix=camera.matrix * [[1.01], [1.01], [1.0]])
-    found = _adjusted_photo(photo, longer)
+    found = _adjusted_photo(photo, longer, PairMedia.none(), 0)
     assert found.principal_distance == pytest.approx(35.35)
     assert found.sigma_pixel == 0.4
 

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bifocal import GeometryError, Interior, Matches, Pair
+from bifocal import Interior, Matches, Pair
 from bifocal.cli import match as match_command
-from bifocal.orientation.match_workflow import match_summary
 from bifocal.orientation.validation import check_distortion
+from bifocal.workbook.match_workflow import match_summary
+from multimedia import GeometryError
 from photocore.camera.pinhole import project
 from tests.bifocal.orientation.layered_wall import camera, relief_at, take
 from tests.builders.commands import bifocal_command as main

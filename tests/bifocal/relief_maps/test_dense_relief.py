@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bifocal import GeometryError, Grid, InputError, Pair, Photo, Quality, dense_relief
+from bifocal import Grid, Pair, Photo, Quality, dense_relief
 from bifocal.files.images import as_grey
 from bifocal.orientation.pair_observations import at
 from bifocal.relief_maps import edges, flow, forward_projection, seed
@@ -16,7 +16,8 @@ from bifocal.relief_maps.dense_matching import _resampled
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import common_bounds, make_frame, working_grid
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
-from bifocal.relief_maps.relief_files import hatched
+from bifocal.relief_maps.relief_files import hatched, shaded
+from multimedia import GeometryError, InputError
 from photocore.shrinkage import shrink_noise
 from tests.scenes import RICH, Rendering, Scene, SetupErrors, bifocal_cameras, facade, render
 from tests.scenes.shapes import box
@@ -302,6 +303,15 @@ def test_the_precision_of_the_set_up_is_added_cell_by_cell_where_it_is_stated():
     row = int(np.argmin(np.abs(grid.rows_y - 0.5)))
     np.testing.assert_allclose(sigma[row], np.sqrt(everywhere[:, 2, 2]), rtol=0.02)
     assert not orientation_sigma(shot().pair, relief, grid).any()
+
+
+def test_light_falls_on_relief_from_the_upper_left():
+    """Slopes of 0.8 to either side, halved: n = (-+0.4, 0, 1) against the light, a wall being 1."""
+    roof = (0.8 * np.minimum(np.arange(40.0), np.arange(40.0)[::-1])).astype(np.float32)
+    shade = shaded(np.full((4, 40, 3), 0.5), np.tile(roof, (4, 1)), 1.0)[2, :, 0]
+    light, length = np.array([-0.45, 0.74]) / 0.74, np.hypot(0.4, 1)
+    expected = [0.5 * (np.dot((-s, 1.0), light) / length) ** 0.8 for s in (0.4, -0.4)]
+    np.testing.assert_allclose(shade[[5, 35]], expected, rtol=1e-6)
 
 
 def test_flow_of_a_known_zoom_gives_its_relief_and_nothing_across():

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifocal import GeometryError, InputError, Pair, Photo, solve
+from bifocal import Measuring, Pair, Photo, Taking, solve
 from bifocal.survey.orientation_check import check_orientation
+from multimedia import GeometryError, InputError
 from tests.scenes import SetupErrors, bifocal_cameras
 
 METRES = np.array([[0.00369, 0, -5.67], [0, -0.00369, 3.78], [0, 0, 1.0]])
@@ -16,6 +17,8 @@ IDEAL = Pair(
     image1=Photo(plane_from_pixel=METRES, nadir=[0, 0], distance=17.5),
     image2=Photo(plane_from_pixel=METRES, nadir=[0, 0], distance=9.5),
 )
+
+PICKS = Measuring(sigma_px=0.5)
 
 
 def picks(distortion, count=12, seed=3, noise=0.0):
@@ -119,13 +122,13 @@ def test_points_off_the_plane_show_the_centre_of_zoom(noise, limit):
     seen = [p + rng.normal(0, noise, p.shape) for p in cameras.exact.project(xyz)]
     data = dict(zip(("col1", "row1", "col2", "row2"), np.hstack(seen).T, strict=True))
     data |= {"id": [str(i) for i in range(60)], "code": ["PLANE"] * 14 + [""] * 46}
-    survey = solve(data, pair=cameras.nominal, sigma_px=0.5, adjust_setup=True)
+    survey = solve(data, pair=cameras.nominal, measuring=PICKS, adjust_setup=True)
     error = (survey.table["r"] - xyz[:, 2])[np.hypot(xyz[:, 0], xyz[:, 1]) > 1.5]
     assert np.sqrt(np.mean(error**2)) < limit
     assert any("relief spreads from a point" in text for text in survey.remarks)
     # Without points off the plane nothing shows it.
     plane = {key: values[:14] for key, values in data.items()}
-    flat = solve(plane, pair=cameras.nominal, sigma_px=0.5, adjust_setup=True)
+    flat = solve(plane, pair=cameras.nominal, measuring=PICKS, adjust_setup=True)
     assert not any("relief spreads" in text for text in flat.remarks)
 
 
@@ -143,6 +146,7 @@ def test_an_ideal_survey_in_millimetres_finds_the_same_centre():
     millimetres = np.hstack([positions[0] * 35 / 17.5, positions[1] * 19 / 9.5])
     data = dict(zip(("x1", "y1", "x2", "y2"), millimetres.T, strict=True))
     data |= {"id": [str(i) for i in range(60)], "code": ["PLANE"] * 14 + [""] * 46}
-    survey = solve(data, d1=17.5, d2=9.5, c1=35, c2=19, sigma_s=0.002, adjust_setup=True)
+    taking, measuring = Taking(d1=17.5, d2=9.5, c1=35, c2=19), Measuring(sigma_s=0.002)
+    survey = solve(data, taking=taking, measuring=measuring, adjust_setup=True)
     away = np.hypot(xyz[:, 0], xyz[:, 1]) > 1.5
     np.testing.assert_allclose(survey.table["r"][away], xyz[away, 2], atol=2e-4)

@@ -7,15 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bifocal import GeometryError, InputError, Pair, Photo, PointObservations, SurveySetup
+from bifocal import Measuring, Pair, Photo, PointObservations, SurveySetup, Taking
 from bifocal.survey.point_survey import solve_points
+from multimedia import GeometryError, InputError
 
 
 def solve_ideal(setup, points):
-    return solve_points(setup.pair(), setup.in_millimetres(points), limits=setup.limits)
+    return solve_points(setup.pair(), setup.in_millimetres(points), limits=setup.measuring.limits)
 
 
-SETUP = SurveySetup(d1=17.5, d2=9.5, c1=35.0, c2=19.0)
+SETUP = SurveySetup(taking=Taking(d1=17.5, d2=9.5, c1=35.0, c2=19.0))
 
 
 def seen(xyz, *, c, d):
@@ -27,8 +28,8 @@ def seen(xyz, *, c, d):
 def observed(xyz, setup=SETUP, **more):
     return PointObservations(
         ids=tuple(f"P{i}" for i in range(len(xyz))),
-        xy1=seen(xyz, c=setup.c1, d=setup.d1),
-        xy2=seen(xyz, c=setup.c2, d=setup.d2),
+        xy1=seen(xyz, c=setup.taking.c1, d=setup.taking.d1),
+        xy2=seen(xyz, c=setup.taking.c2, d=setup.taking.d2),
         **more,
     )
 
@@ -75,16 +76,14 @@ def test_theta_runs_clockwise_from_the_y_axis():
 
 
 def test_unequal_scales_are_taken_out():
-    setup = SurveySetup(d1=17.5, d2=9.5, c1=35.0, c2=19.1)
+    setup = SurveySetup(taking=Taking(d1=17.5, d2=9.5, c1=35.0, c2=19.1))
     xyz = grid()
     assert solve_ideal(setup, observed(xyz, setup)).xyz == pytest.approx(xyz, abs=1e-11)
 
 
 def test_pixels_are_counted_down_from_the_nadir_row():
     pitch, nadir = 0.0074, (1536.0, 1024.0)
-    setup = SurveySetup(
-        d1=17.5, d2=9.5, c1=35.0, c2=19.0, pitch=pitch, unit="px", nadir1=nadir, nadir2=nadir
-    )
+    setup = SETUP.but(pitch=pitch, unit="px", nadir1=nadir, nadir2=nadir)
     xyz = np.array([[2.0, 1.0, 0.5]])
     pixels = [nadir + seen(xyz, c=c, d=d) / [pitch, -pitch] for c, d in ((35, 17.5), (19, 9.5))]
     assert pixels[0][0, 1] < nadir[1]  # above the nadir: a smaller row
@@ -203,14 +202,14 @@ def test_millimetres_of_a_general_pair_are_those_of_image_1():
 
 def test_equal_distances_are_refused():
     with pytest.raises(GeometryError, match="same distance"):
-        SurveySetup(d1=9.5, d2=9.5).pair()
+        SurveySetup(taking=Taking(d1=9.5, d2=9.5)).pair()
 
 
 def test_scales_that_differ_too_much_are_refused_with_the_size_of_the_fault():
     with pytest.raises(GeometryError, match=r"47\.4%.*tolerance 2\.0%"):
-        SurveySetup(d1=17.5, d2=14.0, c1=35.0, c2=19.0).check_scales()
+        SurveySetup(taking=Taking(d1=17.5, d2=14.0, c1=35.0, c2=19.0)).check_scales()
 
 
 def test_pixels_without_the_size_of_a_pixel_are_refused():
     with pytest.raises(InputError, match="pitch"):
-        SurveySetup(d1=17.5, d2=9.5, unit="px").pair()
+        SurveySetup(taking=Taking(d1=17.5, d2=9.5), measuring=Measuring(unit="px")).pair()

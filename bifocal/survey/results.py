@@ -1,0 +1,189 @@
+"""What came out of a survey: columns of a text table, JSON, lines and sentences."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from bifocal.survey.basis import basis
+from bifocal.survey.solved_survey import SolvedSurvey
+from bifocal.survey.tolerances import sentence
+from photocore.jsonfile import to_text
+
+_NUMBERS = ("r", "e1", "e2", "s_c", "X", "Y", "Z", "q", "sigma_X", "sigma_Y", "sigma_r")
+
+#: Columns shown on the screen.
+SHOWN = ("r", "e1", "e2", "X", "Y", "sigma_X", "sigma_Y", "sigma_r")
+
+
+def csv_columns(solution: SolvedSurvey) -> dict[str, Any]:
+    """Return the columns of the text table, headings with units."""
+    table, world = solution.table, solution.world
+    columns: dict[str, Any] = {"id": list(table.ids)}
+    units = dict.fromkeys(("e1", "e2", "s_c", "q"), length_unit(solution))
+    for key in ("X", "Y", "Z"):
+        columns[f"{key} [m]"] = table[key]
+    if solution.georeference is not None:
+        columns |= {f"{key} [m]": world[:, i] for i, key in enumerate("ENH")}
+    for key in ("r", "e1", "e2", "s_c", "q", "sigma_X", "sigma_Y", "sigma_r"):
+        columns[f"{key} [{units.get(key, 'm')}]"] = table[key]
+    if solution.georeference is not None:
+        sigma = solution.world_sigma
+        columns |= {f"sigma_{key} [m]": sigma[:, i] for i, key in enumerate("ENH")}
+    columns["flag"] = list(table.flags)
+    if any(solution.points.note):
+        columns["note"] = list(solution.points.note)
+    return columns
+
+
+def solution_json(solution: SolvedSurvey) -> str:
+    """Return everything as the text of one JSON object; undefined numbers are null."""
+    head = to_text(_head(solution))
+    # A million points: each record is put together as text, not as a tree of objects.
+    records = ",\n".join(_records(solution))
+    return f'{{"points": [{records}], {head[1:]}'
+
+
+def _records(solution: SolvedSurvey) -> list[str]:
+    table = solution.table
+    columns = [table[key].tolist() for key in _NUMBERS]
+    world, keys = [], list(_NUMBERS)
+    if solution.georeference is not None:
+        placed = np.hstack([solution.world, solution.world_sigma])
+        world = placed.T.tolist()
+        keys += ["E", "N", "H", "sigma_E", "sigma_N", "sigma_H"]
+    numbers = [
+        [repr(value) if math.isfinite(value) else "null" for value in values]
+        for values in (*columns, *world)
+    ]
+    names = [json.dumps(name, ensure_ascii=False) for name in table.ids]
+    use = ["true" if value else "false" for value in solution.points.use]
+    template = (
+        '{{"id": {}, ' + ", ".join(f'"{key}": {{}}' for key in keys)
+        + ', "flag": "{}", "use": {}}}'
+    )  # fmt: skip
+    return [template.format(*row) for row in zip(names, *numbers, table.flags, use, strict=True)]
+
+
+def _head(solution: SolvedSurvey) -> dict[str, Any]:
+    """Return all but the points."""
+    axes = solution.check.axes
+    return {
+        "check": {
+            **asdict(axes["Z"]),
+            "axes": {key: asdict(axis) for key, axis in axes.items()},
+            "errors": [
+                {"id": name, "dX": e[0], "dY": e[1], "dZ": e[2]}
+                for name, e in zip(solution.check.ids, solution.check.errors, strict=True)
+            ],
+            "verdict": verdict_lines(solution),
+            "missing": list(solution.check.missing),
+        },
+        "georeference": _georeference(solution),
+        "setup_check": _orientation_check(solution),
+        "sigma_px": solution.sigma_px,
+        "rests_on": basis(solution),
+        "units": {
+            "r": "m",
+            "X": "m",
+            "e1": length_unit(solution),
+            "sigma_X": "m",
+            "sigma_Y": "m",
+            "sigma_r": "m",
+        },
+        "remarks": list(solution.remarks),
+    }
+
+
+def length_unit(solution: SolvedSurvey) -> str:
+    """Return the unit of e1, e2, s_c and q: without an image scale they are on the wall."""
+    known = solution.setup is not None or solution.table.image_scale is not None
+    return "mm" if known else "m"
+
+
+def _georeference(solution: SolvedSurvey) -> dict[str, Any] | None:
+    geo = solution.georeference
+    if geo is None:
+        return None
+    return {
+        "model": geo.model,
+        "n": int(geo.used.sum()),
+        "left_out": list(geo.bad),
+        "sigma0": geo.sigma0,
+        "error_ratio": geo.error_ratio,
+        "scale": geo.world_from_wall.scale,
+        "rotation": geo.world_from_wall.rotation,
+        "wall_centre": geo.world_from_wall.source_centre,
+        "world_centre": geo.world_from_wall.target_centre,
+        "residuals": [
+            {"id": name, "vE": v[0], "vN": v[1], "vH": v[2], "used": bool(used)}
+            for name, v, used in zip(geo.ids, geo.residuals, geo.used, strict=True)
+        ],
+    }
+
+
+def _orientation_check(solution: SolvedSurvey) -> dict[str, Any] | None:
+    check = solution.orientation_check
+    if check is None:
+        return None
+    return {
+        "points": check.points,
+        "sigma0": check.sigma0,
+        "outliers": list(check.outliers),
+        "adjusted": solution.adjusted,
+        "parameters": [asdict(parameter) for parameter in check.parameters],
+    }
+
+
+def verdict_lines(solution: SolvedSurvey) -> list[str]:
+    """Return one sentence per tolerance rule."""
+    verdicts = solution.check.verdicts
+    rules = list(dict.fromkeys(verdict.rule.key for verdict in verdicts))
+    return [sentence(tuple(v for v in verdicts if v.rule.key == key)) for key in rules]
+
+
+def point_rows(solution: SolvedSurvey, most: int) -> list[tuple[str, ...]]:
+    """Return the first points as rows of text: id, the columns of `SHOWN`, flag.
+
+    A point that is not used is no good point: its flag stands in brackets.
+    """
+    table = solution.table
+    rows = []
+    for i in range(min(most, len(table))):
+        shown = [_shown(table[key][i], 4) for key in SHOWN]
+        flag = table.flags[i] if solution.points.use[i] else f"({table.flags[i]}, unused)"
+        rows.append((table.ids[i], *shown, flag))
+    return rows
+
+
+def summary(solution: SolvedSurvey) -> list[str]:
+    """Return what the sigmas rest on, check points, verdict and georeference in words."""
+    lines = [basis(solution)]
+    for axis, errors in solution.check.axes.items():
+        if errors.n:
+            lines.append(
+                f"Check {axis}: {errors.n} {_points(errors.n)}, RMSE {errors.rmse:.4f} m, "
+                f"mean {errors.mean:+.4f} m, largest {errors.max_abs:.4f} m"
+            )
+    lines += [f"Drawing scale, {line}" for line in verdict_lines(solution)]
+    geo = solution.georeference
+    if geo is not None:
+        used = int(geo.used.sum())
+        spread = "no redundancy" if math.isnan(geo.sigma0) else f"sigma0 {geo.sigma0:.4f} m"
+        lines.append(
+            f"Georeference: {geo.model}, {used} {_points(used)}, {spread}, scale "
+            f"{geo.world_from_wall.scale:.6f}"
+        )
+    return lines
+
+
+def _points(count: int) -> str:
+    return "point" if count == 1 else "points"
+
+
+def _shown(value: float, places: int) -> str:
+    return f"{value:.{places}f}" if math.isfinite(value) else "-"

@@ -1,0 +1,153 @@
+"""A solved survey: geometry, points, check points, the wall in the world."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bifocal.model.pair import Pair
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.orientation_check import OrientationCheck
+from bifocal.survey.reference import CheckResult, Georeference
+from bifocal.survey.relief_table import ReliefTable
+from bifocal.survey.setup import SurveySetup
+from bifocal.survey.survey_input import SurveyInput
+from bifocal.survey.survey_media import SurveyMedia
+from bifocal.survey.tolerances import RULES, ToleranceRule
+from photocore.arrays import FloatArray
+
+#: Homographies of both images, shape (3, 3), None for none.
+Corrections = tuple[FloatArray | None, FloatArray | None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WorldPoints:
+    """Solved points in the world; NaN, or None, where there are no control points."""
+
+    table: ReliefTable
+    georeference: Georeference | None
+
+    @property
+    def xyz(self) -> FloatArray:
+        """E, N, H of every point, shape (n, 3). [m]"""
+        if self.georeference is None:
+            return np.full((len(self.table), 3), np.nan)
+        return self.georeference.world_from_wall(self.table.xyz)
+
+    @property
+    def near(self) -> FloatArray:
+        """E, N, H about a whole-metre origin, shape (n, 3). [m]"""
+        if self.georeference is None:
+            return np.full((len(self.table), 3), np.nan)
+        return self.georeference.near_of(self.table.xyz)
+
+    @property
+    def covariance(self) -> FloatArray | None:
+        """Covariance of E, N, H, shape (n, 3, 3); None where it is not known. [m²]"""
+        geo, table = self.georeference, self.table
+        if geo is None or table.covariance is None:
+            return None
+        own = table.own_covariance
+        if geo.precision is None or own is None:
+            return geo.covariance_of(table.xyz, table.covariance)
+        effect = table.effect_of_orientation(table.xyz)
+        return geo.covariance_of(table.xyz, own, ids=table.ids, effect=effect)
+
+    @property
+    def sigma(self) -> FloatArray:
+        """Standard deviations of E, N, H, shape (n, 3). [m]"""
+        covariance = self.covariance
+        if covariance is None:
+            return np.full((len(self.table), 3), np.nan)
+        variances = np.diagonal(covariance, axis1=1, axis2=2)
+        # Where points without redundancy are placed exactly, rounding is left.
+        return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
+
+    @property
+    def common(self) -> FloatArray:
+        """What the orientation still adds to E, N, H once placed, shape (n, 3, 3). [m²]"""
+        geo, table = self.georeference, self.table
+        effect = table.effect_of_orientation(table.xyz)
+        if geo is None or effect is None or geo.precision is None:
+            return np.full((len(table), 3, 3), np.nan)
+        return geo.common(self.near, effect)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SolvedSurvey:
+    """A solved survey, and where it comes from.
+
+    Attributes
+    ----------
+    survey : SurveyInput
+        What was measured and is known, with the set-up as options left it.
+    setup : SurveySetup or None
+        Of an ideal pair; None for one given by homographies.
+    pair : Pair
+        The geometry.
+    media : SurveyMedia or None
+        What the photos of a pair given by homographies look through, where that was stated.
+    sigma_px : float or None
+        Measuring precision of raw pixels. [px]
+    points : PointObservations
+        As solved: images exchanged where the user had them the other way round.
+    table : ReliefTable
+        What came out: relief, displacements, coordinates, precision, flags.
+    check : CheckResult
+        Errors at check points.
+    rules : tuple of ToleranceRule
+        For the verdict.
+    georeference : Georeference or None
+        The transformation to the world; None without control points.
+    orientation_check : OrientationCheck or None
+        What the points of the reference plane tell.
+    adjusted : bool
+        Whether the orientation was corrected by it.
+    corrections : pair of ndarray, shape (3, 3), or None
+        Homographies that corrected the typed coordinates in mm, where the pair is ideal.
+    remarks : tuple of str
+        What the user should know.
+    source : Path
+        The file it came from.
+    pair_path : Path or None
+        The pair file.
+    given : mapping
+        The options that took the place of what the workbook says.
+    """
+
+    survey: SurveyInput
+    setup: SurveySetup | None
+    pair: Pair
+    media: SurveyMedia | None = None
+    sigma_px: float | None = None
+    points: PointObservations
+    table: ReliefTable
+    check: CheckResult
+    rules: tuple[ToleranceRule, ...] = RULES
+    georeference: Georeference | None = None
+    orientation_check: OrientationCheck | None = None
+    adjusted: bool = False
+    corrections: Corrections = (None, None)
+    remarks: tuple[str, ...] = ()
+    source: Path = Path()
+    pair_path: Path | None = None
+    given: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def placed(self) -> WorldPoints:
+        """The points in the world."""
+        return WorldPoints(self.table, self.georeference)
+
+    @property
+    def world(self) -> FloatArray:
+        """E, N, H of every point, shape (n, 3); NaN without control points. [m]"""
+        return self.placed.xyz
+
+    @property
+    def world_sigma(self) -> FloatArray:
+        """Standard deviations of E, N, H, shape (n, 3); NaN without control points. [m]"""
+        return self.placed.sigma

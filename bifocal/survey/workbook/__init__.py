@@ -1,1 +1,0 @@
-"""The survey workbook: its layout, reading it, writing it, updating it in place."""

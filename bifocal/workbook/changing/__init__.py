@@ -1,0 +1,1 @@
+"""Workbooks of the user changed in place."""

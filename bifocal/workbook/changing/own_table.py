@@ -1,0 +1,268 @@
+"""Results put beside a table of the user's own, with the sheet `Setup` that its formulas need."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bifocal.survey.reference import Georeference
+from bifocal.survey.relief_table import ENTRIES
+from bifocal.survey.survey_input import SurveyInput
+from bifocal.workbook.changing.setup_update import (
+    add_sheets,
+    write_corrections,
+    write_options,
+)
+from bifocal.workbook.changing.update import refuse_earlier, store_named_cells
+from bifocal.workbook.content import SurveyContent, point_cells, result_cells
+from bifocal.workbook.formulas.columns import NEAR, ideal_points, pair_points
+from bifocal.workbook.formulas.placed_formulas import added_covariance
+from bifocal.workbook.formulas.precision_lines import precision_values
+from bifocal.workbook.formulas.setup_cells import TITLE_BLOCK, cells_of
+from bifocal.workbook.making.book import build
+from bifocal.workbook.reading.reader import TO_DEGREES, TO_MM
+from bifocal.workbook.words import term
+from photocore.errors import InputError
+from photocore.tables import Table
+from photocore.workbook.changing.cells import CellValue
+from photocore.workbook.changing.editor import WorkbookEditor
+from photocore.workbook.changing.named_cells import make_numbers, place_of
+from photocore.workbook.changing.result_columns import (
+    OwnTable,
+    ResultColumn,
+    head_row,
+    put_result_columns,
+)
+from photocore.workbook.making.live_columns import LiveColumn
+from photocore.workbook.reading.grid import column_letters, quoted_title, split_cell
+
+#: Name of the headings of the results in a workbook of the user's own.
+MARK = "bifocal_results"
+#: Under which headings raw pixels stand, where an ideal pair takes them for coordinates.
+_RAW = {"x1": "col1", "y1": "row1", "x2": "col2", "y2": "row2"}
+
+
+def add_results(
+    source: Path,
+    target: Path,
+    survey: SurveyInput,
+    content: SurveyContent,
+    *,
+    given: Mapping[str, Any],
+    overwrite: bool,
+) -> Path | None:
+    """Copy a workbook with the results in new columns of its own table; all else as it was.
+
+    Parameters
+    ----------
+    source, target : Path
+        The workbook, and where the changed one goes; may be the same.
+    survey : SurveyInput
+        What was read from it.
+    content : SurveyContent
+        What came out, evaluated as formulas see it.
+    given : mapping
+        The options that take the place of what the workbook says.
+    overwrite : bool
+        Replace an existing file.
+
+    Returns
+    -------
+    Path or None
+        The backup of a workbook changed in place.
+
+    Raises
+    ------
+    InputError
+        If the workbook cannot be changed.
+    """
+    if source.suffix.lower() != target.suffix.lower():
+        raise InputError(
+            f"{target}: results go into the table of {source.name} itself, or into a new .xlsx."
+        )
+    refuse_earlier(source, survey)
+    editor = WorkbookEditor(source, survey.book)
+    content = replace(content, links=_links(editor, survey, given))
+    built = build(content)
+    needed = [
+        name
+        for name, defined in built.book.defined_names.items()
+        if defined.attr_text.startswith("'Setup'!") and name not in TITLE_BLOCK
+    ]
+    if any(place_of(editor, name) is None for name in needed if not name.startswith("a")):
+        add_sheets(editor, built, ["Setup"])
+    store_named_cells(editor, built, content)
+    write_options(editor, content, given)
+    write_corrections(editor, content)
+    table = survey.table
+    make_numbers(editor, table, lambda key: _typed_factor(table, key))
+    grid = editor.grid(table.sheet).rows
+    own = OwnTable(
+        sheet=table.sheet,
+        head=head_row(grid, table.columns, table.headings, table.rows[0]),
+        rows=table.rows,
+        columns=_inputs(table.columns, content),
+        factors=_factors(table),
+    )
+    put_result_columns(editor, own, _columns(own, content), mark=MARK)
+    return editor.save(target, overwrite=overwrite)
+
+
+def _links(editor: WorkbookEditor, survey: SurveyInput, given: Mapping[str, Any]) -> dict[str, str]:
+    """Return where values of `Setup` stand in sheets of the user's own, to refer to them."""
+    replaced = cells_of(given)
+    links = {}
+    for key, (sheet, cell) in survey.setup.places.items():
+        row, column = split_cell(cell)
+        stands = editor.grid(sheet).rows.get(row, {}).get(column)
+        named = place_of(editor, key) == (sheet, row, column)
+        if isinstance(stands, float) and not named and key not in replaced:
+            links[key] = f"{quoted_title(sheet)}!${column_letters(column)}${row}"
+    return links
+
+
+def _factors(table: Table) -> dict[str, float]:
+    """Return what brings the cells of a column to mm or degrees; those with a unit are numbers."""
+    scales = {key: TO_DEGREES if key == "theta" else TO_MM for key in table.units}
+    return {
+        key: scales[key].get(unit, 1.0)
+        for key, unit in table.units.items()
+        if key not in table.typed_units
+    }
+
+
+def _typed_factor(table: Table, key: str) -> float:
+    """Return what brings the cells of a column that say their unit themselves to mm or degrees."""
+    scale = TO_DEGREES if key == "theta" else TO_MM
+    return scale.get(table.units[key], 1.0) if key in table.typed_units else 1.0
+
+
+def _inputs(columns: Mapping[str, int], content: SurveyContent) -> dict[str, int]:
+    """Return the input columns by the keys of the formulas."""
+    inputs = dict(columns)
+    if not content.is_pair and "x1" not in inputs and set(_RAW.values()) <= inputs.keys():
+        inputs |= {key: inputs[raw] for key, raw in _RAW.items()}
+    return inputs
+
+
+def _columns(table: OwnTable, content: SurveyContent) -> list[ResultColumn]:
+    """Return the results: what the formulas need and the table lacks, then the formulas."""
+    cells = point_cells(content)
+    corrected = [] if content.setup is None else content.setup.adjusted
+    images = [image for image, matrix in enumerate(corrected, start=1) if matrix is not None]
+    if content.is_pair:
+        described = pair_points(undistorted=content.undistorted, media=content.media_cells)
+    else:
+        described = ideal_points(
+            xy="x1" in table.columns or bool(images),
+            polar="s1" in table.columns,
+            theta="theta" in table.columns,
+            code="code" in table.columns,
+            adjusted=images,
+            media=content.media_cells,
+        )
+    results = []
+    for column in described:
+        if column.key in ("id", "use", "code", "note", *NEAR, "o_EN"):
+            continue
+        if column.kind == "input" and column.key in table.columns:
+            continue
+        results.append(_column(column, cells[column.key]))
+    if content.georeference is not None:
+        world = result_cells(content, cells)
+        results += _world(content.georeference, world)
+        results += _world_sigmas(content, cells, world)
+    return results
+
+
+def _column(column: LiveColumn, values: Sequence[CellValue]) -> ResultColumn:
+    known = term("columns", column.key)
+    unit = "" if known is None else known.unit
+    return ResultColumn(
+        key=column.key,
+        heading=f"{column.key} [{unit}]" if unit else column.key,
+        values=values,
+        formula=column.formula,
+        number_format="0." + "0" * column.places if column.places else "",
+    )
+
+
+def _world(geo: Georeference, cells: Mapping[str, Sequence[CellValue]]) -> list[ResultColumn]:
+    """Return the world coordinates; the transformation stands in their formulas as numbers."""
+    fit, columns = geo.world_from_wall, []
+    origin = np.asarray(geo.origin) + np.asarray(geo.offset)
+    for i, name in enumerate("ENH"):
+        turned = "+".join(
+            f"({factor!r})*([@{axis}]-({centre!r}))"
+            for axis, factor, centre in zip(
+                "XYZ", fit.rotation[i].tolist(), fit.source_centre.tolist(), strict=True
+            )
+        )
+        columns.append(
+            ResultColumn(
+                key=name,
+                heading=f"{name} [m]",
+                values=cells[name],
+                formula=f'IF(COUNT([@X],[@Y],[@Z])=3,{float(origin[i])!r}+{fit.scale!r}*({turned}),"")',
+                number_format="0.000",
+            )
+        )
+    return columns
+
+
+def _world_sigmas(
+    content: SurveyContent,
+    cells: Mapping[str, Sequence[CellValue]],
+    world: Mapping[str, Sequence[CellValue]],
+) -> list[ResultColumn]:
+    """Return sigma_E, sigma_N, sigma_H and what their formulas need, numbers as in `_world`."""
+    geo, table = content.georeference, content.table
+    if geo is None or table is None or geo.precision is None or table.covariance is None:
+        return []
+    fit, numbers = geo.world_from_wall, precision_values(geo)
+    used = {name for name, is_used in zip(geo.ids, geo.used, strict=True) if is_used}
+    shared: list[CellValue] = [-1 if name in used else 1 for name in table.ids]
+    columns = [ResultColumn(key="shared", heading="shared", values=shared)]
+    kept, factor = ("k_", "sigma_px^2*") if content.is_pair else ("cov_", "")
+    near = {name: f"[@n_{name}]" for name in "ENH"}
+    for i, name in enumerate("ENH"):
+        row = (fit.scale * fit.rotation[i]).tolist()
+        turned = "+".join(
+            f"({turn!r})*([@{axis}]-({centre!r}))"
+            for turn, axis, centre in zip(row, "XYZ", fit.source_centre.tolist(), strict=True)
+        )
+        columns.append(
+            ResultColumn(
+                key=f"n_{name}",
+                heading=f"n_{name} [m]",
+                values=cells[f"n_{name}"],
+                formula=f'IF(COUNT([@X],[@Y],[@Z])=3,{float(geo.offset[i])!r}+{turned},"")',
+            )
+        )
+    for i, name in enumerate("ENH"):
+        row = (fit.scale * fit.rotation[i]).tolist()
+        own = "+".join(
+            f"({(1 if a == b else 2) * row[a] * row[b]!r})*[@{kept}{key}]"
+            for key, (a, b) in ENTRIES.items()
+        )
+        added = re.sub(
+            r"g_[zuw]_[A-Z]+", lambda m: f"({numbers[m[0]]!r})", added_covariance(name, name, near)
+        )
+        sign = "1" if geo.model == "2D" and name == "H" else "[@shared]"
+        common = f"+N([@o_{name}])^2" if content.is_pair else ""
+        variance = f"{factor}({own})+{sign}*({added}){common}"
+        columns.append(
+            ResultColumn(
+                key=f"sigma_{name}",
+                heading=f"sigma_{name} [m]",
+                values=world[f"sigma_{name}"],
+                formula=f'IF(COUNT([@n_E],[@cov_XX])=2,SQRT(MAX(0,{variance})),"")',
+                number_format="0.0000",
+            )
+        )
+    return columns

@@ -1,0 +1,152 @@
+"""Options written into the cells of a survey workbook that exists; sheets it lacks."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from typing import Any
+
+from bifocal.workbook.content import SurveyContent, setup_cells
+from bifocal.workbook.formulas.columns import adjustment_names
+from bifocal.workbook.formulas.setup_cells import TITLE_BLOCK, TYPED_FORMULAS, cells_of, groups
+from bifocal.workbook.making.charts import HEAD, KEYS, LEFT
+from bifocal.workbook.words import word
+from photocore.errors import InputError
+from photocore.workbook.changing.cells import CellValue
+from photocore.workbook.changing.editor import WorkbookEditor
+from photocore.workbook.changing.named_cells import place_of
+from photocore.workbook.making.live_book import BookBuilder
+from photocore.workbook.making.newbook import finished_parts
+from photocore.workbook.reading.grid import cell_name, quoted_title
+
+#: Options that have no cell of their own; those of the distances depend on each other.
+_OTHERS = {"d1", "d2", "pair", "rules", "adjust_setup"}
+#: The table by which a sheet is known, whatever it is called now.
+_TABLES = {
+    "Results": "tblResults",
+    "Check": "tblCheck",
+    "Georeference": "tblGeo",
+    "Planning": "tblPlan",
+    "Log": "tblLog",
+}
+
+
+def add_missing_sheets(editor: WorkbookEditor, built: BookBuilder) -> list[str]:
+    """Add the sheets that a survey workbook needs and the user took away; return their titles."""
+    missing = [title for title, table in _TABLES.items() if editor.table(table) is None]
+    if place_of(editor, "d_1") is None:
+        missing.append("Setup")
+    check = editor.table("tblCheck")
+    # Its last chart draws the errors of the sheet Check, which it finds by its title.
+    if chart_sheet(editor) is None and (check is None or check.sheet == "Check"):
+        missing.append("Charts")
+    if missing:
+        add_sheets(editor, built, missing)
+    return missing
+
+
+def chart_sheet(editor: WorkbookEditor) -> str | None:
+    """Return the sheet of the charts, known by its columns, whatever it is called now."""
+    columns = range(LEFT + 1, LEFT + 1 + len(KEYS))
+    for title in sorted(editor.titles, key=lambda title: title != "Charts"):
+        head = editor.grid(title).rows.get(HEAD, {})
+        if tuple(head.get(column) for column in columns) == KEYS:
+            return title
+    return None
+
+
+def add_sheets(editor: WorkbookEditor, built: BookBuilder, titles: list[str]) -> None:
+    """Add sheets of a survey workbook behind all others."""
+    package = io.BytesIO()
+    built.book.save(package)
+    content = finished_parts(package, blocks=built.blocks, results=built.results)
+    editor.add_sheets(content, {title: editor.free_title(title) for title in titles})
+
+
+def write_options(editor: WorkbookEditor, content: SurveyContent, given: Mapping[str, Any]) -> None:
+    """Write options into their cells, in place of the formula of a default too.
+
+    Raises
+    ------
+    InputError
+        If a cell has lost its name.
+    """
+    cells = {**setup_cells(content), "g_model": content.model}
+    wanted = cells_of(given.keys() - _OTHERS)
+    if content.is_pair:
+        wanted.discard("sigma_s")  # follows from sigma_px
+        if content.sigma_px is not None:
+            wanted.add("sigma_px")
+        if "pair" in given or "adjust_setup" in given:
+            listed = groups(is_pair=True, media=content.media_cells)
+            typed = {name for group in listed[:-1] for name in group}
+            wanted |= typed - {"delta_d", "sigma_r_max", "k_off", "k_plane", *TITLE_BLOCK}
+    elif content.setup is not None:
+        wanted |= {"input_unit"} | ({"c_2", "enlargement_2"} if "adjust_setup" in given else set())
+    if {"d1", "d2", "pair"} & given.keys():
+        wanted |= _distances(editor, cells)
+    for name in sorted(wanted):
+        place = place_of(editor, name)
+        if place is None:
+            if place_of(editor, "d_2") is not None and cells.get(name) is not None:
+                raise InputError(
+                    f"{editor.path}: no cell is named {name} any more, so the value cannot be "
+                    "written. Give the cell its name again, or write to a new workbook."
+                )
+            continue
+        if not _holds(editor, place, cells.get(name)):
+            editor.put(*place, cells.get(name))
+
+
+def _holds(editor: WorkbookEditor, place: tuple[str, int, int], value: CellValue) -> bool:
+    """Whether a cell holds a typed value, and no formula."""
+    sheet, row, column = place
+    stands = editor.grid(sheet).rows.get(row, {}).get(column)
+    model = editor.models(sheet, row).get(column)
+    if stands is None and value == "mm":
+        return True
+    return (stands == value) and (model is None or not model.formula)
+
+
+def _distances(editor: WorkbookEditor, cells: dict[str, CellValue]) -> set[str]:
+    """Return which cells of d_1, d_2 and delta_d take the distances, so that they agree."""
+    d_1, step = place_of(editor, "d_1"), place_of(editor, "delta_d")
+    first, second = cells.get("d_1"), cells.get("d_2")
+    if d_1 is None or step is None or first is None or second is None:
+        return {"d_1", "d_2"}
+    sheet, row, column = step
+    if not isinstance(editor.grid(sheet).rows.get(row, {}).get(column), int | float):
+        return {"d_1", "d_2"}
+    # The difference as people write it: 8.1, not 8.100000000000001.
+    cells["delta_d"] = round(float(first) - float(second), 12)
+    own = editor.models(d_1[0], d_1[1]).get(d_1[2])
+    follows = own is not None and own.formula.replace(" ", "") == TYPED_FORMULAS["d_1"]
+    return {"d_2", "delta_d"} if follows else {"d_1", "d_2", "delta_d"}
+
+
+def write_corrections(editor: WorkbookEditor, content: SurveyContent) -> None:
+    """Write what corrects the coordinates of a photo into cells of their own below `Setup`."""
+    place = place_of(editor, "d_1")
+    if content.setup is None or place is None:
+        return
+    sheet, known_row, column = place
+    below = max(editor.grid(sheet).rows, default=known_row) + 2
+    styles = editor.styles_of(sheet, known_row)
+    for image, matrix in enumerate(content.setup.adjusted, start=1):
+        if matrix is None:
+            continue
+        for name, value in zip(adjustment_names(image), matrix.ravel().tolist(), strict=True):
+            own = place_of(editor, name)
+            if own is None:
+                own = (sheet, below, column)
+                editor.define(name, f"{quoted_title(sheet)}!{_absolute(below, column)}")
+                editor.put(sheet, below, 1, name)
+                editor.put(sheet, below, 2, word("correction", content.language).format(n=image))
+                below += 1
+            editor.put(*own, value, style=styles.get(column, ""))
+        below += 1
+
+
+def _absolute(row: int, column: int) -> str:
+    letters = cell_name(row, column).rstrip("0123456789")
+    return f"${letters}${row}"

@@ -1,0 +1,469 @@
+"""Put results, options and language into a survey workbook that exists, and nothing else."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from bifocal.survey.survey_input import SurveyInput
+from bifocal.workbook.changing.setup_update import (
+    add_missing_sheets,
+    chart_sheet,
+    write_corrections,
+    write_options,
+)
+from bifocal.workbook.changing.translate import translate
+from bifocal.workbook.content import STRUCTURED_ROWS, SurveyContent
+from bifocal.workbook.formulas.setup_cells import TYPED_FORMULAS
+from bifocal.workbook.formulas.space_block import BLOCK
+from bifocal.workbook.making.book import build, unprinted_formula
+from bifocal.workbook.making.charts import HEAD, LEFT
+from bifocal.workbook.reading.setup_reader import media_count
+from bifocal.workbook.words import word
+from photocore.errors import InputError
+from photocore.output import free_path
+from photocore.workbook.changing.cells import CellValue, NewColumn, escape
+from photocore.workbook.changing.editor import WorkbookEditor
+from photocore.workbook.changing.named_cells import place_of, type_column, type_value
+from photocore.workbook.making.live_book import BookBuilder, short_formula
+from photocore.workbook.making.live_columns import TEXT_KEYS, row_formula
+from photocore.workbook.making.newbook import RowBlock
+from photocore.workbook.making.print_area import move_print_area
+from photocore.workbook.reading.grid import (
+    TableArea,
+    column_letters,
+    plain_title,
+    split_area,
+    split_cell,
+)
+from photocore.workbook.reading.package import uncollected
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BookUpdate:
+    """What became of a survey workbook.
+
+    Attributes
+    ----------
+    kept : Path or None
+        The backup of a workbook changed in place.
+    added : tuple of str
+        Sheets that were missing and are there again, behind all others.
+    """
+
+    kept: Path | None
+    added: tuple[str, ...]
+
+
+def is_earlier(survey: SurveyInput) -> bool:
+    """Tell by its names whether a workbook's sheets were made by an earlier version."""
+    names = () if survey.book is None else survey.book.names
+    newest = "setup_missing" if "sigma_px" in names else "enlargement_1"
+    came = {"b_lever": newest, "g_k": "g_space"}  # what stands beside what from the start
+    return any(old in names and new not in names for old, new in came.items())
+
+
+def refuse_earlier(source: Path, survey: SurveyInput) -> None:
+    """Refuse to change a workbook in place whose formulas an earlier version made.
+
+    Raises
+    ------
+    InputError
+        Naming the way out.
+    """
+    if is_earlier(survey):
+        raise InputError(
+            f"{source}: was made by an earlier version of this program, whose formulas are not "
+            f"renewed in place. Write to a new workbook, e.g. --out {_other(source)}: set-up, "
+            "points, check and control points are carried over; this one stays as it is."
+        )
+
+
+def is_same_kind(survey: SurveyInput, content: SurveyContent) -> bool:
+    """Tell whether a survey workbook has the formulas that what came out of it needs."""
+    names = () if survey.book is None else survey.book.names
+    measured = content.is_pair == ("col1" in survey.table.present)
+    return measured and content.media_cells == media_count(names) and not is_earlier(survey)
+
+
+def check_kind(source: Path, survey: SurveyInput, content: SurveyContent) -> None:
+    """Refuse to change a survey workbook for coordinates into one for raw pixels, or the reverse.
+
+    Nor one for photos in air into one for media, nor one of an earlier version.
+
+    Raises
+    ------
+    InputError
+        Naming the way out.
+    """
+    refuse_earlier(source, survey)
+    if is_same_kind(survey, content):
+        return
+    kind = "coordinates in mm or px" if content.is_pair else "raw pixels of a pair"
+    if content.is_pair == ("col1" in survey.table.present):
+        kind = "photos in air"
+    raise InputError(
+        f"{source}: its formulas are made for another kind of measurement ({kind}) and are not "
+        f"changed into others in place. Write to a new workbook, e.g. --out {_other(source)}; this "
+        "one stays as it is."
+    )
+
+
+def _other(source: Path) -> str:
+    """Return the name of a new workbook beside one that stays as it is."""
+    return free_path(source.parent, f"{source.stem}-result", source.suffix).name
+
+
+@uncollected()
+def update_book(
+    source: Path,
+    target: Path,
+    survey: SurveyInput,
+    content: SurveyContent,
+    *,
+    given: Mapping[str, Any],
+    overwrite: bool = False,
+) -> BookUpdate:
+    """Copy a survey workbook with fresh results in its formula cells; all else byte for byte.
+
+    Rows that hold points but no formulas get them, tables grow over points below them, sheets that
+    are missing are added, options and language are written where they belong.
+
+    Parameters
+    ----------
+    source : Path
+        The workbook.
+    target : Path
+        Where to; the same path changes it in place and keeps the old file.
+    survey : SurveyInput
+        What was read from it.
+    content : SurveyContent
+        What came out, evaluated as the workbook's own formulas do, in the language wanted.
+    given : mapping
+        The options that take the place of what the workbook says, by name.
+    overwrite : bool
+        Replace an existing file.
+
+    Returns
+    -------
+    BookUpdate
+        What the user should be told.
+
+    Raises
+    ------
+    InputError
+        If the workbook's formulas are made for another kind of measurement, or it cannot be
+        changed.
+    """
+    editor, built = WorkbookEditor(source, survey.book), build(content)
+    points = editor.table("tblPoints")
+    if points is None:
+        raise InputError(f"{source}: has lost its table tblPoints; write to a new workbook.")
+    check_kind(source, survey, content)
+    other_words = content.language != survey.language
+    if other_words:
+        translate(editor, content, survey.language)
+    added = add_missing_sheets(editor, built)
+    store_named_cells(editor, built, content)
+    write_options(editor, content, given)
+    write_corrections(editor, content)
+    first = points.area[0] + 1
+    rows = [row - first for row in survey.table.rows]
+    length = max([_length(points), *(row + 1 for row in rows)])
+    _table(editor, built, "tblPoints", rows, length, anew=_corrected(content))
+    _table(editor, built, "tblResults", rows, length)
+    _print_points(editor, max(rows, default=0) + 1, content.language)
+    for name, sheet_rows in (("tblCheck", survey.known_rows), ("tblGeo", survey.control_rows)):
+        own = editor.table(name)
+        if own is not None:
+            rows_there = [row - own.area[0] - 1 for row in sheet_rows]
+            _table(editor, built, name, rows_there)
+    for name, key in (("tblPlan", "relief_cm"), ("tblFrame", "share")):
+        _fixed_table(editor, built, name, key)
+    _verdict(editor, built, content, rules="rules" in given, words=other_words)
+    _charts(editor, built, rows)
+    _log(editor, content)
+    return BookUpdate(kept=editor.save(target, overwrite=overwrite), added=tuple(added))
+
+
+def _print_points(editor: WorkbookEditor, count: int, language: str) -> None:
+    """Print as many rows of `Points` and `Results` as hold points, unless the user chose others."""
+    for name in ("Points", "Results"):
+        place, area = place_of(editor, f"unprinted_{name}"), editor.table(f"tbl{name}")
+        if place is None or area is None:
+            continue
+        sheet, row, column = place
+        stands = editor.models(sheet, row).get(column)
+        found = re.search(r">(\d+),", stands.formula if stands else "")
+        head = area.area[0]
+        if found and move_print_area(editor, area.sheet, head + int(found[1]), head + count):
+            formula = unprinted_formula(word("unprinted", language), count)
+            editor.put(*place, "", formula=formula, style=stands.style if stands else "")
+
+
+def _corrected(content: SurveyContent) -> Sequence[str]:
+    """Return the columns whose formulas depend on whether coordinates are corrected."""
+    if content.setup is None or all(matrix is None for matrix in content.setup.adjusted):
+        return ()
+    return ("s1_used", "s2_used", "theta_used", "q")
+
+
+def _length(area: TableArea) -> int:
+    return area.area[2] - area.area[0]
+
+
+def store_named_cells(editor: WorkbookEditor, built: BookBuilder, content: SurveyContent) -> None:
+    """Store the results of single formulas, found by their names; type what was found."""
+    typed = {"g_auto"}
+    for name, defined in built.book.defined_names.items():
+        sheet, _, cell = defined.attr_text.partition("!")
+        sheet, cell = plain_title(sheet), cell.replace("$", "")
+        if name == BLOCK:
+            _store_block(editor, built.results[sheet], cell)
+            continue
+        place = place_of(editor, name)
+        if place is None:
+            continue
+        value = built.results[sheet].get(cell)
+        if name in typed and content.georeference is not None:
+            shown = built.book[sheet][cell].value
+            type_value(editor, place, shown if value is None else value)
+        elif built.book[sheet][cell].data_type == "f" or name in TYPED_FORMULAS:
+            editor.set_result(*place, _result(value))
+        if built.book[sheet][cell].data_type != "f" and name not in typed:
+            _make_number(editor, place, value)
+
+
+def _store_block(editor: WorkbookEditor, results: Mapping[str, CellValue], cells: str) -> None:
+    """Store the results of the formulas of `BLOCK`, wherever it stands now."""
+    sheet, _, area = editor.book.names.get(BLOCK, "").rpartition("!")
+    sheet = plain_title(sheet)
+    if sheet not in editor.titles or ":" not in area:
+        return
+    top, left, bottom, right = split_area(cells)
+    down, across, *_ = split_area(area.replace("$", ""))
+    for cell, value in results.items():
+        row, column = split_cell(cell)
+        if top <= row <= bottom and left <= column <= right:
+            at = (row - top + down, column - left + across)
+            editor.set_result(sheet, *at, _result(value))
+
+
+def _make_number(editor: WorkbookEditor, place: tuple[str, int, int], value: CellValue) -> None:
+    """Turn a number that was typed as text into a number: formulas do not see it otherwise."""
+    sheet, row, column = place
+    stands = editor.grid(sheet).rows.get(row, {}).get(column)
+    if isinstance(stands, str) and isinstance(value, int | float) and value == value:
+        editor.set_value(sheet, row, column, value)
+
+
+def _result(value: CellValue) -> CellValue:
+    return "" if value is None else value
+
+
+def _table(
+    editor: WorkbookEditor,
+    built: BookBuilder,
+    name: str,
+    rows: Sequence[int],
+    length: int = 0,
+    *,
+    anew: Sequence[str] = (),
+) -> None:
+    """Store the results of a table, formulas where they are missing.
+
+    Parameters
+    ----------
+    rows : sequence of int
+        Row of each entry, counted from the table's first; all others are blank.
+    length : int
+        Rows it must have at least.
+    anew : sequence of str
+        Columns whose formulas are written whatever stands there.
+    """
+    area, content = editor.table(name), built.tables[name]
+    if area is None:
+        return
+    headings, first = area.headings(), area.area[0] + 1
+    length = max([length, _length(area), *(row + 1 for row in rows)])
+    editor.extend(name, area.area[0] + length)
+    letters = {key: column_letters(number) for key, number in headings.items()}
+    styles = editor.styles_of(area.sheet, first)
+    filled, prepared = [], []
+    for column in content.columns:
+        if column.key not in headings:
+            continue
+        given = content.cells.get(column.key, ())
+        number = headings[column.key]
+        style = styles.get(number, "")
+        if column.kind == "input" and column.key not in TEXT_KEYS:
+            stands = editor.grid(area.sheet).rows
+            for row, value in zip(rows, given, strict=False):
+                if isinstance(stands.get(first + row, {}).get(number), str):
+                    _make_number(editor, (area.sheet, first + row, number), value)
+        if anew and column.kind == "input" and column.key in ("x1", "y1", "x2", "y2"):
+            _complete(editor, (area.sheet, first, number), rows, given)
+        if column.kind != "formula":
+            prepared.append(NewColumn(number, [None] * (length - _length(area)), style))
+        if column.kind == "input":
+            continue
+        values = _by_rows(given, rows, length, spare=_result(column.spare))
+        if column.kind == "value":
+            typed = [None if value == "" else value for value in values]
+            type_column(editor, (area.sheet, first, number), typed)
+            continue
+        text = row_formula(area.name, column.formula)[1:]
+        if column.key in anew:
+            for row, value in enumerate(values, start=first):
+                editor.put(area.sheet, row, number, value, formula=text, style=style)
+            continue
+        formula: Callable[[int], str] | None = _constant(escape(text))
+        if _lacks(editor, text):
+            formula = None
+        elif length > STRUCTURED_ROWS:
+            formula = _escaped(short_formula(area.name, column.formula, letters, area.area[0]))
+        filled.append(NewColumn(number, values, style, formula))
+    editor.fill_rows(area.sheet, first, filled)
+    editor.fill_rows(area.sheet, first + _length(area), prepared)
+
+
+def _by_rows(
+    given: Sequence[CellValue], rows: Sequence[int], length: int, *, spare: CellValue
+) -> list[CellValue]:
+    """Return the values of a column of a table, those of its blank rows too."""
+    values = [spare] * length
+    count = min(len(rows), len(given))
+    if count and rows[0] >= 0 and [*rows[:count]] == [*range(rows[0], rows[0] + count)]:
+        values[rows[0] : rows[0] + count] = ["" if v is None else v for v in given[:count]]
+        return values[:length]
+    for row, value in zip(rows, given, strict=False):
+        if 0 <= row < length:
+            values[row] = _result(value)
+    return values
+
+
+def _lacks(editor: WorkbookEditor, formula: str) -> bool:
+    """Tell whether a formula names columns that the workbook's tables do not have."""
+    for name, key in re.findall(r"(tbl\w+)\[(?:\[#[^]]+\],\[)?(\w+)\]", formula):
+        area = editor.table(name)
+        if area is None or key not in area.headings():
+            return True
+    return False
+
+
+def _complete(
+    editor: WorkbookEditor,
+    place: tuple[str, int, int],
+    rows: Sequence[int],
+    values: Sequence[CellValue],
+) -> None:
+    """Type coordinates where there are none, of points given by radial distances."""
+    sheet, first, column = place
+    grid = editor.grid(sheet).rows
+    for row, value in zip(rows, values, strict=False):
+        if grid.get(first + row, {}).get(column) is None and value is not None:
+            editor.set_value(sheet, first + row, column, value)
+
+
+def _constant(text: str) -> Callable[[int], str]:
+    """Return a function of the row that is the same formula in all."""
+    return lambda _: text
+
+
+def _escaped(formula: Callable[[int], str]) -> Callable[[int], str]:
+    return lambda row: escape(formula(row))
+
+
+def _fixed_table(editor: WorkbookEditor, built: BookBuilder, name: str, key: str) -> None:
+    """Store the results of a table whose rows are given, where the user left them so."""
+    area, content = editor.table(name), built.tables[name]
+    if area is None:
+        return
+    headings = area.headings()
+    given = content.cells[key]
+    grid = editor.grid(area.sheet).rows
+    if key not in headings or _length(area) != len(given):
+        return
+    first = area.area[0] + 1
+    stand = [grid.get(first + i, {}).get(headings[key]) for i in range(len(given))]
+    if stand == [float(value or 0) for value in given]:
+        _table(editor, built, name, range(len(given)))
+
+
+def _verdict(
+    editor: WorkbookEditor, built: BookBuilder, content: SurveyContent, *, rules: bool, words: bool
+) -> None:
+    """Judge the accuracy by the rules that stand in the workbook, or by those asked for.
+
+    Parameters
+    ----------
+    rules, words : bool
+        Whether the rules, and the formulas with their two words, are written anew.
+    """
+    area, wanted = editor.table("tblVerdict"), built.tables["tblVerdict"]
+    if area is None or not {"tolerance", "verdict"} <= area.headings().keys():
+        return
+    headings, first, grid = area.headings(), area.area[0] + 1, editor.grid(area.sheet).rows
+    accuracy = content.check.accuracy if content.check is not None else math.nan
+    holds, fails = word("holds", content.language), word("fails", content.language)
+    formula = row_formula(area.name, wanted.columns[-1].formula)[1:]
+    count = len(wanted.cells["rule"]) if rules else 0
+    length = max(_length(area), count)
+    style = editor.styles_of(area.sheet, first)
+    for i in range(length):
+        row = first + i
+        tolerance = grid.get(row, {}).get(headings["tolerance"])
+        if rules:
+            asked = {key: wanted.cells[key][i] if i < count else None for key in headings}
+            tolerance = asked.pop("tolerance")
+            asked.pop("verdict")
+            for key, value in (asked | {"tolerance": tolerance}).items():
+                type_value(editor, (area.sheet, row, headings[key]), value)
+        result = ""
+        if isinstance(tolerance, int | float) and not math.isnan(accuracy):
+            result = holds if accuracy <= tolerance / 1000 else fails
+        place = (area.sheet, row, headings["verdict"])
+        if rules or words:
+            editor.put(*place, result, formula=formula, style=style.get(headings["verdict"], ""))
+        else:
+            editor.set_result(*place, result)
+    editor.extend(area.name, area.area[0] + length)
+
+
+def _charts(editor: WorkbookEditor, built: BookBuilder, rows: Sequence[int]) -> None:
+    """Store the numbers of the charts, blanks as #N/A."""
+    title = chart_sheet(editor)
+    if title is None:
+        return
+    block: RowBlock = built.blocks["Charts"]
+    cells = editor.grid(title).rows
+    last = max((row for row, values in cells.items() if LEFT + 1 in values), default=HEAD)
+    for i in range(4):
+        values: list[CellValue] = [float("nan")] * max(last - HEAD, 0)
+        for row, value in zip(rows, block.columns[LEFT + i], strict=False):
+            if 0 <= row < len(values):
+                values[row] = value
+        editor.set_results(title, HEAD + 1, {LEFT + 1 + i: values})
+
+
+def _log(editor: WorkbookEditor, content: SurveyContent) -> None:
+    """Add a row to the sheet `Log`, in its first empty row."""
+    area = editor.table("tblLog")
+    if area is None or not content.log:
+        return
+    headings = area.headings()
+    entry: Mapping[str, str] = dict(
+        zip(("time", "program", "what", "file", "sha256"), content.log[-1], strict=True)
+    )
+    cells = editor.grid(area.sheet).rows
+    _, left, bottom, right = area.area
+    if not any(column in cells.get(bottom, {}) for column in range(left, right + 1)):
+        for key, value in entry.items():
+            if key in headings:
+                editor.set_value(area.sheet, bottom, headings[key], value)
+        return
+    editor.append_rows("tblLog", [{key: entry[key] for key in entry if key in headings}])

@@ -1,0 +1,437 @@
+"""What goes into a survey workbook, and the numbers its formula cells show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bifocal.model.flags import DOUBTFUL_SHARE, FlagLimits
+from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
+from bifocal.survey.georeferencing import residuals
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
+from bifocal.survey.relief_table import ReliefTable, entries
+from bifocal.survey.setup import SurveySetup
+from bifocal.survey.solved_survey import SolvedSurvey, WorldPoints
+from bifocal.survey.survey_media import SurveyMedia
+from bifocal.survey.tolerances import RULES, ToleranceRule
+from bifocal.survey.weighted_similarity import weights_of
+from bifocal.workbook.formulas.columns import (
+    NEAR,
+    adjustment_names,
+    ideal_points,
+    pair_points,
+)
+from bifocal.workbook.formulas.media_formulas import setup_values
+from bifocal.workbook.formulas.setup_cells import MATRICES, NADIRS, PHOTOS, setup_checks
+from photocore.arrays import BoolArray, FloatArray
+from photocore.workbook.changing.cells import CellValue, name_cell
+from photocore.workbook.making.live_columns import LiveColumn
+
+#: Rows of the tables of an empty template.
+POINT_ROWS, CHECK_ROWS, CONTROL_ROWS, SPARE_ROWS = 300, 25, 12, 10
+#: Beyond this many points formulas are written as A1 references, which are shorter.
+STRUCTURED_ROWS = 2000
+#: The charts show the first points only.
+CHART_ROWS = 1000
+#: Columns that are blank where a point has no place on the wall.
+_PLACES = ("X", "Y", "sigma_X", "sigma_Y")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SurveyContent:
+    """A survey as the workbook holds it.
+
+    Attributes
+    ----------
+    language : str
+        ``en``, ``it`` or ``de``.
+    setup : SurveySetup or None
+        Of an ideal pair; None in an empty template and for a general pair.
+    pair : Pair or None
+        The geometry; None in an empty template.
+    as_given : bool
+        Whether points and set-up stand in the order in which an exchanged pair was given.
+    pair_file : str
+        Its file, as seen from the workbook.
+    photo_files : tuple of str
+        Both photos as seen from the workbook, for a general pair without a file.
+    sigma_px : float or None
+        Measuring precision of raw pixels. [px]
+    points, table : PointObservations, ReliefTable or None
+        What was measured and what came out.
+    known, check : KnownPoints, CheckResult or None
+        Check points and their errors.
+    control, georeference : KnownPoints, Georeference or None
+        Control points and the transformation.
+    model : str
+        The model asked for: ``auto``, ``levelled``, ``3D``, ``2D``.
+    rules : tuple of ToleranceRule
+        For the verdict.
+    sensor : tuple of float or None
+        Width and height. [mm]
+    limits : FlagLimits
+        Where the flags begin.
+    links : mapping
+        Values of `Setup` that stand elsewhere in the workbook: name to the cell, as formulas
+        write it.
+    log : sequence of tuple of str
+        Rows of the sheet `Log`: date, program, what, file, SHA-256.
+    rows : int
+        Rows of `Points` in an empty template.
+    media : SurveyMedia or None
+        Cells of media in an empty template, and of a general pair; None for those that follow from
+        the pair. An ideal pair's stand in its set-up.
+    """
+
+    language: str = "en"
+    setup: SurveySetup | None = None
+    pair: Pair | None = None
+    as_given: bool = False
+    pair_file: str = ""
+    photo_files: tuple[str, str] = ("", "")
+    sigma_px: float | None = None
+    points: PointObservations | None = None
+    table: ReliefTable | None = None
+    known: KnownPoints = field(default_factory=KnownPoints)
+    check: CheckResult | None = None
+    control: KnownPoints = field(default_factory=KnownPoints)
+    georeference: Georeference | None = None
+    model: str = "auto"
+    rules: tuple[ToleranceRule, ...] = RULES
+    sensor: tuple[float, float] | None = None
+    limits: FlagLimits = field(default_factory=FlagLimits)
+    links: Mapping[str, str] = field(default_factory=dict)
+    log: Sequence[tuple[str, str, str, str, str]] = ()
+    rows: int = POINT_ROWS
+    media: SurveyMedia | None = None
+
+    @classmethod
+    def of(cls, solved: SolvedSurvey) -> SurveyContent:
+        """Return what the workbook shows of a solved survey."""
+        survey, setup = solved.survey, solved.survey.setup
+        return cls(
+            language=survey.language, setup=solved.setup, pair=solved.pair,
+            sigma_px=solved.sigma_px, points=solved.points, table=solved.table,
+            known=survey.known, check=solved.check, control=survey.control,
+            georeference=solved.georeference, model=survey.model, rules=solved.rules,
+            sensor=setup.sensor, limits=setup.measuring.limits, media=solved.media,
+        )  # fmt: skip
+
+    @property
+    def bent(self) -> SurveyMedia | None:
+        """What the cells of media hold; None in a workbook that has none."""
+        if self.setup is not None:
+            return self.setup.media
+        if self.media is not None or self.pair is None:
+            return self.media
+        return SurveyMedia.of_photos(self.photos)
+
+    @property
+    def media_cells(self) -> int:
+        """How many media there are cells for; 0 in air."""
+        return 0 if self.bent is None else self.bent.media
+
+    @property
+    def is_pair(self) -> bool:
+        """Whether the points are raw pixels of a general pair."""
+        return self.pair is not None and self.setup is None
+
+    @property
+    def photos(self) -> tuple[Photo, ...]:
+        """Both photos in the order of the workbook; none in an empty template."""
+        if self.pair is None:
+            return ()
+        return self.pair.as_given if self.as_given else (self.pair.image1, self.pair.image2)
+
+    @property
+    def undistorted(self) -> bool:
+        """Whether raw pixels are freed of lens distortion beside the raw ones."""
+        return any(photo.lens is not None for photo in self.photos)
+
+    @property
+    def point_columns(self) -> tuple[LiveColumn, ...]:
+        """The columns of `Points`."""
+        if self.is_pair:
+            return pair_points(undistorted=self.undistorted, media=self.media_cells)
+        corrected = self.setup.adjusted if self.setup is not None else ()
+        return ideal_points(
+            adjusted=[image for image, matrix in enumerate(corrected, 1) if matrix is not None],
+            media=self.media_cells,
+        )
+
+    @property
+    def placed(self) -> WorldPoints:
+        """The points in the world."""
+        assert self.table is not None
+        return WorldPoints(self.table, self.georeference)
+
+    @property
+    def point_rows(self) -> int:
+        """Rows of `Points`: an empty form, or the points and a few spare rows."""
+        return self.rows if self.points is None else len(self.points) + SPARE_ROWS
+
+    @property
+    def check_rows(self) -> int:
+        """Rows of `Check`."""
+        return max(CHECK_ROWS, len(self.known) + SPARE_ROWS)
+
+    @property
+    def control_rows(self) -> int:
+        """Rows of `Georeference`."""
+        return max(CONTROL_ROWS, len(self.control) + 3)
+
+
+def inputs(values: FloatArray) -> list[CellValue]:
+    """Return typed numbers; blank where NaN."""
+    return [None if value != value else value for value in values.tolist()]
+
+
+def _named(names: Sequence[str], used: BoolArray) -> dict[str, list[CellValue]]:
+    """Return the columns that every table of points begins with."""
+    return {"id": [name_cell(name) for name in names], "use": [int(value) for value in used]}
+
+
+def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
+    """Return every column of `Points` by key."""
+    points, table = content.points, content.table
+    if points is None:
+        return {}
+    cells = _named(points.ids, points.use)
+    cells |= {"code": list(points.code), "note": list(points.note)}
+    groups = [
+        (("x1", "y1"), points.xy1),
+        (("x2", "y2"), points.xy2),
+        (("s1", "s2", "theta"), points.polar),
+        (("col1", "row1"), points.pixels1),
+        (("col2", "row2"), points.pixels2),
+    ]
+    if content.undistorted:
+        for image, photo, raw in zip(
+            "12", content.photos, (points.pixels1, points.pixels2), strict=True
+        ):
+            ideal = raw if photo.lens is None else photo.lens.undistort(raw)
+            groups.append(((f"ucol{image}", f"urow{image}"), ideal))
+    for keys, array in groups:
+        cells |= {key: inputs(array[:, i]) for i, key in enumerate(keys)}
+    if table is None:
+        return cells
+    # A formula shows nothing where a measurement is missing, #N/A where relief is undefined.
+    incomplete = np.isnan(table["s1_used"])
+    placeless = incomplete | np.isnan(table["theta_used"])
+    if not content.is_pair and table.image_scale is None:
+        placeless[:] = True
+    for key, values in table.columns.items():
+        blank = placeless if key in _PLACES or key.startswith("cov_") else incomplete
+        if key in ("q", "theta_used"):
+            blank = np.isnan(values)
+        cells[key] = _unless(blank, values)
+    cells |= {key: inputs(values) for key, values in table.carried.items()}
+    for key in {"g1", "g2"} & table.carried.keys():
+        cells[key] = _unless(incomplete, table.carried[key])
+    placed = content.placed
+    cells |= {key: inputs(placed.near[:, i]) for i, key in enumerate(NEAR[:3])}
+    mixed = placed.covariance
+    cells[NEAR[3]] = [None] * len(table) if mixed is None else inputs(mixed[:, 0, 1])
+    if content.is_pair:
+        common = placed.common
+        cells |= {f"o_{axis}": inputs(np.sqrt(common[:, i, i])) for i, axis in enumerate("ENH")}
+        cells["o_EN"] = inputs(common[:, 0, 1])
+    else:
+        cells |= _radial_variances(content, placeless)
+    typed = points.has_pixels | points.is_cartesian | points.is_polar
+    cells["flag"] = [
+        flag if given else None for flag, given in zip(table.flags, typed, strict=True)
+    ]
+    return cells
+
+
+def _radial_variances(content: SurveyContent, blank: BoolArray) -> dict[str, list[CellValue]]:
+    """Return the variances that the covariance of a point on an ideal pair is made of."""
+    table, setup = content.table, content.setup
+    assert table is not None
+    assert setup is not None
+    first, second = content.photos
+    m1 = first.scale_number or np.nan
+    k12 = 1.0 if second.scale_number is None else second.scale_number / m1
+    d1, d2, sigma = first.distance, second.distance, setup.precision
+    r, den = table["r"], table["den"]
+    near, far = table["s2_used"] / d2, table["s1_used"] / d1
+    with np.errstate(divide="ignore", invalid="ignore"):
+        g1, g2, aside = 1 - r / d1, (1 - r / d2) * k12, 1 - r / d1
+        if "t1" in table.carried:
+            near, far, g1, g2 = (table.carried[key] for key in ("t2", "t1", "g1", "g2"))
+            aside = table["s_c"] / (table.carried["tan1"] * (first.principal_distance or d1))
+        v1, v2 = (g1 * sigma / den) ** 2, (g2 * sigma / den) ** 2
+    if content.points is not None:
+        v2 += np.where(content.points.in_doubt, DOUBTFUL_SHARE * min(d1, d2), 0.0) ** 2
+    found = {
+        "v_1": v1,
+        "v_2": v2,
+        "v_s": (v1 * near**2 + v2 * far**2) * (m1 / 1000) ** 2,
+        "v_t": (aside * sigma * m1 / 1000) ** 2,
+        "v_sr": -(v1 * near + v2 * far) * m1 / 1000,
+    }
+    return {key: _unless(blank, values) for key, values in found.items()}
+
+
+def _unless(blank: BoolArray, values: FloatArray) -> list[CellValue]:
+    """Return a column of numbers, blank where a condition holds."""
+    return [None if no else v for no, v in zip(blank.tolist(), values.tolist(), strict=True)]
+
+
+def result_cells(
+    content: SurveyContent, cells: Mapping[str, Sequence[CellValue]]
+) -> dict[str, Sequence[CellValue]]:
+    """Return every column of `Results` by key."""
+    if content.table is None:
+        return {}
+    world, sigma = content.placed.xyz, content.placed.sigma
+    return {
+        "id": cells["id"],
+        **{key: inputs(content.table[key]) for key in ("X", "Y", "Z")},
+        **{key: inputs(content.table[key]) for key in ("sigma_X", "sigma_Y", "sigma_r")},
+        **{key: inputs(world[:, i]) for i, key in enumerate("ENH")},
+        **{f"sigma_{key}": inputs(sigma[:, i]) for i, key in enumerate("ENH")},
+        "flag": cells["flag"],
+        "note": cells["note"],
+    }
+
+
+def check_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
+    """Return every column of `Check` by key."""
+    known, check = content.known, content.check
+    cells = _named(known.ids, known.used)
+    for i, axis in enumerate("XYZ"):
+        cells[f"{axis}_ref"] = inputs(known.xyz[:, i])
+        if check is not None:
+            cells[axis] = inputs(check.solved[:, i])
+            cells[f"d{axis}"] = inputs(check.errors[:, i])
+    return cells
+
+
+def control_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
+    """Return every column of `Georeference` by key."""
+    control, geo = content.control, content.georeference
+    cells = _named(control.ids, control.used)
+    cells |= {axis: inputs(control.xyz[:, i]) for i, axis in enumerate("ENH")}
+    if geo is None:
+        return cells
+    cells["found_bad"] = [0 if name in geo.bad else None for name in geo.ids]
+    used, fit = geo.used, geo.world_from_wall
+    centred = geo.solved - fit.source_centre
+    left = residuals(fit, geo.solved, control.xyz - geo.origin, geo.offset)
+    near = geo.near
+    for i, (axis, world) in enumerate(zip("XYZ", "ENH", strict=True)):
+        cells[axis] = inputs(geo.solved[:, i])
+        cells[f"c{axis}"] = inputs(np.where(used, centred[:, i], 0.0))
+        cells[f"c{world}"] = inputs(np.where(used, near[:, i], 0.0))
+        cells[f"v{world}"] = inputs(left[:, i])
+    cells["w"] = [int(value) for value in used]
+    return cells | _weight_cells(geo)
+
+
+def _weight_cells(geo: Georeference) -> dict[str, list[CellValue]]:
+    """Return covariances of the control points, their weights, and weights times design."""
+    if geo.covariance is None:
+        return {}
+    cells = {key: inputs(values) for key, values in entries(geo.covariance, "q_").items()}
+    size, used = len(geo.ids), geo.used
+    flat = geo.model == "2D"
+    weights = np.zeros((size, 3, 3))
+    weights[used] = weights_of(geo.covariance[used], flat=flat)
+    centred = np.zeros((size, 3))
+    centred[used] = geo.solved[used] - geo.world_from_wall.source_centre
+    east, north, height = np.where(used[:, None], geo.near, 0.0).T
+    zero, turned = np.zeros(size), 1.0 if flat else 0.0
+    design = [
+        (east, turned * north, -north), (north, -turned * east, east), (zero, height, zero)
+    ]  # fmt: skip
+    cells |= {key: inputs(values) for key, values in entries(weights, "p_").items()}
+    columns = {f"u_{{}}{name}": np.stack(d, axis=-1) for name, d in zip("pqm", design, strict=True)}
+    for key, column in {**columns, "h_{}": centred}.items():
+        weighted = np.einsum("nij,nj->ni", weights, column)
+        cells |= {key.format(axis): inputs(weighted[:, i]) for i, axis in enumerate("XYZ")}
+    return cells
+
+
+def setup_cells(content: SurveyContent) -> dict[str, CellValue]:
+    """Return the value of every named cell of `Setup`; what is absent is blank."""
+    pair, is_pair, media = content.pair, content.is_pair, content.bent
+    cells = _setup_cells(content)
+    cells |= setup_values(media, pair, as_given=content.as_given, is_pair=is_pair)
+    return cells | setup_checks(cells, is_pair=is_pair, media=content.media_cells)
+
+
+def _setup_cells(content: SurveyContent) -> dict[str, CellValue]:
+    limits, setup = content.limits, content.setup
+    cells: dict[str, CellValue] = {
+        "input_unit": "mm", "k_off": limits.off_radial, "k_plane": limits.on_plane,
+        "unit_x": 1, "unit_y": 1, "k_12": 1.0, "enlargement_1": 1, "enlargement_2": 1,
+        **{f"off_{axis}{image}": 0 for axis in "xy" for image in "12"},
+    }  # fmt: skip
+    if content.pair is None:
+        return cells
+    for image, photo in enumerate(content.photos, start=1):
+        cells |= {
+            f"d_{image}": photo.distance,
+            f"c_{image}": photo.principal_distance,
+            f"m_{image}": photo.scale_number,
+        }
+    first, second = content.photos
+    d1, d2 = first.distance, second.distance
+    # As its formula has it: of photos typed the other way round it is negative.
+    cells["b_lever"] = d1 * d2 / (d1 - d2)
+    cells["sigma_r_max"] = limits.relief_limit(content.pair.d2)
+    if setup is None:
+        return cells | _pair_cells(content, first, second)
+    if first.scale_number is not None and second.scale_number is not None:
+        cells["k_12"] = second.scale_number / first.scale_number
+    cells |= {"photo_1": setup.photo1 or None, "photo_2": setup.photo2 or None}
+    enlargement1, enlargement2 = setup.taking.enlargements
+    cells |= {"c_1": setup.taking.c1, "enlargement_1": enlargement1}
+    cells |= {"c_2": setup.taking.c2, "enlargement_2": enlargement2}
+    cells |= setup.title_block
+    cells |= {"pitch": setup.taking.pitch, "input_unit": setup.unit, "sigma_s": setup.precision}
+    if setup.unit == "px" and setup.taking.pitch is not None:
+        cells |= {"unit_x": setup.taking.pitch, "unit_y": -setup.taking.pitch}
+    for image, matrix in enumerate(setup.adjusted, start=1):
+        if matrix is not None:
+            cells |= dict(zip(adjustment_names(image), matrix.ravel().tolist(), strict=True))
+    for image, nadir in ((1, setup.taking.nadir1), (2, setup.taking.nadir2)):
+        column, row = nadir or (0.0, 0.0)
+        cells |= {f"nadir_{image}_col": column, f"nadir_{image}_row": row}
+        if setup.unit == "px":
+            cells |= {f"off_x{image}": column, f"off_y{image}": row}
+    return cells
+
+
+def _pair_cells(content: SurveyContent, first: Photo, second: Photo) -> dict[str, CellValue]:
+    """Return the cells of `Setup` that only a general pair has."""
+    assert content.pair is not None
+    scale = first.scale_number or 1000.0
+    sigma = first.precision(content.sigma_px or first.sigma_pixel or second.sigma_pixel)
+    cells: dict[str, CellValue] = {
+        "pair_file": content.pair_file,
+        **{key: name or None for key, name in zip(PHOTOS, content.photo_files, strict=True)},
+        "input_unit": "px",
+        "pitch": first.pixel_size,
+        "sigma_px": sigma,
+        "m_1": scale,
+    }
+    cells |= dict(zip(("e_x", "e_y"), content.pair.zoom_centre.tolist(), strict=True))
+    spacing = []
+    for image, photo in enumerate((first, second)):
+        cells |= dict(zip(NADIRS[image], photo.nadir.tolist(), strict=True))
+        cells |= dict(zip(MATRICES[image], photo.plane_from_pixel.ravel().tolist(), strict=True))
+        if content.points is not None and len(content.points):
+            pixels = content.points.pixels2 if image else content.points.pixels1
+            jacobian = photo.metres_per_pixel(pixels[~np.isnan(pixels).any(axis=1)])
+            if len(jacobian):
+                spacing.append(float(np.median(np.sqrt((jacobian**2).sum(axis=(1, 2)) / 2))))
+    # What one pixel is on the wall, typically: whatever image scale is typed later.
+    pixel = 1000.0 * sum(spacing) / len(spacing) if spacing else 0.0
+    return cells | {"pixel_wall": pixel, "sigma_s": sigma * pixel / scale}

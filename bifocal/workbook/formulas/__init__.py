@@ -1,0 +1,1 @@
+"""The formulas of the survey workbook and the names of its cells."""

@@ -1,0 +1,1 @@
+"""Survey workbooks made: their sheets, charts and sketch."""

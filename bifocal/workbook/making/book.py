@@ -1,0 +1,244 @@
+"""Write a new survey workbook: every result a live formula that already shows its number."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from openpyxl.styles import Alignment
+
+from bifocal.workbook.content import (
+    STRUCTURED_ROWS,
+    SurveyContent,
+    point_cells,
+    result_cells,
+    setup_cells,
+)
+from bifocal.workbook.formulas.columns import LOG
+from bifocal.workbook.formulas.results_columns import results_columns
+from bifocal.workbook.making.cameras_sketch import cameras_sketch
+from bifocal.workbook.making.charts import charts
+from bifocal.workbook.making.georeference_sheet import georeference
+from bifocal.workbook.making.reference_sheets import check, planning
+from bifocal.workbook.making.setup_sheet import setup_sheet
+from bifocal.workbook.words import WORDS, readme
+from photocore.workbook.changing.cells import CellValue
+from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
+from photocore.workbook.making.live_columns import LiveColumn
+from photocore.workbook.making.look import (
+    BODY_FONT,
+    DOUBT,
+    GOOD,
+    HEAD_FONT,
+    WARN_FONT,
+    WRONG,
+    colour_words,
+    strike_out,
+)
+from photocore.workbook.reading.grid import column_letters
+
+#: Row of the keys in `Points` and `Results`.
+HEAD = 4
+#: Rows of an empty form that are printed: one page of `Results`.
+FORM_ROWS = 28
+#: Fill and text of each flag; the word itself always stands in the cell too.
+FLAG_COLOURS = {
+    "OK": GOOD,
+    "ON-PLANE": ("DDEBF7", "1F4E79"),
+    "WEAK": ("FFF2CC", "7F6000"),
+    "UNCERTAIN": ("FCE4D6", "9C3D00"),
+    "NADIR": ("EDEDED", "3B3B3B"),
+    "OFF-RADIAL": WRONG,
+    "CHECK": DOUBT,
+}
+#: Scale of the sheet `Points` on paper: labels stay above 8 pt. [%]
+_SCALE = 92
+#: Name of the column `use` of `Points`, for rules of other sheets, which may not name a table.
+USED = "points_use"
+#: Where the sketch of the cameras stands on the sheet `Readme`.
+_SKETCH = "C3"
+
+
+def write_book(path: Path | str, content: SurveyContent, *, overwrite: bool = False) -> None:
+    """Write a survey workbook, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+        An ``.xlsx`` file.
+    content : SurveyContent
+        What it holds; an empty one makes the template.
+    overwrite : bool
+        Replace an existing file.
+    """
+    build(content).save(path, overwrite=overwrite)
+
+
+def build(content: SurveyContent) -> BookBuilder:
+    """Return all sheets of the workbook, tables with one prototype row each."""
+    builder = BookBuilder(language=content.language, words=WORDS)
+    builder.book.properties.creator = "bifocal"
+    builder.book.properties.title = "bifocal survey"
+    _readme(builder, media=bool(content.media_cells))
+    setup_sheet(builder, content)
+    cells = point_cells(content)
+    _points(builder, content, cells)
+    _results(builder, content, cells)
+    check(builder, content)
+    georeference(builder, content)
+    planning(builder, content)
+    charts(builder, content, cells)
+    _log(builder, content)
+    builder.open_at("Points" if content.points else "Readme")
+    return builder
+
+
+def _readme(builder: BookBuilder, *, media: bool) -> None:
+    sheet = builder.sheet("Readme")
+    sheet.worksheet.column_dimensions["A"].width = 80
+    sheet.worksheet.column_dimensions["B"].width = 2
+    for row, line in enumerate(readme(builder.language, media=media), start=3):
+        heading = line.startswith("#")
+        sheet.text(f"A{row}", line.lstrip("#"), HEAD_FONT if heading else None)
+    sketch = cameras_sketch(builder.word("nadir"), builder.word("sketch"))
+    builder.drawings["Readme"] = sketch.part(_SKETCH)
+    # Nothing stands in the cells below the sketch: without this they would not be printed.
+    sheet.worksheet.print_area = "A1:C34"
+    sheet.worksheet.column_dimensions["C"].width = 50
+    sheet.finish(landscape=True, guarded=False)
+    sheet.worksheet.page_setup.fitToHeight = 1
+
+
+def _points(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
+    """Write what was measured and, beside it, all results as formulas."""
+    columns = content.point_columns
+    note = "points_pair" if content.is_pair else "points_how"
+    sheet = _long_sheet(builder, "Points", note, columns, content, cells)
+    keys = [column.key for column in columns]
+    first_result = keys.index("note") + 2
+    sheet.worksheet.sheet_properties.outlinePr.summaryRight = True
+    # Each page begins with the names: the title would be cut off there, so it heads the page.
+    sheet.worksheet.oddHeader.left.text = builder.word("Points")
+    sheet.finish(
+        landscape=True,
+        freeze=f"B{HEAD + 1}",
+        repeat=f"{HEAD - 1}:{HEAD}",
+        scale=_SCALE,
+        breaks=(len(columns), (first_result,)),
+    )
+
+
+def _results(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
+    """Write what a client is handed: names, coordinates, precision, below a title block."""
+    results, columns = result_cells(content, cells), results_columns(is_pair=content.is_pair)
+    sheet = _long_sheet(builder, "Results", "", columns, content, results)
+    _title_block(sheet, content, results)
+    sheet.finish(landscape=True, freeze=f"B{HEAD + 1}", repeat=f"{HEAD - 1}:{HEAD}")
+
+
+def _long_sheet(
+    builder: BookBuilder,
+    name: str,
+    note: str,
+    columns: Sequence[LiveColumn],
+    content: SurveyContent,
+    cells: Cells,
+) -> SheetBuilder:
+    """Write a sheet that is one table with a row per point, its flags coloured."""
+    sheet, rows = builder.sheet(name, note), content.point_rows
+    short = rows > STRUCTURED_ROWS
+    sheet.table(
+        f"tbl{name}", columns, at=(HEAD, 1), rows=rows, cells=cells, repeat=True, short=short
+    )
+    keys = [column.key for column in columns]
+    flag, last = column_letters(keys.index("flag") + 1), HEAD + rows
+    if "use" in keys:
+        used = column_letters(keys.index("use") + 1)
+        builder.define(USED, f"'{name}'!${used}${HEAD + 1}:${used}${last}")
+        unused = f"AND(ISNUMBER(${used}{HEAD + 1}),${used}{HEAD + 1}=0)"
+    else:
+        at = f"INDEX({USED},ROW()-{HEAD})"
+        unused = f"AND(ISNUMBER({at}),{at}=0)"
+    # A point that is not used is no good point, whatever its flag.
+    whole = f"A{HEAD + 1}:{column_letters(len(columns))}{last}"
+    strike_out(sheet.worksheet, whole, unused)
+    bold = ("OFF-RADIAL", "NADIR", "CHECK")
+    flags = f"{flag}{HEAD + 1}:{flag}{last}"
+    colour_words(sheet.worksheet, flags, FLAG_COLOURS, bold=bold, stop=True)
+    _printed(sheet, print_area(name, len(columns), printed_rows(content)), content)
+    return sheet
+
+
+def printed_rows(content: SurveyContent) -> int:
+    """Return how many points are printed: all there are, or one page of an empty form."""
+    if content.points is None:
+        return min(FORM_ROWS, content.point_rows)
+    return max(len(content.points), 1)
+
+
+def print_area(sheet: str, columns: int, rows: int) -> str:
+    """Return the cells of `Points` or `Results` that are printed."""
+    return f"A{1 if sheet == 'Results' else HEAD - 1}:{column_letters(columns)}{HEAD + rows}"
+
+
+def unprinted_formula(words: str, rows: int) -> str:
+    """Return the formula of the warning that points stand below the printed rows."""
+    return f'IF(COUNTA(tblPoints[id])>{rows},"{words}","")'
+
+
+def _printed(sheet: SheetBuilder, area: str, content: SurveyContent) -> None:
+    """Print only the rows that hold points, and say so where points stand below them."""
+    name = sheet.worksheet.title
+    sheet.worksheet.print_area = area
+    formula = unprinted_formula(sheet.book.word("unprinted"), printed_rows(content))
+    sheet.formula("E1", formula, None, name=f"unprinted_{name}", font=WARN_FONT)
+
+
+_BLOCK_PLACE = Alignment(wrap_text=True, vertical="top")
+#: The title block: cell, the cells it spans, its name.
+_BLOCKS = (
+    ("A2", "D2", "title_project"), ("E2", "I2", "title_survey"), ("J2", "O2", "title_units"),
+)  # fmt: skip
+
+
+def _title_block(sheet: SheetBuilder, content: SurveyContent, results: Cells) -> None:
+    """Write whose survey it is, by whom, when, in which units, and how good."""
+    book, setup = sheet.book, setup_cells(content)
+
+    def line(word: str, name: str) -> tuple[str, str]:
+        return f'"{book.word(word)}: "&{name}', f"{book.word(word)}: {setup.get(name) or ''}"
+
+    people = [line("project", "project"), line("client", "client")]
+    survey = [line("surveyor", "surveyor"), line("survey_date", "survey_date")]
+    solved = sum(isinstance(x, float) and x == x for x in results.get("X", ()))
+    worst = None if content.check is None else content.check.accuracy
+    shown = "" if worst is None or worst != worst else f"{round(worst, 3):g} m"
+    points, rmse = book.word("points_solved"), book.word("worst_of_checks")
+    people += [
+        (f'"{points}: "&COUNT(tblResults[X])', f"{points}: {solved}"),
+    ]
+    survey += [
+        (
+            f'"{rmse}: "&IF(ISNUMBER(check_worst),ROUND(check_worst,3)&" m","")',
+            f"{rmse}: {shown}",
+        )
+    ]
+    for (left, right, name), lines in zip(_BLOCKS, (people, survey), strict=False):
+        text = "&CHAR(10)&".join(formula for formula, _ in lines)
+        value: CellValue = "\n".join(shown for _, shown in lines)
+        sheet.formula(left, text, value, name=name, font=BODY_FONT)
+        sheet.worksheet.merge_cells(f"{left}:{right}")
+        sheet.worksheet[left].alignment = _BLOCK_PLACE
+    left, right, _ = _BLOCKS[-1]
+    sheet.word(left, "result_units")
+    sheet.worksheet.merge_cells(f"{left}:{right}")
+    sheet.worksheet[left].alignment = _BLOCK_PLACE
+    sheet.worksheet.row_dimensions[2].height = 42
+
+
+def _log(builder: BookBuilder, content: SurveyContent) -> None:
+    sheet = builder.sheet("Log")
+    keys = [column.key for column in LOG]
+    cells = {key: [row[i] for row in content.log] for i, key in enumerate(keys)}
+    sheet.table("tblLog", LOG, at=(HEAD, 1), rows=max(len(content.log), 1), cells=cells)
+    sheet.finish(landscape=True, guarded=False)

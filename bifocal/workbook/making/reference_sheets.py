@@ -1,0 +1,174 @@
+"""The sheets `Check` and `Planning` of a new survey workbook."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from openpyxl.styles import Alignment
+
+from bifocal.model.flags import FlagLimits
+from bifocal.survey.tolerances import judge
+from bifocal.workbook.content import SurveyContent, check_cells, setup_cells
+from bifocal.workbook.formulas.columns import (
+    CHECK,
+    FRAME_SHARES,
+    OVER_FRAME,
+    PLANNED_RELIEF,
+    UNCERTAINTY,
+    verdict_columns,
+)
+from bifocal.workbook.formulas.media_formulas import larger, planned
+from bifocal.workbook.words import word
+from photocore.workbook.changing.cells import CellValue
+from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
+from photocore.workbook.making.look import GOOD, HEAD_FONT, WRONG, colour_words
+from photocore.workbook.reading.grid import column_letters
+
+#: Row of the keys of the check table; statistics stand above.
+CHECK_HEAD = 12
+_SENSOR = ("sensor_w", "sensor_h")
+#: First column of the verdict, beside the check table.
+VERDICT_LEFT = 14
+
+
+def check(builder: BookBuilder, content: SurveyContent) -> None:
+    """Write errors at check points, their statistics and the verdict."""
+    rows = content.check_rows
+    sheet = builder.sheet("Check", "check_how")
+    for letter, axis in zip("BCD", "XYZ", strict=True):
+        sheet.text(f"{letter}4", f"d{axis}", HEAD_FONT)
+        sheet.worksheet[f"{letter}4"].alignment = Alignment(horizontal="right")
+    for row, (key, (body, attribute)) in enumerate(_STATISTICS.items(), start=5):
+        sheet.word(f"A{row}", key)
+        for letter, axis in zip("BCD", "XYZ", strict=True):
+            errors = None if content.check is None else content.check.axes[axis]
+            value: CellValue = 0 if key == "n" else None
+            if errors is not None and errors.n:
+                value = getattr(errors, attribute)
+            text = body.format(f"tblCheck[d{axis}]", f"{letter}5")
+            form, name = "0" if key == "n" else "0.0000", f"check_{key}_{axis}"
+            sheet.formula(f"{letter}{row}", text, value, form=form, name=name)
+    sheet.word("A9", "worst")
+    accuracy = content.check.accuracy if content.check is not None else math.nan
+    worst = None if math.isnan(accuracy) else accuracy
+    sheet.formula(
+        "B9", 'IF(COUNT(B6:D6)=0,"",MAX(B6:D6))', worst, form="0.0000", name="check_worst"
+    )
+    cells = check_cells(content)
+    sheet.table("tblCheck", CHECK, at=(CHECK_HEAD, 1), rows=rows, cells=cells)
+    sheet.worksheet.column_dimensions["A"].width = 22
+    for letter in ("L", "M"):
+        sheet.worksheet.column_dimensions[letter].width = 1.5
+    _verdict(sheet, content, accuracy)
+    repeat = f"{CHECK_HEAD - 1}:{CHECK_HEAD}"
+    sheet.finish(landscape=True, freeze=f"B{CHECK_HEAD + 1}", repeat=repeat)
+
+
+#: Statistics of errors: formula of their column and the cell of their number, attribute.
+_STATISTICS = {
+    "n": ("COUNT({0})", "n"),
+    "rmse": ('IF({1}=0,"",SQRT(SUMSQ({0})/{1}))', "rmse"),
+    "mean": ('IF({1}=0,"",AVERAGE({0}))', "mean"),
+    "max": ('IF({1}=0,"",MAX(MAX({0}),-MIN({0})))', "max_abs"),
+}
+
+
+def _verdict(sheet: SheetBuilder, content: SurveyContent, accuracy: float) -> None:
+    """Write what drawing scales the accuracy holds, beside the check table."""
+    language = sheet.book.language
+    holds, fails = word("holds", language), word("fails", language)
+    verdicts = judge(accuracy, content.rules)
+    unknown = math.isnan(accuracy)
+    sheet.table(
+        "tblVerdict",
+        verdict_columns(holds, fails),
+        at=(CHECK_HEAD, VERDICT_LEFT),
+        rows=len(verdicts),
+        cells={
+            "rule": [verdict.rule.name for verdict in verdicts],
+            "scale": [verdict.scale for verdict in verdicts],
+            "tolerance": [verdict.tolerance * 1000.0 for verdict in verdicts],
+            "verdict": [
+                None if unknown else holds if verdict.holds else fails for verdict in verdicts
+            ],
+        },
+    )
+    first, last = CHECK_HEAD + 1, CHECK_HEAD + len(verdicts)
+    letter = column_letters(VERDICT_LEFT + 3)
+    colours = {holds: GOOD, fails: WRONG}
+    colour_words(sheet.worksheet, f"{letter}{first}:{letter}{last}", colours)
+
+
+def planning(builder: BookBuilder, content: SurveyContent) -> None:
+    """Write what precision to expect over the frame and where relief cannot be told from zero."""
+    sheet, cells = builder.sheet("Planning", "type"), setup_cells(content)
+    scale_name = "m_seen" if content.media_cells and not content.is_pair else "m_1"
+    scale, pitch, sigma, base = (
+        float(cells.get(name) or math.nan) for name in (scale_name, "pitch", "sigma_s", "b_lever")
+    )
+
+    def live(formula: str) -> str:
+        formula = planned(formula, content.media_cells, is_pair=content.is_pair)
+        frame = "(sensor_w^2+sensor_h^2)"
+        return formula if content.is_pair else formula.replace(frame, f"({frame}*{larger(1)}^2)")
+
+    sizes = content.sensor or (math.nan, math.nan)
+    sheet.word("A6", "footprint")
+    for row, (name, size) in enumerate(zip(_SENSOR, sizes, strict=True), start=4):
+        sheet.word(f"A{row}", name)
+        sheet.input(f"B{row}", size, form="0.00", name=name)
+        sheet.validate(f"B{row}", title=name, prompt=word(name, builder.language), above_zero=True)
+    # By the principal distance: without it the image scale of a general pair is only nominal.
+    d1_name = "seen_1" if content.media_cells else "d_1"
+    c1, d1 = (float(cells.get(name) or math.nan) for name in ("c_1", d1_name))
+    for letter, name, size in zip("BC", _SENSOR, sizes, strict=True):
+        body, covered = f'IF(COUNT({name},c_1,d_1)=3,{name}*d_1/c_1,"")', _known(size * d1 / c1)
+        body = live(body)
+        named = name.replace("sensor", "covered")
+        sheet.formula(f"{letter}6", body, covered, form="0.00", name=named)
+    sheet.word("A7", "gsd")
+    body, pixel = live('IF(COUNT(pitch,m_1)=2,pitch*m_1,"")'), pitch * scale
+    if content.is_pair:
+        body = 'IF(COUNT(pixel_wall)=1,pixel_wall,"")'
+        pixel = float(cells.get("pixel_wall") or math.nan)
+    sheet.formula("B7", body, _known(pixel), form="0.00", name="gsd_mm")
+    diagonal = math.hypot(*sizes) * float(cells["enlargement_1"] or 1)  # of the print, if any
+    sheet.word("A9", "uncertainty", HEAD_FONT)
+    shown = _uncertainty(content, sigma, scale, diagonal)
+    columns = [replace(column, formula=live(column.formula)) for column in UNCERTAINTY]
+    sheet.table("tblPlan", columns, at=(11, 1), rows=len(PLANNED_RELIEF), cells=shown)
+    head = 11 + len(PLANNED_RELIEF) + 4
+    sheet.word(f"A{head - 2}", "over_frame", HEAD_FONT)
+    radii = [share / 200 * diagonal for share in FRAME_SHARES]
+    over_frame: Cells = {
+        "share": FRAME_SHARES,
+        "s_mm": list(map(_known, radii)),
+        "sigma_r": [_known(math.sqrt(2) * sigma * base / radius) for radius in radii],
+    }
+    rows = len(FRAME_SHARES)
+    columns = [replace(column, formula=live(column.formula)) for column in OVER_FRAME]
+    sheet.table("tblFrame", columns, at=(head, 1), rows=rows, cells=over_frame)
+    sheet.worksheet.column_dimensions["A"].width = 36
+    sheet.finish()
+
+
+def _known(value: float) -> float | None:
+    """Return a number; None where what it follows from is not given."""
+    return None if math.isnan(value) else value
+
+
+def _uncertainty(content: SurveyContent, sigma: float, scale: float, diagonal: float) -> Cells:
+    """Return the radii inside which a relief is below twice its standard deviation."""
+    d1, d2 = content.pair.straight_distances if content.pair else (math.nan, math.nan)
+    radii = []
+    for cm in PLANNED_RELIEF:
+        r = cm / 100
+        noise = FlagLimits().on_plane * math.sqrt(2) * sigma
+        radii.append(noise * (d1 - r) * (d2 - r) / (r * abs(d1 - d2)))
+    return {
+        "relief_cm": PLANNED_RELIEF,
+        "radius_mm": list(map(_known, radii)),
+        "radius_m": [_known(radius * scale / 1000) for radius in radii],
+        "share": [_known(200 * radius / diagonal) for radius in radii],
+    }

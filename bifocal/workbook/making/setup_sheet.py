@@ -1,0 +1,114 @@
+"""The sheet `Setup` of a new survey workbook: one named cell per value, and what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from openpyxl.styles import Alignment
+
+from bifocal.workbook.content import SurveyContent, setup_cells
+from bifocal.workbook.formulas.columns import adjustment_names
+from bifocal.workbook.formulas.media_formulas import INDEX_LIMITS
+from bifocal.workbook.formulas.setup_cells import (
+    FORMS,
+    POSITIVE,
+    STATES,
+    TEXTS,
+    formulas,
+    groups,
+    may_be_zero,
+    state,
+    state_formula,
+)
+from bifocal.workbook.words import term, word
+from photocore.workbook.changing.cells import CellValue
+from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
+from photocore.workbook.making.look import GOOD, HEAD_FONT, WRONG, colour_words
+from photocore.workbook.making.words import Wording
+
+#: What a typed number of the set-up may be, where it need not be above zero.
+_NUMBERS = (-1e7, 1e7)
+
+
+def setup_sheet(builder: BookBuilder, content: SurveyContent) -> None:
+    """Write the set-up, typed and calculated, and in one line what it still lacks."""
+    sheet, cells = builder.sheet("Setup", "type"), setup_cells(content)
+    words = {key: builder.word(key) for key in STATES}
+    if content.media_cells:
+        words["state_scale"] = builder.word("state_scale_media")
+    line = state_formula(words, is_pair=content.is_pair)
+    sheet.formula("A3", line, state(cells, words), name="setup_state", font=HEAD_FONT)
+    sheet.headings(4, ("name", "description", "value", "unit"), (15, 61, 18, 9))
+    listed = groups(is_pair=content.is_pair, media=content.media_cells)
+    row = 5
+    for group in listed:
+        for name in group:
+            _setup_cell(sheet, row, name, cells, content, typed=group is not listed[-1])
+            row += 1
+        row += 1
+    for image in (1, 2):
+        names = [name for name in adjustment_names(image) if name in cells]
+        for name in names:
+            told = word("correction", builder.language).format(n=image)
+            sheet.describe(row, (name, told))
+            sheet.input(f"C{row}", cells[name], name=name)
+            sheet.validate(f"C{row}", title=name, prompt=told, limits=_NUMBERS)
+            row += 1
+    colour_words(sheet.worksheet, f"C5:C{row}", {"OK": GOOD, "CHECK": WRONG}, bold=("CHECK",))
+    sheet.finish(freeze="A5", repeat="4:4")
+
+
+def _setup_cell(
+    sheet: SheetBuilder,
+    row: int,
+    name: str,
+    cells: Mapping[str, CellValue],
+    content: SurveyContent,
+    *,
+    typed: bool,
+) -> None:
+    """Write one named value with its description and unit."""
+    known = _wording(name, content)
+    matrix = f"H{name[1]}({name[3:4]},{name[4:5]})"
+    told = known.in_language(sheet.book.language).format(n=name[-1]) if known else matrix
+    unit = known.unit if known else ""
+    sheet.describe(row, (name, told), unit)
+    cell, form, value = f"C{row}", FORMS.get(name, "General"), cells.get(name)
+    sheet.worksheet[cell].alignment = Alignment(horizontal="right")
+    if typed:
+        _validate(sheet, cell, name, f"{told} [{unit}]" if unit else told)
+    if name in content.links:
+        sheet.formula(cell, content.links[name], value, form=form, name=name, editable=True)
+        return
+    live = formulas(is_pair=content.is_pair, media=content.media_cells)
+    is_default = {
+        "d_1": content.pair is None,
+        "sigma_s": content.setup is None or content.setup.measuring.sigma_s is None,
+        "sigma_r_max": content.limits.sigma_r_max is None,
+    }
+    if not typed or (name in live and is_default.get(name, False)):
+        sheet.formula(cell, live[name], value, form=form, name=name, editable=typed)
+        return
+    sheet.input(cell, value, form=form, name=name)
+
+
+def _wording(name: str, content: SurveyContent) -> Wording | None:
+    """Return what a cell is called; numbered ones share an entry, some differ with media."""
+    bent = term("setup", f"{name}_media") if content.media_cells else None
+    return bent or term("setup", name) or term("setup", name.rstrip("0123456789"))
+
+
+def _validate(sheet: SheetBuilder, cell: str, name: str, prompt: str) -> None:
+    """Tell what a cell of `Setup` is for, and refuse what cannot be meant."""
+    if name == "input_unit":
+        sheet.validate(cell, title=name, prompt=prompt, choices="mm,px")
+    elif name in TEXTS:
+        sheet.validate(cell, title=name, prompt=prompt)
+    else:
+        above = name in POSITIVE
+        limits = None if above else _NUMBERS
+        if name.startswith("index_"):
+            limits = INDEX_LIMITS
+        elif may_be_zero(name):
+            limits = (0.0, _NUMBERS[1])
+        sheet.validate(cell, title=name, prompt=prompt, above_zero=above, limits=limits)

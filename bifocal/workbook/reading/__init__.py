@@ -1,0 +1,1 @@
+"""Surveys read: workbooks, tables, lists of picks."""

@@ -1,0 +1,239 @@
+"""One list of picks per photo, from CAD or an image viewer, joined by the names of the points."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bifocal.survey.observations import PointObservations
+from bifocal.workbook.reading.known_reader import refuse_absurd
+from photocore.arrays import FloatArray
+from photocore.errors import CellError, InputError, WorkbookError
+from photocore.tables import Column, read_table
+from photocore.tables.numbers import Decimal
+from photocore.textfile import check_file
+
+#: Headings of image viewers: pixels, rows down.
+_COLUMNS = (
+    Column("id", aliases=("Point", "Punto", "Punkt", "Name", "Nr", "Label"), kind="text"),
+    Column("x", aliases=("x1", "x2"), unit=""),
+    Column("y", aliases=("y1", "y2"), unit=""),
+    Column("col", aliases=("column", "col1", "col2", "i", "u", "pixel x"), unit="px"),
+    Column("row", aliases=("row1", "row2", "line", "j", "v", "pixel y"), unit="px"),
+)
+_TO_MM = {"mm": 1.0, "cm": 10.0, "um": 1e-3, "m": 1000.0}
+#: A text further from a point than this share of the drawing is not its name.
+_NEAR = 0.05
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PickList:
+    """Picks of one photo.
+
+    Attributes
+    ----------
+    ids : tuple of str, length n
+    places : ndarray, shape (n, 2)
+        (column, row) [px], or x, y from the nadir, y up [mm].
+    unit : str
+        ``px``, ``mm``, or empty where the file does not say.
+    file : Path
+    """
+
+    ids: tuple[str, ...]
+    places: FloatArray
+    unit: str
+    file: Path
+
+
+def read_picks(path: Path | str, decimal: Decimal | None = None) -> PickList:
+    """Read the picks of one photo.
+
+    Parameters
+    ----------
+    path : path
+        A table (``.csv .xlsx .ods``) with the headings id and x, y or col, row; or a drawing
+        (``.dxf``): a POINT with its name as the nearest TEXT, or TEXT alone, its insertion point
+        being the pick. Attach the photo to the drawing, or place its top left corner at 0, 0 with
+        one unit per pixel: y then is negative; else its coordinates are x, y from the nadir.
+    decimal : {"point", "comma"}, optional
+        Decimal separator of numbers typed as text.
+
+    Raises
+    ------
+    InputError
+        If the file holds no picks, or a point has no name or two places.
+    """
+    path = Path(path)
+    found = _of_drawing(path) if path.suffix.lower() == ".dxf" else _of_table(path, decimal)
+    if not found.ids:
+        raise InputError(f"{path}: holds no picks.")
+    seen: set[str] = set()
+    for name in found.ids:
+        if name in seen:
+            raise InputError(f"{path}: the point {name!r} stands there twice; give each one place.")
+        seen.add(name)
+    return found
+
+
+def joined(first: PickList, second: PickList, unit: str | None = None) -> PointObservations:
+    """Return the points that stand in both lists, in the order of the first.
+
+    Raises
+    ------
+    InputError
+        If the lists share no name, or have different units.
+    """
+    units = {unit} if unit else {first.unit, second.unit} - {""}
+    if len(units) > 1:
+        raise InputError(
+            f"{first.file} is in {first.unit}, {second.file} in {second.unit}; give both alike."
+        )
+    place = {name: row for row, name in enumerate(second.ids)}
+    ids = tuple(name for name in first.ids if name in place)
+    if not ids:
+        raise InputError(
+            f"{first.file} and {second.file} share no point: "
+            f"{', '.join(first.ids[:3])} ... against {', '.join(second.ids[:3])} ... "
+            "Give the same points the same names."
+        )
+    rows = {name: row for row, name in enumerate(first.ids)}
+    one = first.places[[rows[name] for name in ids]]
+    other = second.places[[place[name] for name in ids]]
+    if (units or {"px"}) == {"px"}:
+        return PointObservations(ids=ids, pixels1=one, pixels2=other)
+    return PointObservations(ids=ids, xy1=one, xy2=other)
+
+
+def left_over(first: PickList, second: PickList) -> list[str]:
+    """Return a sentence for each list that holds points which the other does not."""
+    said = []
+    for one, other in ((first, second), (second, first)):
+        alone = [name for name in one.ids if name not in set(other.ids)]
+        if alone:
+            more = " ..." if len(alone) > 10 else ""
+            said.append(
+                f"{one.file.name}: {len(alone)} point(s) not in {other.file.name}, left out: "
+                f"{', '.join(alone[:10])}{more}"
+            )
+    return said
+
+
+def _of_table(path: Path, decimal: Decimal | None) -> PickList:
+    """Return the picks of a text table or workbook."""
+    errors: list[CellError] = []
+    table = read_table(path, _COLUMNS, name="Points", decimal=decimal, errors=errors)
+    keys = ("col", "row") if {"col", "row"} <= table.present else ("x", "y")
+    if not set(keys) <= table.present or "id" not in table.present:
+        raise InputError(
+            f"{path}: the picks of one photo need the headings id and x, y or col, row."
+        )
+    refuse_absurd(table, keys, errors)
+    names = [name or "" for name in table.texts("id")]
+    places = np.stack([table.numbers(key) for key in keys], axis=-1)
+    for row, name in enumerate(names):
+        given = ~np.isnan(places[row])
+        if given.any() and not given.all():
+            key = keys[int(np.argmin(given))]
+            errors.append(table.error(row, key, "is blank; a pick has two coordinates."))
+        elif given.all() and not name:
+            errors.append(table.error(row, "id", "the pick has no name; give it one."))
+    if errors:
+        raise WorkbookError(errors)
+    symbol = "px" if keys[0] == "col" else table.units.get("x", "")
+    factor = _TO_MM.get(symbol, 1.0)
+    if symbol not in (*_TO_MM, "px", ""):
+        raise InputError(f"{path}: coordinates in {symbol}; give them in px or mm.")
+    keep = np.array([bool(name) for name in names]) & ~np.isnan(places).any(axis=1)
+    return PickList(
+        ids=tuple(name for name, kept in zip(names, keep, strict=True) if kept),
+        places=places[keep] * factor,
+        unit="mm" if symbol in _TO_MM else symbol,
+        file=path,
+    )
+
+
+def _of_drawing(path: Path) -> PickList:
+    """Return the picks of a drawing."""
+    model = _model_space(path)
+    texts = [
+        (entity.plain_text() if entity.dxftype() == "MTEXT" else entity.dxf.text, _insert(entity))
+        for entity in model.query("TEXT MTEXT")
+    ]
+    texts = [(text.strip(), place) for text, place in texts if text.strip()]
+    points = [tuple(entity.dxf.location)[:2] for entity in model.query("POINT")]
+    named = _named(path, points, texts) if points else texts
+    places: FloatArray = np.array([place for _, place in named]).reshape(-1, 2)
+    unit = ""
+    images = list(model.query("IMAGE"))
+    if len(images) > 1:
+        raise InputError(f"{path}: {len(images)} images; a list of picks is of one photo.")
+    if images:
+        places, unit = _pixels_of_image(images[0], places), "px"
+    elif len(places) and (places[:, 1] <= 0).all() and (places[:, 0] >= 0).all():
+        # The corner of the photo at 0, 0; pixels are counted from their centres.
+        places, unit = places * [1.0, -1.0] - 0.5, "px"
+    else:
+        unit = "mm"
+    return PickList(ids=tuple(name for name, _ in named), places=places, unit=unit, file=path)
+
+
+def _model_space(path: Path) -> Any:
+    """Return the model space of a drawing."""
+    import ezdxf
+
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder, expected a drawing.")
+    check_file(path)
+    try:
+        return ezdxf.readfile(path).modelspace()
+    except (ezdxf.DXFError, OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: is no DXF drawing that can be read ({error}).") from error
+
+
+def _insert(entity: Any) -> tuple[float, float]:
+    """Return the place of a text: its alignment point where it has one."""
+    dxf = entity.dxf
+    moved = entity.dxftype() == "TEXT" and (dxf.halign or dxf.valign)
+    place = dxf.align_point if moved and dxf.hasattr("align_point") else dxf.insert
+    return float(place[0]), float(place[1])
+
+
+def _named(
+    path: Path, points: list[tuple[float, ...]], texts: list[tuple[str, tuple[float, float]]]
+) -> list[tuple[str, tuple[float, float]]]:
+    """Return each point with the nearest text, nearest couples first, each text once."""
+    if len(texts) < len(points):
+        raise InputError(
+            f"{path}: {len(points)} points but {len(texts)} texts; write the name beside each "
+            "point."
+        )
+    size = max(np.ptp(np.array(points), axis=0).max(), 1e-9)
+    couples = sorted(
+        (math.dist(point, place), i, j)
+        for i, point in enumerate(points)
+        for j, (_, place) in enumerate(texts)
+    )
+    names: dict[int, int] = {}
+    taken: set[int] = set()
+    for distance, i, j in couples:
+        if i not in names and j not in taken:
+            if len(points) > 1 and distance > _NEAR * size:
+                x, y = points[i]
+                raise InputError(f"{path}: the point at {x:g}, {y:g} has no name beside it.")
+            names[i] = j
+            taken.add(j)
+    return [(texts[names[i]][0], (point[0], point[1])) for i, point in enumerate(points)]
+
+
+def _pixels_of_image(image: Any, places: FloatArray) -> FloatArray:
+    """Return the pixels of places in a drawing on the photo attached there."""
+    dxf = image.dxf
+    corner = np.array(tuple(dxf.insert)[:2])  # lower left corner of the photo
+    axes = np.array([tuple(dxf.u_pixel)[:2], tuple(dxf.v_pixel)[:2]])  # of one pixel
+    inside = np.linalg.solve(axes.T, (places - corner).T).T
+    return np.stack([inside[:, 0] - 0.5, dxf.image_size[1] - inside[:, 1] - 0.5], axis=-1)

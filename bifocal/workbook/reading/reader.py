@@ -1,0 +1,386 @@
+"""Read measured points from whatever people bring: our workbook, their own, or a text table."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.survey_input import SurveyInput, where_of, with_measured
+from bifocal.workbook.reading.known_reader import (
+    TO_M,
+    factor_of,
+    read_known,
+    refuse_absurd,
+    understood,
+    unit_error,
+)
+from bifocal.workbook.reading.setup_reader import is_general, read_setup
+from bifocal.workbook.words import LANGUAGES, word
+from photocore.arrays import BoolArray, FloatArray
+from photocore.errors import CellError, InputError, WorkbookError
+from photocore.tables import (
+    Column,
+    Table,
+    open_tables,
+    parse_column_map,
+    read_named_values,
+    read_table,
+)
+from photocore.tables.csvread import CsvFile
+from photocore.tables.headings import bare
+from photocore.tables.numbers import Decimal
+from photocore.workbook.reading.grid import SheetFile
+from photocore.workbook.reading.package import uncollected
+
+_XY, _POLAR = ("x1", "y1", "x2", "y2"), ("s1", "s2", "theta")
+_PIXELS = ("col1", "row1", "col2", "row2")
+#: Units expected where neither heading nor cell says one; that of x1..y2 depends on `Setup`.
+_UNITS = {"theta": "deg", "r_measured": "m", "s1": "mm", "s2": "mm"} | dict.fromkeys(_PIXELS, "px")
+#: Coordinates of both photos under one heading each, in the order of the photos.
+_SHARED = {"x1": "x", "y1": "y", "x2": "x", "y2": "y"} | {
+    "col1": "col", "row1": "row", "col2": "col", "row2": "row"
+}  # fmt: skip
+#: Headings of image coordinates in other programs: i counts columns, j rows.
+_OTHER = {"col1": "i", "row1": "j", "col2": "i", "row2": "j"}
+TO_DEGREES = {"deg": 1.0, "gon": 0.9, "rad": float(np.degrees(1.0))}
+TO_MM = {"mm": 1.0, "cm": 10.0, "um": 1e-3, "m": 1000.0}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadOptions:
+    """How to read: columns by hand, sheet, decimal separator, hidden rows.
+
+    Attributes
+    ----------
+    columns : mapping
+        Key to heading or column letter.
+    sheet : str or None
+        The sheet of the points.
+    decimal : {"point", "comma"} or None
+        Decimal separator of numbers typed as text.
+    visible_only : bool
+        Leave hidden rows out.
+    given : collection of str
+        Cells of the set-up that options replace, by their names; ``pair`` replaces them all.
+    """
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    sheet: str | None = None
+    decimal: Decimal | None = None
+    visible_only: bool = False
+    given: Collection[str] = ()
+
+
+def point_columns(*, shared: Sequence[str] = ()) -> list[Column]:
+    """Return the columns of measured points with every heading that is understood.
+
+    Parameters
+    ----------
+    shared : sequence of str
+        Keys that also take the headings "x y x y" or "col row col row" of photos 1 and 2. Tables
+        of points often hold X and Y on the wall too, so this is tried where nothing else fits.
+    """
+    columns = []
+    for key in ("id", *_XY, *_POLAR, *_PIXELS, "use", "code", "note", "r_measured"):
+        more = [_SHARED[key], *([_OTHER[key]] if key in _OTHER else [])] if key in shared else []
+        columns.append(understood(key, more=more, unit=_UNITS.get(key, "")))
+    return columns
+
+
+def column_map(text: str | None) -> dict[str, str]:
+    """Return key to heading or column letter from what a user typed; empty for None."""
+    return parse_column_map(text, [column.key for column in point_columns()]) if text else {}
+
+
+@uncollected()
+def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyInput:
+    """Read a survey: points, set-up, check points and control points.
+
+    Parameters
+    ----------
+    path : path
+        ``.xlsx``, ``.xlsm``, ``.ods`` or ``.csv``.
+    options : ReadOptions, optional
+        How to read.
+
+    Returns
+    -------
+    SurveyInput
+
+    Raises
+    ------
+    WorkbookError
+        Naming every bad cell of all sheets.
+    InputError
+        If the file or a sheet cannot be used at all.
+    """
+    options = options or ReadOptions()
+    book = open_tables(path)
+    errors: list[CellError] = []
+    table = _read_points(book, options, errors)
+    _require_coordinates(table, book, path)
+    points, unit = _observations(table, errors)
+    sheets = book if isinstance(book, SheetFile) else None
+    setup = read_setup(Path(path), sheets, options.decimal, errors, options.given)
+    check = read_known(book, "Check", ("X_ref", "Y_ref", "Z_ref"), errors, options.decimal)
+    control = read_known(book, "Georeference", ("E", "N", "H"), errors, options.decimal)
+    parts = (table, setup, check, control)
+    model, language, is_ours = "auto", "en", False
+    if sheets is not None:
+        asked = read_named_values(
+            sheets, [Column("g_model", kind="text")], sheet="Georeference", errors=errors
+        )
+        model = asked.text("g_model") or "auto"
+        language = _language(sheets)
+        is_ours = any(area.name == "tblPoints" for area in sheets.tables)
+    if errors:
+        raise WorkbookError(errors)
+    remarks = [remark for part in (table, check, control) for remark in part.remarks]
+    remarks += _typed_as_text([cell for part in parts for cell in part.text_cells])
+    return SurveyInput(
+        points=points,
+        setup=setup,
+        unit=unit,
+        known=with_measured(check.points.called_as(points.ids), points),
+        control=control.points.called_as(points.ids),
+        model=model,
+        language=language,
+        is_ours=is_ours,
+        table=table,
+        book=sheets,
+        titles=() if sheets is None else tuple(sheets.titles),
+        known_rows=check.rows,
+        control_rows=control.rows,
+        remarks=tuple(dict.fromkeys(remarks)),
+    )
+
+
+def _typed_as_text(cells: Sequence[str]) -> list[str]:
+    """Return what is said about numbers that the formulas of a workbook do not see."""
+    if not cells:
+        return []
+    more = f" and {len(cells) - 10} more" if len(cells) > 10 else ""
+    return [
+        f"{', '.join(cells[:10])}{more}: numbers typed as text. They were read, but formulas do "
+        "not see them: the result workbook (--out) holds them as numbers."
+    ]
+
+
+def _read_points(book: SheetFile | CsvFile, options: ReadOptions, errors: list[CellError]) -> Table:
+    """Return the table of points; headings that both photos share are the last resort."""
+    # In the workbook of a general pair x1..y2 are formulas that follow from the raw pixels.
+    general = isinstance(book, SheetFile) and is_general(book)
+    followed = {*_XY, *_POLAR} if general else set()
+    for shared in ((), _PIXELS, _XY):
+        last = shared == _XY
+        complaints: list[CellError] = []
+        try:
+            table = read_table(
+                book,
+                [c for c in point_columns(shared=shared) if c.key not in followed],
+                name="Points",
+                sheet=options.sheet,
+                decimal=options.decimal,
+                column_map=options.columns or None,
+                visible_only=options.visible_only,
+                errors=complaints,
+            )
+        except InputError:
+            if last:
+                raise
+            continue
+        given = table.present & {*_XY, *_PIXELS, "s1", "s2"}
+        if last or (given and (not shared or table.present.issuperset(shared))):
+            break
+    errors += complaints
+    for key in followed:
+        table.values[key] = np.full(len(table), np.nan)
+    return table
+
+
+def _require_coordinates(table: Table, book: object, path: Path | str) -> None:
+    """Refuse a table without the coordinates of both photos.
+
+    Raises
+    ------
+    InputError
+        Naming the missing sheet or columns.
+    """
+    have = table.present
+    kinds = (_XY, _PIXELS, ("s1", "s2"))
+    # A column that is missing beside filled ones matters even where another kind is complete.
+    broken = any(
+        not have.issuperset(keys)
+        and any(not np.isnan(table.numbers(key)).all() for key in keys if key in have)
+        for keys in kinds
+    )
+    if not broken and any(have.issuperset(keys) for keys in kinds):
+        return
+    where = where_of(table)
+    ours = isinstance(book, SheetFile) and bare(table.sheet) != "points"
+    if ours and not any(bare(title) == "points" for title in book.titles):  # type: ignore[attr-defined]
+        shown = ", ".join(f'"{title}"' for title in book.titles)  # type: ignore[attr-defined]
+        raise InputError(
+            f'{Path(path).name}: there is no sheet "Points" and no other table of points measured '
+            f"on both photos (looked in {shown}). It needs the headings x1 y1 x2 y2, or s1 s2 "
+            "theta, or col1 row1 col2 row2; say which columns they are with --columns."
+        )
+    groups = [keys for keys in kinds if have & set(keys) and not have.issuperset(keys)]
+    wanted = groups[0] if groups else _XY
+    missing = ", ".join(key for key in wanted if key not in have)
+    raise InputError(
+        f"{where}: there is no column {missing}. Points need x1 y1 x2 y2 [mm or px], or s1 s2 [mm] "
+        'and theta, or col1 row1 col2 row2 [px]; say which columns they are: --columns "id=A,...".'
+    )
+
+
+def _observations(table: Table, errors: list[CellError]) -> tuple[PointObservations, str]:
+    """Return the points and the unit of x1..y2 that the headings say."""
+    faulty = {(error.cell, error.column) for error in errors}
+    ids = table.texts("id")
+    if "id" not in table.present:
+        ids = [str(number) for number in range(1, len(table) + 1)]
+    ids = [name or "" for name in ids]
+    said = bare(table.headings.get("theta", "")) in ("angle", "angolo", "winkel")
+    if said and len(table) and "s1" in table.present and "x1" not in table.present:
+        table.remarks.append(
+            f'{table.cell(0, "theta")}: "{table.headings["theta"]}" is read as theta, clockwise '
+            "from up (+y). Of angles that run counter-clockwise from +x, as in CAD, X and Y would "
+            "come out exchanged: call the column theta and fill in 90 deg minus the angle."
+        )
+    errors += table.repeated("id")
+    refuse_absurd(table, (*_XY, *_POLAR, *_PIXELS, "r_measured"), errors)
+    use = table.numbers("use")
+    used: BoolArray = np.isnan(use) | (use != 0)
+    unit, factor = _unit_of_xy(table, errors)
+    xy = _stack(table, _XY) * factor
+    scales = [TO_MM, TO_MM, TO_DEGREES]
+    polar = _stack(table, _POLAR) * [
+        factor_of(table, key, factors, errors) for key, factors in zip(_POLAR, scales, strict=True)
+    ]
+    pixels = _stack(table, _PIXELS)
+    for key in _PIXELS:
+        factor_of(table, key, {"px": 1.0}, errors)
+    measured = table.numbers("r_measured") * factor_of(table, "r_measured", TO_M, errors)
+    _check_rows(table, ids, used, xy, polar, pixels, faulty, errors)
+    if errors:
+        ids = [name or f"row {row}" for name, row in zip(ids, table.rows, strict=True)]
+    points = PointObservations(
+        ids=tuple(ids),
+        xy1=xy[:, :2],
+        xy2=xy[:, 2:],
+        polar=polar,
+        pixels1=pixels[:, :2],
+        pixels2=pixels[:, 2:],
+        use=used,
+        code=tuple(table.texts("code")),
+        note=tuple(table.texts("note")),
+        r_measured=measured,
+    )
+    return points, unit
+
+
+def _stack(table: Table, keys: Sequence[str]) -> FloatArray:
+    return np.stack([table.numbers(key) for key in keys], axis=-1).reshape(-1, len(keys))
+
+
+def _unit_of_xy(table: Table, errors: list[CellError]) -> tuple[str, float]:
+    """Return ``mm`` or ``px`` as the headings say, and the factor to it."""
+    said = {key: table.units[key] for key in _XY if table.units.get(key)}
+    kinds = set(said.values())
+    if not kinds:
+        return "", 1.0
+    if len(kinds) > 1:
+        key = next(iter(said))
+        shown = ", ".join(f"{name} [{symbol}]" for name, symbol in said.items())
+        errors.append(
+            CellError(
+                f"the coordinates have different units: {shown}. Give all in mm or all in px.",
+                file=table.file,
+                sheet=table.sheet,
+                column=key,
+            )
+        )
+        return "", 1.0
+    symbol = kinds.pop()
+    bare_keys = [k for k in _XY if k not in said and not np.isnan(table.numbers(k)).all()]
+    for key in sorted(table.typed_units.intersection(said)) if bare_keys else ():
+        row = int(np.flatnonzero(~np.isnan(table.numbers(key)))[0])
+        message = (
+            f"is in {symbol} by the unit typed into the cell, while {', '.join(bare_keys)} says no "
+            "unit. Write the unit of the coordinates into their headings, the cells without it."
+        )
+        errors.append(table.error(row, key, message))
+    if symbol == "px":
+        return "px", 1.0
+    if symbol not in TO_MM:
+        errors.append(unit_error(table, next(iter(said)), symbol, "mm or px"))
+        return "", 1.0
+    return "mm", TO_MM[symbol]
+
+
+def _check_rows(
+    table: Table,
+    ids: Sequence[str],
+    used: BoolArray,
+    xy: FloatArray,
+    polar: FloatArray,
+    pixels: FloatArray,
+    faulty: set[tuple[str, str]],
+    errors: list[CellError],
+) -> None:
+    """Complain about points without a name, measured on one photo only, or with s <= 0."""
+    for row in range(len(table)):
+        if used[row] and not ids[row] and (table.cell(row, "id"), "id") not in faulty:
+            errors.append(table.error(row, "id", "the point has no name; give it one."))
+    groups = ((_XY, xy), (_PIXELS, pixels), (("s1", "s2"), polar[:, :2]))
+    for keys, values in groups:
+        given = ~np.isnan(values)
+        partly = used & given.any(axis=1) & ~given.all(axis=1)
+        if keys == ("s1", "s2"):
+            # Image coordinates, where both photos have them, make the radial distances idle.
+            partly &= np.isnan(xy).all(axis=1)
+        for row in np.flatnonzero(partly).tolist():
+            lacking = [key for i, key in enumerate(keys) if not given[row, i]]
+            if any((table.cell(row, key), key) in faulty for key in lacking):
+                continue  # its own complaint stands already
+            errors.append(table.error(row, lacking[0], _incomplete(ids[row], keys, lacking)))
+    if "s1" in table.present or "s2" in table.present:
+        for i, key in enumerate(("s1", "s2")):
+            for row in np.flatnonzero(used & (polar[:, i] <= 0)).tolist():
+                errors.append(
+                    table.error(
+                        row,
+                        key,
+                        f"{polar[row, i]:g} mm at point {ids[row]}: a radial distance must be "
+                        "above zero; at the nadir itself there is no relief to measure. Set use = "
+                        "0 or measure it again.",
+                    )
+                )
+
+
+def _incomplete(name: str, keys: Sequence[str], lacking: Sequence[str]) -> str:
+    images = {key[-1] for key in lacking}
+    here = {key[-1] for key in keys if key not in lacking}
+    if len(images) == 1 and images.isdisjoint(here):
+        other = "2" if images == {"1"} else "1"
+        return (
+            f"point {name} is measured only on image {other}; measure it on image "
+            f"{images.pop()} too, or set use = 0."
+        )
+    return f"point {name} lacks {', '.join(lacking)}; complete it, or set use = 0."
+
+
+def _language(book: SheetFile) -> str:
+    """Return the language of a survey workbook by the title of its sheet `Points`."""
+    title = next((name for name in book.titles if bare(name) == "points"), None)
+    if title is not None:
+        words = {str(cell) for cell in book.grid(title).rows.get(1, {}).values()}
+        for language in LANGUAGES:
+            if word("Points", language) in words:
+                return language
+    return "en"

@@ -1,0 +1,316 @@
+"""Read the cells of the sheet `Setup`, or of a user's own, found by name or label."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable
+from pathlib import Path
+
+import numpy as np
+
+from bifocal.survey.setup import Measuring, SurveySetup, Taking
+from bifocal.survey.survey_media import (
+    FEWEST,
+    HEIGHTS,
+    MOST,
+    SurveyMedia,
+    index_names,
+    media_names,
+    thickness_names,
+)
+from bifocal.workbook.formulas.columns import adjustment_names
+from bifocal.workbook.formulas.media_formulas import INDEX_LIMITS
+from bifocal.workbook.formulas.setup_cells import (
+    MATRICES,
+    NADIRS,
+    PHOTOS,
+    PRINTS,
+    TITLE_BLOCK,
+    TYPED_FORMULAS,
+)
+from bifocal.workbook.reading.known_reader import LARGEST
+from bifocal.workbook.words import headings, term
+from photocore.arrays import FloatArray
+from photocore.errors import CellError
+from photocore.tables import Column, NamedValues, read_named_values
+from photocore.tables.model import Kind
+from photocore.tables.numbers import Decimal
+from photocore.workbook.reading.grid import SheetFile
+from photocore.workbook.reading.package import open_package
+from photocore.workbook.reading.xlsx import read_directory
+
+_NUMBERS = (
+    *("c_1", "c_2", *PRINTS, "d_1", "d_2", "delta_d", "pitch"),
+    *("sigma_s", "sigma_px", "sigma_r_max", "k_off", "k_plane"),
+    *("nadir_1_col", "nadir_1_row", "nadir_2_col", "nadir_2_row", "sensor_w", "sensor_h"),
+)
+_TEXTS = ("input_unit", "pair_file", *PHOTOS)
+#: d_1 typed and d_2 + delta_d may differ by this much: a tape's millimetre.
+_AGREE = 0.0015
+
+
+def read_setup(
+    path: Path, book: SheetFile | None, decimal: Decimal | None, errors: list[CellError],
+    given: Collection[str],
+) -> SurveySetup:  # fmt: skip
+    """Return the values of `Setup`.
+
+    Parameters
+    ----------
+    path : Path
+        The file, to look at formulas.
+    book : SheetFile or None
+        The open workbook; None for a text table, which has no set-up.
+    decimal : str or None
+        Decimal separator of numbers typed as text.
+    errors : list
+        Takes the complaints.
+    given : collection of str
+        Cells that options replace, by their names; ``pair`` replaces them all.
+    """
+    if book is None:
+        return SurveySetup(where=path.name)
+    complaints: list[CellError] = []
+    # In the workbook of a general pair sigma_s follows from sigma_px: nothing to read.
+    columns = [c for c in _columns() if not (c.key == "sigma_s" and is_general(book))]
+    if "d_1" in book.names and "d_2" in book.names:
+        # Our own workbook: every value has its name, labels need not be searched for.
+        titles = [Column(key, kind="text") for key in TITLE_BLOCK]
+        columns = [c for c in (*columns, *titles) if c.key.casefold() in book.names]
+    else:
+        # Cells of media are found by name only: no workbook of a user's own has them otherwise.
+        columns = [c for c in columns if c.key not in media_names(MOST)]
+    values = read_named_values(
+        book, columns, sheet="Setup", decimal=decimal, errors=complaints, several=True, given=given
+    )
+    where = f"{book.label} › Setup" if "Setup" in book.titles else book.label
+    formulas = _formulas(path, values)
+    defaults = {key for key in ("sigma_s", "sigma_r_max") if key in formulas}
+    # Cells with the template's own formula are defaults, calculated or not.
+    told = [e for e in complaints if e.column not in formulas]
+    number = {key: _number(values, key) for key in _NUMBERS if key not in defaults}
+    _check_positive(values, number, told)
+    media = _media(book, values, told)
+    d1 = _distance(values, number, "d_1" in formulas, told)
+    unit = _unit(values, told)
+    # What options replace may hold anything, as all beside another pair that is not our workbook.
+    is_idle = "pair" in given and "d_1" not in book.names
+    errors += [] if is_idle else [error for error in told if error.column not in given]
+    matrices, nadirs = _general(values)
+    return SurveySetup(
+        taking=Taking(
+            d1=d1,
+            d2=_near(number, d1),
+            c1=number["c_1"],
+            c2=number["c_2"],
+            enlargement1=number["enlargement_1"],
+            enlargement2=number["enlargement_2"],
+            pitch=number["pitch"],
+            nadir1=_place(number["nadir_1_col"], number["nadir_1_row"]),
+            nadir2=_place(number["nadir_2_col"], number["nadir_2_row"]),
+        ),
+        measuring=Measuring(
+            unit=unit,
+            sigma_s=number.get("sigma_s"),
+            sigma_px=number["sigma_px"],
+            sigma_r_max=number.get("sigma_r_max"),
+            k_off=number["k_off"],
+            k_plane=number["k_plane"],
+        ),
+        sensor=_place(number["sensor_w"], number["sensor_h"]),
+        pair_file=_text(values, "pair_file"),
+        photo1=_text(values, "photo_1").strip(),
+        photo2=_text(values, "photo_2").strip(),
+        title_block={key: text for key in TITLE_BLOCK if (text := _text(values, key))},
+        matrices=matrices,
+        nadirs=nadirs,
+        adjusted=_adjusted(book),
+        media=media,
+        places=values.places,
+        where=where,
+        remarks=tuple(values.remarks),
+        text_cells=tuple(values.text_cells),
+    )
+
+
+def _adjusted(book: SheetFile) -> tuple[FloatArray | None, FloatArray | None]:
+    """Return the corrections of both photos' coordinates, None where the workbook has none."""
+    found: list[FloatArray | None] = []
+    for image in (1, 2):
+        names = adjustment_names(image)
+        places = [book.names[name] for name in names if name in book.names]
+        cells = [book.grid(sheet).rows.get(row, {}).get(column) for sheet, row, column in places]
+        numbers = [cell for cell in cells if isinstance(cell, float)]
+        found.append(np.reshape(numbers, (3, 3)) if len(numbers) == len(names) else None)
+    return found[0], found[1]
+
+
+def media_count(names: Collection[str]) -> int:
+    """Return for how many media a workbook has cells, by the names of its cells; 0 for air."""
+    count = sum(name in names for name in index_names(MOST))
+    return count if count >= FEWEST else 0
+
+
+def _media(book: SheetFile, values: NamedValues, errors: list[CellError]) -> SurveyMedia | None:
+    """Return what the cells of media hold, complaining about what cannot be meant."""
+    count = media_count(book.names)
+    if not count:
+        return None
+    cells = {name: _number(values, name) for name in media_names(count)}
+    media = SurveyMedia.of_cells(cells, count)
+    complaints = {**_bad_indices(media), **_bad_thicknesses(media)}
+    for name in HEIGHTS:
+        z0 = cells[name]
+        if z0 is not None and z0 < 0:
+            complaints[name] = f"found {z0:g} m, expected zero or more."
+        elif z0 is None and any(index is not None for index in media.indices[1:]):
+            complaints[name] = "is blank: type the way from the camera to the first interface [m]."
+    errors += [values.error(name, told) for name, told in complaints.items()]
+    return media
+
+
+def _bad_indices(media: SurveyMedia) -> dict[str, str]:
+    """Return what is wrong with refractive indices, by cell."""
+    low, high = INDEX_LIMITS
+    return {
+        name: f"found {index:g}, expected a refractive index, {low:g} to {high:g}."
+        for name, index in zip(index_names(media.media), media.indices, strict=True)
+        if index is not None and not low <= index <= high
+    }
+
+
+def _bad_thicknesses(media: SurveyMedia) -> dict[str, str]:
+    """Return what is wrong with thicknesses, by cell: media between two others have one."""
+    stated = [n for n, index in enumerate(media.indices, start=1) if index is not None or n == 1]
+    complaints = {}
+    names = thickness_names(media.media)
+    for n, (name, thick) in enumerate(zip(names, media.thicknesses, strict=True), start=2):
+        inside = n in stated and n != stated[-1]
+        if thick is not None and thick < 0:
+            complaints[name] = f"found {thick:g} m, expected zero or more."
+        elif inside and thick is None:
+            complaints[name] = f"is blank: type the thickness of medium {n} in metres."
+        elif n not in stated and thick:
+            complaints[name] = f"found {thick:g} m, but index_{n} is blank: type it, or clear this."
+        elif not inside and thick:
+            complaints[name] = (
+                f"found {thick:g} m, but medium {n} is the last one with an index, which has no "
+                f"thickness: type index_{n + 1}, or clear this cell."
+            )
+    return complaints
+
+
+def is_general(book: SheetFile) -> bool:
+    """Whether a workbook describes a general pair by homographies."""
+    return "h1_11" in book.names
+
+
+def _columns() -> list[Column]:
+    columns = []
+    for key in (*_NUMBERS, *media_names(MOST), *_general_names(), *_TEXTS):
+        known = term("setup", key)
+        unit = known.unit if known is not None and key not in _TEXTS else ""
+        kind: Kind = "text" if key in _TEXTS else "number"
+        columns.append(Column(key, headings("setup", key), kind=kind, unit=unit))
+    return columns
+
+
+def _general_names() -> Iterable[str]:
+    return (name for group in (*MATRICES, *NADIRS) for name in group)
+
+
+def _text(values: NamedValues, key: str) -> str:
+    return values.text(key) if key in values.values else ""
+
+
+def _number(values: NamedValues, key: str) -> float | None:
+    return values.number(key) if key in values.values and values.has(key) else None
+
+
+def _formulas(path: Path, values: NamedValues) -> set[str]:
+    """Return which cells hold the template's own formula instead of a typed number."""
+    wanted = {key: values.places[key] for key in TYPED_FORMULAS if key in values.places}
+    if path.suffix.lower() not in (".xlsx", ".xlsm", ".xltx", ".xltm") or not wanted:
+        return set()
+    with open_package(path) as package:
+        directory = read_directory(path, package)
+        parts = {sheet.title: sheet.part for sheet in directory.sheets}
+        own = set()
+        for key, (sheet, cell) in wanted.items():
+            text = package.read(parts[sheet]).decode("utf-8", errors="replace")
+            match = re.search(rf'<(?:\w+:)?c r="{cell}"[^>]*><(?:\w+:)?f[^>]*>([^<]*)<', text)
+            # Those of older versions are a part of today's.
+            stands = _plain(match[1]) if match else ""
+            if stands.startswith("if(") and stands in _plain(TYPED_FORMULAS[key]):
+                own.add(key)
+    return own
+
+
+def _plain(formula: str) -> str:
+    """Return a formula without blanks, case and sheet-name noise."""
+    text = formula.replace("&quot;", '"').replace("&lt;", "<").replace("&gt;", ">")
+    return re.sub(r"[\s$]", "", text).casefold()
+
+
+def _check_positive(
+    values: NamedValues, number: dict[str, float | None], errors: list[CellError]
+) -> None:
+    for key, value in number.items():
+        if value is not None and not key.startswith("nadir") and value <= 0:
+            errors.append(values.error(key, f"found {value:g}, expected a number above zero."))
+        elif value is not None and not 1e-9 < abs(value or 1.0) < LARGEST:
+            errors.append(values.error(key, f"found {value:g}, which cannot be meant; correct it."))
+
+
+def _distance(
+    values: NamedValues, number: dict[str, float | None], is_formula: bool, errors: list[CellError]
+) -> float | None:
+    """Return d_1: typed, or d_2 + delta_d; complain if both are given and differ."""
+    near, step = number["d_2"], number["delta_d"]
+    typed = None if is_formula else number["d_1"]
+    total = near + step if near is not None and step is not None else None
+    if typed is not None and total is not None and abs(typed - total) > _AGREE:
+        errors.append(
+            values.error(
+                "d_1",
+                f"found {typed:g} m, but d_2 + delta_d = {near:g} + {step:g} = {total:g} m. "
+                "Correct one of the three, or clear delta_d.",
+            )
+        )
+    return typed if typed is not None else total
+
+
+def _place(column: float | None, row: float | None) -> tuple[float, float] | None:
+    return None if column is None or row is None else (column, row)
+
+
+def _near(number: dict[str, float | None], d1: float | None) -> float | None:
+    """Return d_2: typed, or d_1 - delta_d."""
+    step = number["delta_d"]
+    if number["d_2"] is None and d1 is not None and step is not None and d1 > step:
+        return d1 - step
+    return number["d_2"]
+
+
+def _unit(values: NamedValues, errors: list[CellError]) -> str:
+    """Return the input unit, millimetres where the cell is blank."""
+    text = _text(values, "input_unit").strip().casefold()
+    if text in ("", "mm"):
+        return "mm"
+    if text in ("px", "pixel", "pixels", "pix"):
+        return "px"
+    errors.append(values.error("input_unit", f'found "{text}", expected mm or px.'))
+    return "mm"
+
+
+def _general(
+    values: NamedValues,
+) -> tuple[tuple[FloatArray, FloatArray] | None, tuple[FloatArray, FloatArray]]:
+    """Return homographies and nadirs on the wall, if the workbook describes a general pair."""
+    if not all(name in values.values and values.has(name) for name in _general_names()):
+        return None, (np.zeros(2), np.zeros(2))
+    first, second = (
+        np.array([values.number(name) for name in names]).reshape(3, 3) for names in MATRICES
+    )
+    nadirs = [np.array([values.number(name) for name in names]) for names in NADIRS]
+    return (first, second), (nadirs[0], nadirs[1])

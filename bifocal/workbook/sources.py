@@ -1,0 +1,157 @@
+"""Where a survey comes from: what was measured, and the geometry it was measured with."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from bifocal.model.lens import Lens
+from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
+from bifocal.remarks import remark
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.setup import SurveySetup
+from bifocal.survey.survey_input import SurveyInput, with_measured
+from bifocal.survey.units import refuse_far_stations
+from bifocal.workbook.reading.pick_lists import joined, left_over, read_picks
+from bifocal.workbook.reading.reader import ReadOptions, read_survey
+from photocore.errors import GeometryError, InputError
+
+Lists = tuple[Path | str, Path | str]
+Source = Path | str | PointObservations | SurveyInput | Mapping[str, Any] | Lists
+#: Files that are workbooks, and so no pair files.
+BOOKS = (".xlsx", ".xlsm", ".ods")
+
+
+def measured(source: Source, options: ReadOptions, unit: str | None) -> tuple[SurveyInput, Path]:
+    """Return what was measured, and the file it stands in."""
+    if isinstance(source, tuple):
+        first, second = (read_picks(path, options.decimal) for path in source)
+        survey = SurveyInput.of_points(joined(first, second, unit))
+        where = f"{first.file.name}, {second.file.name}"
+        survey = replace(
+            survey,
+            setup=replace(survey.setup, where=where),
+            remarks=tuple(left_over(first, second)),
+        )
+        return survey, first.file
+    if isinstance(source, Mapping):
+        source = PointObservations.from_columns(source)
+    if isinstance(source, PointObservations):
+        source = SurveyInput.of_points(source)
+    if isinstance(source, SurveyInput):
+        return source, Path(source.table.file)
+    if not isinstance(source, Path | str):
+        raise InputError(
+            f"solve: expected a file, or columns by key, found {type(source).__name__}. Of a data "
+            "frame give the columns: dict(frame) with pandas, frame.to_dict() with polars."
+        )
+    return read_survey(source, options), Path(source)
+
+
+def set_up(
+    survey: SurveyInput,
+    pair: Pair | Path | str | None,
+    given: Mapping[str, Any],
+    options: ReadOptions,
+) -> tuple[SurveyInput, Pair | Path | str | None]:
+    """Return the points with the set-up that holds for them, and the pair where it is not that."""
+    if isinstance(pair, Path | str) and Path(pair).suffix.lower() in BOOKS:
+        survey, pair = _with_setup_of(Path(pair), survey, options.given), None
+    setup = survey.setup.but(**{"unit": survey.unit or survey.setup.unit, **given})
+    if not len(survey.points):
+        raise InputError(f"{survey.where}: there is no point. Fill in the measured points.")
+    if pair is None:
+        refuse_far_stations(setup.taking.d1, setup.taking.d2, setup.where, options=given)
+    return replace(survey, setup=setup), pair
+
+
+def _with_setup_of(path: Path, survey: SurveyInput, given: Collection[str]) -> SurveyInput:
+    """Return measured points with the set-up, check and control points of a survey workbook."""
+    book = read_survey(path, ReadOptions(given=given))
+    setup = book.setup
+    if setup.pair_file:
+        setup = replace(setup, pair_file=str((path.parent / setup.pair_file).resolve()))
+    return replace(
+        book,
+        points=survey.points,
+        setup=setup,
+        unit=survey.unit,
+        known=with_measured(book.known, survey.points),
+        is_ours=False,
+        table=survey.table,
+        remarks=(*survey.remarks, *book.remarks),
+    )
+
+
+def given_pair(
+    survey: SurveyInput, path: Path, pair: Pair | Path | str | None
+) -> tuple[Pair | None, Path | None, list[str]]:
+    """Return the pair asked for, or the one the workbook describes, its file, and remarks."""
+    if isinstance(pair, Pair):
+        return pair, None, list(pair.remarks)
+    if pair is not None:
+        given = Pair.read(pair)
+        return given, Path(pair), [f"{pair}: {remark}" for remark in given.remarks]
+    setup = survey.setup
+    named = path.parent / setup.pair_file if setup.pair_file else None
+    file = named if named is not None and named.is_file() else None
+    described = described_pair(setup, file, path.parent)
+    if described is None:
+        return None, None, []
+    said = described.remarks
+    if setup.media and not setup.refracted:
+        said = tuple(remark for remark in said if not remark.startswith("layers:"))
+    return described, file, [f"{setup.where}: {remark}" for remark in said]
+
+
+def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair | None:
+    """Return the pair whose homographies `Setup` holds, with the lenses of its pair file.
+
+    Where that file is not read a remark says that pixels count as free of lens distortion. Media
+    are those of the workbook, where it has cells for them (`UNBENT` where these are blank), else
+    those of the file.
+    """
+    taking = setup.taking
+    if setup.matrices is None or taking.d1 is None or taking.d2 is None:
+        return None
+    lenses: list[Lens | None] = [None, None]
+    sizes: list[tuple[int, int] | None] = [None, None]
+    orientation, remarks, extra = None, list[str](), {"setup": None}
+    media: list[dict[str, Any]] = [{}, {}]
+    if setup.media:
+        through = [setup.media.through(number) for number in (1, 2)]
+        media = [{"layers": layers, "z0": z0} for layers, z0 in through]
+    if setup.pair_file and file is None:
+        remarks.append(remark("survey.no_lens", file=setup.pair_file))
+    if file is not None:
+        try:
+            given = Pair.read(file)
+            extra = {"setup": given.extra.get("setup")}
+            lenses = [given.image1.lens, given.image2.lens]
+            sizes = [given.image1.image_size, given.image2.image_size]
+            if not setup.media or setup.media.layers == given.layers:
+                orientation = given.orientation  # it may count the media too
+            if not setup.media:
+                media = [
+                    {name: getattr(photo, name) for name in ("layers", "z0", "interface_normal")}
+                    for photo in (given.image1, given.image2)
+                ]
+        except (InputError, GeometryError) as error:
+            remarks.append(remark("survey.lens_unusable", file=setup.pair_file, why=error))
+    photos = [
+        Photo(
+            plane_from_pixel=matrix, nadir=nadir, distance=d, lens=lens, principal_distance=c,
+            image_size=size, **through,
+        )
+        for matrix, nadir, d, lens, c, size, through in zip(
+            setup.matrices, setup.nadirs, (taking.d1, taking.d2), lenses, (taking.c1, taking.c2),
+            sizes, media, strict=True,
+        )
+    ]  # fmt: skip
+    return Pair(
+        image1=photos[0], image2=photos[1], folder=folder, orientation=orientation,
+        remarks=tuple(remarks), extra=extra,
+    )  # fmt: skip

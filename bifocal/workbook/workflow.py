@@ -1,0 +1,107 @@
+"""Solve a survey: file in, relief, coordinates, precision, check and world coordinates out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from bifocal.model.pair import Pair
+from bifocal.survey.setup import SCALE_TOLERANCE, Measuring, Taking, given_of
+from bifocal.survey.solved_survey import SolvedSurvey
+from bifocal.survey.solver import solve_survey
+from bifocal.survey.survey_media import SurveyMedia
+from bifocal.survey.tolerances import RULES, ToleranceRule, as_rule
+from bifocal.survey.units import refuse_not_above_zero
+from bifocal.workbook.formulas.setup_cells import cells_of
+from bifocal.workbook.reading.reader import ReadOptions
+from bifocal.workbook.sources import Source, given_pair, measured, set_up
+
+
+def solve(
+    source: Source,
+    *,
+    pair: Pair | Path | str | None = None,
+    taking: Taking | None = None,
+    measuring: Measuring | None = None,
+    adjust_setup: bool = False,
+    model: str | None = None,
+    scale_tolerance: float = SCALE_TOLERANCE,
+    rules: Sequence[str | ToleranceRule] = (),
+    reading: ReadOptions | None = None,
+) -> SolvedSurvey:
+    r"""Solve measured points: relief, displacements, coordinates, precision, check, world.
+
+    Parameters
+    ----------
+    source : path, mapping, PointObservations, SurveyInput or tuple of two paths
+        A survey workbook or table (``.xlsx .xlsm .ods .csv``), or columns by key: ``id`` and
+        ``x1 y1 x2 y2`` [mm or px], or ``s1 s2`` [mm] and ``theta`` [deg], or ``col1 row1 col2
+        row2`` [px]; each of shape (n,), NaN where blank. Two paths: the picks of photo 1 and of
+        photo 2 (`bifocal.workbook.reading.pick_lists.read_picks`), joined by name.
+    pair : Pair or path, optional
+        Pair or pair file, for raw pixels, or a survey workbook whose set-up, check and control
+        points are taken; default the workbook's own set-up.
+    taking : Taking, optional
+        Distances [m], principal distances [mm] and the like, in place of those of `Setup`.
+    measuring : Measuring, optional
+        Unit and precision of what was measured, in place of those of `Setup`.
+    adjust_setup : bool
+        Correct the orientation by points of the reference plane (code PLANE, r = 0).
+    model : {"auto", "levelled", "3D", "2D"}, optional
+        Of the roto-translation to the world; default the workbook's, else auto.
+    scale_tolerance : float
+        Share by which the scales of both photos may differ.
+    rules : sequence of str or ToleranceRule
+        For the verdict on drawing scales: names, ``"0.2mm"`` at scale, ``"2cm"`` on the wall.
+    reading : ReadOptions, optional
+        Which column is which, the sheet of the points, the decimal separator; found by default.
+
+    Returns
+    -------
+    SolvedSurvey
+        ``table`` holds the columns of the sheet `Points` by key (``table["r"]``, ``table.xyz`` of
+        shape (n, 3), ``table.flags``), NaN where undefined; ``remarks`` what the user should know.
+
+    Raises
+    ------
+    WorkbookError
+        Naming every bad cell.
+    InputError, GeometryError
+        If an option, the set-up or the geometry is at fault.
+
+    Notes
+    -----
+    Eqs. (1) to (7) of [1]_; see `bifocal.survey.point_survey.solve_points`.
+
+    References
+    ----------
+    .. [1] Midulla, "Bifocal pairs of images for low-cost survey in close range photogrammetry".
+
+    Examples
+    --------
+    A point 2 m right of the nadir and 1 m before the wall, 35 mm / 17.5 m and 19 mm / 9.5 m:
+
+    >>> picks = {"id": ["P1"], "s1": [35 * 2 / 16.5], "s2": [19 * 2 / 8.5], "theta": [90]}
+    >>> survey = solve(picks, taking=Taking(d1=17.5, d2=9.5, c1=35, c2=19))
+    >>> survey.table.xyz.round(9).tolist(), survey.table.flags
+    ([[2.0, 0.0, 1.0]], ('OK',))
+    """
+    given = given_of(taking) | given_of(measuring)
+    refuse_not_above_zero(**given, scale_tolerance=scale_tolerance)
+    judged = tuple(as_rule(rule) for rule in rules) or RULES
+    asked = given | {n: v for n, v in (("pair", pair), ("model", model)) if v is not None}
+    options = replace(reading or ReadOptions(), given=tuple(cells_of(asked)))
+    survey, path = measured(source, options, given.get("unit"))
+    survey, pair = set_up(survey, pair, given, options)
+    general, pair_path, pair_remarks = given_pair(survey, path, pair)
+    # What is wrong with the pair comes first.
+    survey = replace(survey, model=model or survey.model, remarks=(*pair_remarks, *survey.remarks))
+    solved = solve_survey(
+        survey, general, adjust=adjust_setup, scale_tolerance=scale_tolerance, rules=judged
+    )
+    media = solved.media
+    if general is not None and pair is not None:  # the cells of media take those of its file
+        count = media.media if media else 0
+        media = SurveyMedia.of_photos((general.image1, general.image2), count)
+    return replace(solved, media=media, source=path, pair_path=pair_path, given=asked)

@@ -1,0 +1,137 @@
+"""Remarks with a key and values; their words lie in a package's `remarks.toml`, in 3 languages.
+
+A remark is a ``str``, its English words: files, JSON and the command line hold these. Reports and
+pages call `Remarks.in_language`, which knows a remark by its words wherever it stands, also in a
+text that was read from a file or put together from several.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from functools import cached_property, lru_cache, partial
+from importlib.resources import files
+from string import Formatter
+from typing import Any
+
+from photocore.workbook.making.words import LANGUAGES
+
+#: Entries of this section are single words: looked up only as values of blanks ``{...!s}``.
+WORDS = "word."
+#: What a blank with a number format may hold; any other holds any text.
+_NUMBER, _TEXT = r"[-+−\d.,:einfa%]+?", r"[^\n]+?"
+
+
+class Remark(str):
+    """Something to tell the user, in English words.
+
+    Attributes
+    ----------
+    key : str
+        Its section and name in `remarks.toml`.
+    values : mapping
+        What fills its blanks.
+    """
+
+    key: str
+    values: Mapping[str, Any]
+
+
+class Remarks:
+    """The remarks of a package and of those it builds on.
+
+    Parameters
+    ----------
+    *packages : str
+        Each with a file `remarks.toml` of tables ``[section.name]``, each of which holds one text
+        with blanks a language. A blank is a format field; ``!s`` says that its value is itself
+        looked up.
+
+    Examples
+    --------
+    >>> remark = Remarks("bifocal")
+    >>> text = remark("survey.off_radial_more", count=3)
+    >>> text
+    '... and 3 more OFF-RADIAL points.'
+    >>> remark.in_language(f"survey.xlsx: {text}", "it")
+    'survey.xlsx: ... e altri 3 punti OFF-RADIAL.'
+    """
+
+    def __init__(self, *packages: str) -> None:
+        self.packages = packages
+        self.in_language = lru_cache(4096)(self._in_language)
+
+    @cached_property
+    def texts(self) -> dict[str, dict[str, str]]:
+        """Texts by key and language."""
+        found: dict[str, dict[str, str]] = {}
+        for package in self.packages:
+            text = files(package).joinpath("remarks.toml").read_text(encoding="utf-8")
+            for section, entries in tomllib.loads(text).items():
+                found |= {f"{section}.{name}": words for name, words in entries.items()}
+        return found
+
+    def __call__(self, key: str, **values: Any) -> Remark:
+        """Return a remark by its key, its blanks filled."""
+        told = Remark(self.texts[key]["en"].format(**values))
+        told.key, told.values = key, values
+        return told
+
+    def _in_language(self, text: str, language: str) -> str:
+        """Return a text with all remarks known in it in another of `LANGUAGES`.
+
+        Parameters
+        ----------
+        text : str
+            A `Remark`, or any text that holds some: their words tell which.
+        language : str
+        """
+        if language == LANGUAGES[0]:
+            return str(text)
+        for entry in self._entries:
+            if all(literal in text for literal in entry.literals):
+                text = entry.pattern.sub(partial(self._worded, entry, language), text)
+        return str(text)
+
+    def _worded(self, entry: _Entry, language: str, match: re.Match[str]) -> str:
+        blanks = match.groupdict()
+        for name in entry.nested & blanks.keys():
+            word = self._words.get(blanks[name])
+            blanks[name] = word[language] if word else self.in_language(blanks[name], language)
+        return entry.texts[language].format(**blanks)
+
+    @cached_property
+    def _words(self) -> dict[str, dict[str, str]]:
+        return {text["en"]: text for key, text in self.texts.items() if key.startswith(WORDS)}
+
+    @cached_property
+    def _entries(self) -> list[_Entry]:
+        """What is searched for, longest first."""
+        found = [_Entry(text) for key, text in self.texts.items() if not key.startswith(WORDS)]
+        return sorted(found, key=lambda entry: -sum(map(len, entry.literals)))
+
+
+class _Entry:
+    """A text of `remarks.toml`: how to know it, and its other languages without formats."""
+
+    def __init__(self, texts: Mapping[str, str]) -> None:
+        parts = list(Formatter().parse(texts["en"]))
+        self.literals = [literal for literal, *_ in parts if literal]
+        self.nested = {name for _, name, _, mark in parts if name and mark == "s"}
+        self.pattern = re.compile("".join(_patterns(parts)))
+        self.texts = {key: re.sub(r"(?<=\w)[:!][^{}]*}", "}", text) for key, text in texts.items()}
+
+
+def _patterns(parts: list[Any]) -> Iterator[str]:
+    """Yield the parts of the regular expression that knows a text."""
+    known: set[str] = set()
+    for place, (literal, name, form, _) in enumerate(parts):
+        yield re.escape(literal)
+        if name is None:
+            continue
+        kind = _NUMBER if form else _TEXT
+        if place == len(parts) - 1:
+            kind = kind[:-1]  # at the end as much as there is
+        yield f"(?P={name})" if name in known else f"(?P<{name}>{kind})"
+        known.add(name)

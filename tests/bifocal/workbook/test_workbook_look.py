@@ -1,0 +1,357 @@
+"""The survey workbook as its user sees it: on the screen, on paper, in three languages."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from pathlib import Path
+
+import openpyxl
+import pytest
+from click.testing import CliRunner
+from openpyxl.utils import range_boundaries
+
+from bifocal import SurveySetup, Taking
+from bifocal.workbook.content import SurveyContent
+from bifocal.workbook.making.book import write_book
+from bifocal.workbook.template_workflow import write_template
+from tests.bifocal.workbook.test_survey_workbook import ideal_content, named, pair_content
+from tests.builders.commands import bifocal_command as main
+from tests.recalculate import recalculated
+from tests.workbook_page import dimension, printed_columns, scale_of, sizes_of
+
+TEMPLATES = Path(__file__).parents[3] / "templates"
+LANGUAGES = ("en", "it", "de")
+
+
+@pytest.fixture(scope="module")
+def books(tmp_path_factory):
+    """Return workbooks by name: the templates, a survey, a pair."""
+    folder = tmp_path_factory.mktemp("books")
+    write_book(folder / "ideal.xlsx", ideal_content(26))
+    write_book(folder / "pair.xlsx", pair_content(20))
+    paths = {f"survey-{code}": TEMPLATES / f"survey-{code}.xlsx" for code in LANGUAGES}
+    paths |= {name: folder / f"{name}.xlsx" for name in ("ideal", "pair")}
+    return {name: (path, openpyxl.load_workbook(path)) for name, path in paths.items()}
+
+
+NAMES = [*(f"survey-{code}" for code in LANGUAGES), "ideal", "pair"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_is_under_8_pt_on_paper(name, books):
+    for sheet in books[name][1]:
+        assert min(sizes_of(sheet)) >= 8, (sheet.title, scale_of(sheet))
+        assert sheet.page_setup.paperSize == 9
+        assert sheet.oddFooter.center.text == "&D"
+        assert sheet.oddFooter.right.text.endswith("&P / &N")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_all_sheets_have_one_face_and_one_scale_of_sizes(name, books):
+    cells = [cell for sheet in books[name][1] for row in sheet.iter_rows() for cell in row]
+    assert {cell.font.name for cell in cells} == {"Arial"}
+    assert {cell.font.sz for cell in cells} == {9, 10, 14}
+
+
+def test_results_are_one_page_for_a_client(books):
+    sheet = books["ideal"][1]["Results"]
+    assert sheet.print_area == "'Results'!$A$1:$O$30"
+    assert sheet.print_title_rows == "$3:$4"
+    assert sheet.page_setup.orientation == "landscape"
+    rows = [sheet.row_dimensions[r].height or 13.5 for r in range(1, 31)]
+    paper = 595.3 - 72 * (sheet.page_margins.top + sheet.page_margins.bottom)
+    assert sum(rows) * scale_of(sheet) < paper
+    values = openpyxl.load_workbook(books["ideal"][0], data_only=True)["Results"]
+    for words in ("Project:", "Client:"):
+        assert words in values["A2"].value
+    assert "Date:" in values["E2"].value
+    assert "metres" in values["J2"].value
+
+
+def test_the_title_block_says_what_is_typed_on_setup(tmp_path):
+    block = {"project": "Palazzo Nuovo", "surveyor": "Ada", "survey_date": "3 May 2026"}
+    content = ideal_content(26, title_block=block)
+    write_book(tmp_path / "r.xlsx", content)
+    values = openpyxl.load_workbook(tmp_path / "r.xlsx", data_only=True)["Results"]
+    assert values["A2"].value.startswith("Project: Palazzo Nuovo\nClient: \n")
+    assert values["E2"].value.startswith("Surveyed by: Ada\nDate: 3 May 2026\n")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_points_break_between_columns_that_fit_the_page(name, books):
+    sheet = books[name][1]["Points"]
+    ends = [brk.id for brk in sheet.col_breaks.brk] + [printed_columns(sheet)[-1]]
+    paper = (841.9 - 72 * 0.8) / scale_of(sheet)
+    before = 1
+    for end in ends:
+        columns = [1, *(c for c in printed_columns(sheet) if before < c <= end)]
+        assert sum(dimension(sheet, c).width * 5.56 for c in columns) <= paper
+        before = end
+    assert sheet.print_title_cols == "$A:$A"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_rows_to_fill_in_are_reachable_on_a_laptop(name, books):
+    for sheet in books[name][1]:
+        if sheet.freeze_panes is None:
+            continue
+        frozen = openpyxl.utils.cell.coordinate_from_string(sheet.freeze_panes)[1] - 1
+        heights = [sheet.row_dimensions[r].height or 13.5 for r in range(1, frozen + 1)]
+        # A laptop of 768 lines shows about 360 pt of a sheet.
+        assert sum(heights) < 200, sheet.title
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_steps_of_the_fit_are_folded_away_and_no_yellow_cell_is_without_a_word(name, books):
+    book = books[name][1]
+    sheet = book["Georeference"]
+    shown = {"g_model", "g_auto", "g_used", "g_n", "g_k", "g_sigma0", "g_alpha"}
+    shown |= {f"g_{axis}0" for axis in "XYZENH"} | {f"g_{i}{j}" for i in "123" for j in "123"}
+    steps = [key for key in book.defined_names if key[:2] in ("g_", "s3") and key not in shown]
+    assert len(steps) > 100
+    for key in steps:
+        left, top, right, bottom = named_area(book, key)
+        for column in range(left, right + 1):
+            assert dimension(sheet, column).hidden, key
+            for row in range(top, bottom + 1):
+                fill = sheet.cell(row, column).fill
+                assert not fill.fgColor.rgb.endswith("FFF9DB"), key
+    for key in shown:
+        assert not dimension(sheet, named(book, key).column).hidden, key
+
+
+def test_steps_of_the_fit_fit_their_columns_once_unfolded(books):
+    path, book = books["ideal"]
+    sheet, values = book["Georeference"], openpyxl.load_workbook(path, data_only=True)
+    seen = 0
+    for row in sheet.iter_rows(max_row=11):
+        for cell in row:
+            if not sheet.column_dimensions[cell.column_letter].hidden or cell.data_type != "f":
+                continue
+            assert cell.number_format == "0.00E+00", cell.coordinate
+            value = values["Georeference"][cell.coordinate].value
+            if isinstance(value, int | float):
+                seen += 1
+                assert len(f"{value:.2E}") < sheet.column_dimensions[cell.column_letter].width
+    assert seen > 20
+
+
+def test_units_stand_apart_from_their_values(books):
+    sheet = books["survey-en"][1]["Setup"]
+    units = [cell for row in sheet.iter_rows(min_col=4, max_col=4) for cell in row if cell.value]
+    assert len(units) > 5
+    assert {(c.alignment.horizontal, c.alignment.indent) for c in units} == {("left", 1)}
+
+
+def inputs(sheet):
+    """Return the cells that may be typed into and where what they say is defined."""
+    said = {}
+    for rule in sheet.data_validations.dataValidation:
+        for area in rule.sqref.ranges:
+            left, top, right, bottom = range_boundaries(str(area))
+            for row in range(top, bottom + 1):
+                for column in range(left, right + 1):
+                    assert (row, column) not in said, "two rules for one cell"
+                    said[row, column] = rule
+    cells = [c for row in sheet.iter_rows() for c in row if not c.protection.locked]
+    return cells, said
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_input_cell_says_what_it_wants(name, books):
+    count = 0
+    for sheet in books[name][1]:
+        cells, said = inputs(sheet)
+        for cell in cells:
+            rule = said.get((cell.row, cell.column))
+            assert rule is not None, (sheet.title, cell.coordinate)
+            assert rule.showInputMessage, (sheet.title, cell.coordinate)
+            assert 3 < len(rule.prompt) <= 255, (sheet.title, cell.coordinate)
+            assert rule.type is None or rule.error, (sheet.title, cell.coordinate)
+            count += 1
+    assert count > 200
+
+
+def test_prompts_are_in_the_language_of_the_workbook(books):
+    prompts = {}
+    for code in LANGUAGES:
+        book = books[f"survey-{code}"][1]
+        prompts[code] = {r.prompt for s in book for r in s.data_validations.dataValidation}
+    assert any("numero" in p or "punto" in p.lower() for p in prompts["it"])
+    assert len(prompts["en"] & prompts["de"]) < 8
+    assert len(prompts["en"] & prompts["it"]) < 8
+
+
+STATES = [
+    ({}, "Still missing: d_2, delta_d, c_1, c_2"),
+    ({"d1": 17.5, "d2": 9.5}, "Still missing: c_1, c_2"),
+    ({"d1": 17.5, "d2": 9.5, "c1": 35.0, "c2": 19.0}, "The set-up is complete."),
+    ({"d1": 17.5, "d2": 9.5, "c1": 35.0, "c2": 20.0}, "The scales c_1/d_1 and c_2/d_2 differ"),
+]
+
+
+@pytest.mark.parametrize(("given", "told"), STATES)
+def test_setup_says_in_one_line_what_is_missing_or_wrong(given, told, tmp_path):
+    setup = SurveySetup(taking=Taking(**given)) if given else None
+    content = SurveyContent(setup=setup, pair=setup and setup.pair(), rows=3)
+    write_book(tmp_path / "s.xlsx", content)
+    book = openpyxl.load_workbook(tmp_path / "s.xlsx", data_only=True)
+    assert named(book, "setup_state").coordinate == "A3"
+    assert named(book, "setup_state").value.startswith(told)
+
+
+@pytest.mark.acceptance
+@pytest.mark.office
+def test_the_sheet_itself_finds_swapped_distances_and_unequal_scales(tmp_path):
+    write_template(tmp_path / "form.xlsx", rows=3)
+    book = openpyxl.load_workbook(tmp_path / "form.xlsx")
+    typed = {"c_1": 35, "c_2": 21, "d_2": 17.5, "d_1": 9.5, "input_unit": "px"}
+    for name, value in typed.items():
+        named(book, name).value = value
+    book.save(tmp_path / "typed.xlsx")
+    fresh = recalculated(tmp_path / "typed.xlsx", tmp_path)
+    missing = "pitch, nadir_1_col ... nadir_2_row"
+    assert named(fresh, "setup_missing").value == missing
+    assert named(fresh, "setup_state").value == f"Still missing: {missing}"
+    assert named(fresh, "check_order").value == "CHECK"
+    assert named(fresh, "check_scale").value == "CHECK"
+
+
+@pytest.mark.parametrize("name", ["ideal", "pair"])
+def test_a_point_that_is_not_used_keeps_no_green_ok(name, books):
+    book = books[name][1]
+    area = named_area(book, "points_use")
+    for title in ("Points", "Results"):
+        sheet = book[title]
+        flag = [cell.value for cell in sheet[4]].index("flag") + 1
+        letter = openpyxl.utils.get_column_letter(flag)
+        rules = [
+            (rule.priority, rule, str(cells.sqref))
+            for cells in sheet.conditional_formatting
+            for rule in cells.rules
+        ]
+        first = min(rules, key=lambda found: found[0])
+        assert f":{letter}" in first[2] or title == "Results"
+        assert first[2].startswith("A5:")
+        assert first[1].stopIfTrue
+        assert first[1].dxf.font.strike
+        assert first[1].dxf.fill.bgColor.rgb.endswith("FFFFFF")
+        assert "=0" in first[1].formula[0]
+    keys = [cell.value for cell in book["Points"][4]]
+    assert area[0] == keys.index("use") + 1
+    assert area[1] == 5
+
+
+def named_area(book, name):
+    """Return the bounds of a named area."""
+    return range_boundaries(book.defined_names[name].attr_text.partition("!")[2].replace("$", ""))
+
+
+def parts(path):
+    with zipfile.ZipFile(path) as package:
+        return {name: package.read(name) for name in package.namelist()}
+
+
+@pytest.fixture
+def solved(tmp_path):
+    """Return a survey workbook of 12 points made from a text table."""
+    lines = ["id,x1,y1,x2,y2"]
+    for i in range(12):
+        x, y, r = 0.7 * (i % 8) - 2.4, 0.9 * (i % 5) - 1.7, 0.2 * (i % 3)
+        far, near = 35 / (17.5 - r), 19 / (9.5 - r)
+        lines.append(f"P{i},{far * x},{far * y},{near * x},{near * y}")
+    (tmp_path / "points.csv").write_text("\n".join(lines), encoding="utf-8")
+    path = tmp_path / "s.xlsx"
+    lenses = ["--d1", "17.5", "--d2", "9.5", "--c1", "35", "--c2", "19"]
+    arguments = ["solve", str(tmp_path / "points.csv"), "--out", str(path), *lenses]
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 0, result.stderr
+    return path
+
+
+def test_the_sketch_is_small_and_stays_when_the_workbook_is_solved_in_place(solved):
+    before = parts(solved)
+    name = next(part for part in before if "sketch" in part)
+    text = before[name].decode()
+    assert len(text) < 40_000
+    symbols = "".join(re.findall(r"<a:t>([^<]*)</a:t>", text))
+    for symbol in ("c1", "c2", "d1", "d2", "s1", "s2", "e1", "r", "nadir", "Δd"):
+        assert symbol in symbols
+    colours = set(re.findall(r'srgbClr val="(\w+)"', text))
+    assert {"0072B2", "D55E00", "009E73"} <= colours  # Okabe and Ito
+    rels = before["xl/worksheets/_rels/sheet1.xml.rels"].decode()
+    assert f'Target="/{name}"' in rels
+    solve(solved, "--d1", "17.6")
+    after = parts(solved)
+    for part in (name, "xl/worksheets/sheet1.xml", "xl/worksheets/_rels/sheet1.xml.rels"):
+        assert after[part] == before[part]
+
+
+@pytest.fixture
+def filled(tmp_path):
+    """Return a template of 30 rows with 40 typed points."""
+    write_template(tmp_path / "form.xlsx", rows=30)
+    book = openpyxl.load_workbook(tmp_path / "form.xlsx")
+    for name, value in (("c_1", 35), ("c_2", 19), ("d_2", 9.5), ("delta_d", 8)):
+        named(book, name).value = value
+    for i in range(40):
+        x, y = 0.7 * (i % 8) - 2.4, 0.9 * (i % 5) - 1.7
+        far, near = 35 / 17.2, 19 / 9.2
+        typed = (f"P{i}", far * x, far * y, near * x, near * y)
+        for letter, value in zip("ABCDE", typed, strict=True):
+            book["Points"][f"{letter}{5 + i}"] = value
+    book.save(tmp_path / "filled.xlsx")
+    return tmp_path / "filled.xlsx"
+
+
+def solve(path, *options):
+    arguments = ["solve", str(path), "--out", str(path), "--overwrite", "-q", *options]
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 0, result.stderr
+
+
+def test_the_printed_rows_follow_the_points_and_all_rows_are_seen(filled):
+    solve(filled, "--lang", "it")
+    book = openpyxl.load_workbook(filled)
+    assert book["Results"].print_area == "'Results'!$A$1:$O$44"
+    assert book["Points"].print_area == "'Points'!$A$3:$AQ$44"
+    assert book["Results"]["E1"].value.startswith('=IF(COUNTA(tblPoints[id])>40,"Altri punti')
+    assert "Mancano ancora" in book["Setup"]["A3"].value
+    light = openpyxl.load_workbook(filled, read_only=True, data_only=True)
+    rows = list(light["Points"].iter_rows(min_row=5, values_only=True))
+    assert [row[0] for row in rows[:40]] == [f"P{i}" for i in range(40)]
+    assert len(list(light["Results"].iter_rows(min_row=5, max_row=44))) == 40
+
+
+def test_a_print_area_of_the_users_own_stays(filled):
+    book = openpyxl.load_workbook(filled)
+    book["Results"].print_area = "A1:G12"
+    book.save(filled)
+    solve(filled)
+    book = openpyxl.load_workbook(filled)
+    assert book["Results"].print_area == "'Results'!$A$1:$G$12"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_sheet_says_how_far_it_reaches(name, books):
+    path, book = books[name]
+    light = openpyxl.load_workbook(path, read_only=True)
+    for sheet in book:
+        assert light[sheet.title].max_row == sheet.max_row, sheet.title
+        assert light[sheet.title].max_column == sheet.max_column, sheet.title
+
+
+def test_rows_added_in_place_widen_what_the_sheet_says(solved):
+    book = openpyxl.load_workbook(solved)
+    sheet = book["Points"]
+    for row in range(17, 45):
+        sheet.cell(row, 1).value = f"Q{row}"
+        for column in range(2, 6):
+            sheet.cell(row, column).value = sheet.cell(5, column).value
+    book.save(solved)
+    solve(solved)
+    light = openpyxl.load_workbook(solved, read_only=True, data_only=True)
+    for title in ("Points", "Results"):
+        assert light[title].max_row >= 44
+        assert light[title].cell(44, 1).value == "Q44"

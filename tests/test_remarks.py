@@ -1,0 +1,65 @@
+"""Remarks: every key is used and has its words in three languages, with the same blanks."""
+
+import re
+from pathlib import Path
+from string import Formatter
+
+import pytest
+
+from bifocal.remarks import in_language, remark
+from photocore.workbook.making.words import LANGUAGES
+
+CODE = {
+    path: path.read_text(encoding="utf-8")
+    for package in ("bifocal", "multimedia", "photocore")
+    for path in Path(package).rglob("*.py")
+}
+KEYS = sorted(remark.texts)
+
+
+def blanks(text):
+    return sorted({(name, form) for _, name, form, _ in Formatter().parse(text) if name})
+
+
+def sample(text):
+    """Values for the blanks of a text."""
+    return {
+        name: (3 if form[-1] == "d" else 0.4375) if form else f"P{place}"
+        for place, (name, form) in enumerate(blanks(text))
+    }
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_a_remark_has_its_words_in_three_languages_with_the_same_blanks(key):
+    texts = remark.texts[key]
+    assert tuple(texts) == LANGUAGES
+    assert all(blanks(texts[language]) == blanks(texts["en"]) for language in LANGUAGES)
+
+
+@pytest.mark.parametrize("key", [key for key in KEYS if not key.startswith("word.")])
+def test_a_remark_is_known_by_its_words_wherever_it_stands(key):
+    texts, values = remark.texts[key], sample(remark.texts[key]["en"])
+    told = remark(key, **values)
+    assert (told.key, told.values) == (key, values)
+    for language in LANGUAGES:
+        words = texts[language].format(**values)
+        assert in_language(str(told), language) == words
+        assert in_language(f"pair.json: {told}", language) == f"pair.json: {words}"
+
+
+@pytest.mark.parametrize("key", [key for key in KEYS if not key.startswith("word.")])
+def test_a_remark_is_used(key):
+    section, name = key.split(".")
+    stem = re.escape(f'"{section}.')
+    said = {found for text in CODE.values() for found in re.findall(rf"{stem}[\w{{}}\' .]*", text)}
+    assert any(name.startswith(one.removeprefix(f'"{section}.').split("{")[0]) for one in said)
+
+
+def test_every_remark_that_code_names_has_words():
+    named = {key for text in CODE.values() for key in re.findall(r'\bremark\(\s*"([\w.]+)"', text)}
+    assert named
+    assert named <= set(KEYS)
+
+
+def test_what_holds_no_remark_stays_as_it_is():
+    assert in_language("nothing of ours", "it") == "nothing of ours"
