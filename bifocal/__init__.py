@@ -38,7 +38,8 @@ Sample pairs                  SAMPLE, WATER_SAMPLE: folders of photos with exact
 
 What they take and give: Bounds, CheckResult, FlagLimits, FlatSurface, Foot, Grid, KnownPoints,
 Layers, MapSurface, MediaPath, NamedPoints, OrientationCheck, Pinhole, PlanePicks,
-PointObservations, Progress, RadialDivision, Registration, ReliefTable, Similarity, SpaceSums,
+PointObservations, Progress, ProjectedPoints, RadialDivision, Registration, ReliefTable,
+Similarity, SpaceSums,
 Surface, SurveyInput, SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision,
 WeightedSums, Window, WorldPoints.
 

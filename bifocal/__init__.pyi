@@ -1,6 +1,6 @@
 from multimedia import Layers
 from photocore.camera.distortion import RadialDivision
-from photocore.camera.pinhole import Pinhole
+from photocore.camera.pinhole import Pinhole, ProjectedPoints
 from photocore.camera.similarity import Similarity
 from photocore.cli import Progress
 from photocore.errors import (
@@ -111,6 +111,7 @@ __all__ = [
     "PlanePicks",
     "PointObservations",
     "Progress",
+    "ProjectedPoints",
     "Quality",
     "RadialDivision",
     "ReadOptions",
