@@ -33,20 +33,20 @@ def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
     sigma = observations.sigma_tie
     if observations.tie_used.sum() >= 20 and sigma > WORST_FIT * unit:
         remarks.append(remark("orientation.misses_lines", sigma=sigma))
-    lenses = list(zip(observations.interiors, adjusted.cameras, strict=True))
-    changes = [float(np.log(camera.matrix[0, 0] / interior.focal)) for interior, camera in lenses]
-    pulled = [
-        not interior.is_assumed and abs(change) > CONTRADICTS * interior.sigma_focal
-        for (interior, _), change in zip(lenses, changes, strict=True)
+    lenses = observations.interiors
+    changes = [
+        float(np.log(camera.matrix[0, 0] / interior.focal))
+        for interior, camera in zip(lenses, adjusted.cameras, strict=True)
     ]
-    for n, ((interior, _), change) in enumerate(zip(lenses, changes, strict=True)):
-        alone = 100 * np.expm1(change - changes[1 - n])
-        apart = all(pulled) and changes[0] * changes[1] < 0  # one wrong lens pulls both
-        if pulled[n]:
-            told = {"change": 100 * np.expm1(change), "sigmas": abs(change) / interior.sigma_focal}
-            about = {"number": n + 1, "source": interior.source, **told}
-            key = f"orientation.focal_contradicts{'_both' if apart else ''}"
-            remarks.append(remark(key, alone=alone, **about))
+    limits = [np.inf if lens.is_assumed else CONTRADICTS * lens.sigma_focal for lens in lenses]
+    pulled = np.flatnonzero(np.abs(changes) > limits)
+    both = len(pulled) == 2 and changes[0] * changes[1] < 0  # one wrong lens pulls both
+    for n in pulled:
+        change, lens = changes[n], lenses[n]
+        told = {"change": 100 * np.expm1(change), "alone": 100 * np.expm1(change - changes[1 - n])}
+        about = {"number": int(n) + 1, "source": lens.source, **told}
+        key = f"orientation.focal_contradicts{'_both' if both else ''}"
+        remarks.append(remark(key, sigmas=abs(change) / lens.sigma_focal, **about))
     for name, camera, given in zip(
         ("far", "near"), adjusted.cameras, (site.distance1, site.distance2), strict=True
     ):
