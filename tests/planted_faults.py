@@ -113,11 +113,11 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         ),
     ),
     (
-        "bifocal/networks/joint_media.py",
+        "bifocal/model/pair_media.py",
         "tests/bifocal/orientation/test_adjustment_through_media.py",
         (
-            ("by_camera[:, :, 4:7] += seen.by_media", "by_camera[:, :, 4:7] -= seen.by_media"),
-            ("self.axes[2] @ camera.rotation)", "self.axes[2] @ camera.rotation.T)"),
+            ("NAMES.index(turn)] = 1.0", "NAMES.index(turn)] = -1.0"),
+            ("stated = stated @ camera.rotation", "stated = stated @ camera.rotation.T"),
         ),
     ),
     (

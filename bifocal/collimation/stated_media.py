@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from bifocal.model.pair import Pair
 from bifocal.model.pair_media import PairMedia
-from bifocal.networks.joint_media import media_of as media_of_cameras
 from multimedia import Layers
 
 #: Fields of the set-up that say what lies between the cameras and the wall: indices of refraction,
@@ -60,17 +60,12 @@ def media_of(setup: Setup, pair: Pair | None = None) -> PairMedia:
 
 
 def _of_pair(pair: Pair) -> PairMedia:
-    """Return what a pair looks through: ports that move with it, or what stays with the object."""
-    first, second = media_of_cameras(pair)
-    if first is None or second is None:
-        return PairMedia.none()
-    if first.height is not None:
-        return PairMedia(layers=first.layers, depth=first.height - first.layers.thickness)
-    return PairMedia(
-        layers=first.layers,
-        port=(first.z0, second.z0),
-        normals=(pair.image1.interface_normal, pair.image2.interface_normal),
-    )
+    """Return what a pair looks through; ports lean as they do, however the cameras turn."""
+    media = PairMedia.of(pair)
+    if not media or media.depth:
+        return media
+    normals = (pair.image1.interface_normal, pair.image2.interface_normal)
+    return replace(media, normals=normals, turning=(False, False))
 
 
 def media_as_dict(media: PairMedia) -> dict[str, Any] | None:

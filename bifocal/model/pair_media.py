@@ -14,14 +14,22 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.media import MediaPath, interface_axes
-from bifocal.model.orientation_precision import NAMES, common_names, names_of
+from bifocal.media import MediaPath, interface_axes, view
+from bifocal.model.orientation_precision import (
+    CAMERA,
+    NAMES,
+    common_names,
+    names_of,
+    pinhole,
+    rates_of,
+)
+from bifocal.model.pair import Pair
 from bifocal.model.photo import AXIS
 from bifocal.rays import Foot, foot_of, straight
 from multimedia import Layers
 from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX, typical_sigma
 from photocore.arrays import FloatArray, not_negative, positive
-from photocore.camera.pinhole import Pinhole
+from photocore.camera.pinhole import PARAMETERS, Pinhole, ProjectedPoints
 from photocore.camera.rotation import rotation_from_vector
 from photocore.errors import InputError
 
@@ -36,6 +44,9 @@ STEEPEST = 0.7
 LEANS = ("lean1", "lean2")
 #: The media of a pair that looks through none.
 AIR = Layers(indices=(1.0, 1.0))
+#: Normal of interfaces parallel to the reference plane; normals that differ by less than `ALIKE`
+#: are one and the same glass. [-]
+SQUARE, ALIKE = np.array([0.0, 0.0, 1.0]), 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -52,6 +63,8 @@ class PairMedia:
     normals : pair
         Of either camera's interfaces: (X, Y, r) in the plane frame, ``"axis"`` for a port square to
         its optical axis, None where they are parallel to the reference plane.
+    turning : pair of bool
+        Whether a normal is stated in its camera's own frame, with which the port then turns.
     leans : pair of ndarray, shape (3, 3)
         Small turns of either camera's interfaces from there, as found: rows are multiplied by it.
     sigmas : mapping of str to float
@@ -71,6 +84,7 @@ class PairMedia:
     port: tuple[float, float] | None = None
     depth: float | None = None
     normals: tuple[Normal, Normal] = (None, None)
+    turning: tuple[bool, bool] = (False, False)
     leans: tuple[FloatArray, FloatArray] = field(default_factory=lambda: (np.eye(3), np.eye(3)))
     sigmas: Mapping[str, float] = field(default_factory=dict)
 
@@ -105,6 +119,62 @@ class PairMedia:
     def none(cls) -> PairMedia:
         """Return the media of a pair in air: nothing is refracted, nothing of them unknown."""
         return cls(layers=AIR, port=(0.0, 0.0))
+
+    @classmethod
+    def of(cls, pair: Pair) -> PairMedia:
+        """Return what both cameras of a pair look through.
+
+        Whether it is a port, or stays with the object, follows from z0: of a port both are alike,
+        else both first interfaces are as high over the reference plane. Ports that lean turn with
+        their cameras.
+
+        Raises
+        ------
+        InputError
+            If glass that stays with the object leans against the reference plane.
+        """
+        if not pair.layers:
+            return cls.none()
+        photos = (pair.image1, pair.image2)
+        towards = [photo.towards_camera for photo in photos]
+        first, second = (photo.z0 or 0.0 for photo in photos)
+        heights = [
+            float(normal @ [*photo.nadir, photo.distance]) - z0
+            for normal, photo, z0 in zip(towards, photos, (first, second), strict=True)
+        ]
+        lean = [float(np.abs(normal - SQUARE).max()) >= ALIKE for normal in towards]
+        one_glass = float(np.abs(towards[0] - towards[1]).max()) < ALIKE
+        if one_glass and abs(heights[0] - heights[1]) < abs(first - second):
+            if any(lean):
+                raise InputError(
+                    "both photos look through one glass or surface that stays with the wall and "
+                    "leans against it: pairs are adjusted together through ports, which turn with "
+                    "their cameras, or through glass parallel to the reference plane. Choose a "
+                    "plane parallel to it (`bifocal align`: coordinates of the control points in "
+                    "that frame)."
+                )
+            return cls(layers=pair.layers, depth=heights[0] - pair.layers.thickness)
+        own = [
+            pinhole(photo).rotation @ normal if leans else None
+            for photo, normal, leans in zip(photos, towards, lean, strict=True)
+        ]
+        return cls(
+            layers=pair.layers, port=(first, second), normals=(own[0], own[1]),
+            turning=(lean[0], lean[1]),
+        )  # fmt: skip
+
+    @classmethod
+    def of_cameras(cls, far: tuple[PairMedia, int], near: tuple[PairMedia, int]) -> PairMedia:
+        """Return the media of two cameras, each 0 or 1 of a pair whose media are known."""
+        (first, i), (second, j) = far, near
+        if not (first and second):
+            return cls.none()
+        return replace(
+            first,
+            port=first.port and (first.port[i], (second.port or first.port)[j]),
+            normals=(first.normals[i], second.normals[j]),
+            turning=(first.turning[i], second.turning[j]),
+        )
 
     def __bool__(self) -> bool:
         """Whether there are media at all."""
@@ -228,6 +298,7 @@ class PairMedia:
             self,
             port=None if self.port is None else self.port[::-1],
             normals=self.normals[::-1],
+            turning=self.turning[::-1],
             leans=self.leans[::-1],
             sigmas={turned.get(name, name): sigma for name, sigma in self.sigmas.items()},
         )
@@ -247,6 +318,8 @@ class PairMedia:
             return np.asarray(-camera.rotation[2] @ lean)
         if stated is None:
             return lean[2] if self._may_lean(number) else None
+        if self.turning[number]:
+            stated = stated @ camera.rotation
         return np.asarray(stated / np.linalg.norm(stated) @ lean)
 
     def _may_lean(self, number: int) -> bool:
@@ -268,6 +341,19 @@ class PairMedia:
     def foot(self, number: int, camera: Pinhole) -> Foot:
         """Return camera 0 or 1 with what its rays cross, reduced to what relief needs."""
         return foot_of(camera, self.path(number, camera))
+
+    def view(self, number: int, camera: Pinhole, xyz: FloatArray) -> ProjectedPoints:
+        """Return what `project_with_jacobian` does for camera 0 or 1, through media; NaN if unseen.
+
+        Media that stay come nearer to a camera that goes up, a port moves and may turn with it.
+        """
+        seen = view(camera, self.path(number, camera), xyz)
+        if not self:
+            return ProjectedPoints(seen.pixels, seen.by_point, seen.by_camera)
+        rates = rates_of(seen, np.zeros((len(xyz), 2, 2)), number) @ self.by_unknowns()
+        first = number * len(CAMERA)
+        by_camera = rates[..., first : first + len(PARAMETERS)]
+        return ProjectedPoints(seen.pixels, seen.by_point, by_camera)
 
     def near_axis(self, number: int, camera: Pinhole) -> tuple[float, float]:
         """Return the distance of the straight camera that sees alike near the axis, and its rate.
@@ -302,12 +388,17 @@ class PairMedia:
         if not self:
             return np.eye(len(rows))
         out = np.zeros((len(rows), len(names)))
-        first, second = (isinstance(normal, str) for normal in self.normals)
         stays = self.depth is not None
-        out[:, : len(NAMES)] = by_cameras(self.layers, stays=stays, turning=(first, second))
-        for number, lean in enumerate(self.leans, start=1):  # a lean turns with what it leans from
+        out[: len(NAMES), : len(NAMES)] = np.eye(len(NAMES))
+        for number, normal in enumerate(self.normals, start=1):
+            if stays:
+                out[rows.index(f"z0 {number}"), NAMES.index(f"Z {number}")] = 1.0
+            for axis in "XYZ" if isinstance(normal, str) or self.turning[number - 1] else "":
+                lean, turn = f"lean {axis} {number}", f"turn {axis} {number}"
+                out[rows.index(lean), NAMES.index(turn)] = 1.0
+        for number, turned in enumerate(self.leans, start=1):  # a lean turns with where it leans
             own = [rows.index(f"lean {axis} {number}") for axis in "XYZ"]
-            out[own, : len(NAMES)] = lean.T @ out[own, : len(NAMES)]
+            out[own, : len(NAMES)] = turned.T @ out[own, : len(NAMES)]
         for column, name in enumerate(names[len(NAMES) :], start=len(NAMES)):
             if name in rows:
                 out[rows.index(name), column] = 1.0
@@ -323,25 +414,3 @@ class PairMedia:
 def _unknowns(name: str) -> tuple[str, ...]:
     """Return the unknowns that a name states: of a lean both turns of the port."""
     return tuple(f"lean {axis} {name[4:]}" for axis in "XY") if name in LEANS else (name,)
-
-
-def by_cameras(layers: Layers, *, stays: bool, turning: tuple[bool, bool]) -> FloatArray:
-    """Return how what `names_of` counts moves with the cameras, their media given, shape (k, 24).
-
-    Parameters
-    ----------
-    layers : Layers
-    stays : bool
-        Whether the media stay with the object: the farther from a camera that moves away.
-    turning : pair of bool
-        Whether the far and the near camera's port turns with it.
-    """
-    rows = list(names_of(layers))
-    out = np.eye(len(rows), len(NAMES))
-    for number, turns in enumerate(turning, start=1):
-        if stays:
-            out[rows.index(f"z0 {number}"), NAMES.index(f"Z {number}")] = 1.0
-        for axis in "XYZ" if turns else "":
-            lean, turn = f"lean {axis} {number}", f"turn {axis} {number}"
-            out[rows.index(lean), NAMES.index(turn)] = 1.0
-    return out

@@ -135,8 +135,7 @@ class Photo:
                 "z0 is missing: photos taken through layers need the distance from the camera "
                 "centre to the first interface, in metres."
             )
-        normal = self.interface_normal
-        turn = None if normal is None else interface_axes(normal / np.linalg.norm(normal))
+        turn = None if self.interface_normal is None else interface_axes(self.towards_camera)
         path = MediaPath(layers=layers, z0=self.z0, distance=self.distance, turn=turn)
         if not path.holds(np.zeros(2), np.zeros(())):
             raise GeometryError(
@@ -161,6 +160,14 @@ class Photo:
     def leans(self) -> bool:
         """Whether its interfaces lean against the reference plane."""
         return self.media is not None and self.media.turn is not None
+
+    @property
+    def towards_camera(self) -> FloatArray:
+        """Unit normal of its interfaces, or of the reference plane, towards the camera, (3,)."""
+        normal = self.interface_normal
+        if normal is None:
+            return np.array([0.0, 0.0, 1.0])
+        return np.asarray(normal / np.linalg.norm(normal))
 
     @property
     def scale_number(self) -> float | None:

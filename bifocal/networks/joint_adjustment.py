@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from bifocal.model.orientation_precision import CAMERA
-from bifocal.networks.joint_media import media_with_cameras, project_through
+from bifocal.model.pair_media import PairMedia
 from bifocal.networks.joint_observations import JointObservations, with_enough_rays, with_rays
 from photocore import adjustment
 from photocore.adjustment import OUTLIER_LIMIT, Fit, huber_weights, standardised
@@ -116,8 +116,9 @@ class JointAdjustment(JointUnknowns):
             whole[np.ix_(place, place)] = self.by_camera[camera]
         whole[np.ix_(*places)] = self.between[pair]
         whole[np.ix_(*places[::-1])] = self.between[pair].T
-        by = media_with_cameras((seen.media_of(own[0]), seen.media_of(own[1])))
-        return whole if by is None else by @ whole @ by.T
+        media = PairMedia.of_cameras(*(seen.media_of(camera) for camera in own))
+        by = media.by_unknowns()
+        return by @ whole @ by.T if media else whole
 
 
 def adjust_jointly(observations: JointObservations, start: JointUnknowns) -> JointAdjustment:
@@ -290,8 +291,8 @@ class _System:
         by_camera = np.empty((count, 2, len(ESTIMATED)))
         for number, camera in enumerate(state.cameras):
             rows = self.order[self.slices[number] : self.slices[number + 1]]
-            media = self.seen.media_of(number)
-            view = project_through(camera, media, state.xyz[self.seen.point[rows]])
+            media, side = self.seen.media_of(number)
+            view = media.view(side, camera, state.xyz[self.seen.point[rows]])
             pixels[rows], by_point[rows] = view.pixels, view.by_point
             by_camera[rows] = view.by_camera[:, :, ESTIMATED]
         return pixels, by_point, by_camera

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bifocal.networks.joint_media import CameraMedia
+from bifocal.model.pair_media import PairMedia
 from photocore.arrays import BoolArray, FloatArray, IntArray
 
 #: Of fewer points with known coordinates no frame follows.
@@ -36,8 +36,9 @@ class JointObservations:
         Their standard deviations. [m]
     sigma_focal : ndarray, shape (m,)
         Relative standard deviation of the focal lengths; 0: held.
-    media : tuple of CameraMedia or None
-        What each camera looks through; empty where all are in air.
+    media : tuple of (PairMedia, int)
+        What each camera looks through: media of a pair, and 0 or 1 for its far or near camera;
+        empty where all are in air.
     pairs : tuple of (int, int)
         The far and the near camera of each pair; empty: 0 and 1, 2 and 3, and so on.
     """
@@ -51,7 +52,7 @@ class JointObservations:
     known: FloatArray
     sigma_known: FloatArray
     sigma_focal: FloatArray
-    media: tuple[CameraMedia | None, ...] = ()
+    media: tuple[tuple[PairMedia, int], ...] = ()
     pairs: tuple[tuple[int, int], ...] = ()
 
     def __post_init__(self) -> None:
@@ -59,9 +60,9 @@ class JointObservations:
             far = range(0, len(self.names) - 1, 2)
             object.__setattr__(self, "pairs", tuple((k, k + 1) for k in far))
 
-    def media_of(self, camera: int) -> CameraMedia | None:
-        """Return what a camera looks through; None in air."""
-        return self.media[camera] if self.media else None
+    def media_of(self, camera: int) -> tuple[PairMedia, int]:
+        """Return what a camera looks through, and which of its pair's cameras it is."""
+        return self.media[camera] if self.media else (PairMedia.none(), 0)
 
     @property
     def frame_is_known(self) -> bool:

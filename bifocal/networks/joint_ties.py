@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 
 from bifocal.matching.features import Features, alike, match_features, spread_evenly
+from bifocal.model.pair_media import PairMedia
 from bifocal.networks.joint_adjustment import JointUnknowns
 from bifocal.networks.joint_media import (
-    CameraMedia,
     highest_relief,
     meeting_point,
     place_on_plane,
@@ -22,7 +22,7 @@ from photocore.camera.pinhole import Pinhole
 from photocore.camera.similarity import Similarity, fit_plane
 from photocore.errors import GeometryError
 
-Media = Sequence[CameraMedia | None]
+Media = Sequence[PairMedia]
 #: Where points begin, they keep this share of the way to the last interface, in which none lies.
 BEFORE_MEDIA = 0.8
 #: Matches of two photos that one geometry explains to this are kept. [px of the searched photo]
@@ -158,8 +158,8 @@ def into_one_frame(
         Control points, NaN for others. [m]
     names : sequence of str
         Of the pairs.
-    media : sequence of CameraMedia or None
-        What each camera looks through; empty where all are in air.
+    media : sequence of PairMedia
+        What the cameras of each pair look through; empty where all are in air.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def into_one_frame(
         If a pair shares no points with the others; it is named.
     """
     count = len(cameras) // 2
-    media = media or (None,) * len(cameras)
+    media = media or (PairMedia.none(),) * (len(cameras) // 2)
     places = _places_by_pair(cameras, shared, ideal, media)
     fixed = [int(np.isfinite(known + place).all(axis=1).sum()) for place in places]
     root = int(np.argmax(fixed))
@@ -209,7 +209,7 @@ def near_each_other(
     Repeated windows are matched a window apart; what is left of the frames' tilts, and the relief
     itself, put rays of one point apart by a few per cent of the distance.
     """
-    media = media or (None,) * len(cameras)
+    media = media or (PairMedia.none(),) * (len(cameras) // 2)
     places = _meeting_the_wall(cameras, shared, ideal, media)[:, :2]
     reach = NEAR * np.array([camera.centre[2] for camera in cameras])[shared.photo]
     order = np.argsort(shared.point, kind="stable")
@@ -230,9 +230,9 @@ def _meeting_the_wall(
 ) -> FloatArray:
     """Return where rays meet the reference plane, shape (n, 3); NaN where they do not. [m]"""
     places = np.full((len(ideal), 3), np.nan)
-    for number, (camera, through) in enumerate(zip(cameras, media, strict=True)):
+    for number, camera in enumerate(cameras):
         rays = shared.photo == number
-        places[rays] = place_on_plane(camera, through, ideal[rays])
+        places[rays] = place_on_plane(camera, media[number // 2], number % 2, ideal[rays])
     return places
 
 
@@ -259,10 +259,10 @@ def _places_by_pair(
             rays = shared.photo == 2 * k + side
             seen[side, shared.point[rays]] = ideal[rays]
         both = slice(2 * k, 2 * k + 2)
-        xyz = meeting_point(cameras[both], media[both], (seen[0], seen[1]))
+        xyz = meeting_point(cameras[both], media[k], (seen[0], seen[1]))
         lowest = min(cameras[2 * k].centre[2], cameras[2 * k + 1].centre[2])
         wild = ~(np.abs(xyz[:, 2]) < 0.5 * lowest)  # near the zoom centre relief is not known
-        wild |= xyz[:, 2] > BEFORE_MEDIA * highest_relief(cameras[both], media[both])
+        wild |= xyz[:, 2] > BEFORE_MEDIA * highest_relief(cameras[both], media[k])
         xyz[wild] = np.nan
         places.append(xyz)
     return places

@@ -13,10 +13,11 @@ from bifocal.files.images import photo_info, read_grey
 from bifocal.matching.features import Features, find_features
 from bifocal.model.orientation_precision import NAMES, as_dict, exchanged, pinhole
 from bifocal.model.pair import Pair
+from bifocal.model.pair_media import PairMedia
 from bifocal.model.photo import Photo
 from bifocal.networks.joint_adjustment import Blunder, JointAdjustment, adjust_jointly
 from bifocal.networks.joint_control import NamedPositions, name_of, named_positions
-from bifocal.networks.joint_media import CameraMedia, bent_again, media_of, straightened
+from bifocal.networks.joint_media import bent_again, straightened
 from bifocal.networks.joint_observations import JointObservations, of_one_camera, with_rays
 from bifocal.networks.joint_ties import (
     SharedPoints,
@@ -188,7 +189,7 @@ def adjust_pairs(
     pairs = [Pair.read(path) for path in paths]
     for path, pair in zip(paths, pairs, strict=True):
         with located(path):
-            media_of(pair)
+            PairMedia.of(pair)
     tables = named_positions(
         paths,
         pairs,
@@ -245,10 +246,10 @@ def joint_adjustment(
         count=named.shared.count + ties.count,
     )
     cameras = [pinhole(photo) for photo in photos]
-    media = tuple(through for pair in pairs for through in media_of(pair))
+    media = tuple(PairMedia.of(pair) for pair in pairs)
     ideal = _ideal([photos[once[camera]] for camera in camera_of], shared)
     observed = _observations(pairs, names, named, shared, ideal, features, task)
-    observed = replace(observed, media=media)
+    observed = replace(observed, media=tuple((one, side) for one in media for side in (0, 1)))
     start = into_one_frame(cameras, shared, ideal, observed.known, names, media)
     good = near_each_other(start.cameras, shared, ideal, media)
     good |= shared.point < named.shared.count
@@ -367,7 +368,7 @@ def _adjusted_pair(
     seen = adjusted.observations
     photos = [
         replace(
-            _adjusted_photo(photo, adjusted.cameras[camera], seen.media_of(camera)),
+            _adjusted_photo(photo, adjusted.cameras[camera], *seen.media_of(camera)),
             file=own.file, image_size=own.image_size, extra=own.extra,
         )
         for camera, own, photo in zip(
@@ -384,14 +385,13 @@ def _adjusted_pair(
     )  # fmt: skip
 
 
-def _adjusted_photo(photo: Photo, camera: Pinhole, media: CameraMedia | None = None) -> Photo:
+def _adjusted_photo(photo: Photo, camera: Pinhole, media: PairMedia, side: int) -> Photo:
     stretch = float(camera.matrix[0, 0] / pinhole(photo).matrix[0, 0])
     c = photo.principal_distance
     distance = float(camera.centre[2])
     return replace(
         photo, plane_from_pixel=plane_from_pixel(camera), nadir=camera.centre[:2],
-        distance=distance, z0=photo.z0 if media is None else media.z0_at(distance),
-        interface_normal=photo.interface_normal if media is None else media.normal(camera),
+        distance=distance, **media.of_photo(side, camera),
         principal_distance=None if c is None else stretch * c,
     )  # fmt: skip
 

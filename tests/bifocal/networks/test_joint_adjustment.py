@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from bifocal import PairMedia
 from bifocal.cli.main import main
 from bifocal.model.orientation_precision import pinhole
 from bifocal.model.pair import Pair
@@ -241,7 +242,7 @@ def test_a_longer_principal_distance_is_stated_in_millimetres_too():
     photo = replace(Pair.ideal(c1=35, d1=17.5, c2=19, d2=9.5).image1, sigma_pixel=0.4)
     camera = pinhole(photo)
     longer = camera._replace(matrix=camera.matrix * [[1.01], [1.01], [1.0]])
-    found = _adjusted_photo(photo, longer)
+    found = _adjusted_photo(photo, longer, PairMedia.none(), 0)
     assert found.principal_distance == pytest.approx(35.35)
     assert found.sigma_pixel == 0.4
 

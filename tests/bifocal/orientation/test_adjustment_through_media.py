@@ -11,6 +11,7 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
+from bifocal import PairMedia
 from bifocal.cli.main import main
 from bifocal.model.orientation_precision import pinhole
 from bifocal.model.pair import Pair
@@ -19,7 +20,6 @@ from bifocal.networks.joint_adjustment import (
     JointUnknowns,
     adjust_jointly,
 )
-from bifocal.networks.joint_media import CameraMedia, media_of, project_through
 from bifocal.networks.joint_observations import JointObservations
 from bifocal.networks.joint_workflow import _adjusted_pair, _adjusted_photo
 from multimedia import Layers
@@ -37,12 +37,24 @@ KINDS = {"tank": (2.0, None), "port": (None, 0.06), "leaning": (None, 0.06)}
 LEANING = rotation_from_vector(np.radians([8.0, -5.0, 0.0])) @ np.diag([1.0, -1, -1])
 
 
+def media_told(*kinds):
+    """Return what the package is told of both cameras' media; of one kind for both."""
+    kinds = kinds * (3 - len(kinds))
+    height, port = KINDS[kinds[0]]
+    leaning = [kind == "leaning" for kind in kinds]
+    return PairMedia(
+        layers=Layers(**AQUARIUM), port=port and (port, port),
+        depth=height and height - AQUARIUM["thicknesses"][0],
+        normals=tuple(LEANING[2] if leans else None for leans in leaning), turning=tuple(leaning),
+    )  # fmt: skip
+
+
 def wet(camera, kind):
     """Return a camera behind media, and what the package is told of them."""
     height, port = KINDS[kind]
     z0 = camera.centre[2] - height if height else port
     axes = LEANING if kind == "leaning" else None
-    told = CameraMedia(layers=Layers(**AQUARIUM), z0=float(z0), height=height, axes=axes)
+    told = media_told(kind)
     return WetCamera(
         matrix=camera.matrix, rotation=camera.rotation, centre=camera.centre, size=(5000, 3300),
         z0=z0, axes=np.eye(3) if axes is None else axes @ camera.rotation, **AQUARIUM,
@@ -62,7 +74,7 @@ def test_a_camera_sees_through_media_what_traced_rays_show(kind):
     camera = camera_at(rng, 0.5, 7.0, 6000.0)
     xyz = rng.uniform([-2, -1.5, -0.4], [2, 1.5, 0.6], (20, 3))
     scene, media = wet(camera, kind)
-    view = project_through(camera, media, xyz)
+    view = media.view(0, camera, xyz)
     np.testing.assert_allclose(view.pixels, scene.view_of(xyz), atol=1e-7)
 
     def slope(change, step=1e-5):
@@ -100,7 +112,7 @@ def measured(kind, rng, pairs=3, noise=0.4):
         pixels=rays[:, 2:] + rng.normal(0, noise, (len(rays), 2)),
         sigma=np.full(len(rays), noise), ids=tuple(f"P{k}" for k in range(count)),
         known=known, sigma_known=np.full((count, 3), 0.001), sigma_focal=np.zeros(len(cameras)),
-        media=tuple(wet(camera, kind)[1] for camera in cameras),
+        media=tuple((media_told(kind), k % 2) for k in range(len(cameras))),
     )  # fmt: skip
     off = [np.r_[np.zeros(4), rng.normal(0, 0.003, 3), rng.normal(0, 0.05, 3)] for _ in cameras]
     start = JointUnknowns(
@@ -132,9 +144,11 @@ def test_pairs_behind_media_are_as_precise_as_their_sigmas_say(kind):
 
 def test_ports_move_with_the_camera_and_tanks_stay():
     port, tank = (Pair.from_dict(content(name)) for name in ("port", "tank"))
-    assert [one.height for one in media_of(port)] == [None, None]
-    assert [one.height for one in media_of(tank)] == pytest.approx([0.9, 0.9])
-    assert media_of(tank)[0].z0_at(3.6) == pytest.approx(2.7)
+    assert PairMedia.of(port).depth is None
+    told = PairMedia.of(tank)
+    assert told.depth + told.layers.thickness == pytest.approx(0.9)
+    higher = pinhole(tank.image1)._replace(centre=np.array([0.0, 0.0, 3.6]))
+    assert told.z0(0, higher) == pytest.approx(2.7)
     assert PAIRS["tank"][1]["z0"] == 2.6
 
 
@@ -238,10 +252,10 @@ def test_an_adjusted_pair_tells_every_point_what_its_cameras_are_worth(name, tmp
     """By hand: each camera moved alone, z0 and the port following it as they do."""
     pair = Pair.from_dict(content(name))
     cameras = [pinhole(photo) for photo in (pair.image1, pair.image2)]
-    media, rng = media_of(pair), np.random.default_rng(4)
+    media, rng = PairMedia.of(pair), np.random.default_rng(4)
     mixed = rng.normal(size=(14, 14)) * 1e-4
     whole = mixed @ mixed.T
-    adjusted = adjustment(cameras, media, [whole])
+    adjusted = adjustment(cameras, [(media, 0), (media, 1)], [whole])
     made = _adjusted_pair(pair, adjusted, 0, (pair.image1, pair.image2))
     made.write(tmp_path / "made.pair.json")
     again = Pair.read(tmp_path / "made.pair.json")
@@ -256,7 +270,7 @@ def test_an_adjusted_pair_tells_every_point_what_its_cameras_are_worth(name, tmp
             for step in (1e-6, -1e-6):
                 photos = [pair.image1, pair.image2]
                 moved = cameras[side].stepped(step * np.eye(10)[parameter])
-                photos[side] = _adjusted_photo(photos[side], moved, media[side])
+                photos[side] = _adjusted_photo(photos[side], moved, media, side)
                 ends.append(Pair(image1=photos[0], image2=photos[1]).intersect(*pixels).xyz)
             by[:, :, 7 * side + column] = (ends[0] - ends[1]) / 2e-6
     np.testing.assert_allclose(
@@ -283,15 +297,16 @@ def test_glass_that_stays_and_leans_is_refused_before_any_work(tmp_path):
     assert done.exit_code == 1
     assert "a.pair.json: both photos look through one glass" in done.stderr
     square = {key: data[key] | {"interface_normal": [0, 0, 1.0]} for key in ("image1", "image2")}
-    told = media_of(Pair.from_dict({**data, **square}))
-    assert [one.axes for one in told] == [None, None]
+    told = PairMedia.of(Pair.from_dict({**data, **square}))
+    assert told.normals == (None, None)
+    assert told.depth is not None
 
 
 def test_the_covariance_of_a_pair_is_its_own_whatever_pairs_stand_beside_it():
     rng = np.random.default_rng(5)
     camera = camera_at(rng, 0.0, 7.0, 6000.0)
     kinds = ("leaning", "port", "port", "leaning", "tank", "tank")
-    media = [wet(camera, kind)[1] for kind in kinds]
+    media = [(media_told(*kinds[k : k + 2]), side) for k in (0, 2, 4) for side in (0, 1)]
     mixed = rng.normal(size=(3, 14, 14)) * 1e-4
     covariances = mixed @ mixed.transpose(0, 2, 1)
     together = adjustment([camera] * 6, media, covariances)
