@@ -37,22 +37,24 @@ def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
             "by 0.1 to 0.2. The likely reason is lens distortion (calibrate, give --lens), motion "
             "in the scene, or two photos of different states."
         )
-    lenses = list(zip(observations.interiors, adjusted.cameras, strict=True))
-    changes = [float(np.log(camera.matrix[0, 0] / interior.focal)) for interior, camera in lenses]
-    pulled = [
-        not interior.is_assumed and abs(change) > CONTRADICTS * interior.sigma_focal
-        for (interior, _), change in zip(lenses, changes, strict=True)
+    lenses = observations.interiors
+    changes = [
+        float(np.log(camera.matrix[0, 0] / interior.focal))
+        for interior, camera in zip(lenses, adjusted.cameras, strict=True)
     ]
-    for n, ((interior, _), change) in enumerate(zip(lenses, changes, strict=True)):
-        alone = 100 * np.expm1(change - changes[1 - n])
-        apart = all(pulled) and changes[0] * changes[1] < 0  # one wrong lens pulls both
-        if pulled[n]:
-            remarks.append(
-                f"The focal length of photo {n + 1} came out {100 * np.expm1(change):+.1f} % from "
-                f"the one given ({interior.source}), {abs(change) / interior.sigma_focal:.0f} of "
-                "its standard deviations: check it, the lens distortion and the distances."
-                + (f" If the other photo's is right, it is {alone:+.0f} % off." if apart else "")
-            )
+    limits = [np.inf if lens.is_assumed else CONTRADICTS * lens.sigma_focal for lens in lenses]
+    pulled = np.flatnonzero(np.abs(changes) > limits)
+    for n in pulled:
+        change, lens = changes[n], lenses[n]
+        text = (
+            f"The focal length of photo {n + 1} came out {100 * np.expm1(change):+.1f} % from "
+            f"the one given ({lens.source}), {abs(change) / lens.sigma_focal:.0f} of its standard "
+            "deviations: check it, the lens distortion and the distances."
+        )
+        if len(pulled) == 2 and changes[0] * changes[1] < 0:  # one wrong lens pulls both
+            alone = 100 * np.expm1(change - changes[1 - n])
+            text += f" If the other photo's is right, it is {alone:+.0f} % off."
+        remarks.append(text)
     for name, camera, given in zip(
         ("far", "near"), adjusted.cameras, (site.distance1, site.distance2), strict=True
     ):
