@@ -36,10 +36,10 @@ def named_positions(
     paths: Sequence[Path],
     pairs: Sequence[Pair],
     *,
-    control: Sequence[Path | None],
-    check: Sequence[Path | None],
-    sigma: float,
-    unit: str,
+    control: Sequence[Path | None] = (),
+    check: Sequence[Path | None] = (),
+    sigma: float = 0.003,
+    unit: str = "m",
 ) -> NamedPositions:
     """Return the points of all tables, one of each for every pair or none, joined by name.
 
