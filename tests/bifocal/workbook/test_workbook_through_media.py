@@ -169,7 +169,7 @@ def test_a_workbook_of_raw_pixels_equals_the_library(name, tmp_path):
     pixels[0][5] += [8, -6]
     ids = tuple(map(str, range(12)))
     points = PointObservations(ids=ids, pixels1=pixels[0], pixels2=pixels[1])
-    write_survey(tmp_path / "p.xlsx", points, pair=pair, measuring=PICKS)
+    write_survey(tmp_path / "p.xlsx", points, pair=pair, sigma_px=0.3)
     assert lint(tmp_path / "p.xlsx") == []
     assert assert_recalculated_equals_cached(tmp_path / "p.xlsx", tmp_path) > 800
     rows = rows_of(recalculated(tmp_path / "p.xlsx", tmp_path), "Points", 4)[:12]
