@@ -453,7 +453,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     (
         "multimedia/adjustment/bundle_equations.py",
         "tests/multimedia/adjustment/test_bundle.py",
-        (("by_turn(by_point[on], arm)", "by_turn(by_point[on], -arm)"),),
+        (("points[on] - pose.centre)", "pose.centre - points[on])"),),
     ),
 )
 

@@ -10,13 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
 from bifocal.model.orientation_precision import CAMERA
 from bifocal.model.pair_media import PairMedia
 from bifocal.networks.joint_observations import JointObservations, with_enough_rays, with_rays
-from photocore import adjustment
-from photocore.adjustment import OUTLIER_LIMIT, Fit, huber_weights, standardised
+from photocore.adjustment import OUTLIER_LIMIT, Fit, huber_weights, minimise, standardised
+from photocore.adjustment.network import Network, Rows, State
 from photocore.adjustment.sparse import SparseEquations
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.camera.pinhole import PARAMETERS, Pinhole
@@ -150,11 +149,8 @@ def adjust_jointly(observations: JointObservations, start: JointUnknowns) -> Joi
     seen = _without(seen, tests < FAR_OFF, known, blunders)
     for left in range(ROUNDS, -1, -1):
         system = _System(seen, start, focal)
-        fit = adjustment.fit(
-            start, system.equations, system.advance, names=system.unknown_names,
-            what="the pairs", rounding=ROUNDING, largest=0,
-        )  # fmt: skip
-        start = fit.state
+        fit = system.network.solve(system.start, largest=0)
+        start = _unknowns(fit.state)
         sigma0 = _sigma0(fit, system)
         keep, known, found = _gross(seen, system, fit, sigma0)
         if not found or not left:
@@ -175,7 +171,7 @@ def _coarse(
     fixed = np.isfinite(seen.known).any(axis=1)
     spread = LOOSE * seen.sigma_known
     for number in range(COARSE):
-        away = np.linalg.norm(_System(seen, start, focal).rays(start)[0] - seen.pixels, axis=1)
+        away = _away(_System(seen, start, focal))
         away = np.nan_to_num(away, nan=1e6)
         if number and fixed.any():  # before, the start is no better than any control point
             off = _off_control(seen, start)[fixed]
@@ -185,15 +181,23 @@ def _coarse(
             seen, sigma=seen.sigma / np.sqrt(huber_weights(away, 2.0)), sigma_known=spread
         )
         system = _System(weighted, start, focal)
-        start = adjustment.minimise(
-            start, system.equations, system.advance, what="the pairs", most=6, largest=0
-        ).state
-    away = np.linalg.norm(_System(seen, start, focal).rays(start)[0] - seen.pixels, axis=1)
-    away = away / seen.sigma
+        network = system.network
+        fit = minimise(system.start, network.equations, network.advance, most=6, largest=0)
+        start = _unknowns(fit.state)
+    away = _away(_System(seen, start, focal)) / seen.sigma
     usual = max(float(np.median(away)) / 1.1774, 1.0)  # Rayleigh's median
     off = _off_control(seen, start)
     agreed = max(float(np.median(off[fixed])) / 1.5382, 1.0) if fixed.any() else 1.0  # Maxwell's
     return start, np.nan_to_num(away / usual, nan=np.inf), off / agreed
+
+
+def _unknowns(state: State) -> JointUnknowns:
+    return JointUnknowns(cameras=tuple(state.blocks["camera"].values()), xyz=state.points)
+
+
+def _away(system: _System) -> FloatArray:
+    """Return how far points are seen from where they were measured, shape (n,). [px]"""
+    return np.linalg.norm(system.rays(system.start)[0] - system.seen.pixels, axis=1)
 
 
 def _off_control(seen: JointObservations, state: JointUnknowns) -> FloatArray:
@@ -233,11 +237,10 @@ def _without(
 
 
 class _System:
-    """The equations: where each row and each column stands.
+    """The network: two rows for each ray, one for each known coordinate, and what else is believed.
 
-    Rows: two for each ray, one for each known coordinate, one for the relief of each other point
-    (it lies before the cameras, a standard deviation of the nearest one's distance), one for each
-    focal length that is not held.
+    That is the relief of each other point (it lies before the cameras, a standard deviation of the
+    nearest one's distance), and each focal length that is not held.
     """
 
     def __init__(self, seen: JointObservations, start: JointUnknowns, focal: FloatArray) -> None:
@@ -249,111 +252,81 @@ class _System:
             # Seven are free: the far camera, and for the scale the near one's distance.
             free[0], free[1, -1] = False, False
         self.column = np.where(free, np.cumsum(free.ravel()).reshape(free.shape) - 1, -1)
-        self.width = int(free.sum())
         names = [PARAMETERS[e] for e in ESTIMATED]
-        self.camera_names = [f"{seen.names[i]}: {names[k]}" for i, k in np.argwhere(free).tolist()]
-        self.order = np.argsort(seen.camera, kind="stable")
-        self.slices = np.searchsorted(seen.camera[self.order], np.arange(count + 1))
+        order = np.argsort(seen.camera, kind="stable")
+        self.own = np.split(order, np.searchsorted(seen.camera[order], np.arange(1, count)))
         self.fixed = np.argwhere(np.isfinite(seen.known))
-        rays = np.bincount(seen.point, minlength=len(seen.ids))
         # A point without rays stays where it is, in all three coordinates.
-        self.used = rays > 0
+        self.used = np.bincount(seen.point, minlength=len(seen.ids)) > 0
         self.loose = np.flatnonzero(self.used & ~np.isfinite(seen.known[:, 2]))
         self.reach = float(min(camera.centre[2] for camera in start.cameras))
         self.focal = np.flatnonzero(free[:, 0])
         self.first_focal = np.log(focal)
+        self.start = State(
+            blocks={"camera": dict(enumerate(start.cameras))},
+            points=start.xyz,
+            drift=np.zeros(free.sum()),
+        )
+        shape = (len(self.used), 3)
+        self.network = Network(
+            labels=[f"{seen.names[i]}: {names[k]}" for i, k in np.argwhere(free).tolist()],
+            columns={"camera": {
+                k: {e: at for e, at in zip(ESTIMATED, own, strict=True) if at >= 0}
+                for k, own in enumerate(self.column.tolist())
+            }},
+            free=np.broadcast_to(self.used[:, None], shape), kept=np.full(shape, -1),
+            names=[f"{seen.ids[k]}: {axis}" for k in np.flatnonzero(self.used) for axis in "XYr"],
+            terms=(self._rays, self._known), step=_stepped, what="the pairs", rounding=ROUNDING,
+            kind=SparseEquations,
+        )  # fmt: skip
 
-    @property
-    def unknown_names(self) -> list[str]:
-        """What is unknown, cameras first."""
-        used = np.flatnonzero(self.used).tolist()
-        return [
-            *self.camera_names,
-            *(f"{self.seen.ids[k]}: {axis}" for k in used for axis in "XYr"),
-        ]
-
-    def advance(self, state: JointUnknowns, step: FloatArray) -> JointUnknowns | None:
-        """Return the state after a step."""
-        cameras = []
-        for camera, columns in zip(state.cameras, self.column, strict=True):
-            whole = np.zeros(len(PARAMETERS))
-            own = columns >= 0
-            whole[np.array(ESTIMATED)[own]] = step[columns[own]]
-            cameras.append(camera.stepped(whole))
-        xyz = state.xyz.copy()
-        xyz[self.used] += step[self.width :].reshape(-1, 3)
-        return JointUnknowns(cameras=tuple(cameras), xyz=xyz)
-
-    def rays(self, state: JointUnknowns) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def rays(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return pixels (n, 2), derivatives by the points (n, 2, 3) and the cameras (n, 2, 7)."""
         count = len(self.seen.camera)
         pixels, by_point = np.empty((count, 2)), np.empty((count, 2, 3))
         by_camera = np.empty((count, 2, len(ESTIMATED)))
-        for number, camera in enumerate(state.cameras):
-            rows = self.order[self.slices[number] : self.slices[number + 1]]
+        for number, camera in state.blocks["camera"].items():
+            rows = self.own[number]
             media, side = self.seen.media_of(number)
-            view = media.view(side, camera, state.xyz[self.seen.point[rows]])
+            view = media.view(side, camera, state.points[self.seen.point[rows]])
             pixels[rows], by_point[rows] = view.pixels, view.by_point
             by_camera[rows] = view.by_camera[:, :, ESTIMATED]
         return pixels, by_point, by_camera
 
-    def equations(self, state: JointUnknowns) -> SparseEquations | None:
-        """Return weighted residuals and derivatives; None with a point behind a camera."""
+    def _rays(self, state: State, rows: Rows) -> bool:
         seen = self.seen
         pixels, by_point, by_camera = self.rays(state)
         if not np.isfinite(pixels).all():
-            return None
-        weight = 1.0 / seen.sigma
-        point, axis = self.fixed.T
-        coordinate = 1.0 / seen.sigma_known[point, axis]
-        misfit = (state.xyz[point, axis] - seen.known[point, axis]) * coordinate
-        focal = np.log([state.cameras[k].matrix[0, 0] for k in self.focal])
-        drift = (focal - self.first_focal[self.focal]) / seen.sigma_focal[self.focal]
-        residuals = [((pixels - seen.pixels) * weight[:, None]).ravel(), misfit]
-        residuals += [state.xyz[self.loose, 2] / self.reach, drift]
-        rays, rows = 2 * len(weight), np.arange(2 * len(weight))
-        columns = np.repeat(self.column[seen.camera], 2, axis=0)
-        values = (by_camera * weight[:, None, None]).reshape(rays, -1)
-        own = columns >= 0
-        above = rays + len(misfit) + len(self.loose)
-        design = csr_matrix(
-            (
-                np.r_[values[own], 1.0 / seen.sigma_focal[self.focal]],
-                (
-                    np.r_[np.broadcast_to(rows[:, None], columns.shape)[own],
-                          above + np.arange(len(drift))],
-                    np.r_[columns[own], self.column[self.focal, 0]],
-                ),
-            ),
-            shape=(above + len(drift), self.width),
-        )  # fmt: skip
-        triple = 3 * np.repeat(seen.point, 2)[:, None] + np.arange(3)
-        eliminated = csr_matrix(
-            (
-                np.r_[(by_point * weight[:, None, None]).ravel(), coordinate,
-                      np.full(len(self.loose), 1.0 / self.reach)],
-                (
-                    np.r_[np.repeat(rows, 3), rays + np.arange(above - rays)],
-                    np.r_[triple.ravel(), 3 * point + axis, 3 * self.loose + 2],
-                ),
-            ),
-            shape=(above + len(drift), 3 * len(seen.ids)),
-        )  # fmt: skip
-        free = np.repeat(self.used[:, None], 3, axis=1)
-        return SparseEquations(
-            residuals=np.concatenate(residuals), design=design,
-            eliminated=eliminated @ _only(free), free=free,
-        )  # fmt: skip
+            return False
+        weight = 1.0 / seen.sigma[:, None, None]
+        lines = rows.add((pixels - seen.pixels) * weight[:, 0])
+        rows.by_label(lines[..., None], self.column[seen.camera][:, None], by_camera * weight)
+        rows.by_points(lines, seen.point[:, None], by_point * weight)
+        return True
+
+    def _known(self, state: State, rows: Rows) -> bool:
+        seen, (point, axis), along = self.seen, self.fixed.T, np.eye(3)
+        weight = 1.0 / seen.sigma_known[point, axis]
+        lines = rows.add((state.points[point, axis] - seen.known[point, axis]) * weight)
+        rows.by_points(lines, point, along[axis] * weight[:, None])
+        lines = rows.add(state.points[self.loose, 2] / self.reach)
+        rows.by_points(lines, self.loose, along[2] / self.reach)
+        focal, weight = self.focal, 1.0 / seen.sigma_focal[self.focal]
+        drift = (
+            np.log([state.blocks["camera"][k].matrix[0, 0] for k in focal])
+            - self.first_focal[focal]
+        )
+        rows.by_label(rows.add(drift * weight), self.column[focal, 0], weight)
+        return True
 
 
-def _only(free: BoolArray) -> csr_matrix:
-    """Return the matrix that blanks the columns of what is not free."""
-    from scipy.sparse import diags
+def _stepped(camera: Pinhole, places: list[int], step: FloatArray) -> Pinhole:
+    whole = np.zeros(len(PARAMETERS))
+    whole[places] = step
+    return camera.stepped(whole)
 
-    return diags(free.ravel().astype(float)).tocsr()
 
-
-def _sigma0(fit: Fit[JointUnknowns], system: _System) -> float:
+def _sigma0(fit: Fit[State], system: _System) -> float:
     """Return the standard deviation of unit weight of rays and control; 1 where nothing checks it.
 
     The weak beliefs about relief have next to no residual and would make it look too good.
@@ -380,7 +353,7 @@ def _units(
 
 
 def _gross(
-    seen: JointObservations, system: _System, fit: Fit[JointUnknowns], sigma0: float
+    seen: JointObservations, system: _System, fit: Fit[State], sigma0: float
 ) -> tuple[BoolArray, FloatArray, list[Blunder]]:
     """Return which rays stay, the coordinates that stay known, and what goes: the worst of each.
 
@@ -418,7 +391,7 @@ def _adjusted(
     given: JointObservations,
     seen: JointObservations,
     system: _System,
-    fit: Fit[JointUnknowns],
+    fit: Fit[State],
     sigma0: float,
     blunders: tuple[tuple[Blunder, ...], tuple[Blunder, ...]],
 ) -> JointAdjustment:
@@ -441,9 +414,9 @@ def _adjusted(
     between = factor * np.array([part(place[far], place[near]) for far, near in seen.pairs])
     covariance = factor * linear.block_cofactor
     covariance[~system.used] = np.nan
-    xyz = np.where(system.used[:, None], fit.state.xyz, np.nan)
+    xyz = np.where(system.used[:, None], fit.state.points, np.nan)
     return JointAdjustment(
-        cameras=fit.state.cameras, xyz=xyz, observations=seen, covariance=covariance,
+        cameras=_unknowns(fit.state).cameras, xyz=xyz, observations=seen, covariance=covariance,
         sigma0=sigma0, redundancy=fit.redundancy - len(system.loose), iterations=fit.iterations,
         residuals=system.rays(fit.state)[0] - seen.pixels, control=xyz - given.known,
         blunders=blunders[0], left_in=blunders[1], by_camera=by_camera, between=between,

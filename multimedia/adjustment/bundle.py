@@ -11,9 +11,7 @@ import numpy as np
 from multimedia.adjustment.bundle_columns import place_columns, with_common_values
 from multimedia.adjustment.bundle_equations import (
     Bundle,
-    BundleState,
     ImageObservations,
-    Pose,
 )
 from multimedia.adjustment.interior_choice import choose_interior, with_interior
 from multimedia.adjustment.media_unknowns import WITH_VALUE
@@ -30,6 +28,7 @@ from multimedia.orientation.intersection import intersect
 from multimedia.orientation.plate_poses import FEWEST, plate_pose
 from multimedia.projects.model import ObjectPoints, Project
 from photocore.adjustment import Fit, huber_weights
+from photocore.adjustment.network import State
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.camera.rotation import skew
 from photocore.camera.similarity import fit_similarity
@@ -115,9 +114,7 @@ def _weighted(bundle: Bundle, weights: FloatArray) -> Bundle:
     return replace(bundle, observations=replace(seen, sigma=seen.sigma / np.sqrt(weights)))
 
 
-def _balanced(
-    bundle: Bundle, fitted: Fit[BundleState], weights: FloatArray
-) -> tuple[Bundle, Fit[BundleState]]:
+def _balanced(bundle: Bundle, fitted: Fit[State], weights: FloatArray) -> tuple[Bundle, Fit[State]]:
     """Weigh image coordinates by what they are worth where priors stand beside them.
 
     Their sigmas only matter against one another until a prior is stated in its own unit: an
@@ -157,12 +154,14 @@ def prepare(project: Project, unknowns: Unknowns) -> tuple[Bundle, tuple[str, ..
     movable = _movable(unknowns, points, sigma, plate_of)
     columns = place_columns(project, unknowns, ids, movable)
     poses = _start_poses(project, unknowns.plates, ids, plate_of, local)
-    for plate, (rotation, shift) in enumerate(poses):
-        points[plate_of == plate] = local[plate_of == plate] @ rotation.T + shift
+    for plate, pose in enumerate(poses):
+        on = plate_of == plate
+        points[on] = local[on] @ pose.rotation.T + pose.centre
     points = _start_points(project, ids, points)
     weighted = movable & np.isfinite(sigma) & (sigma > 0) & (unknowns.control != "free")
-    start = BundleState(
-        cameras=project.cameras, media=dict(project.media), points=points, poses=poses,
+    cameras, plates = dict(enumerate(project.cameras)), dict(enumerate(poses))
+    start = State(
+        blocks={"camera": cameras, "media": project.media, "plate": plates}, points=points,
         drift=np.zeros(len(columns.labels)),
     )  # fmt: skip
     bundle = Bundle(
@@ -259,7 +258,7 @@ def _start_points(project: Project, ids: Sequence[str], points: FloatArray) -> F
 def _start_poses(
     project: Project, plates: Sequence[str], ids: Sequence[str], plate_of: IntArray,
     local: FloatArray,
-) -> tuple[Pose, ...]:  # fmt: skip
+) -> tuple[Camera, ...]:  # fmt: skip
     """Return the pose of each plate that fits its intersected points best.
 
     Raises
@@ -277,11 +276,12 @@ def _start_poses(
             poses.append(_pose_from_one(project, [ids[j] for j in on.tolist()], local[on], label))
             continue
         start = fit_similarity(local[on][good], xyz[good])
-        poses.append((start.rotation, start.target_centre - start.rotation @ start.source_centre))
+        shift = start.target_centre - start.rotation @ start.source_centre
+        poses.append(Camera(centre=shift, rotation=start.rotation, principal_distance=1.0))
     return tuple(poses)
 
 
-def _pose_from_one(project: Project, names: Sequence[str], local: FloatArray, label: str) -> Pose:
+def _pose_from_one(project: Project, names: Sequence[str], local: FloatArray, label: str) -> Camera:
     """Return the pose of a plate from the camera that sees most of it.
 
     Raises
@@ -298,9 +298,10 @@ def _pose_from_one(project: Project, names: Sequence[str], local: FloatArray, la
             f"than {FEWEST} by one; that is too few for a start."
         )
     try:
-        return plate_pose(
+        rotation, shift = plate_pose(
             project.cameras[k], local[seen[k]], image[k, seen[k]], project.interface_of(k)
         )
+        return Camera(centre=shift, rotation=rotation, principal_distance=1.0)
     except (GeometryError, ConvergenceError, InputError) as error:
         raise GeometryError(
             f"adjust: plate {label}: camera {project.camera_names[k]} gives no start for its pose: "
@@ -317,7 +318,7 @@ def _intersected(project: Project, ids: Sequence[str], which: IntArray) -> Float
 
 
 def _adjustment(
-    bundle: Bundle, result: Fit[BundleState], weights: FloatArray, remarks: tuple[str, ...]
+    bundle: Bundle, result: Fit[State], weights: FloatArray, remarks: tuple[str, ...]
 ) -> Adjustment:
     """Return everything in the project's own terms."""
     project, seen, state = bundle.project, bundle.observations, result.state
@@ -340,7 +341,10 @@ def _adjustment(
         square = float((misses[mine] ** 2).sum())
         sigma0_of[name] = unit * float(np.sqrt(square / share)) if share > 1e-9 else float("nan")
     return Adjustment(
-        project=replace(project, cameras=state.cameras, media=state.media, object_points=points),
+        project=replace(
+            project, cameras=tuple(state.blocks["camera"].values()), media=state.blocks["media"],
+            object_points=points,
+        ),
         names=bundle.columns.labels, values=values,
         covariance=change @ result.linear.cofactor @ change.T * result.sigma0**2,
         point_covariance=covariance, residuals=residuals, standardised=normed,
@@ -350,7 +354,7 @@ def _adjustment(
     )  # fmt: skip
 
 
-def _points(bundle: Bundle, result: Fit[BundleState]) -> tuple[ObjectPoints, FloatArray]:
+def _points(bundle: Bundle, result: Fit[State]) -> tuple[ObjectPoints, FloatArray]:
     """Return the adjusted object points and their covariances."""
     place, cofactor, state = bundle.columns, result.linear.cofactor, result.state
     covariance = result.linear.block_cofactor.copy()
@@ -361,7 +365,7 @@ def _points(bundle: Bundle, result: Fit[BundleState]) -> tuple[ObjectPoints, Flo
     for plate, at in enumerate(place.plates):
         pose = cofactor[np.ix_(list(at.values()), list(at.values()))]
         for j in np.flatnonzero(bundle.plate_of == plate):
-            arm = state.points[j] - state.poses[plate][1]
+            arm = state.points[j] - state.blocks["plate"][plate].centre
             rows = np.concatenate([np.eye(3), -skew(arm)], axis=1)
             covariance[j] = rows @ pose @ rows.T
     control = bundle.project.object_points
@@ -376,22 +380,19 @@ def _points(bundle: Bundle, result: Fit[BundleState]) -> tuple[ObjectPoints, Flo
     ), full  # fmt: skip
 
 
-def _values(bundle: Bundle, state: BundleState) -> tuple[FloatArray, FloatArray]:
+def _values(bundle: Bundle, state: State) -> tuple[FloatArray, FloatArray]:
     """Return the adjusted unknowns, and the change from rotation vectors to angles."""
     place = bundle.columns
     values, change = state.drift.copy(), np.eye(len(place.labels))
-    plates = [
-        Camera(centre=shift, rotation=rotation, principal_distance=1.0)
-        for rotation, shift in state.poses
-    ]
-    for at, camera in zip((*place.cameras, *place.plates), (*state.cameras, *plates), strict=True):
+    poses = (*state.blocks["camera"].values(), *state.blocks["plate"].values())
+    for at, camera in zip((*place.cameras, *place.plates), poses, strict=True):
         for name, column in at.items():
             values[column] = camera.value(name)
         turns = [at[name] for name in EXTERIOR[3:] if name in at]
         if turns:
             change[np.ix_(turns, turns)] = _rates(camera)
     for who, at in place.media.items():
-        interface = state.media[who]
+        interface = state.blocks["media"][who]
         for name, column in at.items():
             if name.startswith(WITH_VALUE):
                 values[column] = interface.value(name)

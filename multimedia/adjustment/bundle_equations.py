@@ -2,53 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike
-from scipy.sparse import csr_matrix, hstack
+from scipy.sparse import hstack
 
-from multimedia.adjustment.bundle_columns import BundleColumns, Places
+from multimedia.adjustment.bundle_columns import BundleColumns
 from multimedia.adjustment.unknowns import Unknowns
-from multimedia.media.camera import EXTERIOR, Camera
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.interfaces import Interfaces
+from multimedia.media.camera import EXTERIOR
 from multimedia.media.projection import project_with_jacobian
 from multimedia.projects.model import Project
-from photocore.adjustment import LARGEST, BlockEquations, Fit, fit
+from photocore.adjustment import LARGEST, Fit
+from photocore.adjustment.network import Network, Rows, State
 from photocore.arrays import BoolArray, FloatArray, IntArray
-from photocore.camera.rotation import by_turn, rotation_from_vector, skew
-from photocore.errors import GeometryError, InputError
+from photocore.camera.rotation import by_turn, skew
+from photocore.errors import GeometryError
 
 #: A motion of everything is a datum defect if it moves image points by less than this share of
 #: what its parts would move them on their own.
 _DEFECT = 1e-9
-#: Rotation and shift.
-Pose = tuple[FloatArray, FloatArray]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class BundleState:
-    """Everything that changes during the iteration.
-
-    Attributes
-    ----------
-    cameras : tuple of Camera
-    media : mapping of str to FlatInterface or Interfaces
-    points : ndarray, shape (p, 3)
-        World coordinates; those on plates follow from the pose.
-    poses : tuple of (rotation (3, 3), shift (3,))
-        World from plate.
-    drift : ndarray, shape (u,)
-        Sum of all steps of the remaining unknowns: for priors, and for values that count from 0.
-    """
-
-    cameras: tuple[Camera, ...]
-    media: Mapping[str, FlatInterface | Interfaces]
-    points: FloatArray
-    poses: tuple[Pose, ...]
-    drift: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,24 +46,6 @@ class ImageObservations:
     sigma: FloatArray
 
 
-class _Entries:
-    """Entries of a sparse matrix in the order in which they come."""
-
-    def __init__(self) -> None:
-        self.parts: list[list[FloatArray]] = []
-
-    def add(self, rows: ArrayLike, columns: ArrayLike, values: ArrayLike) -> None:
-        """Note values at rows and columns that broadcast against them; repeated ones add up."""
-        self.parts.append([part.ravel() for part in np.broadcast_arrays(rows, columns, values)])
-
-    def matrix(self, shape: tuple[int, int]) -> csr_matrix:
-        """Return the matrix."""
-        if not self.parts:
-            return csr_matrix(shape)
-        rows, columns, values = (np.concatenate(part) for part in zip(*self.parts, strict=True))
-        return csr_matrix((values, (rows, columns)), shape=shape)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Bundle:
     """A project and the unknowns wanted of it, turned into equations.
@@ -102,7 +56,9 @@ class Bundle:
     unknowns : Unknowns
     ids : tuple of str
         All object points, control first, new ones behind.
-    start : BundleState
+    start : State
+        Blocks ``camera``, ``media`` and ``plate``: the last is world from plate, as the pose of a
+        camera. World coordinates of points on plates follow from it.
     observations : ImageObservations
     columns : BundleColumns
     plate_of : ndarray of int, shape (p,)
@@ -122,7 +78,7 @@ class Bundle:
     project: Project
     unknowns: Unknowns
     ids: tuple[str, ...]
-    start: BundleState
+    start: State
     observations: ImageObservations
     columns: BundleColumns
     plate_of: IntArray
@@ -132,139 +88,92 @@ class Bundle:
     known_sigma: FloatArray
     datum: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
-    def fit(self, start: BundleState, *, largest: int = LARGEST) -> Fit[BundleState]:
-        """Adjust from a start; beyond ``largest`` unknowns by elimination of the points."""
-        frees = np.argwhere(self.free).tolist()
-        names = [*self.columns.labels, *(f"point {self.ids[j]}:{'XYZ'[k]}" for j, k in frees)]
-        size = float(np.abs(self.observations.image).max(initial=0.0))
-        # Projecting rounds a few times: ten units in the last place of the largest coordinate.
-        rounding = 2e-15 * size / float(self.observations.sigma.min(initial=1.0))
-        return fit(
-            start, self.equations, self.advance, names=names, what="adjustment", rounding=rounding,
-            largest=largest,
-        )  # fmt: skip
-
-    def equations(self, state: BundleState) -> BlockEquations | None:
-        """Return the equations at a state; None if a point is not seen there.
+    @property
+    def network(self) -> Network:
+        """The unknowns and what observes them.
 
         Image coordinates come first (x and y of each in turn), then weighted coordinates, priors,
         scale bars and the datum.
         """
-        seen = self.observations
+        frees, place = np.argwhere(self.free).tolist(), self.columns
+        size = float(np.abs(self.observations.image).max(initial=0.0))
+        cameras, plates = (dict(enumerate(some)) for some in (place.cameras, place.plates))
+        return Network(
+            labels=place.labels, free=self.free, kept=place.points,
+            columns={"camera": cameras, "media": place.media, "plate": plates},
+            names=[f"point {self.ids[j]}:{'XYZ'[k]}" for j, k in frees],
+            terms=(self._images, self._known, self._scale_bars, self._datum), moved=self._carried,
+            # Projecting rounds a few times: ten units in the last place of the largest coordinate.
+            rounding=2e-15 * size / float(self.observations.sigma.min(initial=1.0)),
+        )  # fmt: skip
+
+    def fit(self, start: State, *, largest: int = LARGEST) -> Fit[State]:
+        """Adjust from a start; beyond ``largest`` unknowns by elimination of the points."""
+        return self.network.solve(start, largest=largest)
+
+    def _carried(self, state: State) -> State:
+        """Return a state with the points on plates where their poses put them."""
+        for plate, pose in state.blocks["plate"].items():
+            on = self.plate_of == plate
+            state.points[on] = self.local[on] @ pose.rotation.T + pose.centre
+        return state
+
+    def _images(self, state: State, rows: Rows) -> bool:
+        seen, place, media = self.observations, self.columns, state.blocks["media"]
         image = np.empty(seen.image.shape)
-        design, eliminated = _Entries(), _Entries()
-        for k, rows in enumerate(seen.rows):
-            projected = self._camera_rows(state, k, rows, design, eliminated)
-            if projected is None:
-                return None
-            image[rows] = projected
-        misses = [((image - seen.image) / seen.sigma).ravel()]
-        count = misses[0].size
-        for miss, columns, values, points, by_points in self._extra_rows(state):
-            misses.append(np.array([miss]))
-            design.add(count, columns, values)
-            eliminated.add(count, points, by_points)
-            count += 1
-        return BlockEquations(
-            residuals=np.concatenate(misses),
-            design=design.matrix((count, len(self.columns.labels))),
-            eliminated=eliminated.matrix((count, self.free.size)),
-            free=self.free,
-        )
+        lines = rows.count + np.arange(image.size).reshape(image.shape)
+        for k, own in enumerate(seen.rows):
+            which, medium = seen.point[own], self.project.media_of[k]
+            of_camera, through = place.cameras[k], place.media.get(medium, {})
+            points = state.points[which]
+            try:
+                view = project_with_jacobian(
+                    state.blocks["camera"][k], points, media[medium] if medium else None,
+                    camera_names=tuple(of_camera), interface_names=tuple(through),
+                )  # fmt: skip
+            except GeometryError:
+                return False
+            image[own] = view.image
+            weight = 1.0 / seen.sigma[own][:, :, None]
+            by_point, at = view.by_point * weight, lines[own][..., None]
+            rows.by_label(at, list(of_camera.values()), view.by_camera * weight)
+            rows.by_label(at, list(through.values()), view.by_interface * weight)
+            for plate, pose in state.blocks["plate"].items():
+                on = self.plate_of[which] == plate
+                turned = by_turn(by_point[on], points[on] - pose.centre)
+                by_pose = np.concatenate([by_point[on], turned], axis=2)
+                rows.by_label(at[on], list(place.plates[plate].values()), by_pose)
+            rows.by_points(lines[own], which[:, None], by_point)
+        rows.add((image - seen.image) / seen.sigma)
+        return bool(np.isfinite(image).all())
 
-    def _camera_rows(
-        self, state: BundleState, k: int, rows: IntArray, design: _Entries, eliminated: _Entries
-    ) -> FloatArray | None:
-        """Enter the derivatives of one camera's rows; return its image points, None if unseen."""
-        place, which = self.columns, self.observations.point[rows]
-        medium = self.project.media_of[k]
-        own, through = place.cameras[k], place.media.get(medium, {})
-        points = state.points[which]
-        try:
-            seen = project_with_jacobian(
-                state.cameras[k], points, state.media[medium] if medium else None,
-                camera_names=tuple(own), interface_names=tuple(through),
-            )  # fmt: skip
-        except GeometryError:
-            return None
-        if not np.isfinite(seen.image).all():
-            return None
-        weight = 1.0 / self.observations.sigma[rows][:, :, None]
-        lines = 2 * rows[:, None, None] + np.arange(2)[:, None]
-        by_point = seen.by_point * weight
-        design.add(lines, list(own.values()), seen.by_camera * weight)
-        design.add(lines, list(through.values()), seen.by_interface * weight)
-        for plate, pose in enumerate(place.plates):
-            on = self.plate_of[which] == plate
-            arm = points[on] - state.poses[plate][1]
-            design.add(lines[on], _columns(pose, EXTERIOR[:3]), by_point[on])
-            design.add(lines[on], _columns(pose, EXTERIOR[3:]), by_turn(by_point[on], arm))
-        column = place.points[which]
-        end, axis = np.nonzero(column >= 0)
-        design.add(lines[end, :, 0], column[end, axis][:, None], by_point[end, :, axis])
-        mine = 3 * which[:, None, None] + np.arange(3)
-        eliminated.add(lines, mine, by_point * self.free[which][:, None, :])
-        return seen.image
+    def _known(self, state: State, rows: Rows) -> bool:
+        point, axis = np.nonzero(np.isfinite(self.known_sigma))
+        weight = 1.0 / self.known_sigma[point, axis]
+        lines = rows.add((state.points[point, axis] - self.known[point, axis]) * weight)
+        rows.by_points(lines, point, np.eye(3)[axis] * weight[:, None])
+        columns = np.array(list(self.columns.priors), dtype=np.int64)
+        weight = 1.0 / np.array(list(self.columns.priors.values()))
+        rows.by_label(rows.add(state.drift[columns] * weight), columns, weight)
+        return True
 
-    def _extra_rows(
-        self, state: BundleState
-    ) -> Iterator[tuple[float, ArrayLike, ArrayLike, ArrayLike, ArrayLike]]:
-        """Yield weighted coordinates, priors, scale bars and datum: residual and derivatives."""
-        place = self.columns
-        for j, axis in np.argwhere(np.isfinite(self.known_sigma)).tolist():
-            sigma, column = self.known_sigma[j, axis], place.points[j, axis]
-            miss = (state.points[j, axis] - self.known[j, axis]) / sigma
-            if column >= 0:
-                yield miss, column, 1.0 / sigma, 0, 0.0
-            else:
-                yield miss, 0, 0.0, 3 * j + axis, 1.0 / sigma
-        for column, sigma in place.priors.items():
-            yield state.drift[column] / sigma, column, 1.0 / sigma, 0, 0.0
+    def _scale_bars(self, state: State, rows: Rows) -> bool:
         for bar in self.unknowns.scale_bars:
-            ends = [self.ids.index(bar.first), self.ids.index(bar.second)]
+            ends = np.array([self.ids.index(bar.first), self.ids.index(bar.second)])
             offset = state.points[ends[1]] - state.points[ends[0]]
             length = float(np.linalg.norm(offset))
             along = np.stack([-offset, offset]) / length / bar.sigma
-            columns = place.points[ends]
-            unknown = columns >= 0
-            miss = (length - bar.length) / bar.sigma
-            yield miss, columns[unknown], along[unknown], 0, 0.0
-        moved = np.concatenate([state.drift, (state.points - self.start.points).ravel()])
-        stay = len(place.labels)
-        for row in self.datum:
-            near, far = np.flatnonzero(row[:stay]), np.flatnonzero(row[stay:])
-            yield float(row @ moved), near, row[near], far, row[stay + far]
+            rows.by_points(rows.add(np.array([(length - bar.length) / bar.sigma])), ends, along)
+        return True
 
-    def advance(self, state: BundleState, step: FloatArray) -> BundleState | None:
-        """Return the state after a step, None where it is impossible."""
-        place = self.columns
-        own = step[: len(place.labels)]
-        media = dict(state.media)
-        try:
-            cameras = tuple(
-                camera.stepped(list(at), own[list(at.values())]) if at else camera
-                for camera, at in zip(state.cameras, place.cameras, strict=True)
-            )
-            for name, at in place.media.items():
-                media[name] = media[name].stepped(list(at), own[list(at.values())])
-        except (InputError, GeometryError):
-            return None
-        points = state.points.copy()
-        points[self.free] += step[len(own) :]
-        kept = place.points >= 0
-        points[kept] += own[place.points[kept]]
-        poses = []
-        for plate, (at, (rotation, shift)) in enumerate(
-            zip(place.plates, state.poses, strict=True)
-        ):
-            turned = rotation_from_vector(own[_columns(at, EXTERIOR[3:])]) @ rotation
-            moved = shift + own[_columns(at, EXTERIOR[:3])]
-            poses.append((turned, moved))
-            on = self.plate_of == plate
-            points[on] = self.local[on] @ turned.T + moved
-        return BundleState(
-            cameras=cameras, media=media, points=points, poses=tuple(poses), drift=state.drift + own
-        )
+    def _datum(self, state: State, rows: Rows) -> bool:
+        moved = np.concatenate([state.drift, (state.points - self.start.points).ravel()])
+        stay = len(self.columns.labels)
+        for row in self.datum:
+            lines, near, far = rows.add(row[None] @ moved), *np.split(row, [stay])
+            rows.by_label(lines, np.arange(stay), near)
+            rows.by_points(lines, np.arange(len(self.free)), far.reshape(-1, 3))
+        return True
 
     def datum_rows(self) -> FloatArray:
         """Return the inner constraints of a free network, shape (defect, u + 3 p).
@@ -276,7 +185,7 @@ class Bundle:
         world leaves fewer of them.
         """
         state, stay = self.start, len(self.columns.labels)
-        linear = self.equations(state)
+        linear = self.network.equations(state)
         if self.unknowns.control != "free" or linear is None:
             return np.zeros((0, 0))
         motion = self._motions()
@@ -300,21 +209,16 @@ class Bundle:
         middle = state.points.mean(axis=0)
         reach = float(np.abs(state.points - middle).max()) or 1.0
         motion = np.zeros((stay + self.free.size, 7))
-        centres = [camera.centre for camera in state.cameras] + [shift for _, shift in state.poses]
-        for at, centre in zip((*place.cameras, *place.plates), centres, strict=True):
+        poses = (*state.blocks["camera"].values(), *state.blocks["plate"].values())
+        for at, pose in zip((*place.cameras, *place.plates), poses, strict=True):
             if EXTERIOR[0] in at:
-                motion[_columns(at, EXTERIOR[:3])] = _moved(centre, middle, reach)
-                motion[_columns(at, EXTERIOR[3:]), 3:6] = np.eye(3) / reach
+                motion[[at[name] for name in EXTERIOR[:3]]] = _moved(pose.centre, middle, reach)
+                motion[[at[name] for name in EXTERIOR[3:]], 3:6] = np.eye(3) / reach
         points = np.array([_moved(point, middle, reach) for point in state.points])
         kept = place.points >= 0
         motion[place.points[kept]] = points[kept]
         motion[stay:] = (points * self.free[:, :, None]).reshape(-1, 7)
         return motion
-
-
-def _columns(places: Places, names: tuple[str, ...]) -> list[int]:
-    """Return the columns of some parameters."""
-    return [places[name] for name in names]
 
 
 def _moved(place: FloatArray, middle: FloatArray, reach: float) -> FloatArray:

@@ -422,12 +422,14 @@ def test_a_plate_of_known_shape_finds_its_pose():
 
 def test_every_derivative_is_the_difference_of_the_residuals():
     bundle, _ = prepare(a_plate()[0], Unknowns(plates=("P",), media=("index3",), interior=("c",)))
-    design = bundle.equations(bundle.start).design.toarray()
+    network = bundle.network
+    design = network.equations(bundle.start).design.toarray()
     for column, label in enumerate(bundle.columns.labels):
         step = np.zeros(design.shape[1])
         step[column] = 1e-6
-        ahead, behind = (bundle.advance(bundle.start, sign * step) for sign in (1, -1))
-        change = bundle.equations(ahead).residuals - bundle.equations(behind).residuals
+        moved = (network.advance(bundle.start, sign * step) for sign in (1, -1))
+        ahead, behind = (network.equations(state).residuals for state in moved)
+        change = ahead - behind
         size = np.abs(design[:, column]).max()
         np.testing.assert_allclose(
             change / 2e-6, design[:, column], atol=1e-4 * size, rtol=0, err_msg=label
