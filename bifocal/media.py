@@ -68,7 +68,7 @@ class RadialWays(NamedTuple):
     turn: FloatArray
 
 
-class View(NamedTuple):
+class PointViews(NamedTuple):
     """Pixels (n, 2) with derivatives by point (n, 2, 3), camera (n, 2, 10) and media (n, 2, k).
 
     The camera's `PARAMETERS`, its homography and z0 kept; of the media what
@@ -336,7 +336,7 @@ def media_words(layers: Layers) -> str:
     return f"n = {', '.join([f'{first:g}', *glass, f'{last:g}'])}"
 
 
-def view(camera: Pinhole, path: MediaPath | None, xyz: FloatArray) -> View:
+def view(camera: Pinhole, path: MediaPath | None, xyz: FloatArray) -> PointViews:
     """Return the pixels of points, straight in air or bent on their path, with their derivatives.
 
     Parameters
@@ -350,7 +350,7 @@ def view(camera: Pinhole, path: MediaPath | None, xyz: FloatArray) -> View:
 
     Returns
     -------
-    View
+    PointViews
         All NaN where a point is before the last interface or behind the camera, no ray leads to it,
         or the first interface begins behind the camera.
 
@@ -362,7 +362,7 @@ def view(camera: Pinhole, path: MediaPath | None, xyz: FloatArray) -> View:
     """
     if path is None:
         seen = project_with_jacobian(camera, xyz)
-        return View(*seen, np.zeros((len(xyz), 2, 0)))
+        return PointViews(*seen, np.zeros((len(xyz), 2, 0)))
     normal = np.array([0.0, 0.0, 1.0]) if path.turn is None else path.turn[2]
     if path.z0 < 0:
         xyz = np.full_like(xyz, np.nan)
@@ -383,4 +383,4 @@ def view(camera: Pinhole, path: MediaPath | None, xyz: FloatArray) -> View:
     leaning = by_turn(moved.by_point, xyz - camera.centre) - by_camera[:, :, 4:7]
     by_camera[:, :, 7:] = -moved.by_point
     by_media = np.concatenate([by_index, by_thickness - nearer, -nearer, leaning], axis=2)
-    return View(seen.pixels, moved.by_point, by_camera, by_media)
+    return PointViews(seen.pixels, moved.by_point, by_camera, by_media)

@@ -12,7 +12,7 @@ from photocore.arrays import FloatArray, is_finite_number
 from photocore.errors import InputError
 
 
-class Section(Mapping[str, Any]):
+class FileSection(Mapping[str, Any]):
     """A section, and where it stands; a key that is not there is named when it is asked for.
 
     Parameters
@@ -66,9 +66,9 @@ class Section(Mapping[str, Any]):
             raise self.wrong(key, "a number")
         return float(self[key])
 
-    def section(self, key: str) -> Section:
+    def section(self, key: str) -> FileSection:
         """Return a section of it."""
-        return Section(self[key], f"{self.where}, {key}")
+        return FileSection(self[key], f"{self.where}, {key}")
 
     def numbers(
         self, key: str, *shapes: tuple[int, ...], default: Sequence[float] | None = None

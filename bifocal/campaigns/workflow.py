@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
-import re
-import socket
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from bifocal.campaigns.folder_locks import locked
 from bifocal.campaigns.inputs import check_files
 from bifocal.campaigns.pair_job import (
     FIRST_STEP,
@@ -40,10 +38,6 @@ from photocore.interrupts import raising
 from photocore.output import check_writable
 from photocore.provenance import FileHashes, recording, today
 
-#: File that says which process works in a folder.
-LOCK = ".survey.lock"
-#: What it says: machine and process; nothing where the process was killed at that moment.
-_OURS = re.compile(r"(\S+ \d+)?")
 #: In place of a pair's name in a plan.
 _ALL = "all pairs"
 
@@ -244,7 +238,7 @@ def run_survey(
     jobs = [replace(job, date=job.date or today()) for job in jobs]
     together: list[PairOutcome] = []
     outcomes: dict[str, PairOutcome] = {}
-    with raising(), _locked([job.folder for job in jobs]):
+    with raising(), locked([job.folder for job in jobs]):
         for job in jobs:
             clean(job.folder)
         ready = list(jobs)
@@ -379,54 +373,6 @@ class _Count(Listener):
             f"[{len(self.outcomes)}/{len(self.shares)}] {outcome.name}: {what} in "
             f"{_duration(outcome.seconds)}{rest}"
         )
-
-
-@contextmanager
-def _locked(folders: Sequence[Path]) -> Iterator[None]:
-    """Keep other processes out of folders; a lock whose process is gone counts for nothing."""
-    mine = f"{socket.gethostname()} {os.getpid()}"
-    taken: list[Path] = []
-    try:
-        for folder in folders:
-            try:
-                folder.mkdir(parents=True, exist_ok=True)
-                path = folder / LOCK
-                if path.exists() and _is_alive(path):
-                    raise InputError(
-                        f"{folder}: another run works on it ({path.read_text('utf-8').strip()}). "
-                        f"Wait for it; if there is none, delete {path}."
-                    )
-                if path.exists() and not _OURS.fullmatch(path.read_text("utf-8", "replace")):
-                    raise InputError(f"{path}: is not this program's; move it away.")
-                taken.append(path)
-                path.write_text(mine, encoding="utf-8")
-            except OSError as error:
-                raise InputError(
-                    f"{folder}: cannot be written to ({error.strerror or error}). Free some space "
-                    "or choose another place."
-                ) from error
-        yield
-    finally:
-        for path in taken:
-            with suppress(OSError):
-                path.unlink()
-
-
-def _is_alive(lock: Path) -> bool:
-    """Tell whether the process that wrote a lock may still run."""
-    try:
-        host, number = lock.read_text(encoding="utf-8").split()
-        if host != socket.gethostname():
-            return True  # who knows
-        # Windows has no way to ask without harm: there a lock of this machine counts for nothing.
-        if int(number) == os.getpid() or os.name == "nt":
-            return False
-        os.kill(int(number), 0)
-    except (ValueError, ProcessLookupError):
-        return False
-    except OSError:
-        return True
-    return True
 
 
 def facade_job(

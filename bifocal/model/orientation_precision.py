@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from bifocal.media import PLACING, MediaPath, View, view
+from bifocal.media import PLACING, MediaPath, PointViews, view
 from multimedia import Layers
 from photocore.arrays import FloatArray, as_floats, read_only
 from photocore.camera.pinhole import (
@@ -165,12 +165,12 @@ def _by_orientation(photos: tuple[PlanePhoto, PlanePhoto], xyz: FloatArray) -> F
     return out
 
 
-def rates_of(seen: View, radial: FloatArray, number: int) -> FloatArray:
+def rates_of(seen: PointViews, radial: FloatArray, number: int) -> FloatArray:
     """Return how the pixels of camera 0 or 1 move with all that `names_of` counts, (n, 2, k).
 
     Parameters
     ----------
-    seen : View
+    seen : PointViews
         Of that camera.
     radial : ndarray, shape (n, 2, 2)
         By its two terms of radial distortion.

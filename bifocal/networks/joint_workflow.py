@@ -16,6 +16,7 @@ from bifocal.model.pair import Pair
 from bifocal.model.pair_media import PairMedia
 from bifocal.model.photo import Photo
 from bifocal.networks.joint_adjustment import Blunder, JointAdjustment, adjust_jointly
+from bifocal.networks.joint_control import NamedPositions, name_of, named_positions
 from bifocal.networks.joint_media import bent_again, straightened
 from bifocal.networks.joint_observations import JointObservations, of_one_camera, with_rays
 from bifocal.networks.joint_ties import (
@@ -24,8 +25,6 @@ from bifocal.networks.joint_ties import (
     into_one_frame,
     near_each_other,
 )
-from bifocal.orientation.align_workflow import SIGMA_ON_WALL
-from bifocal.orientation.control_points import Control, read_control
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import Pinhole, plane_from_pixel
 from photocore.cli import Progress, no_progress
@@ -181,7 +180,7 @@ def adjust_pairs(
         If a file is unusable, two pair files have one name, pairs do not overlap, or control is
         missing or contradictory.
     """
-    names = [_name_of(path) for path in paths]
+    names = [name_of(path) for path in paths]
     twice = sorted({name for name in names if names.count(name) > 1})
     if len(paths) < 2:
         raise InputError("an adjustment of several pairs needs two pair files or more.")
@@ -191,7 +190,14 @@ def adjust_pairs(
     for path, pair in zip(paths, pairs, strict=True):
         with located(path):
             PairMedia.of(pair)
-    tables = _tables(paths, pairs, task)
+    tables = named_positions(
+        paths,
+        pairs,
+        control=task.control,
+        check=task.check,
+        sigma=task.sigma_control,
+        unit=task.unit,
+    )
     outputs = [out / "points.csv", *(out / path.name for path in paths)]
     for output in outputs:
         check_not_input(output, *paths, *task.control, *task.check)
@@ -205,21 +211,6 @@ def adjust_pairs(
             _write_pair(pair, folder / path.name, name, out)
         write_csv(folder / "points.csv", table)
     return result
-
-
-def _name_of(path: Path) -> str:
-    return path.name.removesuffix(".json").removesuffix(".pair")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class NamedPositions:
-    """Picked points of all pairs: names, coordinates, rays; ``check`` are compared only."""
-
-    ids: tuple[str, ...]
-    xyz: FloatArray
-    sigma: FloatArray
-    is_check: BoolArray
-    shared: SharedPoints
 
 
 def joint_adjustment(
@@ -282,70 +273,6 @@ def _cameras_of(pairs: Sequence[Pair]) -> list[int]:
         number.setdefault(pair.photo_file(k).resolve(), len(number))
         for pair in pairs for k in (1, 2)
     ]  # fmt: skip
-
-
-def _tables(paths: Sequence[Path], pairs: Sequence[Pair], task: JointTask) -> NamedPositions:
-    """Return the points of all tables, joined by name."""
-    xyz: dict[str, tuple[FloatArray, FloatArray]] = {}
-    check: set[str] = set()
-    rays: list[tuple[int, str, FloatArray]] = []
-    for role, tables in (("control", task.control), ("check", task.check)):
-        if tables and len(tables) != len(paths):
-            raise InputError(
-                f"--{role}: {len(tables)} tables for {len(paths)} pairs; give one for each, in "
-                "their order, and none where a pair has no points."
-            )
-        for index, path in enumerate(tables):
-            if path is None:
-                continue
-            # That a check point without relief is on the wall is nothing to check by.
-            part = read_control(
-                path, sigma=task.sigma_control, unit=task.unit,
-                sigma_plane=None if role == "check" else SIGMA_ON_WALL,
-                unnamed=f"{_name_of(paths[index])}, {role} ",
-            )  # fmt: skip
-            if pairs[index].exchanged:
-                part = part.exchanged()
-            _add(part, path, index, xyz, rays)
-            check |= set(part.ids) if role == "check" else set()
-    ids = tuple(dict.fromkeys(name for _, name, _ in rays))
-    number = {name: k for k, name in enumerate(ids)}
-    blank = (np.full(3, np.nan), np.full(3, 1.0))
-    return NamedPositions(
-        ids=ids,
-        xyz=np.array([xyz.get(name, blank)[0] for name in ids]).reshape(-1, 3),
-        sigma=np.array([xyz.get(name, blank)[1] for name in ids]).reshape(-1, 3),
-        is_check=np.array([name in check for name in ids], dtype=bool),
-        shared=SharedPoints(
-            photo=np.array([photo for photo, _, _ in rays], dtype=np.int64),
-            point=np.array([number[name] for _, name, _ in rays], dtype=np.int64),
-            pixels=np.array([pixel for _, _, pixel in rays], dtype=float).reshape(-1, 2),
-            count=len(ids),
-        ),
-    )
-
-
-def _add(
-    part: Control,
-    path: Path,
-    pair: int,
-    xyz: dict[str, tuple[FloatArray, FloatArray]],
-    rays: list[tuple[int, str, FloatArray]],
-) -> None:
-    """Add a table's points; refuse one that two tables place differently."""
-    for k, name in enumerate(part.ids):
-        if part.positioned[k]:
-            before = xyz.get(name)
-            if before is not None and np.nanmax(np.abs(before[0] - part.xyz[k])) > 1e-6:
-                raise InputError(
-                    f"{path}: point {name} has other coordinates than in another pair's table; "
-                    "points of one name are one point."
-                )
-            if before is None or np.isnan(before[0][2]):
-                xyz[name] = part.xyz[k], part.sigma[k]
-        for side, pixels in enumerate((part.pixels1, part.pixels2)):
-            if np.isfinite(pixels[k]).all():
-                rays.append((2 * pair + side, name, pixels[k]))
 
 
 def _together(photos: Sequence[Photo], shapes: Sequence[tuple[int, ...]]) -> BoolArray:

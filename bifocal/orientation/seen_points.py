@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bifocal import rays
-from bifocal.media import View, view
+from bifocal.media import PointViews, view
 from bifocal.model.pair_media import PairMedia
 from bifocal.orientation.pair_observations import Equations, PairObservations, PairUnknowns
 from photocore.arrays import FloatArray
@@ -15,7 +15,7 @@ from photocore.camera.pinhole import ray_on_plane, triangulate
 UNKNOWN = 1e6
 
 
-def views_of(state: PairUnknowns, xyz: FloatArray) -> list[View]:
+def views_of(state: PairUnknowns, xyz: FloatArray) -> list[PointViews]:
     """Return both cameras' pixels of points with their derivatives."""
     return [view(c, state.media.path(k, c), xyz) for k, c in enumerate(state.cameras)]
 

@@ -22,7 +22,7 @@ from photocore.camera.lensformats import LensData
 from photocore.camera.rotation import checked_rotation
 from photocore.errors import InputError
 from photocore.jsonfile import read_object, write_object
-from photocore.sections import Section
+from photocore.sections import FileSection
 
 VERSION = "1.0"
 #: What its reader insists on and a project does not have; kept from a file that was imported.
@@ -53,14 +53,14 @@ def read_aquacal(path: Path, *, pitch: float) -> Project:
     data = read_object(path, what="AquaCal calibration")
     if not is_aquacal(data):
         raise InputError(f"{path}: has no cameras and interface; is it a calibration of AquaCal?")
-    surface = Section(data, str(path)).section("interface")
+    surface = FileSection(data, str(path)).section("interface")
     normal = surface.numbers("normal", (3,))
     indices = tuple(surface.number(key) for key in ("n_air", "n_water"))
     cameras, media_of = [], []
     media: dict[str, FlatInterface] = {}
     for label in data["cameras"]:
         where = f"{path}, camera {label}"
-        node = Section(data["cameras"][label], where)
+        node = FileSection(data["cameras"][label], where)
         inner, outer = node.section("intrinsics"), node.section("extrinsics")
         lens = LensData(
             camera_matrix=inner.numbers("K", (3, 3)),

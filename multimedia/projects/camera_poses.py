@@ -13,7 +13,7 @@ from photocore.camera.rotation import (
     world_from_camera,
 )
 from photocore.errors import InputError
-from photocore.sections import Section
+from photocore.sections import FileSection
 
 #: Keys of a pose beside ``centre``; one of the ways, or the three angles.
 WAYS = ("rotation", "quaternion", "pose", "camera_from_world")
@@ -25,7 +25,7 @@ _AXES = ("photogrammetric", "opencv")
 _PRINTED = 1e-5
 
 
-def read_pose(value: Section) -> tuple[FloatArray, FloatArray]:
+def read_pose(value: FileSection) -> tuple[FloatArray, FloatArray]:
     """Return the projection centre and the world-from-camera rotation of a camera's section.
 
     Raises
@@ -53,7 +53,7 @@ def read_pose(value: Section) -> tuple[FloatArray, FloatArray]:
     return centre, rotation @ FLIP if axes == "opencv" else rotation
 
 
-def _from_angles(value: Section) -> FloatArray:
+def _from_angles(value: FileSection) -> FloatArray:
     """Return the rotation by omega, phi and kappa in degrees."""
     if lost := [key for key in EXTERIOR[3:] if key not in value]:
         raise InputError(
@@ -70,7 +70,7 @@ def _from_angles(value: Section) -> FloatArray:
     return world_from_camera(*(float(a) for a in turns))
 
 
-def _from_matrix(value: Section, way: str) -> tuple[FloatArray, FloatArray]:
+def _from_matrix(value: FileSection, way: str) -> tuple[FloatArray, FloatArray]:
     """Return centre and rotation as one of `WAYS` states them, in the file's camera axes."""
     what = f"{value.where}, {way}"
     if way == "quaternion":

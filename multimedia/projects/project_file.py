@@ -45,7 +45,7 @@ from photocore.camera.distortion import NAMES, Brown, Convention
 from photocore.camera.fisheye import Fisheye
 from photocore.errors import GeometryError, InputError, located
 from photocore.output import all_or_none, atomic_path, check_all_writable
-from photocore.sections import Section
+from photocore.sections import FileSection
 from photocore.textfile import check_name, read_toml
 
 FORMAT = "multimedia-project/1"
@@ -229,7 +229,7 @@ def _project(data: dict[str, Any], folder: Path) -> Project:
 def _sigma(data: dict[str, Any], cameras: tuple[Camera, ...]) -> float:
     """Return the precision of an image coordinate: as given, else half a pixel. [mm]"""
     if "sigma_image" in data:
-        value = Section(data, "project").number("sigma_image")
+        value = FileSection(data, "project").number("sigma_image")
         del data["sigma_image"]
         return positive(value, "sigma_image", unit="mm")
     pitches = [camera.sensor.pitch.mean() for camera in cameras if camera.sensor is not None]
@@ -240,7 +240,7 @@ def _media(value: Any, where: str, folder: Path) -> FlatInterface | Interfaces:
     if isinstance(value, Mapping) and "surfaces" in value:
         return _surfaces(value, where, folder)
     flat = ("indices", "thicknesses", "point", "normal", "moves_with_camera")
-    section = Section(value, where, (*flat, *_GRADED))
+    section = FileSection(value, where, (*flat, *_GRADED))
     layers = Layers.from_dict(value, where=where)
     point = section.numbers("point", (3,), default=(0, 0, 0))
     normal = section.numbers("normal", (3,), default=(0, 0, 1))
@@ -256,7 +256,7 @@ def _media(value: Any, where: str, folder: Path) -> FlatInterface | Interfaces:
 _GRADED = {"gradient": "gradient", "gradient_level": "level"}
 
 
-def _graded(section: Section) -> tuple[float, float]:
+def _graded(section: FileSection) -> tuple[float, float]:
     """Return by how much the index of the last medium grows with depth, and from which level."""
     gradient, level = (section.number(k) if k in section else 0.0 for k in _GRADED)
     return gradient, level
@@ -264,7 +264,7 @@ def _graded(section: Section) -> tuple[float, float]:
 
 def _surfaces(value: Mapping[str, Any], where: str, folder: Path) -> Interfaces:
     """Return ray-traced surfaces of any form."""
-    section = Section(value, where, ("indices", "surfaces", *_GRADED))
+    section = FileSection(value, where, ("indices", "surfaces", *_GRADED))
     listed = section["surfaces"]
     if not isinstance(listed, list) or not listed:
         raise InputError(f"{where}: surfaces must be a list of sections, camera side first.")
@@ -273,7 +273,7 @@ def _surfaces(value: Mapping[str, Any], where: str, folder: Path) -> Interfaces:
     for number, item in enumerate(listed, start=1):
         place = f"{where}, surface {number}"
         surfaces.append(_surface(item, place, folder))
-        moving.append(Section(item, place).flag("moves_with_camera"))
+        moving.append(FileSection(item, place).flag("moves_with_camera"))
     indices = section.get("indices")
     if not isinstance(indices, list):
         raise InputError(f"{where}: indices must be a list of numbers, camera side first.")
@@ -289,12 +289,12 @@ def _surface(item: Any, place: str, folder: Path) -> RefractingSurface:
     """Return one ray-traced surface."""
     kind = str(item.get("kind", "")) if isinstance(item, Mapping) else ""
     if kind in _FILED:
-        section = Section(item, place, ("kind", "moves_with_camera", "file"))
+        section = FileSection(item, place, ("kind", "moves_with_camera", "file"))
         name = _file_name(section["file"], f"{place}, file")
         surface: RefractingSurface = _FILED[kind][1](folder / name)
         return surface
     if kind == _WAVES:
-        section = Section(item, place, ("kind", "moves_with_camera", "level", "waves"))
+        section = FileSection(item, place, ("kind", "moves_with_camera", "level", "waves"))
         rows = section["waves"]
         if not isinstance(rows, list) or not all(
             isinstance(row, list) and all(is_finite_number(v) for v in row) for row in rows
@@ -308,7 +308,7 @@ def _surface(item: Any, place: str, folder: Path) -> RefractingSurface:
         known = ", ".join((*_KINDS, *_FILED, _WAVES))
         raise InputError(f"{place}: kind must be one of {known}, found {kind!r}.")
     form, keys = _KINDS[kind]
-    section = Section(item, place, ("kind", "moves_with_camera", *keys))
+    section = FileSection(item, place, ("kind", "moves_with_camera", *keys))
     values = {k: section.number(k) if k == "radius" else section.numbers(k, (3,)) for k in keys}
     return form(**values)
 
@@ -352,7 +352,7 @@ _CAMERA_KEYS = ("name", "media", *POSE_KEYS, "c", "principal_point", "distortion
 
 
 def _camera(value: Any, number: int) -> tuple[Camera, str]:
-    section = Section(value, f"camera {number}", _CAMERA_KEYS)
+    section = FileSection(value, f"camera {number}", _CAMERA_KEYS)
     name = str(section.get("name", f"cam{number}"))
     where = section.where = f"camera {name}"
     centre, rotation = read_pose(section)
@@ -399,9 +399,9 @@ def _camera_data(camera: Camera, media: str) -> dict[str, Any]:
 
 def _sensor(value: Any, where: str) -> Sensor:
     where = f"{where}, sensor"
-    section = Section(value, where, ("width", "height", "pitch", "origin"))
+    section = FileSection(value, where, ("width", "height", "pitch", "origin"))
     if isinstance(pitch := section.get("pitch"), int | float):
-        section = Section({**value, "pitch": [pitch, pitch]}, where)
+        section = FileSection({**value, "pitch": [pitch, pitch]}, where)
     size = section.numbers("pitch", (2,))
     if (size > 0.2).any():
         raise InputError(f"{where}: a pitch of {size.tolist()} mm? Typical are 0.002 to 0.03 mm.")
@@ -414,7 +414,7 @@ def _distortion(value: Any, where: str, c: float) -> Distortion:
     where = f"{where}, distortion"
     fisheye = isinstance(value, Mapping) and value.get("convention") == _FISHEYE
     names = Fisheye.names if fisheye else NAMES
-    section = Section(value, where, ("convention", *names))
+    section = FileSection(value, where, ("convention", *names))
     terms = {name: section.number(name) for name in names if name in section}
     if fisheye:
         with located(where):

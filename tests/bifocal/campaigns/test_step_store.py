@@ -11,6 +11,7 @@ import pytest
 
 from bifocal import InputError
 from bifocal.campaigns import step_store
+from bifocal.campaigns.folder_locks import LOCK, locked
 from bifocal.campaigns.step_store import (
     MARK,
     RECORD,
@@ -20,7 +21,6 @@ from bifocal.campaigns.step_store import (
     read_record,
     run_step,
 )
-from bifocal.campaigns.workflow import LOCK, _locked
 from photocore.cli import no_progress
 from photocore.provenance import FileHashes
 from tests.full_disk import full_after
@@ -233,10 +233,10 @@ def test_a_workbook_that_is_open_is_not_replaced(kitchen, lock):
 
 def test_a_lock_of_somebody_else_is_left_alone(tmp_path):
     (tmp_path / LOCK).write_text("my own notes")
-    with pytest.raises(InputError, match="is not this program's"), _locked([tmp_path]):
+    with pytest.raises(InputError, match="is not this program's"), locked([tmp_path]):
         pass
     assert (tmp_path / LOCK).read_text() == "my own notes"
     (tmp_path / LOCK).write_text("")  # killed before it said whose
-    with _locked([tmp_path]):
+    with locked([tmp_path]):
         assert (tmp_path / LOCK).read_text()
     assert not (tmp_path / LOCK).exists()

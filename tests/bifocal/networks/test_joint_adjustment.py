@@ -13,6 +13,7 @@ from bifocal import GeometryError, InputError, Pair, PairMedia, Similarity, read
 from bifocal.model.orientation_precision import pinhole
 from bifocal.networks import joint_adjustment
 from bifocal.networks.joint_adjustment import adjust_jointly
+from bifocal.networks.joint_control import named_positions
 from bifocal.networks.joint_observations import (
     of_one_camera,
     with_enough_rays,
@@ -21,9 +22,7 @@ from bifocal.networks.joint_observations import (
 from bifocal.networks.joint_ties import SharedPoints, into_one_frame, near_each_other
 from bifocal.networks.joint_workflow import (
     JointResult,
-    JointTask,
     _adjusted_photo,
-    _tables,
     _write_pair,
     adjust_pairs,
 )
@@ -304,7 +303,7 @@ def test_a_rendered_street_is_adjusted_by_the_command(tmp_path):
 def test_a_control_point_without_relief_is_on_the_wall_as_for_align(tmp_path):
     (tmp_path / "c.csv").write_text("id,X,Y,r,col1,row1,col2,row2\nA,1,2,,5,6,7,8\n")
     pair = Pair.ideal(d1=17.5, d2=9.5)
-    named = _tables([tmp_path / "a.json"], [pair], JointTask(control=(tmp_path / "c.csv",)))
+    named = named_positions([tmp_path / "a.json"], [pair], control=(tmp_path / "c.csv",))
     np.testing.assert_array_equal(named.xyz, [[1.0, 2.0, 0.0]])
     np.testing.assert_array_equal(named.sigma, [[0.003, 0.003, 0.005]])
 
@@ -322,7 +321,7 @@ def test_rows_without_names_in_two_tables_are_not_one_point(tmp_path):
     first, second = "A,1,2,0,5,6,7,8\n,,,,1,2,3,4\n", ",,,,9,8,7,6\n,,,,5,5,5,5\n"
     control, pair = tables_of(tmp_path, a=first, b=second), Pair.ideal(d1=17.5, d2=9.5)
     paths = [tmp_path / "a.pair.json", tmp_path / "b.pair.json"]
-    named = _tables(paths, [pair, pair], JointTask(control=control))
+    named = named_positions(paths, [pair, pair], control=control)
     assert named.ids == ("A", "a, control 2", "b, control 1", "b, control 2")
     assert named.shared.count == 4
 
@@ -335,7 +334,7 @@ def test_a_row_without_a_name_takes_none_that_another_row_has(tmp_path):
 def test_a_check_point_without_relief_is_compared_in_x_and_y_alone(tmp_path):
     check = tables_of(tmp_path, c="A,1,2,,5,6,7,8\nB,1,3,0.4,5,6,7,8\n")
     pair = Pair.ideal(d1=17.5, d2=9.5)
-    named = _tables([tmp_path / "a.json"], [pair], JointTask(check=check[:1]))
+    named = named_positions([tmp_path / "a.json"], [pair], check=check[:1])
     np.testing.assert_array_equal(named.xyz, [[1.0, 2.0, np.nan], [1.0, 3.0, 0.4]])
     away = ((0.003, 0.0, np.nan), (0.004, 0.0, 0.01))
     points = tuple(
