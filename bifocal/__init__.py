@@ -27,6 +27,7 @@ Points
 The whole wall
     dense_relief, DenseRelief measured relief with its precision, pixel by pixel
     ReliefMap, Quality        relief on a grid, and where each pixel's comes from
+    read_relief, write_relief   its GeoTIFF
     orthophoto, Orthophoto, OrthoOptions, Source   the photo to scale, moved by its relief
     mosaic, Mosaic, MosaicOptions   several orthophotos or relief maps made one
     relief_view               the relief in three dimensions, as a page of HTML

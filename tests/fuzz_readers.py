@@ -22,8 +22,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from bifocal import Lens, Pair, read_image, solve
-from bifocal.files.geotiff import read_relief
+from bifocal import Lens, Pair, read_image, read_relief, solve
 from bifocal.files.images import image_info
 from bifocal.files.point_tables import read_survey_points
 from multimedia import PhotogrammetryError, read_experiment, read_project

@@ -13,9 +13,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from bifocal import SAMPLE, WATER_SAMPLE, Pair, ReliefMap
+from bifocal import SAMPLE, WATER_SAMPLE, Pair, ReliefMap, write_relief
 from bifocal.demo.samples import PICK_SIGMA
-from bifocal.files.geotiff import write_relief
 from multimedia import Layers
 from photocore.tables import write_csv
 from tests.scenes import NamedPoint, Rendering, bifocal_cameras, demo_scene, render

@@ -10,9 +10,8 @@ import pytest
 from click.testing import CliRunner
 
 import bifocal
-from bifocal import SAMPLE, WATER_SAMPLE
+from bifocal import SAMPLE, WATER_SAMPLE, read_relief
 from bifocal.demo.samples import PICK_SIGMA, WATER
-from bifocal.files.geotiff import read_relief
 from tests.builders.commands import bifocal_command as main
 from tests.scenes import demo_scene
 from tests.scenes.refracted import pixels_of

@@ -16,8 +16,8 @@ import rasterio
 from click.testing import CliRunner, Result
 from PIL import Image
 
-from bifocal import Grid, Pair, Photo, ReliefMap, write_image
-from bifocal.files.geotiff import create_raster, read_relief, write_relief
+from bifocal import Grid, Pair, Photo, ReliefMap, read_relief, write_image, write_relief
+from bifocal.files.geotiff import create_raster
 from tests.builders.commands import bifocal_command as main
 
 SIZE = (420, 300)

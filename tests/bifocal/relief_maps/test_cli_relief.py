@@ -11,8 +11,7 @@ import pytest
 import rasterio
 from click.testing import CliRunner
 
-from bifocal import Pair, write_image
-from bifocal.files.geotiff import read_relief
+from bifocal import Pair, read_relief, write_image
 from tests.builders.commands import bifocal_command as main
 from tests.scenes import bifocal_cameras, facade, render
 

@@ -12,8 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 import bifocal
-from bifocal import SAMPLE, Grid, InputError
-from bifocal.files.geotiff import read_relief
+from bifocal import SAMPLE, Grid, InputError, read_relief
 from tests.browser import launched
 from tests.builders.commands import bifocal_command as main
 from tests.web_page import Page
