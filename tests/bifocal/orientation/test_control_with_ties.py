@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bifocal.model.interior_orientation import Interior
+from bifocal.orientation.adjustment.pair_observations import PairObservations, PairUnknowns
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import (
     OrientedPair,
@@ -11,7 +12,6 @@ from bifocal.orientation.orientation_stages import (
     control_alone,
     oriented_in_stages,
 )
-from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
 from photocore.camera.pinhole import Pinhole, triangulate
 from tests.scenes import SetupErrors, bifocal_cameras
 

@@ -8,7 +8,7 @@ import pytest
 from bifocal.model.interior_orientation import Interior
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.orientation_report import orientation_in_words
-from bifocal.orientation.reference_plane import (
+from bifocal.orientation.walls.reference_plane import (
     Face,
     NarrowFace,
     choose_wall,

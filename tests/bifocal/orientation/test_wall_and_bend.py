@@ -12,11 +12,11 @@ from bifocal.model.interior_orientation import Interior
 from bifocal.orientation import absolute_orientation
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import make_alignment
-from bifocal.orientation.bend import WallBend, bend_in_words, bend_of_wall, wall_bend
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import PhotoInput
-from bifocal.orientation.reference_plane import narrow_face
-from bifocal.orientation.relative_orientation import Ties, supported
+from bifocal.orientation.starts.relative_orientation import Ties, supported
+from bifocal.orientation.walls.bend import WallBend, bend_in_words, bend_of_wall, wall_bend
+from bifocal.orientation.walls.reference_plane import narrow_face
 from photocore.camera.distortion import RadialDivision
 from photocore.camera.pinhole import Pinhole
 from photocore.errors import GeometryError
