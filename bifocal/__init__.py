@@ -13,34 +13,39 @@ By hand, the equations
 The pair
     Pair, Photo               both cameras; read and write pair files, intersect and project points
     Intersection              what `Pair.intersect` returns: X, Y, r, covariance, flags
+    read_image, write_image   photos as arrays, upright as seen
     Lens                      principal distance, principal point and distortion of a lens
     calibrate, Calibration    a lens from photos of a board
     align, Alignment          a pair from two photos and what was measured on site
-    Control, Interior, SiteMeasures, PairMedia   what `align` is told
+    Control, Interior, SiteMeasures, PairMedia, read_control   what `align` is told
 Points
     solve, SolvedSurvey       relief, coordinates, precision, check of measured points
     Taking, Measuring         distances and lenses, unit and precision that `solve` is told
     ReadOptions               which column of a table is which
     georeference, Georeference   wall coordinates to world coordinates by control points
-    match, Matches            homologous points found automatically, with their precision
-    MatchSettings             what `match` looks for
+    match, Matches, MatchSettings   homologous points found automatically, with their precision
 The whole wall
     dense_relief, DenseRelief measured relief with its precision, pixel by pixel
     ReliefMap, Quality        relief on a grid, and where each pixel's comes from
-    orthophoto, Orthophoto    the photo to scale, moved by its relief
-    OrthoOptions              how an orthophoto is rendered
-    mosaic, Mosaic            several orthophotos or relief maps made one
-    MosaicOptions             how they are joined
+    orthophoto, Orthophoto, OrthoOptions, Source   the photo to scale, moved by its relief
+    mosaic, Mosaic, MosaicOptions   several orthophotos or relief maps made one
     relief_view               the relief in three dimensions, as a page of HTML
-
 The page
     pick                      orient, pick and draw in the browser, as the command `bifocal pick`
-    page_server, PageServer   the same without a browser, for programs that drive it
-
+    page_server, PageServer, Session   the same without a browser, for programs that drive it
     recording                 what the outputs written within it say made them
+Sample pairs                  SAMPLE, WATER_SAMPLE: folders of photos with exact truth
 
-Files in, files out: the command `bifocal`. Errors are ValueErrors with one message that says what
-is wrong, where, and how to mend it.
+What they take and give: Bounds, CheckResult, FlagLimits, FlatSurface, Foot, Grid, KnownPoints,
+Layers, MapSurface, MediaPath, NamedPoints, OrientationCheck, Pinhole, PlanePicks,
+PointObservations, Progress, ProjectedPoints, RadialDivision, Registration, ReliefTable,
+Similarity, SpaceSums,
+Surface, SurveyInput, SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision,
+WeightedSums, Window, WorldPoints.
+
+Errors are one family with one message each that says what is wrong, where, and how to mend it:
+PhotogrammetryError > InputError (a ValueError) > CellError, WorkbookError, MissingExtraError;
+GeometryError (a ValueError); ConvergenceError. Files in, files out: the command `bifocal`.
 """
 
 from photocore.public_names import public_names

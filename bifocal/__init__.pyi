@@ -1,6 +1,23 @@
+from multimedia import Layers
+from photocore.camera.distortion import RadialDivision
+from photocore.camera.pinhole import Pinhole, ProjectedPoints
+from photocore.camera.similarity import Similarity
+from photocore.cli import Progress
+from photocore.errors import (
+    CellError,
+    ConvergenceError,
+    GeometryError,
+    InputError,
+    MissingExtraError,
+    PhotogrammetryError,
+    WorkbookError,
+)
+
 from .calibration.board_calibration import Calibration
 from .calibration.board_photos import calibrate
+from .collimation.session import Session
 from .collimation.workflow import PageServer, page_server, pick
+from .demo import SAMPLE, WATER_SAMPLE
 from .equations import (
     plane_coordinates,
     relief,
@@ -8,28 +25,45 @@ from .equations import (
     relief_displacements,
     relief_from_displacement,
 )
+from .files.images import read_image, write_image
 from .files.provenance import recording
 from .matching.homologous_points import match
-from .matching.matching import Matches, MatchSettings
+from .matching.matches import Matches
+from .matching.matching import MatchSettings
+from .media import MediaPath
+from .model.flags import FlagLimits
+from .model.grid import Bounds, Grid, Window
 from .model.interior_orientation import Interior
-from .model.intersection import Intersection
+from .model.intersection import Intersection, PlanePicks
 from .model.lens import Lens
 from .model.pair import Pair
 from .model.pair_media import PairMedia
 from .model.photo import Photo
 from .model.relief_map import Quality, ReliefMap
+from .model.surface import FlatSurface, MapSurface, Surface
 from .orientation.alignment import Alignment
-from .orientation.control_points import Control, SiteMeasures
+from .orientation.control_points import Control, SiteMeasures, read_control
 from .orientation.photo_alignment import align
 from .orthophotos.compose import orthophoto
 from .orthophotos.mosaic_in_memory import Mosaic, MosaicOptions, mosaic
-from .orthophotos.ortho_image import OrthoOptions, Orthophoto
+from .orthophotos.ortho_image import OrthoOptions, Orthophoto, Source
+from .rays import Foot
 from .relief_maps.dense_matching import DenseRelief, dense_relief
+from .relief_maps.registration import Registration
 from .reports.relief_view import relief_view
 from .survey.georeferencing import georeference
-from .survey.reference import Georeference
-from .survey.setup import Measuring, Taking
-from .survey.solved_survey import SolvedSurvey
+from .survey.observations import PointObservations
+from .survey.orientation_check import OrientationCheck
+from .survey.reference import CheckResult, Georeference, KnownPoints, NamedPoints
+from .survey.relief_table import ReliefTable
+from .survey.setup import Measuring, SurveySetup, Taking
+from .survey.solved_survey import SolvedSurvey, WorldPoints
+from .survey.space_similarity import SpaceSums
+from .survey.survey_input import SurveyInput
+from .survey.survey_media import SurveyMedia
+from .survey.tolerances import ToleranceRule
+from .survey.transformation_precision import TransformationPrecision
+from .survey.weighted_similarity import WeightedSums
 from .workbook.reading.reader import ReadOptions
 from .workbook.workflow import solve
 
@@ -37,30 +71,72 @@ __version__: str
 
 __all__ = [
     "Alignment",
+    "Bounds",
     "Calibration",
+    "CellError",
+    "CheckResult",
     "Control",
+    "ConvergenceError",
     "DenseRelief",
+    "FlagLimits",
+    "FlatSurface",
+    "Foot",
+    "GeometryError",
     "Georeference",
+    "Grid",
+    "InputError",
     "Interior",
     "Intersection",
+    "KnownPoints",
+    "Layers",
     "Lens",
+    "MapSurface",
     "MatchSettings",
     "Matches",
     "Measuring",
+    "MediaPath",
+    "MissingExtraError",
     "Mosaic",
     "MosaicOptions",
+    "NamedPoints",
+    "OrientationCheck",
     "OrthoOptions",
     "Orthophoto",
     "PageServer",
     "Pair",
     "PairMedia",
     "Photo",
+    "PhotogrammetryError",
+    "Pinhole",
+    "PlanePicks",
+    "PointObservations",
+    "Progress",
+    "ProjectedPoints",
     "Quality",
+    "RadialDivision",
     "ReadOptions",
+    "Registration",
     "ReliefMap",
+    "ReliefTable",
+    "SAMPLE",
+    "Session",
+    "Similarity",
     "SiteMeasures",
     "SolvedSurvey",
+    "Source",
+    "SpaceSums",
+    "Surface",
+    "SurveyInput",
+    "SurveyMedia",
+    "SurveySetup",
     "Taking",
+    "ToleranceRule",
+    "TransformationPrecision",
+    "WATER_SAMPLE",
+    "WeightedSums",
+    "Window",
+    "WorkbookError",
+    "WorldPoints",
     "align",
     "calibrate",
     "dense_relief",
@@ -71,6 +147,8 @@ __all__ = [
     "page_server",
     "pick",
     "plane_coordinates",
+    "read_control",
+    "read_image",
     "recording",
     "relief",
     "relief_displacement",
@@ -78,4 +156,5 @@ __all__ = [
     "relief_from_displacement",
     "relief_view",
     "solve",
+    "write_image",
 ]

@@ -8,17 +8,15 @@ The photos are those of `bifocal demo`: rendered, so that the truth is known.
 import numpy as np
 
 import bifocal
-from bifocal.demo import SAMPLE
 from bifocal.files.geotiff import read_relief
-from bifocal.files.images import read_image
 
-pair = bifocal.Pair.read(SAMPLE / "facade.pair.json")
-far, near = (read_image(SAMPLE / name) for name in ("far.jpg", "near.jpg"))
+pair = bifocal.Pair.read(bifocal.SAMPLE / "facade.pair.json")
+far, near = (bifocal.read_image(bifocal.SAMPLE / name) for name in ("far.jpg", "near.jpg"))
 
 relief = bifocal.dense_relief(pair, far, near, gsd=0.03, bounds=(-4, -2.5, 4, 2.5))
 ortho = bifocal.orthophoto(pair, far, relief, gsd=0.015)
 
-truth = read_relief(SAMPLE / "truth.tif")
+truth = read_relief(bifocal.SAMPLE / "truth.tif")
 columns, rows = np.meshgrid(relief.grid.columns_x, relief.grid.rows_y)
 error = relief.r - truth.sample(np.stack([columns, rows], axis=-1))
 measured = relief.quality == bifocal.Quality.MEASURED

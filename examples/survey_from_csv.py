@@ -9,10 +9,11 @@ workbooks: bifocal solve targets.csv --pair facade.pair.json --out result.xlsx
 import numpy as np
 
 import bifocal
-from bifocal.demo import SAMPLE
 
 picks = bifocal.Measuring(sigma_px=0.2)
-survey = bifocal.solve(SAMPLE / "targets.csv", pair=SAMPLE / "facade.pair.json", measuring=picks)
+survey = bifocal.solve(
+    bifocal.SAMPLE / "targets.csv", pair=bifocal.SAMPLE / "facade.pair.json", measuring=picks
+)
 points = survey.table
 for k in range(0, len(points), 8):
     x, y, r = points.xyz[k]

@@ -53,11 +53,15 @@ Planning and simplified models
     lavest, agrafiotis, telem, Approximation   models without rays, and their error
 Files
     read_project, write_project, Project, ImagePoints, ObjectPoints
-    read_experiment, write_experiment     OpenPTV folders
+    read_experiment, write_experiment, Experiment    OpenPTV folders
     convert, Conversion       cameras of COLMAP, Metashape, OpenCV, AquaCal, in and out
 
-Files in, files out: the command `multimedia`. Errors are ValueErrors with one message that says
-what is wrong, where, and how to mend it.
+What they take and give: Body, Convention, DetectedTargets, HeightField, Media, Medium,
+OpticalMedia, PlaneCandidates, RefractingSurface, Sight, SurfaceSequence, Term, WaterSurface.
+
+Errors are one family with one message each that says what is wrong, where, and how to mend it:
+PhotogrammetryError > InputError (a ValueError) > CellError, WorkbookError, MissingExtraError;
+GeometryError (a ValueError); ConvergenceError. Files in, files out: the command `multimedia`.
 """
 
 from photocore.public_names import public_names

@@ -1,3 +1,14 @@
+from photocore.camera.distortion import Convention
+from photocore.errors import (
+    CellError,
+    ConvergenceError,
+    GeometryError,
+    InputError,
+    MissingExtraError,
+    PhotogrammetryError,
+    WorkbookError,
+)
+
 from .adjustment.bundle import bundle_adjust
 from .adjustment.unknowns import Adjustment, ScaleBar, Unknowns
 from .bathymetry.corrected_points import BathymetryStatus, CorrectedPoints, Precision
@@ -27,16 +38,22 @@ from .design.simplified_models import Approximation, agrafiotis, lavest, telem
 from .design.studies import CalibrationCosts, Placement, Study
 from .exchange.workflow import Conversion, convert
 from .media.camera import Brown, Camera, Fisheye, Sensor
+from .media.collinearity import Medium
 from .media.flat_interface import FlatInterface
-from .media.height_field import RasterSurface, WaveSurface
+from .media.height_field import HeightField, RasterSurface, WaterSurface, WaveSurface
 from .media.interfaces import Interfaces
 from .media.mesh_surface import MeshSurface
-from .media.projection import project, projection_status
+from .media.optical_media import OpticalMedia, Sight
+from .media.projection import Media, project, projection_status
 from .media.ray_paths import RayPaths, RayStatus
 from .media.ray_tracing import aim_rays, trace_rays
-from .media.surfaces import Cylinder, Plane, Sphere
+from .media.surface_motion import Body
+from .media.surface_sequence import SurfaceSequence
+from .media.surfaces import Cylinder, Plane, RefractingSurface, Sphere
 from .openptv.correspondences import correspondences
-from .openptv.experiment import read_experiment, write_experiment
+from .openptv.experiment import Experiment, read_experiment, write_experiment
+from .openptv.openptv_files import DetectedTargets
+from .openptv.plane_sets import PlaneCandidates
 from .orientation.epipolar_curves import (
     Candidates,
     EpipolarCurves,
@@ -69,6 +86,7 @@ from .refraction.water import (
     HOEHLE,
     PARRISH,
     QUAN_FRY,
+    Term,
     WaterFormula,
     WaterIndexDerivatives,
     salinity_from_index,
@@ -85,31 +103,46 @@ __all__ = [
     "Adjustment",
     "Approximation",
     "BathymetryStatus",
-    "CalibrationCosts",
+    "Body",
     "Brown",
+    "CalibrationCosts",
     "Camera",
     "Candidates",
+    "CellError",
+    "Convention",
+    "ConvergenceError",
     "Conversion",
     "CorrectedPoints",
     "Cylinder",
+    "DetectedTargets",
     "EpipolarCurves",
+    "Experiment",
     "FLOAT_GLASS",
     "FUSED_SILICA",
     "Fisheye",
     "FlatInterface",
+    "GeometryError",
     "HOEHLE",
+    "HeightField",
     "ImagePoints",
+    "InputError",
     "Interfaces",
     "IntersectedPoints",
     "Layers",
     "Material",
+    "Media",
+    "Medium",
     "MeshSurface",
+    "MissingExtraError",
     "N_BK7",
     "ObjectPoints",
+    "OpticalMedia",
     "PARRISH",
     "POLYCARBONATE",
+    "PhotogrammetryError",
     "Placement",
     "Plane",
+    "PlaneCandidates",
     "PointStatus",
     "Precision",
     "Project",
@@ -118,6 +151,7 @@ __all__ = [
     "RayIntersections",
     "RayPaths",
     "RayStatus",
+    "RefractingSurface",
     "Resection",
     "SAPPHIRE",
     "ScaleBar",
@@ -125,14 +159,19 @@ __all__ = [
     "ShiftDerivatives",
     "ShiftIteration",
     "ShiftTable",
+    "Sight",
     "Sphere",
     "Study",
+    "SurfaceSequence",
+    "Term",
     "Unknowns",
     "WaterFormula",
     "WaterIndexDerivatives",
     "WaterLevel",
+    "WaterSurface",
     "WaveEffect",
     "WaveSurface",
+    "WorkbookError",
     "agrafiotis",
     "aim_rays",
     "air_refractive_index",

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
 from typing import Any
-
-import lazy_loader
 
 
 def public_names(
@@ -23,11 +24,18 @@ def public_names(
     A name the stub lacks raises AttributeError with the nearest name there is; ``__version__`` is
     that of the distribution.
     """
-    load, names, everything = lazy_loader.attach_stub(package, file)
+    stub = ast.parse(Path(file).with_suffix(".pyi").read_text(encoding="utf-8"))
+    homes = {
+        alias.name: "." * node.level + (node.module or "")
+        for node in stub.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    everything = sorted(homes)
 
     def attribute(name: str) -> Any:
-        if name in everything:
-            return load(name)
+        if name in homes:
+            return getattr(import_module(homes[name], package), name)
         if name == "__version__":
             from importlib.metadata import version
 
@@ -43,4 +51,4 @@ def public_names(
             name=name,  # with it, Python adds no second guess of its own
         )
 
-    return attribute, names, everything
+    return attribute, lambda: list(everything), everything

@@ -97,8 +97,9 @@ class Remarks:
     def _worded(self, entry: _Entry, language: str, match: re.Match[str]) -> str:
         blanks = match.groupdict()
         for name in entry.nested & blanks.keys():
-            word = self._words.get(blanks[name])
-            blanks[name] = word[language] if word else self.in_language(blanks[name], language)
+            words = (self._words.get(word, {language: word}) for word in blanks[name].split(", "))
+            listed = ", ".join(word[language] for word in words)
+            blanks[name] = self.in_language(listed, language)
         return entry.texts[language].format(**blanks)
 
     @cached_property

@@ -16,11 +16,10 @@ from click.testing import CliRunner
 from openpyxl.worksheet.worksheet import Worksheet
 from PIL import Image
 
-from bifocal import Pair
-from bifocal.cli.main import main
-from bifocal.demo import SAMPLE, WATER_SAMPLE
+from bifocal import SAMPLE, WATER_SAMPLE, Pair
 from photocore.arrays import ByteArray
 from tests.bifocal.campaigns import sample_tables
+from tests.builders.commands import bifocal_command as main
 from tests.scenes import demo_scene
 from tests.scenes.make_sample import PIXEL
 

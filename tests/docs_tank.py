@@ -13,16 +13,23 @@ import openpyxl
 import rasterio
 from click.testing import CliRunner
 
+from multimedia import (
+    Camera,
+    Convention,
+    FlatInterface,
+    ImagePoints,
+    Layers,
+    ObjectPoints,
+    Project,
+    Sensor,
+    project,
+    read_project,
+    write_experiment,
+    write_project,
+)
 from multimedia.boards.workflow import find_boards
-from multimedia.cli.main import main
-from multimedia.media.camera import Camera, Sensor
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.projection import project
-from multimedia.openptv.experiment import write_experiment
-from multimedia.projects.model import ImagePoints, ObjectPoints, Project
-from multimedia.projects.project_file import read_project, write_project
-from multimedia.refraction.layers import Layers
-from photocore.camera.distortion import Brown, Convention
+from photocore.camera.distortion import Brown
+from tests.builders.commands import multimedia_command as main
 from tests.multimedia.rendered_boards import Housing, chessboard, photo, poses
 from tests.multimedia.tank import LAYERS, SENSOR, cameras, control
 

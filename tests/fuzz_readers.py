@@ -22,19 +22,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from bifocal import Lens, Pair, read_image, solve
 from bifocal.files.geotiff import read_relief
-from bifocal.files.images import image_info, read_image
+from bifocal.files.images import image_info
 from bifocal.files.point_tables import read_survey_points
-from bifocal.model.lens import Lens
-from bifocal.model.pair import Pair
-from bifocal.workbook.workflow import solve
-from multimedia.openptv.experiment import read_experiment
+from multimedia import PhotogrammetryError, read_experiment, read_project
 from multimedia.projects.dem import Dem
-from multimedia.projects.project_file import read_project
 from multimedia.projects.surface_files import read_water_surface
 from photocore.camera.boards import detect_board
 from photocore.cloud import open_cloud
-from photocore.errors import PhotogrammetryError
 from photocore.raster import Window
 from tests.attack.site import make_site
 

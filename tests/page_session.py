@@ -11,10 +11,9 @@ from typing import Any
 
 from starlette.testclient import TestClient
 
+from bifocal import SAMPLE, Session
 from bifocal.collimation.project import find_files
 from bifocal.collimation.server.application import application
-from bifocal.collimation.session import Session
-from bifocal.demo import SAMPLE
 
 TOKEN = "a-token-for-tests-that-is-long-enough"
 BASE = "http://127.0.0.1:8765"

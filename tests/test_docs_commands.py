@@ -18,10 +18,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from bifocal.cli.main import main as bifocal
-from bifocal.collimation.workflow import PageServer
-from bifocal.demo import SAMPLE
-from multimedia.cli.main import main as multimedia
+from bifocal import SAMPLE, PageServer
+from tests.builders.commands import bifocal_command as bifocal
+from tests.builders.commands import multimedia_command as multimedia
 from tests.docs_desk import make_desk
 from tests.docs_tank import make_bed, make_tank
 from tests.page_commands import DOCS, IN_PART, ROOT, Shown, shown_commands

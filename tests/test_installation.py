@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from bifocal.cli.main import main
-from multimedia.cli.main import main as multimedia
+from bifocal import MissingExtraError
 from photocore import installation, machine
-from photocore.errors import MissingExtraError
+from tests.builders.commands import bifocal_command as main
+from tests.builders.commands import multimedia_command as multimedia
 
 ROOT = Path(__file__).parents[1]
 

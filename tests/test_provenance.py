@@ -13,10 +13,10 @@ import rasterio
 from click.testing import CliRunner
 
 import bifocal
-from bifocal.cli.main import main
-from bifocal.demo import SAMPLE
-from multimedia.cli.main import main as multimedia
+from bifocal import SAMPLE
 from photocore.provenance import note, provenance, recording
+from tests.builders.commands import bifocal_command as main
+from tests.builders.commands import multimedia_command as multimedia
 
 PAIR = SAMPLE / "facade.pair.json"
 DAY = "2019-03-04"

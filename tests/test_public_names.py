@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from importlib.metadata import version
+from typing import Literal, get_args, get_origin, get_type_hints
 
 import pytest
 
@@ -39,6 +40,40 @@ def test_every_name_stands_in_the_table_of_contents(package, name: str) -> None:
     assert getattr(package, name).__doc__
 
 
+def _types_in(hint: object) -> set[type]:
+    """Return the classes an annotation speaks of."""
+    inside = [part for part in get_args(hint) if get_origin(hint) is not Literal]
+    lists = [part for part in inside if isinstance(part, list)]
+    inside += [part for parts in lists for part in parts]
+    own = {hint} if isinstance(hint, type) else set()
+    return own.union(*map(_types_in, inside))
+
+
+@pytest.mark.parametrize(("package", "name"), NAMES)
+def test_every_type_in_the_signature_of_a_name_of_the_contents_is_importable(package, name) -> None:
+    value = getattr(package, name)
+    topics = package.__doc__.split("What they take and give")[0]
+    if not re.search(rf"\b{name}\b", topics) or name == "Session":
+        return  # what a type is made of is its own affair
+    members = [value]
+    if inspect.isclass(value):
+        members += [
+            getattr(member, "fget", None) or getattr(member, "__func__", member)
+            for key, member in vars(value).items()
+            if not key.startswith("_")
+        ]
+    for member in filter(lambda m: inspect.isclass(m) or inspect.isfunction(m), members):
+        hints = {k: v for k, v in get_type_hints(member).items() if not k.startswith("_")}
+        for kind in _types_in(tuple[tuple(hints.values())]):
+            if kind.__module__.split(".")[0] in ("bifocal", "multimedia", "photocore"):
+                assert getattr(package, kind.__name__, None) is kind, f"{kind} in {name}: add it"
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda p: p.__name__)
+def test_the_contents_of_a_package_fit_a_screen(package) -> None:
+    assert len(package.__doc__.splitlines()) <= 64
+
+
 @pytest.mark.parametrize(
     "name",
     [
@@ -67,7 +102,7 @@ def test_public_functions_are_documented_in_full(name: str) -> None:
     ("package", "name", "message"),
     [
         (bifocal, "reliefs", "bifocal has no 'reliefs'; did you mean 'relief'?"),
-        (bifocal, "Foo", "bifocal has no 'Foo'. Public names: help(bifocal)"),
+        (bifocal, "Qwert", "bifocal has no 'Qwert'. Public names: help(bifocal)"),
         (multimedia, "radialshift", "did you mean 'radial_shift'?"),
     ],
 )

@@ -140,7 +140,7 @@ def live_orientation(
             media=media_of(state.setup, pair),
         )
     except PhotogrammetryError as error:
-        told = without_options(str(error))
+        told = without_options(str(error), language)
         return LiveOrientation(error=told, deviations={}, residuals={}, advice=(*hints, told))
     adjusted = oriented.adjusted
     residuals = adjusted.control_residuals

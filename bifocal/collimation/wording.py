@@ -8,6 +8,8 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+from bifocal.remarks import in_language
+
 #: An option of the command line, which the page does not have, with its value.
 _OPTION = r"--[a-z][\w-]*(?: (?:[A-Z]+|\d[\d.]*)(?:,(?:[A-Z]+|\d[\d.]*))*)?"
 #: Advice to use one: in brackets of its own; a clause that begins with it; its last words. What
@@ -15,9 +17,10 @@ _OPTION = r"--[a-z][\w-]*(?: (?:[A-Z]+|\d[\d.]*)(?:,(?:[A-Z]+|\d[\d.]*))*)?"
 _ADVICE = tuple(
     (re.compile(pattern), instead)
     for pattern, instead in (
-        (rf" \({_OPTION}(?:(?:,| or| and) {_OPTION})*\)", ""),
+        (rf" \({_OPTION}(?:(?:,| or| and| o| e| oder| und) {_OPTION})*\)", ""),
         (rf"[:;] {_OPTION} [a-z][^;.]*", ""),
-        (rf"(?:, give| and give| with) {_OPTION}|, {_OPTION}(?=\))", ""),
+        (rf"(?:, give| and give| with|, indicare| con| mit) {_OPTION}", ""),
+        (rf", {_OPTION}(?: angeben|(?=\)))", ""),
         (r"(?<![\w-])--(?=[a-z])", ""),
     )
 )
@@ -33,8 +36,8 @@ def say(section: str, key: str, language: str, **fields: Any) -> str:
     return _content()[section][key][language].format(**fields)
 
 
-def without_options(text: str) -> str:
-    """Return a remark of the program without advice for the command line.
+def without_options(text: str, language: str = "en") -> str:
+    """Return a remark of the program in a language, without advice for the command line.
 
     Examples
     --------
@@ -47,6 +50,7 @@ def without_options(text: str) -> str:
     >>> without_options("wall--b.jpg: is blurred.")
     'wall--b.jpg: is blurred.'
     """
+    text = in_language(text, language)
     for pattern, instead in _ADVICE:
         text = pattern.sub(instead, text)
     return text.strip()

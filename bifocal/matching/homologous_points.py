@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.files.haze import greys_of_pair
-from bifocal.matching.matching import Matches, MatchSettings, match_pair
+from bifocal.matching.matches import Matches
+from bifocal.matching.matching import MatchSettings, match_pair
 from bifocal.model.pair import Pair
 
 

@@ -22,6 +22,7 @@ from bifocal.matching.features import (
     match_along_lines,
     spread_evenly,
 )
+from bifocal.matching.matches import Matches
 from bifocal.matching.patches import PatchResult, refine, same_scale
 from bifocal.matching.targets import SurveyTargets, find_targets
 from bifocal.model.flags import FlagLimits
@@ -48,34 +49,6 @@ NEIGHBOURS, SUPPORTERS, RELIEF_ALIKE = 8, 2, 0.005
 
 #: Relief looked for ends this near to the last interface; in air, to the near camera. [share]
 HIGHEST_SHARE = 0.999
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Matches:
-    """Homologous points.
-
-    Attributes
-    ----------
-    pixels1, pixels2 : ndarray, shape (n, 2)
-        Raw pixels. [px]
-    sigma : ndarray, shape (n,)
-        Precision of the position along the radial line. [px]
-    misfit : ndarray, shape (n,)
-        How far off the line the patch fits best. [px]
-    agreement : ndarray, shape (n,)
-        Correlation of the patches, up to 1.
-    ids : tuple of str
-    kinds : tuple of str
-        ``feature``, ``disc`` or ``code``.
-    """
-
-    pixels1: FloatArray
-    pixels2: FloatArray
-    sigma: FloatArray
-    misfit: FloatArray
-    agreement: FloatArray
-    ids: tuple[str, ...]
-    kinds: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, fields
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -232,6 +232,33 @@ class Gridded(ABC):
     def bounds(self) -> Bounds:
         """Outer edges (X min, Y min, X max, Y max). [m]"""
         return self.grid.bounds
+
+    @property
+    def transform(self) -> Any:
+        """Affine map from (column, row) of pixel corners to (X, Y), as rasterio counts. [m]"""
+        from photocore.raster import corner_transform
+
+        return corner_transform(self.plane_from_pixel)
+
+    def to_xarray(self) -> Any:
+        """Return its bands as an xarray Dataset over the pixel centres x and y. [m]
+
+        Raises
+        ------
+        InputError
+            If xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise InputError("xarray is not installed: pip install xarray") from None
+        values = {field.name: getattr(self, field.name) for field in fields(cast(Any, self))}
+        bands = {
+            name: (("y", "x", "band")[: value.ndim], value)
+            for name, value in values.items()
+            if np.shape(value)[:2] == self.shape and name != "plane_from_pixel"
+        }
+        return xarray.Dataset(bands, coords={"x": self.grid.columns_x, "y": self.grid.rows_y})
 
 
 def bounds_of(positions: FloatArray) -> Bounds:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bifocal.model.lens import SIGMA_FOCAL, Lens
+from bifocal.remarks import remark
 from photocore.arrays import ByteArray, FloatArray, is_finite_number, positive
 from photocore.camera.distortion import RadialDivision
 from photocore.camera.pinhole import Pinhole, camera_matrix
@@ -158,7 +159,7 @@ class Interior:
             1.2 * max(image_size),
             image_size=image_size,
             sigma=0.5,
-            source="unknown, a normal lens assumed",
+            source=remark("orientation.normal_lens"),
         )
 
     @property

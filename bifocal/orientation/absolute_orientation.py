@@ -56,6 +56,7 @@ from bifocal.orientation.tie_points import likely_on_wall, tie_positions
 from bifocal.orientation.tuning import TUNING
 from bifocal.orientation.walls.bend import WallBend, bend_of_wall
 from bifocal.orientation.walls.refracted_bend import refracted_bend
+from bifocal.remarks import remark
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.errors import ConvergenceError, GeometryError, PhotogrammetryError, located
 
@@ -120,10 +121,8 @@ def _oriented(given: Given) -> OrientedPair:
     if cameras[0].centre[2] < cameras[1].centre[2]:
         return _with_photos_exchanged(given)
     if site.far_first is not site:
-        note = (
-            f"--distance1 {site.distance1:g} m is less than --distance2 {site.distance2:g} m, but "
-            f"{given.names[0]} is the far photo; the two distances were exchanged."
-        )
+        d1, d2 = site.distances
+        note = remark("orientation.distances_exchanged", d1=d1, d2=d2, name=given.names[0])
         return _told(replace(given, site=site.far_first), note)
     if enough:
         validation.check_units(cameras, site)
@@ -381,9 +380,6 @@ def _with_photos_exchanged(given: Given, *, typed_stay: bool = False) -> Oriente
         turned, site = turned.with_interiors(given.interiors), replace(site, ordered=True)
     control = given.control.exchanged()
     pair = _oriented(replace(turned, control=control, site=site, media=media))
-    note = (
-        f"{near} is the near photo; the two were exchanged. Image 1 of the pair file is {far}, and "
-        f"--distance{its} means its distance"
-        + (", --focal1 its lens; if it is not so, measure control points." if typed_stay else ".")
-    )
+    key = f"orientation.photos_exchanged{'_typed' if typed_stay else ''}"
+    note = remark(key, near=near, far=far, number=its)
     return replace(pair, exchanged=True, remarks=(note, *pair.remarks))

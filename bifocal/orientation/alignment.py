@@ -27,6 +27,7 @@ from bifocal.orientation.tie_points import (
     tie_positions,
 )
 from bifocal.orientation.walls.reference_plane import zero_sigma
+from bifocal.remarks import remark
 from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.distortion import RadialDivision
@@ -195,7 +196,7 @@ def _lens_of(interior: Interior, radial: FloatArray) -> Lens | None:
         camera_matrix=camera_matrix(interior.focal, 1.0, *interior.centre),
         coefficients=np.array([terms[0], terms[1], 0.0, 0.0, terms[2]]),
         image_size=interior.image_size,
-        source="estimated from the pair's common points",
+        source=remark("orientation.estimated_lens"),
     )
 
 

@@ -22,6 +22,7 @@ from bifocal.orientation.starts.relative_orientation import (
     plane_scale,
 )
 from bifocal.orientation.starts.space_resection import resect
+from bifocal.remarks import remark
 from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import BoolArray
 from photocore.camera.pinhole import fundamental, ray_on_plane
@@ -124,8 +125,7 @@ def ties_of(given: Given, *, needed: bool) -> tuple[Ties | None, tuple[str, ...]
     except GeometryError as error:
         if needed or isinstance(error, validation.SamePhotoError):
             raise
-        remark = f"The pair rests on the control points alone, without common points: {error}"
-        return None, (remark,)
+        return None, (remark("orientation.control_alone", why=error),)
 
 
 def approximate_cameras(

@@ -10,6 +10,7 @@ import numpy as np
 
 from bifocal.model.homography import apply_homography
 from bifocal.model.interior_orientation import Cameras, Images, Interior, Interiors
+from bifocal.remarks import remark
 from photocore.arrays import ByteArray, FloatArray
 from photocore.camera.distortion import RadialDivision
 from photocore.camera.pinhole import Pinhole, plane_from_pixel
@@ -35,11 +36,6 @@ PARTS = 5
 #: Lines that turn the plane off more of the wall's details than this are not the wall's: of the
 #: 457 on a bumpy wall of a phone's photos (berlin_1) they left 27 and then none.
 WALL_KEPT = 0.5
-#: What is said then.
-LINES_OFF_WALL = (
-    "The façade's upright and level lines would turn the plane off the wall's own details and were "
-    "left out: the wall is rough or leans, or the lines are another face's. Control points decide."
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -143,12 +139,8 @@ def lines_of_photos(
 def contradiction_in_words(line: FacadeDirection, cameras: Cameras, test: float) -> str:
     """Return what to say of lines that come out of the wall by so many standard deviations."""
     away = np.rad2deg(np.arcsin(abs(line.in_frame(cameras[line.camera - 1])[2])))
-    return (
-        f"The {line.name} lines of the {'far' if line.camera == 1 else 'near'} photo come out of "
-        f"the plane taken for the wall by {away:.1f}° ({test:.0f} standard deviations) and were "
-        "left out: the wall leans, they are lines of another face, or the details give a wrong "
-        "plane. Control points decide."
-    )
+    about = {"lines": line.name, "photo": "far" if line.camera == 1 else "near"}
+    return remark("orientation.lines_contradict", angle=away, sigmas=test, **about)
 
 
 def facade_directions(

@@ -6,6 +6,7 @@ import numpy as np
 
 from bifocal.model.pair_media import PairMedia
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
+from bifocal.remarks import remark
 from photocore.adjustment import correlations
 from photocore.adjustment.priors import (
     ALIKE,
@@ -51,10 +52,8 @@ def media_remarks(adjusted: AdjustedPair, given: PairMedia) -> tuple[str, ...]:
         if own > UNCARRIED * prior * factor:
             told.append(_hardly_carried(name, given.value(name), prior))
         if (twin := _twin(adjusted, media, row)) and twin[1] > ALIKE:
-            told.append(
-                f"{name} and {twin[0]} can hardly be told apart: correlation {twin[1]:.3f}; points "
-                "off the wall, a taped distance, or a lens file tell them."
-            )
+            about = {"name": name, "twin": twin[0], "correlation": twin[1]}
+            told.append(remark("orientation.hardly_told_apart", **about))
     return tuple(told)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.model.doubts import MISFIT
 from bifocal.orientation.adjustment.pair_observations import PairObservations
 from bifocal.orientation.alignment import standard_deviations, wall_relief
 from bifocal.orientation.control_points import Control, SiteMeasures
@@ -12,6 +11,7 @@ from bifocal.orientation.orientation_stages import OrientedPair
 from bifocal.orientation.starts.photo_order import SURE
 from bifocal.orientation.tuning import TUNING
 from bifocal.orientation.walls.bend import WallBend, bend_in_words
+from bifocal.remarks import remark
 
 #: Common points that fit their lines no better than this, at 3000 px of width, do not fit. Clean
 #: pairs reach 0.19, a phone pair with its lens estimated 0.4. [px]
@@ -32,11 +32,7 @@ def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
     unit = max(observations.interiors[0].image_size) / 3000
     sigma = observations.sigma_tie
     if observations.tie_used.sum() >= 20 and sigma > WORST_FIT * unit:
-        remarks.append(
-            f"{MISFIT}: common points miss their lines by {sigma:.2f} px, good pairs "
-            "by 0.1 to 0.2. The likely reason is lens distortion (calibrate, give --lens), motion "
-            "in the scene, or two photos of different states."
-        )
+        remarks.append(remark("orientation.misses_lines", sigma=sigma))
     lenses = observations.interiors
     changes = [
         float(np.log(camera.matrix[0, 0] / interior.focal))
@@ -44,28 +40,21 @@ def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
     ]
     limits = [np.inf if lens.is_assumed else CONTRADICTS * lens.sigma_focal for lens in lenses]
     pulled = np.flatnonzero(np.abs(changes) > limits)
+    both = len(pulled) == 2 and changes[0] * changes[1] < 0  # one wrong lens pulls both
     for n in pulled:
         change, lens = changes[n], lenses[n]
-        text = (
-            f"The focal length of photo {n + 1} came out {100 * np.expm1(change):+.1f} % from "
-            f"the one given ({lens.source}), {abs(change) / lens.sigma_focal:.0f} of its standard "
-            "deviations: check it, the lens distortion and the distances."
-        )
-        if len(pulled) == 2 and changes[0] * changes[1] < 0:  # one wrong lens pulls both
-            alone = 100 * np.expm1(change - changes[1 - n])
-            text += f" If the other photo's is right, it is {alone:+.0f} % off."
-        remarks.append(text)
+        told = {"change": 100 * np.expm1(change), "alone": 100 * np.expm1(change - changes[1 - n])}
+        about = {"number": int(n) + 1, "source": lens.source, **told}
+        key = f"orientation.focal_contradicts{'_both' if both else ''}"
+        remarks.append(remark(key, sigmas=abs(change) / lens.sigma_focal, **about))
     for name, camera, given in zip(
         ("far", "near"), adjusted.cameras, (site.distance1, site.distance2), strict=True
     ):
         off = float(camera.centre[2]) - (given or 0.0)
         if given and abs(off) > CONTRADICTS * site.sigma:
-            remarks.append(
-                f"The {name} camera's distance came out {off:+.3f} m from the one measured "
-                f"({given:g} m), {abs(off) / site.sigma:.0f} of its standard deviations: check the "
-                "tape, the plane it was measured to, the focal lengths and the lens distortion."
-            )
-    return [remark for remark in remarks if remark]
+            sigmas, key = abs(off) / site.sigma, f"orientation.distance_contradicts_{name}"
+            remarks.append(remark(key, off=off, given=given, sigmas=sigmas))
+    return [text for text in remarks if text]
 
 
 def _bend_of(observations: PairObservations, bend: WallBend) -> str:
@@ -87,10 +76,7 @@ def order_remarks(order: float, names: tuple[str, str]) -> list[str]:
     """Return that the photos do not tell which of them is the near one."""
     if order > SURE:
         return []
-    return [
-        f"Which photo was taken from near cannot be told from what is known; {names[1]} was taken "
-        "for it, as given. If what stands out comes out as lying back, exchange the photos."
-    ]
+    return [remark("orientation.near_unsure", name=names[1])]
 
 
 def wall_remarks(pair: OrientedPair) -> list[str]:
@@ -99,82 +85,59 @@ def wall_remarks(pair: OrientedPair) -> list[str]:
         return []
     zones = sorted(wall_relief(pair), key=lambda zone: -zone["points"])
     if not zones:
-        return [
-            "NO WALL FOUND: hardly any common points gather on one plane, and relief counts from "
-            "one that is known no better than sigma_r says. Name a spot of the wall in the far "
-            "photo (--wall COL,ROW), or give control points."
-        ]
+        return [remark("orientation.no_wall")]
     held = np.cumsum([zone["points"] for zone in zones])
     most = int(np.searchsorted(held, MOST_OF_WALL * held[-1])) + 1
     if most > FEW_ZONES:
         return []
     named = ", ".join(zone["zone"] for zone in zones[:most])
-    return [
-        f"The wall was found in a part of the far photo only ({named}: {held[most - 1]} of "
-        f"{held[-1]} points on it). Its plane is carried on from there; check that it is the wall "
-        "you mean (green in the picture), or give control points (--control)."
-    ]
+    count = {"count": int(held[most - 1]), "all": int(held[-1])}
+    return [remark("orientation.wall_in_part", zones=named, **count)]
 
 
 def control_remarks(control: Control, pair: OrientedPair) -> list[str]:
     """Return what the control points lack."""
-    remarks = [
-        f"Control point {control.ids[index]} is a gross error "
-        f"({pair.adjusted.control_test[index]:.0f} standard deviations) and was left out. Check "
-        "its coordinates and its picks."
+    tests = pair.adjusted.control_test
+    remarks: list[str] = [
+        remark("orientation.gross_control", name=control.ids[index], sigmas=tests[index])
         for index in np.flatnonzero(~pair.observations.pick_used)
     ]
     count = int(control.positioned.sum())
     if 0 < count < 4:
-        remarks.append(
-            f"{count} of at least 4 control points: they give scale and place, the photos the "
-            "rest. Four or more, spread over the photo, fix the plane."
-        )
+        remarks.append(remark("orientation.few_control", count=count))
     if 4 <= count < 9:
-        remarks.append(
-            f"{count} control points; CIPA advises nine, spread over the photo, so that an error "
-            "in one is found."
-        )
+        remarks.append(remark("orientation.cipa_nine", count=count))
     return remarks
 
 
 def distance_remarks(pair: OrientedPair) -> list[str]:
     """Return which distances are poorly determined, and what that does to relief."""
-    remarks = []
+    remarks: list[str] = []
     share = standard_deviations(pair.adjusted)["relief_scale"]
     if not pair.observations.measured and share > WORST_SCALE:
-        remarks.append(
-            f"Without a taped distance the size of relief is known only to {100 * share:.1f} % "
-            f"({1000 * share:.0f} mm of a metre): tape one distance from a camera to the wall "
-            "(--distance1 or --distance2)."
-        )
+        remarks.append(remark("orientation.no_tape", share=100 * share, size=1000 * share))
     for number, camera in enumerate(pair.adjusted.cameras, start=1):
         distance, sigma = float(camera.centre[2]), pair.adjusted.sigma("Z", number)
         if sigma > 0.03 * distance:
-            remarks.append(
-                f"The distance of camera {number} is poorly determined ({distance:.2f} ± "
-                f"{sigma:.2f} m). Give the focal lengths, the distances, or more points off the "
-                "wall."
-            )
+            about = {"number": number, "distance": distance, "sigma": sigma}
+            remarks.append(remark("orientation.poor_distance", **about))
     return remarks
 
 
 def assumptions(observations: PairObservations, site: SiteMeasures) -> list[str]:
     """Return what only the prior holds."""
-    out = []
+    out: list[str] = []
     for number, interior in enumerate(observations.interiors, start=1):
         if interior.is_assumed:
-            out.append(f"focal length of photo {number}: {interior.source}")
+            out.append(remark("orientation.assumed_focal", number=number, source=interior.source))
         if not interior.is_calibrated:
-            out.append(
-                f"principal point of photo {number} in its centre "
-                f"(within {interior.sigma_centre:.0f} px)"
-            )
+            sigma = interior.sigma_centre
+            out.append(remark("orientation.assumed_centre", number=number, sigma=sigma))
     uncorrected = [i for i in observations.interiors if not i.is_calibrated and not i.sigma_radial]
     if uncorrected:
-        out.append("photos free of lens distortion (else calibrate and give --lens)")
+        out.append(remark("orientation.assumed_no_distortion"))
     if site.parallel:
-        out.append("image planes parallel to the wall within 0.3°")
+        out.append(remark("orientation.assumed_parallel"))
     if observations.sigma_zoom is not None:
-        out.append("one focal length for both photos (they agree)")
+        out.append(remark("orientation.assumed_one_lens"))
     return out

@@ -39,6 +39,7 @@ from bifocal.orientation.walls.wall_planes import (
     planes_of_any_direction,
     steep_rivals_in_words,
 )
+from bifocal.remarks import remark
 from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import ByteArray
 from photocore.camera.pinhole import plane_transfer
@@ -261,11 +262,7 @@ def _unbent(pair: OrientedPair) -> OrientedPair:
     if corner < 1.0 * wide / 1500:
         return pair
     values = ", ".join(f"{k1:.4f} {k2:+.4f}" for k1, k2 in pair.adjusted.radial)
-    return pair.told(
-        f"The photos show lens distortion of about {corner:.0f} px at the edge; it was estimated "
-        f"from the common points (k1, k2 = {values}). A calibrated lens (`bifocal calibrate`, "
-        "--lens) is more reliable."
-    )
+    return pair.told(remark("orientation.distortion_estimated", corner=corner, values=values))
 
 
 def _corner(pair: OrientedPair) -> float:
@@ -375,9 +372,9 @@ def _with_lines(pair: OrientedPair, images: Images) -> OrientedPair:
     try:
         turned = pair.readjusted(lines=kept).settled() if kept else pair
     except GeometryError:  # no tie was left on the wall
-        return pair.told(facade_lines.LINES_OFF_WALL)
+        return pair.told(remark("orientation.lines_off_wall"))
     stays = turned.observations.wall.sum() >= facade_lines.WALL_KEPT * old.wall.sum()
-    return turned if stays else pair.told(facade_lines.LINES_OFF_WALL)
+    return turned if stays else pair.told(remark("orientation.lines_off_wall"))
 
 
 def _sigma_ratio(pair: OrientedPair) -> float:
@@ -413,17 +410,10 @@ def _with_named_wall(pair: OrientedPair) -> OrientedPair:
     tolerance = (usual / float(np.sqrt(on.sum())), usual / float(spread[1]))
     walled = with_wall(observations, pair.adjusted, tolerance)
     if not walled.wall.any():
-        return pair.told(
-            "Hardly any detail lies on the control points' plane; relief counts from the control "
-            "points alone."
-        )
+        return pair.told(remark("orientation.little_on_control_plane"))
     test = wall_test(walled, pair.adjusted)
     if test > WALL_LIMIT:
-        return pair.told(
-            f"The details around the control points' plane lie on another plane (by {test:.0f} "
-            "standard deviations): relief counts from the control points alone. Check which face "
-            "of the wall they were measured on, and their relief r."
-        )
+        return pair.told(remark("orientation.other_plane", test=test))
     return replace(pair, observations=walled).readjusted()
 
 

@@ -14,6 +14,7 @@ from bifocal.orientation.tie_points import (
     without_gross_ties,
 )
 from bifocal.orientation.tuning import TUNING
+from bifocal.remarks import remark
 from photocore.adjustment.outliers import robust_sigma
 
 #: Common points that take part, where each costs more than in air; fewer say nothing.
@@ -38,7 +39,7 @@ def with_bent_ties(pair: OrientedPair, ties: Ties) -> OrientedPair:
         # Control leaves the rays uncertain by some pixels: the majority shows by how much.
         base = without_gross_ties(base, adjusted, sigma=robust_sigma(usual))
         if base.tie_used.sum() < FEWEST_TIES:
-            return pair.told("Hardly any common point fits the control points through the media.")
+            return pair.told(remark("orientation.hardly_through_media"))
         adjusted = adjust(base, adjusted)
     height = np.abs(tie_positions(base, adjusted)[:, 2])
     on_wall = base.tie_used & (height < TUNING.bend_band * adjusted.cameras[0].centre[2])

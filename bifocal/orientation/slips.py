@@ -10,6 +10,7 @@ import numpy as np
 
 from bifocal.model.interior_orientation import Cameras, Interiors
 from bifocal.orientation.control_points import Control, SiteMeasures
+from bifocal.remarks import remark
 from photocore.arrays import BoolArray
 
 #: What was typed is doubted where it misses by so many times what it may: with clean control
@@ -127,14 +128,12 @@ def _of_lenses(typed: Typed, *, free: bool) -> Iterator[Slip]:
     focals, sensor = pixels * [first.focal, second.focal], float(sizes[0] * pixels[0])
     shown, true = (" and ".join(dict.fromkeys(f"{f:.3g}" for f in fs))
                    for fs in (focals, focals * sensor / FILM))  # fmt: skip
-    height, wide = min(first.image_size) / sizes[0], f"A sensor {sensor:.3g} mm wide does not fit;"
+    height = min(first.image_size) / sizes[0]
     rows: list[tuple[float, str]] = [
-        (height, f"{wide} that is probably its height: {sensor / height:.1f} mm was taken. Give "
-                 "--sensor-width, the longer side."),
-        (sensor / FILM, f"{shown} mm is probably the 35-mm equivalent: {true} mm on this sensor, "
-                        "which was taken."),
-        *((crop, f"{wide} {sensor / crop:.1f} mm does (crop factor {crop:g}) and was taken. Check "
-                 "--sensor-width.") for crop in (1.5, 1.6)),
+        (height, remark("slips.sensor_height", given=sensor, taken=sensor / height)),
+        (sensor / FILM, remark("slips.film_focal", given=shown, taken=true)),
+        *((crop, remark("slips.crop", given=sensor, taken=sensor / crop, crop=crop))
+          for crop in (1.5, 1.6)),
     ]  # fmt: skip
     for factor, words in rows:
         one, two = (replace(i, focal=i.focal * factor) for i in typed.interiors)
@@ -146,28 +145,21 @@ def _of_lenses(typed: Typed, *, free: bool) -> Iterator[Slip]:
             part, focal=part.focal * max(ratio, 1 / ratio), pixel_size=float(pixels[1 - small]),
             sigma_centre=0.3 * float(sizes.max() - sizes.min()),
         )  # fmt: skip
-        words = (
-            f"Photo {small + 1} is {sizes[small]} px wide, photo {2 - small} {sizes.max()} px: the "
-            "former fits as a part cut out of a photo as large as the latter, and was taken so."
+        words = remark(
+            "slips.cut_out", small=small + 1, size=sizes[small], large=2 - small, wide=sizes.max()
         )
         yield Slip(meant=replace(typed, interiors=(both[0], both[1])), words=words)
     # A wrong tape is not the lens.
     if free and len(typed.control.ids) > 5 and typed.site.distances == (None, None):
         loose = replace(first, sigma_focal=0.5), replace(second, sigma_focal=0.5)
-        words = (
-            f"The focal lengths ({first.source}, {second.source}) contradict the control points "
-            "and were left out. Check --focal1, --focal2 and --sensor-width."
-        )
+        words = remark("slips.focals_contradict", first=first.source, second=second.source)
         yield Slip(meant=replace(typed, interiors=loose), words=words, handicap=CLEARLY)
 
 
 def _of_site(typed: Typed) -> Iterator[Slip]:
     """Yield that the cameras were not square to the wall, where that was said."""
     if typed.site.parallel:
-        words = (
-            "the cameras are not square to the wall, as two distances alone suppose: they look "
-            "<tilts> degrees off its normal. Give --auto with the distances, or --control."
-        )
+        words = remark("slips.not_square", tilts="<tilts>")
         meant = replace(typed, site=replace(typed.site, parallel=False))
         yield Slip(meant=meant, words=words, mended=False)
 
@@ -179,22 +171,18 @@ def _of_control(typed: Typed, now: Fitted | None) -> Iterator[Slip]:
     last = [interior.image_size[1] - 1.0 for interior in typed.interiors]
     rows = [pixels * [1, -1] + [0, end] for pixels, end in zip(picks, last, strict=True)]
     for words, meant in (
-        ("rows counted from the top: row1, row2 seem to count from the bottom",
-         replace(control, pixels1=rows[0], pixels2=rows[1])),
-        ("the sign of Y changed: Y counts upwards", replace(control, xyz=xyz * [1, -1, 1])),
-        ("X and Y exchanged: X counts to the right", replace(control, xyz=xyz[:, [1, 0, 2]])),
-        ("the sign of r changed: r counts towards the cameras",
-         replace(control, xyz=xyz * [1, 1, -1])),
-    ):  # fmt: skip
-        words = f"The control points do not fit as typed; they fit with {words}."
+        (remark("slips.control_rows"), replace(control, pixels1=rows[0], pixels2=rows[1])),
+        (remark("slips.control_y"), replace(control, xyz=xyz * [1, -1, 1])),
+        (remark("slips.control_xy"), replace(control, xyz=xyz[:, [1, 0, 2]])),
+        (remark("slips.control_r"), replace(control, xyz=xyz * [1, 1, -1])),
+    ):
         yield Slip(meant=replace(typed, control=meant), words=words, mended=False)
-    words = "col1, row1 of the control points belong to the second photo; the picks were exchanged."
+    words = remark("slips.picks")
     yield Slip(meant=replace(typed, control=control.exchanged()), words=words)
     few = list(range(count)) if now is None else np.flatnonzero(now.lost).tolist()
     for a, b in combinations(few, 2) if len(few) <= 7 else ():
         order = np.arange(count)
         order[[a, b]] = b, a
         meant = replace(control, xyz=xyz[order], sigma=control.sigma[order])
-        both = f"{control.ids[a]} and {control.ids[b]}"
-        words = f"The coordinates of the control points {both} are exchanged; they were put right."
+        words = remark("slips.coordinates", first=control.ids[a], second=control.ids[b])
         yield Slip(meant=replace(typed, control=meant), words=words)

@@ -131,7 +131,7 @@ def mosaic(
     --------
     Two halves of a grey wall, the second one darker, become one:
 
-    >>> from bifocal.model.grid import Grid
+    >>> from bifocal import Grid
     >>> def half(x, grey):
     ...     grid = Grid.from_bounds((x, 0.0, x + 2.0, 1.0), gsd=0.02)
     ...     image = np.full((*grid.shape, 3), grey, np.uint8)

@@ -5,8 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import IntEnum
+from pathlib import Path
 from typing import Literal, get_args
 
+import numpy as np
+
+from bifocal.files.geotiff import create_raster
 from bifocal.model.grid import Gridded
 from bifocal.model.image import ImageArray
 from photocore.arrays import BoolArray, ByteArray, FloatArray
@@ -95,3 +99,25 @@ class Orthophoto(Gridded):
         """Pixels that show something, shape (height, width)."""
         valid: BoolArray = self.source > 0
         return valid
+
+    def write(self, path: Path | str, *, overwrite: bool = False) -> None:
+        """Write a GeoTIFF of the plane frame: colours, then the `Source` of each pixel.
+
+        Raises
+        ------
+        InputError
+            If the file exists and is not to be overwritten, or cannot be written.
+        """
+        colours = self.image.reshape(*self.shape, -1)
+        names = ("grey",) if colours.shape[2] == 1 else ("red", "green", "blue")
+        with create_raster(
+            path,
+            self.grid,
+            bands=len(names) + 1,
+            dtype=self.image.dtype,
+            names=(*names, "source"),
+            colour=len(names) == 3,
+            overwrite=overwrite,
+        ) as writer:
+            source = self.source[..., None].astype(self.image.dtype)
+            writer.write(np.concatenate([colours, source], axis=-1), column=0, row=0)

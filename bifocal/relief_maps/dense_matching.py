@@ -134,8 +134,7 @@ def dense_relief(
 
     Examples
     --------
-    >>> from bifocal.demo import SAMPLE
-    >>> from bifocal.files.images import read_image
+    >>> from bifocal import SAMPLE, read_image
     >>> photos = [read_image(SAMPLE / name) for name in ("far.jpg", "near.jpg")]
     >>> pair = Pair.read(SAMPLE / "facade.pair.json")
     >>> result = dense_relief(pair, *photos, gsd=0.06, bounds=(-3, -2, 3, 2))

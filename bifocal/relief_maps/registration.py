@@ -9,6 +9,7 @@ import numpy as np
 from bifocal.precision import false_relief_of_scale
 from bifocal.relief_maps.flow import Measurement
 from bifocal.relief_maps.frame import Frame
+from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError
 
@@ -58,26 +59,15 @@ class Registration:
         told = []
         per_scale = self.false_relief_per_scale
         if self.systematic > REMARK_PX:
-            told.append(
-                f"the photos do not fit exactly: matched points miss the radial lines by "
-                f"{self.across_median:.2f} px (median), as from a shift of {self.shift[0]:+.2f}, "
-                f"{self.shift[1]:+.2f} px and a rotation of {np.degrees(self.rotation):+.4f} deg "
-                "of photo 2. Relief is off likewise; improve the pair file with more control "
-                "points (`bifocal align`)."
-            )
+            (x, y), turn = self.shift, np.degrees(self.rotation)
+            about = {"x": x, "y": y, "turn": turn}
+            told.append(remark("relief.no_exact_fit", miss=self.across_median, **about))
         if self.matched < 0.5:
-            told.append(f"only {self.matched:.0%} of the pixels could be matched there and back.")
+            told.append(remark("relief.few_matched", share=self.matched))
         if 0.3 * per_scale < abs(self.wall) < 15 * per_scale:
-            told.append(
-                f"the largest flat surface lies at r = {1000 * self.wall:+.0f} mm. If it is your "
-                "reference plane, the scale of the photos differs by "
-                f"{100 * self.wall / per_scale * 1e-3:+.3f} %."
-            )
-        told.append(
-            f"an error of 0.1 % in the relative scale of the photos shifts all relief by "
-            f"{1000 * per_scale:.0f} mm and shows in no residual: what guarantees it are the "
-            "control points or distances the pair file was made from. Check one known relief."
-        )
+            share = 100 * self.wall / per_scale * 1e-3
+            told.append(remark("relief.flat_surface", wall=1000 * self.wall, share=share))
+        told.append(remark("relief.scale_error", relief=1000 * per_scale))
         return tuple(told)
 
 

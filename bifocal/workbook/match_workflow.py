@@ -9,13 +9,13 @@ import numpy as np
 
 from bifocal.files.haze import read_greys
 from bifocal.files.images import photo_info
-from bifocal.matching.matching import Matches, MatchSettings, match_pair, precision
+from bifocal.matching.matches import Matches
+from bifocal.matching.matching import MatchSettings, match_pair, precision
 from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
 from bifocal.survey.observations import PointObservations
 from bifocal.workbook.template_workflow import write_survey
 from photocore.output import check_ending
-from photocore.tables import write_csv
 from photocore.workbook.making.newbook import check_new_workbook
 
 
@@ -40,7 +40,7 @@ def match_photos(
         Pair.of(pair_path).refuse_ports_that_lean("a survey workbook")
     pair, matches = match_pair_file(pair_path, settings)
     if out.suffix.lower() == ".csv":
-        write_csv(out, csv_columns(matches), formats=_FORMATS, overwrite=overwrite)
+        matches.write(out, overwrite=overwrite)
         return pair, matches
     notes = zip(matches.sigma, matches.misfit, strict=True)
     write_survey(
@@ -80,23 +80,6 @@ def match_pair_file(pair_path: Pair | Path, settings: MatchSettings) -> tuple[Pa
 FEWEST_IN_PART = 3
 #: Parts of the far photo that are asked, across and down.
 PARTS = (6, 4)
-_PIXELS = ("col1 [px]", "row1 [px]", "col2 [px]", "row2 [px]")
-_FORMATS = dict.fromkeys(_PIXELS, ".4f") | dict.fromkeys(
-    ("sigma [px]", "misfit [px]", "agreement"), ".3f"
-)
-
-
-def csv_columns(matches: Matches) -> dict[str, Any]:
-    """Return the columns of the text table, in order."""
-    pixels = np.hstack([matches.pixels1, matches.pixels2]).T
-    return {
-        "id": list(matches.ids),
-        **dict(zip(_PIXELS, pixels, strict=True)),
-        "sigma [px]": matches.sigma,
-        "misfit [px]": matches.misfit,
-        "agreement": matches.agreement,
-        "code": list(matches.kinds),
-    }
 
 
 def match_summary(pair: Pair, matches: Matches) -> dict[str, Any]:

@@ -16,12 +16,17 @@ from PIL import Image
 
 import bifocal.cli.main
 import multimedia.cli.main
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.projection import project
-from multimedia.openptv.experiment import write_experiment
-from multimedia.projects.model import ImagePoints, ObjectPoints, Project
-from multimedia.projects.project_file import write_project
-from photocore.camera.distortion import Brown, Convention
+from multimedia import (
+    Convention,
+    FlatInterface,
+    ImagePoints,
+    ObjectPoints,
+    Project,
+    project,
+    write_experiment,
+    write_project,
+)
+from photocore.camera.distortion import Brown
 from tests.multimedia.tank import LAYERS, SENSOR, cameras, control
 
 PROGRAMS = {"bifocal": bifocal.cli.main.main, "multimedia": multimedia.cli.main.main}

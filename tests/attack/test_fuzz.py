@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from photocore.errors import InputError
+from bifocal import InputError
 from photocore.output import check_writable
 from tests.attack.site import make_site
 from tests.fuzz_readers import READERS, attack

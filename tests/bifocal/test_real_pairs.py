@@ -9,9 +9,9 @@ import pytest
 from scipy.spatial import cKDTree
 
 from benchmarks.bench_orientation import RealPair
-from bifocal import Pair
+from bifocal import MatchSettings, Pair, SiteMeasures, align
 from bifocal.files.images import image_info, read_grey
-from bifocal.matching.matching import MatchSettings, match_pair, precision
+from bifocal.matching.matching import match_pair, precision
 from bifocal.model.orientation_precision import pinhole
 from bifocal.orientation.align_workflow import (
     AlignOptions,
@@ -19,8 +19,6 @@ from bifocal.orientation.align_workflow import (
     align_photos,
     interior_of_photo,
 )
-from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orientation.photo_alignment import align
 from bifocal.workbook.match_workflow import match_photos
 
 pytestmark = pytest.mark.acceptance

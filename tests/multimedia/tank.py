@@ -6,9 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from multimedia.media.camera import Camera, Sensor
-from multimedia.media.projection import project
-from multimedia.refraction.layers import Layers
+from multimedia import Camera, Layers, Sensor, project
 from photocore.camera.distortion import Brown
 
 SENSOR = Sensor(width=1280, height=1024, pitch=np.array([0.012, 0.012]))

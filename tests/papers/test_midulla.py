@@ -11,6 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bifocal import (
+    FlagLimits,
+    GeometryError,
+    InputError,
+    Pair,
+    PlanePicks,
     plane_coordinates,
     rays,
     relief,
@@ -18,9 +23,7 @@ from bifocal import (
     relief_displacements,
     relief_from_displacement,
 )
-from bifocal.model.flags import FlagLimits
-from bifocal.model.intersection import PlanePicks, intersect
-from bifocal.model.pair import Pair
+from bifocal.model.intersection import intersect
 from bifocal.precision import (
     base_factor,
     false_relief_of_scale,
@@ -29,7 +32,6 @@ from bifocal.precision import (
     sigma_relief,
     uncertainty_radius,
 )
-from photocore.errors import GeometryError, InputError
 from tests.rounding import EPS
 
 PAIRS = {"35/19": (35.0, 17.5, 19.0, 9.5), "35/28": (35.0, 17.5, 28.0, 14.0)}

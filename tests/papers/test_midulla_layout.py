@@ -17,14 +17,11 @@ import pytest
 import rasterio
 from click.testing import CliRunner
 
-from bifocal.cli.main import main
+from bifocal import KnownPoints, Measuring, PointObservations, SurveySetup, Taking, georeference
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
-from bifocal.survey.georeferencing import georeference
-from bifocal.survey.observations import PointObservations
 from bifocal.survey.point_survey import solve_points
-from bifocal.survey.reference import KnownPoints
-from bifocal.survey.setup import Measuring, SurveySetup, Taking
 from bifocal.workbook.pair_workflow import points_of, read_pair
+from tests.builders.commands import bifocal_command as main
 
 PITCH, SIZE = 0.00739, (3072, 2048)
 NADIR = (1535.5, 1023.5)

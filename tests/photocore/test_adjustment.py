@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
+from bifocal import ConvergenceError, GeometryError
 from photocore.adjustment import BlockEquations, DenseEquations, fit, minimise
 from photocore.adjustment.sparse import SparseEquations
-from photocore.errors import ConvergenceError, GeometryError
 
 X = np.arange(6.0)
 Y = np.array([1.1, 2.9, 5.2, 6.8, 9.1, 10.9])

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bifocal import InputError
 from photocore.arrays import as_floats, is_finite_number, positive
-from photocore.errors import InputError
 
 
 @pytest.mark.parametrize(

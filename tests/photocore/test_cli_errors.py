@@ -13,8 +13,8 @@ from click.testing import CliRunner, Result
 
 import bifocal.cli.main
 import multimedia.cli.main
+from bifocal import InputError
 from photocore import cli
-from photocore.errors import InputError
 
 pytest_plugins = ["pytester"]
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from photocore.errors import InputError
+from bifocal import InputError
 from photocore.jsonfile import read_object
 
 

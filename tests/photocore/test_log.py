@@ -7,7 +7,7 @@ import logging
 import pytest
 from click.testing import CliRunner
 
-from bifocal.cli.main import main
+from tests.builders.commands import bifocal_command as main
 from tests.full_disk import full_after
 
 SURVEY = "id,s1 [mm],s2 [mm],theta [deg]\nP1,4.24242424,4.47058824,90\n"

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from bifocal import GeometryError
 from photocore.adjustment.network import Network, State
-from photocore.errors import GeometryError
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from bifocal import InputError
 from photocore import output
-from photocore.errors import InputError
 from photocore.output import all_or_none, atomic_folder, atomic_path, check_all_writable
 
 

@@ -9,8 +9,8 @@ import pytest
 import rasterio
 from rasterio.errors import RasterioIOError
 
+from bifocal import InputError
 from photocore import raster
-from photocore.errors import InputError
 from photocore.raster import (
     RasterFile,
     Window,

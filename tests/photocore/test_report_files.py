@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from photocore.errors import InputError
+from bifocal import InputError
 from photocore.reports.document import Document, Paragraph, TextTable
 from photocore.reports.figure_file import write_figure
 from photocore.reports.html_page import write_html

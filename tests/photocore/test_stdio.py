@@ -10,10 +10,10 @@ import zipfile
 import pytest
 from click.testing import CliRunner
 
-from bifocal.cli.main import main
-from bifocal.demo import SAMPLE
-from multimedia.cli.main import main as multimedia
+from bifocal import SAMPLE
 from tests.attack.site import ODS, ods_cell
+from tests.builders.commands import bifocal_command as main
+from tests.builders.commands import multimedia_command as multimedia
 
 TARGETS, PAIR = SAMPLE / "targets.csv", SAMPLE / "facade.pair.json"
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bifocal.model.pair import Pair
-from bifocal.model.photo import Photo
+from bifocal import Pair, Photo
 from photocore.arrays import FloatArray
 
 

@@ -8,8 +8,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from bifocal.model.relief_map import Quality, ReliefMap
-from bifocal.orthophotos.ortho_image import Orthophoto
+from bifocal import Orthophoto, Quality, ReliefMap
 from photocore.arrays import BoolArray, FloatArray
 from tests.scenes.rendering import Rendering
 

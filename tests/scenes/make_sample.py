@@ -13,11 +13,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from bifocal.demo import SAMPLE, WATER_SAMPLE
+from bifocal import SAMPLE, WATER_SAMPLE, Pair, ReliefMap
 from bifocal.demo.samples import PICK_SIGMA
 from bifocal.files.geotiff import write_relief
-from bifocal.model.pair import Pair
-from bifocal.model.relief_map import ReliefMap
 from multimedia import Layers
 from photocore.tables import write_csv
 from tests.scenes import NamedPoint, Rendering, bifocal_cameras, demo_scene, render

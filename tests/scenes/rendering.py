@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bifocal.model.pair import Pair
-from bifocal.model.relief_map import ReliefMap
+from bifocal import Pair, ReliefMap
 from photocore.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from tests.scenes.cameras import CameraPair, SceneCamera
 from tests.scenes.shapes import Scene

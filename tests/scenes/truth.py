@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.model.grid import Grid
-from bifocal.model.relief_map import ReliefMap
+from bifocal import Grid, ReliefMap
 from photocore.arrays import BoolArray, FloatArray
 from tests.scenes.cameras import SceneCamera
 from tests.scenes.tracing import Faces, Parallel, Tracer

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bifocal.model.pair import Pair
+from bifocal import Pair
 from multimedia import Layers
 from photocore.arrays import FloatArray
 from tests.scenes.cameras import CameraPair, SceneCamera

@@ -149,6 +149,7 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
     centre = np.asarray(pair.zoom_centre)
     found = (session.proposal or {}).get("report", {}).get("remarks", ())
     remarks = dict.fromkeys((*pair.remarks, *found))
+    language = session.state.language or session.language
     return plain(
         {
             "name": str(pair.extra.get("name") or session.files.stem),
@@ -164,7 +165,7 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
             "images": images,
             "accepted": session.proposed_path is None,
             "report": session.proposal and session.proposal["report"],
-            "remarks": [without_options(str(remark)) for remark in remarks],
+            "remarks": [without_options(str(remark), language) for remark in remarks],
         }
     )
 
@@ -213,8 +214,9 @@ def _advice(session: Session, live: LiveOrientation | None) -> list[str]:
     if session.files.pair is not None:
         return [] if session.state.points else [say("advice", "points", language)]
     # What was found contradictory or unknown is said first.
-    told = ["".join((session.proposal or {}).get("report", {}).get("remarks", ())[:1])]
-    return [text for text in map(without_options, told) if text] + list(live.advice if live else ())
+    told = "".join((session.proposal or {}).get("report", {}).get("remarks", ())[:1])
+    first = without_options(told, language)
+    return [*([first] if first else []), *(live.advice if live else ())]
 
 
 def _points(session: Session) -> list[dict[str, Any]]:

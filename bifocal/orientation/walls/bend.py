@@ -11,10 +11,11 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from bifocal.model.doubts import MISFIT, MOST_BENT, bend_is_certain
+from bifocal.model.doubts import MOST_BENT, bend_is_certain
 from bifocal.model.homography import apply_homography
 from bifocal.orientation.tuning import TUNING
 from bifocal.orientation.walls.reference_plane import faces
+from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
 
 
@@ -181,28 +182,11 @@ def bend_in_words(
     """
     if not bend.is_certain:
         return ""
-    sure = "" if bend.px > TUNING.strongly_bent else " probably"
-    reason = (
-        "refraction (photos taken through glass or water: give --indices with --port or --depth), "
-        "a lens file of another camera or focus, wrong distances, or no plane wall there"
-        if with_lens
-        else "lens distortion (calibrate with `bifocal calibrate`, give --lens), or refraction "
-        "(photos taken through glass or water: give --indices with --port or --depth)"
-    )
-    if through_media:
-        reason = (
-            "that the media are not as given (--indices in their order from the camera to the "
-            "wall, --thicknesses, --port for glass that moves with the camera, --depth for what "
-            "stays with the wall), or lens distortion (--lens)"
-        )
-    return (
-        f"{MISFIT}: between the photos the wall is bent by {bend.px:.2f} ± "
-        f"{bend.sigma:.2f} px (an honest pair: at most {MOST_BENT:g}). The likely reason is"
-        f"{sure} {reason}. Relief may be wrong by many times the precision of the picks, although "
-        "every point lies on its line: sigma_r counts the bend; "
-        + (
-            "control points that fit no camera were left out, but may be good."
-            if left_out
-            else "no control point was left out for it."
-        )
-    )
+    lens = "lens_known" if with_lens else "certain_lens"
+    reason = remark(f"orientation.reason_{'media' if through_media else lens}")
+    if bend.px <= TUNING.strongly_bent:
+        reason = remark("orientation.reason_probably", reason=reason)
+    return remark(
+        "orientation.bent", px=bend.px, sigma=bend.sigma, most=MOST_BENT, reason=reason,
+        control=remark(f"orientation.control_{'left_out' if left_out else 'kept'}"),
+    )  # fmt: skip

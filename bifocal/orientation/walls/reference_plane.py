@@ -14,6 +14,7 @@ import numpy as np
 from bifocal.model.interior_orientation import Cameras, Interior, Interiors
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.tuning import TUNING
+from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.camera.rotation import rotation_from_vector
 from photocore.errors import GeometryError
@@ -403,13 +404,7 @@ def rivals_in_words(planes: Sequence[Face], site: SiteMeasures) -> str:
         f"{face.pixel[1]:.0f})"
         for face in others
     )
-    return (
-        f"CHECK THE WALL: only {100 * planes[0].share:.0f} % of the details spread over both "
-        "photos lie on the plane taken for the wall (green in the picture), and other planes "
-        f"compete with it, at roughly: {named}. If the wall is one of these, every relief is off "
-        "by that much: name a spot of the wall in the far photo with --wall COL,ROW, or give "
-        "control points."
-    )
+    return remark("orientation.rivals", share=100 * planes[0].share, planes=named)
 
 
 def _heights(xyz: FloatArray, plane: FloatArray) -> FloatArray:

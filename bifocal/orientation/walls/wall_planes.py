@@ -13,6 +13,7 @@ import numpy as np
 
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.tuning import TUNING
+from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
 
 
@@ -173,10 +174,6 @@ def steep_rivals_in_words(
     for plane in others:
         turn = np.rad2deg(np.arccos(np.clip(plane.normal @ chosen.normal, -1.0, 1.0)))
         column, row = np.median(pixels[plane.members], axis=0)
-        share = 100 * plane.share
-        named.append(f"turned by {turn:.0f}°, {share:.0f} % (--wall {column:.0f},{row:.0f})")
-    return (
-        f"WHICH PLANE IS THE WALL? Taken is one with {100 * chosen.share:.0f} % of the area that "
-        f"shows common points; planes of other directions compete: {'; '.join(named)}. Name a spot "
-        "of the wall in the far photo (--wall COL,ROW), or give both distances: their ratio tells."
-    )
+        about = {"angle": turn, "share": 100 * plane.share, "column": column, "row": row}
+        named.append(remark("orientation.turned_plane", **about))
+    return remark("orientation.which_plane", share=100 * chosen.share, planes="; ".join(named))

@@ -11,15 +11,13 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from bifocal import Interior, Lens, calibrate
+from bifocal import InputError, Interior, Lens, calibrate, read_image, write_image
 from bifocal.calibration.board_calibration import lens_of_views
 from bifocal.calibration.plumb_line import calibrate_from_lines, find_straight_edges
 from bifocal.calibration.workflow import undistorted
-from bifocal.cli.main import main
-from bifocal.files.images import read_image, write_image
 from bifocal.model.interior_orientation import lens_of_photo
 from photocore.camera.boards import BoardView, detect_board, find_board_size
-from photocore.errors import InputError
+from tests.builders.commands import bifocal_command as main
 
 MATRIX = np.array([[900.0, 0, 511.5], [0, 905.0, 383.5], [0, 0, 1]])
 BROWN = Lens(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
-from bifocal.demo import SAMPLE
+from bifocal import SAMPLE
 from tests.scenes import demo_scene
 
 FAR, NEAR = SAMPLE / "far.jpg", SAMPLE / "near.jpg"

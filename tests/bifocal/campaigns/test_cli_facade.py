@@ -14,12 +14,11 @@ import rasterio
 from click.testing import CliRunner
 
 import bifocal
+from bifocal import WATER_SAMPLE, Pair
 from bifocal.cli.facade import command
-from bifocal.cli.main import main
-from bifocal.demo import WATER_SAMPLE
-from bifocal.model.pair import Pair
 from bifocal.options import OF_PAIR
 from tests.bifocal.campaigns.sample_tables import FAR, NEAR, write_tables
+from tests.builders.commands import bifocal_command as main
 
 
 def facade(out: Path, *options: object) -> dict:

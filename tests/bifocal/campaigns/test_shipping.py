@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from bifocal import InputError
 from bifocal.campaigns import pair_job
 from bifocal.campaigns.dask_cluster import _look
 from bifocal.campaigns.pair_job import PairJob, run_pair
 from bifocal.campaigns.shipping import packed, run_parcel, unpacked
 from bifocal.campaigns.step_store import Step
-from photocore.errors import InputError
 from photocore.provenance import program
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from bifocal import InputError
 from bifocal.campaigns import step_store
 from bifocal.campaigns.folder_locks import LOCK, locked
 from bifocal.campaigns.step_store import (
@@ -21,7 +22,6 @@ from bifocal.campaigns.step_store import (
     run_step,
 )
 from photocore.cli import no_progress
-from photocore.errors import InputError
 from photocore.provenance import FileHashes
 from tests.full_disk import full_after
 

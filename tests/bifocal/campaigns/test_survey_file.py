@@ -10,18 +10,18 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from bifocal import InputError
 from bifocal.campaigns import photo_pairing
 from bifocal.campaigns.pair_job import refusal, steps_of
 from bifocal.campaigns.survey_file import in_survey_words, read_survey_file
 from bifocal.campaigns.workflow import facade_job
-from bifocal.cli.main import main
 from bifocal.files.images import ImageInfo
 from bifocal.options import MEDIA_OF_PAIR, OF_PAIR, names_of
 from bifocal.orientation.align_workflow import AlignOptions
 from bifocal.orthophotos.ortho_workflow import OrthoTask
 from multimedia import Layers
-from photocore.errors import InputError
 from tests.bifocal.campaigns.sample_tables import FAR, NEAR
+from tests.builders.commands import bifocal_command as main
 
 GOOD = """
 format = "bifocal-survey/1"

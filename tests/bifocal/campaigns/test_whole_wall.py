@@ -10,17 +10,17 @@ import pytest
 import rasterio
 from click.testing import CliRunner
 
+from bifocal import InputError
 from bifocal.campaigns import workflow
 from bifocal.campaigns.pair_job import PairOutcome, steps_of
 from bifocal.campaigns.step_store import Step, run_step, step_key
 from bifocal.campaigns.survey_file import read_survey_file
 from bifocal.campaigns.whole_wall import joint_step, run_whole
 from bifocal.campaigns.workflow import plan_survey
-from bifocal.cli.main import main
 from photocore.cli import no_progress
-from photocore.errors import InputError
 from photocore.provenance import FileHashes
 from tests.bifocal.orientation.street import write_street
+from tests.builders.commands import bifocal_command as main
 
 
 def survey(folder: Path, *above: str) -> Path:

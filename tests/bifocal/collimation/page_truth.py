@@ -6,7 +6,7 @@ import csv
 
 import numpy as np
 
-from bifocal.demo import SAMPLE
+from bifocal import SAMPLE
 from tests.scenes import bifocal_cameras, demo_scene
 from tests.scenes.make_sample import PIXEL, SIZE
 

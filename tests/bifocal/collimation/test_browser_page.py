@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bifocal import Lens
 from bifocal.collimation.server.assets import WEB
-from bifocal.model.lens import Lens
 from tests.browser import Driver, Served, tab_of
 
 STAGES = ("photos", "orientation", "points", "products")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bifocal.demo import WATER_SAMPLE
+from bifocal import WATER_SAMPLE
 from tests.browser import TARGETS, Driver, served, tab_of
 from tests.scenes.wet import WetCamera
 from tests.workbook_lint import lint

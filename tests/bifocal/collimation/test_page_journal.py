@@ -15,10 +15,10 @@ from pathlib import Path
 
 import pytest
 
+from bifocal import InputError
 from bifocal.collimation.journal import Journal
 from bifocal.collimation.project import find_files
 from bifocal.collimation.server.access import Access
-from photocore.errors import InputError
 from tests.page_session import client_of, opened, pick, pick_both, sample_folder, sample_picks
 
 JOURNAL = "facade.journal.jsonl"
@@ -290,6 +290,6 @@ def test_a_killed_server_resumes_with_everything_and_an_open_page_finds_it(tmp_p
 def test_the_bare_command_tells_of_the_page() -> None:
     from click.testing import CliRunner
 
-    from bifocal.cli.main import main
+    from tests.builders.commands import bifocal_command as main
 
     assert "bifocal pick" in CliRunner().invoke(main, []).output

@@ -10,14 +10,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bifocal import Lens, Pair
+from bifocal import SAMPLE, InputError, Lens, Pair, read_image
 from bifocal.collimation.measures import measure
 from bifocal.collimation.pyramids import TILE, level_size, max_level
-from bifocal.demo import SAMPLE
-from bifocal.files.images import read_image
 from bifocal.matching.snapping import snap
 from bifocal.matching.suggestions import radial_line, suggest
-from photocore.errors import InputError
 from tests.bifocal.collimation.page_truth import SPOILT, true_pixels
 from tests.page_session import client_of, opened, sample_folder
 from tests.scenes import bifocal_cameras, demo_scene

@@ -7,8 +7,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from bifocal.demo import SAMPLE
-from bifocal.model.pair import Pair
+from bifocal import SAMPLE, Pair
 from tests.page_session import client_of, opened, pick, pick_both, sample_folder, sample_picks
 
 REPORT = {"remarks": ["found"], "control": []}

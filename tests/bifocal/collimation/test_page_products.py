@@ -12,16 +12,14 @@ import ezdxf
 import numpy as np
 import pytest
 
-from bifocal import Pair, ReliefMap
+from bifocal import SAMPLE, InputError, Pair, ReliefMap
 from bifocal.collimation import job_process, job_tasks
 from bifocal.collimation.live_orientation import control_of, live_orientation
 from bifocal.collimation.project import find_files
 from bifocal.collimation.records import PickedControl, SurveyState
-from bifocal.demo import SAMPLE
 from bifocal.files.geotiff import write_relief
 from bifocal.files.images import image_info
 from bifocal.orientation.control_points import read_lengths
-from photocore.errors import InputError
 from tests.page_session import (
     client_of,
     entries,

@@ -12,9 +12,8 @@ import pytest
 from click.testing import CliRunner
 
 import bifocal
-from bifocal.cli.main import main
-from bifocal.collimation.workflow import page_server
-from photocore.errors import InputError
+from bifocal import InputError, page_server
+from tests.builders.commands import bifocal_command as main
 from tests.page_session import (
     client_of,
     entries,

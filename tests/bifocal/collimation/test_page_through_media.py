@@ -11,12 +11,11 @@ import cv2
 import numpy as np
 import pytest
 
-from bifocal import solve
+from bifocal import Pair, solve
 from bifocal.collimation.job_tasks import task_of
 from bifocal.collimation.pyramids import RectifiedPhoto, max_level
 from bifocal.collimation.stated_media import media_from_dict, media_of
 from bifocal.matching.suggestions import radial_line, seen_in_other, suggest
-from bifocal.model.pair import Pair
 from tests.bifocal.model.test_pair_through_media import PAIRS, content
 from tests.bifocal.model.test_pair_through_media import POINTS as WIDE
 from tests.page_session import client_of, opened, pick_both, sample_folder

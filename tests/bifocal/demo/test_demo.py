@@ -10,10 +10,10 @@ import pytest
 from click.testing import CliRunner
 
 import bifocal
-from bifocal.cli.main import main
-from bifocal.demo import SAMPLE, WATER_SAMPLE
+from bifocal import SAMPLE, WATER_SAMPLE
 from bifocal.demo.samples import PICK_SIGMA, WATER
 from bifocal.files.geotiff import read_relief
+from tests.builders.commands import bifocal_command as main
 from tests.scenes import demo_scene
 from tests.scenes.refracted import pixels_of
 from tests.scenes.tracing import Tracer

@@ -13,13 +13,11 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from bifocal.cli.main import main
-from bifocal.demo import SAMPLE
+from bifocal import SAMPLE, InputError, read_image
 from bifocal.files import images
-from bifocal.files.images import read_image
 from multimedia.projects.photos import read_photo
 from photocore.decoding import decoded, decoders_words
-from photocore.errors import InputError
+from tests.builders.commands import bifocal_command as main
 
 FAR = (SAMPLE / "far.jpg").read_bytes()
 

@@ -13,10 +13,10 @@ import openpyxl
 import pytest
 from click.testing import CliRunner
 
-from bifocal.cli.main import main
+from bifocal import InputError
 from bifocal.files.exports import export_points
 from bifocal.model.points import SurveyPoints
-from photocore.errors import InputError
+from tests.builders.commands import bifocal_command as main
 
 POINTS = SurveyPoints(
     ids=("001", "=HYPERLINK(1)", "C", "lost"),

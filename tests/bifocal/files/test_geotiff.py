@@ -14,9 +14,8 @@ import pytest
 import rasterio
 from PIL import Image
 
+from bifocal import Grid, InputError
 from bifocal.files.geotiff import RasterReader, create_raster, dpi_at_scale, gsd_at_scale
-from bifocal.model.grid import Grid
-from photocore.errors import InputError
 from tests.rounding import EPS
 
 GRID = Grid.from_bounds((-2.0, -1.0, 1.5, 1.0), gsd=0.005)

@@ -6,15 +6,24 @@ import cv2
 import numpy as np
 import pytest
 
-from bifocal import MatchSettings, Pair, PairMedia, Photo, dense_relief, match
+from bifocal import (
+    GeometryError,
+    InputError,
+    MatchSettings,
+    Pair,
+    PairMedia,
+    Photo,
+    dense_relief,
+    match,
+    write_image,
+)
 from bifocal.files.haze import greys_through_water, read_greys
-from bifocal.files.images import as_grey, read_grey, write_image
+from bifocal.files.images import as_grey, read_grey
 from bifocal.matching import homologous_points
 from bifocal.matching.matching import match_pair
 from bifocal.orientation import align_workflow, photo_alignment
 from bifocal.orientation.align_workflow import AlignOptions, KnownLens
 from bifocal.orientation.orientation_stages import OrientedPair
-from photocore.errors import GeometryError, InputError
 from tests.scenes import RICH, Scene, bifocal_cameras, render
 from tests.scenes.rendering import Haze
 from tests.scenes.shapes import box

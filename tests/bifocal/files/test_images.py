@@ -9,15 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bifocal.files.images import (
-    as_grey,
-    image_info,
-    read_image,
-    to_eight_bit,
-    turn_upright,
-    write_image,
-)
-from photocore.errors import InputError
+from bifocal import InputError, read_image, write_image
+from bifocal.files.images import as_grey, image_info, to_eight_bit, turn_upright
 
 PICTURE = np.random.default_rng(7).integers(0, 255, (24, 36, 3), dtype=np.uint8)
 

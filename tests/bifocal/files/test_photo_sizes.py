@@ -10,13 +10,11 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from bifocal import Pair, dense_relief, match, orthophoto
-from bifocal.cli.main import main
+from bifocal import SAMPLE, Pair, dense_relief, match, orthophoto, read_image
 from bifocal.collimation.pictures import Pictures
-from bifocal.demo import SAMPLE
-from bifocal.files.images import read_image
 from bifocal.workbook.pair_workflow import read_pair
-from photocore.errors import InputError
+from multimedia import InputError
+from tests.builders.commands import bifocal_command as main
 
 CHANGES = {
     "reduced": (lambda image: image.resize((768, 512)), "768 x 512", "a copy reduced to 0.5"),

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifocal import Pair
-from bifocal.model.grid import Grid
+from bifocal import Grid, Pair
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
 
 PAIR = Pair.ideal(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bifocal.model.grid import Grid, cut
-from photocore.errors import InputError
+from bifocal import Grid, InputError, ReliefMap
+from bifocal.model.grid import cut
 
 
 def test_bounds_are_the_outer_edges_and_pixels_count_from_their_centres() -> None:
@@ -70,3 +70,14 @@ def test_turned_pixels_are_refused() -> None:
     turned = np.array([[0.01, 0.001, 0.0], [0.001, -0.01, 0.0], [0.0, 0.0, 1.0]])
     with pytest.raises(InputError, match="parallel"):
         Grid.from_affine(turned, (100, 100))
+
+
+def test_a_map_of_relief_speaks_of_corners_to_gis_programs_and_of_centres_to_xarray() -> None:
+    grid = Grid.from_bounds((0.0, 0.0, 2.0, 1.0), gsd=0.5)
+    relief = ReliefMap.from_relief(np.zeros((2, 4)), plane_from_pixel=grid.plane_from_pixel)
+    assert (relief.transform.c, relief.transform.f) == pytest.approx((0.0, 1.0))
+    xarray = pytest.importorskip("xarray")
+    data = relief.to_xarray()
+    assert isinstance(data, xarray.Dataset)
+    assert set(data) == {"r", "sigma", "quality"}
+    assert float(data.r.sel(x=0.25, y=0.75)) == 0.0

@@ -6,13 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifocal import Pair, Photo, georeference, solve
+from bifocal import Measuring, Pair, Photo, RadialDivision, georeference, solve
 from bifocal.model.orientation_precision import CAMERA, NAMES, moved, pinhole
-from bifocal.survey.setup import Measuring
-from photocore.camera.distortion import RadialDivision
+from multimedia import InputError
 from photocore.camera.pinhole import PARAMETERS, plane_from_pixel
 from photocore.camera.rotation import rotation_from_vector
-from photocore.errors import InputError
 from tests.scenes import SetupErrors, bifocal_cameras
 
 CAMERAS = bifocal_cameras(errors=SetupErrors(tilt_deg=8.0), rng=np.random.default_rng(2))

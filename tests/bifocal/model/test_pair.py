@@ -11,12 +11,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bifocal import Lens, Pair, Photo, rays, relief
-from bifocal.model.flags import FlagLimits, point_flags
-from bifocal.survey.observations import PointObservations
+from bifocal import (
+    FlagLimits,
+    GeometryError,
+    InputError,
+    Lens,
+    Pair,
+    Photo,
+    PointObservations,
+    rays,
+    relief,
+)
+from bifocal.model.flags import point_flags
 from bifocal.survey.point_survey import solve_points
 from bifocal.survey.remarks import point_remarks
-from photocore.errors import GeometryError, InputError
 
 GSD = 0.00369
 METRES = np.array([[GSD, 0, -5.67], [0, -GSD, 3.78], [0, 0, 1.0]])

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 import bifocal
-from bifocal import Pair
-from bifocal.media import MediaPath, interface_axes
+from bifocal import GeometryError, InputError, MediaPath, Pair
+from bifocal.media import interface_axes
 from bifocal.model.ray_field import RayField
 from bifocal.rays import object_rays, plane_position, straight
 from multimedia import Layers
-from photocore.errors import GeometryError, InputError
 from tests.scenes.refracted import pixels_of
 
 AQUARIUM = {"indices": [1.0, 1.49, 1.337], "thicknesses": [0.01]}

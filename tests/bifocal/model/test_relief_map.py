@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bifocal.model.grid import Grid
-from bifocal.model.relief_map import Quality, ReliefMap
-from photocore.errors import InputError
+from bifocal import Grid, InputError, Quality, ReliefMap
 
 GRID = Grid.from_bounds((0.0, 0.0, 4.0, 3.0), gsd=1.0).plane_from_pixel
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bifocal.model.grid import Grid
-from bifocal.model.surface import FlatSurface, MapSurface
-from photocore.errors import InputError
+from bifocal import FlatSurface, Grid, InputError, MapSurface
 
 GRID = Grid.from_bounds((0.0, 0.0, 3.0, 2.0), gsd=0.01)
 

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bifocal import PairMedia
-from bifocal.cli.main import main
+from bifocal import GeometryError, InputError, Pair, PairMedia, Similarity, read_control
 from bifocal.model.orientation_precision import pinhole
-from bifocal.model.pair import Pair
 from bifocal.networks import joint_adjustment
 from bifocal.networks.joint_adjustment import adjust_jointly
 from bifocal.networks.joint_control import named_positions
@@ -28,12 +26,10 @@ from bifocal.networks.joint_workflow import (
     _write_pair,
     adjust_pairs,
 )
-from bifocal.orientation.control_points import read_control
 from photocore.camera.rotation import rotation_from_vector
-from photocore.camera.similarity import Similarity
-from photocore.errors import GeometryError, InputError
 from tests.bifocal.orientation.many_pairs import many_pairs
 from tests.bifocal.orientation.street import write_street
+from tests.builders.commands import bifocal_command as main
 
 
 @pytest.mark.acceptance

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from photocore.camera.pinhole import Pinhole, camera_matrix
+from bifocal import Pinhole
+from photocore.camera.pinhole import camera_matrix
 from photocore.camera.rotation import rotation_from_vector
 
 SIZE = (960, 640)

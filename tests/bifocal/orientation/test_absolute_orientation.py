@@ -4,12 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
-from bifocal.model.interior_orientation import Interior
+from bifocal import Control, GeometryError, Interior, SiteMeasures
 from bifocal.orientation.absolute_orientation import orient_pair
-from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import PhotoInput
 from photocore.camera.pinhole import project, triangulate
-from photocore.errors import GeometryError
 from tests.bifocal.orientation.layered_wall import BOARDS, SIZE, camera, photograph, relief_at, take
 
 FAR = camera(16.0, turn_deg=(0.3, -0.2, 0.15), shift=(5.0, -4.0))

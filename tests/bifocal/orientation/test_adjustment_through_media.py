@@ -11,10 +11,8 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from bifocal import PairMedia
-from bifocal.cli.main import main
+from bifocal import Pair, PairMedia, Pinhole
 from bifocal.model.orientation_precision import pinhole
-from bifocal.model.pair import Pair
 from bifocal.networks.joint_adjustment import (
     JointAdjustment,
     JointUnknowns,
@@ -23,10 +21,11 @@ from bifocal.networks.joint_adjustment import (
 from bifocal.networks.joint_observations import JointObservations
 from bifocal.networks.joint_workflow import _adjusted_pair, _adjusted_photo
 from multimedia import Layers
-from photocore.camera.pinhole import Pinhole, camera_matrix
+from photocore.camera.pinhole import camera_matrix
 from photocore.camera.rotation import rotation_from_vector
 from tests.bifocal.model.test_pair_through_media import PAIRS, content
 from tests.bifocal.orientation.street import CONTROL, write_table
+from tests.builders.commands import bifocal_command as main
 from tests.scenes import SetupErrors, bifocal_cameras, demo_scene, render
 from tests.scenes.wet import WetCamera, under_water
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import bifocal
+from bifocal import GeometryError, InputError
 from bifocal.orientation.align_workflow import basis
-from photocore.errors import GeometryError, InputError
 
 SIZE = (401, 301)
 SCALE = [[0.01, 0, -2.0], [0, -0.01, 1.5], [0, 0, 1]]

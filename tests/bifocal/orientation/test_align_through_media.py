@@ -15,9 +15,19 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bifocal import Control, Interior, Pair, PairMedia, SiteMeasures, align
-from bifocal.cli.main import main
-from bifocal.media import MediaPath, interface_axes, view
+from bifocal import (
+    Control,
+    GeometryError,
+    InputError,
+    Interior,
+    MediaPath,
+    Pair,
+    PairMedia,
+    Pinhole,
+    SiteMeasures,
+    align,
+)
+from bifocal.media import interface_axes, view
 from bifocal.model.orientation_precision import NAMES, from_dict, names_of
 from bifocal.orientation import absolute_orientation
 from bifocal.orientation.absolute_orientation import orient_pair
@@ -26,9 +36,9 @@ from bifocal.orientation.refracted_stage import with_bent_ties
 from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.walls.bend import WallBend, bend_in_words
 from multimedia import Layers
-from photocore.camera.pinhole import Pinhole, camera_matrix, project
+from photocore.camera.pinhole import camera_matrix, project
 from photocore.camera.rotation import rotation_from_vector
-from photocore.errors import GeometryError, InputError
+from tests.builders.commands import bifocal_command as main
 from tests.scenes import SetupErrors, bifocal_cameras
 from tests.scenes.refracted import seen_at
 from tests.scenes.wet import under_water

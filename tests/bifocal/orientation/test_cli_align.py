@@ -8,16 +8,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bifocal import Pair
+from bifocal import Interior, Matches, Pair
 from bifocal.cli import match as match_command
-from bifocal.cli.main import main
-from bifocal.matching.matching import Matches
-from bifocal.model.interior_orientation import Interior
 from bifocal.orientation.validation import check_distortion
 from bifocal.workbook.match_workflow import match_summary
+from multimedia import GeometryError
 from photocore.camera.pinhole import project
-from photocore.errors import GeometryError
 from tests.bifocal.orientation.layered_wall import camera, relief_at, take
+from tests.builders.commands import bifocal_command as main
 
 FAR = camera(16.0, turn_deg=(0.3, -0.2, 0.15))
 NEAR = camera(9.0, offset=(0.05, -0.04), turn_deg=(-0.2, 0.25, -0.2))

@@ -3,16 +3,15 @@
 import numpy as np
 import pytest
 
-from bifocal.model.interior_orientation import Interior
+from bifocal import Control, Interior, Pinhole, SiteMeasures
 from bifocal.orientation.adjustment.pair_observations import PairObservations, PairUnknowns
-from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import (
     OrientedPair,
     PhotoInput,
     control_alone,
     oriented_in_stages,
 )
-from photocore.camera.pinhole import Pinhole, triangulate
+from photocore.camera.pinhole import triangulate
 from tests.scenes import SetupErrors, bifocal_cameras
 
 SIZE = (3072, 2048)

@@ -4,14 +4,13 @@ import cv2
 import numpy as np
 import pytest
 
-from bifocal.model.interior_orientation import Interior
+from bifocal import Interior, Pinhole, RadialDivision
 from bifocal.orientation.facade_lines import (
     FacadeDirection,
     facade_turn,
     lines_of_photos,
 )
-from photocore.camera.distortion import RadialDivision
-from photocore.camera.pinhole import Pinhole, camera_matrix, project
+from photocore.camera.pinhole import camera_matrix, project
 from photocore.camera.rotation import rotation_from_vector
 
 SIZE = (1200, 800)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifocal.model.interior_orientation import Interior
+from bifocal import Control, GeometryError, InputError, Interior, SiteMeasures
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.adjustment.pair_adjustment import adjust, line_test, pair_equations
 from bifocal.orientation.adjustment.pair_observations import (
@@ -14,14 +14,12 @@ from bifocal.orientation.adjustment.pair_observations import (
     PairUnknowns,
     at,
 )
-from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.facade_lines import FacadeDirection, contradiction_in_words
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.starts.space_resection import resect
 from bifocal.orientation.tie_points import with_wall
 from bifocal.orientation.walls.reference_plane import NarrowFace
 from photocore.camera.pinhole import project
-from photocore.errors import GeometryError, InputError
 from tests.bifocal.orientation.layered_wall import SIZE, camera
 
 FAR = camera(16.0, offset=(0.4, -0.2), turn_deg=(8.0, -20.0, 1.0), shift=(4.0, -3.0))

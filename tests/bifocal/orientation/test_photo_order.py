@@ -11,18 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bifocal import Control, GeometryError, Interior, SiteMeasures
 from bifocal.collimation.job_tasks import task_of
-from bifocal.model.interior_orientation import Interior
 from bifocal.orientation import approximate_orientation
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.align_workflow import AlignOptions, KnownLens, _way, align_photos
 from bifocal.orientation.approximate_orientation import Given, order_of
-from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.starts.photo_order import SURE, first_is_far
 from bifocal.orientation.starts.relative_orientation import Ties
 from photocore.camera.pinhole import plane_transfer, project
-from photocore.errors import GeometryError
 from tests.bifocal.orientation.layered_wall import SIZE, camera, relief_at, take
 from tests.page_session import opened, sample_folder
 

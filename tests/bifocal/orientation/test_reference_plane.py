@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifocal.model.interior_orientation import Interior
-from bifocal.orientation.control_points import SiteMeasures
+from bifocal import GeometryError, Interior, SiteMeasures
 from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.walls.reference_plane import (
     Face,
@@ -17,7 +16,6 @@ from bifocal.orientation.walls.reference_plane import (
     zero_sigma,
 )
 from photocore.camera.pinhole import project
-from photocore.errors import GeometryError
 from tests.bifocal.orientation.layered_wall import SIZE, camera
 
 CAMERAS = (camera(17.5), camera(9.5))

@@ -6,20 +6,15 @@ import cv2
 import numpy as np
 import pytest
 
-from bifocal import Pair
+from bifocal import Control, GeometryError, Interior, Pair, Pinhole, RadialDivision, SiteMeasures
 from bifocal.matching.features import Features, match_features
-from bifocal.model.interior_orientation import Interior
 from bifocal.orientation import absolute_orientation
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import make_alignment
-from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.starts.relative_orientation import Ties, supported
 from bifocal.orientation.walls.bend import WallBend, bend_in_words, bend_of_wall, wall_bend
 from bifocal.orientation.walls.reference_plane import narrow_face
-from photocore.camera.distortion import RadialDivision
-from photocore.camera.pinhole import Pinhole
-from photocore.errors import GeometryError
 from tests.bifocal.orientation.layered_wall import SIZE as WALL_SIZE
 from tests.bifocal.orientation.layered_wall import camera as wall_camera
 from tests.bifocal.orientation.layered_wall import take

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bifocal.orientation.control_points import SiteMeasures
+from bifocal import SiteMeasures
 from bifocal.orientation.walls.wall_planes import (
     likely_wall,
     planes_of_any_direction,

@@ -16,12 +16,9 @@ import rasterio
 from click.testing import CliRunner, Result
 from PIL import Image
 
-from bifocal import Pair, Photo
-from bifocal.cli.main import main
+from bifocal import Grid, Pair, Photo, ReliefMap, write_image
 from bifocal.files.geotiff import create_raster, read_relief, write_relief
-from bifocal.files.images import write_image
-from bifocal.model.grid import Grid
-from bifocal.model.relief_map import ReliefMap
+from tests.builders.commands import bifocal_command as main
 
 SIZE = (420, 300)
 GSD = 0.01

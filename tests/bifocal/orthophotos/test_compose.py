@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import rasterio
 
 import bifocal
-from bifocal import Lens, OrthoOptions, Pair, Photo
-from bifocal.model.grid import Grid
-from bifocal.model.relief_map import ReliefMap
-from photocore.errors import GeometryError, InputError
+from bifocal import (
+    GeometryError,
+    Grid,
+    InputError,
+    Lens,
+    OrthoOptions,
+    Orthophoto,
+    Pair,
+    Photo,
+    ReliefMap,
+    Source,
+)
 from tests.bifocal.orthophotos.wall_scene import (
     colour_at,
     hidden_at,
@@ -211,3 +220,16 @@ def test_nonsense_is_refused(wall: tuple[Pair, np.ndarray, np.ndarray, ReliefMap
     )
     with pytest.raises(GeometryError, match="horizon"):
         bifocal.orthophoto(Pair(image1=tilted, image2=pair.image2), far)
+
+
+def test_an_orthophoto_is_written_with_its_source_and_place(tmp_path) -> None:
+    colours = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
+    place = Grid.from_bounds((0.0, 0.0, 2.0, 1.0), gsd=0.5).plane_from_pixel
+    source = np.full((2, 4), Source.IMAGE_1, np.uint8)
+    hidden = np.zeros((2, 4), bool)
+    ortho = Orthophoto(image=colours, source=source, hidden=hidden, plane_from_pixel=place)
+    ortho.write(tmp_path / "ortho.tif")
+    with rasterio.open(tmp_path / "ortho.tif") as file:
+        np.testing.assert_array_equal(file.read()[:3].transpose(1, 2, 0), colours)
+        assert (file.read(4) == Source.IMAGE_1).all()
+        assert file.transform == ortho.transform

@@ -11,9 +11,9 @@ import pytest
 import rasterio
 from click.testing import CliRunner, Result
 
-from bifocal.cli.main import main
+from bifocal import Grid
 from bifocal.files.geotiff import create_raster
-from bifocal.model.grid import Grid
+from tests.builders.commands import bifocal_command as main
 
 GSD = 0.005
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import bifocal
-from bifocal.model.grid import Grid
-from photocore.errors import InputError
+from bifocal import Grid, InputError
 
 
 def ortho(bounds, *, factor: float = 1.0, hole: bool = False) -> bifocal.Orthophoto:

@@ -6,9 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from bifocal import Photo
-from bifocal.model.grid import Grid
-from bifocal.model.surface import FlatSurface
+from bifocal import FlatSurface, Grid, InputError, Photo
 from bifocal.orthophotos.radiometry import (
     chromatic_shift,
     corrected_photo,
@@ -16,7 +14,6 @@ from bifocal.orthophotos.radiometry import (
     match_exposure,
 )
 from bifocal.orthophotos.rectify import SourcePhoto
-from photocore.errors import InputError
 
 SIZE = (480, 360)
 PHOTO = Photo(

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bifocal.model.grid import Grid
-from bifocal.model.surface import MapSurface
+from bifocal import Grid, MapSurface
 from bifocal.orthophotos.contour_lines import contour_labels, contours
 from bifocal.orthophotos.sections import section, section_letter
 

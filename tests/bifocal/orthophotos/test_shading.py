@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.model.grid import Grid
-from bifocal.model.surface import MapSurface
+from bifocal import Grid, MapSurface
 from bifocal.orthophotos.shading import shaded
 
 WALL = Grid.from_bounds((0.0, 0.0, 3.0, 2.0), gsd=0.005)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bifocal.model.grid import Grid
+from bifocal import Grid, InputError
 from bifocal.orthophotos.triangles import TriangleSurface
-from photocore.errors import InputError
 
 CORNERS = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]], dtype=float)
 

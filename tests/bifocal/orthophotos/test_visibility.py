@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bifocal.model.grid import Grid
-from bifocal.model.surface import FlatSurface, MapSurface, Surface
+from bifocal import FlatSurface, Foot, Grid, MapSurface, Surface
 from bifocal.orthophotos.visibility import hidden_from
-from bifocal.rays import Foot
 from tests.bifocal.orthophotos.wall_scene import hidden_at, make_pair, relief_at, wall_grid
 
 

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal import Pair, Photo, orthophoto
-from bifocal.model.grid import Grid
-from bifocal.model.relief_map import ReliefMap
-from bifocal.model.surface import MapSurface
+from bifocal import Grid, MapSurface, OrthoOptions, Pair, Photo, ReliefMap, Source, orthophoto
 from bifocal.orthophotos.mask_tidying import LEAST_AREA, tidied
-from bifocal.orthophotos.ortho_image import OrthoOptions, Source
 from bifocal.orthophotos.whole_picture import CompletedSurface
 
 METRES = [[0.01, 0, -1.995], [0, -0.01, 1.995], [0, 0, 1]]

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal import Pair, Photo
-from bifocal.model.grid import Grid
+from bifocal import Grid, Pair, Photo
 
 
 def relief_at(x: np.ndarray, y: np.ndarray) -> np.ndarray:

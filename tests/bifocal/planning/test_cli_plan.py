@@ -8,7 +8,7 @@ import openpyxl
 import pytest
 from click.testing import CliRunner
 
-from bifocal.cli.main import main
+from tests.builders.commands import bifocal_command as main
 from tests.workbook_lint import lint
 
 CANON = ["--sensor", "22.7x15.1", "--pixels", "3072x2048"]

@@ -7,12 +7,12 @@ import openpyxl
 import pytest
 from click.testing import CliRunner
 
-from bifocal.cli.main import main
+from bifocal import GeometryError, InputError
 from bifocal.planning.camera_plan import CameraSensor
 from bifocal.planning.planned_media import PlannedMedia
 from bifocal.planning.stations import plan_stations
 from multimedia import Layers
-from photocore.errors import GeometryError, InputError
+from tests.builders.commands import bifocal_command as main
 from tests.scenes.refracted import seen_at
 from tests.workbook_lint import lint
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bifocal import GeometryError, InputError
 from bifocal.planning.camera_plan import CameraSensor
 from bifocal.planning.stations import plan_stations
-from photocore.errors import GeometryError, InputError
 
 CANON = CameraSensor(width=22.7, height=15.1, columns=3072, rows=2048)
 

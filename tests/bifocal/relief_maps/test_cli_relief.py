@@ -11,10 +11,9 @@ import pytest
 import rasterio
 from click.testing import CliRunner
 
-from bifocal import Pair
-from bifocal.cli.main import main
+from bifocal import Pair, write_image
 from bifocal.files.geotiff import read_relief
-from bifocal.files.images import write_image
+from tests.builders.commands import bifocal_command as main
 from tests.scenes import bifocal_cameras, facade, render
 
 

@@ -12,8 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifocal import dense_relief
-from bifocal.orthophotos.compose import orthophoto
+from bifocal import dense_relief, orthophoto
 from tests.scenes import POOR, RICH, bifocal_cameras, render
 from tests.scenes.delivery import bars, hidden_figures, ortho_figures, relief_figures
 from tests.scenes.loggia import loggia

@@ -8,9 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bifocal import Pair, Photo, Quality, dense_relief
+from bifocal import Grid, Pair, Photo, Quality, dense_relief
 from bifocal.files.images import as_grey
-from bifocal.model.grid import Grid
 from bifocal.orientation.adjustment.pair_observations import at
 from bifocal.relief_maps import edges, flow, forward_projection, seed
 from bifocal.relief_maps.dense_matching import _resampled
@@ -18,7 +17,7 @@ from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import common_bounds, make_frame, working_grid
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
 from bifocal.relief_maps.relief_files import hatched, shaded
-from photocore.errors import GeometryError, InputError
+from multimedia import GeometryError, InputError
 from photocore.shrinkage import shrink_noise
 from tests.scenes import RICH, Rendering, Scene, SetupErrors, bifocal_cameras, facade, render
 from tests.scenes.shapes import box

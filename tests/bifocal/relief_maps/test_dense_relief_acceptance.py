@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bifocal import Pair, Quality, dense_relief
-from bifocal.files.images import read_image
+from bifocal import Pair, Quality, dense_relief, read_image
 from tests.scenes import POOR, RICH, Exposure, bifocal_cameras, facade, render
 
 pytestmark = pytest.mark.acceptance

@@ -7,8 +7,7 @@ from functools import cache
 import cv2
 import numpy as np
 
-from bifocal import Pair, Photo
-from bifocal.model.grid import Grid
+from bifocal import Grid, Pair, Photo
 from bifocal.relief_maps import coarse_level, plane_patches
 from bifocal.relief_maps.frame import Frame
 from bifocal.relief_maps.segments import SPACING, Segments

@@ -11,12 +11,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bifocal import dense_relief, match, orthophoto
+from bifocal import InputError, dense_relief, match, orthophoto
 from bifocal.files.images import as_grey
 from bifocal.rays import plane_position, point_on_ray, straight
 from bifocal.relief_maps import evidence
 from bifocal.relief_maps.frame import make_frame, offsets
-from photocore.errors import InputError
 from tests.scenes import RICH, Rendering, Scene, bifocal_cameras, render
 from tests.scenes.shapes import box
 from tests.scenes.wet import pair_through_media, under_water

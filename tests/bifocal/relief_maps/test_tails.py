@@ -8,8 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from bifocal import Pair, Photo, Quality
-from bifocal.model.grid import Grid
+from bifocal import Grid, Pair, Photo, Quality
 from bifocal.relief_maps import (
     coarse_level,
     edges,

@@ -12,12 +12,10 @@ import pytest
 from click.testing import CliRunner
 
 import bifocal
-from bifocal.cli.main import main
-from bifocal.demo import SAMPLE
+from bifocal import SAMPLE, Grid, InputError
 from bifocal.files.geotiff import read_relief
-from bifocal.model.grid import Grid
-from photocore.errors import InputError
 from tests.browser import launched
+from tests.builders.commands import bifocal_command as main
 from tests.web_page import Page
 
 

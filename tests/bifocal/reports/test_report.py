@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bifocal.cli.main import main
-from bifocal.demo import SAMPLE
+from bifocal import SAMPLE, Grid
 from bifocal.files.geotiff import create_raster
-from bifocal.model.grid import Grid
+from bifocal.orientation.walls.bend import WallBend, bend_in_words
+from bifocal.remarks import in_language, remark
 from bifocal.reports.accuracy import accuracy_blocks
 from bifocal.reports.content import read_content
 from bifocal.reports.pair_report import _provenance, report_document
@@ -26,6 +26,7 @@ from photocore.reports.document import Document
 from photocore.reports.words import LANGUAGES, texts_of, words_of
 from photocore.reports.writing import write_document
 from tests.bifocal.campaigns.sample_tables import CONTROL, FAR, NEAR, write_tables
+from tests.builders.commands import bifocal_command as main
 from tests.web_page import Page
 
 PAIR = SAMPLE / "facade.pair.json"
@@ -203,6 +204,33 @@ def test_without_check_points_the_figure_is_called_optimistic(tables, tmp_path):
     assert "12 unabhängigen Kontrollpunkten" in text
     text = Page(report(tmp_path / "bare.html", "--language", "it")).text
     assert "l'accuratezza non è provata" in text
+
+
+@pytest.mark.parametrize("language", ["it", "de"])
+def test_no_english_is_left_in_a_report_full_of_remarks(tables, tmp_path, language):
+    pair = json.loads(PAIR.read_text(encoding="utf-8"))
+    bent = WallBend(px=0.8, sigma=0.1)
+    values = {"share": 2.0, "size": 20.0, "number": 1, "count": 6, "name": "C7", "sigmas": 5.0}
+    keys = ("no_tape", "few_control", "gross_control", "lines_off_wall", "no_wall")
+    doubts = [bend_in_words(bent, with_lens=True)]
+    doubts += [remark(f"orientation.{key}", **values) for key in keys]
+    lens = remark("orientation.normal_lens")
+    assumed = [remark("orientation.assumed_focal", number=1, source=lens)]
+    pair["setup"] = {"doubts": doubts, "assumed": assumed}
+    for number in (1, 2):
+        pair[f"image{number}"]["file"] = str(SAMPLE / pair[f"image{number}"]["file"])
+    path = tmp_path / "sample.pair.json"
+    path.write_text(json.dumps(pair), encoding="utf-8")
+    check = tmp_path / "check.csv"
+    lines = tables[1].read_text(encoding="utf-8").splitlines()
+    check.write_text("\n".join([*lines, "nowhere" + lines[-1][lines[-1].index(",") :]]))
+    out = tmp_path / "r.html"
+    asked = ["--control", str(tables[0]), "--check", str(check), "--language", language]
+    result = CliRunner().invoke(main, ["report", str(path), "--out", str(out), *asked])
+    assert result.exit_code == 0, result.stderr
+    text = Page(out.read_text(encoding="utf-8")).text.replace(str(tmp_path), "")
+    assert in_language(doubts[0], language) in text
+    assert not re.findall(r".{0,40}\b(?:the|is|are|and|with|give)\b.{0,40}", text)
 
 
 def test_the_pdf_has_the_same_pages_and_names_its_program(tables, tmp_path):

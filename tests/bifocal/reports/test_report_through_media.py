@@ -10,11 +10,11 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from bifocal.cli.main import main
-from bifocal.model.pair import Pair
+from bifocal import Pair
 from bifocal.reports.content import ReportTask, read_content
 from bifocal.reports.refraction import plane_errors
 from tests.bifocal.model.test_pair_through_media import PAIRS, POINTS, content
+from tests.builders.commands import bifocal_command as main
 from tests.scenes.refracted import pixels_of
 
 

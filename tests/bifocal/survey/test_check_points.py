@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bifocal import InputError, KnownPoints, ReliefTable, ToleranceRule
 from bifocal.survey.check_points import check_points
-from bifocal.survey.reference import KnownPoints
-from bifocal.survey.relief_table import ReliefTable
-from bifocal.survey.tolerances import RULES, ToleranceRule, judge, sentence
-from photocore.errors import InputError
+from bifocal.survey.tolerances import RULES, judge, sentence
 
 
 def table(z):

@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from bifocal.survey.georeferencing import georeference
-from bifocal.survey.reference import KnownPoints
-from bifocal.survey.relief_table import ReliefTable
-from photocore.errors import GeometryError, InputError
+from bifocal import GeometryError, InputError, KnownPoints, ReliefTable, georeference
 
 RNG = np.random.default_rng(8)
 XYZ = np.column_stack([RNG.uniform(-5, 5, 12), RNG.uniform(-3, 3, 12), RNG.uniform(-1, 1, 12)])

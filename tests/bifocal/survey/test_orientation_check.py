@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifocal import Pair, Photo, solve
+from bifocal import Measuring, Pair, Photo, Taking, solve
 from bifocal.survey.orientation_check import check_orientation
-from bifocal.survey.setup import Measuring, Taking
-from photocore.errors import GeometryError, InputError
+from multimedia import GeometryError, InputError
 from tests.scenes import SetupErrors, bifocal_cameras
 
 METRES = np.array([[0.00369, 0, -5.67], [0, -0.00369, 3.78], [0, 0, 1.0]])

@@ -7,12 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bifocal.model.pair import Pair
-from bifocal.model.photo import Photo
-from bifocal.survey.observations import PointObservations
+from bifocal import Measuring, Pair, Photo, PointObservations, SurveySetup, Taking
 from bifocal.survey.point_survey import solve_points
-from bifocal.survey.setup import Measuring, SurveySetup, Taking
-from photocore.errors import GeometryError, InputError
+from multimedia import GeometryError, InputError
 
 
 def solve_ideal(setup, points):

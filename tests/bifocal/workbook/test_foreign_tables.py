@@ -6,7 +6,7 @@ import pytest
 
 import bifocal
 from bifocal.workbook.reading.reader import read_survey
-from photocore.errors import InputError, WorkbookError
+from multimedia import InputError, WorkbookError
 
 #: Name, X, Y and r [m] of points seen by 35 mm at 17.5 m and 19 mm at 9.5 m.
 WALL = {"A": (2.0, 1.0, 0.5), "B": (-1.5, 2.0, -0.1), "C": (1.0, -2.0, 0.3), "D": (3.0, 2.5, 0.2)}

@@ -10,9 +10,7 @@ import numpy as np
 import openpyxl
 import pytest
 
-from bifocal import Pair
-from bifocal.survey.observations import PointObservations
-from bifocal.survey.setup import Measuring
+from bifocal import Measuring, Pair, PointObservations
 from bifocal.workbook import workflow
 from bifocal.workbook.changing import update
 from bifocal.workbook.making import book

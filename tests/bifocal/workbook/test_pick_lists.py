@@ -10,13 +10,11 @@ import openpyxl
 import pytest
 from click.testing import CliRunner
 
-from bifocal.cli.main import main
-from bifocal.model.pair import Pair
-from bifocal.survey.setup import Taking
+from bifocal import Pair, Taking, solve
 from bifocal.workbook.pair_workflow import read_pair
 from bifocal.workbook.reading.pick_lists import read_picks
-from bifocal.workbook.workflow import solve
-from photocore.errors import InputError
+from multimedia import InputError
+from tests.builders.commands import bifocal_command as main
 from tests.papers.test_midulla_layout import NADIR, SIZE, fill, pixels, truth
 
 XYZ = truth(3)[[0, 5, 12, 18, 22]]

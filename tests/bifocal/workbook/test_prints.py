@@ -7,13 +7,17 @@ import numpy as np
 import openpyxl
 import pytest
 
-from bifocal import solve
+from bifocal import (
+    Measuring,
+    Pair,
+    PointObservations,
+    SurveyInput,
+    SurveyMedia,
+    SurveySetup,
+    Taking,
+    solve,
+)
 from bifocal.collimation.workbook.setup import completed, typed_setup
-from bifocal.model.pair import Pair
-from bifocal.survey.observations import PointObservations
-from bifocal.survey.setup import Measuring, SurveySetup, Taking
-from bifocal.survey.survey_input import SurveyInput
-from bifocal.survey.survey_media import SurveyMedia
 from bifocal.workbook.reading.reader import read_survey
 from tests.bifocal.workbook.test_cli_solve import POINTS, fill, put, refused, rows, run, write_csv
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached

@@ -19,9 +19,8 @@ from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.table import Table
 from PIL import Image as Picture
 
-from bifocal.survey.setup import Taking
+from bifocal import Taking, solve
 from bifocal.workbook.output import write_result
-from bifocal.workbook.workflow import solve
 from tests.bifocal.workbook.test_cli_solve import POINTS, rows
 from tests.bifocal.workbook.test_survey_workbook import parts
 

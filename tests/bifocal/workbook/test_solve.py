@@ -10,13 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bifocal import Pair, relief
+from bifocal import Measuring, Pair, Taking, georeference, relief, solve
 from bifocal.survey.basis import basis
-from bifocal.survey.georeferencing import georeference
-from bifocal.survey.setup import Measuring, Taking
 from bifocal.workbook.reading.reader import column_map
-from bifocal.workbook.workflow import solve
-from photocore.errors import GeometryError, InputError
+from multimedia import GeometryError, InputError
 
 LENSES = {"d1": 17.5, "d2": 9.5, "c1": 35.0, "c2": 19.0}
 

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bifocal import solve
-from bifocal.cli.main import main
-from bifocal.model.pair import Pair
-from bifocal.survey.setup import Measuring
+from bifocal import Measuring, Pair, solve
 from tests.bifocal.model.test_pair_through_media import PAIRS, POINTS, content
+from tests.builders.commands import bifocal_command as main
 from tests.scenes.refracted import pixels_of
 
 NAMES = ("port", "tank", "surface", "oblique", "leaning port")

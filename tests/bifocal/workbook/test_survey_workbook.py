@@ -11,22 +11,26 @@ import numpy as np
 import openpyxl
 import pytest
 
-from bifocal.model.lens import Lens
-from bifocal.model.pair import Pair
-from bifocal.model.photo import Photo
+from bifocal import (
+    KnownPoints,
+    Lens,
+    Measuring,
+    Pair,
+    Photo,
+    PointObservations,
+    SurveySetup,
+    Taking,
+    georeference,
+)
 from bifocal.survey.check_points import check_points
-from bifocal.survey.georeferencing import georeference
-from bifocal.survey.observations import PointObservations
 from bifocal.survey.point_survey import solve_points
-from bifocal.survey.reference import KnownPoints
-from bifocal.survey.setup import Measuring, SurveySetup, Taking
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.formulas.columns import IDEAL_POINTS, pair_points
 from bifocal.workbook.formulas.georeference_columns import georeference_columns
 from bifocal.workbook.formulas.results_columns import results_columns
 from bifocal.workbook.making.book import write_book
 from bifocal.workbook.template_workflow import write_template
-from photocore.errors import InputError
+from multimedia import InputError
 from tests.recalculate import recalculated, rows_of
 from tests.workbook_lint import lint
 

@@ -11,12 +11,12 @@ import pytest
 from click.testing import CliRunner
 from openpyxl.utils import range_boundaries
 
-from bifocal.cli.main import main
-from bifocal.survey.setup import SurveySetup, Taking
+from bifocal import SurveySetup, Taking
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.making.book import write_book
 from bifocal.workbook.template_workflow import write_template
 from tests.bifocal.workbook.test_survey_workbook import ideal_content, named, pair_content
+from tests.builders.commands import bifocal_command as main
 from tests.recalculate import recalculated
 from tests.workbook_page import dimension, printed_columns, scale_of, sizes_of
 

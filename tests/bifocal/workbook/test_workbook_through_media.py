@@ -11,20 +11,23 @@ import openpyxl
 import pytest
 from click.testing import CliRunner
 
-from bifocal import solve
-from bifocal.cli.main import main
-from bifocal.model.pair import Pair
+from bifocal import (
+    Measuring,
+    Pair,
+    PointObservations,
+    SurveyMedia,
+    SurveySetup,
+    Taking,
+    georeference,
+    solve,
+)
 from bifocal.survey.check_points import check_points
-from bifocal.survey.georeferencing import georeference
-from bifocal.survey.observations import PointObservations
 from bifocal.survey.point_survey import solve_points
-from bifocal.survey.setup import Measuring, SurveySetup, Taking
-from bifocal.survey.survey_media import SurveyMedia
 from bifocal.workbook.making.book import write_book
 from bifocal.workbook.output import write_result
 from bifocal.workbook.pair_workflow import read_pair
 from bifocal.workbook.template_workflow import write_survey, write_template
-from photocore.errors import GeometryError, InputError, WorkbookError
+from multimedia import GeometryError, InputError, WorkbookError
 from tests.bifocal.model.test_pair_through_media import AQUARIUM, POINTS, SURFACE, content
 from tests.bifocal.workbook.test_solve_through_media import measured
 from tests.bifocal.workbook.test_survey_workbook import (
@@ -32,6 +35,7 @@ from tests.bifocal.workbook.test_survey_workbook import (
     ideal_content,
     named,
 )
+from tests.builders.commands import bifocal_command as main
 from tests.recalculate import recalculated, rows_of
 from tests.scenes.refracted import seen_at
 from tests.workbook_lint import lint

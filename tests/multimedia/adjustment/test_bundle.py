@@ -12,13 +12,21 @@ from scipy.spatial.distance import pdist
 from scipy.spatial.transform import Rotation
 from scipy.stats import norm
 
-from multimedia import Camera, Layers
-from multimedia.adjustment.bundle import bundle_adjust, prepare
-from multimedia.adjustment.unknowns import ScaleBar, Unknowns
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.projection import project
-from multimedia.projects.model import ImagePoints, ObjectPoints, Project
-from photocore.errors import GeometryError, InputError
+from multimedia import (
+    Camera,
+    FlatInterface,
+    GeometryError,
+    ImagePoints,
+    InputError,
+    Layers,
+    ObjectPoints,
+    Project,
+    ScaleBar,
+    Unknowns,
+    bundle_adjust,
+    project,
+)
+from multimedia.adjustment.bundle import prepare
 
 INDICES = (1.0, 1.49, 1.3365)
 GLASS = 8.0

@@ -11,9 +11,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from multimedia import read_project, write_project
-from multimedia.cli.main import main
-from photocore.errors import InputError
+from multimedia import InputError, read_project, write_project
+from tests.builders.commands import multimedia_command as main
 from tests.web_page import Page
 
 

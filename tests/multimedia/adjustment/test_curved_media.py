@@ -11,15 +11,24 @@ from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from multimedia import Camera, Interfaces, Layers
-from multimedia.adjustment.bundle import bundle_adjust
-from multimedia.adjustment.unknowns import Unknowns
-from multimedia.cli.main import main
+from multimedia import (
+    Camera,
+    Cylinder,
+    GeometryError,
+    ImagePoints,
+    InputError,
+    Interfaces,
+    Layers,
+    ObjectPoints,
+    Project,
+    Sphere,
+    Unknowns,
+    bundle_adjust,
+    read_project,
+    write_project,
+)
 from multimedia.media.camera import EXTERIOR
-from multimedia.media.surfaces import Cylinder, Sphere
-from multimedia.projects.model import ImagePoints, ObjectPoints, Project
-from multimedia.projects.project_file import read_project, write_project
-from photocore.errors import GeometryError, InputError
+from tests.builders.commands import multimedia_command as main
 from tests.multimedia.curved_world import (
     image_of,
     through_dome,

@@ -7,12 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from multimedia import Layers
-from multimedia.adjustment.bundle import bundle_adjust
-from multimedia.adjustment.unknowns import Adjustment, Unknowns
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.projects.model import ImagePoints, Project
-from photocore.errors import GeometryError
+from multimedia import (
+    Adjustment,
+    FlatInterface,
+    GeometryError,
+    ImagePoints,
+    Layers,
+    Project,
+    Unknowns,
+    bundle_adjust,
+)
 from tests.multimedia.adjustment.test_bundle import (
     GLASS,
     INDICES,

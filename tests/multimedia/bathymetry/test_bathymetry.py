@@ -7,8 +7,8 @@ import pytest
 from scipy.sparse import csr_array
 
 import multimedia as mm
+from multimedia import GeometryError, InputError
 from multimedia.bathymetry import refraction_correction, visible_points
-from photocore.errors import GeometryError, InputError
 
 N = 1.34
 SURFACES = {

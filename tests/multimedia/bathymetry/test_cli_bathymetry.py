@@ -15,7 +15,7 @@ from click.testing import CliRunner
 from rasterio.errors import NotGeoreferencedWarning
 
 import multimedia as mm
-from multimedia.cli.main import main
+from tests.builders.commands import multimedia_command as main
 
 N = 1.34
 LEVEL = 102.5
@@ -302,8 +302,8 @@ def test_cameras_correct_a_cloud_in_all_three_coordinates(tmp_path: Path) -> Non
 
 
 def test_cameras_may_come_from_a_project_file(tmp_path: Path) -> None:
+    from multimedia import write_project
     from multimedia.bathymetry.survey_tables import read_camera_positions
-    from multimedia.projects.project_file import write_project
 
     cameras = tuple(
         mm.Camera.from_angles(centre, 0.0, 0.0, 0.0, principal_distance=35.0, name=f"c{k}")

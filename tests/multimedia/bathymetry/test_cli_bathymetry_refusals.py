@@ -189,7 +189,7 @@ def test_a_full_disk_leaves_the_old_model_as_it_was(
                "--overwrite"]  # fmt: skip
     script = f"""
         import resource, signal
-        from multimedia.cli.main import main
+        from tests.builders.commands import multimedia_command as main
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
         main({[str(word) for word in command]!r})

@@ -17,12 +17,9 @@ from affine import Affine
 from click.testing import CliRunner
 from scipy.optimize import minimize
 
-from multimedia import read_project
+from multimedia import GeometryError, Plane, WaveSurface, read_project
 from multimedia.bathymetry.correction_job import Outcome
-from multimedia.cli.main import main
-from multimedia.media.height_field import WaveSurface
-from multimedia.media.surfaces import Plane
-from photocore.errors import GeometryError
+from tests.builders.commands import multimedia_command as main
 
 INDEX = 1.34
 RNG = np.random.default_rng(12)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import multimedia as mm
+from multimedia import GeometryError, InputError
 from multimedia.bathymetry.waterlevel_workflow import fit_water_level
-from photocore.errors import GeometryError, InputError
 
 
 def tie_points(seed: int, *, surface: int, bottom: int, spread: float = 0.002, slope: float = 0.0):

@@ -12,20 +12,23 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from multimedia import read_project
-from multimedia.adjustment.bundle import bundle_adjust
-from multimedia.adjustment.unknowns import Unknowns
+from multimedia import (
+    Camera,
+    FlatInterface,
+    InputError,
+    Layers,
+    Project,
+    Sensor,
+    Unknowns,
+    bundle_adjust,
+    project,
+    read_project,
+)
 from multimedia.boards.board_points import PosedView, with_boards
-from multimedia.cli.main import main
-from multimedia.media.camera import Camera, Sensor
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.projection import project
 from multimedia.orientation.plate_poses import plate_pose
-from multimedia.projects.model import Project
 from multimedia.projects.photos import read_photo
-from multimedia.refraction.layers import Layers
 from photocore.camera.boards import BoardView, detect_board
-from photocore.errors import InputError
+from tests.builders.commands import multimedia_command as main
 from tests.multimedia.rendered_boards import Housing, chessboard, dots, drawn, photo, poses
 
 EYE = Housing(width=480, height=360, pitch=0.008, c=2.8, k1=-4e-3)

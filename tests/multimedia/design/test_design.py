@@ -11,20 +11,28 @@ import openpyxl
 import pytest
 from click.testing import CliRunner
 
-from multimedia import Camera, FlatInterface, Interfaces, Layers, intersect, project, write_project
-from multimedia.cli.main import main
-from multimedia.design import design_files
-from multimedia.design.accuracy import (
+from multimedia import (
+    Camera,
+    FlatInterface,
+    GeometryError,
+    InputError,
+    Interfaces,
+    Layers,
+    ObjectPoints,
+    Project,
+    Sphere,
     calibration_costs,
     compare_placements,
+    intersect,
     object_grid,
+    project,
     ring_of_cameras,
     study_setup,
+    write_project,
 )
+from multimedia.design import design_files
 from multimedia.design.design_files import write_design_plot
-from multimedia.media.surfaces import Sphere
-from multimedia.projects.model import ObjectPoints, Project
-from photocore.errors import GeometryError, InputError
+from tests.builders.commands import multimedia_command as main
 
 TANK = FlatInterface(layers=Layers(indices=(1.0, 1.5, 1.337), thicknesses=(0.01,)))
 POINTS = object_grid((0.3, 0.2), (0.02, 0.2), count=5)

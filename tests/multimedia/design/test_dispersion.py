@@ -6,15 +6,17 @@ import cv2
 import numpy as np
 import pytest
 
-from multimedia import FLOAT_GLASS, Layers, radial_shift
-from multimedia.design.dispersion import (
+from multimedia import (
+    FLOAT_GLASS,
+    InputError,
+    Layers,
     colour_positions,
     correct_dispersion,
     layers_per_colour,
+    radial_shift,
     seam_width,
     shift_per_colour,
 )
-from photocore.errors import InputError
 
 COLOURS = layers_per_colour(glass=FLOAT_GLASS, thickness=0.01)
 SCENE = {"z0": 0.5, "zp": 0.4}

@@ -14,13 +14,20 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, least_squares
 
-from multimedia import Layers
-from multimedia.design.accuracy import object_grid, study_setup
-from multimedia.design.dispersion import correct_dispersion, seam_width
-from multimedia.design.simplified_models import Approximation, agrafiotis, lavest, telem
+from multimedia import (
+    Approximation,
+    Camera,
+    FlatInterface,
+    Layers,
+    agrafiotis,
+    correct_dispersion,
+    lavest,
+    object_grid,
+    seam_width,
+    study_setup,
+    telem,
+)
 from multimedia.design.workflow import design_ring
-from multimedia.media.camera import Camera
-from multimedia.media.flat_interface import FlatInterface
 from tests.multimedia.mp_camera import apparent_radius
 
 INDICES, GLASS, Z0, C = (1.0, 1.5, 1.337), 0.01, 0.5, 24.0

@@ -10,12 +10,11 @@ import pytest
 from click.testing import CliRunner
 from scipy.optimize import least_squares, root
 
-from multimedia import Camera, FlatInterface, Interfaces, Layers
-from multimedia.cli.main import main
+from multimedia import Camera, FlatInterface, InputError, Interfaces, Layers, Placement
 from multimedia.design import planarity
 from multimedia.design.planarity import SAG, SLOPE, WEDGE, planarity_study
-from multimedia.design.studies import Placement, best_placement
-from photocore.errors import InputError
+from multimedia.design.studies import best_placement
+from tests.builders.commands import multimedia_command as main
 
 C, N, GLASS = 24.0, (1.0, 1.5, 1.337), 0.01
 TANK = FlatInterface(layers=Layers(indices=N, thicknesses=(GLASS,)))

@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from multimedia import Layers, radial_shift
-from multimedia.design.simplified_models import agrafiotis, lavest, telem
-from photocore.errors import InputError
+from multimedia import InputError, Layers, agrafiotis, lavest, radial_shift, telem
 
 PORT = Layers(indices=(1.0, 1.49, 1.34), thicknesses=(0.008,))
 SEA = Layers(indices=(1.0, 1.34))

@@ -13,17 +13,26 @@ import pytest
 from click.testing import CliRunner
 from scipy.optimize import brentq
 
-from multimedia import convert, read_project, write_project
-from multimedia.cli.main import main
-from multimedia.media.camera import Camera, Sensor
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.interfaces import Interfaces
-from multimedia.media.projection import project
-from multimedia.media.surfaces import Plane, Sphere
-from multimedia.projects.model import ImagePoints, ObjectPoints, Project
-from multimedia.refraction.layers import Layers
-from photocore.camera.distortion import Brown, Convention
-from photocore.errors import InputError
+from multimedia import (
+    Camera,
+    Convention,
+    FlatInterface,
+    ImagePoints,
+    InputError,
+    Interfaces,
+    Layers,
+    ObjectPoints,
+    Plane,
+    Project,
+    Sensor,
+    Sphere,
+    convert,
+    project,
+    read_project,
+    write_project,
+)
+from photocore.camera.distortion import Brown
+from tests.builders.commands import multimedia_command as main
 
 SENSOR = Sensor(width=1936, height=1216, pitch=np.array([0.00345, 0.00346]))
 RNG = np.random.default_rng(31)

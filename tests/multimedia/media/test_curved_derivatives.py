@@ -10,12 +10,21 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from multimedia import Camera, Interfaces, Layers, epipolar_curve, intersect, project
+from multimedia import (
+    Camera,
+    Cylinder,
+    InputError,
+    Interfaces,
+    Layers,
+    Plane,
+    Sphere,
+    epipolar_curve,
+    intersect,
+    intersect_rays,
+    project,
+)
 from multimedia.media.camera import EXTERIOR
 from multimedia.media.projection import project_with_jacobian
-from multimedia.media.surfaces import Cylinder, Plane, Sphere
-from multimedia.orientation.intersection import intersect_rays
-from photocore.errors import InputError
 from tests.multimedia.curved_world import (
     image_of,
     through_dome,

@@ -11,22 +11,32 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from multimedia import convert, read_project, write_project
-from multimedia.adjustment.bundle import bundle_adjust
-from multimedia.adjustment.unknowns import Unknowns
-from multimedia.cli.main import main
-from multimedia.media.camera import EXTERIOR, Camera, Sensor
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.projection import project, project_with_jacobian, projection_status
-from multimedia.openptv.experiment import write_experiment
-from multimedia.orientation.intersection import intersect
-from multimedia.orientation.object_rays import image_rays
-from multimedia.orientation.resection import resect
-from multimedia.projects.model import ImagePoints, ObjectPoints, Project
-from multimedia.refraction.layers import Layers
+from multimedia import (
+    Camera,
+    FlatInterface,
+    ImagePoints,
+    InputError,
+    Layers,
+    ObjectPoints,
+    Project,
+    Sensor,
+    Unknowns,
+    bundle_adjust,
+    convert,
+    image_rays,
+    intersect,
+    project,
+    projection_status,
+    read_project,
+    resect,
+    write_experiment,
+    write_project,
+)
+from multimedia.media.camera import EXTERIOR
+from multimedia.media.projection import project_with_jacobian
 from photocore.camera.distortion import Brown
 from photocore.camera.fisheye import Fisheye
-from photocore.errors import InputError
+from tests.builders.commands import multimedia_command as main
 from tests.rounding import EPS
 
 mp.mp.dps = 40

@@ -6,16 +6,23 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from multimedia.media.camera import EXTERIOR, INTERIOR, Camera
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.interfaces import Interfaces
-from multimedia.media.projection import project, project_with_jacobian, projection_status
-from multimedia.media.surfaces import Sphere
-from multimedia.refraction.layers import Layers
-from multimedia.refraction.shifting import radial_shift
-from photocore.camera.distortion import NAMES, Brown, Convention
+from multimedia import (
+    Camera,
+    Convention,
+    FlatInterface,
+    GeometryError,
+    InputError,
+    Interfaces,
+    Layers,
+    Sphere,
+    project,
+    projection_status,
+    radial_shift,
+)
+from multimedia.media.camera import EXTERIOR, INTERIOR
+from multimedia.media.projection import project_with_jacobian
+from photocore.camera.distortion import NAMES, Brown
 from photocore.camera.rotation import rotation_vector_from_angle_rates
-from photocore.errors import GeometryError, InputError
 from tests.multimedia.mp_camera import derivative, image
 from tests.rounding import EPS
 

@@ -13,7 +13,7 @@ from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
 import multimedia as mm
-from photocore.errors import GeometryError, InputError
+from multimedia import GeometryError, InputError
 from tests.rounding import EPS
 
 WATER = 1.337

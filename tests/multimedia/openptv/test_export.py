@@ -9,16 +9,23 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from multimedia.cli.main import main
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.projection import project
-from multimedia.openptv.experiment import read_experiment, write_experiment
-from multimedia.orientation.intersection import intersect
-from multimedia.projects.model import ImagePoints, ObjectPoints, Project
-from multimedia.projects.project_file import read_project, write_project
-from multimedia.refraction.layers import Layers
-from photocore.camera.distortion import Brown, Convention
-from photocore.errors import InputError
+from multimedia import (
+    Convention,
+    FlatInterface,
+    ImagePoints,
+    InputError,
+    Layers,
+    ObjectPoints,
+    Project,
+    intersect,
+    project,
+    read_experiment,
+    read_project,
+    write_experiment,
+    write_project,
+)
+from photocore.camera.distortion import Brown
+from tests.builders.commands import multimedia_command as main
 from tests.multimedia.tank import SENSOR, cameras, control
 
 HALF = np.array([SENSOR.width, SENSOR.height]) / 2

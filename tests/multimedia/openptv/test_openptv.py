@@ -11,10 +11,22 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from multimedia.cli.main import main
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.projection import project
-from multimedia.openptv.experiment import particle_points, read_experiment, write_experiment
+from multimedia import (
+    Convention,
+    FlatInterface,
+    GeometryError,
+    ImagePoints,
+    InputError,
+    ObjectPoints,
+    Project,
+    intersect,
+    intersect_pairs,
+    project,
+    read_experiment,
+    resect,
+    write_experiment,
+)
+from multimedia.openptv.experiment import particle_points
 from multimedia.openptv.openptv_files import (
     glass_interface,
     read_camera,
@@ -23,11 +35,8 @@ from multimedia.openptv.openptv_files import (
     read_targets,
 )
 from multimedia.openptv.workflow import import_openptv
-from multimedia.orientation.intersection import intersect, intersect_pairs
-from multimedia.orientation.resection import resect
-from multimedia.projects.model import ImagePoints, ObjectPoints, Project
-from photocore.camera.distortion import Brown, Convention
-from photocore.errors import GeometryError, InputError
+from photocore.camera.distortion import Brown
+from tests.builders.commands import multimedia_command as main
 from tests.multimedia.tank import LAYERS, SENSOR, cameras, control
 
 CALIBRATION = ("c", "xh", "yh", "k1", "p1", "p2", "scale")

@@ -11,18 +11,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from multimedia import correspondences, write_project
-from multimedia.cli.main import main
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.projection import project
+from multimedia import FlatInterface, InputError, Project, correspondences, project, write_project
 from multimedia.openptv.openptv_files import (
     glass_interface,
     read_camera,
     read_control,
     read_correspondences,
 )
-from multimedia.projects.model import Project
-from photocore.errors import InputError
+from tests.builders.commands import multimedia_command as main
 from tests.multimedia.tank import LAYERS, SENSOR, cameras
 
 WALL = FlatInterface(layers=LAYERS)

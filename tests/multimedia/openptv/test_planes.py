@@ -10,16 +10,19 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from multimedia.cli.main import main
-from multimedia.media.camera import Camera
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.projection import project
-from multimedia.openptv.experiment import write_experiment
+from multimedia import (
+    Camera,
+    Convention,
+    FlatInterface,
+    Layers,
+    Project,
+    project,
+    read_project,
+    write_experiment,
+)
 from multimedia.openptv.workflow import import_openptv
-from multimedia.projects.model import Project
-from multimedia.projects.project_file import read_project
-from multimedia.refraction.layers import Layers
-from photocore.camera.distortion import Brown, Convention
+from photocore.camera.distortion import Brown
+from tests.builders.commands import multimedia_command as main
 from tests.multimedia.tank import SENSOR
 
 NOISE = 0.3  # px

@@ -9,12 +9,20 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from multimedia import bundle_adjust, intersect, project, read_project, write_project
-from multimedia.adjustment.unknowns import Unknowns
-from multimedia.cli.main import main
-from multimedia.media.flat_interface import FlatInterface
+from multimedia import (
+    FlatInterface,
+    ImagePoints,
+    ObjectPoints,
+    Project,
+    Unknowns,
+    bundle_adjust,
+    intersect,
+    project,
+    read_project,
+    write_project,
+)
 from multimedia.orientation.calibration_covariance import KEY, with_calibration
-from multimedia.projects.model import ImagePoints, ObjectPoints, Project
+from tests.builders.commands import multimedia_command as main
 from tests.multimedia.tank import LAYERS, cameras, control, images
 
 NOISE = 0.003

@@ -12,12 +12,17 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from multimedia import (
+    FlatInterface,
+    ImagePoints,
+    InputError,
+    ObjectPoints,
+    Project,
+    read_project,
+    write_project,
+)
 from multimedia.cli.main import SUMMARIES, main
-from multimedia.media.flat_interface import FlatInterface
 from multimedia.orientation.workflow import intersect_project
-from multimedia.projects.model import ImagePoints, ObjectPoints, Project
-from multimedia.projects.project_file import read_project, write_project
-from photocore.errors import InputError
 from tests.multimedia.tank import LAYERS, cameras, control, images
 
 COMMANDS = ("project", "intersect", "resect", "epipolar", "openptv")
@@ -159,7 +164,7 @@ def test_openptv_goes_there_and_back(tmp_path):
     ]  # fmt: skip
     wall = FlatInterface(layers=LAYERS, point=(0, 0, 100))
     body = ObjectPoints(ids=tuple(map(str, range(1, 31))), xyz=POINTS + np.array([0, 0, 100.0]))
-    from multimedia.media.projection import project
+    from multimedia import project
 
     image = np.concatenate([project(c, body.xyz, wall) for c in views])
     write_project(

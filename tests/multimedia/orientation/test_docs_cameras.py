@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from multimedia.cli.main import main
+from tests.builders.commands import multimedia_command as main
 
 PAGE = Path(__file__).parents[3] / "docs" / "underwater-cameras.md"
 TEXT = PAGE.read_text(encoding="utf-8")

@@ -7,10 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from multimedia.media.projection import project
-from multimedia.orientation.epipolar_curves import epipolar_candidates, epipolar_curve
-from multimedia.orientation.object_rays import image_rays
-from photocore.errors import InputError
+from multimedia import InputError, epipolar_candidates, epipolar_curve, image_rays, project
 from tests.multimedia.tank import LAYERS, cameras, control, images
 
 VIEWS = cameras()

@@ -8,13 +8,18 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from multimedia.media.interfaces import Interfaces
-from multimedia.media.projection import project
-from multimedia.media.surfaces import Plane, Sphere
-from multimedia.orientation.intersection import intersect, intersect_pairs, intersect_rays
-from multimedia.orientation.object_rays import image_rays
-from multimedia.orientation.point_status import PointStatus
-from photocore.errors import InputError
+from multimedia import (
+    InputError,
+    Interfaces,
+    Plane,
+    PointStatus,
+    Sphere,
+    image_rays,
+    intersect,
+    intersect_pairs,
+    intersect_rays,
+    project,
+)
 from tests.multimedia.tank import LAYERS, cameras, control, images
 
 VIEWS = cameras()

@@ -10,17 +10,22 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from multimedia.media.camera import EXTERIOR, INTERIOR, Camera
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.interfaces import Interfaces
-from multimedia.media.projection import project
-from multimedia.media.surfaces import Sphere
+from multimedia import (
+    Camera,
+    ConvergenceError,
+    FlatInterface,
+    GeometryError,
+    InputError,
+    Interfaces,
+    Layers,
+    Sphere,
+    project,
+    resect,
+)
+from multimedia.media.camera import EXTERIOR, INTERIOR
 from multimedia.orientation import pose_starts
-from multimedia.orientation.resection import resect
-from multimedia.refraction.layers import Layers
 from photocore.camera.distortion import Brown
 from photocore.camera.rotation import rotation_from_vector, world_from_camera
-from photocore.errors import ConvergenceError, GeometryError, InputError
 from tests.multimedia.tank import LAYERS, cameras, control, images
 
 CALIBRATION = ("c", "xh", "yh", "k1", "p1", "p2", "scale")

@@ -8,11 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
-from multimedia.media.camera import Camera
-from multimedia.media.projection import project
-from multimedia.projects.project_file import read_project
+from multimedia import Camera, GeometryError, InputError, project, read_project
 from photocore.camera.rotation import quaternion_from_rotation, rotation_from_quaternion
-from photocore.errors import GeometryError, InputError
 
 CENTRE, RVEC = np.array([0.3, -0.2, 1.1]), np.array([2.9, 0.4, -0.3])
 POINTS = np.array([[0.1, 0.05, -0.2], [-0.1, 0.2, 0.1], [0.3, 0.0, 0.0], [0.0, -0.1, -0.3]])

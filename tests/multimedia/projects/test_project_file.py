@@ -8,17 +8,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.interfaces import Interfaces
-from multimedia.media.surfaces import Cylinder, Plane, Sphere
-from multimedia.projects.model import ImagePoints, ObjectPoints, Project
+from multimedia import (
+    Cylinder,
+    FlatInterface,
+    GeometryError,
+    ImagePoints,
+    InputError,
+    Interfaces,
+    ObjectPoints,
+    Plane,
+    Project,
+    Sphere,
+    read_project,
+    write_project,
+)
 from multimedia.projects.point_tables import (
     read_image_points,
     read_object_points,
     write_columns,
 )
-from multimedia.projects.project_file import read_project, write_project
-from photocore.errors import GeometryError, InputError
 from tests.multimedia.tank import LAYERS, cameras, control, images
 from tests.rounding import EPS
 

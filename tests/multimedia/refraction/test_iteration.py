@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from multimedia.refraction.iteration import best_over_compensation, iterated_radius
+from multimedia import InputError, best_over_compensation, iterated_radius
 from multimedia.refraction.shift import shift_derivatives, shifted_radius
-from photocore.errors import InputError
 
 INDICES = (1.0, 1.5, 1.34)
 

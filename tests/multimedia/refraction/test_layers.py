@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from multimedia import Interfaces, Layers, correct_bathymetry
-from photocore.errors import GeometryError, InputError
+from multimedia import GeometryError, InputError, Interfaces, Layers, correct_bathymetry
 
 
 def test_two_media_need_no_thickness() -> None:

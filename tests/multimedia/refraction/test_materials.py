@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import pytest
 
-from multimedia.refraction.materials import (
+from multimedia import (
     ACRYLIC,
     FLOAT_GLASS,
     FUSED_SILICA,
-    MATERIALS,
     N_BK7,
     POLYCARBONATE,
     SAPPHIRE,
+    InputError,
     Material,
     air_refractive_index,
 )
-from photocore.errors import InputError
+from multimedia.refraction.materials import MATERIALS
 
 
 @pytest.mark.parametrize(

@@ -12,9 +12,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from multimedia import Layers, radial_shift, radial_shift_derivatives, radial_shift_ratio
+from multimedia import (
+    GeometryError,
+    InputError,
+    Layers,
+    radial_shift,
+    radial_shift_derivatives,
+    radial_shift_ratio,
+)
 from multimedia.refraction.shift import shift_derivatives, shift_ratio, shifted_radius
-from photocore.errors import GeometryError, InputError
 from tests.rounding import EPS
 
 GOLDEN = json.loads(

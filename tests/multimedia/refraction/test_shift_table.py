@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from multimedia import Layers, ShiftTable, radial_shift
-from photocore.errors import GeometryError, InputError
+from multimedia import GeometryError, InputError, Layers, ShiftTable, radial_shift
 from tests.rounding import EPS
 
 TANK = Layers(indices=(1.0, 1.5, 1.34), thicknesses=(10.0,))

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 import multimedia as mm
-from multimedia.refraction.iteration import best_over_compensation, iterated_radius
+from multimedia import GeometryError, InputError, best_over_compensation, iterated_radius
 from multimedia.refraction.shift import axis_ratio, shift_derivatives, shift_ratio, shifted_radius
 from multimedia.refraction.unrolled import unrolled_shift
-from photocore.errors import GeometryError, InputError
 
 NAN = np.nan
 TANK = mm.Layers(indices=(1.0, 1.5, 1.34), thicknesses=(0.01,))

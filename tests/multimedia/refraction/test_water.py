@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from multimedia.refraction.water import (
+from multimedia import (
     HOEHLE,
     PARRISH,
     QUAN_FRY,
-    WATER_FORMULAS,
+    InputError,
     WaterFormula,
     salinity_from_index,
     temperature_from_index,
@@ -17,7 +17,7 @@ from multimedia.refraction.water import (
     water_index_sigma,
     water_refractive_index,
 )
-from photocore.errors import InputError
+from multimedia.refraction.water import WATER_FORMULAS
 
 ALL = pytest.mark.parametrize("formula", WATER_FORMULAS.values(), ids=lambda f: f.name)
 SEA = {"wavelength_nm": 550.0, "temperature_c": 18.0, "salinity_percent": 3.5, "depth": 4.0}

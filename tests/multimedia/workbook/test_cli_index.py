@@ -7,7 +7,7 @@ import json
 import pytest
 from click.testing import CliRunner, Result
 
-from multimedia.cli.main import main
+from tests.builders.commands import multimedia_command as main
 
 
 def run(*arguments: str) -> Result:

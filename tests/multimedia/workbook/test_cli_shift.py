@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from multimedia import Layers, radial_shift
-from multimedia.cli.main import main
 from photocore.workbook.changing.editor import WorkbookEditor
+from tests.builders.commands import multimedia_command as main
 from tests.rounding import EPS
 
 TANK = ("--indices", "1,1.5,1.34", "--thicknesses", "0.01", "--camera", "0.2,0.1,0.51")

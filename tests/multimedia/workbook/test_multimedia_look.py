@@ -8,8 +8,8 @@ import openpyxl
 import pytest
 from click.testing import CliRunner
 
-from multimedia.cli.main import main
 from tests.bifocal.workbook.test_workbook_look import dimension, inputs
+from tests.builders.commands import multimedia_command as main
 from tests.workbook_lint import lint
 from tests.workbook_page import sizes_of
 

@@ -13,8 +13,8 @@ from openpyxl.chart import ScatterChart
 from openpyxl.workbook.defined_name import DefinedName
 
 from multimedia import Layers, radial_shift
-from multimedia.cli.main import main
 from tests import office
+from tests.builders.commands import multimedia_command as main
 from tests.rounding import EPS
 
 MEDIA = ("--indices", "1,1.5,1.34", "--thicknesses", "0.01", "--camera", "0,0,0.51")
@@ -244,7 +244,7 @@ def test_an_option_takes_the_place_of_a_formula_that_was_never_calculated(tmp_pa
 
 
 def test_a_bifocal_survey_is_refused_in_one_line(tmp_path: Path) -> None:
-    from bifocal.cli.main import main as bifocal
+    from tests.builders.commands import bifocal_command as bifocal
 
     path = tmp_path / "survey.xlsx"
     assert CliRunner().invoke(bifocal, ["template", str(path)]).exit_code == 0

@@ -9,12 +9,11 @@ import numpy as np
 import openpyxl
 import pytest
 
-from multimedia import QUAN_FRY, Layers, radial_shift, water_refractive_index
+from multimedia import QUAN_FRY, InputError, Layers, radial_shift, water_refractive_index
 from multimedia.refraction.unrolled import unrolled_shift
 from multimedia.workbook.shift_points import ShiftPoints, ShiftSetup
 from multimedia.workbook.shift_workbook import write_shift_workbook
 from multimedia.workbook.workflow import write_template
-from photocore.errors import InputError
 from tests import office
 from tests.workbook_lint import lint
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from photocore.camera.distortion import NAMES, Brown, Convention, RadialDivision
-from photocore.errors import InputError
+from bifocal import InputError, RadialDivision
+from multimedia import Convention
+from photocore.camera.distortion import NAMES, Brown
 from tests.rounding import EPS
 
 LENS = dict(k1=1e-4, k2=-2e-7, k3=1e-10, p1=3e-5, p2=-2e-5, scale=1.002, shear=0.001)

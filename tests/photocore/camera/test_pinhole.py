@@ -6,10 +6,9 @@ import pytest
 from scipy.linalg import rq
 
 import multimedia.media.projection
-from bifocal import Pair, Photo
+from bifocal import Pair, Photo, Pinhole
 from photocore.camera.pinhole import (
     PARAMETERS,
-    Pinhole,
     camera_matrix,
     cameras_seeing,
     central,

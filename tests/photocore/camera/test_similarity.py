@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from bifocal import GeometryError, InputError
 from photocore.camera.similarity import fit_levelled, fit_plane, fit_similarity
-from photocore.errors import GeometryError, InputError
 
 WALL = np.array([[0, 0, 0], [6, 0, 0.1], [6, 4, -0.3], [0, 4, 0.4], [3, 2, 1.0]], dtype=float)
 UTM = np.array([351234.567, 4123456.789, 33.21])

@@ -9,9 +9,9 @@ import laspy
 import numpy as np
 import pytest
 
+from bifocal import InputError
 from photocore.cloud import open_cloud, write_cloud
 from photocore.cloud.ply import read_ply_mesh
-from photocore.errors import InputError
 
 POINTS = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
 FACES = "element face 1\nproperty list uchar int vertex_indices\n"

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from photocore.errors import PhotogrammetryError
+from bifocal import PhotogrammetryError
 from photocore.tables import Column, csvread, read_table, write_csv
 
 pytest.importorskip("pyarrow")

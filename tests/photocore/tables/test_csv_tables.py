@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from photocore.errors import InputError, WorkbookError
+from bifocal import InputError, WorkbookError
 from photocore.tables import Column, read_named_values, read_table, write_csv
 
 COLUMNS = (

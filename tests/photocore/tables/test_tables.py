@@ -8,7 +8,7 @@ import numpy as np
 import openpyxl
 import pytest
 
-from photocore.errors import InputError, WorkbookError
+from bifocal import InputError, WorkbookError
 from photocore.tables import Column, open_tables, parse_column_map, read_named_values, read_table
 
 POLAR = (

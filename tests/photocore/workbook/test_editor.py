@@ -9,7 +9,7 @@ from pathlib import Path
 import openpyxl
 import pytest
 
-from photocore.errors import InputError
+from bifocal import InputError
 from photocore.tables import Column, read_table
 from photocore.workbook.changing.changes import SheetChanges
 from photocore.workbook.changing.editor import WorkbookEditor

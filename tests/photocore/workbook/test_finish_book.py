@@ -7,7 +7,7 @@ import io
 import openpyxl
 import pytest
 
-from photocore.errors import InputError
+from bifocal import InputError
 from photocore.workbook.making.newbook import RowBlock, finish_book
 
 

@@ -6,7 +6,7 @@ import zipfile
 
 import pytest
 
-from photocore.errors import InputError
+from bifocal import InputError
 from photocore.workbook.changing.changes import replaced_outside_cells
 from photocore.workbook.changing.editor import WorkbookEditor
 from photocore.workbook.changing.result_columns import head_row

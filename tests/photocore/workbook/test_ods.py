@@ -6,7 +6,7 @@ import zipfile
 import openpyxl
 import pytest
 
-from photocore.errors import WorkbookError
+from bifocal import WorkbookError
 from photocore.tables import Column, read_named_values, read_table
 from tests import office
 

@@ -7,11 +7,11 @@ import openpyxl
 import pytest
 from click.testing import CliRunner
 
-from bifocal.cli.main import main as bifocal
-from multimedia.cli.main import main as multimedia
-from photocore.errors import InputError
+from bifocal import InputError
 from photocore.workbook.reading.package import rewrite_package
 from photocore.workbook.reading.xlsx import open_xlsx
+from tests.builders.commands import bifocal_command as bifocal
+from tests.builders.commands import multimedia_command as multimedia
 
 OFFICE = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
 PACKAGE = "http://schemas.openxmlformats.org/package/2006/relationships"

@@ -7,7 +7,7 @@ import zipfile
 
 import pytest
 
-from photocore.errors import InputError
+from bifocal import InputError
 from photocore.tables import Column, read_named_values, read_table
 from photocore.workbook.changing.editor import WorkbookEditor
 from photocore.workbook.reading import package
