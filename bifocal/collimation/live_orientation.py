@@ -14,12 +14,12 @@ from bifocal.model.interior_orientation import Interior
 from bifocal.model.orientation_precision import rates_of
 from bifocal.model.pair import Pair
 from bifocal.orientation.absolute_orientation import orient_pair
+from bifocal.orientation.adjustment.pair_observations import at
+from bifocal.orientation.adjustment.seen_points import on_the_plane, views_of
 from bifocal.orientation.align_workflow import SIGMA_ON_WALL, KnownLens, interior_of_photo
 from bifocal.orientation.alignment import standard_deviations
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
-from bifocal.orientation.pair_observations import at
-from bifocal.orientation.seen_points import on_the_plane, views_of
 from photocore.arrays import FloatArray
 from photocore.errors import PhotogrammetryError
 

@@ -39,7 +39,7 @@ def named_positions(
     control: Sequence[Path | None] = (),
     check: Sequence[Path | None] = (),
     sigma: float = 0.003,
-    unit: str = "m",
+    unit: str = "",
 ) -> NamedPositions:
     """Return the points of all tables, one of each for every pair or none, joined by name.
 

@@ -14,6 +14,7 @@ from bifocal.model.doubts import CERTAIN
 from bifocal.model.interior_orientation import with_one_lens
 from bifocal.model.pair_media import PairMedia
 from bifocal.orientation import validation
+from bifocal.orientation.adjustment.pair_observations import PairObservations, PairUnknowns
 from bifocal.orientation.approximate_orientation import (
     Given,
     approximate_cameras,
@@ -24,7 +25,6 @@ from bifocal.orientation.approximate_orientation import (
     ties_of,
 )
 from bifocal.orientation.as_set_up import check_room
-from bifocal.orientation.bend import WallBend, bend_of_wall
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.media_options import THROUGH_MEDIA
 from bifocal.orientation.media_report import media_remarks, refuse_impossible_media
@@ -47,15 +47,15 @@ from bifocal.orientation.orientation_stages import (
     lines_tested,
     oriented_in_stages,
 )
-from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
-from bifocal.orientation.photo_order import SURE
-from bifocal.orientation.refracted_bend import refracted_bend
-from bifocal.orientation.refracted_resection import resect_through
 from bifocal.orientation.refracted_stage import with_bent_ties
-from bifocal.orientation.relative_orientation import Ties
 from bifocal.orientation.slips import MOST, Fitted, Typed, slip_of
+from bifocal.orientation.starts.photo_order import SURE
+from bifocal.orientation.starts.refracted_resection import resect_through
+from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.tie_points import likely_on_wall, tie_positions
 from bifocal.orientation.tuning import TUNING
+from bifocal.orientation.walls.bend import WallBend, bend_of_wall
+from bifocal.orientation.walls.refracted_bend import refracted_bend
 from bifocal.remarks import remark
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.errors import ConvergenceError, GeometryError, PhotogrammetryError, located

@@ -17,16 +17,16 @@ from bifocal.model.orientation_precision import CAMERA, NAMES, moved
 from bifocal.model.pair import Pair
 from bifocal.model.pair_media import PairMedia
 from bifocal.model.photo import Photo
+from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
+from bifocal.orientation.adjustment.pair_observations import PairObservations, at
 from bifocal.orientation.facade_lines import LEAST_IN_LINE, facade_turn
 from bifocal.orientation.media_report import media_in_words
 from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput, Photos
-from bifocal.orientation.pair_adjustment import AdjustedPair
-from bifocal.orientation.pair_observations import PairObservations, at
-from bifocal.orientation.reference_plane import zero_sigma
 from bifocal.orientation.tie_points import (
     tie_positions,
 )
+from bifocal.orientation.walls.reference_plane import zero_sigma
 from bifocal.remarks import remark
 from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import BoolArray, FloatArray

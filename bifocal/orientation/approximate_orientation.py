@@ -10,18 +10,18 @@ from bifocal.matching.features import find_features
 from bifocal.model.interior_orientation import Cameras, Interiors
 from bifocal.model.pair_media import PairMedia
 from bifocal.orientation import validation
+from bifocal.orientation.adjustment.pair_observations import PairObservations
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import SIGMA_PARALLEL, Photos
-from bifocal.orientation.pair_observations import PairObservations
-from bifocal.orientation.photo_order import first_is_far
-from bifocal.orientation.relative_orientation import (
+from bifocal.orientation.starts.photo_order import first_is_far
+from bifocal.orientation.starts.relative_orientation import (
     Ties,
     epipolar_distance,
     find_ties,
     first_cameras,
     plane_scale,
 )
-from bifocal.orientation.space_resection import resect
+from bifocal.orientation.starts.space_resection import resect
 from bifocal.remarks import remark
 from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import BoolArray

@@ -11,8 +11,8 @@ import numpy as np
 
 from bifocal import rays
 from bifocal.model.interior_orientation import Images
-from bifocal.orientation.pair_adjustment import AdjustedPair
-from bifocal.orientation.pair_observations import PairObservations
+from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
+from bifocal.orientation.adjustment.pair_observations import PairObservations
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.camera.pinhole import project, ray_on_plane
 

@@ -7,10 +7,10 @@ import numpy as np
 from bifocal.model.interior_orientation import Cameras
 from bifocal.model.orientation_precision import NAMES
 from bifocal.model.pair_media import PairMedia
+from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
+from bifocal.orientation.adjustment.pair_observations import PairObservations, at
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair, Photos
-from bifocal.orientation.pair_adjustment import AdjustedPair
-from bifocal.orientation.pair_observations import PairObservations, at
 from photocore.arrays import FloatArray
 from photocore.camera.pinhole import Pinhole
 from photocore.errors import InputError

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from bifocal.orientation.adjustment.pair_observations import PairObservations
 from bifocal.orientation.alignment import standard_deviations, wall_relief
-from bifocal.orientation.bend import WallBend, bend_in_words
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair
-from bifocal.orientation.pair_observations import PairObservations
-from bifocal.orientation.photo_order import SURE
+from bifocal.orientation.starts.photo_order import SURE
 from bifocal.orientation.tuning import TUNING
+from bifocal.orientation.walls.bend import WallBend, bend_in_words
 from bifocal.remarks import remark
 
 #: Common points that fit their lines no better than this, at 3000 px of width, do not fit. Clean

@@ -13,12 +13,15 @@ import numpy as np
 from bifocal.model.interior_orientation import SIGMA_RADIAL, Cameras, Images, Interior
 from bifocal.model.orientation_precision import NAMES
 from bifocal.orientation import facade_lines, validation
+from bifocal.orientation.adjustment.pair_adjustment import (
+    AdjustedPair,
+    adjust,
+    evaluated,
+    line_test,
+)
+from bifocal.orientation.adjustment.pair_observations import PairObservations, PairUnknowns, at
 from bifocal.orientation.area_points import even_points
-from bifocal.orientation.bend import WallBend
 from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orientation.pair_adjustment import AdjustedPair, adjust, evaluated, line_test
-from bifocal.orientation.pair_observations import PairObservations, PairUnknowns, at
-from bifocal.orientation.reference_plane import Face, choose_wall, onto_plane, rivals_in_words
 from bifocal.orientation.tie_points import (
     refine_ties,
     tie_positions,
@@ -29,7 +32,9 @@ from bifocal.orientation.tie_points import (
     without_gross_ties,
 )
 from bifocal.orientation.tuning import TUNING
-from bifocal.orientation.wall_planes import (
+from bifocal.orientation.walls.bend import WallBend
+from bifocal.orientation.walls.reference_plane import Face, choose_wall, onto_plane, rivals_in_words
+from bifocal.orientation.walls.wall_planes import (
     likely_wall,
     planes_of_any_direction,
     steep_rivals_in_words,

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from bifocal.orientation.adjustment.pair_adjustment import adjust, evaluated
 from bifocal.orientation.orientation_stages import OrientedPair
-from bifocal.orientation.pair_adjustment import adjust, evaluated
-from bifocal.orientation.relative_orientation import Ties
+from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.tie_points import (
     tie_positions,
     without_gross_ties,

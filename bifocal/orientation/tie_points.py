@@ -9,12 +9,12 @@ import numpy as np
 from bifocal.matching.patches import refine, same_scale
 from bifocal.model.homography import apply_homography
 from bifocal.model.interior_orientation import Cameras, Images, Interiors
-from bifocal.orientation.pair_adjustment import AdjustedPair, wall_equations
-from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
-from bifocal.orientation.reference_plane import NarrowFace, narrow_face
-from bifocal.orientation.relative_orientation import supported
-from bifocal.orientation.seen_points import meeting_points
+from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair, wall_equations
+from bifocal.orientation.adjustment.pair_observations import PairObservations, PairUnknowns
+from bifocal.orientation.adjustment.seen_points import meeting_points
+from bifocal.orientation.starts.relative_orientation import supported
 from bifocal.orientation.tuning import TUNING
+from bifocal.orientation.walls.reference_plane import NarrowFace, narrow_face
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import (

@@ -9,9 +9,9 @@ from bifocal.matching.features import sharpness
 from bifocal.model.homography import apply_homography
 from bifocal.model.interior_orientation import Cameras, Images, Interior, Interiors
 from bifocal.model.photo import FARTHEST_WALL
+from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orientation.pair_adjustment import AdjustedPair
-from bifocal.orientation.relative_orientation import Ties, rotation_only
+from bifocal.orientation.starts.relative_orientation import Ties, rotation_only
 from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import GeometryError, InputError
 

@@ -31,10 +31,10 @@ from bifocal.media import interface_axes, view
 from bifocal.model.orientation_precision import NAMES, from_dict, names_of
 from bifocal.orientation import absolute_orientation
 from bifocal.orientation.absolute_orientation import orient_pair
-from bifocal.orientation.bend import WallBend, bend_in_words
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.refracted_stage import with_bent_ties
-from bifocal.orientation.relative_orientation import Ties
+from bifocal.orientation.starts.relative_orientation import Ties
+from bifocal.orientation.walls.bend import WallBend, bend_in_words
 from multimedia import Layers
 from photocore.camera.pinhole import camera_matrix, project
 from photocore.camera.rotation import rotation_from_vector

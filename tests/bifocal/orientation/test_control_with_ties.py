@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from bifocal import Control, Interior, Pinhole, SiteMeasures
+from bifocal.orientation.adjustment.pair_observations import PairObservations, PairUnknowns
 from bifocal.orientation.orientation_stages import (
     OrientedPair,
     PhotoInput,
     control_alone,
     oriented_in_stages,
 )
-from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
 from photocore.camera.pinhole import triangulate
 from tests.scenes import SetupErrors, bifocal_cameras
 

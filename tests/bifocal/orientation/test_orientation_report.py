@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
+from bifocal.orientation.adjustment.pair_observations import at
 from bifocal.orientation.alignment import standard_deviations
 from bifocal.orientation.orientation_report import orientation_in_words
-from bifocal.orientation.pair_adjustment import AdjustedPair
-from bifocal.orientation.pair_observations import at
 from tests.bifocal.orientation.layered_wall import camera
 
 SURE = {"distance1": 0.01, "distance2": 0.01, "scale": 1e-5, "relief_scale": 0.0}

@@ -7,13 +7,18 @@ import pytest
 
 from bifocal import Control, GeometryError, InputError, Interior, SiteMeasures
 from bifocal.orientation.absolute_orientation import orient_pair
+from bifocal.orientation.adjustment.pair_adjustment import adjust, line_test, pair_equations
+from bifocal.orientation.adjustment.pair_observations import (
+    NAMES,
+    PairObservations,
+    PairUnknowns,
+    at,
+)
 from bifocal.orientation.facade_lines import FacadeDirection, contradiction_in_words
 from bifocal.orientation.orientation_stages import PhotoInput
-from bifocal.orientation.pair_adjustment import adjust, line_test, pair_equations
-from bifocal.orientation.pair_observations import NAMES, PairObservations, PairUnknowns, at
-from bifocal.orientation.reference_plane import NarrowFace
-from bifocal.orientation.space_resection import resect
+from bifocal.orientation.starts.space_resection import resect
 from bifocal.orientation.tie_points import with_wall
+from bifocal.orientation.walls.reference_plane import NarrowFace
 from photocore.camera.pinhole import project
 from tests.bifocal.orientation.layered_wall import SIZE, camera
 

@@ -18,8 +18,8 @@ from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.align_workflow import AlignOptions, KnownLens, _way, align_photos
 from bifocal.orientation.approximate_orientation import Given, order_of
 from bifocal.orientation.orientation_stages import PhotoInput
-from bifocal.orientation.photo_order import SURE, first_is_far
-from bifocal.orientation.relative_orientation import Ties
+from bifocal.orientation.starts.photo_order import SURE, first_is_far
+from bifocal.orientation.starts.relative_orientation import Ties
 from photocore.camera.pinhole import plane_transfer, project
 from tests.bifocal.orientation.layered_wall import SIZE, camera, relief_at, take
 from tests.page_session import opened, sample_folder

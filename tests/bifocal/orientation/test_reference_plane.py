@@ -7,7 +7,7 @@ import pytest
 
 from bifocal import GeometryError, Interior, SiteMeasures
 from bifocal.orientation.orientation_report import orientation_in_words
-from bifocal.orientation.reference_plane import (
+from bifocal.orientation.walls.reference_plane import (
     Face,
     NarrowFace,
     choose_wall,

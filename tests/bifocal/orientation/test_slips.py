@@ -8,13 +8,13 @@ import pytest
 from bifocal import Control, GeometryError, Interior, SiteMeasures
 from bifocal.orientation import absolute_orientation
 from bifocal.orientation.absolute_orientation import _with_words, orient_pair
+from bifocal.orientation.adjustment.pair_observations import PairObservations
 from bifocal.orientation.alignment import make_alignment
 from bifocal.orientation.approximate_orientation import Given
-from bifocal.orientation.bend import WallBend
 from bifocal.orientation.orientation_remarks import hopeless_bend, model_remarks
 from bifocal.orientation.orientation_stages import PhotoInput
-from bifocal.orientation.pair_observations import PairObservations
 from bifocal.orientation.slips import slip_of
+from bifocal.orientation.walls.bend import WallBend
 from photocore.camera.pinhole import project
 from tests.bifocal.orientation.layered_wall import SIZE, camera
 from tests.bifocal.orientation.test_pair_adjustment import POINTS

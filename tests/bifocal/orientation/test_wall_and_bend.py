@@ -11,10 +11,10 @@ from bifocal.matching.features import Features, match_features
 from bifocal.orientation import absolute_orientation
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import make_alignment
-from bifocal.orientation.bend import WallBend, bend_in_words, bend_of_wall, wall_bend
 from bifocal.orientation.orientation_stages import PhotoInput
-from bifocal.orientation.reference_plane import narrow_face
-from bifocal.orientation.relative_orientation import Ties, supported
+from bifocal.orientation.starts.relative_orientation import Ties, supported
+from bifocal.orientation.walls.bend import WallBend, bend_in_words, bend_of_wall, wall_bend
+from bifocal.orientation.walls.reference_plane import narrow_face
 from tests.bifocal.orientation.layered_wall import SIZE as WALL_SIZE
 from tests.bifocal.orientation.layered_wall import camera as wall_camera
 from tests.bifocal.orientation.layered_wall import take

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bifocal import SiteMeasures
-from bifocal.orientation.wall_planes import (
+from bifocal.orientation.walls.wall_planes import (
     likely_wall,
     planes_of_any_direction,
     steep_rivals_in_words,

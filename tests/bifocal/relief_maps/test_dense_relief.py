@@ -10,7 +10,7 @@ import pytest
 
 from bifocal import Grid, Pair, Photo, Quality, dense_relief
 from bifocal.files.images import as_grey
-from bifocal.orientation.pair_observations import at
+from bifocal.orientation.adjustment.pair_observations import at
 from bifocal.relief_maps import edges, flow, forward_projection, seed
 from bifocal.relief_maps.dense_matching import _resampled
 from bifocal.relief_maps.forward_projection import MapBands

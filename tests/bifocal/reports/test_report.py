@@ -16,7 +16,7 @@ from click.testing import CliRunner
 
 from bifocal import SAMPLE, Grid
 from bifocal.files.geotiff import create_raster
-from bifocal.orientation.bend import WallBend, bend_in_words
+from bifocal.orientation.walls.bend import WallBend, bend_in_words
 from bifocal.remarks import in_language, remark
 from bifocal.reports.accuracy import accuracy_blocks
 from bifocal.reports.content import read_content

@@ -12,7 +12,7 @@ import numpy as np
 
 from bifocal.model.homography import apply_homography
 from bifocal.model.interior_orientation import Images
-from bifocal.orientation.relative_orientation import Ties
+from bifocal.orientation.starts.relative_orientation import Ties
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import homogeneous
 

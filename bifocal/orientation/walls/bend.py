@@ -13,8 +13,8 @@ import numpy as np
 
 from bifocal.model.doubts import MOST_BENT, bend_is_certain
 from bifocal.model.homography import apply_homography
-from bifocal.orientation.reference_plane import faces
 from bifocal.orientation.tuning import TUNING
+from bifocal.orientation.walls.reference_plane import faces
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
 

@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 
 from bifocal.model.homography import apply_homography
-from bifocal.orientation.bend import WallBend, bend_of_wall
-from bifocal.orientation.pair_adjustment import AdjustedPair
-from bifocal.orientation.pair_observations import PairUnknowns
-from bifocal.orientation.seen_points import meeting_points, on_the_plane, views_of
+from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
+from bifocal.orientation.adjustment.pair_observations import PairUnknowns
+from bifocal.orientation.adjustment.seen_points import meeting_points, on_the_plane, views_of
+from bifocal.orientation.walls.bend import WallBend, bend_of_wall
 from photocore.arrays import FloatArray
 from photocore.camera.pinhole import project
 
@@ -35,8 +35,8 @@ def refracted_bend(
     Returns
     -------
     WallBend
-        As of `bifocal.orientation.bend.bend_of_wall`; NaN too where it is no more than cameras and
-        media, as uncertain as they are, leave open. [px, at 3000 px of width]
+        As of `bend_of_wall`; NaN too where it is no more than cameras and media, as uncertain as
+        they are, leave open. [px, at 3000 px of width]
     """
     flat = straightened(adjusted, pixels1, pixels2)
     known = np.isfinite(np.concatenate(flat, axis=1)).all(axis=1)

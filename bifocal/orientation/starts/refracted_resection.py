@@ -9,7 +9,7 @@ import numpy as np
 from bifocal import rays
 from bifocal.model.interior_orientation import Interior
 from bifocal.model.pair_media import PairMedia
-from bifocal.orientation.space_resection import resect
+from bifocal.orientation.starts.space_resection import resect
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import Pinhole
 from photocore.errors import GeometryError
@@ -27,7 +27,7 @@ def resect_through(
     Parameters
     ----------
     xyz, pixels, interior
-        As of `bifocal.orientation.space_resection.resect`.
+        As of `bifocal.orientation.starts.space_resection.resect`.
     media : PairMedia
     number : int
         0 for the far camera, 1 for the near one.

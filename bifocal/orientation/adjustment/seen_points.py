@@ -7,7 +7,11 @@ import numpy as np
 from bifocal import rays
 from bifocal.media import PointViews, view
 from bifocal.model.pair_media import PairMedia
-from bifocal.orientation.pair_observations import Equations, PairObservations, PairUnknowns
+from bifocal.orientation.adjustment.pair_observations import (
+    Equations,
+    PairObservations,
+    PairUnknowns,
+)
 from photocore.arrays import FloatArray
 from photocore.camera.pinhole import ray_on_plane, triangulate
 

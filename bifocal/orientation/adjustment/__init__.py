@@ -1,0 +1,1 @@
+"""The pair adjusted: observations, what each point sees, unknowns, least squares."""
