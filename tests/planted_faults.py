@@ -148,7 +148,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     ),
     (
         "bifocal/model/grid.py",
-        "tests/bifocal/model tests/bifocal/files/test_geotiff.py",
+        "tests/bifocal/model",
         (
             (
                 "self.y0 - (self.height - 1) * self.gsd - half",
@@ -297,8 +297,8 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         (('relief = f"{points.xyz[i, 2]:+.3f}"', 'relief = f"{z:+.3f}"'),),
     ),
     (
-        "bifocal/files/geotiff.py",
-        "tests/bifocal/files/test_geotiff.py",
+        "bifocal/model/geotiff.py",
+        "tests/bifocal/model/test_geotiff.py",
         (("-grid.gsd, grid.x0, grid.y0)", "-grid.gsd, grid.bounds[0], grid.bounds[3])"),),
     ),
     (
