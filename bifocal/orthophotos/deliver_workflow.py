@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.files.geotiff import (
+from bifocal.files.strips import write_png
+from bifocal.media import media_words
+from bifocal.model.geotiff import (
     RELIEF_BANDS,
     RasterReader,
     create_raster,
     dpi_at_scale,
     gsd_at_scale,
 )
-from bifocal.files.strips import write_png
-from bifocal.media import media_words
 from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
 from bifocal.model.points import SurveyPoints

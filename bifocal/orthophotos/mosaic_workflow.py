@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.files.geotiff import RasterReader, check_relief, create_raster
+from bifocal.model.geotiff import RasterReader, check_relief, create_raster
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.surface import MapSurface
 from bifocal.orthophotos.compose import TILE

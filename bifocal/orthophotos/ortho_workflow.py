@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.files.geotiff import (
+from bifocal.files.images import ImageArray, photo_info, read_image
+from bifocal.files.point_tables import read_survey_points
+from bifocal.model.geotiff import (
     RasterReader,
     bytes_in_words,
     check_relief,
     create_raster,
     dpi_at_scale,
 )
-from bifocal.files.images import ImageArray, photo_info, read_image
-from bifocal.files.point_tables import read_survey_points
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.pair import Pair
 from bifocal.model.points import SurveyPoints
