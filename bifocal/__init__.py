@@ -26,8 +26,7 @@ Points
     match, Matches, MatchSettings   homologous points found automatically, with their precision
 The whole wall
     dense_relief, DenseRelief measured relief with its precision, pixel by pixel
-    ReliefMap, Quality        relief on a grid, and where each pixel's comes from
-    read_relief, write_relief   its GeoTIFF
+    ReliefMap, Quality        relief on a grid, its GeoTIFF, and where each pixel's comes from
     orthophoto, Orthophoto, OrthoOptions, Source   the photo to scale, moved by its relief
     mosaic, Mosaic, MosaicOptions   several orthophotos or relief maps made one
     relief_view               the relief in three dimensions, as a page of HTML

@@ -25,7 +25,6 @@ from .equations import (
     relief_displacements,
     relief_from_displacement,
 )
-from .files.geotiff import read_relief, write_relief
 from .files.images import read_image, write_image
 from .files.provenance import recording
 from .matching.homologous_points import match
@@ -150,7 +149,6 @@ __all__ = [
     "plane_coordinates",
     "read_control",
     "read_image",
-    "read_relief",
     "recording",
     "relief",
     "relief_displacement",
@@ -159,5 +157,4 @@ __all__ = [
     "relief_view",
     "solve",
     "write_image",
-    "write_relief",
 ]

@@ -17,10 +17,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from bifocal import Pair, Photo, dense_relief
+from bifocal import Pair, Photo, ReliefMap, dense_relief
 from bifocal.demo import SAMPLE
-from bifocal.files.geotiff import read_relief
-from bifocal.model.relief_map import ReliefMap
 
 HERE = Path(__file__).parent
 #: Every so many pixels of the truth, noise of a pick [px], and what is put in: degrees, a share.
@@ -227,7 +225,7 @@ def draw_relief(pair: Pair, truth: ReliefMap) -> Figure:
 def main(folder: Path) -> None:
     """Write both pictures into a folder."""
     pair = Pair.read(SAMPLE / "facade.pair.json")
-    truth = read_relief(SAMPLE / "truth.tif")
+    truth = ReliefMap.read(SAMPLE / "truth.tif")
     save(draw_relief(pair, truth), folder / "what-goes-wrong.jpg")
     save(draw_one_by_one(pair, truth), folder / "what-goes-wrong-one-by-one.jpg")
 

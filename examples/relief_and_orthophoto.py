@@ -15,7 +15,7 @@ far, near = (bifocal.read_image(bifocal.SAMPLE / name) for name in ("far.jpg", "
 relief = bifocal.dense_relief(pair, far, near, gsd=0.03, bounds=(-4, -2.5, 4, 2.5))
 ortho = bifocal.orthophoto(pair, far, relief, gsd=0.015)
 
-truth = bifocal.read_relief(bifocal.SAMPLE / "truth.tif")
+truth = bifocal.ReliefMap.read(bifocal.SAMPLE / "truth.tif")
 columns, rows = np.meshgrid(relief.grid.columns_x, relief.grid.rows_y)
 error = relief.r - truth.sample(np.stack([columns, rows], axis=-1))
 measured = relief.quality == bifocal.Quality.MEASURED

@@ -22,7 +22,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from bifocal import Lens, Pair, read_image, read_relief, solve
+from bifocal import Lens, Pair, ReliefMap, read_image, solve
 from bifocal.files.images import image_info
 from bifocal.files.point_tables import read_survey_points
 from multimedia import PhotogrammetryError, read_experiment, read_project
@@ -90,7 +90,7 @@ READERS: dict[str, Reader] = {
     "las": Reader("cloud.las", _cloud),
     "laz": Reader("cloud.laz", _cloud),
     "text cloud": Reader("cloud.csv", _cloud),
-    "relief": Reader("relief.tif", read_relief),
+    "relief": Reader("relief.tif", ReliefMap.read),
     "dem": Reader("dem.tif", _dem),
     "jpeg": Reader("far.jpg", _image),
     "water": Reader("water.json", lambda p: read_water_surface(str(p))),

@@ -137,9 +137,9 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         (("weights[None])", "weights[None, ::-1])"),),
     ),
     (
-        "bifocal/planning/planned_media.py",
+        "bifocal/planning/stations.py",
         "tests/bifocal/planning/test_plan_through_media.py",
-        (("(rest - self.port) * last / first", "(rest - self.port) * first / last"),),
+        (("(rest - z0) * last / first", "(rest - z0) * first / last"),),
     ),
     (
         "bifocal/model/flags.py",
@@ -148,7 +148,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     ),
     (
         "bifocal/model/grid.py",
-        "tests/bifocal/model tests/bifocal/files/test_geotiff.py",
+        "tests/bifocal/model",
         (
             (
                 "self.y0 - (self.height - 1) * self.gsd - half",
@@ -297,8 +297,8 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         (('relief = f"{points.xyz[i, 2]:+.3f}"', 'relief = f"{z:+.3f}"'),),
     ),
     (
-        "bifocal/files/geotiff.py",
-        "tests/bifocal/files/test_geotiff.py",
+        "bifocal/model/geotiff.py",
+        "tests/bifocal/model/test_geotiff.py",
         (("-grid.gsd, grid.x0, grid.y0)", "-grid.gsd, grid.bounds[0], grid.bounds[3])"),),
     ),
     (

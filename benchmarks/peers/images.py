@@ -15,8 +15,8 @@ import rasterio
 from benchmarks.peers.comparison import Comparison, Task, Tool
 from bifocal import Pair, Photo, calibrate, dense_relief
 from bifocal.calibration.workflow import undistorted
-from bifocal.files.geotiff import create_raster
 from bifocal.files.images import read_image, write_image
+from bifocal.model.geotiff import create_raster
 from bifocal.model.grid import Grid
 from bifocal.model.lens import Lens
 from tests.scenes import bifocal_cameras, facade, render

@@ -10,8 +10,8 @@ from time import monotonic
 from typing import Any
 
 from bifocal.collimation.stated_media import media_from_dict
-from bifocal.files.geotiff import gsd_at_scale
 from bifocal.matching.matching import MatchSettings
+from bifocal.model.geotiff import gsd_at_scale
 from bifocal.orientation.align_workflow import (
     AlignOptions,
     KnownLens,

@@ -11,10 +11,10 @@ import numpy as np
 from bifocal.collimation.pyramids import Pyramid, RectifiedPhoto, wall_grid
 from bifocal.collimation.records import Pixel
 from bifocal.collimation.tile_store import TileStore
-from bifocal.files.geotiff import RasterReader
 from bifocal.files.images import ImageArray, ImageInfo, image_info, read_image
 from bifocal.matching.snapping import snap
 from bifocal.matching.suggestions import radial_line, suggest
+from bifocal.model.geotiff import RasterReader
 from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from bifocal.collimation.project import SurveyFiles
-from bifocal.files.geotiff import RasterReader, read_relief
+from bifocal.model.geotiff import RasterReader
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
 from photocore.arrays import FloatArray
@@ -113,7 +113,7 @@ class Products:
             raise InputError("there is no relief yet; run it first.")
         version = _version(path)
         if self._relief is None or self._relief[0] != version:
-            self._relief = version, read_relief(path)
+            self._relief = version, ReliefMap.read(path)
         return self._relief[1]
 
     def overlay(self) -> bytes:

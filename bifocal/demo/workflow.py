@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.demo.samples import FACADE, PICK_SIGMA, Sample
-from bifocal.files.geotiff import RasterReader, dpi_at_scale, read_relief
 from bifocal.files.images import read_image
 from bifocal.files.strips import write_png
+from bifocal.model.geotiff import RasterReader, dpi_at_scale
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
@@ -123,7 +123,7 @@ def run_demo(
         dpi = dpi_at_scale(file.grid.gsd, sample.sheet_scale)
         write_png(folder / "ortho.png", file, dpi=dpi, overwrite=True)
     progress(1.0, 1.0, "done")
-    median, share, known = _against_truth(read_relief(folder / "relief.tif"), sample)
+    median, share, known = _against_truth(ReliefMap.read(folder / "relief.tif"), sample)
     return DemoResult(
         folder=folder, files=sample.files, ids=ids, true=true, found=relief, sigma=sigma,
         flags=flags, map_median=median, map_share=share, map_known=known, limit=sample.limit,
@@ -146,7 +146,7 @@ def _survey(
 
 def _seen_truth(sample: Sample) -> tuple[FloatArray, FloatArray]:
     """Return places within the bounds that both cameras see, (n, 2), and their relief. [m]"""
-    truth = read_relief(sample.folder / "truth.tif")
+    truth = ReliefMap.read(sample.folder / "truth.tif")
     both = read_image(sample.folder / "seen.png") > 0
     places = np.concatenate(
         [truth.plane_positions(slice(k, k + 1)).reshape(-1, 2) for k in range(len(both))]

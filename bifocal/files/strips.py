@@ -10,7 +10,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from bifocal.files.geotiff import METRES_PER_INCH, RasterReader
+from bifocal.model.geotiff import METRES_PER_INCH, RasterReader
 from photocore.arrays import ByteArray
 from photocore.output import atomic_path
 

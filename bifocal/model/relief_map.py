@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from enum import IntEnum
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bifocal.model.geotiff import RELIEF_BANDS, RasterReader, check_relief, create_raster
 from bifocal.model.grid import Grid, Gridded
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray, as_points, read_only
 from photocore.errors import InputError
+from photocore.raster import BLOCK
 
 
 class Quality(IntEnum):
@@ -88,6 +92,58 @@ class ReliefMap(Gridded):
             quality=np.where(known, Quality.MEASURED, Quality.UNKNOWN).astype(np.uint8),
             plane_from_pixel=np.asarray(plane_from_pixel, dtype=np.float64),
         )
+
+    @classmethod
+    def read(cls, path: Path | str) -> ReliefMap:
+        """Return the relief map of a raster of the plane frame.
+
+        Sigma and quality are filled in where the file lacks them: a file of one band is taken as
+        exact, sigma 0 and quality measured.
+
+        Raises
+        ------
+        InputError
+            If the file is missing or damaged, does not say where it lies, has turned or oblong
+            pixels, or is a picture.
+        """
+        with RasterReader(path) as reader:
+            check_relief(reader)
+            size = (0, 0, reader.grid.width, reader.grid.height)
+            plane_from_pixel = reader.grid.plane_from_pixel
+            exact = cls.from_relief(reader.read_floats(*size), plane_from_pixel=plane_from_pixel)
+            sigma, quality = exact.sigma, exact.quality
+            with np.errstate(invalid="ignore", over="ignore"):  # what the types cannot hold
+                if reader.bands >= 2:
+                    sigma = np.asarray(reader.read(*size, bands=[2])[:, :, 0], np.float32)
+                if reader.bands >= 3:
+                    band = np.asarray(reader.read(*size, bands=[3])[:, :, 0], np.float64)
+                    quality = np.clip(np.nan_to_num(band), 0, 255).astype(np.uint8)
+            return replace(exact, sigma=sigma, quality=quality)
+
+    def write(
+        self, path: Path | str, *, overwrite: bool = False, tags: Mapping[str, str] | None = None
+    ) -> None:
+        """Write a GeoTIFF of the plane frame: relief, sigma, quality; NaN where unknown.
+
+        Parameters
+        ----------
+        tags : mapping of str, optional
+            What else the file is to say of itself.
+
+        Raises
+        ------
+        InputError
+            If the file exists and is not to be overwritten, or cannot be written.
+        """
+        with create_raster(
+            path, self.grid, bands=3, dtype=np.float32, overwrite=overwrite, names=RELIEF_BANDS,
+            nodata=float("nan"), tags=tags,
+        ) as writer:  # fmt: skip
+            for column, row, part in self.grid.tiles(4 * BLOCK):
+                cut = np.s_[row : row + part.height, column : column + part.width]
+                layers = (self.r[cut], self.sigma[cut], self.quality[cut])
+                block = np.stack([np.asarray(layer, np.float32) for layer in layers], axis=-1)
+                writer.write(block, column=column, row=row)
 
     @property
     def shape(self) -> tuple[int, int]:

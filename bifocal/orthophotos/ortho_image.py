@@ -10,7 +10,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from bifocal.files.geotiff import create_raster
+from bifocal.model.geotiff import create_raster
 from bifocal.model.grid import Gridded
 from bifocal.model.image import ImageArray
 from photocore.arrays import BoolArray, ByteArray, FloatArray

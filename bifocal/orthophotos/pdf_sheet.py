@@ -16,8 +16,8 @@ from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
-from bifocal.files.geotiff import RasterReader
 from bifocal.files.strips import colour_strips, predicted
+from bifocal.model.geotiff import RasterReader
 from bifocal.orthophotos.canvas import BLUE, WHITE, Colour, Pen, Place, text_width
 from bifocal.orthophotos.contour_lines import LABEL_SIZE, contour_labels
 from bifocal.orthophotos.drawing import STRIP, Drawing, PrintSheet

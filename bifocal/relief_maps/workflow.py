@@ -10,7 +10,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.files.geotiff import write_relief
 from bifocal.files.images import ImageArray, photo_info, read_image, to_eight_bit
 from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
@@ -93,7 +92,7 @@ def relief_of_pair(
         "BIFOCAL_D2": f"{pair.image2.distance:.6g}",
         "BIFOCAL_PAIR": named or str(pair.extra.get("name", "")),
     }
-    write_relief(job.out, result, overwrite=job.overwrite, tags=tags)
+    result.write(job.out, overwrite=job.overwrite, tags=tags)
     written = [job.out]
     if job.preview is not None:
         write_preview(job.preview, result, overwrite=job.overwrite)

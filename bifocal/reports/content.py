@@ -10,9 +10,9 @@ from typing import Any
 import cv2
 import numpy as np
 
-from bifocal.files.geotiff import RasterReader, read_relief
 from bifocal.files.images import photo_info, read_image, to_eight_bit
 from bifocal.files.strips import ROWS, colour_strips
+from bifocal.model.geotiff import RasterReader
 from bifocal.model.grid import Bounds
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
@@ -194,7 +194,7 @@ def read_content(source: Path, task: ReportTask) -> PairContent:
 
 def _relief(path: Path) -> ReliefMap:
     """Return a relief map; refuse one that knows nothing, or infinite values."""
-    relief = read_relief(path)
+    relief = ReliefMap.read(path)
     with located(path):
         MapSurface.of_array(relief.r, relief.grid)
     return relief

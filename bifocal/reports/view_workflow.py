@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bifocal.files.geotiff import read_relief
+from bifocal.model.relief_map import ReliefMap
 from bifocal.reports.content import ortho_thumbnail
 from bifocal.reports.relief_view import relief_view
 from photocore.output import atomic_path, check_ending, check_writable
@@ -40,7 +40,7 @@ def view_relief(
     """
     check_ending(out, "the view is written as .html.", ".html", ".htm")
     check_writable(out, overwrite=overwrite)
-    relief = read_relief(source)
+    relief = ReliefMap.read(source)
     picture = None if ortho is None else ortho_thumbnail(ortho)[0]
     page = relief_view(relief, picture, title=title or source.stem, language=language)
     with atomic_path(out, overwrite=overwrite) as temporary:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from bifocal import SAMPLE, WATER_SAMPLE, Pair, ReliefMap, write_relief
+from bifocal import SAMPLE, WATER_SAMPLE, Pair, ReliefMap
 from bifocal.demo.samples import PICK_SIGMA
 from multimedia import Layers
 from photocore.tables import write_csv
@@ -100,7 +100,7 @@ def main(folder: Path, *, water: bool = False) -> None:
         image2=replace(pair.image2, file="near.jpg", image_size=(width, height)),
     )
     pair.write(folder / "facade.pair.json", overwrite=True)
-    write_relief(folder / "truth.tif", rendering.truth, overwrite=True)
+    rendering.truth.write(folder / "truth.tif", overwrite=True)
     both = rendering.visible1 & rendering.visible2 & np.isfinite(rendering.truth.r)
     Image.fromarray((both * 255).astype(np.uint8)).save(folder / "seen.png", optimize=True)
     seen = [target for target in rendering.targets if target.seen]

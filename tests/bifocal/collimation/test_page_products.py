@@ -12,7 +12,7 @@ import ezdxf
 import numpy as np
 import pytest
 
-from bifocal import SAMPLE, InputError, Pair, ReliefMap, write_relief
+from bifocal import SAMPLE, InputError, Pair, ReliefMap
 from bifocal.collimation import job_process, job_tasks
 from bifocal.collimation.live_orientation import control_of, live_orientation
 from bifocal.collimation.project import find_files
@@ -231,9 +231,14 @@ def test_a_job_that_fails_says_why_and_one_that_is_cancelled_leaves_nothing(tmp_
         small = {"kind": "ortho", "bounds": [900, 900, 901, 901], "gsd": 0.01}
         job = _wait(client, client.post("/api/jobs", json=small).json()["id"])
         assert job["state"] == "failed"
-        assert job["message"]
+        assert job["message"].startswith("the photo shows nothing of the area asked for")
+        session.language = "it"
+        job = _wait(client, client.post("/api/jobs", json=small).json()["id"])
+        assert job["message"].startswith("la foto non mostra nulla dell'area richiesta")
         number = client.post("/api/jobs", json={"kind": "relief"}).json()["id"]
-        assert client.post("/api/jobs", json={"kind": "match"}).status_code == 422
+        refused = client.post("/api/jobs", json={"kind": "match"})
+        assert refused.status_code == 422
+        assert refused.json()["error"].startswith("il lavoro relief è ancora in corso")
         assert client.delete(f"/api/jobs/{number}").status_code == 200
         assert _wait(client, number)["state"] == "cancelled"
         for bad in ({"kind": "roof"}, {"kind": "deliver", "sheet": "../A3"}, {"kind": "relief",
@@ -252,7 +257,7 @@ def test_relief_is_read_on_the_page(tmp_path) -> None:
     with opened(folder) as session:
         client = client_of(session)
         assert "run it first" in client.get("/relief/value?X=0&Y=0").json()["error"]
-        write_relief(folder / "facade.relief.tif", relief)
+        relief.write(folder / "facade.relief.tif")
         session.note_made("relief", ["facade.relief.tif"])
         # r rises by 1 m over 4 m from X = -2.
         assert client.get("/relief/value?X=0.05&Y=0").json()["r"] == pytest.approx(0.5125, abs=1e-6)
@@ -406,7 +411,7 @@ def test_the_precision_of_a_place_is_that_of_its_pixel_up_to_the_rim(tmp_path) -
     sigma = np.arange(1, 13, dtype=np.float32).reshape(3, 4) / 1000
     metres = [[1.0, 0, 0], [0, -1.0, 2], [0, 0, 1]]
     relief = ReliefMap.from_relief(np.zeros((3, 4), np.float32), plane_from_pixel=metres)
-    write_relief(folder / "facade.relief.tif", replace(relief, sigma=sigma))
+    replace(relief, sigma=sigma).write(folder / "facade.relief.tif")
     with opened(folder) as session:
         session.note_made("relief", ["facade.relief.tif"])
         told = session.products

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 import bifocal
-from bifocal import SAMPLE, WATER_SAMPLE, read_relief
+from bifocal import SAMPLE, WATER_SAMPLE, ReliefMap
 from bifocal.demo.samples import PICK_SIGMA, WATER
 from tests.builders.commands import bifocal_command as main
 from tests.scenes import demo_scene
@@ -50,7 +50,7 @@ def test_the_demo_under_water_finds_the_truth_and_tells_what_neglect_costs(tmp_p
     assert 0.6 < np.sqrt(np.mean(np.square(pulls))) < 1.5
     # What it says neglect costs, from the files that it left: rays shot independently, no media.
     pair = bifocal.Pair.read(out / "facade.pair.json")
-    truth, rng = read_relief(out / "truth.tif"), np.random.default_rng(8)
+    truth, rng = ReliefMap.read(out / "truth.tif"), np.random.default_rng(8)
     places = rng.uniform(WATER.bounds[:2], WATER.bounds[2:], (40, 2))
     points = np.column_stack([places, truth.sample(places)])
     seen = [pixels_of(side.to_dict(), points, pair.layers.as_dict())
@@ -85,7 +85,7 @@ def test_the_sample_under_water_is_what_bent_rays_show():
     names = ("col1 [px]", "row1 [px]", "col2 [px]", "row2 [px]")
     picks = np.array([[float(row[name]) for name in names] for row in rows])
     assert 0.5 * PICK_SIGMA < np.std(picks - pixels) < 1.6 * PICK_SIGMA
-    truth = read_relief(WATER_SAMPLE / "truth.tif")
+    truth = ReliefMap.read(WATER_SAMPLE / "truth.tif")
     known = np.abs(truth.sample(points[:, :2]) - points[:, 2])
     assert np.median(known) < 1e-4
 
@@ -106,6 +106,6 @@ def test_the_sample_that_ships_is_what_the_scene_gives():
     names = ("col1 [px]", "row1 [px]", "col2 [px]", "row2 [px]")
     picks = np.array([[float(row[name]) for name in names] for row in rows])
     assert np.std(picks - pixels) == pytest.approx(PICK_SIGMA, rel=0.25)
-    truth = read_relief(SAMPLE / "truth.tif")
+    truth = ReliefMap.read(SAMPLE / "truth.tif")
     known = np.abs(truth.sample(points[:, :2]) - points[:, 2])
     assert np.median(known) < 1e-4

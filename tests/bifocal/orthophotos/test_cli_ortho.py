@@ -16,8 +16,8 @@ import rasterio
 from click.testing import CliRunner, Result
 from PIL import Image
 
-from bifocal import Grid, Pair, Photo, ReliefMap, read_relief, write_image, write_relief
-from bifocal.files.geotiff import create_raster
+from bifocal import Grid, Pair, Photo, ReliefMap, write_image
+from bifocal.model.geotiff import create_raster
 from tests.builders.commands import bifocal_command as main
 
 SIZE = (420, 300)
@@ -43,7 +43,7 @@ def wall(tmp_path: Path) -> Path:
     pair.write(tmp_path / "wall.pair.json")
     grid = Grid.from_bounds((-2.1, -1.5, 2.1, 1.5), gsd=GSD)
     relief = ReliefMap.from_relief(relief_of(grid), plane_from_pixel=grid.plane_from_pixel)
-    write_relief(tmp_path / "relief.tif", relief)
+    relief.write(tmp_path / "relief.tif")
     return tmp_path
 
 
@@ -57,7 +57,7 @@ def run(folder: Path, *arguments: str) -> Result:
 
 
 def test_a_relief_map_survives_its_file(wall: Path) -> None:
-    relief = read_relief(wall / "relief.tif")
+    relief = ReliefMap.read(wall / "relief.tif")
     np.testing.assert_array_equal(relief.r, relief_of(relief.grid))
     assert relief.grid.bounds == pytest.approx((-2.1, -1.5, 2.1, 1.5))
     assert (relief.quality == 1).all()
@@ -262,7 +262,7 @@ def test_numbers_of_a_flat_wall_have_millimetres(wall: Path) -> None:
     grid = Grid.from_bounds((-2.1, -1.5, 2.1, 1.5), gsd=GSD)
     flat = np.broadcast_to(0.004 * grid.columns_x, grid.shape).astype(np.float32)
     relief = ReliefMap.from_relief(flat, plane_from_pixel=grid.plane_from_pixel)
-    write_relief(wall / "relief.tif", relief, overwrite=True)
+    relief.write(wall / "relief.tif", overwrite=True)
     done = run(wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50")
     assert done.exit_code == 0, done.output
     page = page_of(wall / "d" / "Torre_est_relief.pdf")
@@ -271,10 +271,10 @@ def test_numbers_of_a_flat_wall_have_millimetres(wall: Path) -> None:
 
 
 def test_the_sheet_of_a_whole_picture_says_what_was_not_measured(wall: Path) -> None:
-    relief = read_relief(wall / "relief.tif")
+    relief = ReliefMap.read(wall / "relief.tif")
     r = relief.r.copy()
     r[100:200, 100:200] = np.nan
-    write_relief(wall / "relief.tif", replace(relief, r=r), overwrite=True)
+    replace(relief, r=r).write(wall / "relief.tif", overwrite=True)
     done = run(
         wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50", "--complete",
         "--section", "y=-1.2",
@@ -289,10 +289,10 @@ def test_the_sheet_of_a_whole_picture_says_what_was_not_measured(wall: Path) -> 
 
 
 def test_sigma_and_quality_lie_beside_the_delivered_relief(wall: Path) -> None:
-    relief = read_relief(wall / "relief.tif")
+    relief = ReliefMap.read(wall / "relief.tif")
     quality, sigma = relief.quality.copy(), np.full(relief.shape, 0.004, np.float32)
     quality[:, :84], sigma[:, :84] = 3, 0.02
-    write_relief(wall / "relief.tif", replace(relief, quality=quality, sigma=sigma), overwrite=True)
+    replace(relief, quality=quality, sigma=sigma).write(wall / "relief.tif", overwrite=True)
     done = run(
         wall, "--relief", "relief.tif", "--deliver", "d", "--out", "o.tif", "--scale", "1:50",
         "--bounds", "-3,-1,2,1", "--json",
@@ -300,7 +300,7 @@ def test_sigma_and_quality_lie_beside_the_delivered_relief(wall: Path) -> None:
     assert done.exit_code == 0, done.output
     assert json.loads(done.stdout)["file"] == "o.tif"
     assert (wall / "o.tif").read_bytes() == (wall / "d" / "Torre_est.tif").read_bytes()
-    found = read_relief(wall / "d" / "Torre_est_relief_values.tif")
+    found = ReliefMap.read(wall / "d" / "Torre_est_relief_values.tif")
     x = found.grid.columns_x
     assert np.isnan(found.r[:, x < -2.1]).all()
     assert np.isnan(found.sigma[:, x < -2.1]).all()
@@ -327,10 +327,10 @@ def test_a_nameless_pair_is_called_as_its_folder_where_its_file_has_no_name(wall
 
 
 def test_a_phantom_does_not_take_the_colours_from_the_wall(wall: Path) -> None:
-    relief = read_relief(wall / "relief.tif")
+    relief = ReliefMap.read(wall / "relief.tif")
     r = np.where(relief.r > 0.1, relief.r, np.float32(0))
     r[40:44, 40:44] = 1.9
-    write_relief(wall / "relief.tif", replace(relief, r=r), overwrite=True)
+    replace(relief, r=r).write(wall / "relief.tif", overwrite=True)
     done = run(wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50")
     assert done.exit_code == 0, done.output
     page = page_of(wall / "d" / "Torre_est_relief.pdf")
@@ -343,10 +343,10 @@ def test_a_phantom_does_not_take_the_colours_from_the_wall(wall: Path) -> None:
 
 
 def test_a_phantom_before_a_flat_wall_does_not_refuse_the_delivery(wall: Path) -> None:
-    relief = read_relief(wall / "relief.tif")
+    relief = ReliefMap.read(wall / "relief.tif")
     r = np.zeros_like(relief.r)
     r[40:52, 40:52] = 2.5  # 2500 levels of the least interval, a millimetre
-    write_relief(wall / "relief.tif", replace(relief, r=r), overwrite=True)
+    replace(relief, r=r).write(wall / "relief.tif", overwrite=True)
     done = run(wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50")
     assert done.exit_code == 0, done.output
     assert "contour lines every 0.005 m" in page_of(wall / "d" / "Torre_est_relief.pdf")
@@ -582,10 +582,10 @@ def page_of(pdf: Path) -> str:
 
 @pytest.mark.acceptance
 def test_the_relief_sheet_hatches_what_was_not_measured_and_has_a_legend(wall: Path) -> None:
-    relief = read_relief(wall / "relief.tif")
+    relief = ReliefMap.read(wall / "relief.tif")
     quality = relief.quality.copy()
     quality[:, :84] = 2  # a fifth of the width
-    write_relief(wall / "relief.tif", replace(relief, quality=quality), overwrite=True)
+    replace(relief, quality=quality).write(wall / "relief.tif", overwrite=True)
     (wall / "c.csv").write_text("id,X,Y,Z\nA_VERY_LONG_NAME_AT_THE_EDGE,2.09,1.4,0\n")
     done = run(
         wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:25", "--paper", "A4",

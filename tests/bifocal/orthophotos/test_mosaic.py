@@ -12,7 +12,7 @@ import rasterio
 from click.testing import CliRunner, Result
 
 from bifocal import Grid
-from bifocal.files.geotiff import create_raster
+from bifocal.model.geotiff import create_raster
 from tests.builders.commands import bifocal_command as main
 
 GSD = 0.005

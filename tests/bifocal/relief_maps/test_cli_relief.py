@@ -11,7 +11,7 @@ import pytest
 import rasterio
 from click.testing import CliRunner
 
-from bifocal import Pair, read_relief, write_image
+from bifocal import Pair, ReliefMap, write_image
 from tests.builders.commands import bifocal_command as main
 from tests.scenes import bifocal_cameras, facade, render
 
@@ -58,7 +58,7 @@ def test_relief_writes_three_bands_and_says_what_guarantees_the_scale(folder, tm
     truth = np.load(folder / "truth.npy")
     assert np.nanmedian(np.abs(relief - truth)) < 0.04  # 30 mm pixels: nearly all are edges
     np.testing.assert_array_equal(np.isnan(relief), quality == 0)
-    assert read_relief(out).gsd == pytest.approx(0.0296)
+    assert ReliefMap.read(out).gsd == pytest.approx(0.0296)
 
 
 def test_json_preview_and_clouds(folder, tmp_path):

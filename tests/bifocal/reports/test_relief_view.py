@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 import bifocal
-from bifocal import SAMPLE, Grid, InputError, read_relief
+from bifocal import SAMPLE, Grid, InputError, ReliefMap
 from tests.browser import launched
 from tests.builders.commands import bifocal_command as main
 from tests.web_page import Page
@@ -101,7 +101,7 @@ def test_the_page_stands_alone_and_is_small(pages):
     data = data_of(text)
     assert data["bounds"] == pytest.approx([-4, -3, 4, 3])
     assert data["photo"].startswith("data:image/jpeg;base64,")
-    relief = read_relief(SAMPLE / "truth.tif")
+    relief = ReliefMap.read(SAMPLE / "truth.tif")
     away = heights_of(data) - relief.sample(
         np.stack(np.meshgrid(
             data["left"] + data["step"] * np.arange(data["width"]),

@@ -15,7 +15,7 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal import SAMPLE, Grid
-from bifocal.files.geotiff import create_raster
+from bifocal.model.geotiff import create_raster
 from bifocal.orientation.walls.bend import WallBend, bend_in_words
 from bifocal.remarks import in_language, remark
 from bifocal.reports.accuracy import accuracy_blocks

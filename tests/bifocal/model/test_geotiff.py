@@ -15,7 +15,7 @@ import rasterio
 from PIL import Image
 
 from bifocal import Grid, InputError
-from bifocal.files.geotiff import RasterReader, create_raster, dpi_at_scale, gsd_at_scale
+from bifocal.model.geotiff import RasterReader, create_raster, dpi_at_scale, gsd_at_scale
 from tests.rounding import EPS
 
 GRID = Grid.from_bounds((-2.0, -1.0, 1.5, 1.0), gsd=0.005)
@@ -139,7 +139,7 @@ def test_a_disk_that_fills_up_in_the_middle_is_reported_and_leaves_nothing(tmp_p
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
         from bifocal.model.grid import Grid
-        from bifocal.files.geotiff import create_raster
+        from bifocal.model.geotiff import create_raster
         grid = Grid.from_bounds((0, 0, 5, 5), gsd=0.005)
         noise = np.random.default_rng(1).integers(0, 255, (*grid.shape, 3), dtype=np.uint8)
         with create_raster({str(tmp_path / "o.tif")!r}, grid, bands=3, dtype=np.uint8) as writer:

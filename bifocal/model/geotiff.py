@@ -15,12 +15,10 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from bifocal.model.grid import Grid
-from bifocal.model.relief_map import Quality, ReliefMap
 from photocore.arrays import Float32Array
 from photocore.errors import InputError
 from photocore.output import all_or_none, atomic_path, check_all_writable, is_virtual
 from photocore.raster import (
-    BLOCK,
     RasterFile,
     RasterWriter,
     corner_transform,
@@ -167,48 +165,6 @@ def gsd_at_scale(dpi: float, scale: float) -> float:
     0.005
     """
     return METRES_PER_INCH * scale / dpi
-
-
-def write_relief(
-    path: Path | str,
-    relief: ReliefMap,
-    *,
-    overwrite: bool = False,
-    tags: Mapping[str, str] | None = None,
-) -> None:
-    """Write a relief map: relief, sigma, quality; NaN where unknown."""
-    grid = relief.grid
-    with create_raster(
-        path, grid, bands=3, dtype=np.float32, overwrite=overwrite, names=RELIEF_BANDS,
-        nodata=float("nan"), tags=tags,
-    ) as writer:  # fmt: skip
-        for column, row, part in grid.tiles(4 * BLOCK):
-            cut = np.s_[row : row + part.height, column : column + part.width]
-            layers = (relief.r[cut], relief.sigma[cut], relief.quality[cut])
-            block = np.stack([np.asarray(layer, np.float32) for layer in layers], axis=-1)
-            writer.write(block, column=column, row=row)
-
-
-def read_relief(path: Path | str) -> ReliefMap:
-    """Return a whole relief map; sigma and quality are filled in where the file lacks them.
-
-    A file of one band is taken as exact: sigma 0, quality measured.
-    """
-    with RasterReader(path) as reader:
-        check_relief(reader)
-        size = (0, 0, reader.grid.width, reader.grid.height)
-        r = reader.read_floats(*size)
-        sigma = np.where(np.isnan(r), r, np.float32(0))
-        quality = np.where(np.isnan(r), Quality.UNKNOWN, Quality.MEASURED).astype(np.uint8)
-        with np.errstate(invalid="ignore", over="ignore"):  # what the types cannot hold
-            if reader.bands >= 2:
-                sigma = np.asarray(reader.read(*size, bands=[2])[:, :, 0], np.float32)
-            if reader.bands >= 3:
-                band = np.asarray(reader.read(*size, bands=[3])[:, :, 0], np.float64)
-                quality = np.clip(np.nan_to_num(band), 0, 255).astype(np.uint8)
-        return ReliefMap(
-            r=r, sigma=sigma, quality=quality, plane_from_pixel=reader.grid.plane_from_pixel
-        )
 
 
 def check_relief(reader: RasterReader) -> None:
