@@ -137,9 +137,9 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         (("weights[None])", "weights[None, ::-1])"),),
     ),
     (
-        "bifocal/planning/planned_media.py",
+        "bifocal/planning/stations.py",
         "tests/bifocal/planning/test_plan_through_media.py",
-        (("(rest - self.port) * last / first", "(rest - self.port) * first / last"),),
+        (("(rest - z0) * last / first", "(rest - z0) * first / last"),),
     ),
     (
         "bifocal/model/flags.py",

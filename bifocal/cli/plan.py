@@ -80,8 +80,9 @@ def command(
     Give the lenses and the camera, and one wish: the size of the wall, a scale, a pixel size on
     the wall, or a sigma of the relief.
     """
+    from bifocal.model.pair_media import PairMedia
     from bifocal.planning.camera_plan import CameraSensor
-    from bifocal.planning.workflow import make_plan, plan_as_dict, planned_media
+    from bifocal.planning.workflow import make_plan, plan_as_dict
 
     if equivalents and (focal_lengths or sensor):
         raise click.UsageError("Give --equivalent, or --focal with --sensor, not both.")
@@ -94,7 +95,9 @@ def command(
     if indices is None and (thicknesses or port is not None or depth is not None):
         raise click.UsageError("--thicknesses, --port and --depth go with --indices.")
     if indices is not None:
-        wishes["media"] = planned_media(indices, thicknesses or (), port=port, depth=depth)
+        wishes["media"] = PairMedia.stated(
+            indices, thicknesses or (), ports=(port, None), depth=depth
+        )
     plan = make_plan(equivalents or focal_lengths, camera, out=out, **wishes)
     print_result(plan_as_dict(plan), _lines(plan), as_json=as_json)
     if out is not None:

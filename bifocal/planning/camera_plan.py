@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
-from bifocal.planning.planned_media import PlannedMedia, sigma_at
-from bifocal.precision import sigma_relief
+from bifocal.model.pair_media import PairMedia
 from photocore.arrays import FloatArray, positive
+from photocore.camera.pinhole import Pinhole
 from photocore.errors import InputError
 
 #: Of the frame of 36 x 24 mm, by which makers state equivalents. [mm]
@@ -131,7 +131,7 @@ class Plan:
         Picking precision the figures rest on. [px]
     sigma_r_max : float
         Bound of the area of uncertainty. [m]
-    media : PlannedMedia or None
+    media : PairMedia
         What the photos look through.
     """
 
@@ -139,7 +139,7 @@ class Plan:
     stations: tuple[Station, ...]
     sigma_px: float
     sigma_r_max: float
-    media: PlannedMedia | None = None
+    media: PairMedia = field(default_factory=PairMedia.none)
 
     @property
     def best(self) -> Station:
@@ -172,12 +172,30 @@ class Plan:
         x = np.linspace(-half_w, half_w, columns)
         y = np.linspace(half_h, -half_h, rows)
         radius = np.hypot(*np.meshgrid(x, y))
-        if self.media is not None:
-            d, c = (station.d1, station.d2), (station.c1, station.c2)
-            pair = self.media.pair(d, c, pitch=self.sensor.pitch, sigma_px=self.sigma_px)
-            return x, y, sigma_at(pair, np.where(radius < 1e-9, 0.0, radius))
-        sigma = self.sigma_px * station.gsd
-        grid = sigma_relief(
-            radius, radius, d1=station.d1, d2=station.d2, sigma_1=sigma, sigma_2=sigma
-        )
-        return x, y, np.where(radius < 1e-9, np.nan, grid)
+        d, c = (station.d1, station.d2), (station.c1, station.c2)
+        pair = planned_pair(self.media, d, c, pitch=self.sensor.pitch, sigma_px=self.sigma_px)
+        return x, y, sigma_at(pair, np.where(radius < 1e-9, 0.0, radius))
+
+
+def planned_pair(
+    media: PairMedia, d: tuple[float, float], c: tuple[float, float], *, pitch: float,
+    sigma_px: float,
+) -> Pair:  # fmt: skip
+    """Return the planned pair, square to the wall, its pixels counted from the middle."""
+    pair = Pair.ideal(d1=d[0], d2=d[1], c1=c[0], c2=c[1], pitch=pitch, sigma=sigma_px)
+    if not media:
+        return pair
+    square_on = np.diag([1.0, -1.0, -1.0])
+    first, second = (
+        replace(photo, **media.of_photo(k, Pinhole(np.eye(3), square_on, np.array([0, 0, d[k]]))))
+        for k, photo in enumerate((pair.image1, pair.image2))
+    )
+    return Pair(image1=first, image2=second)
+
+
+def sigma_at(pair: Pair, radius: FloatArray) -> FloatArray:
+    """Return the sigma of relief on the plane at radii from the nadir, NaN at the nadir. [m]"""
+    flat = radius.reshape(-1)
+    xyz = np.column_stack([flat, np.zeros_like(flat), np.zeros_like(flat)])
+    found = pair.intersect(*pair.project(xyz)).sigma[:, 2]
+    return np.where(flat > 0, found, np.nan).reshape(radius.shape)

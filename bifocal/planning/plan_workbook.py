@@ -9,8 +9,8 @@ from bifocal.media import media_words
 from photocore.workbook.making.newbook import new_workbook, save_book
 
 if TYPE_CHECKING:
+    from bifocal.model.pair_media import PairMedia
     from bifocal.planning.camera_plan import Plan
-    from bifocal.planning.planned_media import PlannedMedia
 
 _COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("pair", "Lenses", "@"),
@@ -39,18 +39,18 @@ _MEDIA_COLUMNS = (
 
 def _columns(plan: Plan) -> tuple[tuple[str, str, str], ...]:
     """Return key, label and number format of every column."""
-    if plan.media is None:
+    if not plan.media:
         return _COLUMNS
     after = [key for key, *_ in _COLUMNS].index("delta_d") + 1
     return (*_COLUMNS[:after], *_MEDIA_COLUMNS, *_COLUMNS[after:])
 
 
-def _media_words(media: PlannedMedia) -> str:
+def _media_words(media: PairMedia) -> str:
     """Return what the photos of a plan look through."""
-    if media.depth is not None:
+    if media.port is None:
         stays = f"reference plane {media.depth:g} m behind the last interface"
     else:
-        stays = f"port {media.port or 0.0:g} m before the cameras"
+        stays = f"port {media.port[0]:g} m before the cameras"
     return f"; through media of {media_words(media.layers)}, {stays}; d counts all of them"
 
 
@@ -85,7 +85,7 @@ def _stations_sheet(sheet: Any, plan: Plan) -> None:
         f"Sensor {sensor.width:g} x {sensor.height:g} mm, {sensor.columns} x {sensor.rows} px; "
         f"picks precise to {plan.sigma_px:g} px; area of uncertainty: sigma r above "
         f"{plan.sigma_r_max * 1000:.0f} mm"
-    ) + ("" if plan.media is None else _media_words(plan.media))
+    ) + (_media_words(plan.media) if plan.media else "")
     columns = _columns(plan)
     for column, (key, label, _) in enumerate(columns, start=1):
         # Labels for people above, stable keys for formulas as the table's headings.
@@ -98,7 +98,7 @@ def _stations_sheet(sheet: Any, plan: Plan) -> None:
         sheet.row_dimensions[row].height = 30 if station.note else 15
         values = (
             f"{station.c1:g}/{station.c2:g} mm", station.d1, station.d2, station.delta_d,
-            *(() if plan.media is None else (station.z0_1, station.z0_2)),
+            *((station.z0_1, station.z0_2) if plan.media else ()),
             station.scale_number, station.gsd * 1000, *station.footprint,
             f"{station.photos[0]} x {station.photos[1]}", station.sigma_r_rms * 1000,
             station.sigma_r_corner * 1000, station.sigma_ortho * 1000, station.uncertain_radius,

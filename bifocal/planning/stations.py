@@ -10,9 +10,9 @@ from math import ceil, hypot, sqrt
 import numpy as np
 
 from bifocal.model.pair import Pair
-from bifocal.planning.camera_plan import CameraSensor, Plan, Station
-from bifocal.planning.planned_media import PlannedMedia, sigma_at
-from bifocal.precision import base_factor, sigma_relief, uncertainty_radius
+from bifocal.model.pair_media import PairMedia
+from bifocal.planning.camera_plan import CameraSensor, Plan, Station, planned_pair, sigma_at
+from bifocal.precision import base_factor, uncertainty_radius
 from photocore.arrays import positive
 from photocore.errors import GeometryError, InputError
 
@@ -37,7 +37,7 @@ def plan_stations(
     sigma_px: float = 0.5,
     sigma_r_max: float | None = None,
     free_space: float | None = None,
-    media: PlannedMedia | None = None,
+    media: PairMedia | None = None,
 ) -> Plan:
     """Return stations, scale and precision for every pair of the given lenses.
 
@@ -61,7 +61,7 @@ def plan_stations(
         best pair. [m]
     free_space : float, optional
         Room in front of the wall. [m]
-    media : PlannedMedia, optional
+    media : PairMedia, optional
         What both photos look through; scales are then those near the axis.
 
     Returns
@@ -105,7 +105,8 @@ def plan_stations(
         raise InputError(f"give only one of {' and '.join(given)}: each of them sets the scale.")
     if not given and object_size is None:
         raise InputError("give the size of the wall, a photo scale, a GSD or a wanted sigma of r.")
-    if media is not None and sigma_r is not None:
+    media = media or PairMedia.none()
+    if media and sigma_r is not None:
         raise InputError("through media give a scale, a GSD or the size of the wall, not a sigma.")
     for name, value in (*wishes.items(), ("free_space", free_space)):
         if value is not None:
@@ -151,33 +152,23 @@ def plan_stations(
 def _station(
     c1: float, c2: float, scale_number: float, sensor: CameraSensor,
     object_size: tuple[float, float] | None, sigma_px: float, free_space: float | None,
-    media: PlannedMedia | None,
+    media: PairMedia,
 ) -> Station:  # fmt: skip
     """Return the stations of one pair of lenses, the uncertainty still open."""
     d1, d2 = straight = (scale_number * c1 / 1000, scale_number * c2 / 1000)
     gsd = sensor.pitch * scale_number / 1000
     footprint = (sensor.columns * gsd, sensor.rows * gsd)
-    z0: tuple[float | None, float | None] = (None, None)
-    pair = None
-    if media is not None:
-        (d1, far), (d2, near) = (
-            media.placed(d, c) for d, c in zip((d1, d2), (c1, c2), strict=True)
-        )
-        z0 = (far, near)
-        pair = media.pair((d1, d2), (c1, c2), pitch=sensor.pitch, sigma_px=sigma_px)
+    if media:
+        d1, d2 = (_placed(media, k, d, c) for k, d, c in ((0, d1, c1), (1, d2, c2)))
+    pair = planned_pair(media, (d1, d2), (c1, c2), pitch=sensor.pitch, sigma_px=sigma_px)
+    if media:
         straight = pair.straight_distances
         footprint = _seen_by_both(pair, sensor, (c1, c2))
     half_diagonal = hypot(*footprint) / 2
     # Mean square radius of a rectangle about its centre is diagonal² / 12.
     rms = hypot(*footprint) / sqrt(12)
-    sigma = sigma_px * gsd
-    in_both = {"d1": d1, "d2": d2, "sigma_1": sigma, "sigma_2": sigma}
-
-    def sigma_of(radius: float) -> float:
-        if pair is not None:
-            return float(sigma_at(pair, np.array([radius]))[0])
-        return float(sigma_relief(radius, radius, **in_both))
-
+    base = base_factor(d1=straight[0], d2=straight[1])
+    sigma_rms, sigma_corner = sigma_at(pair, np.array([rms, half_diagonal])).tolist()
     feasible = free_space is None or d1 <= free_space
     note = ""
     if not feasible:
@@ -190,13 +181,49 @@ def _station(
     return Station(
         c1=c1, c2=c2, d1=d1, d2=d2, delta_d=d1 - d2, scale_number=scale_number, gsd=gsd,
         footprint=footprint, photos=_photos(object_size, footprint),
-        sigma_r_rms=sigma_of(rms),
-        sigma_r_corner=sigma_of(half_diagonal),
+        sigma_r_rms=sigma_rms, sigma_r_corner=sigma_corner,
         # e1 = s1 r / d1, Eq. (1)
-        sigma_ortho=sqrt(2) * sigma * base_factor(d1=straight[0], d2=straight[1]) / straight[0],
+        sigma_ortho=sqrt(2) * sigma_px * gsd * base / straight[0],
         uncertain_radius=0.0, uncertain_share=0.0, feasible=feasible, note=note,
-        z0_1=z0[0], z0_2=z0[1], straight=straight,
+        z0_1=pair.image1.z0, z0_2=pair.image2.z0, straight=straight,
     )  # fmt: skip
+
+
+def _placed(media: PairMedia, number: int, apparent: float, c: float) -> float:
+    """Return the distance of camera 0 or 1 that shows the wall's middle from afar.
+
+    Parameters
+    ----------
+    apparent : float
+        Distance from which a camera without media shows the middle at the wanted scale. [m]
+    c : float
+        Principal distance, for the message. [mm]
+
+    Raises
+    ------
+    GeometryError
+        If the media leave no room at that scale.
+
+    Notes
+    -----
+    Near the axis a layer of thickness h and index n seems ``h n1 / n`` thick, so the scale is
+    ``c / (z0 + sum(t n1 / n) + H n1 / nm)``: that sum, not d, is proportional to c.
+    """
+    first, *inner, last = media.layers.indices
+    glass = zip(media.layers.thicknesses, inner, strict=True)
+    rest = apparent - sum(t * first / n for t, n in glass)
+    if media.port is not None:
+        z0 = media.port[number]
+        behind = (rest - z0) * last / first
+    else:
+        assert media.depth is not None
+        z0, behind = rest - media.depth * first / last, media.depth
+    if z0 < 0 or behind <= 0:
+        raise GeometryError(
+            f"the {c:g} mm lens would have to stand inside the glass or the water: the object "
+            f"would seem {apparent:.2f} m away. Choose a smaller scale, or a longer lens."
+        )
+    return z0 + media.layers.thickness + behind
 
 
 def _seen_by_both(pair: Pair, sensor: CameraSensor, c: tuple[float, float]) -> tuple[float, float]:

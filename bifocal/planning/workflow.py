@@ -9,9 +9,7 @@ from typing import Any
 
 from bifocal.planning.camera_plan import CameraSensor, Plan
 from bifocal.planning.plan_workbook import write_plan
-from bifocal.planning.planned_media import PlannedMedia
 from bifocal.planning.stations import plan_stations
-from multimedia import Layers
 from photocore.output import check_ending
 from photocore.workbook.making.newbook import check_new_workbook
 
@@ -35,18 +33,6 @@ def make_plan(
     if out is not None:
         write_plan(out, plan, overwrite=overwrite)
     return plan
-
-
-def planned_media(
-    indices: Sequence[float],
-    thicknesses: Sequence[float],
-    *,
-    port: float | None,
-    depth: float | None,
-) -> PlannedMedia:
-    """Return the media of a plan; see `bifocal.planning.planned_media.PlannedMedia`."""
-    layers = Layers(indices=tuple(indices), thicknesses=tuple(thicknesses))
-    return PlannedMedia(layers=layers, port=port, depth=depth)
 
 
 def plan_as_dict(plan: Plan) -> dict[str, Any]:

@@ -7,9 +7,8 @@ import openpyxl
 import pytest
 from click.testing import CliRunner
 
-from bifocal import GeometryError, InputError
-from bifocal.planning.camera_plan import CameraSensor
-from bifocal.planning.planned_media import PlannedMedia
+from bifocal import GeometryError, InputError, PairMedia
+from bifocal.planning.camera_plan import CameraSensor, planned_pair
 from bifocal.planning.stations import plan_stations
 from multimedia import Layers
 from tests.builders.commands import bifocal_command as main
@@ -19,8 +18,8 @@ from tests.workbook_lint import lint
 CANON = CameraSensor(width=22.7, height=15.1, columns=3072, rows=2048)
 LAYERS = Layers(indices=(1.0, 1.49, 1.337), thicknesses=(0.01,))
 MEDIA = {
-    "port": PlannedMedia(layers=LAYERS, port=0.05),
-    "tank": PlannedMedia(layers=LAYERS, depth=0.9),
+    "port": PairMedia(layers=LAYERS, port=(0.05, 0.05)),
+    "tank": PairMedia(layers=LAYERS, depth=0.9),
 }
 
 
@@ -40,7 +39,8 @@ def test_both_photos_show_the_middle_at_the_wanted_scale(name):
 def test_the_sigma_is_that_of_noisy_picks(name):
     plan = plan_stations([35, 19], CANON, scale_number=100, sigma_px=0.3, media=MEDIA[name])
     best, rng = plan.best, np.random.default_rng(3)
-    pair = plan.media.pair((best.d1, best.d2), (35, 19), pitch=CANON.pitch, sigma_px=0.3)
+    d = (best.d1, best.d2)
+    pair = planned_pair(plan.media, d, (35, 19), pitch=CANON.pitch, sigma_px=0.3)
     radius = np.hypot(*best.footprint) / np.sqrt(12)
     seen = pair.project(np.broadcast_to([radius, 0.0, 0.0], (4000, 3)))
     found = pair.intersect(*(side + rng.normal(0, 0.3, side.shape) for side in seen))
@@ -54,7 +54,7 @@ def test_media_of_one_index_change_no_plan():
     layers = Layers(indices=(1.0, 1.0))
     air = plan_stations([35, 19], CANON, scale_number=100).best
     same = plan_stations(
-        [35, 19], CANON, scale_number=100, media=PlannedMedia(layers=layers, depth=0.9)
+        [35, 19], CANON, scale_number=100, media=PairMedia(layers=layers, depth=0.9)
     ).best
     for name in ("d1", "d2", "gsd", "sigma_r_rms", "sigma_r_corner", "sigma_ortho"):
         assert getattr(same, name) == pytest.approx(getattr(air, name), rel=1e-9)
@@ -63,20 +63,20 @@ def test_media_of_one_index_change_no_plan():
 @pytest.mark.parametrize(
     ("media", "error", "message"),
     [
-        ({"port": 0.05, "depth": 0.9}, InputError, "one of the two"),
+        ({"port": (0.05, 0.05), "depth": 0.9}, InputError, "one of the two"),
         ({}, InputError, "one of the two"),
         ({"depth": 9.0}, GeometryError, "inside the glass or the water"),
-        ({"port": 3.0}, GeometryError, "inside the glass or the water"),
+        ({"port": (3.0, 3.0)}, GeometryError, "inside the glass or the water"),
     ],
 )
 def test_media_that_leave_no_room_are_refused(media, error, message):
     with pytest.raises(error, match=message):
-        plan_stations([35, 19], CANON, scale_number=100, media=PlannedMedia(layers=LAYERS, **media))
+        plan_stations([35, 19], CANON, scale_number=100, media=PairMedia(layers=LAYERS, **media))
 
 
 def test_a_lens_whose_edges_are_totally_reflected_is_refused():
     """From water into air: 18 mm aside by 10 mm is 61 degrees, beyond asin(1 / 1.337)."""
-    diver = PlannedMedia(layers=Layers(indices=(1.337, 1.0)), depth=0.3)
+    diver = PairMedia(layers=Layers(indices=(1.337, 1.0)), depth=0.3)
     full = CameraSensor(width=36, height=24, columns=6000, rows=4000)
     with pytest.raises(GeometryError, match=r"10 mm lens.*reflect"):
         plan_stations([35, 10], full, scale_number=100, object_size=(3, 2), media=diver)
