@@ -17,10 +17,10 @@ from openpyxl.worksheet.worksheet import Worksheet
 from PIL import Image
 
 from bifocal import SAMPLE, WATER_SAMPLE, Pair
-from photocore.arrays import ByteArray
 from tests.bifocal.campaigns import sample_tables
 from tests.builders.commands import bifocal_command as main
 from tests.scenes import demo_scene
+from tests.scenes.arrays import ByteArray
 from tests.scenes.make_sample import PIXEL
 
 #: The sample's targets are called P1 to P32 here.

@@ -14,6 +14,7 @@ import rasterio
 from click.testing import CliRunner
 
 from multimedia import (
+    Brown,
     Camera,
     Convention,
     FlatInterface,
@@ -28,7 +29,6 @@ from multimedia import (
     write_project,
 )
 from multimedia.boards.workflow import find_boards
-from photocore.camera.distortion import Brown
 from tests.builders.commands import multimedia_command as main
 from tests.multimedia.rendered_boards import Housing, chessboard, photo, poses
 from tests.multimedia.tank import LAYERS, SENSOR, cameras, control

@@ -161,7 +161,7 @@ def _through_media(session: Session, way: str, given: list[float | None]) -> str
     InputError
         If something of the media is lacking, or neither is given.
     """
-    setup, language = session.state.setup, session.state.language or session.language
+    setup, language = session.state.setup, session.spoken
     if missing := lacking(setup):
         raise InputError(say("media", missing, language))
     if not media_of(setup, session.pictures.pair) or way == "control":
@@ -201,9 +201,10 @@ def _write_control(session: Session, control: Control) -> dict[str, Path | None]
 def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any]) -> str:
     """Take over what a job made; return what the user should know."""
     kind = task["kind"]
+    told = " ".join(without_options(said, session.spoken) for said in result.get("remarks", ()))
     if kind == "align":
         session.propose(Path(task["out"]), result)
-        return _told(result)
+        return told
     if kind == "match":
         session.command({"op": "points.add", "points": result["points"]})
         return ""
@@ -218,9 +219,4 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
             names.append(f"{folder.name}/{drawing.name}")
     session.note_made(kind, names)
     session.show_products()
-    return _told(result)
-
-
-def _told(result: Mapping[str, Any]) -> str:
-    """Return the remarks of a job without advice for the command line."""
-    return " ".join(without_options(str(remark)) for remark in result.get("remarks", ()))
+    return told

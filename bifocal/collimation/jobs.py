@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.collimation.wording import without_options
+from bifocal.remarks import remark
 from photocore.errors import InputError, PhotogrammetryError
 
 #: Plain data, as it goes to the worker and comes back.
@@ -67,6 +68,8 @@ class JobRunner:
         Called with each event of a job.
     changed : callable
         Called where the survey's state is another.
+    language : callable
+        Returns that of the page.
     """
 
     def __init__(
@@ -74,8 +77,9 @@ class JobRunner:
         lock: threading.RLock,
         tell: Callable[[dict[str, Any]], None],
         changed: Callable[[], None],
+        language: Callable[[], str],
     ) -> None:
-        self._lock, self._tell_all, self._changed = lock, tell, changed
+        self._lock, self._tell_all, self._changed, self._language = lock, tell, changed, language
         self.jobs: dict[str, PageJob] = {}
         self._count = 0
         self._threads: list[threading.Thread] = []
@@ -101,9 +105,7 @@ class JobRunner:
         with self._lock:
             running = [job for job in self.jobs.values() if job.state == "running"]
             if running:
-                raise InputError(
-                    f"the job {running[0].kind} is still running; wait for it or cancel it."
-                )
+                raise InputError(remark("page.job_still_runs", kind=running[0].kind))
             task = task_of()
             self._count += 1
             job = PageJob(str(self._count), kind)
@@ -149,7 +151,7 @@ class JobRunner:
                 text=True, encoding="utf-8", cwd=Path.cwd(),
             )  # fmt: skip
         except OSError as error:
-            self._end(job, "failed", f"the job could not be started ({error.strerror}).")
+            self._fail(job, remark("page.job_not_started", why=error.strerror))
             return
         with process:
             with self._lock:
@@ -163,8 +165,7 @@ class JobRunner:
         elif "result" in answer:
             self._finish(job, partial(finish, task, answer["result"]))
         else:
-            why = answer.get("error", "the job ended without a result.")
-            self._end(job, "failed", without_options(why))
+            self._fail(job, answer.get("error") or remark("page.job_without_result"))
 
     def _follow(self, job: PageJob, process: subprocess.Popen[str], task: Task) -> dict[str, Any]:
         """Return the last line of a worker, telling its progress meanwhile."""
@@ -191,10 +192,13 @@ class JobRunner:
         try:
             remarks = finish()
         except (PhotogrammetryError, OSError) as error:
-            self._end(job, "failed", str(error))
+            self._fail(job, str(error))
             return
         job.progress = 1.0
         self._end(job, "done", remarks)
+
+    def _fail(self, job: PageJob, why: str) -> None:
+        self._end(job, "failed", without_options(why, self._language()))
 
     def _end(self, job: PageJob, state: str, message: str) -> None:
         job.state, job.message = state, message

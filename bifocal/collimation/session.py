@@ -73,7 +73,7 @@ class Session:
             self.pictures = Pictures(files.folder / f".{files.stem}.tiles", photos, pair)
             self.results = None if pair is None else self._results(pair)
             self.products = Products(files)
-            self.jobs = JobRunner(self.lock, self.tell, self.changed)
+            self.jobs = JobRunner(self.lock, self.tell, self.changed, lambda: self.spoken)
             self.sync = WorkbookSync(self)
             self._replay_all()
             self.journal.cut()
@@ -133,6 +133,11 @@ class Session:
         path = self.proposed_path
         if path is not None:
             self._show_pair(Pair.read(path))
+
+    @property
+    def spoken(self) -> str:
+        """Language of the page."""
+        return self.state.language or self.language
 
     @property
     def proposed_path(self) -> Path | None:
@@ -462,13 +467,10 @@ class Session:
         state, infos = self.state, self.pictures.infos
         if len(infos) != 2:
             return None
-        language = state.language or self.language
-        pair = self.pictures.pair
-        facts = (
-            dict(state.control), dict(state.tapes), state.setup, state.lenses, language, id(pair),
-        )  # fmt: skip
+        pair, said = self.pictures.pair, self.spoken
+        facts = (dict(state.control), dict(state.tapes), state.setup, state.lenses, said, id(pair))
         if self.orientation is None or self.orientation[0] != facts:
-            self.orientation = facts, live_orientation(state, infos, language, pair)
+            self.orientation = facts, live_orientation(state, infos, said, pair)
         return self.orientation[1]
 
     def measure(self, names: Sequence[str]) -> dict[str, float | None]:

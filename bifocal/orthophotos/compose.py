@@ -21,6 +21,7 @@ from bifocal.orthophotos.pull_push import fill_holes
 from bifocal.orthophotos.rectify import SourcePhoto, footprint
 from bifocal.orthophotos.visibility import hidden_from
 from bifocal.orthophotos.whole_picture import CompletedSurface
+from bifocal.remarks import remark
 from photocore.arrays import BoolArray, ByteArray, Float32Array
 from photocore.errors import InputError
 
@@ -140,17 +141,13 @@ def orthophoto(
         cut = np.s_[row : row + tile.source.shape[0], column : column + tile.source.shape[1]]
         out[cut], marks[cut], hidden[cut] = tile
     if not marks.any():
-        raise InputError(NOTHING_IN_COMMON)
+        raise InputError(remark("ortho.nothing_in_common"))
     return Orthophoto(
         image=out, source=marks, hidden=hidden, plane_from_pixel=grid.plane_from_pixel
     )
 
 
 #: Said when no pixel of an orthophoto could be taken from a photo.
-NOTHING_IN_COMMON = (
-    "the photo shows nothing of the area asked for: the relief map or the bounds belong to another "
-    "wall, or to another pair file."
-)
 
 
 def as_surface(relief: ReliefMap | Surface | ArrayLike | None) -> Surface:

@@ -42,6 +42,7 @@ from bifocal.orthophotos.section_files import write_section_dxf, write_section_s
 from bifocal.orthophotos.sections import section, section_letter
 from bifocal.orthophotos.shading import colour_limits, shaded, tints, unmeasured
 from bifocal.orthophotos.tiles import RasterResult
+from bifocal.remarks import remark
 from photocore.arrays import Float32Array, positive
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
@@ -187,22 +188,13 @@ def deliver(
         picture = replace(drawing, notes=(*told, *drawing.notes))
         missing = _pictures(place, name, picture, sheet, relief.lines if relief else ())
         if missing.names:
-            remarks += (
-                f"{missing.names} marked points stand on the sheet without name, since names would "
-                "lie over each other; the drawing (.dxf) has them all.",
-            )
+            remarks += (remark("drawing.without_name", count=missing.names),)
         if missing.points:
-            remarks += (
-                f"{missing.points} points lie outside the picture and are not on the sheet; the "
-                "drawing (.dxf) has them.",
-            )
+            remarks += (remark("drawing.outside", count=missing.points),)
         if relief:
             share = _draw_relief(place, f"{name}_relief", relief, drawing, sheet)
             if share:
-                remarks += (
-                    f"relief sheet: {share:.1%} of it was not measured but interpolated or "
-                    "hidden; paler, hatched, and without contour lines.",
-                )
+                remarks += (remark("drawing.relief_not_measured", share=share),)
         for number, cut in enumerate(cuts, start=1):
             for writer, ending in ((write_section_dxf, "dxf"), (write_section_svg, "svg")):
                 target = place / f"{name}_section{number}.{ending}"

@@ -23,6 +23,7 @@ from bifocal.orthophotos.mosaic_blending import (
     plan_mosaic,
 )
 from bifocal.orthophotos.tiles import RasterResult, write_tiles
+from bifocal.remarks import remark
 from photocore.arrays import Float32Array, IntArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
@@ -180,7 +181,7 @@ def _remarks(
     layers: Sequence[_FileLayer], seams: SeamPlan, grid: Grid, *, values: bool
 ) -> list[str]:
     """Return what the user should know of how the inputs fit."""
-    remarks = []
+    remarks: list[str] = []
     paths = [layer.reader.path for layer in layers]
     alone = len({path.name for path in paths}) == len(paths)
     names = [path.name if alone else str(path) for path in paths]
@@ -191,26 +192,23 @@ def _remarks(
         or max(abs(x - round(x)) for x in grid.offset_in(layer.grid)) > 0.01
     ]
     if moved:
-        remarks.append(
-            f"resampled, their pixels lie between those of the mosaic: {', '.join(moved)}"
-        )
+        remarks.append(remark("mosaic.resampled", names=", ".join(moved)))
     if not seams.differences:
-        remarks.append("the rasters do not overlap: exposure and fit could not be compared.")
+        remarks.append(remark("mosaic.no_overlap"))
     for (i, j), difference in seams.differences.items():
         if values and abs(difference) > _RELIEF_STEP:
+            gap = 1000 * abs(difference)
             where = "before" if difference > 0 else "behind"
             remarks.append(
-                f"{names[i]} lies {abs(difference) * 1000:.0f} mm {where} {names[j]} on their "
-                "overlap."
+                remark("mosaic.step", name=names[i], gap=gap, where=where, other=names[j])
             )
     for (i, j), likeness in seams.likeness.items():
         if likeness < _WEAK:
-            remarks.append(
-                f"{names[i]} and {names[j]} are little alike on their overlap (correlation "
-                f"{likeness:+.2f}): see whether their X and Y are of one frame."
-            )
+            told = remark("mosaic.little_alike", name=names[i], other=names[j], likeness=likeness)
+            remarks.append(told)
     if not values:
         for name, gains in zip(names, seams.gains, strict=True):
             if np.abs(gains - 1).max() > 0.02:
-                remarks.append(f"{name}: colours times {', '.join(f'{g:.2f}' for g in gains)}")
+                factors = ", ".join(f"{g:.2f}" for g in gains)
+                remarks.append(remark("mosaic.gains", name=name, factors=factors))
     return remarks

@@ -23,12 +23,13 @@ from bifocal.model.grid import Bounds, Grid
 from bifocal.model.pair import Pair
 from bifocal.model.points import SurveyPoints
 from bifocal.model.surface import EVERYWHERE, FlatSurface, MapSurface, Surface
-from bifocal.orthophotos.compose import NOTHING_IN_COMMON, choose_grid, render
+from bifocal.orthophotos.compose import choose_grid, render
 from bifocal.orthophotos.ortho_image import OrthoOptions, Source
 from bifocal.orthophotos.radiometry import corrected_photo, match_exposure
 from bifocal.orthophotos.rectify import SourcePhoto
 from bifocal.orthophotos.tiles import RasterResult, write_tiles
 from bifocal.orthophotos.triangles import TriangleSurface
+from bifocal.remarks import remark
 from photocore.arrays import ByteArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
@@ -162,7 +163,7 @@ def make_ortho(
                 what="orthophoto",
             )  # fmt: skip
             if counts[0] == total and not hidden:
-                raise InputError(NOTHING_IN_COMMON)
+                raise InputError(remark("ortho.nothing_in_common"))
     shares = {source.name.lower(): float(counts[source]) / total for source in Source}
     shares["hidden"] = hidden / total
     notes += _advice(shares, task)
@@ -185,11 +186,11 @@ def _advice(shares: dict[str, float], task: OrthoTask) -> list[str]:
         return []
     ways = []
     if task.image != "both":
-        ways.append("--image both adds what the other photo sees")
+        ways.append(remark("ortho.way_both"))
     if not task.options.fill:
-        ways.append("--fill closes holes with the colours around them")
-    ways.append("--complete makes a whole picture and marks what is not measured")
-    return [f"{shares['none']:.0%} of the picture is empty: {'; '.join(ways)}."]
+        ways.append(remark("ortho.way_fill"))
+    ways.append(remark("ortho.way_complete"))
+    return [remark("ortho.empty", share=shares["none"], ways="; ".join(ways))]
 
 
 @contextmanager
@@ -214,11 +215,8 @@ def open_surface(
         nearest = min(pair.image1.distance, pair.image2.distance)
         named = task.relief or (task.points.name if task.points is not None else "relief")
         if high >= nearest or low < -20 * pair.image1.distance:
-            raise InputError(
-                f"{named}: runs from {low:g} to {high:g} m, "
-                f"but the near camera stands {nearest:g} m from the plane. It must be in metres, "
-                "positive towards the cameras, and belong to this pair."
-            )
+            about = {"name": named, "low": low, "high": high, "near": nearest}
+            raise InputError(remark("ortho.relief_of_another_pair", **about))
         yield surface, reader, remarks
 
 
@@ -231,7 +229,8 @@ def _triangles(
     known = np.isfinite(points.xyz).all(axis=1)
     keep = known & np.array([flag not in _USELESS for flag in points.flags], dtype=bool)
     if not keep.all():
-        remarks.append(f"{int((~keep).sum())} of {len(keep)} points left out: no usable relief.")
+        count = int((~keep).sum())
+        remarks.append(remark("ortho.points_left_out", count=count, total=len(keep)))
     used = points.take(keep)
     index = {name: i for i, name in enumerate(used.ids)}
     lines = []
@@ -245,9 +244,7 @@ def _triangles(
         if len(set(line)) < 2:
             raise InputError(f"breakline {','.join(line)}: name two points or more.")
         lines.append([index[name] for name in line])
-    remarks.append(
-        "Relief between the points is interpolated; outside of them the orthophoto is empty."
-    )
+    remarks.append(remark("ortho.between_points"))
     with located(source.name):
         return TriangleSurface(used.xyz, lines), tuple(remarks)
 
@@ -275,12 +272,9 @@ def _grid(pair: Pair, first: int, size: tuple[int, int], surface: Surface, task:
     strange = not FINEST <= ratio <= COARSEST or pixels > MOST_PIXELS
     strange = strange or (ratio < FINE and pixels > MANY_PIXELS)
     if strange and not task.any_size:
-        raise InputError(
-            f"a pixel of {grid.gsd * 1000:g} mm makes an orthophoto of {grid.width:,} x "
-            f"{grid.height:,} px ({bytes_in_words(3 * pixels)}), while a pixel of the photo covers "
-            f"{own * 1000:.2g} mm. If that is what you want, add --any-size; otherwise give --gsd "
-            f"in metres or with its unit (0.005 or 5mm), or smaller --bounds."
-        )
+        about = {"size": 1000 * grid.gsd, "width": grid.width, "height": grid.height}
+        told = bytes_in_words(3 * pixels)
+        raise InputError(remark("ortho.strange_size", bytes=told, own=1000 * own, **about))
     return grid
 
 
@@ -288,23 +282,22 @@ def _sources(
     pair: Pair, images: dict[int, ImageArray], surface: Surface, grid: Grid, task: OrthoTask
 ) -> tuple[list[SourcePhoto], list[str]]:
     """Return the photos ready to be rendered, corrected as asked for, and what was done."""
-    photos, remarks = [], []
+    photos: list[SourcePhoto] = []
+    remarks: list[str] = []
     for number in sorted(images):
         photo = pair.photo(number)
         pixels = images.pop(number)  # the reduced or corrected copy is enough from here on
         image, chromatic, notes = corrected_photo(
             pixels, photo, vignetting=task.vignetting, chromatic=task.chromatic
         )
-        remarks += [f"image {number}: {note}" for note in notes]
+        remarks += [remark("ortho.of_image", number=number, note=note) for note in notes]
         photos.append(
             SourcePhoto.prepare(photo, image, number=number, gsd=grid.gsd, chromatic=chromatic)
         )
     if len(photos) == 2:
         first, second = (photo.image for photo in photos)
         if first.dtype != second.dtype or first.ndim != second.ndim:
-            raise InputError(
-                "the two photos differ in bits or colour; save both alike, or use --image 1."
-            )
+            raise InputError(remark("ortho.photos_differ"))
         if task.match:
             photos[1], note = match_exposure(photos[0], photos[1], surface, grid)
             remarks.append(note)

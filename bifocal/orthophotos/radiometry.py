@@ -20,6 +20,7 @@ from bifocal.model.photo import Photo
 from bifocal.model.surface import Surface
 from bifocal.orthophotos.rectify import ChromaticShift, SourcePhoto
 from bifocal.orthophotos.visibility import hidden_from
+from bifocal.remarks import remark
 from photocore.arrays import BoolArray, Float32Array, FloatArray
 from photocore.errors import InputError
 
@@ -53,18 +54,15 @@ def corrected_photo(
     image = as_photo(image)
     if vignetting:
         image = devignetted(image, photo, vignetting)
-        notes.append(f"vignetting corrected ({vignetting}).")
+        notes.append(remark("ortho.vignetting", law=vignetting))
     shift = None
     if chromatic:
         if image.ndim == 2:
-            notes.append("grey: no colour shift to correct.")
+            notes.append(remark("ortho.grey"))
         else:
             shift = chromatic_shift(image)
             corner = [sum(terms) * shift.radius for terms in (shift.red, shift.blue)]
-            notes.append(
-                f"colour shift corrected: red {corner[0]:+.2f} px, blue {corner[1]:+.2f} px "
-                "in the corner."
-            )
+            notes.append(remark("ortho.colour_shift", red=corner[0], blue=corner[1]))
     return image, shift, tuple(notes)
 
 
@@ -164,7 +162,7 @@ def match_exposure(
         positions.append((column, row))
     usable &= np.logical_and.reduce([((s > 0.03) & (s < 0.97)).all(axis=-1) for s in samples])
     if np.count_nonzero(usable) < _LEAST_COMMON:
-        return second, "exposure not matched: the photos share too little of the wall."
+        return second, remark("ortho.not_matched")
     centre, radius = _middle(second.size)
     column, row = positions[1]
     square = ((column - centre[0]) ** 2 + (row - centre[1]) ** 2)[usable] / radius**2
@@ -175,8 +173,7 @@ def match_exposure(
     ]
     image = _recoloured(second.image, fits, limit)
     gains = ", ".join(f"{math.exp(fit[0]):.2f}" for fit in fits)
-    note = f"image 2 matched to the colours of image 1 (gain {gains})."
-    return replace(second, image=image), note
+    return replace(second, image=image), remark("ortho.matched", gains=gains)
 
 
 def _fit(log1: FloatArray, log2: FloatArray, square: FloatArray) -> FloatArray:

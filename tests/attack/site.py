@@ -14,9 +14,8 @@ import rasterio
 from click.testing import CliRunner
 from PIL import Image
 
-import bifocal.cli.main
-import multimedia.cli.main
 from multimedia import (
+    Brown,
     Convention,
     FlatInterface,
     ImagePoints,
@@ -26,10 +25,10 @@ from multimedia import (
     write_experiment,
     write_project,
 )
-from photocore.camera.distortion import Brown
+from tests.builders.commands import bifocal_command, multimedia_command
 from tests.multimedia.tank import LAYERS, SENSOR, cameras, control
 
-PROGRAMS = {"bifocal": bifocal.cli.main.main, "multimedia": multimedia.cli.main.main}
+PROGRAMS = {"bifocal": bifocal_command, "multimedia": multimedia_command}
 
 #: Columns, rows and metres per pixel of the photos and rasters.
 WIDTH, HEIGHT, GSD = 240, 160, 0.048

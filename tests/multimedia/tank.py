@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from multimedia import Camera, Layers, Sensor, project
-from photocore.camera.distortion import Brown
+from multimedia import Brown, Camera, Layers, Sensor, project
 
 SENSOR = Sensor(width=1280, height=1024, pitch=np.array([0.012, 0.012]))
 LAYERS = Layers(indices=(1.0, 1.5, 1.337), thicknesses=(10.0,))

@@ -11,14 +11,13 @@ import click
 import pytest
 from click.testing import CliRunner, Result
 
-import bifocal.cli.main
-import multimedia.cli.main
 from bifocal import InputError
 from photocore import cli
+from tests.builders.commands import bifocal_command, multimedia_command
 
 pytest_plugins = ["pytester"]
 
-PROGRAMS = {"bifocal": bifocal.cli.main.main, "multimedia": multimedia.cli.main.main}
+PROGRAMS = {"bifocal": bifocal_command, "multimedia": multimedia_command}
 
 
 @pytest.fixture

@@ -9,11 +9,10 @@ import click
 import pytest
 from click.testing import CliRunner
 
-import bifocal.cli.main
-import multimedia.cli.main
 from photocore.options import Length, Number, Numbers, Size
+from tests.builders.commands import bifocal_command, multimedia_command
 
-PROGRAMS = {"bifocal": bifocal.cli.main.main, "multimedia": multimedia.cli.main.main}
+PROGRAMS = {"bifocal": bifocal_command, "multimedia": multimedia_command}
 CANON = "--focal 35 --focal 19 --sensor 22.7x15.1"
 RING = "design --distance 0.6 --c 25 --extent 0.3x0.3 --depths 0.02x0.2"
 DELIVER = "ortho w.pair.json --deliver d"

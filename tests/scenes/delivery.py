@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from bifocal import Orthophoto, Quality, ReliefMap
-from photocore.arrays import BoolArray, FloatArray
+from tests.scenes.arrays import BoolArray, FloatArray
 from tests.scenes.rendering import Rendering
 
 #: Errors beyond this are visible at 1:50. [m]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bifocal import Pair, ReliefMap
-from photocore.arrays import BoolArray, ByteArray, FloatArray, IntArray
+from tests.scenes.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from tests.scenes.cameras import CameraPair, SceneCamera
 from tests.scenes.shapes import Scene
 from tests.scenes.texture import Painter

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from photocore.arrays import FloatArray
+from tests.scenes.arrays import FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from photocore.arrays import BoolArray, FloatArray
+from tests.scenes.arrays import BoolArray, FloatArray
 from tests.scenes.shapes import Material, Scene
 from tests.scenes.tracing import Faces, Tracer
 

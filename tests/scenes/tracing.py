@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from photocore.arrays import BoolArray, FloatArray
+from tests.scenes.arrays import BoolArray, FloatArray
 from tests.scenes.shapes import Convex, Material, Scene
 
 Faces = NDArray[np.int32]

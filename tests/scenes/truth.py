@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bifocal import Grid, ReliefMap
-from photocore.arrays import BoolArray, FloatArray
+from tests.scenes.arrays import BoolArray, FloatArray
 from tests.scenes.cameras import SceneCamera
 from tests.scenes.tracing import Faces, Parallel, Tracer
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from bifocal import Pair
 from multimedia import Layers
-from photocore.arrays import FloatArray
+from tests.scenes.arrays import FloatArray
 from tests.scenes.cameras import CameraPair, SceneCamera
 
 

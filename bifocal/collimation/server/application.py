@@ -21,6 +21,7 @@ from bifocal.collimation.server.requests import answer, in_thread, json_body, se
 from bifocal.collimation.server.security import Guard, TooLarge, cookie_of
 from bifocal.collimation.server.state_view import state_of
 from bifocal.collimation.session import Session
+from bifocal.remarks import in_language
 from photocore.errors import PhotogrammetryError
 
 #: Seconds after which an idle stream of events says that it is alive.
@@ -67,8 +68,9 @@ async def _fault(request: Request, error: Exception) -> Response:  # noqa: ARG00
     return answer({"error": f"an error of the program ({type(error).__name__})."}, 500)
 
 
-async def _refused(request: Request, error: Exception) -> Response:  # noqa: ARG001
-    return answer({"error": str(error)}, 422)
+async def _refused(request: Request, error: Exception) -> Response:
+    spoken = request.app.state.session.spoken
+    return answer({"error": in_language(str(error), spoken)}, 422)
 
 
 async def _plain_error(request: Request, error: Exception) -> Response:  # noqa: ARG001
@@ -82,7 +84,7 @@ async def _too_large(request: Request, error: Exception) -> Response:  # noqa: A
 
 async def _page(request: Request) -> Response:
     session = session_of(request)
-    text = request.app.state.assets.page(session.state.language or session.language)
+    text = request.app.state.assets.page(session.spoken)
     response = Response(text, media_type="text/html", headers={"cache-control": "no-store"})
     if "token" in request.query_params:
         response.set_cookie(

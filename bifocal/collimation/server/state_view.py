@@ -26,7 +26,7 @@ def state_of(session: Session) -> dict[str, Any]:
         return {
             "serving": session.serving,
             "revision": session.revision,
-            "language": state.language or session.language,
+            "language": session.spoken,
             "title": session.files.stem,
             "stage": state.stage or _stage(session),
             "workbook": session.files.workbook.name,
@@ -79,7 +79,7 @@ def _length_unit(session: Session) -> str:
 
 def _photos(session: Session) -> list[dict[str, Any]]:
     shown: list[dict[str, Any]] = []
-    language = session.state.language or session.language
+    language = session.spoken
     for number, info in enumerate(session.pictures.infos, start=1):
         typed = session.state.lenses.get(number, {})
         shown.append(
@@ -149,7 +149,6 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
     centre = np.asarray(pair.zoom_centre)
     found = (session.proposal or {}).get("report", {}).get("remarks", ())
     remarks = dict.fromkeys((*pair.remarks, *found))
-    language = session.state.language or session.language
     return plain(
         {
             "name": str(pair.extra.get("name") or session.files.stem),
@@ -165,7 +164,7 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
             "images": images,
             "accepted": session.proposed_path is None,
             "report": session.proposal and session.proposal["report"],
-            "remarks": [without_options(str(remark), language) for remark in remarks],
+            "remarks": [without_options(said, session.spoken) for said in remarks],
         }
     )
 
@@ -208,7 +207,7 @@ def _live(live: LiveOrientation | None) -> dict[str, Any] | None:
 
 def _advice(session: Session, live: LiveOrientation | None) -> list[str]:
     """Return what would help most next."""
-    language = session.state.language or session.language
+    language = session.spoken
     if len(session.pictures.infos) < 2:
         return [say("ask", "photos", language)]
     if session.files.pair is not None:

@@ -34,7 +34,10 @@ class Survey(Protocol):
     lock: threading.RLock
     files: SurveyFiles
     state: SurveyState
-    language: str
+
+    @property
+    def spoken(self) -> str:
+        """Language of the page."""
 
     @property
     def accepted_pair(self) -> Pair | None:
@@ -175,7 +178,6 @@ class WorkbookSync:
             points = survey.state.sorted_points()
             pair, pair_path = survey.accepted_pair, survey.files.pair
             revision = survey.state.revision
-            language = survey.state.language or survey.language
         wanted = {point.name: row_of(point) for point in points}
         if pair is None or pair_path is None:
             return
@@ -195,7 +197,7 @@ class WorkbookSync:
             if not any(point.is_complete for point in points):
                 return
             check_not_open(path)
-            write_new(path, points, pair, pair_path, language)
+            write_new(path, points, pair, pair_path, survey.spoken)
         read = read_rows(path)
         if lost := wanted.keys() - read.rows.keys():
             raise InputError(f"{path.name}: did not take {len(lost)} points, {min(lost)} first.")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.survey_input import SurveyInput, where_of, with_measured
 from bifocal.workbook.reading.known_reader import (
@@ -247,11 +248,8 @@ def _observations(table: Table, errors: list[CellError]) -> tuple[PointObservati
     ids = [name or "" for name in ids]
     said = bare(table.headings.get("theta", "")) in ("angle", "angolo", "winkel")
     if said and len(table) and "s1" in table.present and "x1" not in table.present:
-        table.remarks.append(
-            f'{table.cell(0, "theta")}: "{table.headings["theta"]}" is read as theta, clockwise '
-            "from up (+y). Of angles that run counter-clockwise from +x, as in CAD, X and Y would "
-            "come out exchanged: call the column theta and fill in 90 deg minus the angle."
-        )
+        about = {"cell": table.cell(0, "theta"), "heading": table.headings["theta"]}
+        table.remarks.append(remark("survey.angle_as_theta", **about))
     errors += table.repeated("id")
     refuse_absurd(table, (*_XY, *_POLAR, *_PIXELS, "r_measured"), errors)
     use = table.numbers("use")

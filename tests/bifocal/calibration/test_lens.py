@@ -13,6 +13,7 @@ from PIL import Image
 
 from bifocal import InputError, Interior, Lens, calibrate, read_image, write_image
 from bifocal.calibration.board_calibration import lens_of_views
+from bifocal.calibration.lens_database import lens_from_database
 from bifocal.calibration.plumb_line import calibrate_from_lines, find_straight_edges
 from bifocal.calibration.workflow import undistorted
 from bifocal.model.interior_orientation import lens_of_photo
@@ -455,8 +456,6 @@ def canon(path, focal=19.0, lens="Canon EF-S 18-55mm f/3.5-5.6", model="Canon EO
 
 def test_the_database_scale_on_the_axis_is_taken_out(tmp_path):
     pytest.importorskip("lensfunpy")
-    from bifocal.calibration.lens_database import lens_from_database
-
     for focal, axis in ((19.0, 1.035), (35.0, 1.007)):
         found = lens_from_database(canon(tmp_path / f"{focal}.jpg", focal))
         assert found.axis_scale == pytest.approx(axis, abs=0.001)
@@ -469,8 +468,6 @@ def test_the_database_scale_on_the_axis_is_taken_out(tmp_path):
 
 def test_an_ambiguous_or_unknown_lens_is_offered_as_a_choice(tmp_path):
     pytest.importorskip("lensfunpy")
-    from bifocal.calibration.lens_database import lens_from_database
-
     with pytest.raises(InputError, match=r"Choose one[\s\S]*EF-S 18-55mm f/3.5-5.6"):
         lens_from_database(canon(tmp_path / "a.jpg", lens=""))
     with pytest.raises(InputError, match="not in the lens database"):

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from bifocal import InputError
-from bifocal.campaigns import pair_job
 from bifocal.campaigns.dask_cluster import _look
 from bifocal.campaigns.pair_job import PairJob, run_pair
 from bifocal.campaigns.shipping import packed, run_parcel, unpacked
@@ -39,7 +38,7 @@ def job(tmp_path, monkeypatch) -> PairJob:
             Step(name="points", files=table, after=("align",), make=points),
         ]
 
-    monkeypatch.setattr(pair_job, "steps_of", steps_of)
+    monkeypatch.setattr("bifocal.campaigns.pair_job.steps_of", steps_of)
     (tmp_path / "photos").mkdir()
     for name in ("photos/far.jpg", "photos/near.jpg", "control.csv"):
         (tmp_path / name).write_text(name)

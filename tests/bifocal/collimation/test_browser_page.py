@@ -271,7 +271,7 @@ def test_what_is_refused_stays_as_it_was_typed(page: Driver) -> None:
     fields = [page.tab.get_by_test_id(f"tape-{index}") for index in range(4)]
     toast = "() => document.querySelector('[data-testid=toast]').textContent"
     # A sigma with its unit and an unknown point are refused, a decimal comma is none of both.
-    for name, sigma, told in (("H", "5 mm", "no number"), ("Z", "0,005", "no control point Z")):
+    for name, sigma, told in (("H", "5 mm", "above zero"), ("Z", "0,005", "no control point Z")):
         typed = ["G", name, "3,002", sigma]
         for field, text in zip(fields, typed, strict=True):
             field.fill(text)

@@ -231,9 +231,14 @@ def test_a_job_that_fails_says_why_and_one_that_is_cancelled_leaves_nothing(tmp_
         small = {"kind": "ortho", "bounds": [900, 900, 901, 901], "gsd": 0.01}
         job = _wait(client, client.post("/api/jobs", json=small).json()["id"])
         assert job["state"] == "failed"
-        assert job["message"]
+        assert job["message"].startswith("the photo shows nothing of the area asked for")
+        session.language = "it"
+        job = _wait(client, client.post("/api/jobs", json=small).json()["id"])
+        assert job["message"].startswith("la foto non mostra nulla dell'area richiesta")
         number = client.post("/api/jobs", json={"kind": "relief"}).json()["id"]
-        assert client.post("/api/jobs", json={"kind": "match"}).status_code == 422
+        refused = client.post("/api/jobs", json={"kind": "match"})
+        assert refused.status_code == 422
+        assert refused.json()["error"].startswith("il lavoro relief è ancora in corso")
         assert client.delete(f"/api/jobs/{number}").status_code == 200
         assert _wait(client, number)["state"] == "cancelled"
         for bad in ({"kind": "roof"}, {"kind": "deliver", "sheet": "../A3"}, {"kind": "relief",

@@ -10,7 +10,7 @@ from bifocal import Measuring, Pair, Photo, RadialDivision, georeference, solve
 from bifocal.model.orientation_precision import CAMERA, NAMES, moved, pinhole
 from multimedia import InputError
 from photocore.camera.pinhole import PARAMETERS, plane_from_pixel
-from photocore.camera.rotation import rotation_from_vector
+from tests.builders.pinholes import rotation_from_vector
 from tests.scenes import SetupErrors, bifocal_cameras
 
 CAMERAS = bifocal_cameras(errors=SetupErrors(tilt_deg=8.0), rng=np.random.default_rng(2))

@@ -11,7 +11,6 @@ from click.testing import CliRunner
 
 from bifocal import GeometryError, InputError, Pair, PairMedia, Similarity, read_control
 from bifocal.model.orientation_precision import pinhole
-from bifocal.networks import joint_adjustment
 from bifocal.networks.joint_adjustment import adjust_jointly
 from bifocal.networks.joint_control import named_positions
 from bifocal.networks.joint_observations import (
@@ -26,10 +25,10 @@ from bifocal.networks.joint_workflow import (
     _write_pair,
     adjust_pairs,
 )
-from photocore.camera.rotation import rotation_from_vector
 from tests.bifocal.orientation.many_pairs import many_pairs
 from tests.bifocal.orientation.street import write_street
 from tests.builders.commands import bifocal_command as main
+from tests.builders.pinholes import rotation_from_vector
 
 
 @pytest.mark.acceptance
@@ -171,7 +170,7 @@ def test_two_control_points_hold_no_frame_and_bend_nothing():
 
 
 def test_more_gross_errors_than_rounds_are_said_to_be_left_in(monkeypatch):
-    monkeypatch.setattr(joint_adjustment, "ROUNDS", 1)
+    monkeypatch.setattr("bifocal.networks.joint_adjustment.ROUNDS", 1)
     case = many_pairs(4, np.random.default_rng(5), control=8)
     known = case.observations.known.copy()
     known[[2, 5], 2] += 0.4

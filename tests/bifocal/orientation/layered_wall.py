@@ -12,8 +12,7 @@ import cv2
 import numpy as np
 
 from bifocal import Pinhole
-from photocore.camera.pinhole import camera_matrix
-from photocore.camera.rotation import rotation_from_vector
+from tests.builders.pinholes import camera_matrix, rotation_from_vector
 
 SIZE = (960, 640)
 #: Boards: x, y of the lower left corner, width, height, relief. [m]

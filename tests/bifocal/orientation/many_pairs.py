@@ -9,8 +9,7 @@ import numpy as np
 from bifocal import Pinhole
 from bifocal.networks.joint_adjustment import JointUnknowns
 from bifocal.networks.joint_observations import JointObservations
-from photocore.camera.pinhole import camera_matrix, project
-from photocore.camera.rotation import rotation_from_vector
+from tests.builders.pinholes import camera_matrix, project, rotation_from_vector
 
 #: 35 mm at 17.5 m and 19 mm at 9.5 m with 3.8 um pixels, 5000 x 3300 px: 9.5 x 6.3 m of wall.
 FOCAL, DISTANCE, SIZE = (9210.0, 5000.0), (17.5, 9.5), (5000, 3300)

@@ -7,8 +7,9 @@ import pytest
 from bifocal import Control, GeometryError, Interior, SiteMeasures
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.orientation_stages import PhotoInput
-from photocore.camera.pinhole import project, triangulate
+from photocore.camera.pinhole import triangulate
 from tests.bifocal.orientation.layered_wall import BOARDS, SIZE, camera, photograph, relief_at, take
+from tests.builders.pinholes import project
 
 FAR = camera(16.0, turn_deg=(0.3, -0.2, 0.15), shift=(5.0, -4.0))
 NEAR = camera(9.0, offset=(0.05, -0.04), turn_deg=(-0.2, 0.25, -0.2), shift=(-4.0, 3.0))

@@ -21,11 +21,10 @@ from bifocal.networks.joint_adjustment import (
 from bifocal.networks.joint_observations import JointObservations
 from bifocal.networks.joint_workflow import _adjusted_pair, _adjusted_photo
 from multimedia import Layers
-from photocore.camera.pinhole import camera_matrix
-from photocore.camera.rotation import rotation_from_vector
 from tests.bifocal.model.test_pair_through_media import PAIRS, content
 from tests.bifocal.orientation.street import CONTROL, write_table
 from tests.builders.commands import bifocal_command as main
+from tests.builders.pinholes import camera_matrix, rotation_from_vector
 from tests.scenes import SetupErrors, bifocal_cameras, demo_scene, render
 from tests.scenes.wet import WetCamera, under_water
 

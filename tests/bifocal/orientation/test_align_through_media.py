@@ -29,15 +29,13 @@ from bifocal import (
 )
 from bifocal.media import interface_axes, view
 from bifocal.model.orientation_precision import NAMES, from_dict, names_of
-from bifocal.orientation import absolute_orientation
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.orientation_stages import PhotoInput, with_bent_ties
 from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.walls.bend import WallBend, bend_in_words
 from multimedia import Layers
-from photocore.camera.pinhole import camera_matrix, project
-from photocore.camera.rotation import rotation_from_vector
 from tests.builders.commands import bifocal_command as main
+from tests.builders.pinholes import camera_matrix, project, rotation_from_vector
 from tests.scenes import SetupErrors, bifocal_cameras
 from tests.scenes.refracted import seen_at
 from tests.scenes.wet import under_water
@@ -584,8 +582,10 @@ def test_unknown_lenses_are_named_where_control_does_not_make_up_for_them(
     monkeypatch, kind, seed, count, relief, said
 ):
     """Before photos are matched: control off the wall by 2 to 5 cm, picked to 0.3 px."""
-    monkeypatch.setattr(absolute_orientation, "HOPELESS", 0.3)
-    monkeypatch.setattr(absolute_orientation, "ties_of", lambda *_, **__: pytest.fail("matched"))
+    monkeypatch.setattr("bifocal.orientation.absolute_orientation.HOPELESS", 0.3)
+    monkeypatch.setattr(
+        "bifocal.orientation.absolute_orientation.ties_of", lambda *_, **__: pytest.fail("matched")
+    )
     rng = np.random.default_rng(seed)
     taken, media, placed = cameras(kind)
     xyz = points(rng, count, relief)

@@ -13,9 +13,9 @@ from bifocal.cli import match as match_command
 from bifocal.orientation.validation import check_distortion
 from bifocal.workbook.match_workflow import match_summary
 from multimedia import GeometryError
-from photocore.camera.pinhole import project
 from tests.bifocal.orientation.layered_wall import camera, relief_at, take
 from tests.builders.commands import bifocal_command as main
+from tests.builders.pinholes import project
 
 FAR = camera(16.0, turn_deg=(0.3, -0.2, 0.15))
 NEAR = camera(9.0, offset=(0.05, -0.04), turn_deg=(-0.2, 0.25, -0.2))

@@ -10,8 +10,7 @@ from bifocal.orientation.facade_lines import (
     facade_turn,
     lines_of_photos,
 )
-from photocore.camera.pinhole import camera_matrix, project
-from photocore.camera.rotation import rotation_from_vector
+from tests.builders.pinholes import camera_matrix, project, rotation_from_vector
 
 SIZE = (1200, 800)
 MATRIX = camera_matrix(1500.0, 1.0, 605.0, 396.0)

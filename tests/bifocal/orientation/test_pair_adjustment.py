@@ -19,8 +19,8 @@ from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.starts.space_resection import resect
 from bifocal.orientation.tie_points import with_wall
 from bifocal.orientation.walls.reference_plane import NarrowFace
-from photocore.camera.pinhole import project
 from tests.bifocal.orientation.layered_wall import SIZE, camera
+from tests.builders.pinholes import project
 
 FAR = camera(16.0, offset=(0.4, -0.2), turn_deg=(8.0, -20.0, 1.0), shift=(4.0, -3.0))
 NEAR = camera(9.0, offset=(-0.3, 0.1), turn_deg=(-6.0, 15.0, -2.0), shift=(-3.0, 5.0))

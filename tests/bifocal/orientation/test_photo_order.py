@@ -13,15 +13,15 @@ import pytest
 
 from bifocal import Control, GeometryError, Interior, SiteMeasures
 from bifocal.collimation.job_tasks import task_of
-from bifocal.orientation import approximate_orientation
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.align_workflow import AlignOptions, KnownLens, _way, align_photos
 from bifocal.orientation.approximate_orientation import Given, order_of
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.starts.photo_order import SURE, first_is_far
 from bifocal.orientation.starts.relative_orientation import Ties
-from photocore.camera.pinhole import plane_transfer, project
+from photocore.camera.pinhole import plane_transfer
 from tests.bifocal.orientation.layered_wall import SIZE, camera, relief_at, take
+from tests.builders.pinholes import project
 from tests.page_session import opened, sample_folder
 
 FAR, NEAR = camera(16.0), camera(8.0)
@@ -71,7 +71,9 @@ def test_a_flat_wall_shows_no_order() -> None:
 
 def test_lenses_alike_leave_no_order_to_ask(views, monkeypatch) -> None:
     """What was typed for one photo fits the other as well: the scale on the wall tells."""
-    monkeypatch.setattr(approximate_orientation, "first_is_far", lambda *_: pytest.fail("asked"))
+    monkeypatch.setattr(
+        "bifocal.orientation.approximate_orientation.first_is_far", lambda *_: pytest.fail("asked")
+    )
     photos = tuple(replace(p, interior=typed(FAR)) for p in inputs(views.far, views.near))
     given = Given(photos=(photos[0], photos[1]), control=Control(), site=SITE)
     assert order_of(given, ties(FAR, NEAR)) == np.inf
@@ -103,14 +105,17 @@ def test_photos_in_the_wrong_order_keep_the_sign_of_relief(views) -> None:
 
 @pytest.mark.acceptance
 def test_an_order_that_nothing_tells_is_asked(views, monkeypatch) -> None:
-    monkeypatch.setattr(approximate_orientation, "first_is_far", lambda *_: -2.0)
+    monkeypatch.setattr("bifocal.orientation.approximate_orientation.first_is_far", lambda *_: -2.0)
     made = orient_pair(inputs(views.far, views.near), control=Control(), site=SITE)
     assert not made.exchanged
     assert "cannot be told" in made.remarks[0]
 
 
 def test_missing_focal_lengths_are_found_before_the_work(views, monkeypatch) -> None:
-    monkeypatch.setattr(approximate_orientation, "find_features", lambda *_: pytest.fail("worked"))
+    monkeypatch.setattr(
+        "bifocal.orientation.approximate_orientation.find_features",
+        lambda *_: pytest.fail("worked"),
+    )
     unknown = [
         replace(photo, interior=Interior.unknown(SIZE)) for photo in inputs(views.far, views.near)
     ]

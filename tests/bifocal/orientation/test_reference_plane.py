@@ -15,8 +15,8 @@ from bifocal.orientation.walls.reference_plane import (
     rivals_in_words,
     zero_sigma,
 )
-from photocore.camera.pinhole import project
 from tests.bifocal.orientation.layered_wall import SIZE, camera
+from tests.builders.pinholes import project
 
 CAMERAS = (camera(17.5), camera(9.5))
 SITE = SiteMeasures(distance1=17.5, distance2=9.5, parallel=True)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from bifocal import Control, GeometryError, Interior, SiteMeasures
-from bifocal.orientation import absolute_orientation
 from bifocal.orientation.absolute_orientation import _with_words, orient_pair
 from bifocal.orientation.adjustment.pair_observations import PairObservations
 from bifocal.orientation.alignment import make_alignment
@@ -15,9 +14,9 @@ from bifocal.orientation.orientation_remarks import hopeless_bend, model_remarks
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.slips import slip_of
 from bifocal.orientation.walls.bend import WallBend
-from photocore.camera.pinhole import project
 from tests.bifocal.orientation.layered_wall import SIZE, camera
 from tests.bifocal.orientation.test_pair_adjustment import POINTS
+from tests.builders.pinholes import project
 
 #: Turned to the wall, and square to it.
 OBLIQUE = (
@@ -163,7 +162,8 @@ def test_the_near_photo_first_takes_its_own_distance_along(monkeypatch) -> None:
     """And slips are looked for once, before the photos are exchanged."""
     asked = []
     monkeypatch.setattr(
-        absolute_orientation, "slip_of", lambda *given, **how: asked.append(slip_of(*given, **how))
+        "bifocal.orientation.absolute_orientation.slip_of",
+        lambda *given, **how: asked.append(slip_of(*given, **how)),
     )
     far, near = photos()
     site = SiteMeasures(distance1=9.0, distance2=16.0)

@@ -8,7 +8,6 @@ import pytest
 
 from bifocal import Control, GeometryError, Interior, Pair, Pinhole, RadialDivision, SiteMeasures
 from bifocal.matching.features import Features, match_features
-from bifocal.orientation import absolute_orientation
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import make_alignment
 from bifocal.orientation.orientation_stages import PhotoInput
@@ -121,8 +120,10 @@ def bent_pair(k: tuple[float, float], way: str, seed: int, monkeypatch: pytest.M
         pixels1=first, pixels2=second, seen1=first, seen2=second, homography=homography,
         on_plane=wall, tolerance=0.3,
     )  # fmt: skip
-    monkeypatch.setattr(absolute_orientation, "ties_of", lambda *_, **__: (ties, ()))
-    monkeypatch.setattr(absolute_orientation, "_mended_by_ties", lambda *_: None)
+    monkeypatch.setattr(
+        "bifocal.orientation.absolute_orientation.ties_of", lambda *_, **__: (ties, ())
+    )
+    monkeypatch.setattr("bifocal.orientation.absolute_orientation._mended_by_ties", lambda *_: None)
     far, near = (round(float(camera.centre[2]), 3) for camera in both)
     site = SiteMeasures(distance1=far, distance2=near)
     control = Control()

@@ -5,6 +5,7 @@ import openpyxl
 import pytest
 
 import bifocal
+from bifocal.workbook.output import write_result
 from bifocal.workbook.reading.reader import read_survey
 from multimedia import InputError, WorkbookError
 
@@ -247,3 +248,12 @@ def test_the_number_of_a_point_is_told_from_its_north(book):
 def test_a_table_of_angles_without_points_says_what_is_missing(book):
     with pytest.raises(InputError, match="there is no point"):
         bifocal.solve(book(Picks=[("id", "s1", "s2", "Winkel")]), **OPTIONS)
+
+
+def test_centimetres_typed_into_the_cells_become_the_millimetres_that_formulas_see(book):
+    rows = [(name, *(f"{value / 10!r} cm" for value in pick)) for name, *pick in TABLE[1:]]
+    path = book(Camera=LABELS, Picks=[TABLE[0], *rows])
+    write_result(path, bifocal.solve(path), overwrite=True)
+    sheet = openpyxl.load_workbook(path)["Picks"]
+    cells = [[cell.value for cell in row] for row in sheet["B2:E5"]]
+    np.testing.assert_allclose(cells, PICKS, rtol=1e-14)

@@ -121,7 +121,7 @@ ALL = Unknowns(interior=INNER, media=("index3",))
 
 def with_true_cameras(project_, interior=True):
     """Return the project started at the truth, for problems whose datum comes from the cameras."""
-    from photocore.camera.distortion import Brown
+    from multimedia import Brown
 
     cameras = []
     for k, (pose, inner) in enumerate(zip(POSES, INTERIORS, strict=True)):

@@ -30,7 +30,6 @@ from multimedia import (
     study_setup,
     write_project,
 )
-from multimedia.design import design_files
 from multimedia.design.design_files import write_design_plot
 from tests.builders.commands import multimedia_command as main
 
@@ -221,7 +220,8 @@ def test_the_plot_holds_no_empty_panel_and_no_curve_beyond_its_rim(monkeypatch, 
     """Angles near 180 degrees, no cone to place, sigmas of micrometres in their own unit."""
     figures = []
     monkeypatch.setattr(
-        design_files, "write_figure", lambda _, figure, **__: figures.append(figure)
+        "multimedia.design.design_files.write_figure",
+        lambda _, figure, **__: figures.append(figure),
     )
     depth = np.linspace(0.02, 0.2, 4)
     by_depth = np.column_stack([depth, *(np.full(4, s) for s in (2e-5, 2e-5, 6e-5, 173.0, 171.0))])

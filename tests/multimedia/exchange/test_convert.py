@@ -14,6 +14,7 @@ from click.testing import CliRunner
 from scipy.optimize import brentq
 
 from multimedia import (
+    Brown,
     Camera,
     Convention,
     FlatInterface,
@@ -31,7 +32,6 @@ from multimedia import (
     read_project,
     write_project,
 )
-from photocore.camera.distortion import Brown
 from tests.builders.commands import multimedia_command as main
 
 SENSOR = Sensor(width=1936, height=1216, pitch=np.array([0.00345, 0.00346]))

@@ -12,7 +12,9 @@ import pytest
 from click.testing import CliRunner
 
 from multimedia import (
+    Brown,
     Camera,
+    Fisheye,
     FlatInterface,
     ImagePoints,
     InputError,
@@ -34,8 +36,6 @@ from multimedia import (
 )
 from multimedia.media.camera import EXTERIOR
 from multimedia.media.projection import project_with_jacobian
-from photocore.camera.distortion import Brown
-from photocore.camera.fisheye import Fisheye
 from tests.builders.commands import multimedia_command as main
 from tests.rounding import EPS
 

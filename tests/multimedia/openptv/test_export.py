@@ -10,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from multimedia import (
+    Brown,
     Convention,
     FlatInterface,
     ImagePoints,
@@ -24,7 +25,6 @@ from multimedia import (
     write_experiment,
     write_project,
 )
-from photocore.camera.distortion import Brown
 from tests.builders.commands import multimedia_command as main
 from tests.multimedia.tank import SENSOR, cameras, control
 

@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from multimedia import (
+    Brown,
     Convention,
     FlatInterface,
     GeometryError,
@@ -35,7 +36,6 @@ from multimedia.openptv.openptv_files import (
     read_targets,
 )
 from multimedia.openptv.workflow import import_openptv
-from photocore.camera.distortion import Brown
 from tests.builders.commands import multimedia_command as main
 from tests.multimedia.tank import LAYERS, SENSOR, cameras, control
 

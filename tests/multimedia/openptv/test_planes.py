@@ -11,6 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from multimedia import (
+    Brown,
     Camera,
     Convention,
     FlatInterface,
@@ -21,7 +22,6 @@ from multimedia import (
     write_experiment,
 )
 from multimedia.openptv.workflow import import_openptv
-from photocore.camera.distortion import Brown
 from tests.builders.commands import multimedia_command as main
 from tests.multimedia.tank import SENSOR
 

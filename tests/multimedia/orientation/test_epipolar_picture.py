@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from multimedia.orientation import epipolar_picture
 from multimedia.orientation.epipolar_picture import draw_epipolar
 
 
@@ -13,7 +12,8 @@ def drawn(monkeypatch, tmp_path, curves, targets=()):
     """Return the axes of a picture of curves over 1280 x 1024 px, depths from -12 to 12."""
     figures: list[Figure] = []
     monkeypatch.setattr(
-        epipolar_picture, "write_figure", lambda _, figure, **__: figures.append(figure)
+        "multimedia.orientation.epipolar_picture.write_figure",
+        lambda _, figure, **__: figures.append(figure),
     )
     draw_epipolar(
         tmp_path / "curves.png", curves, [f"p{k}" for k in range(len(curves))],

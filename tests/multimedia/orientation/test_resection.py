@@ -11,6 +11,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from multimedia import (
+    Brown,
     Camera,
     ConvergenceError,
     FlatInterface,
@@ -24,8 +25,8 @@ from multimedia import (
 )
 from multimedia.media.camera import EXTERIOR, INTERIOR
 from multimedia.orientation import pose_starts
-from photocore.camera.distortion import Brown
-from photocore.camera.rotation import rotation_from_vector, world_from_camera
+from photocore.camera.rotation import world_from_camera
+from tests.builders.pinholes import rotation_from_vector
 from tests.multimedia.tank import LAYERS, cameras, control, images
 
 CALIBRATION = ("c", "xh", "yh", "k1", "p1", "p2", "scale")

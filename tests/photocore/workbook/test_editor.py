@@ -11,6 +11,7 @@ import pytest
 
 from bifocal import InputError
 from photocore.tables import Column, read_table
+from photocore.workbook.changing.cells import NewCell, NewColumn, NewRows, RowFormula
 from photocore.workbook.changing.changes import SheetChanges
 from photocore.workbook.changing.editor import WorkbookEditor
 from photocore.workbook.changing.splice import splice_sheet
@@ -362,8 +363,6 @@ def test_another_reader_sees_the_stored_results(rich, tmp_path):
 
 
 def test_blocks_and_typed_cells_meet_in_rows_that_exist_or_not():
-    from photocore.workbook.changing.cells import NewColumn, NewRows, RowFormula
-
     before = '<w><sheetData><row r="3"><c r="A3" s="5"/><c r="C3"/></row></sheetData></w>'
     columns = [
         NewColumn(1, [1.0, 2.0, None], "7"),
@@ -392,8 +391,6 @@ def test_blocks_and_typed_cells_meet_in_rows_that_exist_or_not():
 def test_a_formula_copied_downwards_moves_its_relative_rows_only(formula, moved):
     from openpyxl.formula.translate import Translator
 
-    from photocore.workbook.changing.cells import RowFormula
-
     assert RowFormula(formula, 2).at(7) == moved
     if "_x" not in formula:
         assert Translator(f"={formula}", "F2").translate_formula("F7") == f"={moved}"
@@ -413,8 +410,6 @@ PLAIN_CHANGES = [
 
 @pytest.mark.parametrize("changes", PLAIN_CHANGES)
 def test_a_plain_sheet_changes_as_by_the_parser(changes):
-    from photocore.workbook.changing.cells import NewCell, NewColumn, NewRows
-
     cells = (
         '<row r="2" spans="1:4"><c r="A2" t="inlineStr"><is><t>P1 &amp; Ö</t></is></c>'
         '<c r="B2" s="3"><v>1.5</v></c><c r="C2"><v/></c>'

@@ -10,7 +10,6 @@ import pytest
 from photocore.workbook.changing.cells import NewColumn, NewRows, result_texts, type_and_content
 from photocore.workbook.changing.changes import SheetChanges
 from photocore.workbook.changing.splice import splice_sheet
-from photocore.workbook.reading import plainsheet
 from photocore.workbook.reading.plainsheet import plain_rows, sheet_data
 from photocore.workbook.reading.xlsx import open_xlsx
 from tests.bare_workbook import write
@@ -77,7 +76,7 @@ def formed(text):
 
 @pytest.fixture(autouse=True)
 def eager(monkeypatch):
-    monkeypatch.setattr(plainsheet, "_OFTEN", 3)
+    monkeypatch.setattr("photocore.workbook.reading.plainsheet._OFTEN", 3)
 
 
 CASES = [(1, 0.0), (2, 0.02), (3, 0.1), (4, 0.3), (5, 0.05)]
