@@ -15,7 +15,7 @@ from bifocal.model.orientation_precision import rates_of
 from bifocal.model.pair import Pair
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.adjustment.pair_observations import at
-from bifocal.orientation.adjustment.seen_points import on_the_plane, views_of
+from bifocal.orientation.adjustment.seen_points import views_of
 from bifocal.orientation.align_workflow import SIGMA_ON_WALL, KnownLens, interior_of_photo
 from bifocal.orientation.alignment import standard_deviations
 from bifocal.orientation.control_points import Control, SiteMeasures
@@ -198,7 +198,7 @@ def _most_help(oriented: OrientedPair, language: str) -> list[str]:
         for across in range(3):
             for down in range(3):
                 pixel = np.array([[width * (0.1 + 0.4 * across), height * (0.1 + 0.4 * down)]])
-                place = on_the_plane(oriented.adjusted, 0, pixel)
+                place = oriented.adjusted.media.on_plane(0, cameras[0], pixel)
                 place[:, 2] = relief
                 design, noise = _control_rows(oriented, place)
                 after = _sigma_with(covariance, design, noise, watched)

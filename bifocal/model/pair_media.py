@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from bifocal import rays
 from bifocal.media import MediaPath, interface_axes, view
 from bifocal.model.orientation_precision import (
     CAMERA,
@@ -29,7 +30,7 @@ from bifocal.rays import Foot, foot_of, straight
 from multimedia import Layers
 from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX, typical_sigma
 from photocore.arrays import FloatArray, not_negative, positive
-from photocore.camera.pinhole import PARAMETERS, Pinhole, ProjectedPoints
+from photocore.camera.pinhole import PARAMETERS, Pinhole, ProjectedPoints, ray_on_plane, triangulate
 from photocore.camera.rotation import rotation_from_vector
 from photocore.errors import InputError
 
@@ -354,6 +355,26 @@ class PairMedia:
         first = number * len(CAMERA)
         by_camera = rates[..., first : first + len(PARAMETERS)]
         return ProjectedPoints(seen.pixels, seen.by_point, by_camera)
+
+    def on_plane(self, number: int, camera: Pinhole, pixels: FloatArray) -> FloatArray:
+        """Return where rays of camera 0's or 1's ideal pixels meet the plane, (n, 3). [m]"""
+        place = ray_on_plane(camera, pixels)
+        if self:
+            place[:, :2] = rays.object_rays(place[:, :2], self.foot(number, camera)).position
+            place[:, 2] = np.where(np.isfinite(place[:, 0]), 0.0, np.nan)
+        return place
+
+    def meeting(
+        self, cameras: Sequence[Pinhole], pixels1: FloatArray, pixels2: FloatArray
+    ) -> FloatArray:
+        """Return where the rays of ideal pixels of both cameras meet, shape (n, 3). [m]"""
+        first, second = cameras
+        if not self:
+            return triangulate(first, second, pixels1, pixels2)
+        far, near = self.foot(0, first), self.foot(1, second)
+        both = zip(cameras, (pixels1, pixels2), strict=True)
+        q1, q2 = (ray_on_plane(camera, pixels)[:, :2] for camera, pixels in both)
+        return rays.point_on_ray(q1, rays.relief_of_rays(q1, q2, far, near), far)
 
     def near_axis(self, number: int, camera: Pinhole) -> tuple[float, float]:
         """Return the distance of the straight camera that sees alike near the axis, and its rate.

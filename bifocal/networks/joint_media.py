@@ -11,32 +11,9 @@ from bifocal.matching.features import Features
 from bifocal.model.homography import apply_homography
 from bifocal.model.pair_media import PairMedia
 from bifocal.model.photo import Photo
-from bifocal.rays import object_rays, point_on_ray, relief_of_rays, seen_distance
+from bifocal.rays import seen_distance
 from photocore.arrays import FloatArray
-from photocore.camera.pinhole import Pinhole, ray_on_plane, triangulate
-
-
-def place_on_plane(
-    camera: Pinhole, media: PairMedia, number: int, pixels: FloatArray
-) -> FloatArray:
-    """Return where rays of camera 0 or 1 meet the reference plane, (n, 3), relief zero. [m]"""
-    place = ray_on_plane(camera, pixels)
-    if media:
-        place[:, :2] = object_rays(place[:, :2], media.foot(number, camera)).position
-        place[:, 2] = np.where(np.isfinite(place[:, 0]), 0.0, np.nan)
-    return place
-
-
-def meeting_point(
-    cameras: Sequence[Pinhole], media: PairMedia, pixels: tuple[FloatArray, FloatArray]
-) -> FloatArray:
-    """Return where the rays of both cameras of a pair meet, shape (n, 3). [m]"""
-    first, second = cameras
-    if not media:
-        return triangulate(first, second, *pixels)
-    far, near = (media.foot(k, camera) for k, camera in enumerate(cameras))
-    q1, q2 = (ray_on_plane(c, p)[:, :2] for c, p in zip(cameras, pixels, strict=True))
-    return point_on_ray(q1, relief_of_rays(q1, q2, far, near), far)
+from photocore.camera.pinhole import Pinhole
 
 
 def highest_relief(cameras: Sequence[Pinhole], media: PairMedia) -> float:

@@ -12,11 +12,7 @@ import numpy as np
 from bifocal.matching.features import Features, alike, match_features, spread_evenly
 from bifocal.model.pair_media import PairMedia
 from bifocal.networks.joint_adjustment import JointUnknowns
-from bifocal.networks.joint_media import (
-    highest_relief,
-    meeting_point,
-    place_on_plane,
-)
+from bifocal.networks.joint_media import highest_relief
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.camera.pinhole import Pinhole
 from photocore.camera.similarity import Similarity, fit_plane
@@ -232,7 +228,7 @@ def _meeting_the_wall(
     places = np.full((len(ideal), 3), np.nan)
     for number, camera in enumerate(cameras):
         rays = shared.photo == number
-        places[rays] = place_on_plane(camera, media[number // 2], number % 2, ideal[rays])
+        places[rays] = media[number // 2].on_plane(number % 2, camera, ideal[rays])
     return places
 
 
@@ -259,7 +255,7 @@ def _places_by_pair(
             rays = shared.photo == 2 * k + side
             seen[side, shared.point[rays]] = ideal[rays]
         both = slice(2 * k, 2 * k + 2)
-        xyz = meeting_point(cameras[both], media[k], (seen[0], seen[1]))
+        xyz = media[k].meeting(cameras[both], seen[0], seen[1])
         lowest = min(cameras[2 * k].centre[2], cameras[2 * k + 1].centre[2])
         wild = ~(np.abs(xyz[:, 2]) < 0.5 * lowest)  # near the zoom centre relief is not known
         wild |= xyz[:, 2] > BEFORE_MEDIA * highest_relief(cameras[both], media[k])

@@ -11,7 +11,6 @@ from bifocal.model.homography import apply_homography
 from bifocal.model.interior_orientation import Cameras, Images, Interiors
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair, wall_equations
 from bifocal.orientation.adjustment.pair_observations import PairObservations, PairUnknowns
-from bifocal.orientation.adjustment.seen_points import meeting_points
 from bifocal.orientation.starts.relative_orientation import Ties, supported
 from bifocal.orientation.tuning import TUNING
 from bifocal.orientation.walls.reference_plane import NarrowFace, narrow_face
@@ -110,7 +109,7 @@ def with_support(observations: PairObservations, adjusted: AdjustedPair) -> Pair
 
 def tie_positions(observations: PairObservations, state: PairUnknowns) -> FloatArray:
     """Return where the rays of the ties meet, shape (m, 3). [m]"""
-    return meeting_points(state, *observations.straight_ties(state.radial))
+    return state.media.meeting(state.cameras, *observations.straight_ties(state.radial))
 
 
 def relief_per_pixel(observations: PairObservations, state: PairUnknowns) -> FloatArray:

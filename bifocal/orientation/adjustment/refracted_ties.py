@@ -10,7 +10,7 @@ from bifocal.orientation.adjustment.pair_observations import (
     PairObservations,
     PairUnknowns,
 )
-from bifocal.orientation.adjustment.seen_points import meeting_points, views_of
+from bifocal.orientation.adjustment.seen_points import views_of
 from photocore.arrays import BoolArray
 
 #: Steps to the point nearest to both rays; the first is good to a thousandth of the misfit.
@@ -33,7 +33,7 @@ def meeting_equations(
     models = observations.radial_models(state.radial)
     raw = observations.tie1[which], observations.tie2[which]
     straight = [model.undistort(x) for model, x in zip(models, raw, strict=True)]
-    pixels, xyz = np.concatenate(straight, axis=1), meeting_points(state, *straight)
+    pixels, xyz = np.concatenate(straight, axis=1), state.media.meeting(state.cameras, *straight)
     for _ in range(STEPS):
         views = views_of(state, xyz)
         design = np.concatenate([seen.by_point for seen in views], axis=1)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal import rays
 from bifocal.media import PointViews, view
 from bifocal.model.pair_media import PairMedia
 from bifocal.orientation.adjustment.pair_observations import (
@@ -13,7 +12,6 @@ from bifocal.orientation.adjustment.pair_observations import (
     PairUnknowns,
 )
 from photocore.arrays import FloatArray
-from photocore.camera.pinhole import ray_on_plane, triangulate
 
 #: A coordinate that was not measured, as a standard deviation. [m]
 UNKNOWN = 1e6
@@ -24,34 +22,16 @@ def views_of(state: PairUnknowns, xyz: FloatArray) -> list[PointViews]:
     return [view(c, state.media.path(k, c), xyz) for k, c in enumerate(state.cameras)]
 
 
-def on_the_plane(state: PairUnknowns, number: int, pixels: FloatArray) -> FloatArray:
-    """Return where the rays of camera 0's or 1's ideal pixels meet the plane, shape (n, 3). [m]"""
-    camera = state.cameras[number]
-    place = ray_on_plane(camera, pixels)
-    if state.media:
-        foot = state.media.foot(number, camera)
-        place[:, :2] = rays.object_rays(place[:, :2], foot).position
-    return place
-
-
-def meeting_points(state: PairUnknowns, pixels1: FloatArray, pixels2: FloatArray) -> FloatArray:
-    """Return where the rays of ideal pixels of both photos meet, shape (n, 3). [m]"""
-    if not state.media:
-        return triangulate(*state.cameras, pixels1, pixels2)
-    far, near = (state.media.foot(k, c) for k, c in enumerate(state.cameras))
-    q1, q2 = (
-        ray_on_plane(c, p)[:, :2] for c, p in zip(state.cameras, (pixels1, pixels2), strict=True)
-    )
-    return rays.point_on_ray(q1, rays.relief_of_rays(q1, q2, far, near), far)
-
-
 def known_points(
     observations: PairObservations, state: PairUnknowns, picks: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return control points, what was not measured filled in roughly, and their sigmas."""
     control = observations.control
-    both = meeting_points(state, picks[:, :2], picks[:, 2:])
-    first, second = (on_the_plane(state, k, picks[:, 2 * k : 2 * k + 2]) for k in (0, 1))
+    both = state.media.meeting(state.cameras, picks[:, :2], picks[:, 2:])
+    first, second = (
+        state.media.on_plane(k, camera, picks[:, 2 * k : 2 * k + 2])
+        for k, camera in enumerate(state.cameras)
+    )
     single = np.where(np.isfinite(first), first, second)
     guess = np.where(np.isfinite(both), both, single)
     flat = control.sigma[:, 2:] < UNKNOWN  # relief known: the plane fixes X and Y better

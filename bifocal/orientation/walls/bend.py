@@ -15,7 +15,7 @@ from bifocal.model.doubts import MOST_BENT, bend_is_certain
 from bifocal.model.homography import apply_homography
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.orientation.adjustment.pair_observations import PairUnknowns
-from bifocal.orientation.adjustment.seen_points import meeting_points, on_the_plane, views_of
+from bifocal.orientation.adjustment.seen_points import views_of
 from bifocal.orientation.tuning import TUNING
 from bifocal.orientation.walls.reference_plane import faces
 from bifocal.remarks import remark
@@ -162,7 +162,7 @@ def bend_between(
         As of `bend_of_wall`; NaN too where it is no more than cameras and media, as uncertain as
         they are, leave open. [px, at 3000 px of width]
     """
-    height = meeting_points(state, pixels1, pixels2)[:, 2] / state.cameras[0].centre[2]
+    height = state.media.meeting(state.cameras, pixels1, pixels2)[:, 2] / state.cameras[0].centre[2]
     flat1, flat2 = straightened(state, pixels1, pixels2)
     if state.media:
         used = used & np.isfinite(np.hstack([flat1, flat2])).all(axis=1)
@@ -184,7 +184,7 @@ def straightened(
     if not state.media:
         return pixels1, pixels2
     first, second = (
-        project(camera, on_the_plane(state, number, pixels))
+        project(camera, state.media.on_plane(number, camera, pixels))
         for number, (camera, pixels) in enumerate(
             zip(state.cameras, (pixels1, pixels2), strict=True)
         )
@@ -196,7 +196,8 @@ def _open(adjusted: AdjustedPair, size: tuple[int, int]) -> float:
     """Return how much the uncertainty of cameras and media bends a flat wall, root mean square."""
     columns, rows = np.meshgrid(np.linspace(0, size[0], 12), np.linspace(0, size[1], 8))
     seen = np.column_stack([columns.ravel(), rows.ravel()])
-    seen1, seen2 = (view.pixels for view in views_of(adjusted, on_the_plane(adjusted, 0, seen)))
+    flat = adjusted.media.on_plane(0, adjusted.cameras[0], seen)
+    seen1, seen2 = (view.pixels for view in views_of(adjusted, flat))
     values, vectors = np.linalg.eigh(adjusted.of_unknowns)
     factor = vectors * np.sqrt(np.maximum(values, 0.0))
     squares = []
