@@ -2,5 +2,5 @@
 
 from photocore.remarks import Remarks
 
-remark = Remarks("bifocal")
+remark = Remarks("photocore", "bifocal")
 in_language = remark.in_language

@@ -136,3 +136,6 @@ def _patterns(parts: list[Any]) -> Iterator[str]:
             kind = kind[:-1]  # at the end as much as there is
         yield f"(?P={name})" if name in known else f"(?P<{name}>{kind})"
         known.add(name)
+
+
+remark = Remarks("photocore")

@@ -9,6 +9,7 @@ import numpy as np
 
 from photocore.arrays import FloatArray
 from photocore.errors import LARGEST
+from photocore.remarks import remark
 from photocore.tables.model import Column
 from photocore.tables.numbers import (
     Decimal,
@@ -90,11 +91,13 @@ def numbers(
     common_unit = _typed_unit(texts, wanted, complain, has_bare=bool(np.isfinite(result).any()))
     _read_texts(result, texts, decimal, elsewhere, complain, largest)
     typed = sum(bool(part.unit) for part in texts.values())
-    taken_off = f"{column.key}: the unit typed into {typed} cells was taken off."
+    told: list[str] = (
+        [remark("table.unit_taken_off", column=column.key, count=typed)] if typed else []
+    )
     if column.kind == "integer":
         for broken in np.flatnonzero(np.isfinite(result) & (result != np.floor(result))):
             complain(int(broken), f"found {result[broken]:.15g}, expected a whole number.")
-    return result, common_unit or unit, [taken_off] if typed else []
+    return result, common_unit or unit, told
 
 
 def flags(values: Sequence[Value | None], complain: Complain) -> FloatArray:

@@ -16,6 +16,7 @@ import numpy as np
 
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError
+from photocore.remarks import remark
 from photocore.tables.headings import Match, describe, find_columns, is_summary
 from photocore.tables.model import Column
 from photocore.tables.numbers import ArrowTexts, Decimal, is_clear, plain_numbers
@@ -107,7 +108,7 @@ def open_csv(path: Path) -> CsvFile:
         raise InputError(f"{path}: the file is empty; save or copy it again.")
     if content.startswith((b"PK\x03\x04", b"\xd0\xcf\x11\xe0")):
         raise InputError(f"{path}: is a workbook, not a text table; give it the ending .xlsx.")
-    remarks = []
+    remarks: list[str] = []
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         try:
             text = content.decode("utf-16")
@@ -118,7 +119,7 @@ def open_csv(path: Path) -> CsvFile:
             text = content.decode("utf-8-sig")
         except UnicodeDecodeError:
             text = content.decode("cp1252", errors="replace")
-            remarks.append("The file is not UTF-8; its letters were read as Windows-1252.")
+            remarks.append(remark("table.not_utf8"))
     if "\0" in text[:10_000]:
         raise InputError(f"{path}: is not a text table.")
     first = text[: text.find("\n")].strip().strip('"') if "\n" in text else text

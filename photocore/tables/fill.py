@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from photocore.errors import CellError, InputError, WorkbookError
+from photocore.remarks import remark
 from photocore.tables import convert
 from photocore.tables.headings import Match, unknown_unit
 from photocore.tables.model import Column, Table
@@ -55,9 +56,7 @@ def fill(
             # Only sheets hold dates; a text table may be long.
             dated = sum(isinstance(value, CellDate) for value in values) if table.sheet else 0
             if dated:
-                table.remarks.append(
-                    f"{column.key}: {dated} cells hold dates; type a name like 3-4 as '3-4."
-                )
+                table.remarks.append(remark("table.dates", column=column.key, count=dated))
         elif column.kind == "flag":
             table.values[column.key] = convert.flags(values, complain)
         else:

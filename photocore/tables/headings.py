@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 
+from photocore.remarks import remark
 from photocore.tables.model import Column
 from photocore.tables.numbers import UNITS, unit_symbol
 from photocore.workbook.reading.grid import (
@@ -339,7 +340,7 @@ def _take_names(
     filled = sum(number in grid.rows[row] for row in below if row <= match.header + 50)
     count = sum(row <= match.header + 50 for row in below)
     if number > 0 and filled > count / 2 and number not in heads:
-        remark = f"Column {column_letters(number)} has no heading; it is taken for the point names."
+        said = remark("table.unnamed_column", column=column_letters(number))
     else:
         kinds = {column.key: column.kind for column in columns}
         measured = [n for key, n in match.columns.items() if kinds[key] in ("number", "integer")]
@@ -352,14 +353,12 @@ def _take_names(
         places = [n for n in (*named, *range(edge, first)) if span[0] <= n <= span[1]]
         free = (n for n in places if n not in (*used, *north))
         number = next((n for n in free if _are_names(heads.get(n, ""), n, data)), 0)
-        remark = match.guessed = (
-            f'"{heads.get(number, "")}" (column {column_letters(number)}) is taken for the point '
-            "names."
-        )
+        about = {"heading": heads.get(number, ""), "column": column_letters(number)}
+        said = match.guessed = remark("table.guessed_names", **about)
     if number:
         match.columns[name.key] = number
         match.headings[name.key] = str(heads.get(number, ""))
-        match.remarks.append(remark)
+        match.remarks.append(said)
         # "N." of points beside "N" of the north.
         others = {key: [n for n in own if n != number] for key, own in match.doubles.items()}
         match.doubles = {key: own for key, own in others.items() if len(own) > 1}

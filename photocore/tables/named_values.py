@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 import numpy as np
 
 from photocore.errors import CellError, InputError, WorkbookError
+from photocore.remarks import remark
 from photocore.tables import convert
 from photocore.tables.csvread import CsvFile
 from photocore.tables.headings import bare, unit_of, unknown_unit
@@ -91,14 +92,12 @@ def read_named_values(
         if place and name.kind == "number" and isinstance(value, str) and result.has(name.key):
             result.text_cells.append(f"{place[0]}!{result.cell(name.key)}")
     if said:
-        result.remarks.append(f"Read beside labels: {', '.join(said)}.")
+        result.remarks.append(remark("table.beside_labels", values=", ".join(said)))
     for title in sorted({*labels} - {*titles}):
         left = [f'"{v}"' for k, v in labels[title].items() if k not in {*given, *result.places}]
         if left:
-            result.remarks.append(
-                f'Not read: {", ".join(left)} on the sheet "{title}", which does not look like a '
-                f'set-up. If it is one, call it "{sheet}".'
-            )
+            about = {"values": ", ".join(left), "sheet": title, "wanted": sheet}
+            result.remarks.append(remark("table.no_setup_sheet", **about))
     if errors is None and complaints:
         raise WorkbookError(complaints)
     faulty = {error.column for error in complaints}

@@ -8,6 +8,7 @@ from itertools import chain
 from pathlib import Path
 
 from photocore.errors import CellError, InputError, WorkbookError
+from photocore.remarks import remark
 from photocore.tables.csvread import (
     CsvFile,
     find_in_text,
@@ -205,10 +206,9 @@ def _find(
         best = max(whole, key=lambda place: place.match.score[:2])
         others = [p for p in whole if p is not best and p.match.score[:2] == best.match.score[:2]]
         if others:
-            best.match.remarks.append(
-                f'The sheet "{best.grid.title}" is used; {_quoted(p.grid.title for p in others)} '
-                "has the same headings."
-            )
+            names = _quoted(p.grid.title for p in others)
+            told = remark("table.which_sheet", sheet=best.grid.title, others=names)
+            best.match.remarks.append(told)
         return best
     near = near or max(places, key=lambda place: place.match.score, default=None)
     raise _nothing_found(book, titles, columns, near)
@@ -245,16 +245,10 @@ def _reach_below(grid: CellGrid, match: Match, bottom: int) -> None:
         row += 1
     if row > bottom:
         match.last = row
-        match.remarks.append(
-            f'The sheet "{grid.title}" has {row - bottom} rows directly below the table; they are '
-            "used too."
-        )
+        match.remarks.append(remark("table.rows_below", sheet=grid.title, count=row - bottom))
     apart = [n for n, cells in grid.rows.items() if n > row and _count(cells, used) > 1]
     if apart:
-        match.remarks.append(
-            f'The sheet "{grid.title}" has numbers below the table, from row {min(apart)} on, that '
-            "are NOT used: blank rows part them from it. Move them up if they are points."
-        )
+        match.remarks.append(remark("table.numbers_below", sheet=grid.title, row=min(apart)))
 
 
 def _count(cells: Mapping[int, Value], columns: Collection[int]) -> int:

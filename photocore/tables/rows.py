@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from photocore.remarks import remark
 from photocore.tables.headings import Match, bare, is_summary
 from photocore.tables.model import Column
 from photocore.workbook.reading.grid import CellGrid, Value
@@ -84,7 +85,7 @@ class RowSorter:
         if not self.left_out:
             return []
         rows = ", ".join(map(str, self.left_out[:5])) + (", ..." if len(self.left_out) > 5 else "")
-        return [f"Left out as notes, since they stand apart and hold no number: row {rows}."]
+        return [remark("table.notes_left_out", rows=rows)]
 
 
 def label(value: Value) -> str:
@@ -132,10 +133,10 @@ def data_rows(
             after = row
             continue
         del data.rows[index], data.blocks[index]
-        data.remarks.append(f"Row {row} is left out: a mean, a sum or the like is no point.")
+        data.remarks.append(remark("table.summary_left_out", row=row))
     if hidden:
-        what = "were left out" if visible_only else "are used too; --visible-only leaves them out"
-        data.remarks.append(f"{hidden} hidden or filtered rows {what}.")
+        key = f"table.hidden_{'left_out' if visible_only else 'used'}"
+        data.remarks.append(remark(key, count=hidden))
     return data
 
 

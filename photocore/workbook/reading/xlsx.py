@@ -13,6 +13,7 @@ from xml.etree.ElementTree import Element
 from xml.parsers import expat
 
 from photocore.errors import InputError
+from photocore.remarks import remark
 from photocore.workbook.reading.grid import (
     CellDate,
     CellFault,
@@ -124,7 +125,7 @@ def open_xlsx(path: Path, *, max_rows: int) -> SheetFile:
 def _remarks(book: Workbook) -> list[str]:
     """Return what the user should know about values that come from elsewhere."""
     if any(kind == "externalLink" for kind, _ in book.relations.values()):
-        return ["The workbook refers to other workbooks; their values are used as last stored."]
+        return [remark("table.other_workbooks")]
     return []
 
 
