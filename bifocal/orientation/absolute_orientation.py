@@ -46,19 +46,17 @@ from bifocal.orientation.orientation_stages import (
     control_alone,
     lines_tested,
     oriented_in_stages,
+    with_bent_ties,
 )
-from bifocal.orientation.refracted_stage import with_bent_ties
 from bifocal.orientation.slips import MOST, Fitted, Typed, slip_of
 from bifocal.orientation.starts.photo_order import SURE
-from bifocal.orientation.starts.refracted_resection import resect_through
 from bifocal.orientation.starts.relative_orientation import Ties
-from bifocal.orientation.tie_points import likely_on_wall, tie_positions
+from bifocal.orientation.tie_points import likely_on_wall
 from bifocal.orientation.tuning import TUNING
-from bifocal.orientation.walls.bend import WallBend, bend_of_wall
-from bifocal.orientation.walls.refracted_bend import refracted_bend
+from bifocal.orientation.walls.bend import WallBend, bend_between
 from bifocal.remarks import remark
 from photocore.adjustment import OUTLIER_LIMIT
-from photocore.errors import ConvergenceError, GeometryError, PhotogrammetryError, located
+from photocore.errors import ConvergenceError, GeometryError, PhotogrammetryError
 
 #: Distances that control through media leaves so uncertain are not found from common points either,
 #: without focal lengths: 44 % ends at 10 %.
@@ -163,23 +161,12 @@ def _through_media(given: Given, lacking: str) -> OrientedPair:
     """
     if not given.enough:
         raise GeometryError(THROUGH_MEDIA)
-    control, interiors, media = given.control, given.interiors, given.media
-    agree = np.ones(len(control.ids), dtype=bool)
-    found = []
-    seen_in = zip((control.pixels1, control.pixels2), given.photos, strict=True)
-    for number, (pixels, photo) in enumerate(seen_in):
-        seen = control.positioned & np.isfinite(pixels).all(axis=1)
-        xyz, ideal = np.nan_to_num(control.xyz[seen]), photo.interior.ideal(pixels[seen])
-        with located(photo.name):
-            camera, fits = resect_through(xyz, ideal, photo.interior, media, number)
-        found.append(camera)
-        agree[np.flatnonzero(seen)[~fits]] = False
-    cameras = found[0], found[1]
+    cameras, agree, interiors = approximate_cameras(given, None, True)
     if cameras[0].centre[2] < cameras[1].centre[2]:
         return _with_photos_exchanged(given)
     validation.check_units(cameras, given.site)
-    observations = replace(observations_of(given, interiors, None, agree), media=media)
-    start = PairUnknowns(cameras=cameras, media=media)
+    observations = observations_of(given, interiors, None, agree)
+    start = PairUnknowns(cameras=cameras, media=given.media)
     pair = control_alone(observations, start, named=given.site.wall is not None)
     shares = [pair.adjusted.sigma("Z", n) / pair.adjusted.cameras[n - 1].centre[2] for n in (1, 2)]
     if lacking and max(shares) > HOPELESS:
@@ -188,10 +175,11 @@ def _through_media(given: Given, lacking: str) -> OrientedPair:
     note = "the media as given, no common points: control points alone"
     if ties is not None:
         pair, note = with_bent_ties(pair, ties), "the media as given"
-        bend = refracted_bend(pair.adjusted, ties.seen1, ties.seen2, interiors[0].image_size)
+        every, size = np.ones(len(ties.seen1), dtype=bool), interiors[0].image_size
+        bend = bend_between(pair.adjusted, ties.seen1, ties.seen2, every, size)
         pair = replace(pair, bend=bend)
     pair = _without_gross(replace(pair, assumed=(*pair.assumed, note)))
-    refuse_impossible_media(pair.adjusted, media)
+    refuse_impossible_media(pair.adjusted, given.media)
     check_room(pair.adjusted.media, pair.adjusted.cameras)
     return _with_words(pair, given, remarks)
 
@@ -215,13 +203,8 @@ def _with_words(pair: OrientedPair, given: Given, remarks: tuple[str, ...]) -> O
 
 def _bend(observations: PairObservations, state: PairUnknowns) -> WallBend:
     """Return how far the wall is from a plane between the photos."""
-    used = observations.tie_used
-    if used.sum() < 30:
-        return WallBend()
-    seen1, seen2 = observations.straight_ties(state.radial)
-    height = tie_positions(observations, state)[used, 2] / state.cameras[0].centre[2]
-    size = observations.interiors[0].image_size
-    return bend_of_wall(seen1[used], seen2[used], size, height)
+    seen, size = observations.straight_ties(state.radial), observations.interiors[0].image_size
+    return bend_between(state, *seen, observations.tie_used, size)
 
 
 def _reason(
@@ -374,7 +357,7 @@ def _with_photos_exchanged(given: Given, *, typed_stay: bool = False) -> Oriente
             "the spot in it."
         )
     its = 1 if site.far_first is site else 2
-    site, media = site.far_first, given.media and given.media.exchanged()
+    site, media = site.far_first, given.media.exchanged()
     turned = replace(given, photos=given.photos[::-1])
     if typed_stay:
         turned, site = turned.with_interiors(given.interiors), replace(site, ordered=True)

@@ -22,6 +22,7 @@ from bifocal.orientation.starts.relative_orientation import (
     plane_scale,
 )
 from bifocal.orientation.starts.space_resection import resect
+from bifocal.orientation.tie_points import with_ties
 from bifocal.remarks import remark
 from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import BoolArray
@@ -136,11 +137,12 @@ def approximate_cameras(
     agree = np.ones(len(control.ids), dtype=bool)
     if enough:
         cameras = []
-        for pixels, photo in zip((control.pixels1, control.pixels2), given.photos, strict=True):
+        picks = zip((control.pixels1, control.pixels2), given.photos, strict=True)
+        for number, (pixels, photo) in enumerate(picks):
             seen = control.positioned & np.isfinite(pixels).all(axis=1)
-            xyz = np.nan_to_num(control.xyz[seen])
+            xyz, ideal = np.nan_to_num(control.xyz[seen]), photo.interior.ideal(pixels[seen])
             with located(photo.name):
-                camera, fits = resect(xyz, photo.interior.ideal(pixels[seen]), photo.interior)
+                camera, fits = resect(xyz, ideal, photo.interior, given.media, number)
             cameras.append(camera)
             agree[np.flatnonzero(seen)[~fits]] = False
         return (cameras[0], cameras[1]), agree, interiors
@@ -222,18 +224,9 @@ def observations_of(
         sigma_tilt=SIGMA_PARALLEL if site.parallel else None,
         free_datum=control.positioned.sum() < 2,
         sigma_body=_same_body(interiors),
+        media=given.media,
     )
-    if ties is None:
-        return base
-    return replace(
-        base,
-        tie1=ties.seen1,
-        tie2=ties.seen2,
-        sigma_tie=ties.tolerance / 2,
-        tie_used=np.ones(len(ties.seen1), dtype=bool),
-        wall=ties.on_plane,
-        wall_rows=np.zeros((3, len(ties.seen1))),
-    )
+    return base if ties is None else with_ties(base, ties)
 
 
 def _same_body(interiors: Interiors) -> float | None:

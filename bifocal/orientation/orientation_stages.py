@@ -22,12 +22,14 @@ from bifocal.orientation.adjustment.pair_adjustment import (
 from bifocal.orientation.adjustment.pair_observations import PairObservations, PairUnknowns, at
 from bifocal.orientation.area_points import even_points
 from bifocal.orientation.control_points import SiteMeasures
+from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.tie_points import (
     refine_ties,
     tie_positions,
     wall_roughness,
     wall_test,
     with_support,
+    with_ties,
     with_wall,
     without_gross_ties,
 )
@@ -55,6 +57,8 @@ ON_WALL, WALL_LIMIT = 4.0, 3.0
 FREE = (1e-5, 1e-6)
 #: Relative standard deviation with which two photos of one lens have one principal distance.
 ONE_LENS = 1e-3
+#: Common points that take part, where each costs more than in air; fewer say nothing.
+MOST_BENT_TIES, FEWEST_TIES = 1000, 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -196,6 +200,27 @@ def _with_ties(pair: OrientedPair, observations: PairObservations) -> OrientedPa
     ties = replace(pair.observations, interiors=interiors)
     ties = without_gross_ties(ties, pair.adjusted, sigma=sigma)
     return replace(pair, observations=ties).readjusted().settled()
+
+
+def with_bent_ties(pair: OrientedPair, ties: Ties) -> OrientedPair:
+    """Return a pair oriented by control points through media with ties whose bent rays meet."""
+    count = len(ties.seen1)
+    some = np.linspace(0, count - 1, min(count, MOST_BENT_TIES)).astype(int)
+    few = replace(
+        ties, seen1=ties.seen1[some], seen2=ties.seen2[some], on_plane=ties.on_plane[some]
+    )
+    base = with_ties(pair.observations, few)
+    adjusted = evaluated(base, pair.adjusted)
+    for _ in range(3):
+        # Control leaves the rays uncertain by some pixels: the majority shows by how much.
+        sigma = robust_sigma(adjusted.tie_misfit[base.tie_used])
+        base = without_gross_ties(base, adjusted, sigma=sigma)
+        if base.tie_used.sum() < FEWEST_TIES:
+            return pair.told(remark("orientation.hardly_through_media"))
+        adjusted = adjust(base, adjusted)
+    height = np.abs(tie_positions(base, adjusted)[:, 2])
+    on_wall = base.tie_used & (height < TUNING.bend_band * adjusted.cameras[0].centre[2])
+    return replace(pair, observations=replace(base, wall=on_wall), adjusted=adjusted)
 
 
 def _refined(pair: OrientedPair, images: Images, photos: Photos) -> OrientedPair:

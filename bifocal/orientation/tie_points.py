@@ -12,7 +12,7 @@ from bifocal.model.interior_orientation import Cameras, Images, Interiors
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair, wall_equations
 from bifocal.orientation.adjustment.pair_observations import PairObservations, PairUnknowns
 from bifocal.orientation.adjustment.seen_points import meeting_points
-from bifocal.orientation.starts.relative_orientation import supported
+from bifocal.orientation.starts.relative_orientation import Ties, supported
 from bifocal.orientation.tuning import TUNING
 from bifocal.orientation.walls.reference_plane import NarrowFace, narrow_face
 from photocore.adjustment import OUTLIER_LIMIT
@@ -61,6 +61,19 @@ def refine_ties(
     patches = refine(smooth1, smooth2, raw1, raw2, local, both)
     good = patches.converged & (patches.zncc > 0.85) & (patches.sigma < 0.3)
     return interiors[1].ideal(patches.pixels2), good
+
+
+def with_ties(observations: PairObservations, ties: Ties) -> PairObservations:
+    """Return the observations with common points, all of which take part."""
+    return replace(
+        observations,
+        tie1=ties.seen1,
+        tie2=ties.seen2,
+        sigma_tie=ties.tolerance / 2,
+        tie_used=np.ones(len(ties.seen1), dtype=bool),
+        wall=ties.on_plane,
+        wall_rows=np.zeros((3, len(ties.seen1))),
+    )
 
 
 def without_gross_ties(

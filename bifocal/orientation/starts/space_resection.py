@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 
+from bifocal import rays
 from bifocal.model.interior_orientation import Interior
+from bifocal.model.pair_media import PairMedia
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import Pinhole, camera_matrix, cameras_seeing, project
 from photocore.errors import GeometryError
 
 #: Picks that miss by more than this share of the image width are gross, whatever the lens.
 GROSS_SHARE = 0.006
+#: Rounds in which points are put where they seem to be; it settles in three to six. Then the
+#: camera moves by less than a share of its distance.
+ROUNDS, SETTLED = 12, 1e-5
 
 
-def resect(xyz: FloatArray, pixels: FloatArray, interior: Interior) -> tuple[Pinhole, BoolArray]:
+def resect(
+    xyz: FloatArray, pixels: FloatArray, interior: Interior, media: PairMedia | None = None,
+    number: int = 0,
+) -> tuple[Pinhole, BoolArray]:  # fmt: skip
     """Return an approximate camera and which points agree with it.
 
     Parameters
@@ -25,6 +35,10 @@ def resect(xyz: FloatArray, pixels: FloatArray, interior: Interior) -> tuple[Pin
         Their ideal pixels.
     interior : Interior
         What is known of the lens. An unknown principal distance is searched over a wide range.
+    media : PairMedia, optional
+        What the camera looks through.
+    number : int
+        Which of theirs it is: 0 for the far camera, 1 for the near one.
 
     Returns
     -------
@@ -34,8 +48,61 @@ def resect(xyz: FloatArray, pixels: FloatArray, interior: Interior) -> tuple[Pin
     Raises
     ------
     GeometryError
-        With fewer than four points, or points in line, or none that agree.
+        With fewer than four points, or points in line, or none that agree; or points before the
+        media.
+
+    Notes
+    -----
+    A camera in air sees the points where their straight rays of the first medium are (Maas 2015,
+    Eqs. 1 and 2: the radial shift). Seen near the axis, that is a scene compressed in depth by
+    n_1 / n_m behind a surface that stays with it, and behind a port a lens n_m / n_1 times as long;
+    from there both are found in turn.
     """
+    if not media:
+        return _in_air(xyz, pixels, interior)
+    bent = media.layers.indices[0] / media.layers.indices[-1]
+    if media.depth is not None:
+        squeezed = xyz.copy()
+        squeezed[:, 2] = media.depth - (media.depth - xyz[:, 2]) * bent
+        camera, agree = _in_air(squeezed, pixels, interior)
+        ratio = camera.matrix[0, 0] / interior.focal
+    else:
+        longer = replace(interior, focal=interior.focal / bent)
+        camera, agree = _in_air(xyz, pixels, longer)
+        ratio = camera.matrix[0, 0] * bent / interior.focal
+    # A principal distance that was searched is found; it is not searched in every round.
+    known = replace(
+        interior, focal=interior.focal * ratio, sigma_focal=min(interior.sigma_focal, 0.02)
+    )
+    for _ in range(ROUNDS):
+        there = np.zeros(len(xyz), dtype=bool)
+        if media.z0(number, camera) >= 0:
+            seeming = _seeming(camera, media, number, xyz)
+            there = np.asarray(np.isfinite(seeming).all(axis=1))
+        if there.sum() < 4:
+            raise GeometryError(
+                "the control points do not lie behind the media as they are given. Check --depth "
+                "or --port, the indices in their order from the camera to the wall, and metres."
+            )
+        before = camera.centre
+        camera, fits = _in_air(seeming[there], pixels[there], known)
+        agree = there.copy()
+        agree[there] = fits
+        if np.linalg.norm(camera.centre - before) < SETTLED * before[2]:
+            break
+    return camera, agree
+
+
+def _seeming(camera: Pinhole, media: PairMedia, number: int, xyz: FloatArray) -> FloatArray:
+    """Return points moved along their heights onto the straight rays that show them, (n, 3)."""
+    foot = media.foot(number, camera)
+    away = rays.plane_position(xyz, foot) - foot.nadir
+    reach = 1.0 - xyz[:, 2:] / foot.distance
+    return np.concatenate([foot.nadir + away * reach, xyz[:, 2:]], axis=1)
+
+
+def _in_air(xyz: FloatArray, pixels: FloatArray, interior: Interior) -> tuple[Pinhole, BoolArray]:
+    """Return `resect` of a camera that looks through no media."""
     if len(xyz) < 4:
         raise GeometryError(
             f"{len(xyz)} control points with X, Y and pixels in this photo; a camera needs four, "

@@ -30,8 +30,7 @@ from bifocal import (
 from bifocal.media import interface_axes, view
 from bifocal.model.orientation_precision import NAMES, from_dict, names_of
 from bifocal.orientation.absolute_orientation import orient_pair
-from bifocal.orientation.orientation_stages import PhotoInput
-from bifocal.orientation.refracted_stage import with_bent_ties
+from bifocal.orientation.orientation_stages import PhotoInput, with_bent_ties
 from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.walls.bend import WallBend, bend_in_words
 from multimedia import Layers
