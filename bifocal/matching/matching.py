@@ -31,6 +31,7 @@ from bifocal.model.interior_orientation import Images
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.rays import point_on_ray, relief_of_rays, zoom_factor
+from bifocal.remarks import remark
 from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.errors import GeometryError
@@ -95,10 +96,8 @@ def match_pair(pair: Pair, images: Images, settings: MatchSettings | None = None
     low, high = settings.relief_range or (-0.5 * near, 0.4 * near)
     reliefs = (low, min(high, HIGHEST_SHARE * pair.highest_relief))
     if not reliefs[0] < reliefs[1]:
-        raise GeometryError(
-            f"relief from {low:g} m: both photos see relief below {pair.highest_relief:g} m only, "
-            f"and up to {high:g} m is looked for. Choose a lower least relief, or a higher largest."
-        )
+        about = {"low": low, "seen": pair.highest_relief, "high": high}
+        raise GeometryError(remark("match.relief_unseen", **about))
     parts = []
     if settings.targets:
         parts.append(_target_matches(pair, images, reliefs))
@@ -107,10 +106,7 @@ def match_pair(pair: Pair, images: Images, settings: MatchSettings | None = None
     matches = _joined(parts)
     few = settings.features and len(matches.ids) < FEWEST_MATCHED
     if not len(matches.ids) or few:
-        raise GeometryError(
-            f"only {len(matches.ids)} points match: photos and pair file do not belong together, "
-            "or a photo is blurred. Make the pair file again with `bifocal align`."
-        )
+        raise GeometryError(remark("match.too_few", count=len(matches.ids)))
     return matches
 
 

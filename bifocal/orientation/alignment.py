@@ -169,14 +169,14 @@ def _facade_axes(
         along = ends[1] - ends[0]
         angle = float(np.arctan2(along[1], along[0])) - (np.pi / 2 if vertical else 0.0)
         turn = (angle + np.pi / 2) % np.pi - np.pi / 2
-        note = f"{'Y' if vertical else 'X'} axis along the line given"
+        note = remark(f"orientation.axis_{'y' if vertical else 'x'}_along_line")
     else:
         turn, share = (
             (0.0, 0.0) if photo.grey is None else facade_turn(photo.grey, far, photo.interior)
         )
-        note = "axes along the façade's straight lines"
+        note = remark("orientation.axes_along_facade")
         if share < LEAST_IN_LINE:
-            turn, note = 0.0, "Y axis as upright as the far photo"
+            turn, note = 0.0, remark("orientation.axis_as_photo")
     cosine, sine = np.cos(turn), np.sin(turn)
     return np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]]), note
 

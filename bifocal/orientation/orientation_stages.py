@@ -463,10 +463,7 @@ def _parallel_if_so(pair: OrientedPair, most: float) -> OrientedPair:
         pair = replace(pair, tolerance=tolerance)
         observations = with_wall(pair.observations, pair.adjusted, tolerance)
         changes["wall_rows"], changes["wall"] = observations.wall_rows, observations.wall
-    note = (
-        f"image planes parallel to the wall within {np.rad2deg(sigma):.2g}° (as they are to each "
-        "other)"
-    )
+    note = remark("orientation.parallel_to_wall", angle=np.rad2deg(sigma))
     return replace(pair, assumed=(*pair.assumed, note)).readjusted(**changes)
 
 

@@ -12,6 +12,7 @@ from bifocal.model.photo import FARTHEST_WALL
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.starts.relative_orientation import Ties, rotation_only
+from bifocal.remarks import remark
 from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import GeometryError, InputError
 
@@ -82,25 +83,13 @@ def is_flat(
     corners = np.array([[0, 0], [width, 0], [width, height], [0, height]], dtype=np.float64)
     moved = apply_homography(ties.homography, corners) - corners
     if moving < 0.03 and np.abs(moved).max() < 2 * ties.tolerance:
-        raise SamePhotoError(
-            f"{names[0]} and {names[1]} show the same view: one photo twice, or two shots from the "
-            "same place. The method needs two distances."
-        )
+        raise SamePhotoError(remark("refused.same_view", first=names[0], second=names[1]))
     if moving >= 0.03:
         return False
     if rotation_only(ties, interiors):
-        raise GeometryError(
-            f"no parallax: {names[0]} and {names[1]} were taken from one place, only the zoom was "
-            "changed. A zoom enlarges everything alike, so relief leaves no trace. This is the "
-            "classic mistake: change the lens AND walk, long lens from afar, short lens from near."
-        )
+        raise GeometryError(remark("refused.zoom_only", first=names[0], second=names[1]))
     if not flat_is_fine:
-        raise GeometryError(
-            "no parallax: nothing in the photos stands out from the wall or behind it (or only "
-            "the zoom was changed, without walking), so the nadir cannot be found. Give four "
-            "control points (--control), or both distances with the camera square to the wall "
-            "(--distance1, --distance2)."
-        )
+        raise GeometryError(remark("refused.flat"))
     return True
 
 
@@ -113,23 +102,14 @@ def check_units(cameras: Cameras, site: SiteMeasures) -> None:
             continue
         agree |= 0.8 < distance / measured < 1.25
         if measured > FARTHEST_WALL and not agree:
-            raise InputError(
-                f"--distance{name} {measured:g} m is too far for a wall, and the control points "
-                f"say {distance:.4g} m: is it in mm? Distances are in metres "
-                f"(--distance{name} {measured / 1000:g})."
-            )
+            about = {"number": name, "given": measured, "found": distance}
+            raise InputError(remark("refused.too_far", meant=measured / 1000, **about))
         for factor, unit in ((1000.0, "mm"), (100.0, "cm")):
             if 0.8 < distance / measured / factor < 1.25:
-                raise InputError(
-                    f"the control points are in {unit}: they put camera {name} {distance:,.0f} "
-                    f"away, --distance{name} says {measured:g} m. Write them in metres, or the "
-                    f"unit into the headings (X [{unit}])."
-                )
+                about = {"unit": unit, "number": name, "found": distance, "given": measured}
+                raise InputError(remark("refused.control_unit", **about))
     if max(d1, d2) > FARTHEST_WALL and not agree:
-        raise InputError(
-            f"the control points put the cameras {d1:,.0f} and {d2:,.0f} m from the wall: they "
-            "are in mm or cm. Write them in metres, or the unit into the headings (X [mm])."
-        )
+        raise InputError(remark("refused.control_far", d1=d1, d2=d2))
 
 
 def check_distortion(radial: FloatArray, interior: Interior) -> None:
@@ -140,19 +120,10 @@ def check_distortion(radial: FloatArray, interior: Interior) -> None:
     # r / (1 + bend), so that a bend of -1 and below folds the photo over.
     moved = abs(bend / (1 + bend)) if bend > -0.9 else np.inf
     if moved > MOST_DISTORTION and interior.is_assumed:
-        raise GeometryError(
-            "the focal lengths are not known (no EXIF data), and the photos do not tell them. Give "
-            "--focal1 and --focal2 with --sensor-width, e.g. --focal1 35 --focal2 19 "
-            "--sensor-width 22.7, or --lens."
-        )
+        raise GeometryError(remark("refused.no_focals"))
     if moved > MOST_DISTORTION:
-        raise GeometryError(
-            f"the common points fit only if the lens distorted the photo's corners by "
-            f"{min(100 * moved, 999):.0f} % of the half diagonal (k1 = {radial[0]:.2f}): the "
-            "sensor width or the focal length is probably wrong. Check --sensor-width "
-            "(--pixel-size), --focal1 and --focal2; a lens that does distort so much has to be "
-            "calibrated (`bifocal calibrate`, --lens)."
-        )
+        share = min(100 * moved, 999)
+        raise GeometryError(remark("refused.distortion", share=share, k1=radial[0]))
 
 
 def check_movement(adjusted: AdjustedPair) -> None:
@@ -161,16 +132,9 @@ def check_movement(adjusted: AdjustedPair) -> None:
     d1, d2 = float(first.centre[2]), float(second.centre[2])
     moved = float(np.linalg.norm(first.centre - second.centre))
     if moved < LEAST_CHANGE * d1:
-        raise GeometryError(
-            f"no parallax: both photos were taken from one place ({moved:.2f} m apart, {d1:.2f} m "
-            "from the wall), only the zoom was changed. This is the classic mistake: change the "
-            "lens AND walk, long lens from afar, short lens from near."
-        )
+        raise GeometryError(remark("refused.one_place", apart=moved, distance=d1))
     if abs(d1 - d2) < LEAST_CHANGE * max(d1, d2):
-        raise GeometryError(
-            f"hardly any change of distance: {d1:.2f} and {d2:.2f} m. Relief comes from the "
-            "difference; go nearer with the short lens, by a third of the distance or more."
-        )
+        raise GeometryError(remark("refused.one_distance", d1=d1, d2=d2))
 
 
 def check_determined(adjusted: AdjustedPair) -> None:
@@ -180,12 +144,5 @@ def check_determined(adjusted: AdjustedPair) -> None:
         sigma = adjusted.sigma("Z", number)
         if sigma < 0.25 * distance:
             continue
-        missing = (
-            "control points off the wall (a relief of 0.3 m or more), the focal lengths "
-            "(--lens, --focal1, --focal2) or the distances (--distance1, --distance2)"
-        )
-        raise GeometryError(
-            f"the distance of camera {number} is not determined: {distance:.2f} ± {sigma:.2f} m. "
-            f"A flat wall seen square on does not tell a long lens from a short distance. Give "
-            f"{missing}."
-        )
+        about = {"number": number, "distance": distance, "sigma": sigma}
+        raise GeometryError(remark("refused.undetermined", **about))

@@ -26,6 +26,7 @@ from bifocal.relief_maps.frame import (
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
 from bifocal.relief_maps.registration import Registration, check_registration
 from bifocal.relief_maps.stages import relief_map
+from bifocal.remarks import remark
 from photocore.arrays import ByteArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
@@ -209,29 +210,21 @@ def _grids(
     step = native if gsd is None else float(gsd)
     box = common if bounds is None else bounds
     wanted = Grid.from_bounds(box, gsd=step)
-    size = f"{box[2] - box[0]:.3g} x {box[3] - box[1]:.3g} m"
+    about = {"gsd": step, "wide": box[2] - box[0], "high": box[3] - box[1], "native": native}
+    about |= {"width": wanted.width, "height": wanted.height}
     if wanted.width * wanted.height > LARGEST_MAP or max(wanted.shape) > LONGEST_SIDE:
-        raise InputError(
-            f"gsd: {step:g} m over {size} would be {wanted.width} x {wanted.height} px. Is the "
-            f"unit right? The GSD is in metres; a pixel of the far photo is {native:.4g} m."
-        )
+        raise InputError(remark("relief.gsd_too_fine", **about))
     few = min(wanted.shape) < FEWEST_PIXELS and step > 1.01 * native
     if few or min(wanted.shape) < 2 or step > max(COARSEST_GSD, 2 * native):
-        raise InputError(
-            f"gsd: {step:g} m over {size} leaves {wanted.width} x {wanted.height} px. Is the unit "
-            f"right? The GSD is in metres; a pixel of the far photo is {native:.4g} m. The photos "
-            f"are matched at half the GSD, so it may be {COARSEST_GSD:g} m at most and must leave "
-            f"{FEWEST_PIXELS} px a side."
-        )
+        about |= {"coarsest": COARSEST_GSD, "fewest": FEWEST_PIXELS}
+        raise InputError(remark("relief.gsd_too_coarse", **about))
     low, high = relief_range or seed.usual_range(pair.image2.distance)
     reach = _seen_box(pair, box, low, high) if bounds is not None else box
     lower, upper = np.maximum(reach[:2], common[:2]), np.minimum(reach[2:], common[2:])
     reach = (*lower.tolist(), *upper.tolist())
     if reach[2] - reach[0] < 16 * native or reach[3] - reach[1] < 16 * native:
-        raise InputError(
-            f"bounds: {box} m lie outside what both photos see, "
-            f"{tuple(round(v, 2) for v in common)} m."
-        )
+        seen = tuple(round(v, 2) for v in common)
+        raise InputError(remark("relief.bounds_outside", bounds=box, seen=seen))
     factor, most = QUALITIES[quality]
     area = (reach[2] - reach[0]) * (reach[3] - reach[1])
     fine = max(native * factor, np.sqrt(area / most), step / 2)

@@ -16,6 +16,7 @@ from bifocal.model.grid import Bounds, Grid, bounds_of, cut
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.model.ray_field import RayField
+from bifocal.remarks import remark
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
 from photocore.errors import GeometryError, InputError
 
@@ -170,10 +171,7 @@ def common_bounds(pair: Pair, shapes: tuple[tuple[int, ...], tuple[int, ...]]) -
         places.append(footprint[_shows(other, across, footprint)])
     both = np.concatenate(places)
     if len(both) < 4:
-        raise GeometryError(
-            "the two photos have no common area on the reference plane: check that they show the "
-            "same wall and that the pair file belongs to them."
-        )
+        raise GeometryError(remark("relief.nothing_in_common"))
     return bounds_of(both)
 
 
@@ -235,10 +233,8 @@ def working_grid(pair: Pair, shape1: tuple[int, ...], box: Bounds, gsd: float) -
         x0, y0 = matrix[:2] @ np.array([column, row, 1.0])
         grid = Grid(x0=float(x0), y0=float(y0), gsd=gsd, width=grid.width, height=grid.height)
     if max(grid.shape) > LONGEST_SIDE:
-        raise InputError(
-            f"the relief would be worked out on {grid.width} x {grid.height} px, more than "
-            f"{LONGEST_SIDE} a side: give a coarser gsd or smaller bounds."
-        )
+        about = {"width": grid.width, "height": grid.height, "most": LONGEST_SIDE}
+        raise InputError(remark("relief.too_large", **about))
     return grid
 
 
@@ -256,10 +252,7 @@ def make_frame(
     first, seen1 = _on_grid(pair.image1, image1, grid)
     second, seen2 = _on_grid(pair.image2, image2, grid)
     if not (seen1 & seen2).any():
-        raise GeometryError(
-            "the two photos have no common area within the bounds: check the bounds and that the "
-            "photos show the same wall."
-        )
+        raise GeometryError(remark("relief.nothing_within_bounds"))
     fields = None
     if pair.refracted:
         reliefs = relief_range or (0.0, 0.0)

@@ -88,10 +88,7 @@ def check_registration(frame: Frame, measured: Measurement) -> Registration:
     matched = common & (loop < MATCHED)
     share = float(matched.sum() / max(common.sum(), 1))
     if share < LEAST_MATCHED:
-        raise GeometryError(
-            f"only {share:.0%} of the pixels can be matched between the two photos: do both show "
-            "the same wall, and does the pair file belong to them? Check the control points."
-        )
+        raise GeometryError(remark("relief.not_matched", share=share))
     radius = np.hypot(px, py)
     zone = NADIR_ZONE * np.hypot(frame.grid.width, frame.grid.height) / 2
     use = matched & (radius > zone) & np.isfinite(relief)
@@ -99,12 +96,8 @@ def check_registration(frame: Frame, measured: Measurement) -> Registration:
         px[use], py[use], across[use].astype(np.float64)
     )
     if median > REFUSE_PX:
-        raise GeometryError(
-            f"the photos are not registered: matched points miss the radial lines by {median:.1f} "
-            f"px (median; {REFUSE_PX:g} px is the limit), as from a shift of "
-            f"{shift[0]:+.1f}, {shift[1]:+.1f} px and a rotation of {np.degrees(rotation):+.3f} "
-            "deg. Make the pair file with `bifocal align --control` or `--auto`."
-        )
+        about = {"miss": median, "most": REFUSE_PX, "x": shift[0], "y": shift[1]}
+        raise GeometryError(remark("relief.not_registered", turn=np.degrees(rotation), **about))
     d1, d2 = frame.distances
     return Registration(
         matched=share,

@@ -17,6 +17,7 @@ from bifocal.model.relief_map import ReliefMap
 from bifocal.relief_maps import dense_relief
 from bifocal.relief_maps.frame import values_at
 from bifocal.relief_maps.relief_files import write_preview
+from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.cloud import write_cloud
@@ -83,9 +84,7 @@ def relief_of_pair(
         relief_range=job.relief_range, progress=progress,
     )  # fmt: skip
     if not result.known.any():
-        raise GeometryError(
-            "no relief could be measured within the bounds: the photos have no common area there."
-        )
+        raise GeometryError(remark("relief.none_within_bounds"))
     named = "" if isinstance(pair_file, Pair) else Path(pair_file).name
     tags = {
         "BIFOCAL_D1": f"{pair.image1.distance:.6g}",
