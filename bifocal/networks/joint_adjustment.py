@@ -15,7 +15,7 @@ from bifocal.model.orientation_precision import CAMERA
 from bifocal.model.pair_media import PairMedia
 from bifocal.networks.joint_observations import JointObservations, with_enough_rays, with_rays
 from photocore.adjustment import OUTLIER_LIMIT, Fit, huber_weights, minimise, standardised
-from photocore.adjustment.network import Network, Rows, State
+from photocore.adjustment.network import Network, NetworkState, Rows
 from photocore.adjustment.sparse import SparseEquations
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.camera.pinhole import PARAMETERS, Pinhole
@@ -191,7 +191,7 @@ def _coarse(
     return start, np.nan_to_num(away / usual, nan=np.inf), off / agreed
 
 
-def _unknowns(state: State) -> JointUnknowns:
+def _unknowns(state: NetworkState) -> JointUnknowns:
     return JointUnknowns(cameras=tuple(state.blocks["camera"].values()), xyz=state.points)
 
 
@@ -262,7 +262,7 @@ class _System:
         self.reach = float(min(camera.centre[2] for camera in start.cameras))
         self.focal = np.flatnonzero(free[:, 0])
         self.first_focal = np.log(focal)
-        self.start = State(
+        self.start = NetworkState(
             blocks={"camera": dict(enumerate(start.cameras))},
             points=start.xyz,
             drift=np.zeros(free.sum()),
@@ -280,7 +280,7 @@ class _System:
             kind=SparseEquations,
         )  # fmt: skip
 
-    def rays(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def rays(self, state: NetworkState) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return pixels (n, 2), derivatives by the points (n, 2, 3) and the cameras (n, 2, 7)."""
         count = len(self.seen.camera)
         pixels, by_point = np.empty((count, 2)), np.empty((count, 2, 3))
@@ -293,7 +293,7 @@ class _System:
             by_camera[rows] = view.by_camera[:, :, ESTIMATED]
         return pixels, by_point, by_camera
 
-    def _rays(self, state: State, rows: Rows) -> bool:
+    def _rays(self, state: NetworkState, rows: Rows) -> bool:
         seen = self.seen
         pixels, by_point, by_camera = self.rays(state)
         if not np.isfinite(pixels).all():
@@ -304,7 +304,7 @@ class _System:
         rows.by_points(lines, seen.point[:, None], by_point * weight)
         return True
 
-    def _known(self, state: State, rows: Rows) -> bool:
+    def _known(self, state: NetworkState, rows: Rows) -> bool:
         seen, (point, axis), along = self.seen, self.fixed.T, np.eye(3)
         weight = 1.0 / seen.sigma_known[point, axis]
         lines = rows.add((state.points[point, axis] - seen.known[point, axis]) * weight)
@@ -326,7 +326,7 @@ def _stepped(camera: Pinhole, places: list[int], step: FloatArray) -> Pinhole:
     return camera.stepped(whole)
 
 
-def _sigma0(fit: Fit[State], system: _System) -> float:
+def _sigma0(fit: Fit[NetworkState], system: _System) -> float:
     """Return the standard deviation of unit weight of rays and control; 1 where nothing checks it.
 
     The weak beliefs about relief have next to no residual and would make it look too good.
@@ -353,7 +353,7 @@ def _units(
 
 
 def _gross(
-    seen: JointObservations, system: _System, fit: Fit[State], sigma0: float
+    seen: JointObservations, system: _System, fit: Fit[NetworkState], sigma0: float
 ) -> tuple[BoolArray, FloatArray, list[Blunder]]:
     """Return which rays stay, the coordinates that stay known, and what goes: the worst of each.
 
@@ -391,7 +391,7 @@ def _adjusted(
     given: JointObservations,
     seen: JointObservations,
     system: _System,
-    fit: Fit[State],
+    fit: Fit[NetworkState],
     sigma0: float,
     blunders: tuple[tuple[Blunder, ...], tuple[Blunder, ...]],
 ) -> JointAdjustment:

@@ -28,7 +28,7 @@ from multimedia.orientation.intersection import intersect
 from multimedia.orientation.plate_poses import FEWEST, plate_pose
 from multimedia.projects.model import ObjectPoints, Project
 from photocore.adjustment import Fit, huber_weights
-from photocore.adjustment.network import State
+from photocore.adjustment.network import NetworkState
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.camera.rotation import skew
 from photocore.camera.similarity import fit_similarity
@@ -114,7 +114,9 @@ def _weighted(bundle: Bundle, weights: FloatArray) -> Bundle:
     return replace(bundle, observations=replace(seen, sigma=seen.sigma / np.sqrt(weights)))
 
 
-def _balanced(bundle: Bundle, fitted: Fit[State], weights: FloatArray) -> tuple[Bundle, Fit[State]]:
+def _balanced(
+    bundle: Bundle, fitted: Fit[NetworkState], weights: FloatArray
+) -> tuple[Bundle, Fit[NetworkState]]:
     """Weigh image coordinates by what they are worth where priors stand beside them.
 
     Their sigmas only matter against one another until a prior is stated in its own unit: an
@@ -160,7 +162,7 @@ def prepare(project: Project, unknowns: Unknowns) -> tuple[Bundle, tuple[str, ..
     points = _start_points(project, ids, points)
     weighted = movable & np.isfinite(sigma) & (sigma > 0) & (unknowns.control != "free")
     cameras, plates = dict(enumerate(project.cameras)), dict(enumerate(poses))
-    start = State(
+    start = NetworkState(
         blocks={"camera": cameras, "media": project.media, "plate": plates}, points=points,
         drift=np.zeros(len(columns.labels)),
     )  # fmt: skip
@@ -318,7 +320,7 @@ def _intersected(project: Project, ids: Sequence[str], which: IntArray) -> Float
 
 
 def _adjustment(
-    bundle: Bundle, result: Fit[State], weights: FloatArray, remarks: tuple[str, ...]
+    bundle: Bundle, result: Fit[NetworkState], weights: FloatArray, remarks: tuple[str, ...]
 ) -> Adjustment:
     """Return everything in the project's own terms."""
     project, seen, state = bundle.project, bundle.observations, result.state
@@ -354,7 +356,7 @@ def _adjustment(
     )  # fmt: skip
 
 
-def _points(bundle: Bundle, result: Fit[State]) -> tuple[ObjectPoints, FloatArray]:
+def _points(bundle: Bundle, result: Fit[NetworkState]) -> tuple[ObjectPoints, FloatArray]:
     """Return the adjusted object points and their covariances."""
     place, cofactor, state = bundle.columns, result.linear.cofactor, result.state
     covariance = result.linear.block_cofactor.copy()
@@ -380,7 +382,7 @@ def _points(bundle: Bundle, result: Fit[State]) -> tuple[ObjectPoints, FloatArra
     ), full  # fmt: skip
 
 
-def _values(bundle: Bundle, state: State) -> tuple[FloatArray, FloatArray]:
+def _values(bundle: Bundle, state: NetworkState) -> tuple[FloatArray, FloatArray]:
     """Return the adjusted unknowns, and the change from rotation vectors to angles."""
     place = bundle.columns
     values, change = state.drift.copy(), np.eye(len(place.labels))

@@ -13,7 +13,7 @@ from multimedia.media.camera import EXTERIOR
 from multimedia.media.projection import project_with_jacobian
 from multimedia.projects.model import Project
 from photocore.adjustment import LARGEST, Fit
-from photocore.adjustment.network import Network, Rows, State
+from photocore.adjustment.network import Network, NetworkState, Rows
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.camera.rotation import by_turn, skew
 from photocore.errors import GeometryError
@@ -56,7 +56,7 @@ class Bundle:
     unknowns : Unknowns
     ids : tuple of str
         All object points, control first, new ones behind.
-    start : State
+    start : NetworkState
         Blocks ``camera``, ``media`` and ``plate``: the last is world from plate, as the pose of a
         camera. World coordinates of points on plates follow from it.
     observations : ImageObservations
@@ -78,7 +78,7 @@ class Bundle:
     project: Project
     unknowns: Unknowns
     ids: tuple[str, ...]
-    start: State
+    start: NetworkState
     observations: ImageObservations
     columns: BundleColumns
     plate_of: IntArray
@@ -107,18 +107,18 @@ class Bundle:
             rounding=2e-15 * size / float(self.observations.sigma.min(initial=1.0)),
         )  # fmt: skip
 
-    def fit(self, start: State, *, largest: int = LARGEST) -> Fit[State]:
+    def fit(self, start: NetworkState, *, largest: int = LARGEST) -> Fit[NetworkState]:
         """Adjust from a start; beyond ``largest`` unknowns by elimination of the points."""
         return self.network.solve(start, largest=largest)
 
-    def _carried(self, state: State) -> State:
+    def _carried(self, state: NetworkState) -> NetworkState:
         """Return a state with the points on plates where their poses put them."""
         for plate, pose in state.blocks["plate"].items():
             on = self.plate_of == plate
             state.points[on] = self.local[on] @ pose.rotation.T + pose.centre
         return state
 
-    def _images(self, state: State, rows: Rows) -> bool:
+    def _images(self, state: NetworkState, rows: Rows) -> bool:
         seen, place, media = self.observations, self.columns, state.blocks["media"]
         image = np.empty(seen.image.shape)
         lines = rows.count + np.arange(image.size).reshape(image.shape)
@@ -147,7 +147,7 @@ class Bundle:
         rows.add((image - seen.image) / seen.sigma)
         return bool(np.isfinite(image).all())
 
-    def _known(self, state: State, rows: Rows) -> bool:
+    def _known(self, state: NetworkState, rows: Rows) -> bool:
         point, axis = np.nonzero(np.isfinite(self.known_sigma))
         weight = 1.0 / self.known_sigma[point, axis]
         lines = rows.add((state.points[point, axis] - self.known[point, axis]) * weight)
@@ -157,7 +157,7 @@ class Bundle:
         rows.by_label(rows.add(state.drift[columns] * weight), columns, weight)
         return True
 
-    def _scale_bars(self, state: State, rows: Rows) -> bool:
+    def _scale_bars(self, state: NetworkState, rows: Rows) -> bool:
         for bar in self.unknowns.scale_bars:
             ends = np.array([self.ids.index(bar.first), self.ids.index(bar.second)])
             offset = state.points[ends[1]] - state.points[ends[0]]
@@ -166,7 +166,7 @@ class Bundle:
             rows.by_points(rows.add(np.array([(length - bar.length) / bar.sigma])), ends, along)
         return True
 
-    def _datum(self, state: State, rows: Rows) -> bool:
+    def _datum(self, state: NetworkState, rows: Rows) -> bool:
         moved = np.concatenate([state.drift, (state.points - self.start.points).ravel()])
         stay = len(self.columns.labels)
         for row in self.datum:

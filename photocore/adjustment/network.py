@@ -23,7 +23,7 @@ from photocore.errors import GeometryError, InputError
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class State:
+class NetworkState:
     """Blocks by kind and name, points (p, 3), and the sum of all steps of the labels, (u,)."""
 
     blocks: Mapping[str, Mapping[Any, Any]]
@@ -86,7 +86,7 @@ class Network:
     kept : ndarray of int, shape (p, 3)
         Columns of coordinates that are unknowns like others, else -1.
     terms : sequence of callable
-        State and `Rows`, to which they add what they observe; False where that is impossible.
+        State and `Rows`, to which they add what they observe; False where it is impossible.
     step : callable
         Block, names and step to the block that is moved so; by default its own ``stepped``.
     moved : callable, optional
@@ -117,7 +117,7 @@ class Network:
         """Columns of the coordinates that are eliminated, else -1, shape (p, 3)."""
         return np.where(self.free, np.arange(self.free.size).reshape(self.free.shape), -1)
 
-    def equations(self, state: State) -> BlockEquations | None:
+    def equations(self, state: NetworkState) -> BlockEquations | None:
         """Return the equations at a state, None where one of the terms is impossible."""
         rows = Rows(self)
         if not all(term(state, rows) for term in self.terms):
@@ -128,7 +128,7 @@ class Network:
             eliminated=rows.matrix(rows.eliminated, self.free.size), free=self.free,
         )  # fmt: skip
 
-    def advance(self, state: State, step: FloatArray) -> State | None:
+    def advance(self, state: NetworkState, step: FloatArray) -> NetworkState | None:
         """Return the state after a step, None where it is impossible."""
         own, points = step[: len(self.labels)], state.points.copy()
         blocks = {kind: dict(some) for kind, some in state.blocks.items()}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bifocal import GeometryError
-from photocore.adjustment.network import Network, State
+from photocore.adjustment.network import Network, NetworkState
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ def network(points, terms, kept=-1):
     free[:, 0] = place[:, 0] < 0
     labels = ["length", "a", "b"] + ["X of point 1"] * (kept >= 0)
     columns = {"rod": {"a": {"length": 0, "offset": 1}, "b": {"length": 0, "offset": 2}}}
-    start = State(
+    start = NetworkState(
         blocks={"rod": {"a": Rod(1.0, 0.0), "b": Rod(1.0, 0.0)}}, points=np.zeros((points, 3)),
         drift=np.zeros(len(labels)),
     )  # fmt: skip
