@@ -38,7 +38,7 @@ CHECK = _file(
     "--check", "Table of independent check points, like --control: the accuracy is judged by them."
 )
 UNIT = choice("--unit", "m|cm|mm", "Unit of the coordinates.  [default: the headings', else m]")
-LANGUAGE = choice("--language", "en|it|de", "Of report and workbook.", default="en")
+LANGUAGE = choice("--language", "en|it|de", "Of report, workbook and sheets.", default="en")
 BOUNDS = number(
     "--bounds", "XMIN,YMIN,XMAX,YMAX", "Part of the wall [m].  [default: all that is known]",
     type=Numbers(4),

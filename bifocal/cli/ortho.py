@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bifocal.options import CONTROL, DRAWING, GSD, PICTURE
+from bifocal.options import CONTROL, DRAWING, GSD, LANGUAGE, PICTURE
 from photocore.cli import print_result, progress_bar, remark
 from photocore.options import FILE, Length, as_json, cog, overwrite, takes
 
@@ -28,6 +28,7 @@ Examples:
 """
 
 _CONTROL = CONTROL.but(help="Table of control points to draw.")
+_LANGUAGE = LANGUAGE.but(help="Of sheets and sections.")
 
 
 @click.command(epilog=EXAMPLE)
@@ -48,7 +49,7 @@ _CONTROL = CONTROL.but(help="Table of control points to draw.")
     "--deliver", "folder", type=FILE, metavar="DIR",
     help="Write GeoTIFF, PNG, DXF and PDF, of the relief too, into a folder. Needs --scale.",
 )  # fmt: skip
-@takes(*DRAWING, _CONTROL)
+@takes(*DRAWING, _CONTROL, _LANGUAGE)
 @click.option("--title", default="", help="Title of the drawing.  [default: the pair's name]")
 @click.option("--tfw", is_flag=True, help="Also write the world file beside it.")
 @cog
@@ -74,7 +75,7 @@ def command(
 
     if out is None and folder is None:
         raise click.UsageError("Give --out FILE, --deliver DIR or both.")
-    drawing = {option.name: given.pop(option.name) for option in (*DRAWING, _CONTROL)}
+    drawing = {option.name: given.pop(option.name) for option in (*DRAWING, _CONTROL, _LANGUAGE)}
     scale = drawing["scale"]
     if folder is not None and scale is None:
         raise click.UsageError("--deliver needs the scale of the drawing, e.g. --scale 1:50.")
