@@ -228,8 +228,8 @@ def _grids(
     if min(work.shape) < LIMITS.smallest_work * halved:
         raise InputError(
             f"the photos would be matched on {work.width // halved} x {work.height // halved} px "
-            f"of {fine:.3g} m; at least {LIMITS.smallest_work} a side are needed. Give larger bounds, a "
-            "finer gsd or quality standard."
+            f"of {fine:.3g} m; at least {LIMITS.smallest_work} a side are needed. Give larger "
+            "bounds, a finer gsd or quality standard."
         )
     if bounds is None and gsd is None:
         # The map's pixels are those of photo 1, where that is square to the wall.

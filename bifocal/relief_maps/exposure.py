@@ -40,7 +40,7 @@ def match_exposure(frame: Frame, coarse: Float32Array) -> Frame:
     content = cv2.remap(frame.seen2.astype(np.uint8), columns, rows, cv2.INTER_NEAREST) > 0
     use = content & frame.seen1[part]
     for grey in (first, second):
-        use &= (grey > EXPOSURE.darkest) & (grey < EXPOSURE.brightest)
+        use &= (grey > EXPOSURE.darkest) & (grey < 255 - EXPOSURE.darkest)
     if use.sum() < 200:
         return frame
     # Vignetting belongs to photo 2's own pixels, so the terms are taken at its positions.

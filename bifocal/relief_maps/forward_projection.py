@@ -37,8 +37,8 @@ def stretch(frame: Frame, relief: Float32Array) -> Float32Array:
     """Return how much of the wall, along the radius, a pixel of photo 1 covers, in pixels.
 
     With s1 the radius about the nadir of photo 1, ``ds'/ds1 = 1 - r/d1 - (s1/d1) dr/ds1``: near one
-    on a true surface, more on a ramp that no camera can have seen as a surface (`STRETCH`), near
-    zero on the side face of a step, which has no place of its own on the map (`SIDE_FACE`).
+    on a true surface, more on a ramp that no camera can have seen as a surface (`stretch`), near
+    zero on the side face of a step, which has no place of its own on the map (`side_face`).
     """
     foot = frame.foot(1)
     across = cv2.Sobel(relief, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)

@@ -16,7 +16,7 @@ from bifocal.relief_maps import forward_projection
 from bifocal.relief_maps.flow import Measurement
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame
-from bifocal.relief_maps.tuning import EDGES, PROJECTION, REGIONS
+from bifocal.relief_maps.tuning import EDGES, EVIDENCE, PROJECTION, REGIONS
 from photocore.arrays import BoolArray, Float32Array
 
 #: Regions of fewer blocks a side are two ramps, one from either rim, that meet.
@@ -47,7 +47,7 @@ def put_behind(
     10 cm, empty 5.1 to 5.3 %).
     """
     least = forward_projection.covering(frame, PROJECTION.covers)
-    lost = ((matched.loop > REGIONS.lost_loop) & ~support & frame.seen1).astype(np.uint8)
+    lost = ((matched.loop > EVIDENCE.lost_loop) & ~support & frame.seen1).astype(np.uint8)
     blocks = _block_means(lost) > 0.5
     square = np.ones((NARROWEST, NARROWEST), np.uint8)
     wide = cv2.morphologyEx(blocks.astype(np.uint8), cv2.MORPH_OPEN, square)
@@ -95,7 +95,7 @@ def _surface_behind(frame: Frame, relief: Float32Array, support: BoolArray) -> F
     """
     share = _block_means(support.astype(np.float32))
     sums = _block_means(np.where(support, relief, np.float32(0)))
-    known = share * REGIONS.block**2 >= REGIONS.fewest
+    known = share * REGIONS.block**2 >= EVIDENCE.fewest
     values = (sums / np.maximum(share, np.float32(1e-3))).astype(np.float32)
     nothing = np.zeros(values.shape, np.float32)
     bands = MapBands(values, nothing, nothing.astype(np.uint8))

@@ -107,10 +107,11 @@ class _Problem:
         at = np.stack([borders.row, borders.column]) / 2 - 0.25
         x0, y0 = half.from_centre()
         parallax = np.float32(half.pair.base_factor) / np.maximum(np.sqrt(x0 * x0 + y0 * y0), 2)
+        covers = PATCHES.covers[0] * parallax + np.float32(PATCHES.covers[1])
         return cls(
             half=half, segments=segments, label=label, down=y - row, across=x - column, first=first,
             second=second, weight=1 / (2 * (variance + slack)), tie=tie,
-            covers=(PATCHES.covers[0] * parallax + np.float32(PATCHES.covers[1])).astype(np.float32),
+            covers=covers.astype(np.float32),
             top=np.zeros((height, width), np.float32),
             from_own=at - middle[:, borders.own], from_other=at - middle[:, borders.other],
         )  # fmt: skip

@@ -59,7 +59,7 @@ class Segments(NamedTuple):
 
     @classmethod
     def of(cls, image: ByteArray) -> Segments:
-        """Cut a photo into segments some `SPACING` pixels wide; it must be larger than one."""
+        """Cut a photo into segments some `spacing` pixels wide; it must be larger than one."""
         quiet = cv2.medianBlur(
             cv2.bilateralFilter(image, SEGMENTS.smoothing, SEGMENTS.edge, SEGMENTS.reach), 3
         )
