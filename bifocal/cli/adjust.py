@@ -5,37 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import click
-
-from bifocal.options import JOINT
 from photocore.cli import print_result, progress_bar, tell_written
-from photocore.options import FILE, as_json, overwrite, takes
-
-EXAMPLE = """\b
-Examples:
-  bifocal adjust left.pair.json right.pair.json --control left.csv --control right.csv --out joint
-  bifocal adjust a.pair.json b.pair.json c.pair.json --control a.csv --control none
-                 --control c.csv --out joint
-"""
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("pairs", type=FILE, nargs=-1, required=True, metavar="PAIR.pair.json...")
-@click.option(
-    "--out", type=FILE, required=True, metavar="DIR", help="Folder of the adjusted pairs."
-)
-@click.option(
-    "--control", type=FILE, multiple=True,
-    help="Table of control points of a pair, as for `bifocal align`, or none; repeat it, one for "
-    "each PAIR. Points of one name are one point.",
-)  # fmt: skip
-@click.option(
-    "--check", type=FILE, multiple=True,
-    help="The same for independent check points: they are compared, and hold nothing.",
-)  # fmt: skip
-@takes(*JOINT)
-@overwrite
-@as_json
+@declared
 def command(
     pairs: tuple[Path, ...], out: Path, control: tuple[Path, ...], check: tuple[Path, ...],
     unit: str | None, overwrite: bool, as_json: bool, **sigmas: Any,

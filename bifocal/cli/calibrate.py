@@ -7,47 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bifocal.options import OF_DATABASE
 from photocore.cli import print_result, progress_bar, remark, text_table
-from photocore.options import BOARD, FILE, PATTERN, as_json, choice, number, overwrite, takes
+from photocore.options import declared
 
 if TYPE_CHECKING:
     from bifocal.calibration.board_calibration import Calibration
 
-EXAMPLE = """\b
-Examples:
-  bifocal calibrate board*.jpg --out lens35.json
-  bifocal calibrate charuco*.jpg --pattern charuco --board 8x11 --out lens35.json
-  bifocal calibrate facade.jpg --straight-edges --focal-px 4740 --out lens35.json
-  bifocal calibrate facade.jpg --lines lines.csv --out lens35.json
-  bifocal calibrate facade.jpg --database --out lens35.json
 
-One lens file holds for one lens at one focus and one zoom mark.
-"""
-
-
-@click.command(epilog=EXAMPLE)
-@click.argument("images", nargs=-1, required=True, metavar="IMAGE...", type=FILE)
-@click.option("--out", type=FILE, required=True, help="The lens file.")
-@PATTERN
-@BOARD.but(help=f"{BOARD.attributes['help']}  [default: chessboard recognised by itself]")
-@choice(
-    "--model", "auto|k1|k1k2|k1k2p|k1k2pk3|fisheye",
-    "Distortion terms; auto takes in what an F test at 1 % asks for.", default="auto",
-)  # fmt: skip
-@click.option(
-    "--straight-edges", is_flag=True,
-    help="No board: use the straight edges of a façade (radial terms only).",
-)  # fmt: skip
-@click.option(
-    "--lines", type=FILE,
-    help="No board: points picked along straight lines; headings line, col [px], row [px].",
-)  # fmt: skip
-@number("--focal-px", "PX", "With lines: principal distance [px].")
-@click.option("--database", is_flag=True, help="Take the lens database's data for this photo.")
-@takes(*OF_DATABASE)
-@overwrite
-@as_json
+@declared
 def command(
     images: tuple[Path, ...], out: Path, pattern: str, board: tuple[int, int] | None,
     model: str, straight_edges: bool, lines: Path | None, focal_px: float | None, database: bool,

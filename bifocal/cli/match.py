@@ -9,44 +9,10 @@ from typing import Any
 import click
 
 from photocore.cli import print_result, remark
-from photocore.options import FILE, NEW_TABLE, NUMBER, as_json, choice, number, overwrite
-
-EXAMPLE = """\b
-Examples:
-  bifocal match wall.pair.json --out survey.xlsx
-  bifocal match survey.xlsx --out matched.xlsx
-  bifocal match wall.pair.json --count 2000 --out points.csv
-  bifocal match wall.pair.json --what targets --out targets.xlsx
-Then:
-  bifocal solve survey.xlsx --out result.xlsx
-  bifocal solve points.csv --pair wall.pair.json --json
-"""
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("pair", type=FILE)
-@click.option(
-    "--out",
-    type=NEW_TABLE,
-    required=True,
-    help="Survey workbook (.xlsx) or table (.csv) to write; - is a table on stdout.",
-)
-@click.option(
-    "--count", type=click.IntRange(1, 100_000), default=4000, show_default=True,
-    help="About so many feature points, spread evenly.",
-)  # fmt: skip
-@choice("--what", "all|features|targets", "Natural detail, survey targets, or both.", default="all")
-@number(
-    "--relief-min", "M", "Lowest relief looked for [m].  [default: -0.5 x near distance]",
-    type=NUMBER,
-)  # fmt: skip
-@number(
-    "--relief-max", "M", "Highest relief looked for [m].  [default: 0.4 x near distance]",
-    type=NUMBER,
-)  # fmt: skip
-@choice("--lang", "en|it|de", "Language of the workbook.", default="en")
-@overwrite
-@as_json
+@declared
 def command(
     pair: Path, out: Path, count: int, what: str, relief_min: float | None,
     relief_max: float | None, lang: str, overwrite: bool, as_json: bool,

@@ -7,30 +7,10 @@ from pathlib import Path
 import click
 
 from photocore.cli import print_json, remark
-from photocore.options import FILE, as_json, choice
-
-EXAMPLE = """\b
-Examples:
-  bifocal pick wall.pair.json
-  bifocal pick far.jpg near.jpg --workbook wall.xlsx
-  bifocal pick survey.xlsx --lang it
-  bifocal pick .
-"""
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("sources", nargs=-1, type=FILE, metavar="[PAIR|SURVEY.xlsx|FOLDER|FAR NEAR]")
-@click.option(
-    "--workbook", type=FILE, metavar="SURVEY.xlsx",
-    help="Survey workbook the points go into.  [default: named after the pair]",
-)  # fmt: skip
-@click.option(
-    "--port", type=click.IntRange(0, 65535), default=0, help="Port; 0: one that is free.",
-    show_default=True,
-)  # fmt: skip
-@click.option("--no-browser", is_flag=True, help="Print the address only.")
-@choice("--lang", "en|it|de", "Language of the page.", default="en")
-@as_json
+@declared
 def command(
     sources: tuple[Path, ...], workbook: Path | None, port: int, no_browser: bool, lang: str,
     as_json: bool,

@@ -8,66 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bifocal.options import MEDIA
 from photocore.cli import print_result, remark, text_table
-from photocore.options import (
-    FILE,
-    POSITIVE,
-    THOUSANDTHS,
-    Scale,
-    Size,
-    as_json,
-    number,
-    overwrite,
-    takes,
-)
+from photocore.options import declared
 
 if TYPE_CHECKING:
     from bifocal.planning.camera_plan import Plan
 
-EXAMPLE = """\b
-Examples:
-  bifocal plan --focal 35 --focal 28 --focal 19 --sensor 22.7x15.1 --pixels 3072x2048 --scale 1:500
-  bifocal plan --focal 35 --focal 18 --sensor 23.5x15.6 --pixels 6000x4000 --object 12x8
-               --free-space 20 --out plan.xlsx
-  bifocal plan --focal 35 --focal 19 --sensor 22.7x15.1 --pixels 3072x2048 --scale 1:100
-               --indices 1,1.49,1.337 --thicknesses 0.01 --depth 0.9
-  bifocal plan --equivalent 77 --equivalent 24 --pixels 4000x3000 --object 6x4
-"""
 
-
-@click.command(epilog=EXAMPLE)
-@click.option(
-    "--focal", "focal_lengths", type=POSITIVE, multiple=True, metavar="MM",
-    help="A focal length at hand [mm]; repeat it for every lens or zoom mark.",
-)  # fmt: skip
-@click.option(
-    "--equivalent", "equivalents", type=POSITIVE, multiple=True, metavar="MM",
-    help="A 35 mm equivalent, as phones state it, in place of --focal and --sensor [mm]; repeat "
-    "it for every camera of the phone.",
-)  # fmt: skip
-@click.option("--sensor", type=Size(above=0), help="Width x height of the sensor [mm].")
-@click.option(
-    "--pixels", type=Size(least=1, whole=True), required=True,
-    help="Columns x rows of the photo [px].",
-)  # fmt: skip
-@click.option("--object", "object_size", type=Size(above=0), help="Width x height of the wall [m].")
-@click.option("--scale", "scale_number", type=Scale(), help="Wanted scale of the photo, 1:N.")
-@number("--gsd", "MM", "Wanted pixel on the wall [mm].", type=THOUSANDTHS)
-@number(
-    "--sigma-r", "MM", "Wanted sigma of the relief at the RMS radius of the photo [mm].",
-    type=THOUSANDTHS,
-)  # fmt: skip
-@number("--sigma-px", "PX", "Precision of a pick [px].", default=0.5)
-@number(
-    "--sigma-r-max", "MM", "Area of uncertainty: sigma of the relief above this [mm].  "
-    "[default: 3 x that of the best pair]", type=THOUSANDTHS,
-)  # fmt: skip
-@number("--free-space", "M", "Room in front of the wall [m].")
-@takes(*MEDIA)
-@click.option("--out", type=FILE, help="Also write the plan as .xlsx.")
-@overwrite
-@as_json
+@declared
 def command(
     focal_lengths: tuple[float, ...], equivalents: tuple[float, ...],
     sensor: tuple[float, float] | None, pixels: tuple[int, int],

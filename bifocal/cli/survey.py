@@ -7,40 +7,10 @@ from pathlib import Path
 import click
 
 from photocore.cli import print_json, print_result, progress_bar, remark, tell_written, text_table
-from photocore.options import FILE, Number, as_json, number, overwrite
-
-EXAMPLE = """\b
-Examples:
-  bifocal survey --init photos street.toml
-  bifocal survey street.toml --dry-run
-  bifocal survey street.toml --jobs 4 --memory 12
-  bifocal survey street.toml --scheduler tcp://192.168.0.10:8786
-"""
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("survey", type=FILE, required=False)
-@click.option(
-    "--init", "folder", type=FILE, metavar="DIR",
-    help="Write SURVEY from a folder of photos.  [default: survey.toml in it]",
-)  # fmt: skip
-@click.option("--dry-run", is_flag=True, help="Show what would be made and what is kept.")
-@click.option(
-    "--out", type=FILE, metavar="DIR", help="Folder of the results.  [default: the file's]"
-)
-@number("--jobs", "N", "Pairs at once.  [default: cores]", type=Number(least=1, whole=True))
-@number("--memory", "GIB", "For all pairs at work.  [default: 80 % of what is free]")
-@click.option(
-    "--scheduler", default="", metavar="tcp://...",
-    help="Address of a Dask scheduler.",
-)  # fmt: skip
-@click.option(
-    "--ship", is_flag=True,
-    help="Send photos to its workers and products back.  [default: only where a worker does not "
-    "see the folders]",
-)  # fmt: skip
-@overwrite
-@as_json
+@declared
 @click.pass_context
 def command(
     ctx: click.Context, survey: Path | None, folder: Path | None, dry_run: bool, out: Path | None,

@@ -4,25 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import click
-
 from photocore.cli import tell_written
-from photocore.options import FILE, choice, overwrite
-
-EXAMPLE = """\b
-Examples:
-  bifocal view relief.tif --out wall.html
-  bifocal view relief.tif --ortho ortho.tif --title "Via Roma 12" --out wall.html
-"""
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("relief", type=FILE)
-@click.option("--ortho", type=FILE, help="Orthophoto that gives the colours.")
-@click.option("--title", default="", help="Title.  [default: the file's name]")
-@choice("--language", "en|it|de", "Of the page.", default="en")
-@click.option("--out", type=FILE, required=True, help="Page to write (.html).")
-@overwrite
+@declared
 def command(
     relief: Path, ortho: Path | None, title: str, language: str, out: Path, overwrite: bool
 ) -> None:

@@ -3,66 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import degrees, radians
+from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from photocore.cli import print_result, tell_written, text_table
-from photocore.options import FILE, FOCAL, Number, Numbers, Size, as_json, number, overwrite
+from photocore.options import declared
 
 if TYPE_CHECKING:
     from multimedia.design.studies import Design
 
-EXAMPLE = """\b
-Examples:
-  multimedia design --cameras 4 --distance 0.6 --half-angle 30 --c 25 --extent 0.3x0.3
-             --depths 0.02x0.2 --indices 1,1.5,1.337 --thicknesses 0.01 --sigma 0.0012
-  multimedia design tank.toml --out design.xlsx --plot design.png --flatness
-"""
 
-
-@click.command(epilog=EXAMPLE)
-@click.argument("project", required=False, type=FILE)
-@click.option(
-    "--cameras", "count", type=click.IntRange(1, 100), default=4, show_default=True,
-    help="Cameras on the cone.",
-)  # fmt: skip
-@number("--distance", "M", "From the last face to each camera [m].")
-@click.option(
-    "--half-angle", type=Number(above=0, below=90, to=radians), default=30.0, show_default=True,
-    help="Half opening of the cone of cameras, in air [deg].",
-)  # fmt: skip
-@click.option("--c", "principal_distance", type=FOCAL, help="Principal distance [mm].")
-@click.option(
-    "--indices", type=Numbers(above=0), default="1,1.337", show_default=True,
-    help="Refractive indices from camera to object.",
-)  # fmt: skip
-@click.option(
-    "--thicknesses", type=Numbers(least=0), default="",
-    help="Of media between [m].  [default: none]",
-)  # fmt: skip
-@click.option("--extent", type=Size(above=0), help="Width x height of the object space [m].")
-@click.option(
-    "--depths", type=Size(), metavar="LEASTxLARGEST", help="Depths of the object space [m]."
-)
-@click.option(
-    "--sigma", "sigma_image", type=Number(above=0, most=1), default=0.001, show_default=True,
-    help="Precision of an image coordinate [mm].",
-)  # fmt: skip
-@click.option(
-    "--seed", type=click.IntRange(min=0), default=1, show_default=True,
-    help="Of the simulated noise.",
-)  # fmt: skip
-@click.option(
-    "--flatness", is_flag=True,
-    help="Also study how plane and parallel the faces must be (bent, wedged, wavy ones).",
-)  # fmt: skip
-@click.option("--out", type=FILE, help="Write the tables (.xlsx).")
-@click.option("--plot", type=FILE, help="Draw them (.png, .svg, .pdf).")
-@overwrite
-@as_json
+@declared
 def command(
     project: Path | None, seed: int, flatness: bool, out: Path | None, plot: Path | None,
     overwrite: bool, as_json: bool, **ring: Any,

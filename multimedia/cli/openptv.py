@@ -5,41 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import click
-
 from photocore.cli import print_json, print_result, remark, text_table
-from photocore.options import FILE, as_json, number, overwrite
-
-EXAMPLE = """\b
-Examples:
-  multimedia openptv test_cavity --out cavity.toml
-  multimedia openptv test_cavity --swap-indices --out cavity.toml
-  multimedia openptv cavity.toml --export folder_for_openptv
-"""
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("source", metavar="DIR", type=FILE)
-@click.option(
-    "--out", type=FILE,
-    help="Project file to write (.toml), tables beside it.  [default: name of the folder + .toml, "
-    "here]",
-)  # fmt: skip
-@click.option("--swap-indices", is_flag=True, help="Exchange the indices of glass and water.")
-@click.option(
-    "--min-pixels", "least_pixels", type=click.IntRange(min=1), default=15, show_default=True,
-    help="Smaller targets are no dots of the calibration body [px].",
-)  # fmt: skip
-@number(
-    "--radius", "PX",
-    "Farthest a target may lie from where the stored orientation expects it [px].", default=25.0,
-)  # fmt: skip
-@click.option(
-    "--export", type=FILE,
-    help="The other way: DIR is a project file; write it as an OpenPTV folder.",
-)  # fmt: skip
-@overwrite
-@as_json
+@declared
 def command(
     source: Path, out: Path | None, export: Path | None, overwrite: bool, as_json: bool,
     **options: Any,
