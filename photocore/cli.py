@@ -20,7 +20,7 @@ from photocore.errors import PhotogrammetryError
 from photocore.installation import too_old
 from photocore.interrupts import STOPPED
 from photocore.log import COMMAND_LINE, DATE, is_quiet, log_options
-from photocore.options import NUMBER, STREAMS
+from photocore.option_types import STREAMS
 from photocore.provenance import recording
 from photocore.textfile import odd_name
 
@@ -103,9 +103,6 @@ class LazyGroup(click.Group):
         module = import_module(f"{self.commands_package}.{cmd_name.replace('-', '_')}")
         command: click.Command = module.command
         command.short_help = self.summaries[cmd_name]
-        for parameter in command.params:
-            if parameter.type is click.FLOAT:
-                parameter.type = NUMBER
         if not any("--debug" in parameter.opts for parameter in command.params):
             command.params += [_debug_option(), *log_options()]
         return command

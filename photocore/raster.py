@@ -95,11 +95,10 @@ class RasterFile(ExitStack):
 
         super().__init__()
         self.path = Path(path)
-        check_name(self.path)
-        if self.path.is_dir():
-            raise InputError(f"{self.path}: is a folder; name the raster file in it.")
-        if not is_virtual(self.path):
-            check_file(self.path, "raster file")
+        if is_virtual(self.path):
+            check_name(self.path)
+        else:
+            check_file(self.path, "raster file", folder="; name the raster file in it.")
         self.enter_context(rasterio.Env(GDAL_CACHEMAX=CACHE))
         try:
             file = self._file = self.enter_context(_opened(self.path))

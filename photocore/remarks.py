@@ -8,13 +8,12 @@ text that was read from a file or put together from several.
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Iterator, Mapping
 from functools import cached_property, lru_cache, partial
-from importlib.resources import files
 from string import Formatter
 from typing import Any
 
+from photocore.textfile import packaged
 from photocore.workbook.making.words import LANGUAGES
 
 #: Entries of this section are single words: looked up only as values of blanks ``{...!s}``.
@@ -67,8 +66,7 @@ class Remarks:
         """Texts by key and language."""
         found: dict[str, dict[str, str]] = {}
         for package in self.packages:
-            text = files(package).joinpath("remarks.toml").read_text(encoding="utf-8")
-            for section, entries in tomllib.loads(text).items():
+            for section, entries in packaged(package, "remarks").items():
                 found |= {f"{section}.{name}": words for name, words in entries.items()}
         return found
 

@@ -7,6 +7,7 @@ import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager
 from errno import ENAMETOOLONG
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -59,25 +60,36 @@ def read_text(path: Path, what: str, *, form: str = "") -> str:
             raise InputError(f"{path}: is not a text file, expected a {what}{form}.") from None
 
 
-def check_file(path: Path, missing: str = "file") -> None:
+def check_file(path: Path, missing: str = "file", *, folder: str = "") -> None:
     """Refuse what is no file: nothing at all, or a pipe or device, reading which may wait for ever.
 
     Parameters
     ----------
     path : Path
-        What is to be read; folders are for the caller to refuse.
+        What is to be read.
     missing : str
         What it should be, for the message.
+    folder : str
+        What to say of a folder after "is a folder"; left blank, the caller has refused it.
 
     Raises
     ------
     InputError
-        Saying which of both.
+        Saying which of them, or that no file can have this name.
     """
+    check_name(path)
+    if folder and path.is_dir():
+        raise InputError(f"{path}: is a folder{folder}")
     if not path.exists():
         raise InputError(f"{path}: no such {missing}.")
     if not path.is_file():
         raise InputError(f"{path}: is a pipe or a device; save what it gives as a file first.")
+
+
+def packaged(package: str, name: str) -> dict[str, Any]:
+    """Return what a package's own TOML file of this name holds, such as its `words.toml`."""
+    text = files(package).joinpath(f"{name}.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
@@ -103,11 +115,8 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
 @contextmanager
 def readable(path: Path, what: str, *, missing: str = "file") -> Iterator[None]:
     """Say what is wrong with a file that cannot be read: missing, a folder, a pipe, locked."""
-    check_name(path)
     try:
-        if path.is_dir():
-            raise InputError(f"{path}: is a folder, expected a {what}.")
-        check_file(path, missing)
+        check_file(path, missing, folder=f", expected a {what}.")
         note(path)
         yield
     except FileNotFoundError:

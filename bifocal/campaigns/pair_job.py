@@ -21,21 +21,9 @@ from bifocal.campaigns.step_store import (
     run_step,
     step_key,
 )
-from bifocal.options import (
-    ALIGN,
-    CONTROL,
-    DRAWING,
-    GSD,
-    LANGUAGE,
-    PICTURE,
-    RELIEF,
-    SCALE,
-    UNIT,
-    names_of,
-)
+from bifocal.options import DRAWING, MAP, PICTURE, SET_UP
 from photocore.cli import Progress, no_progress, unforeseen_message
 from photocore.errors import InputError, PhotogrammetryError
-from photocore.options import COG, Option
 from photocore.provenance import FileHashes, recording
 from photocore.raster_places import cloud_optimised
 from photocore.textfile import file_name, odd_name
@@ -295,8 +283,8 @@ def _part_of(progress: Progress, start: float, share: float, step: str) -> Progr
     return report
 
 
-def _some(job: PairJob, *options: Option) -> dict[str, Any]:
-    return {name: job.options[name] for name in names_of(*options) if name in job.options}
+def _some(job: PairJob, *names: str) -> dict[str, Any]:
+    return {name: job.options[name] for name in names if name in job.options}
 
 
 def refusal(job: PairJob) -> str:
@@ -312,13 +300,12 @@ def refusal(job: PairJob) -> str:
 
 
 def _align_files(job: PairJob) -> dict[str, Path]:
-    names = names_of(CONTROL, *ALIGN)
-    return {role: path for role, path in job.files.items() if role in names}
+    return {role: path for role, path in job.files.items() if role in ("control", *SET_UP)}
 
 
 def _align_step(job: PairJob) -> Step:
     files = _align_files(job)
-    options = _some(job, *ALIGN)
+    options = _some(job, *SET_UP)
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
         from bifocal.orientation.align_workflow import AlignOptions, align_photos
@@ -341,7 +328,7 @@ def _photos(job: PairJob) -> dict[str, Path]:
 
 
 def _relief_step(job: PairJob) -> Step:
-    options = _some(job, *RELIEF, COG)
+    options = _some(job, *MAP, "cog")
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
@@ -349,7 +336,7 @@ def _relief_step(job: PairJob) -> Step:
         out = place / job.relief_path.name
         task = ReliefJob(
             out=out, preview=out.with_suffix(".png"), gsd=options.get("relief_gsd"),
-            **_some(job, *RELIEF[1:]),
+            **_some(job, *MAP[1:]),
         )  # fmt: skip
         _, remarks = relief_of_pair(job.pair_path, task, progress=progress)
         return remarks
@@ -363,7 +350,7 @@ def tables_of(job: PairJob) -> dict[str, Path]:
 
 
 def _points_step(job: PairJob) -> Step:
-    options = _some(job, LANGUAGE, UNIT)
+    options = _some(job, "language", "unit")
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
         from bifocal.model.pair import Pair
@@ -400,13 +387,13 @@ def _ortho_task(job: PairJob, options: Mapping[str, Any]) -> OrthoTask:
     from bifocal.orthophotos.ortho_workflow import OrthoTask
 
     return OrthoTask.from_given(
-        {key: options[key] for key in names_of(*PICTURE, GSD) if key in options},
+        {key: options[key] for key in (*PICTURE, "gsd") if key in options},
         relief=job.relief_path,
     )
 
 
 def _ortho_step(job: PairJob) -> Step:
-    options = _some(job, *PICTURE, GSD, COG)
+    options = _some(job, *PICTURE, "gsd", "cog")
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.orthophotos.ortho_workflow import make_ortho
@@ -421,7 +408,7 @@ def _ortho_step(job: PairJob) -> Step:
 
 
 def _drawing_step(job: PairJob) -> Step:
-    options = _some(job, *DRAWING, *PICTURE, COG)
+    options = _some(job, *DRAWING, *PICTURE, "cog")
     tables = {role: job.files[role] for role in ("control", "mark") if role in job.files}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
@@ -439,7 +426,7 @@ def _drawing_step(job: PairJob) -> Step:
 
 
 def _view_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
-    options = {"title": job.name} | _some(job, LANGUAGE)
+    options = {"title": job.name} | _some(job, "language")
     ortho = job.ortho_path(earlier)
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
@@ -453,7 +440,7 @@ def _view_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
 
 
 def _report_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
-    options = {"title": job.name} | _some(job, LANGUAGE, UNIT, SCALE)
+    options = {"title": job.name} | _some(job, "language", "unit", "scale")
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.reports.workflow import ReportTask, write_report

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.campaigns.pair_job import PRODUCTS, PairJob, tables_of
-from bifocal.options import FILES, JOINT, OF_PAIR, names_of
+from bifocal.options import FILES, JOINT, OF_PAIR
 from photocore.errors import InputError
 from photocore.textfile import file_name, read_toml
 
@@ -125,7 +125,7 @@ def _faults_of_whole(jobs: Sequence[PairJob], whole: Mapping[str, Any]) -> list[
         for job in jobs
         if job.folder.name.casefold() in WHOLE
     ]
-    for key in names_of(*JOINT) if whole["joint"] else ():
+    for key in JOINT if whole["joint"] else ():
         if len({job.options.get(key) for job in jobs if tables_of(job)}) > 1:
             faults.append(
                 f"{key}: the pairs say different things of their tables, and joint = true "

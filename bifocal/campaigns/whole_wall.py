@@ -22,7 +22,6 @@ from bifocal.campaigns.step_store import (
     step_key,
 )
 from bifocal.options import JOINT as JOINT_OPTIONS
-from bifocal.options import names_of
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.provenance import FileHashes, recording
@@ -41,7 +40,7 @@ def joint_step(jobs: Sequence[PairJob]) -> Step:
         files |= {f"{job.title} {role}": path for role, path in parts.items()}
     # One unit and precision of the tables for all: the survey file holds no two.
     said = next((job for job in jobs if tables_of(job)), jobs[0]).options
-    options = {name: said[name] for name in names_of(*JOINT_OPTIONS) if name in said}
+    options = {name: said[name] for name in JOINT_OPTIONS if name in said}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.networks.joint_workflow import JointTask, adjust_pairs

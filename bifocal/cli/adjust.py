@@ -5,41 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import click
-
-from bifocal.options import JOINT
 from photocore.cli import print_result, progress_bar, tell_written
-from photocore.options import FILE, as_json, overwrite, takes
-
-EXAMPLE = """\b
-Examples:
-  bifocal adjust left.pair.json right.pair.json --control left.csv --control right.csv --out joint
-  bifocal adjust a.pair.json b.pair.json c.pair.json --control a.csv --control none
-                 --control c.csv --out joint
-"""
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("pairs", type=FILE, nargs=-1, required=True, metavar="PAIR.pair.json...")
-@click.option(
-    "--out", type=FILE, required=True, metavar="DIR", help="Folder of the adjusted pairs."
-)
-@click.option(
-    "--control", type=FILE, multiple=True,
-    help="Table of control points of a pair, as for `bifocal align`, or none; repeat it, one for "
-    "each PAIR. Points of one name are one point.",
-)  # fmt: skip
-@click.option(
-    "--check", type=FILE, multiple=True,
-    help="The same for independent check points: they are compared, and hold nothing.",
-)  # fmt: skip
-@takes(*JOINT)
-@overwrite
-@as_json
+@declared
 def command(
-    pairs: tuple[Path, ...], out: Path, control: tuple[Path, ...], check: tuple[Path, ...],
-    unit: str | None, overwrite: bool, as_json: bool, **sigmas: Any,
-) -> None:  # fmt: skip
+    pairs: tuple[Path, ...], out: Path, overwrite: bool, as_json: bool, **options: Any
+) -> None:
     """Adjust all pairs of one facade in one frame.
 
     Points that the photos share are found by themselves; with the control points of all pairs
@@ -49,7 +22,8 @@ def command(
     """
     from bifocal.networks.joint_workflow import JointTask, adjust_pairs
 
-    task = JointTask(control=_tables(control), check=_tables(check), unit=unit or "", **sigmas)
+    tables = {role: _tables(options[role]) for role in ("control", "check")}
+    task = JointTask(**{**options, **tables, "unit": options["unit"] or ""})
     with progress_bar("adjust", quiet=as_json) as progress:
         result = adjust_pairs(pairs, out, task, overwrite=overwrite, progress=progress)
     print_result(result.to_dict(), result.lines(), as_json=as_json)

@@ -9,50 +9,17 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from bifocal.options import ALIGN, CONTROL
 from photocore.cli import print_result, remark
-from photocore.options import FILE, TABLE, as_json, overwrite, takes
+from photocore.options import declared
 
 if TYPE_CHECKING:
     from bifocal.orientation.alignment import Alignment
 
-EXAMPLE = """\b
-Examples:
-  bifocal align far.jpg near.jpg --control points.csv --out wall.pair.json
-  bifocal align far.jpg near.jpg --distance1 17.5 --distance2 9.5 --focal1 35 --focal2 19
-               --sensor-width 22.7 --out wall.pair.json
-  bifocal align far.jpg near.jpg --as-set-up --distance1 17.5 --distance2 9.5 --focal1 35
-               --focal2 19 --sensor-width 22.7 --out wall.pair.json
-  bifocal align far.jpg near.jpg --auto --distance1 17.5 --wall 612,433 --out wall.pair.json
-  bifocal align reef_far.jpg reef_near.jpg --control reef.csv --indices 1,1.49,1.337
-               --thicknesses 0.01 --port 0.05 --prior index3=0.003 --out reef.pair.json
-  bifocal align survey.xlsx --out wall.pair.json
-\b
-points.csv, one line per control point; r blank = on the wall; pixels in both photos:
-  id,X [m],Y [m],r [m],col1 [px],row1 [px],col2 [px],row2 [px]
-  P1,0.000,0.000,,512.3,1700.8,498.1,1741.0
-"""
 
-
-@click.command(epilog=EXAMPLE)
-@click.argument("far", type=FILE)
-@click.argument("near", type=FILE, required=False)
-@click.option("--out", type=FILE, required=True, help="Pair file to write (*.pair.json).")
-@CONTROL.but(type=TABLE)
-@click.option(
-    "--columns", metavar="MAP",
-    help='Which column of --control is which: "id=A,X=East" or "id,X,Y,r,col1,row1,col2,row2" for '
-    "tables without headings.  [default: found by heading]",
-)  # fmt: skip
-@takes(*ALIGN)
-@click.option("--picture", type=FILE, help="Picture of the set-up.  [default: beside OUT, .png]")
-@click.option("--no-picture", is_flag=True, help="Do not draw the picture.")
-@overwrite
-@as_json
+@declared
 def command(
-    far: Path, near: Path | None, out: Path, picture: Path | None, no_picture: bool,
-    overwrite: bool, as_json: bool, **given: Any,
-) -> None:  # fmt: skip
+    far: Path, near: Path | None, out: Path, overwrite: bool, as_json: bool, **given: Any
+) -> None:
     """Set up a pair: where both cameras stood, how they looked, at which scale.
 
     FAR is the photo taken from afar with the long lens, NEAR the other one. Four ways: control
@@ -71,18 +38,17 @@ def command(
         raise click.UsageError("Give two photos, FAR and NEAR, or a survey workbook as FAR.")
     from bifocal.orientation.align_workflow import AlignOptions, align_photos, alignment_as_dict
 
-    if picture is None and not no_picture:
+    picture = given.pop("picture")
+    if given.pop("no_picture"):
+        picture = None
+    elif picture is None:
         picture = out.with_name(out.name.removesuffix(".json").removesuffix(".pair") + ".pair.png")
-    alignment = align_photos(
-        far, near, out, AlignOptions.from_given(given),
-        picture=None if no_picture else picture, overwrite=overwrite,
-    )  # fmt: skip
-    print_result(
-        alignment_as_dict(alignment), _lines(alignment), as_json=as_json,
-        remarks=dict.fromkeys((*alignment.pair.remarks, *alignment.remarks)),
-    )  # fmt: skip
+    options = AlignOptions.from_given(given)
+    alignment = align_photos(far, near, out, options, picture=picture, overwrite=overwrite)
+    notes = dict.fromkeys((*alignment.pair.remarks, *alignment.remarks))
+    print_result(alignment_as_dict(alignment), _lines(alignment), as_json=as_json, remarks=notes)
     if not as_json:
-        remark(f"Pair written to {out}" + (f", picture to {picture}" if not no_picture else ""))
+        remark(f"Pair written to {out}" + (f", picture to {picture}" if picture else ""))
 
 
 #: Options that a workbook leaves room for.

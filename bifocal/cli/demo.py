@@ -6,33 +6,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
 from photocore.cli import print_result, progress_bar, remark, text_table
-from photocore.options import FILE, as_json, overwrite
+from photocore.options import declared
 
 if TYPE_CHECKING:
     from bifocal.demo.workflow import DemoResult
 
-EXAMPLE = """\b
-Examples:
-  bifocal demo
-  bifocal demo --out sample --overwrite
-  bifocal demo --water --out under-water
-"""
 
-
-@click.command(epilog=EXAMPLE)
-@click.option(
-    "--out", type=FILE, default=Path("bifocal-demo"), show_default=True,
-    help="Folder for the results; it is made.",
-)  # fmt: skip
-@click.option(
-    "--water", is_flag=True,
-    help="A façade under water, through flat ports, from 3.5/1.9 m: bent rays, haze.",
-)  # fmt: skip
-@overwrite
-@as_json
+@declared
 def command(out: Path, water: bool, overwrite: bool, as_json: bool) -> None:
     """Survey a sample façade from two photos, and compare with the exact truth.
 
@@ -52,9 +33,7 @@ def command(out: Path, water: bool, overwrite: bool, as_json: bool) -> None:
 
         sample = WATER if water else FACADE
         result = run_demo(out, sample=sample, overwrite=overwrite, progress=tell)
-    points = zip(
-        result.ids, result.true, result.found, result.sigma, result.flags, strict=True
-    )  # fmt: skip
+    points = zip(result.ids, result.true, result.found, result.sigma, result.flags, strict=True)
     data = {
         "folder": result.folder, "rmse_targets": result.rmse,
         "map_median": result.map_median, f"map_beyond_{_limit(result, '')}": result.map_share,

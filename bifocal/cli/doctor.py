@@ -2,20 +2,11 @@
 
 from __future__ import annotations
 
-import click
-
 from photocore.cli import print_result
-from photocore.options import as_json
-
-EXAMPLE = """\b
-Examples:
-  bifocal doctor
-  bifocal doctor --json
-"""
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@as_json
+@declared
 def command(as_json: bool) -> None:
     """Print versions, extras, LibreOffice, cores, memory and disk: what a fault report needs."""
     from photocore.machine import diagnosis, diagnosis_lines

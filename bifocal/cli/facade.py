@@ -5,53 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from bifocal.options import ALIGN, CHECK, CONTROL, DRAWING, GSD, LANGUAGE, PICTURE, RELIEF, SCALE
 from photocore.cli import print_result, progress_bar
-from photocore.options import COG, FILE, Names, as_json, overwrite, takes
+from photocore.options import declared
 
 if TYPE_CHECKING:
     from bifocal.campaigns.pair_job import PairJob, PairOutcome
 
-EXAMPLE = """\b
-Examples:
-  bifocal facade far.jpg near.jpg --control points.csv --scale 1:50 --out DIR
-  bifocal facade far.jpg near.jpg --control points.csv --check check.csv --scale 1:20 --out wall
-  bifocal facade far.jpg near.jpg --auto --distance1 17.5 --scale 1:100 --language de --out wall
-  bifocal facade reef_far.jpg reef_near.jpg --control reef.csv --indices 1,1.49,1.337
-                 --thicknesses 0.01 --port 0.05 --prior index3=0.003 --out reef
-"""
-
 #: What to look at first.
 _TO_OPEN = ("report/*.html", "drawing/*.pdf", "points/*.xlsx", "relief/*.png", "ortho/*.tif")
-_GSD = GSD.but(help="Pixel of the product ortho [m].  [default: that of the relief map]")
-#: Those of its steps; the scale has a value here.
-_OF_STEPS = dict.fromkeys((*ALIGN, *RELIEF, *PICTURE, _GSD, *DRAWING[1:]))
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("far", type=FILE)
-@click.argument("near", type=FILE)
-@click.option("--out", type=FILE, required=True, metavar="DIR", help="Folder of the results.")
-@CONTROL
-@CHECK
-@SCALE.but(default="1:50", show_default=True)
-@click.option("--name", default="", help="Title.  [default: the folder's name]")
-@LANGUAGE
-@takes(*(option.unset() for option in _OF_STEPS))
-@click.option(
-    "--products", type=Names(), metavar="NAME,NAME,...",
-    help="Of relief, points, ortho, drawing, view, report.  [default: all but ortho, which the "
-    "drawing has]",
-)  # fmt: skip
-@COG
-@overwrite
-@as_json
-def command(
-    far: Path, near: Path, out: Path, name: str, products: tuple[str, ...] | None, overwrite: bool,
-    as_json: bool, **given: Any,
-) -> None:  # fmt: skip
+@declared
+def command(far: Path, near: Path, out: Path, as_json: bool, **given: Any) -> None:
     """Make everything a façade needs from two photos and one table of control points.
 
     The pair is set up, the relief measured, the points solved, orthophoto and drawings made to
@@ -61,7 +26,8 @@ def command(
     """
     from bifocal.campaigns.workflow import facade, facade_job
 
-    job = facade_job(far, near, out, name=name, given=given, products=products, overwrite=overwrite)
+    own = {name: given.pop(name) for name in ("name", "products", "overwrite")}
+    job = facade_job(far, near, out, given=given, **own)
     with progress_bar("facade", quiet=as_json) as progress:
         outcome = facade(job, progress=progress)
     print_result(outcome.to_dict(), _lines(job, outcome), as_json=as_json, remarks=outcome.remarks)

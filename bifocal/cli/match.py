@@ -9,48 +9,11 @@ from typing import Any
 import click
 
 from photocore.cli import print_result, remark
-from photocore.options import FILE, NEW_TABLE, NUMBER, as_json, choice, number, overwrite
-
-EXAMPLE = """\b
-Examples:
-  bifocal match wall.pair.json --out survey.xlsx
-  bifocal match survey.xlsx --out matched.xlsx
-  bifocal match wall.pair.json --count 2000 --out points.csv
-  bifocal match wall.pair.json --what targets --out targets.xlsx
-Then:
-  bifocal solve survey.xlsx --out result.xlsx
-  bifocal solve points.csv --pair wall.pair.json --json
-"""
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("pair", type=FILE)
-@click.option(
-    "--out",
-    type=NEW_TABLE,
-    required=True,
-    help="Survey workbook (.xlsx) or table (.csv) to write; - is a table on stdout.",
-)
-@click.option(
-    "--count", type=click.IntRange(1, 100_000), default=4000, show_default=True,
-    help="About so many feature points, spread evenly.",
-)  # fmt: skip
-@choice("--what", "all|features|targets", "Natural detail, survey targets, or both.", default="all")
-@number(
-    "--relief-min", "M", "Lowest relief looked for [m].  [default: -0.5 x near distance]",
-    type=NUMBER,
-)  # fmt: skip
-@number(
-    "--relief-max", "M", "Highest relief looked for [m].  [default: 0.4 x near distance]",
-    type=NUMBER,
-)  # fmt: skip
-@choice("--lang", "en|it|de", "Language of the workbook.", default="en")
-@overwrite
-@as_json
-def command(
-    pair: Path, out: Path, count: int, what: str, relief_min: float | None,
-    relief_max: float | None, lang: str, overwrite: bool, as_json: bool,
-) -> None:  # fmt: skip
+@declared
+def command(pair: Path, out: Path, count: int, what: str, as_json: bool, **options: Any) -> None:
     """Find the same details of the wall in both photos of PAIR, a pair file or survey workbook.
 
     Discs, chequers and coded markers are found and measured by their centres; natural detail is
@@ -60,30 +23,21 @@ def command(
     from bifocal.workbook.match_workflow import match_photos, match_summary
     from bifocal.workbook.pair_workflow import is_workbook, read_pair
 
-    if relief_min is not None and relief_max is not None and relief_min >= relief_max:
+    low, high = options.pop("relief_min"), options.pop("relief_max")
+    if low is not None and high is not None and low >= high:
         raise click.UsageError("--relief-min must be below --relief-max.")
     source = read_pair(pair)
     reliefs = None
-    if relief_min is not None or relief_max is not None:
+    if low is not None or high is not None:
         near = source.image2.distance
-        reliefs = (
-            -0.5 * near if relief_min is None else relief_min,
-            0.4 * near if relief_max is None else relief_max,
-        )
+        reliefs = (-0.5 * near if low is None else low, 0.4 * near if high is None else high)
     settings = MatchSettings(
-        count=count,
-        relief_range=reliefs,
-        features=what != "targets",
-        targets=what != "features",
+        count=count, relief_range=reliefs, features=what != "targets", targets=what != "features"
     )
-    found = match_photos(
-        source if is_workbook(pair) else pair, out, settings, language=lang, overwrite=overwrite
-    )
+    found = match_photos(source if is_workbook(pair) else pair, out, settings, **options)
     summary = match_summary(*found)
-    print_result(
-        {**summary, "out": out}, _lines(summary), as_json=as_json,
-        remarks=(*found[0].remarks, *_remarks(summary["kinds"], what)),
-    )  # fmt: skip
+    notes = (*found[0].remarks, *_remarks(summary["kinds"], what))
+    print_result({**summary, "out": out}, _lines(summary), as_json=as_json, remarks=notes)
     if not as_json:
         remark(f"Points written to {out}")
 

@@ -3,38 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from photocore.cli import print_json, remark
-from photocore.options import FILE, as_json, choice
-
-EXAMPLE = """\b
-Examples:
-  bifocal pick wall.pair.json
-  bifocal pick far.jpg near.jpg --workbook wall.xlsx
-  bifocal pick survey.xlsx --lang it
-  bifocal pick .
-"""
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("sources", nargs=-1, type=FILE, metavar="[PAIR|SURVEY.xlsx|FOLDER|FAR NEAR]")
-@click.option(
-    "--workbook", type=FILE, metavar="SURVEY.xlsx",
-    help="Survey workbook the points go into.  [default: named after the pair]",
-)  # fmt: skip
-@click.option(
-    "--port", type=click.IntRange(0, 65535), default=0, help="Port; 0: one that is free.",
-    show_default=True,
-)  # fmt: skip
-@click.option("--no-browser", is_flag=True, help="Print the address only.")
-@choice("--lang", "en|it|de", "Language of the page.", default="en")
-@as_json
-def command(
-    sources: tuple[Path, ...], workbook: Path | None, port: int, no_browser: bool, lang: str,
-    as_json: bool,
-) -> None:  # fmt: skip
+@declared
+def command(sources: tuple[Path, ...], no_browser: bool, as_json: bool, **options: Any) -> None:
     """Open the page: orient two photos, pick points, relief, orthophoto, drawing.
 
     Starts from a pair file, a survey workbook, two photos, or the folder of a survey (default: the
@@ -43,7 +21,7 @@ def command(
     """
     from bifocal.collimation.workflow import page_server
 
-    with page_server(*sources, workbook=workbook, port=port, language=lang) as server:
+    with page_server(*sources, **options) as server:
         if as_json:
             print_json({"url": server.url, "token": server.token})
         else:

@@ -8,71 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bifocal.options import MEDIA
 from photocore.cli import print_result, remark, text_table
-from photocore.options import (
-    FILE,
-    POSITIVE,
-    THOUSANDTHS,
-    Scale,
-    Size,
-    as_json,
-    number,
-    overwrite,
-    takes,
-)
+from photocore.options import declared, options_of
 
 if TYPE_CHECKING:
     from bifocal.planning.camera_plan import Plan
 
-EXAMPLE = """\b
-Examples:
-  bifocal plan --focal 35 --focal 28 --focal 19 --sensor 22.7x15.1 --pixels 3072x2048 --scale 1:500
-  bifocal plan --focal 35 --focal 18 --sensor 23.5x15.6 --pixels 6000x4000 --object 12x8
-               --free-space 20 --out plan.xlsx
-  bifocal plan --focal 35 --focal 19 --sensor 22.7x15.1 --pixels 3072x2048 --scale 1:100
-               --indices 1,1.49,1.337 --thicknesses 0.01 --depth 0.9
-  bifocal plan --equivalent 77 --equivalent 24 --pixels 4000x3000 --object 6x4
-"""
 
-
-@click.command(epilog=EXAMPLE)
-@click.option(
-    "--focal", "focal_lengths", type=POSITIVE, multiple=True, metavar="MM",
-    help="A focal length at hand [mm]; repeat it for every lens or zoom mark.",
-)  # fmt: skip
-@click.option(
-    "--equivalent", "equivalents", type=POSITIVE, multiple=True, metavar="MM",
-    help="A 35 mm equivalent, as phones state it, in place of --focal and --sensor [mm]; repeat "
-    "it for every camera of the phone.",
-)  # fmt: skip
-@click.option("--sensor", type=Size(above=0), help="Width x height of the sensor [mm].")
-@click.option(
-    "--pixels", type=Size(least=1, whole=True), required=True,
-    help="Columns x rows of the photo [px].",
-)  # fmt: skip
-@click.option("--object", "object_size", type=Size(above=0), help="Width x height of the wall [m].")
-@click.option("--scale", "scale_number", type=Scale(), help="Wanted scale of the photo, 1:N.")
-@number("--gsd", "MM", "Wanted pixel on the wall [mm].", type=THOUSANDTHS)
-@number(
-    "--sigma-r", "MM", "Wanted sigma of the relief at the RMS radius of the photo [mm].",
-    type=THOUSANDTHS,
-)  # fmt: skip
-@number("--sigma-px", "PX", "Precision of a pick [px].", default=0.5)
-@number(
-    "--sigma-r-max", "MM", "Area of uncertainty: sigma of the relief above this [mm].  "
-    "[default: 3 x that of the best pair]", type=THOUSANDTHS,
-)  # fmt: skip
-@number("--free-space", "M", "Room in front of the wall [m].")
-@takes(*MEDIA)
-@click.option("--out", type=FILE, help="Also write the plan as .xlsx.")
-@overwrite
-@as_json
+@declared
 def command(
-    focal_lengths: tuple[float, ...], equivalents: tuple[float, ...],
-    sensor: tuple[float, float] | None, pixels: tuple[int, int],
-    indices: tuple[float, ...] | None, thicknesses: tuple[float, ...] | None,
-    port: float | None, depth: float | None,
+    focal_lengths: tuple[float, ...], equivalents: tuple[float, ...], pixels: tuple[int, int],
     out: Path | None, as_json: bool, **wishes: Any,
 ) -> None:  # fmt: skip
     """Compare pairs of lenses: where to stand, what a photo covers, how precise it gets.
@@ -84,6 +29,8 @@ def command(
     from bifocal.planning.camera_plan import CameraSensor
     from bifocal.planning.workflow import make_plan, plan_as_dict
 
+    sensor = wishes.pop("sensor")
+    media = {name: wishes.pop(name) for name in options_of("bifocal", "media")}
     if equivalents and (focal_lengths or sensor):
         raise click.UsageError("Give --equivalent, or --focal with --sensor, not both.")
     if equivalents:
@@ -92,12 +39,11 @@ def command(
         raise click.UsageError("Give --focal with --sensor, or --equivalent for a phone.")
     else:
         camera = CameraSensor(width=sensor[0], height=sensor[1], columns=pixels[0], rows=pixels[1])
-    if indices is None and (thicknesses or port is not None or depth is not None):
+    if media["indices"] is not None:
+        media |= {"thicknesses": media["thicknesses"] or (), "ports": (media.pop("port"), None)}
+        wishes["media"] = PairMedia.stated(**media)
+    elif any(value not in (None, ()) for value in media.values()):
         raise click.UsageError("--thicknesses, --port and --depth go with --indices.")
-    if indices is not None:
-        wishes["media"] = PairMedia.stated(
-            indices, thicknesses or (), ports=(port, None), depth=depth
-        )
     plan = make_plan(equivalents or focal_lengths, camera, out=out, **wishes)
     print_result(plan_as_dict(plan), _lines(plan), as_json=as_json)
     if out is not None:

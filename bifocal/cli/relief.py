@@ -6,35 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import click
-
-from bifocal.options import BOUNDS, RELIEF
 from photocore.cli import print_result, progress_bar
-from photocore.options import FILE, as_json, cog, overwrite, takes
-
-EXAMPLE = """\b
-Examples:
-  bifocal relief wall.pair.json --out relief.tif --preview relief.png
-  bifocal relief wall.pair.json --out relief.tif --gsd 0.005 --bounds -5,-3,5,3 --cloud wall.laz
-  bifocal relief survey.xlsx --out relief.tif
-  bifocal relief wall.pair.json --out quick.tif --quality fast --json
-
-Bands of the GeoTIFF: relief [m], NaN where unknown; its sigma [m]; quality (1 measured in both
-photos, 2 interpolated, 3 hidden from a camera, 0 unknown).
-"""
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("pair_file", metavar="PAIR.pair.json", type=FILE)
-@click.option("--out", required=True, type=FILE, help="Relief map to write (.tif).")
-@RELIEF[0].but("--gsd")
-@BOUNDS.but(help="Part of the wall [m].  [default: all that both photos see]")
-@takes(*RELIEF[2:])
-@click.option("--preview", type=FILE, help="Also a shaded picture (.png).")
-@click.option("--cloud", type=FILE, help="Also a coloured point cloud (.ply, .las, .laz).")
-@cog
-@overwrite
-@as_json
+@declared
 def command(pair_file: Path, as_json: bool, **wishes: Any) -> None:
     """Measure the relief of the whole wall from the photos of a pair file or survey workbook.
 

@@ -3,50 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from photocore.cli import print_json, print_result, progress_bar, remark, tell_written, text_table
-from photocore.options import FILE, Number, as_json, number, overwrite
-
-EXAMPLE = """\b
-Examples:
-  bifocal survey --init photos street.toml
-  bifocal survey street.toml --dry-run
-  bifocal survey street.toml --jobs 4 --memory 12
-  bifocal survey street.toml --scheduler tcp://192.168.0.10:8786
-"""
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("survey", type=FILE, required=False)
-@click.option(
-    "--init", "folder", type=FILE, metavar="DIR",
-    help="Write SURVEY from a folder of photos.  [default: survey.toml in it]",
-)  # fmt: skip
-@click.option("--dry-run", is_flag=True, help="Show what would be made and what is kept.")
-@click.option(
-    "--out", type=FILE, metavar="DIR", help="Folder of the results.  [default: the file's]"
-)
-@number("--jobs", "N", "Pairs at once.  [default: cores]", type=Number(least=1, whole=True))
-@number("--memory", "GIB", "For all pairs at work.  [default: 80 % of what is free]")
-@click.option(
-    "--scheduler", default="", metavar="tcp://...",
-    help="Address of a Dask scheduler.",
-)  # fmt: skip
-@click.option(
-    "--ship", is_flag=True,
-    help="Send photos to its workers and products back.  [default: only where a worker does not "
-    "see the folders]",
-)  # fmt: skip
-@overwrite
-@as_json
-@click.pass_context
+@declared
 def command(
-    ctx: click.Context, survey: Path | None, folder: Path | None, dry_run: bool, out: Path | None,
-    jobs: int | None, memory: float | None, scheduler: str, ship: bool, overwrite: bool,
-    as_json: bool,
-) -> None:  # fmt: skip
+    survey: Path | None, folder: Path | None, dry_run: bool, as_json: bool, **machines: Any
+) -> None:
     """Survey many pairs: alignment, relief, points, drawings and report of each.
 
     SURVEY is a TOML file that names the pairs, their control and what is wanted of them. Only
@@ -62,19 +30,18 @@ def command(
         run_survey,
     )
 
+    out, overwrite = machines.pop("out"), machines.pop("overwrite")
     if folder is not None:
         survey = survey or folder / "survey.toml"
         with progress_bar("photos", quiet=as_json) as progress:
             found, left = begin_survey(survey, folder, overwrite=overwrite, progress=progress)
         tell_written(survey)
-        print_result(
-            {"survey": str(survey), "pairs": found, "left": left},
-            [
-                f"{pairs_in_words(found)}; {left} of the photos in none.",
-                f"Say in {survey} how each is controlled, then: bifocal survey {survey} --dry-run",
-            ],
-            as_json=as_json,
-        )  # fmt: skip
+        lines = [
+            f"{pairs_in_words(found)}; {left} of the photos in none.",
+            f"Say in {survey} how each is controlled, then: bifocal survey {survey} --dry-run",
+        ]
+        data = {"survey": str(survey), "pairs": found, "left": left}
+        print_result(data, lines, as_json=as_json)
         return
     if survey is None:
         raise click.UsageError("name the survey file, or --init DIR with a folder of photos.")
@@ -95,16 +62,14 @@ def command(
                 if what == "cannot":
                     click.echo(f"\n{pair}, {step}:\n  {why}")
         if any(what not in ("keep", "make") for *_, what in plan):
-            ctx.exit(1)  # as the work would end
+            raise click.exceptions.Exit(1)  # as the work would end
         return
-    if ship and not scheduler:
+    if machines["ship"] and not machines["scheduler"]:
         raise click.UsageError("--ship goes with --scheduler.")
-    machines = Machines(jobs=jobs, memory=memory, scheduler=scheduler, ship=ship)
+    given: dict[str, Any] = {"machines": Machines(**machines), "mosaic": wants_mosaic(survey)}
     with progress_bar("survey", quiet=as_json) as progress:
-        result = run_survey(
-            pairs, machines=machines, mosaic=wants_mosaic(survey), progress=progress, tell=remark
-        )
+        result = run_survey(pairs, progress=progress, tell=remark, **given)
     result = result.in_words(in_survey_words)
     print_result(result.to_dict(), result.lines(), as_json=as_json)
     if result.failed:
-        ctx.exit(1)
+        raise click.exceptions.Exit(1)

@@ -7,31 +7,11 @@ from typing import Any
 
 import click
 
-from bifocal.options import OF_DATABASE
 from photocore.cli import print_result, progress_bar
-from photocore.options import FILE, as_json, overwrite, takes
-
-EXAMPLE = """\b
-Examples:
-  bifocal undistort far.jpg --lens lens35.json --out-dir corrected
-  bifocal undistort far.jpg near.jpg --lens exif
-
-All other commands take the original photos together with a lens file and resample once; correct
-photos beforehand only for other programs.
-"""
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("images", nargs=-1, required=True, metavar="IMAGE...", type=FILE)
-@click.option(
-    "--lens", required=True, metavar="FILE|exif",
-    help="Lens file (lens.json, COLMAP cameras.txt, Metashape .xml, OpenCV .yml), or exif for the "
-    "lens database.",
-)  # fmt: skip
-@click.option("--out-dir", type=FILE, help="Existing folder to write to.  [default: the photo's]")
-@takes(*OF_DATABASE)
-@overwrite
-@as_json
+@declared
 def command(
     images: tuple[Path, ...], lens: str, out_dir: Path | None, as_json: bool, **options: Any
 ) -> None:

@@ -9,7 +9,7 @@ from bifocal.collimation.records import CODES, Pixel
 from bifocal.collimation.stated_media import INDICES, MEDIA
 from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX
 from photocore.errors import InputError
-from photocore.options import Number
+from photocore.option_types import Number
 from photocore.workbook.making.words import LANGUAGES
 
 Fields = Mapping[str, Any]

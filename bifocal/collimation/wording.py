@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from functools import cache
-from importlib.resources import files
 from typing import Any
 
 from bifocal.remarks import in_language
+from photocore.textfile import packaged
 
 #: An option of the command line, which the page does not have, with its value.
 _OPTION = r"--[a-z][\w-]*(?: (?:[A-Z]+|\d[\d.]*)(?:,(?:[A-Z]+|\d[\d.]*))*)?"
@@ -28,7 +27,7 @@ _ADVICE = tuple(
 
 @cache
 def _content() -> dict[str, dict[str, dict[str, str]]]:
-    return tomllib.loads(files(__package__).joinpath("words.toml").read_text(encoding="utf-8"))
+    return packaged(__package__, "words")
 
 
 def say(section: str, key: str, language: str, **fields: Any) -> str:

@@ -25,7 +25,7 @@ from photocore.errors import InputError
 from photocore.output import atomic_path, check_ending
 from photocore.provenance import note
 from photocore.raster import RasterFile
-from photocore.textfile import check_file, check_name
+from photocore.textfile import check_file
 
 ImageArray = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -35,13 +35,11 @@ MAX_PIXELS = 400_000_000
 _BY_STRIPS = 60_000_000
 #: Endings of the images that are written.
 WRITTEN = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
-RAW_ENDINGS = frozenset(
-    f".{ending}"
-    for ending in (
-        "3fr", "arw", "cr2", "cr3", "crw", "dcr", "dng", "erf", "fff", "iiq", "kdc", "mef", "mos",
-        "mrw", "nef", "nrw", "orf", "pef", "raf", "raw", "rw2", "rwl", "sr2", "srf", "srw", "x3f",
-    )
-)  # fmt: skip
+_RAW = (
+    ".3fr .arw .cr2 .cr3 .crw .dcr .dng .erf .fff .iiq .kdc .mef .mos .mrw .nef .nrw .orf .pef "
+    ".raf .raw .rw2 .rwl .sr2 .srf .srw .x3f"
+)
+RAW_ENDINGS = frozenset(_RAW.split())
 _KNOWN = frozenset({"JPEG", "PNG", "TIFF", "MPO", "BMP", "WEBP"})
 
 
@@ -257,10 +255,7 @@ def write_image(path: Path | str, image: ImageArray, *, overwrite: bool = False)
 
 def _refuse_early(path: Path) -> None:
     """Refuse what can be told from the name and the file system."""
-    check_name(path)
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder, expected a photo.")
-    check_file(path, "image")
+    check_file(path, "image", folder=", expected a photo.")
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; save or copy it again.")
     if path.suffix.lower() in RAW_ENDINGS:

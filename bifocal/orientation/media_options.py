@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from bifocal.model.pair_media import LEANS, Normal, PairMedia
-from bifocal.options import MEDIA_OF_PAIR
 from photocore.adjustment.priors import parse_prior
 from photocore.errors import InputError
+from photocore.options import options_of
 
 #: How a pair through media is set up, and how not.
 THROUGH_MEDIA = (
@@ -31,7 +31,8 @@ def media_of(given: Mapping[str, Any]) -> PairMedia:
         If they do not describe media.
     """
     if given.get("indices") is None:
-        lost = [option for option in MEDIA_OF_PAIR if given.get(option.name) not in (None, ())]
+        media = options_of("bifocal", "media_of_pair").values()
+        lost = [option for option in media if given.get(option.name) not in (None, ())]
         if lost:
             raise InputError(
                 f"{lost[0].flag} goes with --indices: give the refractive indices "

@@ -99,9 +99,7 @@ def find_boards(
     without: list[str] = []
     for k, (photo, (camera, pose)) in enumerate(zip(photos, places, strict=True)):
         progress(k, len(photos), photo.name)
-        sensor = project.cameras[project.camera_index(camera)].sensor
-        if sensor is None:
-            raise InputError(f"camera {camera}: its sensor is not described; pixels need it.")
+        sensor = project.cameras[project.camera_index(camera)].described_sensor()
         found = _view(photo, sensor, camera, pattern=pattern, board=board)
         if isinstance(found, str):
             without.append(f"{photo.name}: {found}")

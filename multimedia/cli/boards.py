@@ -5,37 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from photocore.cli import print_result, progress_bar, text_table
-from photocore.options import BOARD, FILE, PATTERN, as_json, number, overwrite
+from photocore.options import declared
 
 if TYPE_CHECKING:
     from multimedia.boards.workflow import FoundBoards
 
-EXAMPLE = """\b
-Examples:
-  multimedia boards housing.toml dive*.png --board 9x6 --square 24 --out boards.toml
-  multimedia adjust boards.toml --plate all --fix-camera cam1 --interior c,xh,yh,k1
-             --media index3,offset --out calibrated.toml --report calibrated.html
 
-The photos of several cameras are told apart by their names (left_003.png) or folders
-(left/003.png); 003 is then the pose of the board that they share.
-"""
-
-
-@click.command(epilog=EXAMPLE)
-@click.argument("project", type=FILE)
-@click.argument("photos", type=FILE, nargs=-1, required=True)
-@PATTERN
-@BOARD.but(required=True)
-@number(
-    "--square", "L", "Side of a square, or distance of neighbouring circles [object unit].",
-    required=True,
-)  # fmt: skip
-@click.option("--out", type=FILE, required=True, help="Project with the points (.toml).")
-@overwrite
-@as_json
+@declared
 def command(
     project: Path, photos: tuple[Path, ...], out: Path, as_json: bool, **options: Any
 ) -> None:

@@ -5,39 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import click
-
 from photocore.cli import print_result, text_table
-from photocore.options import FILE, as_json, number, overwrite
-
-EXAMPLE = """\b
-Examples:
-  multimedia convert sparse/0 tank.toml --unit mm --pitch 0.00345
-  multimedia convert tank.toml model --to colmap
-  multimedia convert tank.toml cameras.xml
-  multimedia convert calibration.json rig.toml
-  multimedia convert rig.toml calibration.json --to aquacal
-"""
-FORMATS = ("colmap", "metashape", "opencv", "aquacal")
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("source", type=FILE)
-@click.argument("target", type=FILE)
-@click.option(
-    "--to", "form", type=click.Choice(FORMATS),
-    help="Format of TARGET.  [default: by its ending: .toml a project, .xml metashape, "
-    ".yml opencv, none colmap]",
-)  # fmt: skip
-@number(
-    "--pitch", "MM", "Width of a pixel, which the other programs do not know [mm].", default=0.005,
-)  # fmt: skip
-@click.option(
-    "--unit", type=click.Choice(("m", "cm", "mm", "um", "km")), default="m", show_default=True,
-    help="Unit of their lengths, which all but AquaCal leave open.",
-)  # fmt: skip
-@overwrite
-@as_json
+@declared
 def command(source: Path, target: Path, as_json: bool, **options: Any) -> None:
     """Convert SOURCE, a project or the cameras of another program, into TARGET.
 

@@ -3,70 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import degrees, radians
+from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from photocore.cli import print_result, tell_written, text_table
-from photocore.options import FILE, FOCAL, Number, Numbers, Size, as_json, number, overwrite
+from photocore.options import declared, options_of
 
 if TYPE_CHECKING:
     from multimedia.design.studies import Design
 
-EXAMPLE = """\b
-Examples:
-  multimedia design --cameras 4 --distance 0.6 --half-angle 30 --c 25 --extent 0.3x0.3
-             --depths 0.02x0.2 --indices 1,1.5,1.337 --thicknesses 0.01 --sigma 0.0012
-  multimedia design tank.toml --out design.xlsx --plot design.png --flatness
-"""
 
-
-@click.command(epilog=EXAMPLE)
-@click.argument("project", required=False, type=FILE)
-@click.option(
-    "--cameras", "count", type=click.IntRange(1, 100), default=4, show_default=True,
-    help="Cameras on the cone.",
-)  # fmt: skip
-@number("--distance", "M", "From the last face to each camera [m].")
-@click.option(
-    "--half-angle", type=Number(above=0, below=90, to=radians), default=30.0, show_default=True,
-    help="Half opening of the cone of cameras, in air [deg].",
-)  # fmt: skip
-@click.option("--c", "principal_distance", type=FOCAL, help="Principal distance [mm].")
-@click.option(
-    "--indices", type=Numbers(above=0), default="1,1.337", show_default=True,
-    help="Refractive indices from camera to object.",
-)  # fmt: skip
-@click.option(
-    "--thicknesses", type=Numbers(least=0), default="",
-    help="Of media between [m].  [default: none]",
-)  # fmt: skip
-@click.option("--extent", type=Size(above=0), help="Width x height of the object space [m].")
-@click.option(
-    "--depths", type=Size(), metavar="LEASTxLARGEST", help="Depths of the object space [m]."
-)
-@click.option(
-    "--sigma", "sigma_image", type=Number(above=0, most=1), default=0.001, show_default=True,
-    help="Precision of an image coordinate [mm].",
-)  # fmt: skip
-@click.option(
-    "--seed", type=click.IntRange(min=0), default=1, show_default=True,
-    help="Of the simulated noise.",
-)  # fmt: skip
-@click.option(
-    "--flatness", is_flag=True,
-    help="Also study how plane and parallel the faces must be (bent, wedged, wavy ones).",
-)  # fmt: skip
-@click.option("--out", type=FILE, help="Write the tables (.xlsx).")
-@click.option("--plot", type=FILE, help="Draw them (.png, .svg, .pdf).")
-@overwrite
-@as_json
+@declared
 def command(
-    project: Path | None, seed: int, flatness: bool, out: Path | None, plot: Path | None,
-    overwrite: bool, as_json: bool, **ring: Any,
-) -> None:  # fmt: skip
+    project: Path | None, out: Path | None, plot: Path | None, as_json: bool, **ring: Any
+) -> None:
     """Predict precision, ray angles, sensitivities and calibration costs of a set-up.
 
     Of a PROJECT file with cameras, media and the object points to be measured; or of cameras on a
@@ -74,6 +27,8 @@ def command(
     """
     from multimedia.design import workflow as design
 
+    overwrite = ring.pop("overwrite")
+    study = {name: ring.pop(name) for name in ("seed", "flatness")}
     design.check_outputs(out, plot, overwrite=overwrite)
     if project is not None:
         context = click.get_current_context()
@@ -82,14 +37,13 @@ def command(
                 raise click.UsageError(
                     "cameras come from the PROJECT file or from options; give one of them."
                 )
-        result = design.design_project(project, seed=seed, flatness=flatness)
+        result = design.design_project(project, **study)
     else:
-        needed = {"--distance": "distance", "--c": "principal_distance", "--extent": "extent",
-                  "--depths": "depths"}  # fmt: skip
-        missing = [option for option, name in needed.items() if ring[name] is None]
+        options = options_of("multimedia", "design")
+        missing = [options[name].flag for name, value in ring.items() if value is None]
         if missing:
             raise click.UsageError(f"give a PROJECT file, or {', '.join(missing)} as well.")
-        result = design.design_ring(seed=seed, flatness=flatness, **ring)
+        result = design.design_ring(**study, **ring)
     design.write_design(result, out=out, plot=plot, overwrite=overwrite)
     print_result(design.as_dict(result), _lines(result), as_json=as_json, remarks=result.remarks)
     tell_written(out, plot)
@@ -114,10 +68,13 @@ def _lines(result: Design) -> Iterator[str]:
     if result.placements:
         yield "\nPlacement of the cameras"
         places = [
-            (f"{degrees(p.half_angle):.0f}", *(f"{v:.3g}" for v in p.sigma),
-             f"{degrees(p.angle):.1f}")
+            (
+                f"{degrees(p.half_angle):.0f}",
+                *(f"{v:.3g}" for v in p.sigma),
+                f"{degrees(p.angle):.1f}",
+            )
             for p in result.placements
-        ]  # fmt: skip
+        ]
         yield text_table(("half angle", "sigma X", "sigma Y", "sigma Z", "rays"), places)
         best, open_end = best_placement(result.placements)
         angle = f"half angle {degrees(best.half_angle):.0f} deg"

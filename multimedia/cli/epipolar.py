@@ -9,60 +9,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from photocore.cli import print_result, tell_written, text_table
-from photocore.options import (
-    FILE,
-    NEW_TABLE,
-    THOUSANDTHS,
-    Number,
-    Numbers,
-    as_json,
-    number,
-    overwrite,
-)
+from photocore.options import declared
 
 if TYPE_CHECKING:
     from multimedia.orientation.epipolar_workflow import EpipolarResult
 
-EXAMPLE = """\b
-Examples:
-  multimedia epipolar tank.toml --camera cam1 --to cam2 --point 12
-  multimedia epipolar tank.toml --camera cam1 --to cam3 --at 640.5,371.2 --z-range -20,20
-  multimedia epipolar tank.toml --camera cam1 --to cam2 --picture curves.png --photo cam2.tif
-"""
 
-
-@click.command(epilog=EXAMPLE)
-@click.argument("project", type=FILE)
-@click.option("--camera", required=True, help="Camera of the image points.")
-@click.option("--to", "other", required=True, help="Camera in whose image the curves run.")
-@click.option(
-    "--point", "ids", multiple=True, metavar="ID",
-    help="Image point of --camera; repeatable.  [default: all of them]",
-)  # fmt: skip
-@click.option("--at", type=Numbers(2), metavar="A,B", help="Column, row of a point instead [px].")
-@click.option(
-    "--z-range", type=Numbers(2), metavar="A,B",
-    help="Depth range of the object, Z from and to [unit of the project].  [default: that of the "
-    "object points and a quarter more]",
-)  # fmt: skip
-@click.option(
-    "--chord", "chord_error", type=Number(above=0, least=1e-3, to=THOUSANDTHS.to), default=0.5,
-    show_default=True, metavar="UM", help="Largest distance between curve and polygon [um].",
-)  # fmt: skip
-@click.option(
-    "--vertices",
-    type=int,
-    help="Fixed number of vertices instead of --chord.  [default: as needed]",
-)
-@number(
-    "--tolerance", "UM", "Half width of the band in which candidates are looked for [um].",
-    type=THOUSANDTHS, default=10.0,
-)  # fmt: skip
-@click.option("--out", type=NEW_TABLE, help="Vertices as .csv or .xlsx; - is stdout.")
-@click.option("--picture", type=FILE, help="Picture of the curves: .png, .svg or .pdf.")
-@click.option("--photo", type=FILE, help="Image of --to, under the picture.")
-@overwrite
-@as_json
+@declared
 def command(
     project: Path, out: Path | None, picture: Path | None, as_json: bool, **options: Any
 ) -> None:
@@ -77,10 +30,9 @@ def command(
     from multimedia.orientation.epipolar_workflow import epipolar_project
 
     result = epipolar_project(project, out=out, picture=picture, **options)
-    print_result(
-        {"z_range": result.z_range, "curves": result.curves, "candidates": result.candidates},
-        _lines(result), as_json=as_json, remarks=(f"Note: {line}" for line in result.remarks),
-    )  # fmt: skip
+    data = {name: getattr(result, name) for name in ("z_range", "curves", "candidates")}
+    notes = (f"Note: {line}" for line in result.remarks)
+    print_result(data, _lines(result), as_json=as_json, remarks=notes)
     tell_written(out, picture)
 
 

@@ -5,33 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import click
-
-from photocore.options import FILE, NEW_TABLE, as_json, choice, overwrite
-
-EXAMPLE = """\b
-Examples:
-  multimedia intersect tank.toml
-  multimedia intersect tank.toml --points frame.csv --out particles.xlsx
-  multimedia intersect tank.toml --method pairs
-"""
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("project", type=FILE)
-@click.option(
-    "--points", type=FILE,
-    help="Table of image points: camera, id, and col, row [px] or x, y [mm]; or one row per point "
-    "with columns such as 'cam1 col', 'cam1 row'.  [default: the project's own]",
-)  # fmt: skip
-@choice(
-    "--method", "rigorous|rays|pairs",
-    "Least squares of the image residuals; of the distances to the rays; or the mean of the "
-    "midpoints of all pairs of rays, as OpenPTV does.", default="rigorous",
-)  # fmt: skip
-@click.option("--out", type=NEW_TABLE, help="Also write a .csv or .xlsx table; - is stdout.")
-@overwrite
-@as_json
+@declared
 def command(project: Path, out: Path | None, as_json: bool, **options: Any) -> None:
     """Intersect the rays of every point that two or more cameras of PROJECT (.toml) saw.
 

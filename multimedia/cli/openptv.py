@@ -5,45 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import click
-
 from photocore.cli import print_json, print_result, remark, text_table
-from photocore.options import FILE, as_json, number, overwrite
-
-EXAMPLE = """\b
-Examples:
-  multimedia openptv test_cavity --out cavity.toml
-  multimedia openptv test_cavity --swap-indices --out cavity.toml
-  multimedia openptv cavity.toml --export folder_for_openptv
-"""
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("source", metavar="DIR", type=FILE)
-@click.option(
-    "--out", type=FILE,
-    help="Project file to write (.toml), tables beside it.  [default: name of the folder + .toml, "
-    "here]",
-)  # fmt: skip
-@click.option("--swap-indices", is_flag=True, help="Exchange the indices of glass and water.")
-@click.option(
-    "--min-pixels", "least_pixels", type=click.IntRange(min=1), default=15, show_default=True,
-    help="Smaller targets are no dots of the calibration body [px].",
-)  # fmt: skip
-@number(
-    "--radius", "PX",
-    "Farthest a target may lie from where the stored orientation expects it [px].", default=25.0,
-)  # fmt: skip
-@click.option(
-    "--export", type=FILE,
-    help="The other way: DIR is a project file; write it as an OpenPTV folder.",
-)  # fmt: skip
-@overwrite
-@as_json
+@declared
 def command(
-    source: Path, out: Path | None, export: Path | None, overwrite: bool, as_json: bool,
-    **options: Any,
-) -> None:  # fmt: skip
+    source: Path, out: Path | None, export: Path | None, as_json: bool, **options: Any
+) -> None:
     """Read an OpenPTV experiment folder DIR into a project file.
 
     Reads ptv.par, .ori, .addpar, _targets, the calibration body and the first rt_is frame; finds
@@ -57,7 +26,7 @@ def command(
     from multimedia.openptv.workflow import export_openptv, import_openptv
 
     if export is not None:
-        written, inexact = export_openptv(source, export, overwrite=overwrite)
+        written, inexact = export_openptv(source, export, overwrite=options["overwrite"])
         for line in inexact:
             remark(f"Note: {line}")
         remark(f"OpenPTV folder written to {export}")
@@ -66,7 +35,7 @@ def command(
             print_json({"folder": export, "cameras": names, "remarks": list(inexact)})
         return
     target = out if out is not None else Path(f"{source.resolve().name}.toml")
-    imported = import_openptv(source, out=target, overwrite=overwrite, **options)
+    imported = import_openptv(source, out=target, **options)
     project = imported.project
     total = len(project.object_points.ids)
     cameras = list(zip(project.cameras, imported.matched, project.media_of, strict=True))

@@ -5,39 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import click
-
 from photocore.cli import print_result, text_table
-from photocore.options import FILE, as_json, number, overwrite
-
-EXAMPLE = """\b
-Examples:
-  multimedia particles tank.toml --targets img/cam1.10001_targets \\
-    --targets img/cam2.10001_targets --targets img/cam3.10001_targets \\
-    --targets img/cam4.10001_targets --out res/rt_is.10001
-"""
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("project", type=FILE)
-@click.option(
-    "--targets", type=FILE, multiple=True, required=True,
-    help="OpenPTV's _targets file of a camera; once per camera, in the order of PROJECT.",
-)  # fmt: skip
-@number(
-    "--tolerance", "PX", "Farthest a target may lie from where its particle is seen [px].",
-    default=2.0,
-)  # fmt: skip
-@click.option(
-    "--fewest",
-    type=click.IntRange(min=2),
-    default=3,
-    show_default=True,
-    help="Cameras that must have seen a particle; with 2, many are by chance.",
-)
-@click.option("--out", type=FILE, help="Write rt_is.FRAME as OpenPTV does, or .csv or .xlsx.")
-@overwrite
-@as_json
+@declared
 def command(project: Path, targets: tuple[Path, ...], as_json: bool, **options: Any) -> None:
     """Find the particles of one frame among the targets of all cameras of PROJECT, a .toml file.
 

@@ -5,26 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import click
-
-from photocore.options import FILE, NEW_TABLE, as_json, overwrite
-
-EXAMPLE = """\b
-Examples:
-  multimedia project tank.toml
-  multimedia project tank.toml --points wand.csv --out images.csv
-"""
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("project", type=FILE)
-@click.option(
-    "--points", type=FILE,
-    help="Table of object points: id, X, Y, Z.  [default: the project's own]",
-)  # fmt: skip
-@click.option("--out", type=NEW_TABLE, help="Also write a .csv or .xlsx table; - is stdout.")
-@overwrite
-@as_json
+@declared
 def command(project: Path, out: Path | None, as_json: bool, **options: Any) -> None:
     """Project object points into every camera of PROJECT, a .toml file.
 

@@ -6,39 +6,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import click
-
 from photocore.cli import print_result, remark, text_table
-from photocore.options import FILE, Names, as_json, overwrite
-
-EXAMPLE = """\b
-Examples:
-  multimedia resect tank.toml --out oriented.toml
-  multimedia resect tank.toml --estimate c,xh,yh,k1,p1,p2,scale --out calibrated.toml
-  multimedia resect tank.toml --camera cam2 --residuals cam2_residuals.csv
-"""
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("project", type=FILE)
-@click.option(
-    "--estimate", type=Names(), default="", metavar="NAMES",
-    help="Interior parameters to determine beside the exterior orientation, with commas: c, xh, "
-    "yh [mm], k1, k2, k3, p1, p2, scale, shear (fisheye: k1 to k4, scale); or 'all'.  "
-    "[default: none]",
-)  # fmt: skip
-@click.option("--camera", "cameras", multiple=True, help="Only this camera; repeatable.")
-@click.option("--out", type=FILE, help="Write the project with the new orientations.")
-@click.option(
-    "--residuals", type=FILE,
-    help="Write the residuals [mm] of all image points as .csv or .xlsx.",
-)  # fmt: skip
-@overwrite
-@as_json
-def command(
-    project: Path, estimate: tuple[str, ...], out: Path | None, residuals: Path | None,
-    as_json: bool, **options: Any,
-) -> None:  # fmt: skip
+@declared
+def command(project: Path, as_json: bool, **options: Any) -> None:
     """Orient, and with --estimate calibrate, each camera of PROJECT (.toml) on its own.
 
     Uses the image points whose ids are among the object points. The start values of the project
@@ -47,14 +20,13 @@ def command(
     """
     from multimedia.orientation.workflow import resect_project, resected_as_dict
 
-    resected = resect_project(project, estimate=estimate, out=out, residuals=residuals, **options)
+    resected = resect_project(project, **options)
     data = resected_as_dict(resected)
     notes = (f"Note: {line}" for line in resected.remarks)
     print_result(data, _lines(data["cameras"]), as_json=as_json, remarks=notes)
-    if out is not None:
-        remark(f"Project written to {out}")
-    if residuals is not None:
-        remark(f"Residuals written to {residuals}")
+    for what, key in (("Project", "out"), ("Residuals", "residuals")):
+        if options[key] is not None:
+            remark(f"{what} written to {options[key]}")
 
 
 def _lines(cameras: list[dict[str, Any]]) -> Iterator[str]:

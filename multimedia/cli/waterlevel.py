@@ -5,32 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import click
-
 from photocore.cli import print_result
-from photocore.options import FILE, TABLE, as_json, number, overwrite
-
-EXAMPLE = """\b
-Examples:
-  multimedia waterlevel tiepoints.csv
-  multimedia waterlevel tiepoints.ply --tilted --out water.json
-  multimedia bathymetry dem.tif --water-level water.json --index 1.337 --out bed.tif
-"""
+from photocore.options import declared
 
 
-@click.command(epilog=EXAMPLE)
-@click.argument("source", metavar="POINTS", type=TABLE)
-@click.option("--tilted", is_flag=True, help="Fit a tilted plane instead of a height. [off]")
-@number(
-    "--spread", "M",
-    "Expected standard deviation of a surface point, waves included [m]. [default: from the data]",
-)  # fmt: skip
-@click.option(
-    "--out", "target", type=FILE,
-    help="Write the level as .json, for `multimedia bathymetry`. [default: none]",
-)  # fmt: skip
-@overwrite
-@as_json
+@declared
 def command(source: Path, tilted: bool, as_json: bool, **options: Any) -> None:
     """Estimate the mean water height from tie points, some of them on the water surface.
 

@@ -142,8 +142,7 @@ def opencv_of(camera: Camera) -> OpencvCamera:
     InputError
         If the camera has no sensor, or OpenCV's model comes no nearer than a pixel.
     """
-    if camera.sensor is None:
-        raise InputError(f"camera {camera.name}: its sensor is not described; pixels need it.")
+    sensor = camera.described_sensor()
     misfit = 0.0
     lens = camera.distortion
     if (
@@ -152,7 +151,7 @@ def opencv_of(camera: Camera) -> OpencvCamera:
         and (lens.convention is not Convention.BROWN or lens.shear)
     ):
         points, pixels = sensor_rays(camera)
-        image = camera.sensor.image_from_pixel(pixels)
+        image = sensor.image_from_pixel(pixels)
         sign = -1.0 if lens.convention is Convention.PHOTOGRAMMETRIC else 1.0
         start_terms = {name: sign * getattr(lens, name) for name in ("k1", "k2", "k3", "p1", "p2")}
         start = replace(camera, distortion=Brown(**start_terms))
@@ -163,8 +162,7 @@ def opencv_of(camera: Camera) -> OpencvCamera:
                 f"camera {camera.name}: OpenCV's lens model comes no nearer than {misfit:.2g} px "
                 "to this distortion."
             )
-    assert camera.sensor is not None  # checked above; a fit keeps it
-    lens, c, sensor = camera.distortion, camera.principal_distance, camera.sensor
+    lens, c = camera.distortion, camera.principal_distance
     matrix = np.eye(3)
     matrix[[0, 1], [0, 1]] = c / sensor.pitch * [lens.scale, 1.0]
     matrix[:2, 2] = sensor.pixel_from_image(camera.principal_point)

@@ -227,6 +227,18 @@ class Camera:
         """Omega, phi, kappa. [rad]"""
         return angles_from_rotation(self.rotation)
 
+    def described_sensor(self, why: str = "its sensor is not described; pixels need it.") -> Sensor:
+        """Return the sensor.
+
+        Raises
+        ------
+        InputError
+            With ``why``, if the camera has none.
+        """
+        if self.sensor is None:
+            raise InputError(f"camera {self.name}: {why}")
+        return self.sensor
+
     @property
     def looks_along(self) -> FloatArray:
         """Unit vector of the viewing direction in the world, shape (3,)."""

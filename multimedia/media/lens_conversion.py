@@ -46,12 +46,11 @@ def sensor_rays(camera: Camera) -> tuple[FloatArray, FloatArray]:
     InputError
         If the camera has no sensor, or its distortion can be undone nowhere.
     """
-    if camera.sensor is None:
-        raise InputError(f"camera {camera.name}: its sensor is not described; pixels need it.")
-    sides = (camera.sensor.width, camera.sensor.height)
+    sensor = camera.described_sensor()
+    sides = (sensor.width, sensor.height)
     along = [np.linspace(0, side - 1, count) for side, count in zip(sides, _GRID, strict=True)]
     pixels = np.stack(np.meshgrid(*along), axis=-1).reshape(-1, 2)
-    ideal = camera.ideal(camera.sensor.image_from_pixel(pixels))
+    ideal = camera.ideal(sensor.image_from_pixel(pixels))
     seen = np.isfinite(ideal).all(axis=1)
     if not seen.any():
         raise InputError(f"camera {camera.name}: its distortion cannot be undone on the sensor.")
@@ -101,8 +100,7 @@ def farthest_miss(
 
     ``scale`` multiplies what the camera projects; infinite where a point is not seen.
     """
-    if camera.sensor is None:
-        raise InputError(f"camera {camera.name}: its sensor is not described; pixels need it.")
-    miss = (project(camera, points, media) * scale - image) / camera.sensor.pitch
+    pitch = camera.described_sensor().pitch
+    miss = (project(camera, points, media) * scale - image) / pitch
     largest = float(np.linalg.norm(miss, axis=1).max())
     return largest if np.isfinite(largest) else np.inf

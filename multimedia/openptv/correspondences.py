@@ -61,7 +61,7 @@ def correspondences(
     therefore, propose a particle; the other cameras look for it where they would see it. Of all
     proposals the ones seen by most cameras are taken, the best fitting first, each target once.
     """
-    sensors = [_sensor(camera) for camera in cameras]
+    sensors = [c.described_sensor("its sensor is not described; targets need it.") for c in cameras]
     if len(cameras) < 2 or not 2 <= fewest <= len(cameras):
         raise InputError(f"correspondences: {len(cameras)} cameras, at least {fewest} to agree.")
     image = [s.image_from_pixel(t.reshape(-1, 2)) for s, t in zip(sensors, targets, strict=True)]
@@ -193,9 +193,3 @@ def _each_once(numbers: IntArray, order: IntArray) -> IntArray:
             for k, n in mine:
                 used[k].add(n)
     return np.array(kept, dtype=np.int64)
-
-
-def _sensor(camera: Camera) -> Sensor:
-    if camera.sensor is None:
-        raise InputError(f"camera {camera.name}: its sensor is not described; targets need it.")
-    return camera.sensor

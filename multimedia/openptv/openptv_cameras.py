@@ -27,6 +27,7 @@ from photocore.arrays import FloatArray
 from photocore.camera.distortion import Brown, Convention
 from photocore.errors import InputError
 
+_NEEDED = "OpenPTV needs its sensor."
 #: What OpenPTV has and a direction-preserving change of the camera may use.
 _FREE = (*EXTERIOR[3:], "c", "xh", "yh", "k1", "k2", "k3", "p1", "p2", "shear")
 #: Beyond so many pixels a camera is another one. The four cameras of a real tank, calibrated with a
@@ -68,7 +69,7 @@ def common_sensor(cameras: Sequence[Camera]) -> Sensor:
     InputError
         If a camera has none, or one of another size.
     """
-    sensors = [_sensor(camera) for camera in cameras]
+    sensors = [camera.described_sensor(_NEEDED) for camera in cameras]
     first, ratios = sensors[0], []
     for camera, sensor in zip(cameras, sensors, strict=True):
         if (sensor.width, sensor.height) != (first.width, first.height):
@@ -118,7 +119,7 @@ def in_openptvs_terms(
     it goes with the position of the camera, so then the camera is fitted to what it sees of the
     object points.
     """
-    own = _sensor(camera)
+    own = camera.described_sensor(_NEEDED)
     rays, pixels = sensor_rays(camera)
     start, scale = _start(camera, own, sensor)
     target = sensor.image_from_pixel(pixels) / scale
@@ -223,10 +224,3 @@ def _start(camera: Camera, own: Sensor, sensor: Sensor) -> tuple[Camera, float]:
     terms = {name: sign * getattr(lens, name) for name in ("k1", "k2", "k3", "p1", "p2")}
     brown = Brown(**terms, shear=sign * turn, convention=Convention.OPENPTV)
     return replace(camera, principal_point=centre, distortion=brown, sensor=sensor), scale
-
-
-def _sensor(camera: Camera) -> Sensor:
-    """Return the sensor of a camera, or raise InputError if it has none."""
-    if camera.sensor is None:
-        raise InputError(f"camera {camera.name}: OpenPTV needs its sensor.")
-    return camera.sensor

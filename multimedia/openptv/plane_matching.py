@@ -239,6 +239,4 @@ def _pixels(camera: Camera, found: Resection) -> float:
 
 
 def _pitch(camera: Camera) -> FloatArray:
-    if camera.sensor is None:
-        raise InputError(f"camera {camera.name}: matching planes needs its sensor.")
-    return camera.sensor.pitch
+    return camera.described_sensor("matching planes needs its sensor.").pitch

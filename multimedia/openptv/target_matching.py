@@ -46,8 +46,7 @@ def match_targets(
     Nearest neighbours in both directions, then a resection, then again within a radius that
     follows the misfits: a start that is some pixels off does not end in wrong partners.
     """
-    if camera.sensor is None:
-        raise InputError(f"camera {camera.name}: matching targets needs its sensor.")
+    sensor = camera.described_sensor("matching targets needs its sensor.")
     state = camera
     partner = _nearest(state, control, targets, interface, radius)
     for _ in range(_ROUNDS):
@@ -55,12 +54,12 @@ def match_targets(
         if seen.sum() < 4:
             return partner
         image = np.full((len(control), 2), np.nan)
-        image[seen] = camera.sensor.image_from_pixel(targets[partner[seen]])
+        image[seen] = sensor.image_from_pixel(targets[partner[seen]])
         try:
             result = resect(state, control, image, interface)
         except (GeometryError, ConvergenceError, InputError):
             return partner
-        miss = np.linalg.norm(result.residuals[seen] / camera.sensor.pitch, axis=1)
+        miss = np.linalg.norm(result.residuals[seen] / sensor.pitch, axis=1)
         state = result.camera
         limit = min(radius, max(LEAST_RADIUS, WIDEST_MISFIT * float(np.median(miss))))
         again = _nearest(state, control, targets, interface, limit)

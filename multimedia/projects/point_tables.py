@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.media.camera import Camera, Sensor
+from multimedia.media.camera import Camera
 from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
@@ -144,7 +144,7 @@ def read_image_points(path: Path, cameras: Sequence[Camera]) -> tuple[ImagePoint
     else:
         for name in dict.fromkeys(names):
             rows = [row for row, other in enumerate(names) if other == name]
-            values[rows] = _sensor(by_name[name]).image_from_pixel(values[rows])
+            values[rows] = by_name[name].described_sensor(_IN_PIXELS).image_from_pixel(values[rows])
     points = ImagePoints(
         cameras=tuple(names), ids=_ids(table), image=values,
         sigma=_sigmas(table, keys, [by_name[name] for name in names]),
@@ -261,18 +261,16 @@ def _sigmas(table: Table, coordinates: Sequence[str], cameras: Sequence[Camera])
         factor = METRES.get(unit, METRES["mm"]) / METRES["mm"]
         sigma[:, axis] = table.numbers(key) * factor
         if unit == "px" and key in table.present:
-            sigma[:, axis] *= [_sensor(camera).pitch[axis] for camera in cameras]
+            sigma[:, axis] *= [
+                camera.described_sensor(_IN_PIXELS).pitch[axis] for camera in cameras
+            ]
     return sigma
 
 
-def _sensor(camera: Camera) -> Sensor:
-    """Return the sensor of a camera whose image points are in pixels; raise if it has none."""
-    if camera.sensor is None:
-        raise InputError(
-            f"camera {camera.name}: image points are given in pixels, but its sensor is not "
-            "described; add [camera.sensor] with width, height and pitch."
-        )
-    return camera.sensor
+_IN_PIXELS = (
+    "image points are given in pixels, but its sensor is not described; add [camera.sensor] with "
+    "width, height and pitch."
+)
 
 
 def _read_wide(book: object, cameras: Sequence[Camera]) -> tuple[ImagePoints, list[str]] | None:
@@ -301,7 +299,7 @@ def _read_wide(book: object, cameras: Sequence[Camera]) -> tuple[ImagePoints, li
             seen = np.flatnonzero(np.isfinite(values).all(axis=1))
             image = values[seen]
             if first == "col":
-                image = _sensor(camera).image_from_pixel(image)
+                image = camera.described_sensor(_IN_PIXELS).image_from_pixel(image)
             names += [camera.name] * len(seen)
             rows += seen.tolist()
             images.append(image)

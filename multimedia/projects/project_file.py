@@ -35,7 +35,6 @@ from multimedia.projects.point_tables import (
 from multimedia.projects.surface_files import (
     read_mesh,
     read_raster,
-    relative_path,
     wave_rows,
     waves_of,
 )
@@ -44,7 +43,7 @@ from photocore.arrays import is_finite_number, positive
 from photocore.camera.distortion import NAMES, Brown, Convention
 from photocore.camera.fisheye import Fisheye
 from photocore.errors import GeometryError, InputError, located
-from photocore.output import all_or_none, atomic_path, check_all_writable
+from photocore.output import all_or_none, atomic_path, check_all_writable, relative_name
 from photocore.sections import FileSection
 from photocore.textfile import check_name, read_toml
 
@@ -336,7 +335,7 @@ def _surface_data(surface: RefractingSurface, folder: Path) -> dict[str, Any]:
         return {"kind": _WAVES, "level": float(surface.level), "waves": wave_rows(surface)}
     for kind, (filed, _) in _FILED.items():
         if isinstance(surface, filed) and surface.source:
-            return {"kind": kind, "file": relative_path(Path(surface.source), folder)}
+            return {"kind": kind, "file": relative_name(surface.source, folder)}
     for kind, (form, keys) in _KINDS.items():
         if type(surface) is form:
             return {"kind": kind} | {k: np.asarray(getattr(surface, k)).tolist() for k in keys}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,7 @@ from photocore.cloud.ply import read_ply_mesh
 from photocore.errors import LARGEST, InputError, located
 from photocore.jsonfile import read_object
 from photocore.raster import Window
-from photocore.textfile import check_file, check_name
+from photocore.textfile import check_file
 
 FORMAT = "multimedia-waterlevel/1"
 #: A water surface of more cells is coarser than it looks: averaging it down loses nothing.
@@ -81,10 +80,7 @@ def read_mesh(path: Path) -> MeshSurface:
     InputError
         If the file is no such mesh, or has an overhang.
     """
-    check_name(path)
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder, expected a water surface.")
-    check_file(path, "water surface")
+    check_file(path, "water surface", folder=", expected a water surface.")
     if path.suffix.lower() not in MESHES:
         raise InputError(f"{path}: a mesh is a {' or '.join(MESHES)} file.")
     read = read_obj_mesh if path.suffix.lower() == ".obj" else read_ply_mesh
@@ -174,14 +170,6 @@ def wave_rows(surface: WaveSurface) -> list[list[float]]:
         [surface.amplitude, 2 * np.pi / number, turn, np.degrees(surface.phase)]
     ).tolist()
     return rows
-
-
-def relative_path(file: Path, folder: Path) -> str:
-    """Return the way from a folder to a file; the whole way where there is none (other drive)."""
-    try:
-        return Path(os.path.relpath(file, folder.resolve())).as_posix()
-    except ValueError:
-        return file.as_posix()
 
 
 def _wavy(level: float, waves: Sequence[str]) -> WaveSurface:

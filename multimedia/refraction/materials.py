@@ -7,12 +7,14 @@ relative to air, and a set-up that puts air at 1.0 is consistent with them.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photocore.arrays import FloatArray, as_floats
 from photocore.errors import InputError
+from photocore.textfile import packaged
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,57 +68,16 @@ class Material:
         return np.asarray(np.sqrt(1 + sum(b * square / (square - c) for b, c in self.sellmeier)))
 
 
-N_BK7 = Material(
-    name="borosilicate crown glass N-BK7",
-    citation="Schott optical glass data sheets",
-    sellmeier=(
-        (1.03961212, 0.00600069867),
-        (0.231792344, 0.0200179144),
-        (1.01046945, 103.560653),
-    ),
-    wavelength_nm=(300, 2500),
-)
-FUSED_SILICA = Material(
-    name="fused silica",
-    citation="Malitson, J. Opt. Soc. Am. 55, 1965, 1205-1208",
-    sellmeier=(
-        (0.6961663, 0.0684043**2),
-        (0.4079426, 0.1162414**2),
-        (0.8974794, 9.896161**2),
-    ),
-    wavelength_nm=(210, 3710),
-)
-FLOAT_GLASS = Material(
-    name="clear soda-lime float glass",
-    citation="Rubin, Solar Energy Materials 12, 1985, 275-288",
-    powers=((1.5130, 0), (-0.003169, 2), (0.003962, -2)),
-    wavelength_nm=(310, 4600),
-)
-ACRYLIC = Material(
-    name="acrylic (PMMA)",
-    citation="Sultanova, Kasarova, Nikolov, Acta Physica Polonica A 116, 2009, 585-587",
-    sellmeier=((1.1819, 0.011313),),
-    wavelength_nm=(436, 1052),
-)
-POLYCARBONATE = Material(
-    name="polycarbonate",
-    citation="Sultanova, Kasarova, Nikolov, Acta Physica Polonica A 116, 2009, 585-587",
-    sellmeier=((1.4182, 0.021304),),
-    wavelength_nm=(436, 1052),
-)
-SAPPHIRE = Material(
-    name="sapphire, ordinary ray",
-    citation="Malitson and Dodge, J. Opt. Soc. Am. 62, 1972, 1405",
-    sellmeier=(
-        (1.4313493, 0.0726631**2),
-        (0.65054713, 0.1193242**2),
-        (5.3414021, 18.028251**2),
-    ),
-    wavelength_nm=(200, 5000),
-)
+def _material(*, wavelength_nm: list[float], name: str, citation: str, **terms: Any) -> Material:
+    limits = (wavelength_nm[0], wavelength_nm[1])
+    pairs = {key: tuple(map(tuple, rows)) for key, rows in terms.items()}
+    return Material(name=name, citation=citation, wavelength_nm=limits, **pairs)
 
-#: Everything a port or a tank may be made of.
-MATERIALS = (N_BK7, FUSED_SILICA, FLOAT_GLASS, ACRYLIC, POLYCARBONATE, SAPPHIRE)
+
+_ROWS = packaged("multimedia.refraction", "materials").values()
+#: Everything a port or a tank may be made of, from `materials.toml`.
+MATERIALS = tuple(_material(**row) for row in _ROWS)
+N_BK7, FUSED_SILICA, FLOAT_GLASS, ACRYLIC, POLYCARBONATE, SAPPHIRE = MATERIALS
 
 
 def air_refractive_index(

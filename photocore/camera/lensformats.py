@@ -18,7 +18,7 @@ from photocore.arrays import FloatArray, is_finite_number
 from photocore.camera.pinhole import camera_matrix
 from photocore.errors import LARGEST, InputError
 from photocore.jsonfile import read_object
-from photocore.textfile import check_file, check_name, read_text
+from photocore.textfile import check_file, read_text
 
 
 class LensData(NamedTuple):
@@ -42,10 +42,7 @@ def read_foreign_lens(path: Path | str) -> LensData:
         If the file is missing, of another kind, or uses terms OpenCV's model does not have.
     """
     path = Path(path)
-    check_name(path)
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder, expected a lens file.")
-    check_file(path, "lens file")
+    check_file(path, "lens file", folder=", expected a lens file.")
     ending = path.suffix.lower()
     if ending in {".yml", ".yaml"}:
         return _opencv(path)

@@ -12,7 +12,7 @@ from photocore.arrays import FloatArray
 from photocore.cloud.model import Cloud
 from photocore.errors import InputError
 from photocore.output import atomic_path
-from photocore.textfile import check_file, check_name
+from photocore.textfile import check_file
 
 
 def open_cloud(path: Path | str) -> Cloud:
@@ -28,10 +28,7 @@ def open_cloud(path: Path | str) -> Cloud:
     from photocore.cloud.text import TextCloud
 
     path = Path(path)
-    check_name(path)
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; name a point cloud (.csv .ply .las .laz).")
-    check_file(path)
+    check_file(path, folder="; name a point cloud (.csv .ply .las .laz).")
     kinds: dict[str, type[TextCloud | PlyCloud | LasCloud]] = {
         **dict.fromkeys((".csv", ".txt", ".xyz"), TextCloud),
         ".ply": PlyCloud,

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from functools import cache
-from importlib.resources import files
 
 from photocore.errors import InputError
+from photocore.textfile import packaged
 from photocore.workbook.making.words import LANGUAGES
 
 __all__ = ["LANGUAGES", "texts_of", "words_of"]
@@ -18,7 +17,7 @@ Words = Callable[..., str]
 @cache
 def texts_of(package: str) -> dict[str, dict[str, str]]:
     """Return the texts of a package by key and language; ``{...}`` are blanks to fill."""
-    return tomllib.loads(files(package).joinpath("words.toml").read_text(encoding="utf-8"))
+    return packaged(package, "words")
 
 
 def words_of(package: str, language: str) -> Words:

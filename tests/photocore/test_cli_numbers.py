@@ -9,7 +9,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from photocore.options import Length, Number, Numbers, Size
+from photocore.option_types import Length, Number, Numbers, Size
 from tests.builders.commands import bifocal_command, multimedia_command
 
 PROGRAMS = {"bifocal": bifocal_command, "multimedia": multimedia_command}

@@ -186,9 +186,7 @@ def _model_space(path: Path) -> Any:
     """Return the model space of a drawing."""
     import ezdxf
 
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder, expected a drawing.")
-    check_file(path)
+    check_file(path, folder=", expected a drawing.")
     try:
         return ezdxf.readfile(path).modelspace()
     except (ezdxf.DXFError, OSError, UnicodeDecodeError) as error:

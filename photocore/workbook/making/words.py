@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import tomllib
 from functools import cached_property
-from importlib.resources import files
 from typing import Any, NamedTuple
+
+from photocore.textfile import packaged
 
 LANGUAGES = ("en", "it", "de")
 
@@ -44,8 +44,7 @@ class WordBook:
     @cached_property
     def content(self) -> dict[str, dict[str, Any]]:
         """The file."""
-        text = files(self.package).joinpath("words.toml").read_text(encoding="utf-8")
-        return tomllib.loads(text)
+        return packaged(self.package, "words")
 
     def term(self, section: str, key: str) -> Wording | None:
         """Return an entry of a section; None if absent."""
