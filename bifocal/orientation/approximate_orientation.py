@@ -148,11 +148,11 @@ def approximate_cameras(
         return (cameras[0], cameras[1]), agree, interiors
     if ties is None:
         raise GeometryError("too few control points, and no common points to go with them.")
-    interiors = _plausible_focals(interiors, ties, given.site)
+    interiors = plausible_focals(interiors, ties, given.site)
     return _scaled(first_cameras(ties, interiors), given, interiors), agree, interiors
 
 
-def _plausible_focals(interiors: Interiors, ties: Ties, site: SiteMeasures) -> Interiors:
+def plausible_focals(interiors: Interiors, ties: Ties, site: SiteMeasures) -> Interiors:
     """Return interiors whose unknown focal length follows from the distances and the scale."""
     first, second = interiors
     if not (first.is_assumed or second.is_assumed):

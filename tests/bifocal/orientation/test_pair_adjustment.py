@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -14,8 +15,10 @@ from bifocal.orientation.adjustment.pair_observations import (
     PairUnknowns,
     at,
 )
+from bifocal.orientation.approximate_orientation import plausible_focals
 from bifocal.orientation.facade_lines import FacadeDirection, contradiction_in_words
 from bifocal.orientation.orientation_stages import PhotoInput
+from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.starts.space_resection import resect
 from bifocal.orientation.tie_points import with_wall
 from bifocal.orientation.walls.reference_plane import NarrowFace
@@ -249,6 +252,28 @@ def test_hardly_any_change_of_distance_is_refused() -> None:
     points = replace(control(), pixels2=project(beside, POINTS))
     with pytest.raises(GeometryError, match="hardly any change of distance"):
         orient_pair(photos(), control=points, site=SiteMeasures())
+
+
+@pytest.mark.parametrize("unknown", [0, 1])
+def test_an_unknown_focal_length_follows_from_both_distances_and_the_scale(unknown: int) -> None:
+    """On the wall photo 2 is (f2 / d2) / (f1 / d1) as large as photo 1."""
+    xyz = np.array([[x, y, 0.0] for x in (-2, 0, 2) for y in (-1, 0, 1)])
+    cameras = [camera(d, offset=(0, 0), turn_deg=(0, 0, 0), shift=(0, 0)) for d in (16.0, 9.0)]
+    seen = [project(one, xyz) for one in cameras]
+    ties = Ties(
+        pixels1=seen[0],
+        pixels2=seen[1],
+        seen1=seen[0],
+        seen2=seen[1],
+        homography=cv2.findHomography(*seen)[0],
+        on_plane=np.ones(9, bool),
+        tolerance=1.0,
+    )
+    lenses = [replace(interior(focal=c.matrix[0, 0]), sigma_focal=1e-4) for c in cameras]
+    lenses[unknown] = interior()
+    site = SiteMeasures(distance1=16.0, distance2=9.0)
+    found = plausible_focals((lenses[0], lenses[1]), ties, site)
+    assert found[unknown].focal == pytest.approx(cameras[unknown].matrix[0, 0], rel=1e-6)
 
 
 def test_common_points_alone_need_a_tilt_or_a_tape_but_give_the_ratio_of_distances() -> None:

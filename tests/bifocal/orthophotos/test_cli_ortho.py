@@ -155,6 +155,7 @@ def test_the_drawing_has_a_sheet_with_a_viewport_to_scale_and_the_contours(wall:
     assert (window.dxf.width, window.dxf.height) == pytest.approx((84, 60))
     assert tuple(window.dxf.view_center_point)[:2] == pytest.approx((0, 0))
     words = {text.dxf.text for text in sheet.query("TEXT")}
+    assert {text.dxf.rotation for text in sheet.query("TEXT")} <= {0.0, 90.0}
     assert {"Torre (est)", "Orthophoto 1:50", "A", "sections A-A  x=0.8"} <= words
     model = drawing.modelspace()
     levels = {line.dxf.elevation for line in model.query("LWPOLYLINE[elevation > 0.05]")}
