@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 
 from tests.browser import SAMPLE, WATCH, Driver, Served, launched, served, tab_of
+from tests.page_session import opened
 
 #: Megapixels of a photo, three to two.
 MEGAPIXELS = float(sys.argv[1]) if len(sys.argv) > 1 else 24.0
@@ -37,6 +38,7 @@ def enlarged(folder: Path) -> None:
         # Pixel of the small photo from that of the large one: centres at whole numbers.
         scale = np.diag([*factors, 1.0])
         scale[:2, 2] = (factors - 1) / 2
+        data[key]["image_size"] = [WIDTH, HEIGHT]
         data[key]["plane_from_pixel"] = (np.array(data[key]["plane_from_pixel"]) @ scale).tolist()
     (folder / "facade.pair.json").write_text(json.dumps(data))
 
@@ -82,6 +84,15 @@ def asked(page: Driver, count: int = 20) -> Any:
     return np.array([page.tab.evaluate(script, place) for place in places])
 
 
+def thousand(pair: Path) -> None:
+    """Write points into the survey of a pair."""
+    rng = np.random.default_rng(5)
+    places = rng.uniform((20, 20), (WIDTH - 20, HEIGHT - 20), (POINTS, 2)).tolist()
+    points = [{"name": f"Q{k:04d}", "picks": [p, p]} for k, p in enumerate(places)]
+    with opened(pair) as session:
+        session.command({"op": "points.add", "points": points})
+
+
 def main() -> None:
     """Measure and print."""
     with tempfile.TemporaryDirectory() as folder, launched() as browser:
@@ -99,11 +110,10 @@ def main() -> None:
                 print(f"suggestion                     {spread(asked(page))}")
                 page.frames()
                 print(f"frames, two layers             {spread(page.frames())}")
-                rng = np.random.default_rng(5)
-                places = rng.uniform((20, 20), (WIDTH - 20, HEIGHT - 20), (POINTS, 2)).tolist()
-                points = [{"name": f"Q{k:04d}", "picks": [p, p]} for k, p in enumerate(places)]
+        thousand(Path(folder) / "facade.pair.json")
+        with served(Path(folder), "facade.pair.json") as server:
+            with tab_of(browser, server) as page:
                 started = time.perf_counter()
-                page.command("points.add", points=points)
                 page.settled(f"state.points.length === {POINTS}")
                 print(f"{POINTS} points arrive            {time.perf_counter() - started:.2f} s")
                 page.tab.wait_for_timeout(500)

@@ -62,12 +62,13 @@ def write_openpyxl(path, rows):
 
 
 def solve(path, rows, out=None):
+    from bifocal import Taking
     from bifocal.workbook import workflow
     from bifocal.workbook.output import write_result
 
-    options = {"d1": D1, "d2": D2, "c1": C1, "c2": C2} if path.suffix == ".csv" else {}
+    taking = Taking(d1=D1, d2=D2, c1=C1, c2=C2) if path.suffix == ".csv" else None
     begin = time.process_time()
-    solution = workflow.solve(path, **options)
+    solution = workflow.solve(path, taking=taking)
     if out is not None:
         write_result(out, solution, overwrite=True)
     seconds = time.process_time() - begin

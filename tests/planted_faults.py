@@ -194,11 +194,11 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         (('(degrees * distance, "deg", -base', '(degrees, "deg", -base'),),
     ),
     (
-        "bifocal/workbook/formulas/columns.py",
+        "bifocal/workbook/formulas/formulas.toml",
         "tests/bifocal/workbook/test_survey_workbook.py",
         (
             ("(k_12*(1-[@r]/d_2))^2", "(k_12*(1-[@r]/d_1))^2"),
-            ("(n{image}_{axis}-e_{axis})*1000", "n{image}_{axis}*1000"),
+            ("(n{2}_{1}-e_{1})*1000", "n{2}_{1}*1000"),
         ),
     ),
     (

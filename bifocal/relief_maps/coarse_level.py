@@ -14,21 +14,15 @@ import numpy as np
 
 from bifocal.relief_maps import evidence, flow
 from bifocal.relief_maps.frame import Frame
+from bifocal.relief_maps.tuning import COARSE, EVIDENCE
 from photocore.arrays import BoolArray, Float32Array
-
-#: The coarse level is asked where less than this share of the frame is matched there and back:
-#: plaster has 0.3 to 0.6, textured façades 0.95.
-UNSURE = 0.75
-#: Where neither level is sure, the coarse one is believed from this difference: noise throws the
-#: fine one farther (church_2 beyond 10 cm 1.13 to 1.00 %; on plaster it pays nothing). [m]
-GROSS = 0.3
 
 
 def is_unsure(matched: flow.Measurement) -> bool:
     """Return whether so little of a frame is matched that half the resolution may know more."""
     across, loop = matched.across[::4, ::4], matched.loop[::4, ::4]
-    sure = (np.abs(across) < evidence.ACROSS_LIMIT) & (loop < evidence.LOOP_LIMIT)
-    return bool(sure.mean() < UNSURE)
+    sure = (np.abs(across) < EVIDENCE.across_limit) & (loop < EVIDENCE.loop_limit)
+    return bool(sure.mean() < COARSE.unsure)
 
 
 def halved(frame: Frame) -> Frame:
@@ -85,7 +79,7 @@ def backed(
     sigma = flow.sigma_of_relief(frame, fine.r, fine.sigma_px)
     unsure = ~evidence.validated(fine.across, fine.loop, sigma, d2)
     known = unsure & (coarse_sure > 0.99)
-    better = known | (unsure & (np.abs(coarse - fine.r) > GROSS))
+    better = known | (unsure & (np.abs(coarse - fine.r) > COARSE.gross))
     return replace(fine, r=np.where(better, coarse, fine.r)), known, half
 
 

@@ -26,6 +26,7 @@ from bifocal.relief_maps.frame import (
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
 from bifocal.relief_maps.registration import Registration, check_registration
 from bifocal.relief_maps.stages import relief_map
+from bifocal.relief_maps.tuning import FLOW, LIMITS, SEED
 from bifocal.remarks import remark
 from photocore.arrays import ByteArray
 from photocore.cli import Progress, no_progress
@@ -34,16 +35,6 @@ from photocore.errors import InputError
 #: Coarsening of the working frame, and the most pixels it may have. Every second pixel of a frame
 #: is matched in `fast`, but all of them refine it.
 QUALITIES = {"fast": (2.0, 3.2e6), "standard": (1.0, 9e6), "best": (1.0, 30e6)}
-#: Working frames of fewer pixels can afford the finer search.
-SMALL = 3e6
-#: Relief maps of more pixels than this are refused: a unit has been mistaken.
-LARGEST_MAP = 400e6
-#: A GSD coarser than this, and coarser than twice the far photo's pixel, is a slip, too. [m]
-COARSEST_GSD = 0.2
-#: So is a GSD coarser than the photo's that leaves fewer pixels a side than this.
-FEWEST_PIXELS = 64
-#: Matching needs this many working pixels a side.
-SMALLEST_WORK = 24
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -160,13 +151,13 @@ def dense_relief(
     fast = quality == "fast"
     frame = coarse_level.halved(whole) if fast else whole
     progress(0.1, 1.0, "First relief")
-    side = seed.FAST_SIDE if fast else seed.COARSE_SIDE
+    side = SEED.fast_side if fast else SEED.coarse_side
     coarse, _ = seed.coarse_relief(frame, relief_range, side=side)
     whole = match_exposure(whole, coarse)
     frame = coarse_level.halved(whole) if fast else whole
     progress(0.2, 1.0, "Matching")
-    small = not fast and work.width * work.height < SMALL
-    stride = flow.FINE_STRIDE if small else flow.STRIDE
+    small = not fast and work.width * work.height < LIMITS.small
+    stride = FLOW.fine_stride if small else FLOW.stride
     matched = flow.measure(frame, coarse, stride=stride, finer=whole if fast else None)
     del whole
     registration = check_registration(frame, matched)
@@ -212,11 +203,11 @@ def _grids(
     wanted = Grid.from_bounds(box, gsd=step)
     about = {"gsd": step, "wide": box[2] - box[0], "high": box[3] - box[1], "native": native}
     about |= {"width": wanted.width, "height": wanted.height}
-    if wanted.width * wanted.height > LARGEST_MAP or max(wanted.shape) > LONGEST_SIDE:
+    if wanted.width * wanted.height > LIMITS.largest_map or max(wanted.shape) > LONGEST_SIDE:
         raise InputError(remark("relief.gsd_too_fine", **about))
-    few = min(wanted.shape) < FEWEST_PIXELS and step > 1.01 * native
-    if few or min(wanted.shape) < 2 or step > max(COARSEST_GSD, 2 * native):
-        about |= {"coarsest": COARSEST_GSD, "fewest": FEWEST_PIXELS}
+    few = min(wanted.shape) < LIMITS.fewest_pixels and step > 1.01 * native
+    if few or min(wanted.shape) < 2 or step > max(LIMITS.coarsest_gsd, 2 * native):
+        about |= {"coarsest": LIMITS.coarsest_gsd, "fewest": LIMITS.fewest_pixels}
         raise InputError(remark("relief.gsd_too_coarse", **about))
     low, high = relief_range or seed.usual_range(pair.image2.distance)
     reach = _seen_box(pair, box, low, high) if bounds is not None else box
@@ -234,11 +225,11 @@ def _grids(
     # Matched at half of what it is refined at.
     halved = 2 if quality == "fast" else 1
     work = working_grid(pair, images[0].shape, wide, fine / halved)
-    if min(work.shape) < SMALLEST_WORK * halved:
+    if min(work.shape) < LIMITS.smallest_work * halved:
         raise InputError(
             f"the photos would be matched on {work.width // halved} x {work.height // halved} px "
-            f"of {fine:.3g} m; at least {SMALLEST_WORK} a side are needed. Give larger bounds, a "
-            "finer gsd or quality standard."
+            f"of {fine:.3g} m; at least {LIMITS.smallest_work} a side are needed. Give larger "
+            "bounds, a finer gsd or quality standard."
         )
     if bounds is None and gsd is None:
         # The map's pixels are those of photo 1, where that is square to the wall.

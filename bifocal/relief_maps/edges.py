@@ -10,37 +10,8 @@ import cv2
 import numpy as np
 
 from bifocal.relief_maps.frame import Frame, offsets, zoom_map
+from bifocal.relief_maps.tuning import EDGES
 from photocore.arrays import Float32Array
-
-#: Half width of a ramp. [px]
-REACH = 9
-#: Steps whose parallax is smaller than this are left as measured. [px]
-LEAST_STEP = 0.5
-#: Nor are steps of less than this many times the precision of matching: they are its noise.
-NOISE_STEPS = 4.0
-#: Differences of grey value and of its gradient beyond these count alike: façades 81 / 83, beyond
-#: 3 cm 1.28 / 2.33 % with 20 and 14, 1.13 / 2.15 with 12 and 8, 1.08 / 2.07 with 9 and 6, 1.13 /
-#: 2.07 with 7 and 4.5, 1.78 / 2.24 with 5 and 3. Where matching is imprecise, the photos differ by
-#: more than relief: the second ones (church_1, beyond 10 cm 9.1 %, with the first 10.1).
-#: [grey levels]
-LIMITS, IMPRECISE_LIMITS, GREY_SHARE = (9.0, 6.0), (12.0, 8.0), 0.4
-#: Half window and regularisation of the guided filter (He et al. 2013). [px, grey levels²]
-WINDOW, SOFTNESS = 3, 50.0
-#: By how much the upper surface must fit better than the lower one: always, and more where relief
-#: rises outwards, for photo 1 sees the step's side face there and its pixels are nobody's (façade
-#: 11: raised parts were too fat in two thirds of the errors at steps). [grey levels]
-MARGIN, MARGIN_RISING = 0.25, 1.5
-#: Steps of less parallax fit nearly as well on both sides: their margin is less in proportion. [px]
-WIDE_STEP = 4.0
-#: Plain parts cannot tell: margin and ramps fade out below this contrast in 15 x 15 px.
-#: [grey levels]
-CONTRAST, CONTRAST_WINDOW = 8.0, 15
-#: What the measured value is favoured by; where it rises or falls by so much parallax a pixel it is
-#: a ramp, which fits by what flow bent and stands on no surface. [grey levels; grey levels, px]
-FAVOUR, RAMP, RAMP_SLOPE = 0.05, 0.6, 0.3
-#: Matching is imprecise from this on, and precise up to half of it. Where it is imprecise, slopes
-#: are noise and no ramps (façade 84, poor texture: 13.4 % beyond 3 cm, with ramps 14.4 %). [px]
-IMPRECISE = 0.25
 
 
 def sharpen(
@@ -59,17 +30,17 @@ def sharpen(
         Precision of matching, typical of the frame. [px]
     """
     median = cv2.medianBlur(relief, 5)
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * REACH + 1, 2 * REACH + 1))
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * EDGES.reach + 1, 2 * EDGES.reach + 1))
     upper, lower = cv2.dilate(median, disc), cv2.erode(median, disc)
     x, y = frame.from_centre()
     per_relief = np.asarray(np.sqrt(x * x + y * y) / frame.pair.base_factor, dtype=np.float32)
     parallax = (upper - lower) * per_relief
-    band = parallax > max(LEAST_STEP, NOISE_STEPS * typical)
+    band = parallax > max(EDGES.least_step, EDGES.noise_steps * typical)
     result = relief.copy()
     far, near = _features(frame.image1), _features(frame.image2)
     guide = _Guide(far[..., 0])
     precise = precision(typical)
-    limits = precise * np.array(LIMITS) + (1 - precise) * np.array(IMPRECISE_LIMITS)
+    limits = precise * np.array(EDGES.limits) + (1 - precise) * np.array(EDGES.imprecise_limits)
     grey, gradient = limits.tolist()
     misfits = [
         _mismatch(frame, far, near, candidate, grey, gradient)
@@ -77,8 +48,10 @@ def sharpen(
     ]
     own, high, low = (guide.smooth(misfit) for misfit in misfits)
     textured = _textured(frame)
-    own += np.float32(precise) * textured * _ramp(median, per_relief) - np.float32(FAVOUR)
-    margin = textured * _margin(frame, median) * np.clip(parallax / np.float32(WIDE_STEP), 0, 1)
+    own += np.float32(precise) * textured * _ramp(median, per_relief) - np.float32(EDGES.favour)
+    margin = (
+        textured * _margin(frame, median) * np.clip(parallax / np.float32(EDGES.wide_step), 0, 1)
+    )
     up = band & (high + margin <= low) & (high + margin < own)
     down = band & (low - margin < own) & (low < high + margin)
     np.copyto(result, upper, where=up)
@@ -88,7 +61,7 @@ def sharpen(
 
 def precision(sigma_px: float) -> float:
     """Return how far matching of this precision [px] is precise, 0 to 1."""
-    return float(np.clip(2 - 2 * sigma_px / IMPRECISE, 0, 1))
+    return float(np.clip(2 - 2 * sigma_px / EDGES.imprecise, 0, 1))
 
 
 def _ramp(median: Float32Array, per_relief: Float32Array) -> Float32Array:
@@ -97,7 +70,9 @@ def _ramp(median: Float32Array, per_relief: Float32Array) -> Float32Array:
     across = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
     down = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
     steepness = np.sqrt(across * across + down * down) * per_relief
-    return np.asarray(np.float32(RAMP) * np.minimum(steepness / np.float32(RAMP_SLOPE), 1))
+    return np.asarray(
+        np.float32(EDGES.ramp) * np.minimum(steepness / np.float32(EDGES.ramp_slope), 1)
+    )
 
 
 def _margin(frame: Frame, median: Float32Array) -> Float32Array:
@@ -108,16 +83,18 @@ def _margin(frame: Frame, median: Float32Array) -> Float32Array:
     x, y = offsets(frame.grid.shape, frame.grid.pixel_of(frame.foot(1).nadir))
     steepest = np.sqrt((across * across + down * down) * (x * x + y * y)) + np.float32(1e-9)
     rising = np.clip((across * x + down * y) / steepest, 0, 1)
-    return np.asarray(np.float32(MARGIN) + np.float32(MARGIN_RISING) * rising, dtype=np.float32)
+    return np.asarray(
+        np.float32(EDGES.margin) + np.float32(EDGES.margin_rising) * rising, dtype=np.float32
+    )
 
 
 def _textured(frame: Frame) -> Float32Array:
     """Return how far photo 1 has the contrast to tell surfaces by, 0 to 1."""
     grey = frame.image1.astype(np.float32)
-    side = (CONTRAST_WINDOW, CONTRAST_WINDOW)
+    side = (EDGES.contrast_window, EDGES.contrast_window)
     mean = cv2.blur(grey, side)
     spread = np.sqrt(np.maximum(cv2.blur(grey * grey, side) - mean * mean, 0))
-    return np.asarray(np.clip(spread / np.float32(CONTRAST) - np.float32(0.25), 0, 1))
+    return np.asarray(np.clip(spread / np.float32(EDGES.contrast) - np.float32(0.25), 0, 1))
 
 
 def _features(image: np.ndarray) -> Float32Array:
@@ -143,7 +120,7 @@ def _mismatch(
     total = off[..., 1] + off[..., 2]
     np.minimum(total, np.float32(most_gradient), out=total)
     grey = np.minimum(off[..., 0], np.float32(most_grey))
-    grey *= np.float32(GREY_SHARE)
+    grey *= np.float32(EDGES.grey_share)
     total += grey
     return total
 
@@ -154,7 +131,7 @@ class _Guide:
     def __init__(self, image: Float32Array) -> None:
         self.image = image
         self.mean = self._blur(image)
-        self.spread = self._blur(image * image) - self.mean * self.mean + SOFTNESS
+        self.spread = self._blur(image * image) - self.mean * self.mean + EDGES.softness
 
     def smooth(self, values: Float32Array) -> Float32Array:
         """Return the values smoothed."""
@@ -170,5 +147,5 @@ class _Guide:
 
     @staticmethod
     def _blur(values: np.ndarray) -> Float32Array:
-        side = 2 * WINDOW + 1
+        side = 2 * EDGES.window + 1
         return np.asarray(cv2.blur(values, (side, side)))

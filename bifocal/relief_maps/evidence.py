@@ -11,45 +11,16 @@ from bifocal.model.image import local_contrast
 from bifocal.relief_maps import edges
 from bifocal.relief_maps.flow import Measurement
 from bifocal.relief_maps.frame import Frame, offsets
+from bifocal.relief_maps.tuning import EVIDENCE
 from photocore.arrays import BoolArray, Float32Array
-
-#: Limits of a validated pixel: across the radius and there and back. [px]
-ACROSS_LIMIT, LOOP_LIMIT = 0.5, 0.8
-#: A measured relief is known better than this share of d2.
-SIGMA_SHARE = 0.01
-#: Sides of the blocks, fine and coarse, that a pixel's validated surroundings consist of; blocks of
-#: 4 px clip relief that is right (plaster, façade 12: 10.5 instead of 9.6 % beyond 3 cm). [px]
-BLOCKS = (16, 64)
-#: A block with fewer supported pixels says nothing.
-FEWEST = 6
-#: Share of d2 by which a pixel may leave the range of its surroundings.
-SLACK = 0.002
-#: Slope outwards, as a share of that of camera 2's rays, times the square of the misfit of the
-#: photos [grey levels²] from which a pixel counts as not measured: of 14 features of façade 61 and
-#: loggia 301 these two tell best. Such pixels are not called measured, but placed all the same:
-#: left out, 1.57 instead of 1.33 % of the orthophoto were beyond 1 px (81). Where matching is
-#: imprecise the second: measured 72 and 65 % of the points of church_2 and church_1, as good as the
-#: 69 and 62 % that the first leaves. The first is to be multiplied by a power of 1 - d2 / d1, the
-#: parallax of a step whose strip is one pixel wide: the less of it, the less misfit tells the strip
-#: (at 95 % measured 35/19 bears 6.3 and 4.2 % false, façade 81, 35/28 2.0 and 4.8 %, façade 83).
-FALLS_AWAY, FALLS_POWER, FALLS_AWAY_IMPRECISE = 20.0, 1.4, 25.0
-#: A pixel that does not come back to itself is measured all the same if it lands no farther away
-#: than this [px], and the photos fit at it better than this, and have this contrast [grey levels].
-#: Flow back runs as a ramp over every step, on its seen side, too: 3.3 % of façade 81 failed by it
-#: alone, nine in ten of them right to a centimetre. In weaker texture anything fits.
-PARDON_LOOP, PARDON_MISFIT, PARDON_CONTRAST = 5.0, 6.0, 3.0
-#: A pixel of a plain wall whose own relief is so many sigmas off its plane patch is not measured:
-#: one of the two is wrong (façade 62: wrongly measured 8.7 to 7.6 %, measured beyond 3 cm 4.8 to
-#: 3.8 %).
-OFF_PATCH = 3.0
 
 
 def validated(
     across: Float32Array, loop: Float32Array, sigma: Float32Array, distance: float
 ) -> BoolArray:
     """Return which pixels are measured: matched there and back, on the radius, precise enough."""
-    valid = (np.abs(across) < ACROSS_LIMIT) & (loop < LOOP_LIMIT)
-    return np.asarray(valid & (sigma < SIGMA_SHARE * distance))
+    valid = (np.abs(across) < EVIDENCE.across_limit) & (loop < EVIDENCE.loop_limit)
+    return np.asarray(valid & (sigma < EVIDENCE.sigma_share * distance))
 
 
 def supported(support: BoolArray) -> BoolArray:
@@ -82,9 +53,9 @@ def held_back(relief: Float32Array, support: BoolArray, distance: float) -> Floa
     What is nearer than any validated thing around it has been seen by nobody: a mismatch. Held
     back rather than taken out it leaves no hole, and beside a step it still is on one side.
     """
-    slack = np.float32(SLACK * distance)
-    coarse, fine = (_surroundings(relief, support, side) for side in reversed(BLOCKS))
-    factor = BLOCKS[1] // BLOCKS[0]
+    slack = np.float32(EVIDENCE.slack * distance)
+    coarse, fine = (_surroundings(relief, support, side) for side in reversed(EVIDENCE.blocks))
+    factor = EVIDENCE.blocks[1] // EVIDENCE.blocks[0]
     rows, columns = fine.low.shape
     bounds = []
     for near, far in zip(fine, coarse, strict=True):
@@ -92,9 +63,11 @@ def held_back(relief: Float32Array, support: BoolArray, distance: float) -> Floa
         bounds.append(np.where(np.isfinite(near), near, wide))
     height, width = relief.shape
     low, high = (
-        cv2.resize(band, (columns * BLOCKS[0], rows * BLOCKS[0]), interpolation=cv2.INTER_NEAREST)[
-            :height, :width
-        ]
+        cv2.resize(
+            band,
+            (columns * EVIDENCE.blocks[0], rows * EVIDENCE.blocks[0]),
+            interpolation=cv2.INTER_NEAREST,
+        )[:height, :width]
         for band in bounds
     )
     known = ~support & (low <= high)
@@ -110,7 +83,7 @@ def _surroundings(relief: Float32Array, support: BoolArray, side: int) -> _Range
     blocks = (rows, side, columns, side)
     known = np.pad(support, edge).reshape(blocks)
     values = np.pad(relief, edge).reshape(blocks)
-    enough = known.sum((1, 3)) >= FEWEST
+    enough = known.sum((1, 3)) >= EVIDENCE.fewest
     low = np.where(known, values, np.inf).min((1, 3))
     high = np.where(known, values, -np.inf).max((1, 3))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
@@ -131,10 +104,10 @@ def with_pardoned(
     """
     if backing is not None:
         return measured
-    loop = matched.loop * np.float32(LOOP_LIMIT / PARDON_LOOP)
+    loop = matched.loop * np.float32(EVIDENCE.loop_limit / EVIDENCE.lost_loop)
     near = validated(matched.across, loop, sigma, frame.distances[1])
-    fits = cv2.blur(misfit, (3, 3)) < PARDON_MISFIT
-    textured = local_contrast(frame.image1) > PARDON_CONTRAST
+    fits = cv2.blur(misfit, (3, 3)) < EVIDENCE.pardon_misfit
+    textured = local_contrast(frame.image1) > EVIDENCE.pardon_contrast
     return np.asarray(measured | (near & fits & textured))
 
 
@@ -162,15 +135,15 @@ def without_falling(
 
 
 def most_falling(frame: Frame, typical: float = 0.0) -> float:
-    """Return the limit of slope times misfit squared, `FALLS_AWAY`. [grey levels²]"""
+    """Return the limit of slope times misfit squared, `falls_away`. [grey levels²]"""
     d1, d2 = frame.distances
     precise = edges.precision(typical)
-    limit = FALLS_AWAY * (1 - d2 / d1) ** FALLS_POWER
-    return float(precise * limit + (1 - precise) * FALLS_AWAY_IMPRECISE)
+    limit = EVIDENCE.falls_away * (1 - d2 / d1) ** EVIDENCE.falls_power
+    return float(precise * limit + (1 - precise) * EVIDENCE.falls_away_imprecise)
 
 
 def without_unpatched(
     relief: Float32Array, unpatched: Float32Array, sigma: Float32Array, measured: BoolArray
 ) -> BoolArray:
     """Return what is measured but where a plane patch lies far from the relief found there."""
-    return np.asarray(measured & ~(np.abs(relief - unpatched) > OFF_PATCH * sigma))
+    return np.asarray(measured & ~(np.abs(relief - unpatched) > EVIDENCE.off_patch * sigma))

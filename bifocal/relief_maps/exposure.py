@@ -9,14 +9,8 @@ import numpy as np
 
 from bifocal.relief_maps.frame import Frame, zoom_map
 from bifocal.relief_maps.registration import least_absolute
+from bifocal.relief_maps.tuning import EXPOSURE
 from photocore.arrays import Float32Array
-
-#: Grey values outside are clipped or dark noise and do not take part.
-DARKEST, BRIGHTEST = 12.0, 243.0
-#: Exposures that agree to this are left alone. [grey levels]
-WORTHWHILE = 1.0
-#: Pixels on a side of the comparison.
-SAMPLES = 160
 
 
 def match_exposure(frame: Frame, coarse: Float32Array) -> Frame:
@@ -35,7 +29,7 @@ def match_exposure(frame: Frame, coarse: Float32Array) -> Frame:
     texture is made or lost.
     """
     height, width = frame.grid.shape
-    step_x, step_y = max(1, width // SAMPLES), max(1, height // SAMPLES)
+    step_x, step_y = max(1, width // EXPOSURE.samples), max(1, height // EXPOSURE.samples)
     part = (slice(step_y // 2, None, step_y), slice(step_x // 2, None, step_x))
     relief = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
     columns, rows = (axis[part] for axis in zoom_map(frame, relief))
@@ -46,7 +40,7 @@ def match_exposure(frame: Frame, coarse: Float32Array) -> Frame:
     content = cv2.remap(frame.seen2.astype(np.uint8), columns, rows, cv2.INTER_NEAREST) > 0
     use = content & frame.seen1[part]
     for grey in (first, second):
-        use &= (grey > DARKEST) & (grey < BRIGHTEST)
+        use &= (grey > EXPOSURE.darkest) & (grey < 255 - EXPOSURE.darkest)
     if use.sum() < 200:
         return frame
     # Vignetting belongs to photo 2's own pixels, so the terms are taken at its positions.
@@ -54,7 +48,7 @@ def match_exposure(frame: Frame, coarse: Float32Array) -> Frame:
     terms = np.column_stack([np.ones_like(u), u, v, u * u + v * v, np.log(second[use])])
     solution = least_absolute(terms, np.log(first[use]), rounds=12, floor=0.01)
     change = np.abs(np.exp(terms @ solution) - second[use])
-    if np.median(change) < WORTHWHILE:
+    if np.median(change) < EXPOSURE.worthwhile:
         return frame
     level, across, down, vignetting, gamma = solution
     x = np.arange(width)[None, :] / width * 2 - 1

@@ -11,31 +11,8 @@ from bifocal import rays
 from bifocal.model.image import QUIET_BLUR, local_contrast, noise
 from bifocal.relief_maps.flow_refinement import refined
 from bifocal.relief_maps.frame import Frame, offsets, radial_stretch, zoom_map
+from bifocal.relief_maps.tuning import FLOW
 from photocore.arrays import BoolArray, ByteArray, Float32Array
-
-#: Weight of smoothness; 30 is as good before noise is taken out, 20 keeps more detail for it.
-ALPHA = 20.0
-#: On plain walls a smoother flow between blurred photos is better: the texture lies in the noise
-#: (plaster, façade 62: 6.4 to 6.1 mm of median error, measured RMSE 14 to 11.6 mm; textured
-#: façades get worse by it).
-PLAIN_ALPHA = 60.0
-#: A photo is plain if this share of it has less contrast within 15 px, blurred, than its noise is:
-#: 0.4 to 0.7 times on plaster (façades 12 and 62, loggia 302), whose median edges and bars can lift
-#: to 4; at half the resolution, where a smoother flow does harm, 1.2 and more; 2.9 to 10 on
-#: textured façades and churches. [per cent]
-PLAIN_SHARE = 30
-#: Weight of constant grey value, against 10 for constant gradient.
-DELTA = 10.0
-#: Stride of the inverse search's patches: 2 is a little better and half as quick again. [px]
-STRIDE, FINE_STRIDE = 3, 2
-#: The pyramid starts this many halvings down: the seed replaces what lies above.
-COARSEST = 3
-#: Photos that miss the radius by more than this, in the median, are not refined: they fit no
-#: better than that (fast, church_2: 0.45 px, refined 2.5 instead of 2.0 % beyond 10 cm; semireal
-#: church: 0.04 px). [px]
-FIT = 0.3
-#: Window and limits of the local error across the radius. [px]
-WINDOW, CLIP, FLOOR = 31, 2.0, 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -72,8 +49,8 @@ def seeded_flow(
     seed: Float32Array,
     *,
     finest: int,
-    stride: int = STRIDE,
-    alpha: float = ALPHA,
+    stride: int = FLOW.stride,
+    alpha: float = FLOW.alpha,
 ) -> Float32Array:
     """Return the displacement of every pixel of one image in the other, (height, width, 2). [px]
 
@@ -97,14 +74,14 @@ def seeded_flow(
     flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     flow.setFinestScale(finest)
     flow.setVariationalRefinementAlpha(alpha)
-    flow.setVariationalRefinementDelta(DELTA)
+    flow.setVariationalRefinementDelta(FLOW.delta)
     flow.setPatchStride(stride)
-    flow.setCoarsestScale(max(COARSEST, finest))
+    flow.setCoarsestScale(max(FLOW.coarsest, finest))
     return np.asarray(flow.calc(first, second, np.ascontiguousarray(seed)), dtype=np.float32)
 
 
 def measure(
-    frame: Frame, coarse: Float32Array, *, stride: int = STRIDE, finer: Frame | None = None
+    frame: Frame, coarse: Float32Array, *, stride: int = FLOW.stride, finer: Frame | None = None
 ) -> Measurement:
     """Match both photos and return the relief of the pixels of photo 1.
 
@@ -123,25 +100,25 @@ def measure(
     seed_relief = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
     columns, rows = zoom_map(frame, seed_relief)
     x, y = offsets((height, width))
-    seed, photos, alpha = cv2.merge([columns - x, rows - y]), frame, ALPHA
+    seed, photos, alpha = cv2.merge([columns - x, rows - y]), frame, FLOW.alpha
     plain = _is_plain(frame)
     if plain:
         first, second = (
             cv2.GaussianBlur(image, (0, 0), QUIET_BLUR) for image in (frame.image1, frame.image2)
         )
-        photos, alpha = replace(frame, image1=first, image2=second), PLAIN_ALPHA
+        photos, alpha = replace(frame, image1=first, image2=second), FLOW.plain_alpha
     flow = seeded_flow(photos.image1, photos.image2, seed, finest=0, stride=stride, alpha=alpha)
     loop = _loop(photos, flow, alpha)
     relief, across = split(frame, flow)
-    refine = not plain and float(np.median(np.abs(across[::8, ::8]))) < FIT
+    refine = not plain and float(np.median(np.abs(across[::8, ::8]))) < FLOW.fit
     if finer is not None and refine:
         flow = refined(flow, finer.image1, finer.image2)
         relief, across = split(frame, flow)
     refine &= finer is not None
     stretched = radial_stretch(frame)
-    side = WINDOW // 2 if refine else WINDOW
-    rms = cv2.blur(np.minimum(across * across, CLIP * CLIP), (side, side))
-    sigma_px = np.sqrt(rms + np.float32(FLOOR**2)) * stretched
+    side = FLOW.window // 2 if refine else FLOW.window
+    rms = cv2.blur(np.minimum(across * across, FLOW.clip * FLOW.clip), (side, side))
+    sigma_px = np.sqrt(rms + np.float32(FLOW.floor**2)) * stretched
     return Measurement(
         r=relief, across=across, loop=loop, sigma_px=sigma_px, plain=plain, refined=refine
     )
@@ -150,7 +127,7 @@ def measure(
 def _is_plain(frame: Frame) -> bool:
     """Return whether a good part of photo 1 has less contrast than noise."""
     contrast = local_contrast(frame.image1)[frame.seen1][::7]  # it varies slowly
-    return bool(np.percentile(contrast, PLAIN_SHARE) < noise(frame.image1, frame.seen1))
+    return bool(np.percentile(contrast, FLOW.plain_share) < noise(frame.image1, frame.seen1))
 
 
 def split(frame: Frame, flow: Float32Array) -> tuple[Float32Array, Float32Array]:

@@ -6,17 +6,9 @@ import cv2
 import numpy as np
 
 from bifocal.relief_maps.frame import offsets
+from bifocal.relief_maps.tuning import REFINEMENT
 from photocore.arrays import ByteArray, Float32Array
 
-#: Side of the window [px of the flow], of 3, 5 and 9 the best on façades 71 and 83.
-WINDOW = 5
-#: Residual at which a pixel counts half: more is another surface. [grey levels]
-OUTLIER = 10.0
-#: Texture weaker than this moves nothing: added to the mean squared derivative (façades 71 and 83,
-#: fast: median 0.53 and 1.96 mm; with 10 0.55 and 2.25). [(grey levels/px)²]
-SOFTNESS = 0.5
-#: Farthest move: a linearised image reaches no farther. [px]
-FARTHEST = 0.5
 #: Rows of flow worked on at once.
 STRIP = 32
 
@@ -46,13 +38,13 @@ def refined(flow: Float32Array, first: ByteArray, second: ByteArray) -> Float32A
         above, below = max(top - 1, 0), min(bottom + 1, height)
         strip = _products(flow[above:below], above, first, second)
         sums[:, top:bottom] = [p[top - above : bottom - above] for p in strip]
-    xx, xy, yy, ex, ey = (cv2.blur(p, (WINDOW, WINDOW)) for p in sums)
-    xx += np.float32(SOFTNESS)
-    yy += np.float32(SOFTNESS)
+    xx, xy, yy, ex, ey = (cv2.blur(p, (REFINEMENT.window, REFINEMENT.window)) for p in sums)
+    xx += np.float32(REFINEMENT.softness)
+    yy += np.float32(REFINEMENT.softness)
     share = 1 / (xx * yy - xy * xy)
     move = cv2.merge([(xy * ey - yy * ex) * share, (xy * ex - xx * ey) * share])
     # Pixels of the photos are half those of the flow.
-    return np.asarray(flow + 0.5 * np.clip(move, -FARTHEST, FARTHEST))
+    return np.asarray(flow + 0.5 * np.clip(move, -REFINEMENT.farthest, REFINEMENT.farthest))
 
 
 def _products(
@@ -72,7 +64,7 @@ def _products(
     across = cv2.Sobel(mean, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
     down = cv2.Sobel(mean, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
     off = cv2.subtract(moved, first, dtype=cv2.CV_32F)
-    weight = 1 / (1 + off * off * np.float32(OUTLIER**-2))
+    weight = 1 / (1 + off * off * np.float32(REFINEMENT.outlier**-2))
     u, v = weight * across, weight * down
     pairs = (u, across), (u, down), (v, down), (u, off), (v, off)
     return [cv2.resize(a * b, size, interpolation=cv2.INTER_AREA) for a, b in pairs]

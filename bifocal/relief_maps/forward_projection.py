@@ -13,28 +13,8 @@ from bifocal.model.relief_map import Quality
 from bifocal.rays import Foot, magnification, reduction
 from bifocal.relief_maps.flow import Measurement
 from bifocal.relief_maps.frame import Frame, offsets, values_at, zoom_map
+from bifocal.relief_maps.tuning import PROJECTION
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray, IntArray
-
-#: A relief agrees with the pixel it came from to this. [m], relative to d1
-AGREEMENT = 4e-4
-#: A ramp that stretches the wall by more than this is flow running over a hidden strip.
-STRETCH = 1.3
-#: A pixel that covers less of the wall than this sees the side face of a step.
-SIDE_FACE = 0.5
-#: Steps outwards when a hidden strip is filled; 2**LEAPS steps of LEAP pixels are the most.
-LEAP, LEAPS = 3, 7
-#: How much higher what covers a pixel in photo 2 must be: parallax [px] and share of d2. Relief to
-#: be believed covers all, any relief only what is not valid (church_1, without the second: 14.3
-#: instead of 14.2 % beyond 3 cm, 178 instead of 126 scraps of picture).
-COVERS, COVERS_INVALID = (0.7, 0.0005), (1.5, 0.002)
-#: Relief hidden or interpolated farther than this from measured one must be surrounded by it. [px]
-FRINGE_HIDDEN, FRINGE_INTERPOLATED = 24.0, 100.0
-#: Relief leans on squares of this side; on plain walls on larger ones, for specks of interpolated
-#: pixels lie in strips that a cornice hides (plaster, façade 511, 6 MP; 7, 11, 15 px: 73, 26, 23
-#: scraps of picture, RMSE off edges 37.4, 39.7, 49.9 mm). [px]
-GRAIN, GRAIN_PLAIN = 3, 11
-#: Holes are filled from their nearest neighbour up to this depth. [px]
-DEEPEST_HOLE = 30.0
 
 
 class MapBands(NamedTuple):
@@ -57,8 +37,8 @@ def stretch(frame: Frame, relief: Float32Array) -> Float32Array:
     """Return how much of the wall, along the radius, a pixel of photo 1 covers, in pixels.
 
     With s1 the radius about the nadir of photo 1, ``ds'/ds1 = 1 - r/d1 - (s1/d1) dr/ds1``: near one
-    on a true surface, more on a ramp that no camera can have seen as a surface (`STRETCH`), near
-    zero on the side face of a step, which has no place of its own on the map (`SIDE_FACE`).
+    on a true surface, more on a ramp that no camera can have seen as a surface (`stretch`), near
+    zero on the side face of a step, which has no place of its own on the map (`side_face`).
     """
     foot = frame.foot(1)
     across = cv2.Sobel(relief, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
@@ -80,7 +60,7 @@ def side_faces(frame: Frame, relief: Float32Array) -> BoolArray:
     81: 1.39 to 1.18 % beyond 3 cm, orthophoto 1.57 to 1.33 % beyond 1 px; 83, 35/28: 2.75 to 2.49).
     """
     smooth = cv2.blur(cv2.medianBlur(relief, 5), (3, 3))
-    return np.asarray(stretch(frame, smooth) < SIDE_FACE)
+    return np.asarray(stretch(frame, smooth) < PROJECTION.side_face)
 
 
 def to_plane(frame: Frame, source: MapBands, usable: BoolArray, grid: Grid) -> MapBands:
@@ -201,7 +181,7 @@ def _look_up(
 
     Eq. (1), s = s' d / (d - r), with the r it is meant to find: a fixed point.
     """
-    final, tolerance = start, np.float32(AGREEMENT * foot.distance)
+    final, tolerance = start, np.float32(PROJECTION.agreement * foot.distance)
     for _ in range(3):
         value = final
         q = shown_by_first(frame, away, value)
@@ -235,7 +215,7 @@ def fill_from_behind(bands: MapBands, holes: BoolArray, grid: Grid, nadir: Float
     number[row * bands.r.shape[1] + column] = np.arange(len(row))
     target = np.zeros(len(row), dtype=np.int64)
     lowest = np.full(len(row), np.inf, dtype=np.float32)
-    for leap in (LEAP, -LEAP):
+    for leap in (PROJECTION.leap, -PROJECTION.leap):
         beyond = _beyond(row, column, number, bands.r.shape, grid.pixel_of(nadir), leap)
         relief = np.where(number[beyond] < 0, values[beyond], np.float32(np.nan))
         lower = relief < lowest
@@ -260,7 +240,9 @@ def _beyond(
     to_column = np.clip(np.rint(column + leap * dx / length).astype(np.int64), 0, shape[1] - 1)
     to_row = np.clip(np.rint(row + leap * dy / length).astype(np.int64), 0, shape[0] - 1)
     target = to_row * shape[1] + to_column
-    for _ in range(LEAPS):  # each round doubles the leap of those that are still in a hole
+    for _ in range(
+        PROJECTION.leaps
+    ):  # each round doubles the leap of those that are still in a hole
         hop = number[target]
         target = np.where(hop >= 0, target[np.maximum(hop, 0)], target)
     return np.asarray(target)
@@ -282,7 +264,7 @@ def put_behind(
 
     Relief to be believed covers all, any relief what is not valid.
     """
-    least, unsure = covering(frame, COVERS), covering(frame, COVERS_INVALID)
+    least, unsure = covering(frame, PROJECTION.covers), covering(frame, PROJECTION.covers_invalid)
     covered = hidden_in_second(frame, source.r, least, support)
     covered |= hidden_in_second(frame, source.r, unsure) & ~valid
     bands = MapBands(source.r.copy(), source.sigma.copy(), source.quality.copy())
@@ -368,7 +350,7 @@ def fill_small(bands: MapBands, holes: BoolArray) -> None:
     distance, label = cv2.distanceTransformWithLabels(
         unknown.astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
-    fill = holes & unknown & (distance <= DEEPEST_HOLE)
+    fill = holes & unknown & (distance <= PROJECTION.deepest_hole)
     known = np.flatnonzero(~unknown)
     if not len(known) or not fill.any():
         return
@@ -384,19 +366,19 @@ def forget_outside(bands: MapBands, matched: Measurement) -> MapBands:
     walls measured pixels are few: there it leans on interpolated ones, too (plaster, loggia 302 and
     façade 62: 0.4 % of the wall unknown no longer, relief there as good as elsewhere).
     """
-    believed, grain = bands.quality == Quality.MEASURED, GRAIN
+    believed, grain = bands.quality == Quality.MEASURED, PROJECTION.grain
     if matched.plain:
-        believed, grain = believed | (bands.quality == Quality.INTERPOLATED), GRAIN_PLAIN
+        believed, grain = believed | (bands.quality == Quality.INTERPOLATED), PROJECTION.grain_plain
     solid = (believed & np.isfinite(bands.r)).astype(np.uint8)
     solid = cv2.morphologyEx(solid, cv2.MORPH_OPEN, np.ones((grain, grain), np.uint8))
     distance = cv2.distanceTransform(1 - solid, cv2.DIST_L2, 3)
-    away = distance > FRINGE_HIDDEN
+    away = distance > PROJECTION.fringe_hidden
     number, label = cv2.connectedComponents(away.astype(np.uint8), connectivity=4)
     outer = np.zeros(number, dtype=bool)
     for side in (label[0], label[-1], label[:, 0], label[:, -1]):
         outer[side] = True
     outer[0] = False  # near measured relief
-    far = (bands.quality == Quality.HIDDEN) | (distance > FRINGE_INTERPOLATED)
+    far = (bands.quality == Quality.HIDDEN) | (distance > PROJECTION.fringe_interpolated)
     lost = outer[label] & far
     bands.r[lost] = bands.sigma[lost] = np.nan
     bands.quality[lost] = Quality.UNKNOWN

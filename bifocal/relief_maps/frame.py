@@ -16,16 +16,11 @@ from bifocal.model.grid import Bounds, Grid, bounds_of, cut
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.model.ray_field import RayField
+from bifocal.relief_maps.tuning import FRAME
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
 from photocore.errors import GeometryError, InputError
 
-#: A plane grid that fits the pixels of a photo this well is not resampled. [px]
-SAME_LATTICE = 2e-3
-#: Parts of an oblique photo this much coarser than its middle are left out.
-COARSEST_SHARE = 3.0
-#: Side of the raster on which the pixels' shapes are taken. [px]
-STRETCH_SIDE = 64
 #: cv2.remap counts pixels in 16 bits. [px]
 LONGEST_SIDE = 32_000
 
@@ -129,7 +124,7 @@ def radial_stretch(frame: Frame) -> Float32Array:
     A photo oblique to the wall has long pixels on the plane, and an error of matching that is the
     same in all directions of the photo is longer along them; 1 for photos square to the wall.
     """
-    step = max(1, max(frame.grid.shape) // STRETCH_SIDE)
+    step = max(1, max(frame.grid.shape) // FRAME.stretch_side)
     places = np.stack(
         np.meshgrid(frame.grid.columns_x[step // 2 :: step], frame.grid.rows_y[step // 2 :: step]),
         axis=-1,
@@ -213,7 +208,7 @@ def _footprint(photo: Photo, shape: tuple[int, ...]) -> FloatArray:
     determinant = np.linalg.det(photo.metres_per_pixel(pixels))
     middle = np.array([[(width - 1) / 2, (height - 1) / 2]])
     sign = np.sign(np.linalg.det(photo.metres_per_pixel(middle)))
-    limit = (COARSEST_SHARE * photo.gsd((width, height))) ** 2
+    limit = (FRAME.coarsest_share * photo.gsd((width, height))) ** 2
     with np.errstate(invalid="ignore"):
         good = np.isfinite(places).all(-1) & (determinant * sign > 0)
         good &= np.abs(determinant) < limit
@@ -228,7 +223,7 @@ def working_grid(pair: Pair, shape1: tuple[int, ...], box: Bounds, gsd: float) -
     ideal = np.array([[gsd, 0, matrix[0, 2]], [0, -gsd, matrix[1, 2]], [0, 0, 1.0]])
     span = max(shape1[:2])
     straight = photo.lens is None and not photo.refracted
-    if straight and np.abs((matrix - ideal)[:, :2]).max() * span < SAME_LATTICE * gsd:
+    if straight and np.abs((matrix - ideal)[:, :2]).max() * span < FRAME.same_lattice * gsd:
         column, row = np.rint(np.linalg.inv(matrix)[:2] @ np.array([grid.x0, grid.y0, 1.0]))
         x0, y0 = matrix[:2] @ np.array([column, row, 1.0])
         grid = Grid(x0=float(x0), y0=float(y0), gsd=gsd, width=grid.width, height=grid.height)
@@ -315,7 +310,7 @@ def _whole_shift(matrix: FloatArray, grid: Grid) -> tuple[int, int] | None:
     corners = np.array([[0, 0, 1], [grid.width, 0, 1], [0, grid.height, 1], [*grid.shape[::-1], 1]])
     mapped = corners @ matrix.T
     off = mapped[:, :2] / mapped[:, 2:] - (corners @ lattice.T)[:, :2]
-    return (int(offset[0]), int(offset[1])) if np.abs(off).max() < SAME_LATTICE * 10 else None
+    return (int(offset[0]), int(offset[1])) if np.abs(off).max() < FRAME.same_lattice * 10 else None
 
 
 def zoom_map(frame: Frame, relief: Float32Array) -> tuple[Float32Array, Float32Array]:

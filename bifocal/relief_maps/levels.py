@@ -16,22 +16,8 @@ import numpy as np
 from bifocal.model.relief_map import Quality
 from bifocal.relief_maps.flow import Measurement
 from bifocal.relief_maps.forward_projection import MapBands
+from bifocal.relief_maps.tuning import LEVELS
 from photocore.arrays import BoolArray, Float32Array, FloatArray, IntArray
-
-#: Side of the blocks levels are counted in, and of the surroundings in blocks. [px]
-BLOCK, SURROUNDINGS = 64, 3
-#: Height of a class of the count. [m]
-CLASS = 0.004
-#: Reach of the mean: a share of sigma, and at most this: plain wall (plaster, façade 62) is drawn
-#: from 6.4 to 4.9 mm of median error and from 13.9 to 13.3 % beyond 3 cm; twice the reach takes the
-#: panel of a pilaster for the wall (16 %). [m]
-SHARE, FARTHEST = 0.8, 0.012
-#: Reaches the means are made for; relief more precise than half the first is left alone. [m]
-REACHES = (0.005, 0.01)
-#: Relief known better than this counts no more. [m]
-BEST = 0.003
-#: Relief beyond these percentiles is left out.
-TAILS = (0.2, 99.8)
 
 
 def of_plain_walls(bands: MapBands, matched: Measurement) -> MapBands:
@@ -62,18 +48,22 @@ def drawn_to_levels(relief: Float32Array, sigma: Float32Array, measured: BoolArr
     """
     if not measured.any():
         return relief
-    low, high = (float(v) for v in np.percentile(relief[measured], TAILS))
-    count = int((high - low) / CLASS) + 2
+    low, high = (float(v) for v in np.percentile(relief[measured], LEVELS.tails))
+    count = int((high - low) / LEVELS.class_height) + 2
     inside = np.isfinite(relief) & (relief > low) & (relief < high)
     place, shape = _blocks(relief.shape)
     weight, total = _count(relief, sigma, inside & measured, place, shape, (low, count))
-    reach = np.minimum(np.float32(SHARE) * sigma, np.float32(FARTHEST))
-    limits = (REACHES[0] / np.sqrt(2), *(np.sqrt(a * b) for a, b in pairwise(REACHES)), np.inf)
+    reach = np.minimum(np.float32(LEVELS.share) * sigma, np.float32(LEVELS.farthest))
+    limits = (
+        LEVELS.reaches[0] / np.sqrt(2),
+        *(np.sqrt(a * b) for a, b in pairwise(LEVELS.reaches)),
+        np.inf,
+    )
     result = relief.copy()
-    for width, (least, most) in zip(REACHES, pairwise(limits), strict=True):
+    for width, (least, most) in zip(LEVELS.reaches, pairwise(limits), strict=True):
         chosen = inside & (reach >= least) & (reach < most)
         r = relief[chosen]
-        cell = place[chosen] * count + ((r - low) / CLASS).astype(np.int64)
+        cell = place[chosen] * count + ((r - low) / LEVELS.class_height).astype(np.int64)
         around, sums = (_spread(values, width).ravel()[cell] for values in (weight, total))
         mean = np.where(around > 0, sums / np.maximum(around, np.float32(1e-9)), r)
         move = np.clip(mean - r, -reach[chosen], reach[chosen])
@@ -83,8 +73,8 @@ def drawn_to_levels(relief: Float32Array, sigma: Float32Array, measured: BoolArr
 
 def _blocks(shape: tuple[int, int]) -> tuple[IntArray, tuple[int, int]]:
     """Return the number of each pixel's block, and how many there are, down and across."""
-    rows, columns = (-(-length // BLOCK) for length in shape)
-    row, column = (np.arange(length) // BLOCK for length in shape)
+    rows, columns = (-(-length // LEVELS.block) for length in shape)
+    row, column = (np.arange(length) // LEVELS.block for length in shape)
     return row[:, None] * columns + column[None, :], (rows, columns)
 
 
@@ -102,10 +92,10 @@ def _count(
     """
     low, count = classes
     r = relief[use]
-    cell = place[use] * count + ((r - low) / CLASS).astype(np.int64)
-    share = 1 / np.maximum(sigma[use], np.float32(BEST)) ** 2
+    cell = place[use] * count + ((r - low) / LEVELS.class_height).astype(np.int64)
+    share = 1 / np.maximum(sigma[use], np.float32(LEVELS.best)) ** 2
     # A full square: fewer blocks at the corners would draw a slope to the middle of its block.
-    side = (SURROUNDINGS, SURROUNDINGS)
+    side = (LEVELS.surroundings, LEVELS.surroundings)
 
     def around(weights: FloatArray) -> Float32Array:
         sums = np.bincount(cell, weights, shape[0] * shape[1] * count).astype(np.float32)
@@ -121,6 +111,6 @@ def _count(
 
 def _spread(values: Float32Array, reach: float) -> Float32Array:
     """Return the classes of every block blurred by a Gaussian of a reach in metres."""
-    side = 2 * int(3 * reach / CLASS) + 1
-    bell = cv2.getGaussianKernel(side, reach / CLASS).astype(np.float32)
+    side = 2 * int(3 * reach / LEVELS.class_height) + 1
+    bell = cv2.getGaussianKernel(side, reach / LEVELS.class_height).astype(np.float32)
     return np.asarray(cv2.sepFilter2D(values, -1, bell, np.ones(1, np.float32)))

@@ -7,31 +7,14 @@ import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality
-from bifocal.relief_maps import evidence, forward_projection
+from bifocal.relief_maps import forward_projection
 from bifocal.relief_maps.flow import Measurement
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame, offsets
 from bifocal.relief_maps.snapping import surroundings
+from bifocal.relief_maps.tuning import EVIDENCE, MAP
 from photocore.arrays import BoolArray, Float32Array, FloatArray
 from photocore.shrinkage import shrink_noise
-
-#: Noise that is taken out of the map, of measured and of other relief, in parallax: what is smaller
-#: casts shadows that are not there (94 % of the small holes of a church). More of the measured
-#: takes detail (semireal church: 0.25 px 3.39 mm, 0.05 px 3.27 mm). [px]
-NOISE, NOISE_UNMEASURED = 0.05, 2.0
-#: Half windows on the map, where relief is final and casts shadows. [px]
-MAP_WINDOWS = (2, 4)
-#: Pixels this far inwards of what camera 2 cannot see are not called measured: raised parts come
-#: out too fat. Three pixels took 0.2 % of the measured ones and no more wrong ones than one does,
-#: since relief that falls away is told by itself (`evidence`; façade 62, loggia 301). [px]
-GUARD = 1
-#: Share of a step within 5 x 5 px that is added to sigma: which side a pixel is on is uncertain.
-SIGMA_OF_STEP = 0.25
-#: The outline of what is known is that of most pixels in a window of this side. [px]
-OUTLINE = 7
-#: A piece of map with nothing around it goes if it has fewer pixels and is less than this share of
-#: the largest piece; a hole of so few pixels is closed.
-SCRAP, SCRAP_SHARE, HOLE = 4000, 0.05, 25
 
 
 def filled_from_behind(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
@@ -53,11 +36,11 @@ def without_noise(frame: Frame, bands: MapBands, grid: Grid, matched: Measuremen
     per_pixel = _relief_per_pixel(frame, grid)
     noise = np.where(
         bands.quality == Quality.MEASURED,
-        np.float32(NOISE / 2 if matched.refined else NOISE),
-        np.float32(NOISE_UNMEASURED),
+        np.float32(MAP.noise / 2 if matched.refined else MAP.noise),
+        np.float32(MAP.noise_unmeasured),
     )
     quiet = np.minimum(bands.sigma, noise * per_pixel)
-    return bands._replace(r=shrink_noise(bands.r, quiet, MAP_WINDOWS))
+    return bands._replace(r=shrink_noise(bands.r, quiet, MAP.map_windows))
 
 
 def _cover(frame: Frame, grid: Grid) -> BoolArray:
@@ -83,18 +66,20 @@ def with_sigma_of_steps(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
     """Return a map whose sigma knows the doubt of which side of a step a pixel is on."""
     high, low = surroundings(bands.r)
     height = high - low
-    step = np.where(height > _relief_per_pixel(frame, grid), np.float32(SIGMA_OF_STEP) * height, 0)
+    step = np.where(
+        height > _relief_per_pixel(frame, grid), np.float32(MAP.sigma_of_step) * height, 0
+    )
     sigma = np.where(np.isfinite(bands.r), np.hypot(bands.sigma, step), np.float32(np.nan))
     return bands._replace(sigma=sigma)
 
 
 def guarded(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
     """Call nothing measured that camera 2 cannot see, or hardly (in place)."""
-    vague = ~(bands.sigma < evidence.SIGMA_SHARE * frame.distances[1])
+    vague = ~(bands.sigma < EVIDENCE.sigma_share * frame.distances[1])
     bands.quality[vague & (bands.quality == Quality.MEASURED)] = Quality.INTERPOLATED
     rays = frame.fields and frame.fields[1]
     hidden = forward_projection.hidden_on_map(bands.r, grid, frame.foot(2), rays)
-    near = _spread_inwards(hidden, grid.pixel_of(frame.foot(2).nadir), GUARD)
+    near = _spread_inwards(hidden, grid.pixel_of(frame.foot(2).nadir), MAP.guard)
     bands.quality[near & (bands.quality == Quality.MEASURED)] = Quality.HIDDEN
     return bands
 
@@ -115,16 +100,16 @@ def _spread_inwards(mask: BoolArray, middle: FloatArray, reach: int) -> BoolArra
 def tidied(bands: MapBands) -> MapBands:
     """Round the outline of what is known, drop pieces that float, close pinholes (in place)."""
     known = np.isfinite(bands.r)
-    wanted = cv2.medianBlur(known.astype(np.uint8), OUTLINE)
+    wanted = cv2.medianBlur(known.astype(np.uint8), MAP.outline)
     _, label, stats, _ = cv2.connectedComponentsWithStats(wanted, connectivity=8)
     area = stats[:, cv2.CC_STAT_AREA]
     if len(area) > 1:
-        scrap = area < min(SCRAP, SCRAP_SHARE * area[1:].max())
+        scrap = area < min(MAP.scrap, MAP.scrap_share * area[1:].max())
         scrap[0] = False
         if scrap.any():
             wanted[scrap[label]] = 0
     _, label, stats, _ = cv2.connectedComponentsWithStats(1 - wanted, connectivity=4)
-    pinhole = stats[:, cv2.CC_STAT_AREA] < HOLE
+    pinhole = stats[:, cv2.CC_STAT_AREA] < MAP.hole
     pinhole[0] = False
     if pinhole.any():
         wanted[pinhole[label]] = 1

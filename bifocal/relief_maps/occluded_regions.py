@@ -12,22 +12,15 @@ import cv2
 import numpy as np
 
 from bifocal.model.grid import Grid
-from bifocal.relief_maps import edges, forward_projection
+from bifocal.relief_maps import forward_projection
 from bifocal.relief_maps.flow import Measurement
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame
+from bifocal.relief_maps.tuning import EDGES, EVIDENCE, PROJECTION, REGIONS
 from photocore.arrays import BoolArray, Float32Array
 
-#: A pixel that flow there and back leaves farther away than this is lost, not imprecise. [px]
-LOST_LOOP = 5.0
-#: Side of the blocks that regions consist of, half of whose pixels are lost. [px]
-BLOCK = 8
 #: Regions of fewer blocks a side are two ramps, one from either rim, that meet.
-NARROWEST = 2 * (2 * edges.REACH) // BLOCK + 1
-#: A part that camera 2 cannot see counts from so many blocks a side on.
-FEWEST_BLOCKS = 3
-#: A block with fewer supported pixels says nothing.
-FEWEST = 6
+NARROWEST = 2 * (2 * EDGES.reach) // REGIONS.block + 1
 
 
 def put_behind(
@@ -53,8 +46,8 @@ def put_behind(
     between both. All lost regions moved would tear the colonettes of church_2 (1.0 to 1.1 % beyond
     10 cm, empty 5.1 to 5.3 %).
     """
-    least = forward_projection.covering(frame, forward_projection.COVERS)
-    lost = ((matched.loop > LOST_LOOP) & ~support & frame.seen1).astype(np.uint8)
+    least = forward_projection.covering(frame, PROJECTION.covers)
+    lost = ((matched.loop > EVIDENCE.lost_loop) & ~support & frame.seen1).astype(np.uint8)
     blocks = _block_means(lost) > 0.5
     square = np.ones((NARROWEST, NARROWEST), np.uint8)
     wide = cv2.morphologyEx(blocks.astype(np.uint8), cv2.MORPH_OPEN, square)
@@ -65,7 +58,7 @@ def put_behind(
     hidden = forward_projection.hidden_in_second(frame, behind, least, lost == 0)
     unseen = (_block_means(hidden.astype(np.uint8)) > 0.5).astype(np.uint8)
     near = cv2.morphologyEx(
-        unseen, cv2.MORPH_OPEN, np.ones((FEWEST_BLOCKS, FEWEST_BLOCKS), np.uint8)
+        unseen, cv2.MORPH_OPEN, np.ones((REGIONS.fewest_blocks, REGIONS.fewest_blocks), np.uint8)
     )
     reach = np.ones((2 * NARROWEST - 1, 2 * NARROWEST - 1), np.uint8)
     region = _enlarged(wide & cv2.dilate(near, reach), relief.shape) > 0
@@ -75,16 +68,21 @@ def put_behind(
 
 def _enlarged(blocks: np.ndarray, shape: tuple[int, int]) -> Any:
     """Return values of blocks at the pixels of an image."""
-    size = (blocks.shape[1] * BLOCK, blocks.shape[0] * BLOCK)
+    size = (blocks.shape[1] * REGIONS.block, blocks.shape[0] * REGIONS.block)
     return cv2.resize(blocks, size, interpolation=cv2.INTER_NEAREST)[: shape[0], : shape[1]]
 
 
 def _block_means(values: np.ndarray) -> Float32Array:
     """Return the mean of every block; those at the far edges are continued."""
     height, width = values.shape
-    rows, columns = -(-height // BLOCK), -(-width // BLOCK)
+    rows, columns = -(-height // REGIONS.block), -(-width // REGIONS.block)
     whole = cv2.copyMakeBorder(
-        values, 0, rows * BLOCK - height, 0, columns * BLOCK - width, cv2.BORDER_REPLICATE
+        values,
+        0,
+        rows * REGIONS.block - height,
+        0,
+        columns * REGIONS.block - width,
+        cv2.BORDER_REPLICATE,
     )
     means = cv2.resize(whole.astype(np.float32), (columns, rows), interpolation=cv2.INTER_AREA)
     return np.asarray(means)
@@ -97,14 +95,14 @@ def _surface_behind(frame: Frame, relief: Float32Array, support: BoolArray) -> F
     """
     share = _block_means(support.astype(np.float32))
     sums = _block_means(np.where(support, relief, np.float32(0)))
-    known = share * BLOCK**2 >= FEWEST
+    known = share * REGIONS.block**2 >= EVIDENCE.fewest
     values = (sums / np.maximum(share, np.float32(1e-3))).astype(np.float32)
     nothing = np.zeros(values.shape, np.float32)
     bands = MapBands(values, nothing, nothing.astype(np.uint8))
-    gsd, shift = frame.grid.gsd, (BLOCK - 1) / 2 * frame.grid.gsd
+    gsd, shift = frame.grid.gsd, (REGIONS.block - 1) / 2 * frame.grid.gsd
     rows, columns = values.shape
     grid = Grid(
-        x0=frame.grid.x0 + shift, y0=frame.grid.y0 - shift, gsd=gsd * BLOCK, width=columns,
+        x0=frame.grid.x0 + shift, y0=frame.grid.y0 - shift, gsd=gsd * REGIONS.block, width=columns,
         height=rows,
     )  # fmt: skip
     filled = forward_projection.fill_from_behind(bands, ~known, grid, frame.foot(1).nadir)

@@ -17,31 +17,11 @@ from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality
 from bifocal.relief_maps.forward_projection import MapBands, shown_by_first
 from bifocal.relief_maps.frame import Frame
+from bifocal.relief_maps.tuning import RIMS
 from photocore.arrays import BoolArray, ByteArray, Float32Array, IntArray
 
-#: How far inwards of the map's rim the true one is sought. [px]
-REACH = 16
-#: Steps that hide less from camera 1 are left alone. [px]
-LEAST_SHADOW = 1.0
-#: Relief within this share of the step from that of the rim is the raised part's; below the other
-#: share it is the wall's, and the raised part ends.
-SAME, ENDS = 0.35, 0.4
 #: The edge is averaged along the step, at places so far from its middle. [px]
 ALONG = np.arange(-12, 13, 3, dtype=np.float32)
-#: Directions that it may have, from that of the map's step. [degrees]
-TURNS = (-16.0, 0.0, 16.0)
-#: Weaker edges are texture. Façade 71, whose steps are wrong beyond 3 cm in 1.225 %, recall and
-#: precision of hidden pixels 0.605 and 0.827: with 2, 1.267 %, 0.665 and 0.916; 6, 1.249 %, 0.664
-#: and 0.911; 10, 1.240 %, 0.661 and 0.905; 15, 1.232 %, 0.654 and 0.894. [grey levels]
-LEAST_EDGE = 10.0
-#: A rim cannot stand farther in than what camera 2 cannot see is wide, but for so much. [px]
-DOUBT = 1.0
-#: A pixel is lowered from here on beyond the edge: 0.25 px take 0.05 px out of the waves of the
-#: mask and put 0.007 % more of the map and the orthophoto on the wrong surface (façade 71). [px]
-BEYOND = 0.5
-#: Standard deviation of the blur in which the direction of a step is read, and how many pixels of
-#: the map are one there; steps that run nearly along the radius cast no shadow. [px; -; cosine]
-BLUR, COARSER, ALONG_RADIUS = 1.25, 4, 0.2
 
 
 class _Rims(NamedTuple):
@@ -80,7 +60,7 @@ def drawn_in(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
     rims = _falling(frame, bands, grid)
     rims, raised = _measured_inwards(bands, rims)
     across, down = _directions(bands.r, rims)
-    clear = across * rims.u + down * rims.v > ALONG_RADIUS
+    clear = across * rims.u + down * rims.v > RIMS.along_radius
     if clear.any():
         rims, normal = rims.only(clear), (across[clear], down[clear])
         _lower(bands, rims, _edges(frame, grid, rims, raised[clear], normal), normal)
@@ -93,9 +73,9 @@ def _falling(frame: Frame, bands: MapBands, grid: Grid) -> _Rims:
     relief = np.where(np.isfinite(bands.r), bands.r, np.float32(1e3))
     fall = relief - cv2.erode(relief, np.ones((5, 5), np.uint8))
     farthest = np.hypot(*np.maximum(np.abs(nadir), np.abs(nadir - grid.shape[::-1])))
-    least = LEAST_SHADOW * (float(distance) - float(np.nanmax(bands.r))) / float(farthest)
+    least = RIMS.least_shadow * (float(distance) - float(np.nanmax(bands.r))) / float(farthest)
     high = (fall > np.float32(least)) & (bands.quality != Quality.MEASURED) & (relief < 1e3)
-    margin = REACH + 2
+    margin = RIMS.reach + 2
     row, column = np.nonzero(high[margin:-margin, margin:-margin])
     row, column = row + margin, column + margin
     x, y = (column - nadir[0]).astype(np.float32), (row - nadir[1]).astype(np.float32)
@@ -104,11 +84,11 @@ def _falling(frame: Frame, bands: MapBands, grid: Grid) -> _Rims:
     rims = _Rims(column, row, x / rho, y / rho, own, own, rho)
     behind = np.fmin.reduce([relief[rims.places(-step)] for step in (2.0, 3.0, 4.0)])
     fall = own - behind
-    falls = fall * rho > np.float32(LEAST_SHADOW) * (distance - own)
+    falls = fall * rho > np.float32(RIMS.least_shadow) * (distance - own)
     falls &= own - relief[rims.places(-1.0)] > np.float32(0.5) * fall
     # What camera 2 cannot see, by Eq. (1); 1e-6 keeps a camera that touches the relief finite.
     unseen = fall * rho / np.maximum(np.float32(frame.foot(2).distance) - behind, np.float32(1e-6))
-    reach = np.minimum(unseen + np.float32(DOUBT), np.float32(REACH))
+    reach = np.minimum(unseen + np.float32(RIMS.doubt), np.float32(RIMS.reach))
     return rims._replace(behind=behind, reach=reach).only(falls)
 
 
@@ -116,13 +96,13 @@ def _measured_inwards(bands: MapBands, rims: _Rims) -> tuple[_Rims, Float32Array
     """Return the rims with measured relief inwards of them that is theirs, and that relief."""
     raised, nearest = rims.own.copy(), np.zeros(len(rims.row), np.float32)
     left, part, fall = np.arange(len(rims.row)), rims, rims.own - rims.behind
-    for step in range(1, REACH + 1):
+    for step in range(1, RIMS.reach + 1):
         places = part.places(step)
         relief = bands.r[places]
         found = bands.quality[places] == Quality.MEASURED
-        found &= np.abs(relief - part.own) < SAME * fall
+        found &= np.abs(relief - part.own) < RIMS.same * fall
         raised[left[found]], nearest[left[found]] = relief[found], step
-        search = ~found & (relief > part.behind + ENDS * fall)
+        search = ~found & (relief > part.behind + RIMS.ends * fall)
         left, part, fall = left[search], part.only(search), fall[search]
     rims = rims._replace(reach=np.minimum(rims.reach, nearest))
     return rims.only(nearest > 0), raised[nearest > 0]
@@ -130,10 +110,10 @@ def _measured_inwards(bands: MapBands, rims: _Rims) -> tuple[_Rims, Float32Array
 
 def _directions(relief: Float32Array, rims: _Rims) -> tuple[Float32Array, Float32Array]:
     """Return the unit vectors along columns and rows in which relief falls most at the rims."""
-    small = np.nan_to_num(relief[::COARSER, ::COARSER])
-    small = cv2.GaussianBlur(small, (0, 0), BLUR)
-    row = (rims.row // COARSER).clip(0, small.shape[0] - 1)
-    column = (rims.column // COARSER).clip(0, small.shape[1] - 1)
+    small = np.nan_to_num(relief[:: RIMS.coarser, :: RIMS.coarser])
+    small = cv2.GaussianBlur(small, (0, 0), RIMS.blur)
+    row = (rims.row // RIMS.coarser).clip(0, small.shape[0] - 1)
+    column = (rims.column // RIMS.coarser).clip(0, small.shape[1] - 1)
     across = -cv2.Sobel(small, cv2.CV_32F, 1, 0, ksize=3)[row, column]
     down = -cv2.Sobel(small, cv2.CV_32F, 0, 1, ksize=3)[row, column]
     length = np.sqrt(across * across + down * down) + np.float32(1e-9)
@@ -168,7 +148,7 @@ def _edges(
     after = strength[np.minimum(chosen + 1, len(rim) - 1)]
     bend = np.maximum(2 * most - before - after, np.float32(1e-6))
     edge = inwards[chosen] + np.clip(0.5 * (after - before) / bend, -0.5, 0.5)
-    return np.where(most > LEAST_EDGE, edge, np.float32(0)).astype(np.float32)
+    return np.where(most > RIMS.least_edge, edge, np.float32(0)).astype(np.float32)
 
 
 def _seen(
@@ -193,7 +173,7 @@ def _strength(
     height, width = image.shape
     slopes = [cv2.Sobel(image, cv2.CV_16S, *axis, ksize=3).ravel() for axis in ((1, 0), (0, 1))]
     best = np.zeros(len(at[0]), np.float32)
-    for turn in np.radians(TURNS):
+    for turn in np.radians(RIMS.turns):
         cosine, sine = np.float32(np.cos(turn)), np.float32(np.sin(turn))
         u, v = normal[0] * cosine - normal[1] * sine, normal[0] * sine + normal[1] * cosine
         across, down = np.zeros((2, len(u)), np.int32)
@@ -216,11 +196,13 @@ def _lower(
     """Give unmeasured pixels between the edges and the map's rims the relief behind (in place)."""
     lowest = np.full(bands.r.shape, np.inf, np.float32)
     x, y = rims.column - edge * rims.u, rims.row - edge * rims.v
-    for step in range(2 * REACH):
+    for step in range(2 * RIMS.reach):
         some = np.flatnonzero(edge > 0.5 * step - 0.5)
         part = rims.only(some)
         row, column = part.places(0.5 * step)
-        beyond = (column - x[some]) * normal[0][some] + (row - y[some]) * normal[1][some] > BEYOND
+        beyond = (column - x[some]) * normal[0][some] + (row - y[some]) * normal[1][
+            some
+        ] > RIMS.beyond
         np.minimum.at(lowest, (row[beyond], column[beyond]), part.behind[beyond])
     lowered = np.isfinite(lowest) & (bands.quality != Quality.MEASURED)
     bands.r[lowered] = lowest[lowered]

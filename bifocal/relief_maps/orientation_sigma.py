@@ -6,11 +6,8 @@ import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
+from bifocal.relief_maps.tuning import SIGMA
 from photocore.arrays import Float32Array, FloatArray
-
-#: Cells of the map in either direction between which the covariance is interpolated. It is a
-#: polynomial of low degree: on a pair tilted by 20 degrees this is exact to 0.1 %.
-NODES = 24
 
 
 def orientation_sigma(pair: Pair, relief: Float32Array, grid: Grid) -> Float32Array:
@@ -36,8 +33,8 @@ def orientation_sigma(pair: Pair, relief: Float32Array, grid: Grid) -> Float32Ar
     import cv2
 
     height, width = relief.shape
-    columns = np.linspace(0, width - 1, min(NODES, width))
-    rows = np.linspace(0, height - 1, min(NODES, height))
+    columns = np.linspace(0, width - 1, min(SIGMA.nodes, width))
+    rows = np.linspace(0, height - 1, min(SIGMA.nodes, height))
     x, y = grid.columns_x[np.rint(columns).astype(int)], grid.rows_y[np.rint(rows).astype(int)]
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     known = relief[np.isfinite(relief)]

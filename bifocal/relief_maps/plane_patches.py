@@ -15,31 +15,9 @@ import numpy as np
 from bifocal.model.image import noise
 from bifocal.relief_maps import forward_projection
 from bifocal.relief_maps.frame import Frame, offsets, zoom_map
-from bifocal.relief_maps.segments import SPACING, Segments
+from bifocal.relief_maps.segments import Segments
+from bifocal.relief_maps.tuning import PATCHES, SEGMENTS
 from photocore.arrays import ByteArray, Float32Array, FloatArray, IntArray
-
-#: The photos are compared blurred by so much at half the resolution: without, reading
-#: between pixels takes out noise and looks like a better fit (façade 84: median 5.1 instead of
-#: 4.2 mm). [px]
-BLUR = 0.8
-#: Differences count by the noise and by this share of the gradient: no segment fits to less. [px]
-MISPLACED = 0.3
-#: Noise of the difference of both photos to that of one, at half the resolution, as variances.
-DIFFERENCE = 0.8
-#: A difference counts this much at most, and so much where a nearer surface hides the place in
-#: photo 2; half the square of a difference in noises.
-MOST, HIDDEN = 1.0, 0.3
-#: A jump across a pixel of border, without and with contrast, and the contrast [grey levels] that
-#: lets relief jump; jumps beyond the height count alike. [m]
-TIE, FREE, CONTRAST, JUMP = 2.0, 0.1, 2.5, 0.08
-#: What a slope costs against a jump, and the steepest one tried in fits. [m/px]
-SLOPE, STEEPEST = 0.05, 0.02
-#: Rounds, planes of neighbours tried in each, and the share of segments that may change at a time.
-ROUNDS, NEIGHBOURS, AT_A_TIME = 4, 4, 0.6
-#: Weight of no slope in fits to flow. [px²]
-RIDGE = 40.0
-#: A pixel is hidden in photo 2 by what is so much higher. [px of parallax, m]
-COVERS = (1.0, 0.02)
 
 #: Derivatives along columns and rows.
 _WAYS = ((1, 0), (0, 1))
@@ -70,7 +48,7 @@ def fitted(half: Frame, image: ByteArray, relief: Float32Array) -> Float32Array:
     borders, the truncated difference of the planes that meet there: iterated conditional modes
     (Besag 1986) over proposals of the neighbours, as in PatchMatch stereo (Bleyer et al. 2011).
     """
-    if min(image.shape) < 4 * SPACING:
+    if min(image.shape) < 4 * SEGMENTS.spacing:
         return relief
     problem = _Problem.of(half, Segments.of(image))
     height, width = half.grid.shape
@@ -113,22 +91,27 @@ class _Problem:
         row, column = (middle[i].astype(np.float32)[label] for i in (0, 1))
         x, y = offsets((height, width))
         first, second = (
-            cv2.GaussianBlur(image.astype(np.float32), (0, 0), BLUR)
+            cv2.GaussianBlur(image.astype(np.float32), (0, 0), PATCHES.blur)
             for image in (half.image1, half.image2)
         )
         gradient = [cv2.Sobel(first, cv2.CV_32F, *way, ksize=3, scale=0.125) for way in _WAYS]
-        slack = np.float32(MISPLACED**2) * (gradient[0] ** 2 + gradient[1] ** 2)
+        slack = np.float32(PATCHES.misplaced**2) * (gradient[0] ** 2 + gradient[1] ** 2)
         both = [noise(half.image1, half.seen1), noise(half.image2, half.seen2)]
-        variance = np.float32(DIFFERENCE * (both[0] ** 2 + both[1] ** 2) / 2)
+        variance = np.float32(PATCHES.difference * (both[0] ** 2 + both[1] ** 2) / 2)
         borders = segments.borders
-        tie = TIE * borders.length * (FREE + (1 - FREE) * np.exp(-borders.contrast / CONTRAST))
+        tie = (
+            PATCHES.tie
+            * borders.length
+            * (PATCHES.free + (1 - PATCHES.free) * np.exp(-borders.contrast / PATCHES.contrast))
+        )
         at = np.stack([borders.row, borders.column]) / 2 - 0.25
         x0, y0 = half.from_centre()
         parallax = np.float32(half.pair.base_factor) / np.maximum(np.sqrt(x0 * x0 + y0 * y0), 2)
+        covers = PATCHES.covers[0] * parallax + np.float32(PATCHES.covers[1])
         return cls(
             half=half, segments=segments, label=label, down=y - row, across=x - column, first=first,
             second=second, weight=1 / (2 * (variance + slack)), tie=tie,
-            covers=(COVERS[0] * parallax + np.float32(COVERS[1])).astype(np.float32),
+            covers=covers.astype(np.float32),
             top=np.zeros((height, width), np.float32),
             from_own=at - middle[:, borders.own], from_other=at - middle[:, borders.other],
         )  # fmt: skip
@@ -139,15 +122,15 @@ class _Problem:
         measured = self._fit(relief)
         planes = np.zeros_like(measured)
         planes[0] = self._median(relief)
-        for number in range(ROUNDS):
+        for number in range(PATCHES.rounds):
             self._hide(planes)
             misfit = self._misfit(planes)
             # Neighbours' planes, one neighbour's height, every other time the fit to flow.
-            for share in (*(1.0,) * NEIGHBOURS, 0.0, *(None,) * (1 - number % 2)):
+            for share in (*(1.0,) * PATCHES.neighbours, 0.0, *(None,) * (1 - number % 2)):
                 tried = measured if share is None else self._of_neighbours(planes, share, rng)
                 worse = self._misfit(tried)
                 better = worse + self._jumps(tried, planes) < misfit + self._jumps(planes, planes)
-                better &= rng.random(self.segments.number) < AT_A_TIME
+                better &= rng.random(self.segments.number) < PATCHES.at_a_time
                 planes = np.where(better, tried, planes)
                 misfit = np.where(better, worse, misfit)
         return planes
@@ -193,14 +176,14 @@ class _Problem:
         off -= self.first
         off *= off
         off *= self.weight
-        np.minimum(off, np.float32(MOST), out=off)
+        np.minimum(off, np.float32(PATCHES.most), out=off)
         above = cv2.remap(self.top, columns, rows, cv2.INTER_NEAREST, borderValue=1e3)
-        off[above > relief + self.covers] = HIDDEN
+        off[above > relief + self.covers] = PATCHES.hidden
         total = np.bincount(self.label.ravel(), off.ravel(), self.segments.number)
-        steep = (np.abs(planes[1]) + np.abs(planes[2])) * (SPACING / 2 / JUMP)
+        steep = (np.abs(planes[1]) + np.abs(planes[2])) * (SEGMENTS.spacing / 2 / PATCHES.jump)
         borders = self.segments.borders
         length = np.bincount(borders.own, borders.length, self.segments.number)
-        return np.asarray(total + SLOPE * TIE * np.minimum(steep, 1) * length)
+        return np.asarray(total + PATCHES.slope * PATCHES.tie * np.minimum(steep, 1) * length)
 
     def _at_borders(self, planes: FloatArray, others: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the relief of own planes and of the neighbours' at the borders. [m]"""
@@ -214,7 +197,7 @@ class _Problem:
     def _jumps(self, planes: FloatArray, others: FloatArray) -> FloatArray:
         """Return what the jumps from own planes to the neighbours' cost every segment."""
         own, other = self._at_borders(planes, others)
-        cost = self.tie * np.minimum(np.abs(own - other) / JUMP, 1)
+        cost = self.tie * np.minimum(np.abs(own - other) / PATCHES.jump, 1)
         return _added(self.segments.borders.own, cost, self.segments.number)
 
     def _median(self, relief: Float32Array) -> FloatArray:
@@ -234,12 +217,12 @@ class _Problem:
 
         y, x = self.down, self.across
         count, sum_y, sum_x = sums(np.ones_like(y)) + 1e-3, sums(y), sums(x)
-        squares = sums(y * y) + RIDGE, sums(x * y), sums(x * x) + RIDGE
+        squares = sums(y * y) + PATCHES.ridge, sums(x * y), sums(x * x) + PATCHES.ridge
         rows = [count, sum_y, sum_x, sum_y, *squares[:2], sum_x, *squares[1:]]
         matrix = np.stack(rows, axis=-1).reshape(-1, 3, 3)
         right = np.stack([sums(relief), sums(relief * y), sums(relief * x)], axis=-1)
         planes = np.linalg.solve(matrix, right[..., None])[..., 0].T
-        planes[1:] = np.clip(planes[1:], -STEEPEST, STEEPEST)
+        planes[1:] = np.clip(planes[1:], -PATCHES.steepest, PATCHES.steepest)
         return np.asarray(planes)
 
     def _of_neighbours(

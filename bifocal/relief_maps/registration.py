@@ -9,18 +9,10 @@ import numpy as np
 from bifocal.precision import false_relief_of_scale
 from bifocal.relief_maps.flow import Measurement
 from bifocal.relief_maps.frame import Frame
+from bifocal.relief_maps.tuning import REGISTRATION
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError
-
-#: Pixels that come back to themselves within this are taken for matched. [px]
-MATCHED = 1.0
-#: With fewer matched pixels the photos do not show the same thing.
-LEAST_MATCHED = 0.12
-#: Systematic misfit that is worth a remark, and misfit beyond which no relief is made. [px]
-REMARK_PX, REFUSE_PX = 0.35, 3.0
-#: The nadir zone has no direction across the radius. [share of the frame's half diagonal]
-NADIR_ZONE = 0.15
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +50,7 @@ class Registration:
         """What the user should be told."""
         told = []
         per_scale = self.false_relief_per_scale
-        if self.systematic > REMARK_PX:
+        if self.systematic > REGISTRATION.remark_px:
             (x, y), turn = self.shift, np.degrees(self.rotation)
             about = {"x": x, "y": y, "turn": turn}
             told.append(remark("relief.no_exact_fit", miss=self.across_median, **about))
@@ -85,18 +77,18 @@ def check_registration(frame: Frame, measured: Measurement) -> Registration:
     px, py = grid_x[part].astype(np.float64), grid_y[part].astype(np.float64)
     across, loop, relief = measured.across[part], measured.loop[part], measured.r[part]
     common = (frame.seen1 & frame.seen2)[part]
-    matched = common & (loop < MATCHED)
+    matched = common & (loop < REGISTRATION.matched)
     share = float(matched.sum() / max(common.sum(), 1))
-    if share < LEAST_MATCHED:
+    if share < REGISTRATION.least_matched:
         raise GeometryError(remark("relief.not_matched", share=share))
     radius = np.hypot(px, py)
-    zone = NADIR_ZONE * np.hypot(frame.grid.width, frame.grid.height) / 2
+    zone = REGISTRATION.nadir_zone * np.hypot(frame.grid.width, frame.grid.height) / 2
     use = matched & (radius > zone) & np.isfinite(relief)
     shift, rotation, systematic, median = _systematic(
         px[use], py[use], across[use].astype(np.float64)
     )
-    if median > REFUSE_PX:
-        about = {"miss": median, "most": REFUSE_PX, "x": shift[0], "y": shift[1]}
+    if median > REGISTRATION.refuse_px:
+        about = {"miss": median, "most": REGISTRATION.refuse_px, "x": shift[0], "y": shift[1]}
         raise GeometryError(remark("relief.not_registered", turn=np.degrees(rotation), **about))
     d1, d2 = frame.distances
     return Registration(

@@ -12,28 +12,15 @@ import numpy as np
 
 from bifocal import rays
 from bifocal.relief_maps.frame import Frame, offsets, shown_at
+from bifocal.relief_maps.tuning import SEED
 from photocore.arrays import BoolArray, ByteArray, Float32Array
-
-#: Width or height at which the sweep works, in `fast`, too; more brings little (fast, façades 71
-#: and 83: the same beyond 3 cm from 300 and 420 px), costs squarely. [px]
-COARSE_SIDE, FAST_SIDE = 420, 300
-#: Relief tried, as shares of d2: porches go deeper than cornices stand out.
-DEEPEST, HIGHEST = -0.36, 0.22
-#: Steps per coarse pixel of parallax at the far corner, and the most hypotheses.
-STEPS_PER_PIXEL, MOST_STEPS = 1.0, 128
-#: Grey values this weak are noise: they do not correlate. [grey levels]
-NOISE = 2.0
-#: Cost of a hypothesis that falls outside photo 2, between a good (0) and a bad match (1).
-OUTSIDE = 0.45
-#: Penalties of the smoothing: one step, any jump, and how edges of the image lower them.
-ONE_STEP, JUMP = 0.06, 0.55
 
 
 def coarse_relief(
     frame: Frame,
     relief_range: tuple[float, float] | None = None,
     *,
-    side: int = COARSE_SIDE,
+    side: int = SEED.coarse_side,
 ) -> tuple[Float32Array, int]:
     """Return a first relief of the pixels of photo 1 on a coarser grid, and its factor. [m]
 
@@ -67,7 +54,7 @@ def coarse_relief(
     centre = (frame.centre + 0.5) / factor - 0.5
     relief = hypotheses(frame, size, centre, relief_range)
     cost = _cost_volume(far, near, inside, frame, relief, centre)
-    cost[outside] = OUTSIDE
+    cost[outside] = SEED.outside
     best = _semi_global(cost, far)
     coarse = relief[best].astype(np.float32)
     return np.asarray(cv2.medianBlur(coarse, 5)), factor
@@ -75,7 +62,7 @@ def coarse_relief(
 
 def usual_range(d2: float) -> tuple[float, float]:
     """Return the least and the greatest relief tried where none are given. [m]"""
-    return DEEPEST * d2, HIGHEST * d2
+    return SEED.deepest * d2, SEED.highest * d2
 
 
 def hypotheses(
@@ -90,7 +77,7 @@ def hypotheses(
     zoom = rays.zoom_factor(np.array([low, high]), d1=d1, d2=d2)
     corners = np.array([[0, 0], [size[0], 0], [0, size[1]], size]) - centre
     reach = float(np.hypot(*corners.T).max())
-    count = int(np.clip((zoom[1] - zoom[0]) * reach * STEPS_PER_PIXEL, 8, MOST_STEPS))
+    count = int(np.clip((zoom[1] - zoom[0]) * reach * SEED.steps_per_pixel, 8, SEED.most_steps))
     return rays.relief_from_zoom(np.linspace(zoom[0], zoom[1], count), d1=d1, d2=d2)
 
 
@@ -121,8 +108,10 @@ def _cost_volume(
             mean, variance = moments[n]
             mean2, variance2 = _moments(moved, n)
             shared = cv2.blur(far * moved, (n, n)) - mean * mean2
-            score += 0.5 * shared / np.sqrt((variance + NOISE**2) * (variance2 + NOISE**2))
-        cost[..., i] = np.where(there > 0.99, np.clip(1 - score, 0, 1), OUTSIDE)
+            score += (
+                0.5 * shared / np.sqrt((variance + SEED.noise**2) * (variance2 + SEED.noise**2))
+            )
+        cost[..., i] = np.where(there > 0.99, np.clip(1 - score, 0, 1), SEED.outside)
     return cost
 
 
@@ -178,9 +167,9 @@ def _add_path(
             shifted[edge] = 0.0
         least = shifted.min(1, keepdims=True)
         step = np.abs(image[row] - neighbour)[:, None]
-        jump = least + JUMP / (1 + step / 12)
+        jump = least + SEED.jump / (1 + step / 12)
         best = np.minimum(shifted, jump)
-        np.minimum(best[:, 1:], shifted[:, :-1] + ONE_STEP, out=best[:, 1:])
-        np.minimum(best[:, :-1], shifted[:, 1:] + ONE_STEP, out=best[:, :-1])
+        np.minimum(best[:, 1:], shifted[:, :-1] + SEED.one_step, out=best[:, 1:])
+        np.minimum(best[:, :-1], shifted[:, 1:] + SEED.one_step, out=best[:, :-1])
         before = cost[row] + best - least
         total[row] += before

@@ -7,15 +7,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from bifocal.relief_maps.tuning import SEGMENTS
 from photocore.arrays import ByteArray, Float32Array, FloatArray, IntArray
-
-#: Spacing of the segments: with one exact relief a segment, 1.0 % of façade 84 would be off by more
-#: than 3 cm (16 px: 1.7 %, 24 px: 3.6 %). [px]
-SPACING = 12
-#: Edges are looked for in a photo smoothed between them. [px; grey levels, px]
-SMOOTHING, EDGE, REACH = 7, 8.0, 2.0
-#: How much less gradient a pixel must have to start a segment a pixel farther from its middle.
-OFF_MIDDLE = 0.02
 
 
 class Borders(NamedTuple):
@@ -66,8 +59,10 @@ class Segments(NamedTuple):
 
     @classmethod
     def of(cls, image: ByteArray) -> Segments:
-        """Cut a photo into segments some `SPACING` pixels wide; it must be larger than one."""
-        quiet = cv2.medianBlur(cv2.bilateralFilter(image, SMOOTHING, EDGE, REACH), 3)
+        """Cut a photo into segments some `spacing` pixels wide; it must be larger than one."""
+        quiet = cv2.medianBlur(
+            cv2.bilateralFilter(image, SEGMENTS.smoothing, SEGMENTS.edge, SEGMENTS.reach), 3
+        )
         starts = _starts(quiet)
         label = _flooded(quiet, starts)
         count = int(starts.max())
@@ -85,14 +80,14 @@ def _starts(quiet: ByteArray) -> IntArray:
     square = np.ones((3, 3), np.uint8)
     gradient = cv2.morphologyEx(quiet, cv2.MORPH_GRADIENT, square).astype(np.float32)
     gradient = cv2.blur(gradient, (3, 3))
-    rows, columns = (length // SPACING for length in quiet.shape)
-    cells = gradient[: rows * SPACING, : columns * SPACING]
-    cells = cells.reshape(rows, SPACING, columns, SPACING).transpose(0, 2, 1, 3)
-    away = np.arange(SPACING) - (SPACING - 1) / 2
-    penalty = OFF_MIDDLE * np.hypot(away[:, None], away[None, :])
+    rows, columns = (length // SEGMENTS.spacing for length in quiet.shape)
+    cells = gradient[: rows * SEGMENTS.spacing, : columns * SEGMENTS.spacing]
+    cells = cells.reshape(rows, SEGMENTS.spacing, columns, SEGMENTS.spacing).transpose(0, 2, 1, 3)
+    away = np.arange(SEGMENTS.spacing) - (SEGMENTS.spacing - 1) / 2
+    penalty = SEGMENTS.off_middle * np.hypot(away[:, None], away[None, :])
     best = (cells + penalty).reshape(rows, columns, -1).argmin(-1)
-    row = SPACING * np.arange(rows)[:, None] + best // SPACING
-    column = SPACING * np.arange(columns)[None, :] + best % SPACING
+    row = SEGMENTS.spacing * np.arange(rows)[:, None] + best // SEGMENTS.spacing
+    column = SEGMENTS.spacing * np.arange(columns)[None, :] + best % SEGMENTS.spacing
     starts = np.zeros(quiet.shape, np.float32)
     starts[row, column] = np.arange(1, rows * columns + 1).reshape(rows, columns)
     return np.asarray(cv2.dilate(starts, square).astype(np.int32))

@@ -8,23 +8,9 @@ import numpy as np
 from bifocal.relief_maps import edges, flow
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame
+from bifocal.relief_maps.tuning import SMOOTHING
 from photocore.arrays import BoolArray, Float32Array
 from photocore.shrinkage import WINDOWS, shrink_noise
-
-#: Limits of the error across the radius that counts as noise rather than as an edge, else what is
-#: typical of the frame: a fixed 0.25 px took small steps for noise (façade 83, 35/28: 2.44 to
-#: 2.15 % beyond 3 cm). [px]
-NOISE_CLIP = (0.05, 0.25)
-#: Share of the error across the radius that smoothing takes for noise where matching is precise:
-#: the rest stems from edges within its window, or is wider than the windows (façade 83, 35/28,
-#: beyond 3 cm: 1.93 to 1.89 %, loggia 94 1.19 to 1.15; 35/19 as before). Of imprecise matching it
-#: is all (façade 84, poor texture: 13.3 %, with 0.7 13.5).
-NOISE_SHARE = 0.85
-#: Half windows of relief that photos of twice the resolution refined: those of their pixels (façade
-#: 83, fast, beyond 3 cm: 4.1 to 3.8 %). [px]
-REFINED_WINDOWS = (4, 9)
-#: Height from which a step of the map is tidied. [m]
-LEAST_STEP = 0.02
 
 
 def without_noise(
@@ -35,11 +21,11 @@ def without_noise(
     if half is not None:
         return relief
     precise = edges.precision(typical)
-    share = precise * NOISE_SHARE + (1 - precise)
+    share = precise * SMOOTHING.noise_share + (1 - precise)
     quiet = np.float32(share) * np.minimum(
-        matched.sigma_px, np.float32(np.clip(typical, *NOISE_CLIP))
+        matched.sigma_px, np.float32(np.clip(typical, *SMOOTHING.noise_clip))
     )
-    windows = REFINED_WINDOWS if matched.refined else WINDOWS
+    windows = SMOOTHING.refined_windows if matched.refined else WINDOWS
     return shrink_noise(relief, flow.sigma_of_relief(frame, relief, quiet), windows)
 
 
@@ -59,5 +45,5 @@ def steps(relief: Float32Array, side: int = 3) -> BoolArray:
     unknown = ~np.isfinite(relief)
     filled = np.where(unknown, np.float32(0), relief)
     around = np.ones((side, side), dtype=np.uint8)
-    step = cv2.dilate(filled, around) - cv2.erode(filled, around) > LEAST_STEP
+    step = cv2.dilate(filled, around) - cv2.erode(filled, around) > SMOOTHING.least_step
     return np.asarray(step & (cv2.dilate(unknown.astype(np.uint8), around) == 0))

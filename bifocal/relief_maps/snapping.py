@@ -15,16 +15,8 @@ import numpy as np
 from bifocal.model.grid import Grid
 from bifocal.relief_maps.forward_projection import MapBands, shown_by_first
 from bifocal.relief_maps.frame import Frame, offsets, values_at
+from bifocal.relief_maps.tuning import SNAPPING
 from photocore.arrays import Float32Array, FloatArray, IntArray
-
-#: Steps of the map from this height on are drawn to edges, and steeper ones than 45 degrees. [m]
-STEP = 0.03
-#: How far a step is moved at most, how finely, and across how much of it grey values are compared.
-#: [px]
-REACH, FINE, ACROSS = 2.0, 0.5, 1.5
-#: Grey values that an edge must differ by; weaker ones are texture and shadow (façades 81 / 83: of
-#: the pixels moved at fainter edges one half was right before). [grey levels]
-CONTRAST = 20.0
 
 
 class _Steps(NamedTuple):
@@ -91,7 +83,7 @@ def _steps(
     Where a step falls outwards photo 1 sees behind it, and flow has found it as well as its edge
     (façades 81 and 83: of pixels moved there as many were right before as after).
     """
-    least = np.float32(max(STEP, 4 * gsd))
+    least = np.float32(max(SNAPPING.step, 4 * gsd))
     quiet = cv2.GaussianBlur(relief, (0, 0), 1.0)
     row, column = np.nonzero(bounds[0] - bounds[1] > least)
     slopes = [cv2.Sobel(quiet, cv2.CV_32F, *way, ksize=3, scale=0.125) for way in ((1, 0), (0, 1))]
@@ -101,7 +93,7 @@ def _steps(
     place = (quiet[row, column] - middle) / steepness
     x, y = (offset.ravel() for offset in offsets(relief.shape, nadir))
     with np.errstate(invalid="ignore"):
-        near = (across * x[column] + down * y[row] > 0) & (np.abs(place) < REACH)
+        near = (across * x[column] + down * y[row] > 0) & (np.abs(place) < SNAPPING.reach)
     across, down = across / steepness, down / steepness
     return _Steps(row[near], column[near], across[near], down[near], place[near])
 
@@ -115,8 +107,13 @@ def _contrast(frame: Frame, grid: Grid, steps: _Steps, upper: Float32Array) -> F
     start = places - nadir - steps.place[:, None] * ways
     ratio = np.float32(grid.gsd / frame.grid.gsd)
     first, beyond = (shown_by_first(frame, away * ratio, upper) for away in (start, start + ways))
-    half, count = ACROSS / 2, round(ACROSS / FINE)
-    shifts = np.arange(-REACH - half, REACH + half + FINE / 2, FINE, dtype=np.float32)
+    half, count = SNAPPING.across / 2, round(SNAPPING.across / SNAPPING.fine)
+    shifts = np.arange(
+        -SNAPPING.reach - half,
+        SNAPPING.reach + half + SNAPPING.fine / 2,
+        SNAPPING.fine,
+        dtype=np.float32,
+    )
     greys = np.stack(
         [values_at(image, first + t * (beyond - first), cv2.INTER_LINEAR) for t in shifts]
     )
@@ -125,12 +122,14 @@ def _contrast(frame: Frame, grid: Grid, steps: _Steps, upper: Float32Array) -> F
 
 def _strongest(contrast: Float32Array) -> tuple[Float32Array, FloatArray]:
     """Return the shift to the strongest edge [px], and where there is one within reach."""
-    shifts = np.arange(len(contrast), dtype=np.float32) * np.float32(FINE) - np.float32(REACH)
+    shifts = np.arange(len(contrast), dtype=np.float32) * np.float32(SNAPPING.fine) - np.float32(
+        SNAPPING.reach
+    )
     best = contrast.argmax(0)
     peak = np.take_along_axis(contrast, best[None], 0)[0]
-    clear = (peak > CONTRAST) & (best > 0) & (best < len(contrast) - 1)
+    clear = (peak > SNAPPING.contrast) & (best > 0) & (best < len(contrast) - 1)
     inner = np.clip(best, 1, len(contrast) - 2)
     before, at, after = (np.take_along_axis(contrast, inner[None] + i, 0)[0] for i in (-1, 0, 1))
     bend = np.minimum(before - 2 * at + after, np.float32(-1e-6))
     vertex = np.clip((before - after) / (2 * bend), -0.5, 0.5)
-    return shifts[inner] + np.float32(FINE) * vertex, clear
+    return shifts[inner] + np.float32(SNAPPING.fine) * vertex, clear

@@ -52,6 +52,7 @@ from bifocal.relief_maps import (
 )
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame
+from bifocal.relief_maps.tuning import PROJECTION
 from photocore.arrays import BoolArray, Float32Array
 
 
@@ -142,7 +143,7 @@ def _to_plane(
     side_face: BoolArray,
 ) -> MapBands:  # fmt: skip
     """Return the pixels of photo 1 on the map, but for ramps over strips that nobody sees."""
-    steep = forward_projection.stretch(frame, source.r) > forward_projection.STRETCH
+    steep = forward_projection.stretch(frame, source.r) > PROJECTION.stretch
     usable = flow.is_inside(frame, source.r) & ~(steep & ~behind & ~valid) & ~side_face
     return forward_projection.to_plane(frame, source, usable, grid)
 

@@ -6,8 +6,6 @@ iterating: see `bifocal.media`, whose notation this is.
 
 from __future__ import annotations
 
-import re
-
 from bifocal.model.pair import Pair
 from bifocal.rays import seen_distance
 from bifocal.survey.survey_media import SurveyMedia, thickness_names
@@ -70,19 +68,6 @@ def setup_formulas(media: int, *, is_pair: bool) -> dict[str, str]:
     return formulas
 
 
-def planned(formula: str, media: int, *, is_pair: bool) -> str:
-    """Return a formula of the sheet `Planning` as it is near the axis of cameras behind media.
-
-    Straight cameras that see alike there stand at ``reach``; the wall seems to lie at ``seen``.
-    """
-    if not media:
-        return formula
-    formula = formula.replace("*d_1/c_1", "*seen_1/c_1")
-    formula = re.sub(r"\(d_([12])-", r"(reach_\1-", formula)
-    formula = formula.replace("ABS(reach_1-d_2)", "ABS(reach_1-reach_2)")
-    return formula if is_pair else re.sub(r"\bm_1\b", "m_seen", formula)
-
-
 def setup_values(
     media: SurveyMedia | None, pair: Pair | None, *, as_given: bool, is_pair: bool
 ) -> dict[str, CellValue]:
@@ -127,45 +112,3 @@ def setup_values(
     if c1 is not None and c2 is not None and not is_pair:
         cells |= {"mm_1": c1 / first.distance, "k_12": (seen2 / c2) / (seen1 / c1)}
     return cells
-
-
-def _bend(number: int, square: str) -> str:
-    """Return k of medium ``number``: the tangent in it over that in the first."""
-    n = f"n_used_{number}^2"
-    return f"n_used_1/SQRT({n}+({n}-n_used_1^2)*{square})"
-
-
-def _bend_rate(number: int, square: str) -> str:
-    """Return d(tangent in medium ``number``) / d(tangent in the first)."""
-    n = f"n_used_{number}^2"
-    return f"n_used_1*{n}/({n}+({n}-n_used_1^2)*{square})^1.5"
-
-
-def bend(media: int, square: str, *, rate: bool = False) -> str:
-    """Return the formula of the tangent in the object's medium over that in the first.
-
-    Parameters
-    ----------
-    media : int
-        How many there are cells for.
-    square : str
-        Of the tangent in the first medium.
-    rate : bool
-        Of the changes of both instead.
-    """
-    return (_bend_rate if rate else _bend)(media, square)
-
-
-def arm(image: int, media: int, square: str, *, rate: bool = False) -> str:
-    """Return the formula of where a ray meets the plane, over its tangent in the first medium. [m]
-
-    Parameters
-    ----------
-    image : int
-        1 or 2.
-    media, square, rate
-        As in `bend`.
-    """
-    of = _bend_rate if rate else _bend
-    glass = "".join(f"+N(thick_{n})*{of(n, square)}" for n in range(2, media))
-    return f"N(z0_{image}){glass}+behind_{image}*{of(media, square)}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import combinations_with_replacement
 
 #: Turns about E, N, H and the logarithm of the scale, K.
 SMALL = "ENHK"
@@ -12,8 +13,11 @@ _MOVED = {
     "N": {"E": (-1, "H"), "H": (1, "E"), "K": (1, "N")},
     "H": {"E": (1, "N"), "N": (-1, "E"), "K": (1, "H")},
 }
-#: Whether the point of a row is a control point in use, which shares its error with the fit.
-IS_CONTROL = 'SUMPRODUCT((tblGeo[id]&""=[@id]&"")*tblGeo[w])>0'
+
+
+def entry(one: str, other: str) -> str:
+    """Return the name of an entry of a symmetric matrix, whichever way round."""
+    return min(one, other) + max(one, other)
 
 
 def ordered(one: str, other: str) -> str:
@@ -73,24 +77,28 @@ def _summed(named: Sequence[tuple[int, str]]) -> dict[str, int]:
     return sums
 
 
-def turned_covariance(one: str, other: str, cell: str) -> str:
+def turned_covariance(one: str, other: str) -> str:
     """Return the covariance of two of E, N, H, for scale 1, that one on the wall gives.
 
-    Parameters
-    ----------
-    one, other : str
-        ``E``, ``N`` or ``H``.
-    cell : str
-        Where its entries stand, with ``{}`` for their keys XX, XY ...
+    Its entries XX, XY ... are parts of a formula: ``{1}`` calls them by what ``{2}`` begins.
     """
     first, second = ("ENH".index(name) + 1 for name in (one, other))
     terms = []
-    for i, a in enumerate("XYZ", start=1):
-        for j, b in list(enumerate("XYZ", start=1))[i - 1 :]:
-            factor = f"g_{first}{i}*g_{second}{j}"
-            if i != j and one == other:
-                factor = f"2*{factor}"
-            elif i != j:
-                factor = f"({factor}+g_{first}{j}*g_{second}{i})"
-            terms.append(f"{factor}*{cell.format(a + b)}")
+    for (i, a), (j, b) in combinations_with_replacement(enumerate("XYZ", start=1), 2):
+        factor = f"g_{first}{i}*g_{second}{j}"
+        if i != j and one == other:
+            factor = f"2*{factor}"
+        elif i != j:
+            factor = f"({factor}+g_{first}{j}*g_{second}{i})"
+        terms.append(f"{factor}*{{{{1}} {{2}}{a}{b}}}")
     return "+".join(terms)
+
+
+def placed_parts() -> dict[str, str]:
+    """Return parts of formulas, each of a pair: ``turned_EN``, ``added_EN`` and the variances."""
+    cells = {axis: f"{{{{1}} n_{axis}}}" for axis in "ENH"}
+    pairs = ("EE", "NN", "HH", "EN")
+    return {
+        **{f"turned_{pair}": turned_covariance(pair[0], pair[1]) for pair in pairs},
+        **{f"added_{pair}": added_covariance(pair[0], pair[1], cells) for pair in pairs},
+    }

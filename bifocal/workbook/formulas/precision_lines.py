@@ -6,8 +6,7 @@ import numpy as np
 
 from bifocal.survey.reference import Georeference
 from bifocal.survey.weighted_similarity import TURNS
-from bifocal.workbook.formulas.georeference_columns import entry
-from bifocal.workbook.formulas.placed_formulas import SMALL, ordered
+from bifocal.workbook.formulas.placed_formulas import SMALL, entry, ordered
 from bifocal.workbook.formulas.space_block import SpaceBlock
 from photocore.workbook.changing.cells import CellValue
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bifocal.survey.space_similarity import SPACE_TURNS, SQUARINGS, SpaceSums
-from bifocal.workbook.formulas.georeference_columns import entry
+from bifocal.workbook.formulas.placed_formulas import entry
 from photocore.arrays import FloatArray
 from photocore.workbook.making.live_book import SheetBuilder
 from photocore.workbook.making.look import LABEL_FONT

@@ -14,8 +14,7 @@ from bifocal.workbook.content import (
     result_cells,
     setup_cells,
 )
-from bifocal.workbook.formulas.columns import LOG
-from bifocal.workbook.formulas.results_columns import results_columns
+from bifocal.workbook.formulas.columns import FORMULAS, results_columns
 from bifocal.workbook.making.cameras_sketch import cameras_sketch
 from bifocal.workbook.making.charts import charts
 from bifocal.workbook.making.georeference_sheet import georeference
@@ -238,7 +237,8 @@ def _title_block(sheet: SheetBuilder, content: SurveyContent, results: Cells) ->
 
 def _log(builder: BookBuilder, content: SurveyContent) -> None:
     sheet = builder.sheet("Log")
-    keys = [column.key for column in LOG]
+    columns = FORMULAS.columns("log")
+    keys = [column.key for column in columns]
     cells = {key: [row[i] for row in content.log] for i, key in enumerate(keys)}
-    sheet.table("tblLog", LOG, at=(HEAD, 1), rows=max(len(content.log), 1), cells=cells)
+    sheet.table("tblLog", columns, at=(HEAD, 1), rows=max(len(content.log), 1), cells=cells)
     sheet.finish(landscape=True, guarded=False)

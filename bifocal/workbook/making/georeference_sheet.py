@@ -13,7 +13,8 @@ from bifocal.survey.relief_table import ENTRIES
 from bifocal.survey.space_similarity import SpaceSums
 from bifocal.survey.weighted_similarity import TURNS, WeightedSums, determinant
 from bifocal.workbook.content import SurveyContent, control_cells
-from bifocal.workbook.formulas.georeference_columns import entry, georeference_columns
+from bifocal.workbook.formulas.columns import georeference_columns
+from bifocal.workbook.formulas.placed_formulas import entry
 from bifocal.workbook.formulas.precision_lines import precision_lines, precision_values
 from bifocal.workbook.formulas.space_block import STEP_FORM, SpaceBlock
 from photocore.arrays import FloatArray

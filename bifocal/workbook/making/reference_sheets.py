@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from openpyxl.styles import Alignment
 
@@ -11,14 +10,12 @@ from bifocal.model.flags import FlagLimits
 from bifocal.survey.tolerances import judge
 from bifocal.workbook.content import SurveyContent, check_cells, setup_cells
 from bifocal.workbook.formulas.columns import (
-    CHECK,
+    FORMULAS,
     FRAME_SHARES,
-    OVER_FRAME,
     PLANNED_RELIEF,
-    UNCERTAINTY,
-    verdict_columns,
+    PLANNING,
+    planning_facts,
 )
-from bifocal.workbook.formulas.media_formulas import larger, planned
 from bifocal.workbook.words import word
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
@@ -56,7 +53,7 @@ def check(builder: BookBuilder, content: SurveyContent) -> None:
         "B9", 'IF(COUNT(B6:D6)=0,"",MAX(B6:D6))', worst, form="0.0000", name="check_worst"
     )
     cells = check_cells(content)
-    sheet.table("tblCheck", CHECK, at=(CHECK_HEAD, 1), rows=rows, cells=cells)
+    sheet.table("tblCheck", FORMULAS.columns("check"), at=(CHECK_HEAD, 1), rows=rows, cells=cells)
     sheet.worksheet.column_dimensions["A"].width = 22
     for letter in ("L", "M"):
         sheet.worksheet.column_dimensions[letter].width = 1.5
@@ -82,7 +79,7 @@ def _verdict(sheet: SheetBuilder, content: SurveyContent, accuracy: float) -> No
     unknown = math.isnan(accuracy)
     sheet.table(
         "tblVerdict",
-        verdict_columns(holds, fails),
+        FORMULAS.columns("verdict", parts={"holds": holds, "fails": fails}),
         at=(CHECK_HEAD, VERDICT_LEFT),
         rows=len(verdicts),
         cells={
@@ -108,11 +105,8 @@ def planning(builder: BookBuilder, content: SurveyContent) -> None:
         float(cells.get(name) or math.nan) for name in (scale_name, "pitch", "sigma_s", "b_lever")
     )
 
-    def live(formula: str) -> str:
-        formula = planned(formula, content.media_cells, is_pair=content.is_pair)
-        frame = "(sensor_w^2+sensor_h^2)"
-        return formula if content.is_pair else formula.replace(frame, f"({frame}*{larger(1)}^2)")
-
+    facts = planning_facts(media=content.media_cells, is_pair=content.is_pair)
+    lines = FORMULAS.lines("planning", facts)
     sizes = content.sensor or (math.nan, math.nan)
     sheet.word("A6", "footprint")
     for row, (name, size) in enumerate(zip(_SENSOR, sizes, strict=True), start=4):
@@ -123,20 +117,15 @@ def planning(builder: BookBuilder, content: SurveyContent) -> None:
     d1_name = "seen_1" if content.media_cells else "d_1"
     c1, d1 = (float(cells.get(name) or math.nan) for name in ("c_1", d1_name))
     for letter, name, size in zip("BC", _SENSOR, sizes, strict=True):
-        body, covered = f'IF(COUNT({name},c_1,d_1)=3,{name}*d_1/c_1,"")', _known(size * d1 / c1)
-        body = live(body)
-        named = name.replace("sensor", "covered")
-        sheet.formula(f"{letter}6", body, covered, form="0.00", name=named)
+        named, covered = name.replace("sensor", "covered"), _known(size * d1 / c1)
+        sheet.formula(f"{letter}6", lines[named], covered, form="0.00", name=named)
     sheet.word("A7", "gsd")
-    body, pixel = live('IF(COUNT(pitch,m_1)=2,pitch*m_1,"")'), pitch * scale
-    if content.is_pair:
-        body = 'IF(COUNT(pixel_wall)=1,pixel_wall,"")'
-        pixel = float(cells.get("pixel_wall") or math.nan)
-    sheet.formula("B7", body, _known(pixel), form="0.00", name="gsd_mm")
+    pixel = float(cells.get("pixel_wall") or math.nan) if content.is_pair else pitch * scale
+    sheet.formula("B7", lines["gsd_mm"], _known(pixel), form="0.00", name="gsd_mm")
     diagonal = math.hypot(*sizes) * float(cells["enlargement_1"] or 1)  # of the print, if any
     sheet.word("A9", "uncertainty", HEAD_FONT)
     shown = _uncertainty(content, sigma, scale, diagonal)
-    columns = [replace(column, formula=live(column.formula)) for column in UNCERTAINTY]
+    columns = FORMULAS.columns("planning", facts, PLANNING)
     sheet.table("tblPlan", columns, at=(11, 1), rows=len(PLANNED_RELIEF), cells=shown)
     head = 11 + len(PLANNED_RELIEF) + 4
     sheet.word(f"A{head - 2}", "over_frame", HEAD_FONT)
@@ -147,7 +136,7 @@ def planning(builder: BookBuilder, content: SurveyContent) -> None:
         "sigma_r": [_known(math.sqrt(2) * sigma * base / radius) for radius in radii],
     }
     rows = len(FRAME_SHARES)
-    columns = [replace(column, formula=live(column.formula)) for column in OVER_FRAME]
+    columns = FORMULAS.columns("over_frame", facts)
     sheet.table("tblFrame", columns, at=(head, 1), rows=rows, cells=over_frame)
     sheet.worksheet.column_dimensions["A"].width = 36
     sheet.finish()

@@ -7,7 +7,13 @@ file's structured references. Only functions of Excel 2007 are used, no text for
 from __future__ import annotations
 
 import re
+import tomllib
+from collections import ChainMap
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from importlib.resources import files
+from typing import Any
 
 #: Columns of names and words, not of numbers.
 TEXT_KEYS = ("id", "code", "note", "rule")
@@ -71,6 +77,118 @@ def row_formula(table: str, text: str) -> str:
     return "=" + re.sub(r"\[@(\w+)\]", rf"{table}[[#This Row],[\1]]", text)
 
 
-def formula_column(key: str, formula: str, places: int | None = None, **more: object) -> LiveColumn:
-    """Return a column that is calculated."""
-    return LiveColumn(key=key, kind="formula", formula=formula, places=places, **more)  # type: ignore[arg-type]
+class FormulaBook:
+    """The tables and formulas of one kind of workbook, read from a package's `formulas.toml`.
+
+    A row of ``columns`` is a `LiveColumn`. Where it says ``each``, it stands for one column a word:
+    ``{0}`` is the word, ``{1}``, ``{2}`` its letters, or what stands between its colons. Any value
+    may be a table from facts to what holds where they do (``"xy !media"``; an empty key: always);
+    a row with ``when`` is there only where its facts hold, one with ``rows`` is another list. In
+    formulas ``{name one two}`` is a part of ``[parts]``, of the table's or of all, with what it is
+    given as ``{1}``, ``{2}``.
+
+    Parameters
+    ----------
+    package : str
+        Where the file lies.
+    """
+
+    def __init__(self, package: str) -> None:
+        self.package = package
+
+    @cached_property
+    def content(self) -> dict[str, dict[str, Any]]:
+        """The file."""
+        text = files(self.package).joinpath("formulas.toml").read_text(encoding="utf-8")
+        return tomllib.loads(text)
+
+    def columns(
+        self, table: str, facts: Collection[str] = (), parts: Mapping[str, str] | None = None
+    ) -> tuple[LiveColumn, ...]:
+        """Return the columns of a table.
+
+        Parameters
+        ----------
+        table : str
+            Its section.
+        facts : collection of str
+            What holds.
+        parts : mapping, optional
+            Further parts of formulas.
+        """
+        formulas = self._formulas(table, facts, parts)
+        return tuple(formulas.expanded(self.content[table]["columns"], ()))
+
+    def lines(
+        self, table: str, facts: Collection[str] = (), parts: Mapping[str, str] | None = None
+    ) -> dict[str, str]:
+        """Return the single formulas of a section by their names, parameters as in `columns`."""
+        formulas = self._formulas(table, facts, parts)
+        lines = self.content[table]["lines"].items()
+        return {name: formulas.filled(chosen(text, facts)) for name, text in lines}
+
+    def _formulas(
+        self, table: str, facts: Collection[str], parts: Mapping[str, str] | None
+    ) -> _Formulas:
+        known = (self.content, self.content[table])
+        every = ChainMap(dict(parts or {}), *(part.get("parts", {}) for part in known[::-1]))
+        rows = {name: row for part in known for name, row in part.get("rows", {}).items()}
+        return _Formulas(facts, {name: chosen(text, facts) for name, text in every.items()}, rows)
+
+
+@dataclass(frozen=True, slots=True)
+class _Formulas:
+    """What rows are filled with: the facts that hold, the parts of formulas, lists of rows."""
+
+    facts: Collection[str]
+    parts: Mapping[str, str]
+    rows: Mapping[str, Sequence[Mapping[str, Any]]]
+
+    def expanded(
+        self, rows: Iterable[Mapping[str, Any]], given: Sequence[str]
+    ) -> Iterator[LiveColumn]:
+        """Yield the columns of some rows."""
+        for row in rows:
+            if not holds(row.get("when", ""), self.facts):
+                continue
+            words = row["each"].split() if "each" in row else [None]
+            for word in words:
+                own = given if word is None else (word, *(word.split(":") if ":" in word else word))
+                if "rows" in row:
+                    yield from self.expanded(self.rows[row["rows"]], own)
+                else:
+                    yield self._column(row, own)
+
+    def _column(self, row: Mapping[str, Any], given: Sequence[str]) -> LiveColumn:
+        values = {n: chosen(v, self.facts) for n, v in row.items() if n not in ("when", "each")}
+        values = {name: value for name, value in values.items() if value is not None}
+        for name in ("key", "formula"):
+            values[name] = self.filled(values.get(name, "{0}" if name == "key" else ""), given)
+        if "limits" in values:
+            values["limits"] = tuple(values["limits"])
+        return LiveColumn(**{"kind": "formula" if values["formula"] else "input", **values})
+
+    def filled(self, text: str, given: Sequence[str] = ()) -> str:
+        """Return a formula with what is given, and its parts, in their places."""
+        text = _GIVEN.sub(lambda m: given[int(m[1])] if int(m[1]) < len(given) else "", text)
+        while match := _PART.search(text):
+            name, *own = match[1].split()
+            part = self.filled(self.parts[name], (name, *own))
+            text = text[: match.start()] + part + text[match.end() :]
+        return text
+
+
+#: A place for what a part is given, and a part without others inside.
+_GIVEN, _PART = re.compile(r"\{(\d)\}"), re.compile(r"\{([^{}]+)\}")
+
+
+def chosen(value: Any, facts: Collection[str]) -> Any:
+    """Return a value, of a table of values the first whose facts hold; None if none do."""
+    if not isinstance(value, dict):
+        return value
+    return next((text for wanted, text in value.items() if holds(wanted, facts)), None)
+
+
+def holds(wanted: str, facts: Collection[str]) -> bool:
+    """Tell whether facts hold, and those after "!" do not."""
+    return all((word.lstrip("!") in facts) != word.startswith("!") for word in wanted.split())

@@ -205,6 +205,23 @@ def test_one_wrong_lens_of_two_is_told_by_what_each_would_have_to_be() -> None:
     assert near.endswith("If the other photo's is right, it is -25 % off.")
 
 
+def test_a_distance_is_contradicted_beyond_three_standard_deviations_only() -> None:
+    pair = orient_pair(photos(), control=control(), site=SiteMeasures())
+    far, near = (float(camera.centre[2]) for camera in pair.adjusted.cameras)
+
+    def said(distance1: float | None, distance2: float | None) -> list[str]:
+        return model_remarks(
+            pair, SiteMeasures(distance1=distance1, distance2=distance2, sigma=0.02)
+        )
+
+    assert not said(far - 0.059, near + 0.059)
+    (only,) = said(None, near - 0.1)
+    assert "The near camera's distance came out +0.100 m" in only
+    assert "5 of its standard deviations" in only
+    (only,) = said(far + 0.1, None)
+    assert "The far camera's distance came out -0.100 m" in only
+
+
 def test_a_bend_that_is_not_certain_refuses_nothing() -> None:
     """The refusal was empty then."""
     seen = PairObservations(interiors=(photos()[0].interior, photos()[1].interior))

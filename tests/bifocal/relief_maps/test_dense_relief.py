@@ -17,6 +17,7 @@ from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import common_bounds, make_frame, working_grid
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
 from bifocal.relief_maps.relief_files import hatched, shaded
+from bifocal.relief_maps.tuning import PROJECTION
 from multimedia import GeometryError, InputError
 from photocore.shrinkage import shrink_noise
 from tests.scenes import RICH, Rendering, Scene, SetupErrors, bifocal_cameras, facade, render
@@ -248,10 +249,10 @@ def test_relief_that_falls_away_outwards_is_a_ramp_and_that_which_rises_is_none(
     # 1 + 2 k x / d1 pixels of the plane, beyond the limit of 1.3 where x > 0.15 d1 / k.
     frame = small_frame()
     x, y = frame.from_centre()
-    limit = forward_projection.STRETCH - 1
+    limit = PROJECTION.stretch - 1
     for axis in (x + 0 * y, y + 0 * x):
         covered = forward_projection.stretch(frame, (-0.01 * axis).astype(np.float32))
-        falling = covered > forward_projection.STRETCH
+        falling = covered > PROJECTION.stretch
         wanted = axis > limit / 2 * 17.5 / 0.01
         clear = np.abs(axis - limit / 2 * 17.5 / 0.01) > 2
         clear[0] = clear[-1] = clear[:, 0] = clear[:, -1] = False

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.relief_maps.flow_refinement import FARTHEST, STRIP, refined
+from bifocal.relief_maps.flow_refinement import STRIP, refined
+from bifocal.relief_maps.tuning import REFINEMENT
 
 #: Displacement of the pixels of the first photo in the second. [px of the photo]
 SHIFT = (3.3, -1.6)
@@ -48,4 +49,4 @@ def test_no_pixel_moves_farther_than_the_photos_are_linear():
     first, second = (rng.integers(0, 255, (96, 96)).astype(np.uint8) for _ in range(2))
     moved = refined(np.zeros((48, 48, 2), np.float32), first, second)
     assert np.isfinite(moved).all()
-    assert np.abs(moved).max() <= FARTHEST / 2
+    assert np.abs(moved).max() <= REFINEMENT.farthest / 2

@@ -10,7 +10,8 @@ import numpy as np
 from bifocal import Grid, Pair, Photo
 from bifocal.relief_maps import coarse_level, plane_patches
 from bifocal.relief_maps.frame import Frame
-from bifocal.relief_maps.segments import SPACING, Segments
+from bifocal.relief_maps.segments import Segments
+from bifocal.relief_maps.tuning import SEGMENTS
 
 SIDE, PANEL = 320, 0.3
 #: Rows and columns of a panel before the wall, in photo 1.
@@ -54,7 +55,7 @@ def _plaster() -> tuple[Frame, np.ndarray]:
 def test_segments_end_at_the_edges_of_the_photo():
     frame, truth = _plaster()
     segments = Segments.of(frame.image1)
-    assert segments.number == (SIDE // SPACING) ** 2
+    assert segments.number == (SIDE // SEGMENTS.spacing) ** 2
     share = np.bincount(segments.label.ravel(), (truth > 0).ravel()) / np.bincount(
         segments.label.ravel()
     )
@@ -73,7 +74,7 @@ def test_segments_end_at_the_edges_of_the_photo():
     apart = np.hypot(
         borders.row - segments.row[borders.own], borders.column - segments.column[borders.own]
     )
-    assert apart.max() < 3 * SPACING
+    assert apart.max() < 3 * SEGMENTS.spacing
 
 
 def test_a_panel_on_plain_plaster_ends_at_its_edge_whatever_flow_made_of_it():
@@ -94,6 +95,6 @@ def test_a_panel_on_plain_plaster_ends_at_its_edge_whatever_flow_made_of_it():
 
 def test_a_photo_of_few_segments_is_left_as_it_was_measured():
     frame, truth = _plaster()
-    small = frame.image1[: 3 * SPACING]
-    relief = truth[: 3 * SPACING]
+    small = frame.image1[: 3 * SEGMENTS.spacing]
+    relief = truth[: 3 * SEGMENTS.spacing]
     assert plane_patches.fitted(coarse_level.halved(frame), small, relief) is relief

@@ -23,7 +23,8 @@ from bifocal.relief_maps import (
 )
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame, radial_stretch
-from bifocal.relief_maps.map_completion import MAP_WINDOWS, _spread_inwards, tidied
+from bifocal.relief_maps.map_completion import _spread_inwards, tidied
+from bifocal.relief_maps.tuning import COARSE, EDGES, LEVELS, MAP, PROJECTION
 from photocore.shrinkage import shrink_noise
 
 METRES = [[0.01, 0, -0.995], [0, -0.01, 0.995], [0, 0, 1]]
@@ -75,7 +76,7 @@ def test_smoothing_survives_any_sigma():
 def test_smoothing_leaves_the_unknown_unknown_and_gives_it_no_say():
     relief = np.full((64, 64), 0.5, np.float32)
     relief[:, 40:] = np.nan
-    smooth = shrink_noise(relief, np.full_like(relief, 0.05), MAP_WINDOWS)
+    smooth = shrink_noise(relief, np.full_like(relief, 0.05), MAP.map_windows)
     np.testing.assert_array_equal(np.isnan(smooth), np.isnan(relief))
     np.testing.assert_allclose(smooth[:, :40], 0.5, atol=1e-5)
 
@@ -89,7 +90,7 @@ def test_imprecise_relief_is_drawn_to_the_wall_and_to_the_pilaster_before_it():
     drawn = levels.drawn_to_levels(relief, sigma, np.ones(truth.shape, bool))
     before, after = (np.abs(r - truth).mean() for r in (relief, drawn))
     assert after < 0.7 * before
-    assert np.abs(drawn - relief).max() <= levels.SHARE * 0.01 + 1e-6
+    assert np.abs(drawn - relief).max() <= LEVELS.share * 0.01 + 1e-6
 
 
 def test_precise_relief_and_slopes_are_not_drawn_anywhere():
@@ -234,8 +235,8 @@ def test_a_ramp_counts_by_its_parallax_a_pixel():
     relief = np.broadcast_to(0.02 * np.arange(40.0), (40, 40)).astype(np.float32)
     # 0.02 m a pixel are 0.15 px of parallax at 7.5 px/m: half of what makes a ramp.
     steep = edges._ramp(relief, np.float32(7.5))[20, 20]
-    np.testing.assert_allclose(steep, 0.5 * edges.RAMP, rtol=1e-4)
-    np.testing.assert_allclose(edges._ramp(relief, np.float32(75))[20, 20], edges.RAMP, rtol=1e-6)
+    np.testing.assert_allclose(steep, 0.5 * EDGES.ramp, rtol=1e-4)
+    np.testing.assert_allclose(edges._ramp(relief, np.float32(75))[20, 20], EDGES.ramp, rtol=1e-6)
     assert not edges._ramp(np.full((40, 40), 0.3, np.float32), np.float32(75)).any()
 
 
@@ -312,7 +313,7 @@ def test_plaster_that_is_lost_in_noise_is_known_better_at_half_the_resolution():
     assert known.mean() > 0.1
     before, after = (np.abs(found.r[known] - 0.3).mean() for found in (fine, both))
     assert after < 0.85 * before
-    valid = ~known & (np.abs(both.r - fine.r) < coarse_level.GROSS)
+    valid = ~known & (np.abs(both.r - fine.r) < COARSE.gross)
     np.testing.assert_array_equal(both.r[valid], fine.r[valid])
 
 
@@ -340,7 +341,7 @@ def test_on_plain_walls_filled_relief_leans_on_what_is_interpolated():
 
     # Hidden is what lies beyond 140 px; OpenCV's distances run up to 5 % short.
     assert lost(plain=False) == 60
-    assert abs(lost(plain=True) - (60 - forward_projection.FRINGE_HIDDEN)) < 3
+    assert abs(lost(plain=True) - (60 - PROJECTION.fringe_hidden)) < 3
 
 
 def fat_slab() -> tuple[Frame, MapBands]:

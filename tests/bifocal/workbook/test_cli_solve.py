@@ -169,6 +169,13 @@ def test_every_column_of_the_result_table_is_headed_by_its_unit(tmp_path):
     assert float(first["e1 [mm]"]) == pytest.approx(35 * 2 / 16.5 / 17.5, abs=1e-4)
 
 
+def test_the_near_distance_follows_from_the_far_one_and_the_step(tmp_path):
+    setup = {"c_1": 35, "c_2": 19, "d_1": 17.5, "delta_d": 8}
+    answer, _ = solved(fill(tmp_path / "s.xlsx", setup=setup))
+    found = by_id(answer)["P1"]
+    assert [found["X"], found["r"]] == pytest.approx([2, 1], abs=1e-9)
+
+
 def test_swapped_images_are_said_and_solved(tmp_path):
     swapped = [(name, x2, y2, x1, y1) for name, x1, y1, x2, y2 in rows(POINTS)]
     setup = {"c_1": 19, "c_2": 35, "d_1": 9.5, "d_2": 17.5}

@@ -25,9 +25,12 @@ from bifocal import (
 from bifocal.survey.check_points import check_points
 from bifocal.survey.point_survey import solve_points
 from bifocal.workbook.content import SurveyContent
-from bifocal.workbook.formulas.columns import IDEAL_POINTS, pair_points
-from bifocal.workbook.formulas.georeference_columns import georeference_columns
-from bifocal.workbook.formulas.results_columns import results_columns
+from bifocal.workbook.formulas.columns import (
+    georeference_columns,
+    ideal_points,
+    pair_points,
+    results_columns,
+)
 from bifocal.workbook.making.book import write_book
 from bifocal.workbook.template_workflow import write_template
 from multimedia import InputError
@@ -102,7 +105,7 @@ def test_only_functions_of_excel_2007_are_used():
     )
     allowed = set(text.split())
     used = set()
-    columns = [*IDEAL_POINTS, *pair_points(undistorted=True)]
+    columns = [*ideal_points(), *pair_points(undistorted=True)]
     for is_pair in (False, True):
         columns += [*results_columns(is_pair=is_pair), *georeference_columns(is_pair=is_pair)]
     for column in columns:

@@ -335,3 +335,11 @@ def test_numbers_and_nesting_beyond_reason_are_refused(tmp_path, old, new, messa
     with pytest.raises(InputError, match=message) as told:
         read_project(path)
     assert str(told.value).startswith(f"{path}: ")
+
+
+@pytest.mark.parametrize("sigma", [np.ones(2), np.zeros((1, 2)), [[0.001, -0.001]]])
+def test_a_precision_of_image_points_has_their_shape_and_is_positive(sigma) -> None:
+    row = {"cameras": ("A",), "ids": ("1",), "image": [[0.0, 0.0]]}
+    assert ImagePoints(**row, sigma=[[np.nan, 0.001]]).sigma.shape == (1, 2)
+    with pytest.raises(InputError, match=r"expected shape \(1, 2\) and positive"):
+        ImagePoints(**row, sigma=sigma)

@@ -182,6 +182,17 @@ def test_a_camera_on_the_glass_is_calculated_too() -> None:
     )
 
 
+def test_cells_let_in_every_number_that_can_be_meant(tmp_path: Path) -> None:
+    write_template(tmp_path / "form.xlsx", rows=3, steps=6, overwrite=False)
+    sheet = openpyxl.load_workbook(tmp_path / "form.xlsx")["Multimedia"]
+    rules = {rule.promptTitle: rule for rule in sheet.data_validations.dataValidation}
+    limits = {
+        name: (float(r.formula1), float(r.formula2)) for name, r in rules.items() if r.formula2
+    }
+    assert limits["z_0"] == limits["t_1"] == (0, 1e9)
+    assert limits["X_0"] == limits["Y_0"] == (-1e9, 1e9)
+
+
 def test_names_and_headings_are_what_spreadsheets_accept(tmp_path: Path) -> None:
     path = tmp_path / "tank.xlsx"
     write_shift_workbook(path, ORDERS["air glass water"], rows=3)
