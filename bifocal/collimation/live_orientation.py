@@ -9,7 +9,6 @@ import numpy as np
 from bifocal.collimation.records import PickedControl, SurveyState
 from bifocal.collimation.stated_media import lacking, media_of
 from bifocal.collimation.wording import say, without_options
-from bifocal.files.images import ImageInfo
 from bifocal.model.interior_orientation import Interior
 from bifocal.model.orientation_precision import rates_of
 from bifocal.model.pair import Pair
@@ -23,6 +22,7 @@ from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
 from bifocal.orientation.tuning import CONTROL
 from photocore.arrays import FloatArray
 from photocore.errors import PhotogrammetryError
+from photocore.images import ImageInfo
 
 #: Points that stand out or lie back by this part of the near distance are thought of.
 DEPTH = 0.05
