@@ -6,6 +6,7 @@ A row there is at once an option of the command line, a key of files and an argu
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Callable
 from functools import cache, partial
@@ -156,13 +157,23 @@ LIMITS = (
 
 
 @cache
-def _tables(package: str) -> dict[str, dict[str, Any]]:
-    """Return the tables of a package's ``options.toml``; all packages share those of this one."""
+def _tables(package: str) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return what commands share, that of `photocore` too, and each command's text, unparsed."""
     path = Path(str(import_module(package).__file__)).with_name("options.toml")
-    tables = tomllib.loads(path.read_text("utf-8"))
+    common, *commands = re.split(r"^(?=\[\w+\]$)", path.read_text("utf-8"), flags=re.MULTILINE)
+    tables = tomllib.loads(common)
     if package != "photocore":
-        tables["shared"] = _tables("photocore")["shared"] | tables.get("shared", {})
-    return tables
+        tables["shared"] = _tables("photocore")[0]["shared"] | tables["shared"]
+    return tables, {text[1 : text.index("]")]: text for text in commands}
+
+
+@cache
+def _table(package: str, name: str) -> dict[str, Any]:
+    """Return the table of a command, or one that several share."""
+    tables, commands = _tables(package)
+    if name in commands:
+        tables = tomllib.loads(commands[name])
+    return dict(tables[name])
 
 
 @cache
@@ -178,8 +189,8 @@ def options_of(package: str, group: str) -> dict[str, Option]:
         their defaults). One without kind takes after the row that it is ``like``, or after the
         row of its name in ``shared``.
     """
-    tables, options = _tables(package), dict[str, Option]()
-    for name, row in tables[group].items():
+    options: dict[str, Option] = {}
+    for name, row in _table(package, group).items():
         if name == "epilog":
             continue
         if "all" in row:
@@ -188,7 +199,7 @@ def options_of(package: str, group: str) -> dict[str, Option]:
             continue
         if not {"kind", "choices"} & row.keys():
             where, _, like = row.get("like", name).rpartition(".")
-            row = tables[where or "shared"][like] | row
+            row = _table(package, where or "shared")[like] | row
         options.setdefault(name, _option(name, row))
     return options
 
@@ -214,5 +225,4 @@ def declared(function: Callable[..., Any]) -> click.Command:
     """Return the command of a module ``PACKAGE.cli.NAME``, with the options of its table NAME."""
     package, _, name = function.__module__.split(".")
     parameters = [option.parameter() for option in options_of(package, name).values()]
-    epilog = _tables(package)[name]["epilog"]
-    return click.command(epilog=epilog, params=parameters)(function)
+    return click.command(epilog=_table(package, name)["epilog"], params=parameters)(function)

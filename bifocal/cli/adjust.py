@@ -11,9 +11,8 @@ from photocore.options import declared
 
 @declared
 def command(
-    pairs: tuple[Path, ...], out: Path, control: tuple[Path, ...], check: tuple[Path, ...],
-    unit: str | None, overwrite: bool, as_json: bool, **sigmas: Any,
-) -> None:  # fmt: skip
+    pairs: tuple[Path, ...], out: Path, overwrite: bool, as_json: bool, **options: Any
+) -> None:
     """Adjust all pairs of one facade in one frame.
 
     Points that the photos share are found by themselves; with the control points of all pairs
@@ -23,7 +22,8 @@ def command(
     """
     from bifocal.networks.joint_workflow import JointTask, adjust_pairs
 
-    task = JointTask(control=_tables(control), check=_tables(check), unit=unit or "", **sigmas)
+    tables = {role: _tables(options[role]) for role in ("control", "check")}
+    task = JointTask(**{**options, **tables, "unit": options["unit"] or ""})
     with progress_bar("adjust", quiet=as_json) as progress:
         result = adjust_pairs(pairs, out, task, overwrite=overwrite, progress=progress)
     print_result(result.to_dict(), result.lines(), as_json=as_json)

@@ -18,9 +18,8 @@ if TYPE_CHECKING:
 
 @declared
 def command(
-    far: Path, near: Path | None, out: Path, picture: Path | None, no_picture: bool,
-    overwrite: bool, as_json: bool, **given: Any,
-) -> None:  # fmt: skip
+    far: Path, near: Path | None, out: Path, overwrite: bool, as_json: bool, **given: Any
+) -> None:
     """Set up a pair: where both cameras stood, how they looked, at which scale.
 
     FAR is the photo taken from afar with the long lens, NEAR the other one. Four ways: control
@@ -39,18 +38,17 @@ def command(
         raise click.UsageError("Give two photos, FAR and NEAR, or a survey workbook as FAR.")
     from bifocal.orientation.align_workflow import AlignOptions, align_photos, alignment_as_dict
 
-    if picture is None and not no_picture:
+    picture = given.pop("picture")
+    if given.pop("no_picture"):
+        picture = None
+    elif picture is None:
         picture = out.with_name(out.name.removesuffix(".json").removesuffix(".pair") + ".pair.png")
-    alignment = align_photos(
-        far, near, out, AlignOptions.from_given(given),
-        picture=None if no_picture else picture, overwrite=overwrite,
-    )  # fmt: skip
-    print_result(
-        alignment_as_dict(alignment), _lines(alignment), as_json=as_json,
-        remarks=dict.fromkeys((*alignment.pair.remarks, *alignment.remarks)),
-    )  # fmt: skip
+    options = AlignOptions.from_given(given)
+    alignment = align_photos(far, near, out, options, picture=picture, overwrite=overwrite)
+    notes = dict.fromkeys((*alignment.pair.remarks, *alignment.remarks))
+    print_result(alignment_as_dict(alignment), _lines(alignment), as_json=as_json, remarks=notes)
     if not as_json:
-        remark(f"Pair written to {out}" + (f", picture to {picture}" if not no_picture else ""))
+        remark(f"Pair written to {out}" + (f", picture to {picture}" if picture else ""))
 
 
 #: Options that a workbook leaves room for.

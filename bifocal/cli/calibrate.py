@@ -16,9 +16,8 @@ if TYPE_CHECKING:
 
 @declared
 def command(
-    images: tuple[Path, ...], out: Path, pattern: str, board: tuple[int, int] | None,
-    model: str, straight_edges: bool, lines: Path | None, focal_px: float | None, database: bool,
-    overwrite: bool, as_json: bool, **of_database: Any,
+    images: tuple[Path, ...], out: Path, straight_edges: bool, lines: Path | None, database: bool,
+    focal_px: float | None, overwrite: bool, as_json: bool, **options: Any,
 ) -> None:  # fmt: skip
     """Find principal distance, principal point and distortion of a lens.
 
@@ -29,8 +28,9 @@ def command(
 
     if sum([straight_edges or lines is not None, database]) > 1:
         raise click.UsageError("choose one of board photos, straight lines and --database.")
+    of_board = {name: options.pop(name) for name in ("pattern", "board", "model")}
     if database:
-        lens, notes = lenses.write_database_lens(images[0], out, overwrite=overwrite, **of_database)
+        lens, notes = lenses.write_database_lens(images[0], out, overwrite=overwrite, **options)
         data, text = lens.to_dict(), [f"Lens: {lens.source}"]
     elif straight_edges or lines is not None:
         found, notes = lenses.calibrate_from_edges(
@@ -48,14 +48,12 @@ def command(
     else:
         with progress_bar("Calibrating", quiet=as_json) as progress:
             result = lenses.calibrate_from_boards(
-                images, out, pattern=pattern, board=board, model=model, overwrite=overwrite,
-                progress=progress,
-            )  # fmt: skip
+                images, out, overwrite=overwrite, progress=progress, **of_board
+            )
         notes = tuple(f"{name}: the board was not found; left out" for name in result.without_board)
-        data = result.lens.to_dict() | {
-            "photo_rms": result.photo_rms, "dropped": result.dropped, "tried": dict(result.tried),
-            "without_board": result.without_board, "suspicious": result.suspicious,
-        }  # fmt: skip
+        keys = ("photo_rms", "dropped", "tried", "without_board", "suspicious")
+        data = result.lens.to_dict() | {key: getattr(result, key) for key in keys}
+        data["tried"] = dict(result.tried)
         text = _board_text(result)
     print_result(data, text, as_json=as_json, remarks=notes)
     remark(f"Lens file written to {out}")
@@ -65,16 +63,14 @@ def _board_text(result: Calibration) -> list[str]:
     """Return the calibration in words and tables."""
     lens, sigma = result.lens, result.standard_deviations
     matrix = lens.camera_matrix
-    values = {
-        "fx": matrix[0, 0], "fy": matrix[1, 1], "cx": matrix[0, 2], "cy": matrix[1, 2],
-    }  # fmt: skip
+    values = dict(zip(("fx", "fy", "cx", "cy"), matrix[[0, 1, 0, 1], [0, 1, 2, 2]], strict=True))
     names = ("k1", "k2", "k3", "k4") if lens.model == "fisheye" else ("k1", "k2", "p1", "p2", "k3")
     values |= dict(zip(names, lens.coefficients.tolist(), strict=False))
     rows = [
-        (name, f"{value:.3f}" if name[0] in "fc" else f"{value:.6f}",
-         f"{sigma[name]:.3f}" if name[0] in "fc" else f"{sigma[name]:.6f}")
-        for name, value in values.items() if name in sigma
-    ]  # fmt: skip
+        (name, *(f"{one:.{3 if name[0] in 'fc' else 6}f}" for one in (value, sigma[name])))
+        for name, value in values.items()
+        if name in sigma
+    ]
     text = [text_table(("", "value", "sigma"), rows), f"\nRMS {lens.sigma0:.3f} px; {lens.source}"]
     if result.tried:
         text.append("Models: " + ", ".join(f"{name} {rms:.3f} px" for name, rms in result.tried))

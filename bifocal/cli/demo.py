@@ -33,9 +33,7 @@ def command(out: Path, water: bool, overwrite: bool, as_json: bool) -> None:
 
         sample = WATER if water else FACADE
         result = run_demo(out, sample=sample, overwrite=overwrite, progress=tell)
-    points = zip(
-        result.ids, result.true, result.found, result.sigma, result.flags, strict=True
-    )  # fmt: skip
+    points = zip(result.ids, result.true, result.found, result.sigma, result.flags, strict=True)
     data = {
         "folder": result.folder, "rmse_targets": result.rmse,
         "map_median": result.map_median, f"map_beyond_{_limit(result, '')}": result.map_share,

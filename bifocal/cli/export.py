@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -11,16 +12,10 @@ from photocore.options import declared
 
 
 @declared
-def command(
-    result: Path, out: Path, world: bool, order: str, csv_flavour: str, ellipses: float,
-    overwrite: bool,
-) -> None:  # fmt: skip
+def command(result: Path, out: Path, **options: Any) -> None:
     """Write the points of a solved survey (RESULT: .xlsx, .ods or .csv) for other programs."""
     from bifocal.workbook.export_workflow import export
 
-    for note in export(
-        result, out, world=world, order=order, flavour=csv_flavour, ellipses=ellipses,
-        overwrite=overwrite,
-    ):  # fmt: skip
+    for note in export(result, out, **options):
         remark(note)
     click.echo(out)

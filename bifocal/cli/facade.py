@@ -16,10 +16,7 @@ _TO_OPEN = ("report/*.html", "drawing/*.pdf", "points/*.xlsx", "relief/*.png", "
 
 
 @declared
-def command(
-    far: Path, near: Path, out: Path, name: str, products: tuple[str, ...] | None, overwrite: bool,
-    as_json: bool, **given: Any,
-) -> None:  # fmt: skip
+def command(far: Path, near: Path, out: Path, as_json: bool, **given: Any) -> None:
     """Make everything a façade needs from two photos and one table of control points.
 
     The pair is set up, the relief measured, the points solved, orthophoto and drawings made to
@@ -29,7 +26,8 @@ def command(
     """
     from bifocal.campaigns.workflow import facade, facade_job
 
-    job = facade_job(far, near, out, name=name, given=given, products=products, overwrite=overwrite)
+    own = {name: given.pop(name) for name in ("name", "products", "overwrite")}
+    job = facade_job(far, near, out, given=given, **own)
     with progress_bar("facade", quiet=as_json) as progress:
         outcome = facade(job, progress=progress)
     print_result(outcome.to_dict(), _lines(job, outcome), as_json=as_json, remarks=outcome.remarks)

@@ -13,10 +13,7 @@ from photocore.options import declared
 
 
 @declared
-def command(
-    pair: Path, out: Path, count: int, what: str, relief_min: float | None,
-    relief_max: float | None, lang: str, overwrite: bool, as_json: bool,
-) -> None:  # fmt: skip
+def command(pair: Path, out: Path, count: int, what: str, as_json: bool, **options: Any) -> None:
     """Find the same details of the wall in both photos of PAIR, a pair file or survey workbook.
 
     Discs, chequers and coded markers are found and measured by their centres; natural detail is
@@ -26,30 +23,21 @@ def command(
     from bifocal.workbook.match_workflow import match_photos, match_summary
     from bifocal.workbook.pair_workflow import is_workbook, read_pair
 
-    if relief_min is not None and relief_max is not None and relief_min >= relief_max:
+    low, high = options.pop("relief_min"), options.pop("relief_max")
+    if low is not None and high is not None and low >= high:
         raise click.UsageError("--relief-min must be below --relief-max.")
     source = read_pair(pair)
     reliefs = None
-    if relief_min is not None or relief_max is not None:
+    if low is not None or high is not None:
         near = source.image2.distance
-        reliefs = (
-            -0.5 * near if relief_min is None else relief_min,
-            0.4 * near if relief_max is None else relief_max,
-        )
+        reliefs = (-0.5 * near if low is None else low, 0.4 * near if high is None else high)
     settings = MatchSettings(
-        count=count,
-        relief_range=reliefs,
-        features=what != "targets",
-        targets=what != "features",
+        count=count, relief_range=reliefs, features=what != "targets", targets=what != "features"
     )
-    found = match_photos(
-        source if is_workbook(pair) else pair, out, settings, language=lang, overwrite=overwrite
-    )
+    found = match_photos(source if is_workbook(pair) else pair, out, settings, **options)
     summary = match_summary(*found)
-    print_result(
-        {**summary, "out": out}, _lines(summary), as_json=as_json,
-        remarks=(*found[0].remarks, *_remarks(summary["kinds"], what)),
-    )  # fmt: skip
+    notes = (*found[0].remarks, *_remarks(summary["kinds"], what))
+    print_result({**summary, "out": out}, _lines(summary), as_json=as_json, remarks=notes)
     if not as_json:
         remark(f"Points written to {out}")
 

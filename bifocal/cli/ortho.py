@@ -17,10 +17,8 @@ if TYPE_CHECKING:
 
 @declared
 def command(
-    pair: Path, out: Path | None, relief: Path | None, points: Path | None,
-    breaklines: tuple[str, ...], plane: float | None, folder: Path | None, title: str,
-    tfw: bool, overwrite: bool, as_json: bool,
-    **given: Any,
+    pair: Path, out: Path | None, relief: Path | None, points: Path | None, plane: float | None,
+    folder: Path | None, title: str, tfw: bool, overwrite: bool, as_json: bool, **given: Any,
 ) -> None:  # fmt: skip
     """Make the orthophoto of a wall from the photos of a PAIR file or survey workbook.
 
@@ -36,7 +34,7 @@ def command(
 
     if out is None and folder is None:
         raise click.UsageError("Give --out FILE, --deliver DIR or both.")
-    drawing = {name: given.pop(name) for name in (*DRAWING, "control")}
+    drawing = {name: given.pop(name) for name in (*DRAWING, "control", "language")}
     scale = drawing["scale"]
     if folder is not None and scale is None:
         raise click.UsageError("--deliver needs the scale of the drawing, e.g. --scale 1:50.")
@@ -46,6 +44,7 @@ def command(
     own: Path | SurveyPoints | None = points
     if relief is None and points is None and plane is None and is_workbook(pair):
         own = points_of(pair)
+    breaklines = [line.split(",") for line in given.pop("breaklines")]
     if breaklines and own is None:
         raise click.UsageError("--breakline joins measured points; give their table by --points.")
     for name in (*DRAWING[3:], "control"):
@@ -55,9 +54,8 @@ def command(
     if relief is None and own is None and plane is None:
         remark("No relief given: the wall is taken as flat (as with --plane).")
     task = OrthoTask.from_given(
-        given, relief=relief, points=own, breaklines=[line.split(",") for line in breaklines],
-        plane=plane or 0.0, scale=scale,
-    )  # fmt: skip
+        given, relief=relief, points=own, breaklines=breaklines, plane=plane or 0.0, scale=scale
+    )
     files: dict[str, object] = {}
     with progress_bar("orthophoto", quiet=as_json) as progress:
         if folder is not None and scale is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -11,10 +12,7 @@ from photocore.options import declared
 
 
 @declared
-def command(
-    sources: tuple[Path, ...], workbook: Path | None, port: int, no_browser: bool, lang: str,
-    as_json: bool,
-) -> None:  # fmt: skip
+def command(sources: tuple[Path, ...], no_browser: bool, as_json: bool, **options: Any) -> None:
     """Open the page: orient two photos, pick points, relief, orthophoto, drawing.
 
     Starts from a pair file, a survey workbook, two photos, or the folder of a survey (default: the
@@ -23,7 +21,7 @@ def command(
     """
     from bifocal.collimation.workflow import page_server
 
-    with page_server(*sources, workbook=workbook, port=port, language=lang) as server:
+    with page_server(*sources, **options) as server:
         if as_json:
             print_json({"url": server.url, "token": server.token})
         else:

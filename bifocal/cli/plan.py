@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from photocore.cli import print_result, remark, text_table
-from photocore.options import declared
+from photocore.options import declared, options_of
 
 if TYPE_CHECKING:
     from bifocal.planning.camera_plan import Plan
@@ -17,10 +17,7 @@ if TYPE_CHECKING:
 
 @declared
 def command(
-    focal_lengths: tuple[float, ...], equivalents: tuple[float, ...],
-    sensor: tuple[float, float] | None, pixels: tuple[int, int],
-    indices: tuple[float, ...] | None, thicknesses: tuple[float, ...] | None,
-    port: float | None, depth: float | None,
+    focal_lengths: tuple[float, ...], equivalents: tuple[float, ...], pixels: tuple[int, int],
     out: Path | None, as_json: bool, **wishes: Any,
 ) -> None:  # fmt: skip
     """Compare pairs of lenses: where to stand, what a photo covers, how precise it gets.
@@ -32,6 +29,8 @@ def command(
     from bifocal.planning.camera_plan import CameraSensor
     from bifocal.planning.workflow import make_plan, plan_as_dict
 
+    sensor = wishes.pop("sensor")
+    media = {name: wishes.pop(name) for name in options_of("bifocal", "media")}
     if equivalents and (focal_lengths or sensor):
         raise click.UsageError("Give --equivalent, or --focal with --sensor, not both.")
     if equivalents:
@@ -40,12 +39,11 @@ def command(
         raise click.UsageError("Give --focal with --sensor, or --equivalent for a phone.")
     else:
         camera = CameraSensor(width=sensor[0], height=sensor[1], columns=pixels[0], rows=pixels[1])
-    if indices is None and (thicknesses or port is not None or depth is not None):
+    if media["indices"] is not None:
+        media |= {"thicknesses": media["thicknesses"] or (), "ports": (media.pop("port"), None)}
+        wishes["media"] = PairMedia.stated(**media)
+    elif any(value not in (None, ()) for value in media.values()):
         raise click.UsageError("--thicknesses, --port and --depth go with --indices.")
-    if indices is not None:
-        wishes["media"] = PairMedia.stated(
-            indices, thicknesses or (), ports=(port, None), depth=depth
-        )
     plan = make_plan(equivalents or focal_lengths, camera, out=out, **wishes)
     print_result(plan_as_dict(plan), _lines(plan), as_json=as_json)
     if out is not None:

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from photocore.cli import progress_bar, remark, tell_written
 from photocore.options import declared
 
 
 @declared
-def command(
-    source: Path, out: Path, control: Path | None, check: Path | None, relief: Path | None,
-    ortho: Path | None, scale: float | None, title: str, language: str, unit: str | None,
-    overwrite: bool,
-) -> None:  # fmt: skip
+def command(source: Path, out: Path, overwrite: bool, **options: Any) -> None:
     """Report what was measured, with which geometry, and how good it is.
 
     SOURCE is a solved workbook, a PAIR file, or the folder of `bifocal facade` or `bifocal
@@ -23,10 +20,7 @@ def command(
     """
     from bifocal.reports.workflow import ReportTask, report_of
 
-    task = ReportTask(
-        title=title, language=language, scale=scale, control=control, check=check, relief=relief,
-        ortho=ortho, unit=unit or "",
-    )  # fmt: skip
+    task = ReportTask(**options | {"unit": options["unit"] or ""})
     with progress_bar("report") as progress:
         for text in report_of(source, out, task, overwrite=overwrite, progress=progress):
             remark(text)

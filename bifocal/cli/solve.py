@@ -16,10 +16,7 @@ SHOWN = 40
 
 
 @declared
-def command(
-    survey: tuple[Path, ...], out: Path | None, as_json: bool, language: str | None,
-    overwrite: bool, **options: Any,
-) -> None:  # fmt: skip
+def command(survey: tuple[Path, ...], out: Path | None, as_json: bool, **options: Any) -> None:
     """Solve measured points: relief r, displacements, coordinates, precision, check points.
 
     SURVEY is a survey workbook, or any table (.xlsx, .xlsm, .ods, .csv) with the headings id and
@@ -36,6 +33,7 @@ def command(
     from photocore.output import check_not_input
     from photocore.workbook.making.newbook import check_new_workbook
 
+    language, overwrite = options.pop("language"), options.pop("overwrite")
     if out is not None:
         if out.suffix.lower() == ".csv":
             check_not_input(out, *survey)

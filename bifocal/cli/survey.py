@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -11,12 +12,9 @@ from photocore.options import declared
 
 
 @declared
-@click.pass_context
 def command(
-    ctx: click.Context, survey: Path | None, folder: Path | None, dry_run: bool, out: Path | None,
-    jobs: int | None, memory: float | None, scheduler: str, ship: bool, overwrite: bool,
-    as_json: bool,
-) -> None:  # fmt: skip
+    survey: Path | None, folder: Path | None, dry_run: bool, as_json: bool, **machines: Any
+) -> None:
     """Survey many pairs: alignment, relief, points, drawings and report of each.
 
     SURVEY is a TOML file that names the pairs, their control and what is wanted of them. Only
@@ -32,19 +30,18 @@ def command(
         run_survey,
     )
 
+    out, overwrite = machines.pop("out"), machines.pop("overwrite")
     if folder is not None:
         survey = survey or folder / "survey.toml"
         with progress_bar("photos", quiet=as_json) as progress:
             found, left = begin_survey(survey, folder, overwrite=overwrite, progress=progress)
         tell_written(survey)
-        print_result(
-            {"survey": str(survey), "pairs": found, "left": left},
-            [
-                f"{pairs_in_words(found)}; {left} of the photos in none.",
-                f"Say in {survey} how each is controlled, then: bifocal survey {survey} --dry-run",
-            ],
-            as_json=as_json,
-        )  # fmt: skip
+        lines = [
+            f"{pairs_in_words(found)}; {left} of the photos in none.",
+            f"Say in {survey} how each is controlled, then: bifocal survey {survey} --dry-run",
+        ]
+        data = {"survey": str(survey), "pairs": found, "left": left}
+        print_result(data, lines, as_json=as_json)
         return
     if survey is None:
         raise click.UsageError("name the survey file, or --init DIR with a folder of photos.")
@@ -65,16 +62,14 @@ def command(
                 if what == "cannot":
                     click.echo(f"\n{pair}, {step}:\n  {why}")
         if any(what not in ("keep", "make") for *_, what in plan):
-            ctx.exit(1)  # as the work would end
+            raise click.exceptions.Exit(1)  # as the work would end
         return
-    if ship and not scheduler:
+    if machines["ship"] and not machines["scheduler"]:
         raise click.UsageError("--ship goes with --scheduler.")
-    machines = Machines(jobs=jobs, memory=memory, scheduler=scheduler, ship=ship)
+    given: dict[str, Any] = {"machines": Machines(**machines), "mosaic": wants_mosaic(survey)}
     with progress_bar("survey", quiet=as_json) as progress:
-        result = run_survey(
-            pairs, machines=machines, mosaic=wants_mosaic(survey), progress=progress, tell=remark
-        )
+        result = run_survey(pairs, progress=progress, tell=remark, **given)
     result = result.in_words(in_survey_words)
     print_result(result.to_dict(), result.lines(), as_json=as_json)
     if result.failed:
-        ctx.exit(1)
+        raise click.exceptions.Exit(1)

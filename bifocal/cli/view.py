@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from photocore.cli import tell_written
 from photocore.options import declared
 
 
 @declared
-def command(
-    relief: Path, ortho: Path | None, title: str, language: str, out: Path, overwrite: bool
-) -> None:
+def command(relief: Path, out: Path, **options: Any) -> None:
     """Show a relief map in three dimensions, on a page that needs nothing else.
 
     RELIEF is a map of `bifocal relief`. It is thinned to 65 000 points, so that the page is small
@@ -19,5 +18,5 @@ def command(
     """
     from bifocal.reports.view_workflow import view_relief
 
-    view_relief(relief, out, ortho=ortho, title=title, language=language, overwrite=overwrite)
+    view_relief(relief, out, **options)
     tell_written(out)

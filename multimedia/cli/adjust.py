@@ -16,10 +16,8 @@ if TYPE_CHECKING:
 
 @declared
 def command(
-    project: Path, fix_camera: tuple[str, ...], plate: tuple[str, ...], scale_bar: tuple[str, ...],
-    prior: tuple[str, ...], wavelength: float | None, temperature: float | None, depth: float,
-    out: Path | None, report: Path | None, language: str, overwrite: bool, as_json: bool,
-    **choices: Any,
+    project: Path, wavelength: float | None, temperature: float | None, depth: float,
+    out: Path | None, report: Path | None, as_json: bool, **choices: Any,
 ) -> None:  # fmt: skip
     """Adjust cameras, object points and the media of a project together."""
     from multimedia.adjustment import workflow as adjust
@@ -28,14 +26,11 @@ def command(
 
     if (wavelength is None) != (temperature is None):
         raise click.UsageError("the salinity needs both --wavelength and --temperature.")
-    unknowns = Unknowns(
-        fixed_cameras=fix_camera, plates=plate, **choices,
-        scale_bars=tuple(adjust.parse_scale_bar(text) for text in scale_bar),
-        priors=dict(parse_prior(text) for text in prior), typical_priors=True,
-    )  # fmt: skip
-    result, notes = adjust.adjust_project(
-        project, unknowns, out=out, report=report, language=language, overwrite=overwrite
-    )
+    told = {name: choices.pop(name) for name in ("language", "overwrite")}
+    choices["scale_bars"] = tuple(map(adjust.parse_scale_bar, choices["scale_bars"]))
+    choices["priors"] = dict(map(parse_prior, choices["priors"]))
+    unknowns = Unknowns(**choices, typical_priors=True)
+    result, notes = adjust.adjust_project(project, unknowns, out=out, report=report, **told)
     salinity = None
     if wavelength is not None and temperature is not None:
         salinity = adjust.salinity_of(

@@ -12,10 +12,7 @@ from photocore.options import declared
 
 
 @declared
-def command(
-    source: Path, target: Path, beams: bool, sigma_index: float, sigma_level: float,
-    sigma_point: float, as_json: bool, **wishes: Any,
-) -> None:  # fmt: skip
+def command(source: Path, target: Path, beams: bool, as_json: bool, **wishes: Any) -> None:
     """Correct a DEM or point cloud for the refraction at the water surface.
 
     IN is a GeoTIFF (.tif), a point cloud (.csv .txt .xyz .ply .las .laz), or with --rays a table
@@ -36,7 +33,8 @@ def command(
         raise click.UsageError("--rays holds its cameras already; leave the other options out.")
     if beams and cameras:
         raise click.UsageError("--beams and --cameras exclude each other.")
-    precision = Precision(index=sigma_index, level=sigma_level, point=sigma_point)
+    kinds = ("index", "level", "point")
+    precision = Precision(**{kind: wishes.pop(f"sigma_{kind}") for kind in kinds})
     if precision.is_given and (beams or wishes["rays"]):
         raise click.UsageError(
             "--sigma-index, --sigma-level and --sigma-point are not for --beams and --rays."

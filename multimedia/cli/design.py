@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from photocore.cli import print_result, tell_written, text_table
-from photocore.options import declared
+from photocore.options import declared, options_of
 
 if TYPE_CHECKING:
     from multimedia.design.studies import Design
@@ -18,9 +18,8 @@ if TYPE_CHECKING:
 
 @declared
 def command(
-    project: Path | None, seed: int, flatness: bool, out: Path | None, plot: Path | None,
-    overwrite: bool, as_json: bool, **ring: Any,
-) -> None:  # fmt: skip
+    project: Path | None, out: Path | None, plot: Path | None, as_json: bool, **ring: Any
+) -> None:
     """Predict precision, ray angles, sensitivities and calibration costs of a set-up.
 
     Of a PROJECT file with cameras, media and the object points to be measured; or of cameras on a
@@ -28,6 +27,8 @@ def command(
     """
     from multimedia.design import workflow as design
 
+    overwrite = ring.pop("overwrite")
+    study = {name: ring.pop(name) for name in ("seed", "flatness")}
     design.check_outputs(out, plot, overwrite=overwrite)
     if project is not None:
         context = click.get_current_context()
@@ -36,14 +37,13 @@ def command(
                 raise click.UsageError(
                     "cameras come from the PROJECT file or from options; give one of them."
                 )
-        result = design.design_project(project, seed=seed, flatness=flatness)
+        result = design.design_project(project, **study)
     else:
-        needed = {"--distance": "distance", "--c": "principal_distance", "--extent": "extent",
-                  "--depths": "depths"}  # fmt: skip
-        missing = [option for option, name in needed.items() if ring[name] is None]
+        options = options_of("multimedia", "design")
+        missing = [options[name].flag for name, value in ring.items() if value is None]
         if missing:
             raise click.UsageError(f"give a PROJECT file, or {', '.join(missing)} as well.")
-        result = design.design_ring(seed=seed, flatness=flatness, **ring)
+        result = design.design_ring(**study, **ring)
     design.write_design(result, out=out, plot=plot, overwrite=overwrite)
     print_result(design.as_dict(result), _lines(result), as_json=as_json, remarks=result.remarks)
     tell_written(out, plot)
@@ -68,10 +68,13 @@ def _lines(result: Design) -> Iterator[str]:
     if result.placements:
         yield "\nPlacement of the cameras"
         places = [
-            (f"{degrees(p.half_angle):.0f}", *(f"{v:.3g}" for v in p.sigma),
-             f"{degrees(p.angle):.1f}")
+            (
+                f"{degrees(p.half_angle):.0f}",
+                *(f"{v:.3g}" for v in p.sigma),
+                f"{degrees(p.angle):.1f}",
+            )
             for p in result.placements
-        ]  # fmt: skip
+        ]
         yield text_table(("half angle", "sigma X", "sigma Y", "sigma Z", "rays"), places)
         best, open_end = best_placement(result.placements)
         angle = f"half angle {degrees(best.half_angle):.0f} deg"

@@ -30,10 +30,9 @@ def command(
     from multimedia.orientation.epipolar_workflow import epipolar_project
 
     result = epipolar_project(project, out=out, picture=picture, **options)
-    print_result(
-        {"z_range": result.z_range, "curves": result.curves, "candidates": result.candidates},
-        _lines(result), as_json=as_json, remarks=(f"Note: {line}" for line in result.remarks),
-    )  # fmt: skip
+    data = {name: getattr(result, name) for name in ("z_range", "curves", "candidates")}
+    notes = (f"Note: {line}" for line in result.remarks)
+    print_result(data, _lines(result), as_json=as_json, remarks=notes)
     tell_written(out, picture)
 
 

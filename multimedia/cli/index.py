@@ -7,19 +7,11 @@ import click
 from photocore.cli import print_result, remark
 from photocore.options import declared
 
-#: Arguments of the formulas that the options set.
-_KEYS = {
-    "wavelength": "wavelength_nm",
-    "temperature": "temperature_c",
-    "salinity": "salinity_percent",
-}
-
 
 @declared
 def command(
-    depth: float, formula: str, from_index: float | None, sigma_index: float, find: str | None,
-    as_json: bool, **given: float,
-) -> None:  # fmt: skip
+    formula: str, from_index: float | None, find: str | None, as_json: bool, **given: float
+) -> None:
     """Print the refractive index of water; or, the other way round, salinity or temperature.
 
     The number on stdout is the result; formula, standard deviation and doubts go to stderr.
@@ -28,12 +20,12 @@ def command(
         raise click.UsageError("--from-index and --find belong together.")
     from multimedia.workbook.index_workflow import find_from_index, find_index
 
-    water = {key: given[name] for name, key in _KEYS.items()} | {"depth": depth}
-    sigmas = {f"sigma_{key}": given[f"sigma_{name}"] for name, key in _KEYS.items()}
+    sigma_index = given.pop("sigma_index")
+    sigmas = {name: given.pop(name) for name in list(given) if name.startswith("sigma_")}
     if find is None or from_index is None:
-        result = find_index(water, formula, sigmas=sigmas)
+        result = find_index(given, formula, sigmas=sigmas)
     else:
-        result = find_from_index(find, from_index, sigma_index, water, formula, sigmas=sigmas)
+        result = find_from_index(find, from_index, sigma_index, given, formula, sigmas=sigmas)
     print_result(result.as_dict(), [result.text], as_json=as_json)
     if not as_json:
         remark(f"{result.label}, formula {result.formula.name}: {result.formula.citation}")

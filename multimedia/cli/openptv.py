@@ -11,9 +11,8 @@ from photocore.options import declared
 
 @declared
 def command(
-    source: Path, out: Path | None, export: Path | None, overwrite: bool, as_json: bool,
-    **options: Any,
-) -> None:  # fmt: skip
+    source: Path, out: Path | None, export: Path | None, as_json: bool, **options: Any
+) -> None:
     """Read an OpenPTV experiment folder DIR into a project file.
 
     Reads ptv.par, .ori, .addpar, _targets, the calibration body and the first rt_is frame; finds
@@ -27,7 +26,7 @@ def command(
     from multimedia.openptv.workflow import export_openptv, import_openptv
 
     if export is not None:
-        written, inexact = export_openptv(source, export, overwrite=overwrite)
+        written, inexact = export_openptv(source, export, overwrite=options["overwrite"])
         for line in inexact:
             remark(f"Note: {line}")
         remark(f"OpenPTV folder written to {export}")
@@ -36,7 +35,7 @@ def command(
             print_json({"folder": export, "cameras": names, "remarks": list(inexact)})
         return
     target = out if out is not None else Path(f"{source.resolve().name}.toml")
-    imported = import_openptv(source, out=target, overwrite=overwrite, **options)
+    imported = import_openptv(source, out=target, **options)
     project = imported.project
     total = len(project.object_points.ids)
     cameras = list(zip(project.cameras, imported.matched, project.media_of, strict=True))

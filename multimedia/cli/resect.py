@@ -11,10 +11,7 @@ from photocore.options import declared
 
 
 @declared
-def command(
-    project: Path, estimate: tuple[str, ...], out: Path | None, residuals: Path | None,
-    as_json: bool, **options: Any,
-) -> None:  # fmt: skip
+def command(project: Path, as_json: bool, **options: Any) -> None:
     """Orient, and with --estimate calibrate, each camera of PROJECT (.toml) on its own.
 
     Uses the image points whose ids are among the object points. The start values of the project
@@ -23,14 +20,13 @@ def command(
     """
     from multimedia.orientation.workflow import resect_project, resected_as_dict
 
-    resected = resect_project(project, estimate=estimate, out=out, residuals=residuals, **options)
+    resected = resect_project(project, **options)
     data = resected_as_dict(resected)
     notes = (f"Note: {line}" for line in resected.remarks)
     print_result(data, _lines(data["cameras"]), as_json=as_json, remarks=notes)
-    if out is not None:
-        remark(f"Project written to {out}")
-    if residuals is not None:
-        remark(f"Residuals written to {residuals}")
+    for what, key in (("Project", "out"), ("Residuals", "residuals")):
+        if options[key] is not None:
+            remark(f"{what} written to {options[key]}")
 
 
 def _lines(cameras: list[dict[str, Any]]) -> Iterator[str]:

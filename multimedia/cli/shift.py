@@ -12,10 +12,7 @@ from photocore.options import declared
 
 
 @declared
-def command(
-    source: Path, out: Path | None, camera: tuple[float, float, float] | None, z0: float | None,
-    as_json: bool, **options: Any,
-) -> None:  # fmt: skip
+def command(source: Path, out: Path | None, as_json: bool, **options: Any) -> None:
     """Shift points so that straight rays see them where they are seen through the media.
 
     IN is a table (.xlsx, .xlsm, .ods, .csv; - for stdin) with X, Y, Z (points in water have Z
@@ -25,11 +22,11 @@ def command(
     """
     if out is None and not as_json:
         raise click.UsageError("give --out FILE, --json, or both.")
-    if camera is not None and z0 is not None:
+    if None not in (options["camera"], options["z0"]):
         raise click.UsageError("give --camera or --z0, not both.")
     from multimedia.workbook.workflow import shift_file
 
-    report = shift_file(source, out, camera=camera, z0=z0, **options)
+    report = shift_file(source, out, **options)
     for text in report.remarks:
         remark(f"Note: {text}")
     if as_json:

@@ -184,7 +184,7 @@ def test_a_camera_on_the_glass_is_calculated_too() -> None:
 
 def test_cells_let_in_every_number_that_can_be_meant(tmp_path: Path) -> None:
     write_template(tmp_path / "form.xlsx", rows=3, steps=6, overwrite=False)
-    sheet = openpyxl.load_workbook(tmp_path / "form.xlsx").worksheets[0]
+    sheet = openpyxl.load_workbook(tmp_path / "form.xlsx")["Multimedia"]
     rules = {rule.promptTitle: rule for rule in sheet.data_validations.dataValidation}
     limits = {
         name: (float(r.formula1), float(r.formula2)) for name, r in rules.items() if r.formula2
