@@ -23,7 +23,7 @@ from bifocal.orientation.adjustment.pair_observations import (
 from bifocal.orientation.adjustment.refracted_ties import meeting_equations
 from bifocal.orientation.adjustment.seen_points import known_points, views_of
 from bifocal.orientation.facade_lines import FacadeDirection
-from photocore import adjustment
+from photocore.adjustment.network import Network, NetworkState, Rows
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import (
     PARAMETERS,
@@ -93,23 +93,24 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
     GeometryError
         If the observations leave a parameter undetermined.
     """
-    free, names = observations.estimated, observations.names
+    free, names = np.flatnonzero(observations.estimated), observations.names
+    columns = np.arange(len(free))
 
-    def equations(state: PairUnknowns) -> Equations:
-        residuals, jacobian = pair_equations(observations, state)
-        return residuals, jacobian[:, free]
+    def everything(state: NetworkState, rows: Rows) -> bool:
+        residuals, by = pair_equations(observations, state.blocks["pair"][0])
+        rows.by_label(rows.add(residuals)[:, None], columns, by[:, free])
+        return True
 
-    def advance(state: PairUnknowns, step: FloatArray) -> PairUnknowns | None:
-        whole = np.zeros(len(names))
-        whole[free] = step
-        return state.stepped(whole)
-
-    asked = [name for name, estimated in zip(names, free, strict=True) if estimated]
-    start = PairUnknowns(cameras=start.cameras, radial=start.radial, media=start.media)
+    network = Network(
+        labels=[names[k] for k in free],
+        columns={"pair": {0: dict(zip(free.tolist(), columns, strict=True))}},
+        terms=[everything],
+        step=lambda pair, at, step: pair.stepped(np.bincount(at, step, len(names))),
+        what="the pair",
+        rounding=ROUNDING,
+    )
     try:
-        fit = adjustment.fit(
-            start, equations, advance, names=asked, what="the pair", rounding=ROUNDING
-        )
+        fit = network.solve(NetworkState(blocks={"pair": {0: start}}))
     except GeometryError:
         raise GeometryError(
             "the observations do not determine the cameras. Measure more control points, spread "
@@ -119,7 +120,7 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
     sigma0 = float(np.sqrt((fit.residuals @ fit.residuals) / redundancy))
     cofactor = np.zeros((len(names), len(names)))
     cofactor[np.ix_(free, free)] = fit.linear.cofactor
-    state = fit.state
+    state: PairUnknowns = fit.state.blocks["pair"][0]
     covariance = cofactor * max(sigma0, 1.0) ** 2
     by = state.media.by_unknowns()
     return AdjustedPair(
