@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.files.images import photo_info, read_grey
+from bifocal.files.photos import photo_info
 from bifocal.matching.features import Features, find_features
 from bifocal.model.orientation_precision import NAMES, as_dict, exchanged, pinhole
 from bifocal.model.pair import Pair
@@ -30,6 +30,7 @@ from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import Pinhole, plane_from_pixel
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
+from photocore.images import read_grey
 from photocore.jsonfile import write_object
 from photocore.output import (
     atomic_folder,
