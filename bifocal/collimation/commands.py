@@ -30,6 +30,7 @@ from bifocal.collimation.records import (
     SurveyState,
     TapedLength,
 )
+from bifocal.remarks import remark
 from bifocal.survey.observations import DOUBT_CODES
 from photocore.errors import InputError
 
@@ -70,7 +71,7 @@ def _known(command: Fields, before: Known | None) -> Known:
 def _point(state: SurveyState, command: Fields) -> PickedPoint:
     name = command["name"]
     if name not in state.points:
-        raise InputError(f"there is no point {name}.")
+        raise InputError(remark("page.no_point", name=name))
     return state.points[name]
 
 
@@ -79,7 +80,7 @@ def _pick(state: SurveyState, command: Fields) -> list[Change]:
     image, pixel = command["image"], pixel_of(command)
     before = state.points.get(name)
     if before is None and len(state.points) >= MOST_POINTS:
-        raise InputError(f"a survey holds at most {MOST_POINTS} points; begin another.")
+        raise InputError(remark("page.most_points", most=MOST_POINTS))
     after = (before or PickedPoint(name=name, order=state.next_order())).picked(image, pixel)
     if "doubtful" in command:  # a pick that is only moved stays what it is
         after = after.doubted(image, doubtful=command["doubtful"])
@@ -98,7 +99,7 @@ def _rename(state: SurveyState, command: Fields) -> list[Change]:
     if new == before.name:
         return []
     if new in state.points:
-        raise InputError(f"there is a point {new} already; choose another name.")
+        raise InputError(remark("page.point_is_there", name=new))
     lines = [
         Change("lines", line.name, line, replace(line, points=tuple(
             new if name == before.name else name for name in line.points
@@ -117,10 +118,7 @@ def _type(state: SurveyState, command: Fields) -> list[Change]:
     if kind == before.type:
         return []
     if before.type == "doubtful" and kind != "plain":
-        raise InputError(
-            f"{before.name} was accepted in doubt: pick it by hand, or make it plain once you are "
-            "sure; then it may become another."
-        )
+        raise InputError(remark("page.in_doubt", name=before.name))
     return [Change("points", before.name, before, replace(before, code=CODES[kind]))]
 
 
@@ -150,7 +148,7 @@ def _line_set(state: SurveyState, command: Fields) -> list[Change]:
     command = {"layer": "", "points": [], "closed": False, **command}
     layer, points = text_of(command, "layer"), command["points"]
     if len(points) < 2:
-        raise FieldError("points: a line joins two points or more.")
+        raise FieldError(remark("page.line_of_two"))
     unknown = [point for point in points if point not in state.points]
     if unknown:
         raise InputError(f"points: there is no point {unknown[0][:40]}.")
@@ -161,14 +159,14 @@ def _line_set(state: SurveyState, command: Fields) -> list[Change]:
 def _line_delete(state: SurveyState, command: Fields) -> list[Change]:
     name = command["name"]
     if name not in state.lines:
-        raise InputError(f"there is no line {name}.")
+        raise InputError(remark("page.no_line", name=name))
     return [Change("lines", name, state.lines[name], None)]
 
 
 def _control(state: SurveyState, command: Fields) -> PickedControl:
     name = command["name"]
     if name not in state.control:
-        raise InputError(f"there is no control point {name}.")
+        raise InputError(remark("page.no_control", name=name))
     return state.control[name]
 
 
@@ -191,7 +189,7 @@ def _control_pick(state: SurveyState, command: Fields) -> list[Change]:
     pixel = None if command.get("column") is None else pixel_of(command)
     before = state.control.get(name)
     if before is None and pixel is None:
-        raise InputError(f"there is no control point {name}.")
+        raise InputError(remark("page.no_control", name=name))
     after = (before or PickedControl(name=name, order=state.next_order())).picked(image, pixel)
     return [Change("control", name, before, after)]
 
@@ -201,7 +199,7 @@ def _control_rename(state: SurveyState, command: Fields) -> list[Change]:
     if new == before.name:
         return []
     if new in state.control:
-        raise InputError(f"there is a control point {new} already; choose another name.")
+        raise InputError(remark("page.control_is_there", name=new))
     changes = [
         Change("control", before.name, before, None),
         Change("control", new, None, replace(before, name=new)),
@@ -245,19 +243,19 @@ def _tape_set(state: SurveyState, command: Fields) -> list[Change]:
     start, end = command["from"], command["to"]
     length, sigma = command.get("length"), command.get("sigma")
     if start == end:
-        raise InputError("from, to: a tape runs between two points.")
+        raise InputError(remark("page.tape_of_two"))
     if length is None:
-        raise FieldError("length: how long is it, in metres?")
+        raise FieldError(remark("page.tape_length"))
     missing = [name for name in (start, end) if name not in state.control]
     if missing:
-        raise InputError(f"there is no control point {missing[0]}; pick it first.")
+        raise InputError(remark("page.pick_control", name=missing[0]))
     return [_taped(state, TapedLength(start=start, end=end, length=length, sigma=sigma))]
 
 
 def _tape_delete(state: SurveyState, command: Fields) -> list[Change]:
     key = "|".join(sorted((command["from"], command["to"])))
     if key not in state.tapes:
-        raise InputError("there is no tape between these points.")
+        raise InputError(remark("page.no_tape"))
     return [Change("tapes", key, state.tapes[key], None)]
 
 
