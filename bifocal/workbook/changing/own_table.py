@@ -21,8 +21,8 @@ from bifocal.workbook.changing.setup_update import (
 from bifocal.workbook.changing.update import refuse_earlier, store_named_cells
 from bifocal.workbook.content import SurveyContent, point_cells, result_cells
 from bifocal.workbook.formulas.columns import NEAR, ideal_points, pair_points
+from bifocal.workbook.formulas.georeference_values import precision_values
 from bifocal.workbook.formulas.placed_formulas import added_covariance
-from bifocal.workbook.formulas.precision_lines import precision_values
 from bifocal.workbook.formulas.setup_cells import TITLE_BLOCK, cells_of
 from bifocal.workbook.making.book import build
 from bifocal.workbook.reading.reader import TO_DEGREES, TO_MM
@@ -119,9 +119,12 @@ def _links(editor: WorkbookEditor, survey: SurveyInput, given: Mapping[str, Any]
     links = {}
     for key, (sheet, cell) in survey.setup.places.items():
         row, column = split_cell(cell)
-        stands = editor.grid(sheet).rows.get(row, {}).get(column)
         named = place_of(editor, key) == (sheet, row, column)
-        if isinstance(stands, float) and not named and key not in replaced:
+        if (
+            isinstance(editor.value_at(sheet, row, column), float)
+            and not named
+            and key not in replaced
+        ):
             links[key] = f"{quoted_title(sheet)}!${column_letters(column)}${row}"
     return links
 
