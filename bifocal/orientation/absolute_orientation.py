@@ -163,9 +163,9 @@ def _through_media(given: Given, lacking: str) -> OrientedPair:
     if lacking and max(shares) > CONTROL.hopeless:
         raise GeometryError(f"the control points alone do not tell the distances, and {lacking}.")
     ties, remarks = ties_of(given, needed=False)
-    note = "the media as given, no common points: control points alone"
+    note = remark("orientation.assumed_media_control")
     if ties is not None:
-        pair, note = with_bent_ties(pair, ties), "the media as given"
+        pair, note = with_bent_ties(pair, ties), remark("orientation.assumed_media")
         every, size = np.ones(len(ties.seen1), dtype=bool), interiors[0].image_size
         bend = bend_between(pair.adjusted, ties.seen1, ties.seen2, every, size)
         pair = replace(pair, bend=bend)
