@@ -9,6 +9,7 @@ import os
 import time
 import traceback
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -189,11 +190,16 @@ def steps_of(job: PairJob) -> list[Step]:
 
 def plan_of(job: PairJob, hashes: FileHashes) -> list[tuple[str, str]]:
     """Return each step of a pair with ``keep``, ``make``, or why it cannot run."""
+    return plan_of_steps(job.folder, steps_of(job), hashes)
+
+
+def plan_of_steps(parent: Path, steps: Sequence[Step], hashes: FileHashes) -> list[tuple[str, str]]:
+    """Return steps whose folders lie in ``parent`` with ``keep``, ``make``, or what is wrong."""
     plan: list[tuple[str, str]] = []
     earlier: dict[str, StepRecord] = {}
     stale = False
-    for step in steps_of(job):
-        folder = job.folder / step.name
+    for step in steps:
+        folder = parent / step.name
         record = read_record(folder)
         try:
             key = "" if stale else step_key(step, earlier, hashes)
@@ -216,45 +222,85 @@ def run_pair(job: PairJob, progress: Progress = no_progress) -> PairOutcome:
     """
     import cv2
 
-    start = time.perf_counter()
+    steps = steps_of(job)
+    total = sum(WEIGHTS[step.name] for step in steps)
+    parts = []
+    behind = 0.0
+    for step in steps:
+        part = _part_of(progress, behind / total, WEIGHTS[step.name] / total, step.name)
+        parts.append((step, part))
+        behind += WEIGHTS[step.name]
     hashes = FileHashes(job.folder / ".hashes.json")
-    done: list[str] = []
-    kept: list[str] = []
-    remarks: list[str] = []
-    failed, message = "align", ""
+    where, day = f"pair {job.name}, ", job.date or None
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:
-        steps = steps_of(job)
-        total = sum(WEIGHTS[step.name] for step in steps)
-        records: dict[str, StepRecord] = {}
-        behind = 0.0
-        for step in steps:
-            failed = step.name
-            part = _part_of(progress, behind / total, WEIGHTS[step.name] / total, step.name)
-            part(0.0, 1.0)
+        return run_steps(
+            job.name, job.folder, parts, hashes, overwrite=job.overwrite, day=day, where=where
+        )
+    finally:
+        cv2.setNumThreads(threads)
+
+
+def run_steps(
+    name: str,
+    parent: Path,
+    steps: Sequence[tuple[Step, Progress]],
+    hashes: FileHashes,
+    *,
+    overwrite: bool,
+    day: str | None = None,
+    where: str = "",
+) -> PairOutcome:
+    """Run the steps whose results are not in their folders yet; errors become the outcome.
+
+    Parameters
+    ----------
+    name : str
+        That of the outcome.
+    parent : Path
+        Where the folders of the steps lie.
+    steps : sequence of (Step, Progress)
+        Each with what is told how far it is.
+    hashes : FileHashes
+    overwrite : bool
+        Replace files that were changed after they were made.
+    day : str, optional
+        That the files bear.
+    where : str
+        What an error belongs to.
+    """
+    start = time.perf_counter()
+    done: list[str] = []
+    kept: list[str] = []
+    remarks: list[str] = []
+    records: dict[str, StepRecord] = {}
+    failed = message = ""
+    try:
+        for step, progress in steps:
+            failed, folder = step.name, parent / step.name
+            progress(0.0, 1.0)
             key = step_key(step, records, hashes)
-            record = read_record(job.folder / step.name)
-            if record is not None and is_current(job.folder / step.name, record, key, hashes):
+            record = read_record(folder)
+            if record is not None and is_current(folder, record, key, hashes):
                 kept.append(step.name)
             else:
-                rasters = cloud_optimised(bool(job.options.get("cog")))
-                with recording(step.described(), day=job.date or None), rasters:
+                rasters = cloud_optimised(bool(step.options.get("cog")))
+                with recording(step.described(), day=day), rasters:
                     record = run_step(
-                        job.folder, step, key, hashes, progress=part, overwrite=job.overwrite
+                        parent, step, key, hashes, progress=progress, overwrite=overwrite
                     )
                 done.append(step.name)
             records[step.name] = record
             remarks += [f"{step.name}: {remark}" for remark in record.remarks]
-            behind += WEIGHTS[step.name]
         failed = ""
-    except Exception as error:  # one pair's fault, whatever it is, must not stop the others
-        message = failure_message(error, f"pair {job.name}, step {failed}", job.folder)
+    except Exception as error:  # one fault, whatever it is, must not stop the other pairs
+        message = failure_message(error, f"{where}step {failed}", parent)
     finally:
-        cv2.setNumThreads(threads)
-        hashes.save()
+        with suppress(OSError):
+            hashes.save()
     return PairOutcome(
-        name=job.name, done=tuple(done), kept=tuple(kept), failed_step=failed, message=message,
+        name=name, done=tuple(done), kept=tuple(kept), failed_step=failed, message=message,
         remarks=tuple(remarks), seconds=time.perf_counter() - start,
     )  # fmt: skip
 
