@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,20 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
         raise InputError(f"{name}: holds a whole number above {largest:.2g}.") from error
     except (TypeError, ValueError) as error:
         raise InputError(f"{name}: expected numbers, found {value!r:.60}.") from error
+
+
+def floats_of_words(words: Sequence[str], path: Path, where: str) -> FloatArray:
+    """Return words of a file as numbers; refuse the first that is none, {} being its place."""
+    values = np.empty(len(words))
+    for k, word in enumerate(words):
+        try:
+            values[k] = float(word)
+            wrong = "" if abs(values[k]) <= LARGEST else f"{word:.40} is no finite number."
+        except ValueError:
+            wrong = f"expected a number, found {word!r:.40}."
+        if wrong:
+            raise InputError(f"{path}, {where.replace('{}', str(k + 1))}: {wrong}")
+    return values
 
 
 def is_finite_number(value: object) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 from bifocal.model.orientation_precision import CAMERA
 from bifocal.model.pair_media import PairMedia
 from bifocal.networks.joint_observations import JointObservations, with_enough_rays, with_rays
-from photocore.adjustment import OUTLIER_LIMIT, Fit, huber_weights, minimise, standardised
+from photocore.adjustment import OUTLIER_LIMIT, Fit, huber_weights, standardised
 from photocore.adjustment.network import Network, NetworkState, Rows
 from photocore.adjustment.sparse import SparseEquations
 from photocore.arrays import BoolArray, FloatArray, IntArray
@@ -149,7 +149,7 @@ def adjust_jointly(observations: JointObservations, start: JointUnknowns) -> Joi
     seen = _without(seen, tests < FAR_OFF, known, blunders)
     for left in range(ROUNDS, -1, -1):
         system = _System(seen, start, focal)
-        fit = system.network.solve(system.start, largest=0)
+        fit = system.network.solve(system.start)
         start = _unknowns(fit.state)
         sigma0 = _sigma0(fit, system)
         keep, known, found = _gross(seen, system, fit, sigma0)
@@ -181,9 +181,7 @@ def _coarse(
             seen, sigma=seen.sigma / np.sqrt(huber_weights(away, 2.0)), sigma_known=spread
         )
         system = _System(weighted, start, focal)
-        network = system.network
-        fit = minimise(system.start, network.equations, network.advance, most=6, largest=0)
-        start = _unknowns(fit.state)
+        start = _unknowns(system.network.minimise(system.start, most=6).state)
     away = _away(_System(seen, start, focal)) / seen.sigma
     usual = max(float(np.median(away)) / 1.1774, 1.0)  # Rayleigh's median
     off = _off_control(seen, start)
@@ -277,7 +275,7 @@ class _System:
             free=np.broadcast_to(self.used[:, None], shape), kept=np.full(shape, -1),
             names=[f"{seen.ids[k]}: {axis}" for k in np.flatnonzero(self.used) for axis in "XYr"],
             terms=(self._rays, self._known), step=_stepped, what="the pairs", rounding=ROUNDING,
-            kind=SparseEquations,
+            kind=SparseEquations, largest=0,
         )  # fmt: skip
 
     def rays(self, state: NetworkState) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -85,7 +85,7 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
     if not columns.labels and not bundle.free.any():
         raise InputError("adjust: nothing to estimate; free a camera or add new points.")
     weights = np.ones_like(bundle.observations.image)
-    bundle, fitted = _balanced(bundle, bundle.fit(bundle.start), weights)
+    bundle, fitted = _balanced(bundle, bundle.network.solve(bundle.start), weights)
     for _ in range(ROBUST_ROUNDS if unknowns.robust is not None else 0):
         assert unknowns.robust is not None
         plain = fitted.residuals[: weights.size].reshape(-1, 2) / np.sqrt(weights)
@@ -93,7 +93,7 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
         if np.abs(new - weights).max() < 1e-3:
             break
         weights = new
-        fitted = _weighted(bundle, weights).fit(fitted.state)
+        fitted = _weighted(bundle, weights).network.solve(fitted.state)
         bundle, fitted = _balanced(bundle, fitted, weights)
     result = _adjustment(bundle, fitted, weights, remarks)
     refuse_impossible_media(bundle.project, columns, result, unknowns.priors)
@@ -131,7 +131,7 @@ def _balanced(
         if abs(worth - 1) < BALANCED or worth * seen.sigma.min() < EXACT:
             break
         bundle = replace(bundle, observations=replace(seen, sigma=seen.sigma * worth))
-        fitted = _weighted(bundle, weights).fit(fitted.state)
+        fitted = _weighted(bundle, weights).network.solve(fitted.state)
     return bundle, fitted
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.sparse import hstack
@@ -12,8 +12,8 @@ from multimedia.adjustment.unknowns import Unknowns
 from multimedia.media.camera import EXTERIOR
 from multimedia.media.projection import project_with_jacobian
 from multimedia.projects.model import Project
-from photocore.adjustment import LARGEST, Fit
-from photocore.adjustment.network import Network, NetworkState, Rows
+from photocore.adjustment import BlockEquations
+from photocore.adjustment.network import LARGEST, Network, NetworkState, Rows
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.camera.rotation import by_turn, skew
 from photocore.errors import GeometryError
@@ -107,10 +107,6 @@ class Bundle:
             rounding=2e-15 * size / float(self.observations.sigma.min(initial=1.0)),
         )  # fmt: skip
 
-    def fit(self, start: NetworkState, *, largest: int = LARGEST) -> Fit[NetworkState]:
-        """Adjust from a start; beyond ``largest`` unknowns by elimination of the points."""
-        return self.network.solve(start, largest=largest)
-
     def _carried(self, state: NetworkState) -> NetworkState:
         """Return a state with the points on plates where their poses put them."""
         for plate, pose in state.blocks["plate"].items():
@@ -167,12 +163,11 @@ class Bundle:
         return True
 
     def _datum(self, state: NetworkState, rows: Rows) -> bool:
-        moved = np.concatenate([state.drift, (state.points - self.start.points).ravel()])
-        stay = len(self.columns.labels)
-        for row in self.datum:
-            lines, near, far = rows.add(row[None] @ moved), *np.split(row, [stay])
-            rows.by_label(lines, np.arange(stay), near)
-            rows.by_points(lines, np.arange(len(self.free)), far.reshape(-1, 3))
+        if len(self.datum):
+            moved = np.concatenate([state.drift, (state.points - self.start.points).ravel()])
+            points = np.where(self.free, rows.places, -1).ravel()
+            columns = np.concatenate([np.arange(len(self.columns.labels)), points])
+            rows.by_label(rows.add(self.datum @ moved)[:, None], columns, self.datum)
         return True
 
     def datum_rows(self) -> FloatArray:
@@ -185,8 +180,8 @@ class Bundle:
         world leaves fewer of them.
         """
         state, stay = self.start, len(self.columns.labels)
-        linear = self.network.equations(state)
-        if self.unknowns.control != "free" or linear is None:
+        linear = replace(self.network, largest=0).equations(state)
+        if self.unknowns.control != "free" or not isinstance(linear, BlockEquations):
             return np.zeros((0, 0))
         motion = self._motions()
         jacobian = hstack([linear.design, linear.eliminated], "csr")

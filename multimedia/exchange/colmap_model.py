@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from multimedia.exchange.opencv_camera import camera_of, inexact, opencv_of
+from multimedia.exchange.opencv_camera import camera_of, digits, inexact, opencv_of
 from multimedia.media.camera import Camera
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.interfaces import Interfaces
@@ -23,10 +23,10 @@ from multimedia.media.surfaces import Sphere
 from multimedia.projects.camera_poses import FLIP
 from multimedia.projects.model import ImagePoints, ObjectPoints, Project
 from multimedia.refraction.layers import Layers
-from photocore.arrays import FloatArray
+from photocore.arrays import FloatArray, floats_of_words
 from photocore.camera.lensformats import LensData, colmap_lens
 from photocore.camera.rotation import quaternion_from_rotation, rotation_from_quaternion
-from photocore.errors import LARGEST, InputError
+from photocore.errors import InputError
 from photocore.output import atomic_folder
 from photocore.textfile import read_text
 
@@ -128,14 +128,14 @@ def write_colmap(folder: Path, project: Project, *, overwrite: bool = False) -> 
             model = "FULL_OPENCV" if d[4] else "OPENCV"
             numbered = (*numbered, *d[:4], *((d[4], 0, 0, 0) if d[4] else ()))
         port = _port_words(camera, project.interface_of(k - 1))
-        content = f"{model} {view.size[0]} {view.size[1]} {_text(numbered)}{port}"
+        content = f"{model} {view.size[0]} {view.size[1]} {digits(numbered)}{port}"
         number = lines.setdefault(content, str(len(lines) + 1))
-        pose = _text((*quaternion_from_rotation(view.rotation), *view.translation))
+        pose = digits((*quaternion_from_rotation(view.rotation), *view.translation))
         images.append(f"{k} {pose} {number} {camera.name}")
         rows = project.image_points.of_camera(camera.name)
         images.append(_keypoints(project, camera, rows, k, numbers, tracks))
     points = [
-        f"{numbers[name]} {_text(place)} 128 128 128 0 {' '.join(tracks[name])}".rstrip()
+        f"{numbers[name]} {digits(place)} 128 128 128 0 {' '.join(tracks[name])}".rstrip()
         for name, place in zip(project.object_points.ids, project.object_points.xyz, strict=True)
     ]
     with atomic_folder(folder, overwrite=overwrite) as temporary:
@@ -166,7 +166,7 @@ def _keypoints(
     parts = []
     for k, (row, pixel) in enumerate(zip(rows, pixels, strict=True)):
         name = project.image_points.ids[row]
-        parts.append(f"{_text(pixel)} {numbers.get(name, str(_NONE))}")
+        parts.append(f"{digits(pixel)} {numbers.get(name, str(_NONE))}")
         if name in tracks:
             tracks[name].append(f"{number} {k}")
     return " ".join(parts)
@@ -174,7 +174,7 @@ def _keypoints(
 
 def _port(words: Sequence[str], path: Path) -> FlatInterface | Interfaces:
     """Return the port that the words after a lens describe, in our camera frame."""
-    kind, values = words[0], _floats(words[1:], path, f"{words[0]} parameters")
+    kind, values = words[0], floats_of_words(words[1:], path, f"{words[0]} parameters")
     if kind not in _PORTS or len(values) != 8:
         raise InputError(
             f"{path}: {kind} with {len(values)} parameters after the lens: known are "
@@ -207,7 +207,7 @@ def _port_words(camera: Camera, media: FlatInterface | Interfaces | None) -> str
         indices = media.indices if len(media.indices) == 3 else (*media.indices, media.indices[1])
         distance = float(there.height - glass)
         normal = -(FLIP @ there.normal)
-        return f" FLATPORT {_text([*normal, distance, glass, *indices])}"
+        return f" FLATPORT {digits([*normal, distance, glass, *indices])}"
     if isinstance(media, Interfaces) and len(media.surfaces) == 2:
         inner, outer = media.surfaces
         if isinstance(inner, Sphere) and isinstance(outer, Sphere):
@@ -217,7 +217,7 @@ def _port_words(camera: Camera, media: FlatInterface | Interfaces | None) -> str
             )
             if np.abs(first - second).max() <= 1e-12 * inner.radius:
                 wall = outer.radius - inner.radius
-                return f" DOMEPORT {_text([*first, inner.radius, wall, *media.indices])}"
+                return f" DOMEPORT {digits([*first, inner.radius, wall, *media.indices])}"
     raise InputError(
         f"camera {camera.name}: COLMAP knows flat ports of two or three parallel media and domes "
         "of two concentric spheres, not what this camera looks through."
@@ -242,8 +242,8 @@ def _views(path: Path, lenses: dict[str, LensData]) -> list[_View]:
             raise InputError(f"{where}: IMAGE_ID {words[0]!r:.60} is no whole number.")
         if words[8] not in lenses:
             raise InputError(f"{where}: camera {words[8]} is not in cameras.txt.")
-        pose = _floats(words[1:8], path, f"line {number}")
-        table = _floats(second.split(), path, f"line {number + 1}")
+        pose = floats_of_words(words[1:8], path, f"line {number}")
+        table = floats_of_words(second.split(), path, f"line {number + 1}")
         if len(table) % 3:
             raise InputError(f"{path}, line {number + 1}: expected X, Y, POINT3D_ID of each point.")
         table = table.reshape(-1, 3)
@@ -266,7 +266,7 @@ def _points(path: Path) -> ObjectPoints:
         if len(words) < 4:
             raise InputError(f"{path}: {line!r:.60} is not a COLMAP point.")
         ids.append(words[0])
-        xyz.append(_floats(words[1:4], path, f"point {words[0]}"))
+        xyz.append(floats_of_words(words[1:4], path, f"point {words[0]}"))
     return ObjectPoints(ids=tuple(ids), xyz=np.array(xyz).reshape(-1, 3))
 
 
@@ -278,23 +278,7 @@ def _lines(path: Path) -> list[str]:
     ]
 
 
-def _floats(words: Sequence[str], path: Path, where: str) -> FloatArray:
-    values = np.empty(len(words))
-    for k, word in enumerate(words):
-        try:
-            values[k] = float(word)
-        except ValueError:
-            raise InputError(f"{path}, {where}: expected a number, found {word!r:.40}.") from None
-        if not abs(values[k]) <= LARGEST:
-            raise InputError(f"{path}, {where}: {word:.40} is no finite number.")
-    return values
-
-
 def _names(names: Sequence[str]) -> list[str]:
     """Return the names of photos without folder and ending where that leaves them different."""
     short = [PurePosixPath(name).stem for name in names]
     return short if len(set(short)) == len(short) else list(names)
-
-
-def _text(values: Sequence[float] | FloatArray) -> str:
-    return " ".join(f"{float(v):.17g}" for v in values)

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from multimedia.exchange.opencv_camera import OpencvCamera, camera_of, inexact, opencv_of
+from multimedia.exchange.opencv_camera import OpencvCamera, camera_of, digits, left_out, opencv_of
 from multimedia.media.camera import Camera
 from multimedia.projects.model import Project
 from photocore.arrays import FloatArray
@@ -83,23 +83,18 @@ def write_metashape(path: Path, project: Project, *, overwrite: bool = False) ->
         )
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = view.rotation.T, -view.rotation.T @ view.translation
-        ElementTree.SubElement(camera, "transform").text = _text(matrix.ravel())
+        ElementTree.SubElement(camera, "transform").text = digits(matrix.ravel())
     # The chunk's frame is the project's.
     transform = ElementTree.SubElement(chunk, "transform")
-    ElementTree.SubElement(transform, "rotation").text = _text(np.eye(3).ravel())
-    ElementTree.SubElement(transform, "translation").text = _text(np.zeros(3))
+    ElementTree.SubElement(transform, "rotation").text = digits(np.eye(3).ravel())
+    ElementTree.SubElement(transform, "translation").text = digits(np.zeros(3))
     ElementTree.SubElement(transform, "scale").text = "1"
     ElementTree.indent(document)
     with atomic_path(path, overwrite=overwrite) as temporary:
         content = ElementTree.tostring(document, encoding="unicode")
         head = '<?xml version="1.0" encoding="UTF-8"?>\n'
         temporary.write_text(f"{head}{content}\n", encoding="utf-8")
-    remarks = [*inexact(views)]
-    if any(project.media_of):
-        remarks.append("Metashape knows no media: glass and water were not written.")
-    if project.object_points.ids or project.image_points.ids:
-        remarks.append("points are not part of Metashape's camera file; they were not written.")
-    return tuple(remarks)
+    return left_out(project, views, "Metashape", "camera file")
 
 
 def _add_sensor(parent: ElementTree.Element, number: int, name: str, view: OpencvCamera) -> None:
@@ -167,7 +162,3 @@ def _numbers(text: str, count: int, path: Path, where: str) -> FloatArray:
     if len(values) != count or not (np.abs(values) <= LARGEST).all():
         raise InputError(f"{path}: the {where} must be {count} numbers, found {len(values)}.")
     return values
-
-
-def _text(values: FloatArray) -> str:
-    return " ".join(f"{v:.17g}" for v in values.tolist())

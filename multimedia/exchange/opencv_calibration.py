@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.exchange.opencv_camera import OpencvCamera, camera_of, inexact, opencv_of
+from multimedia.exchange.opencv_camera import OpencvCamera, camera_of, left_out, opencv_of
 from multimedia.media.camera import Camera
 from multimedia.projects.model import Project
 from photocore.arrays import FloatArray
@@ -87,12 +87,7 @@ def write_opencv(path: Path, project: Project, *, overwrite: bool = False) -> tu
         with atomic_folder(path, overwrite=overwrite) as folder:
             for name, text in texts.items():
                 (folder / f"{name}.yml").write_text(text, encoding="utf-8")
-    remarks = [*inexact(views)]
-    if any(project.media_of):
-        remarks.append("OpenCV knows no media: glass and water were not written.")
-    if project.object_points.ids or project.image_points.ids:
-        remarks.append("points are not part of OpenCV's calibrations; they were not written.")
-    return tuple(remarks)
+    return left_out(project, views, "OpenCV", "calibrations")
 
 
 def _calibration_text(path: Path, view: OpencvCamera) -> str:

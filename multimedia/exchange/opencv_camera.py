@@ -8,6 +8,7 @@ off, which is mended where they are read and written.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from multimedia.media.camera import Camera, Distortion, Sensor
 from multimedia.media.lens_conversion import farthest_miss, nearest_camera, sensor_rays
 from multimedia.projects.camera_poses import FLIP
+from multimedia.projects.model import Project
 from photocore.arrays import FloatArray
 from photocore.camera.distortion import Brown, Convention
 from photocore.camera.fisheye import TERMS, Fisheye
@@ -193,3 +195,20 @@ def inexact(cameras: dict[str, OpencvCamera]) -> tuple[str, ...]:
         "OpenCV's lens model has no terms for this distortion as it is; written with those that "
         f"come nearest. Image points move by at most: {', '.join(moved)}.",
     )
+
+
+def left_out(
+    project: Project, views: dict[str, OpencvCamera], program: str, files: str
+) -> tuple[str, ...]:
+    """Return what to say of a project written for a program whose files hold cameras alone."""
+    remarks = list(inexact(views))
+    if any(project.media_of):
+        remarks.append(f"{program} knows no media: glass and water were not written.")
+    if project.object_points.ids or project.image_points.ids:
+        remarks.append(f"points are not part of {program}'s {files}; they were not written.")
+    return tuple(remarks)
+
+
+def digits(values: Iterable[float]) -> str:
+    """Return numbers with all their digits, a blank between them."""
+    return " ".join(f"{v:.17g}" for v in values)

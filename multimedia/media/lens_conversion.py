@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from multimedia.media.camera import Camera
-from multimedia.media.projection import Media, project, project_with_jacobian
-from photocore.adjustment import minimise
+from multimedia.media.known_points import KnownPoints, camera_of, start_at
+from multimedia.media.projection import Media, project
 from photocore.arrays import FloatArray
 from photocore.camera.distortion import Brown
-from photocore.errors import GeometryError, InputError
+from photocore.errors import InputError
 
 #: Points along the sides of the sensor at which cameras are compared.
 _GRID = (25, 21)
@@ -81,21 +81,11 @@ def nearest_camera(
     media : Layers, FlatInterface, Interfaces or None
         As for `project`.
     """
-
-    def equations(camera: Camera) -> tuple[FloatArray, FloatArray] | None:
-        seen = project_with_jacobian(camera, points, media, camera_names=names)
-        if not np.isfinite(seen.image).all():
-            return None
-        return (seen.image - image).ravel(), seen.by_camera.reshape(-1, len(names))
-
-    def advance(camera: Camera, step: FloatArray) -> Camera | None:
-        try:
-            return camera.stepped(names, step)
-        except (InputError, GeometryError):
-            return None
-
     what = f"camera {start.name} in the terms of another lens model"
-    return minimise(start, equations, advance, what=what, most=60).state
+    seen = KnownPoints(
+        points=points, image=image, media=media, sigma=np.ones_like(image), what=what
+    )
+    return camera_of(seen.network(names).minimise(start_at(start), most=60).state)
 
 
 def farthest_miss(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,10 +11,10 @@ from multimedia.media.camera import Camera, Sensor
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.lens_conversion import brown_of
 from multimedia.refraction.layers import Layers
-from photocore.arrays import FloatArray, IntArray
+from photocore.arrays import FloatArray, IntArray, floats_of_words
 from photocore.camera.distortion import Brown, Convention
 from photocore.camera.rotation import checked_rotation, nearest_rotation, world_from_camera
-from photocore.errors import LARGEST, InputError
+from photocore.errors import InputError
 from photocore.textfile import read_text
 
 #: A printed matrix has 7 decimals; angles and matrix of one camera differ by a few of the last.
@@ -167,7 +166,7 @@ def read_targets(path: Path, *, field: int = 0) -> DetectedTargets:
             f"{path}: its first line announces {count} targets of 8 numbers, {len(rest)} numbers "
             "follow. The file is cut off, or is no target file."
         )
-    table = floats(path, rest, "value {} of the targets").reshape(-1, 8)
+    table = floats_of_words(rest, path, "value {} of the targets").reshape(-1, 8)
     pixels = table[:, 1:3].copy()
     if field in (1, 2):
         # Half frames: the file counts every other line.
@@ -195,7 +194,7 @@ def read_body(path: Path) -> tuple[list[str], FloatArray]:
                 f"{path}, line {number}: found {len(fields)} values, expected number X Y Z."
             )
         ids.append(fields[0])
-        points.append(floats(path, fields[1:], f"line {number}"))
+        points.append(floats_of_words(fields[1:], path, f"line {number}"))
     if not ids:
         raise InputError(f"{path}: no points; expected lines of number X Y Z.")
     return ids, np.array(points)
@@ -217,7 +216,7 @@ def read_manual(points: Path, pixels: Path) -> tuple[list[str], FloatArray]:
         If the two files do not belong together.
     """
     ids = read_text(points, KIND).split()
-    values = floats(pixels, read_text(pixels, KIND).split(), "man_ori")
+    values = floats_of_words(read_text(pixels, KIND).split(), pixels, "man_ori")
     if values.size != 2 * len(ids):
         raise InputError(
             f"{pixels}: holds {values.size} numbers for the {len(ids)} points of {points.name}; "
@@ -247,7 +246,7 @@ def read_correspondences(path: Path) -> tuple[FloatArray, IntArray]:
         )
     if not rows:
         return np.empty((0, 3)), np.empty((0, 0), dtype=np.int64)
-    table = np.array([floats(path, row, f"line {k}") for k, row in enumerate(rows, 2)])
+    table = np.array([floats_of_words(row, path, f"line {k}") for k, row in enumerate(rows, 2)])
     return table[:, 1:4].copy(), table[:, 4:].astype(np.int64)
 
 
@@ -297,26 +296,11 @@ def _rotation(
     return nearest_rotation(matrix), (f"{path.name}: {odd}",)
 
 
-def floats(path: Path, words: Sequence[str], what: str) -> FloatArray:
-    """Return words as numbers; refuse the first that is none; {} in ``what`` is its place."""
-    values = np.empty(len(words))
-    for place, word in enumerate(words):
-        try:
-            values[place] = float(word)
-        except ValueError:
-            where = what.format(place + 1)
-            raise InputError(f"{path}, {where}: expected a number, found {word!r:.40}.") from None
-        if not abs(values[place]) <= LARGEST:
-            where = what.format(place + 1)
-            raise InputError(f"{path}, {where}: {word:.40} is no finite number.")
-    return values
-
-
 def _number(path: Path, lines: list[str], index: int, what: str) -> float:
     if index >= len(lines):
         raise InputError(f"{path}: ends before line {index + 1} ({what}).")
     words = lines[index].split()[:1] or [""]
-    return float(floats(path, words, f"line {index + 1} ({what})")[0])
+    return float(floats_of_words(words, path, f"line {index + 1} ({what})")[0])
 
 
 def _count(path: Path, lines: list[str], what: str) -> int:
@@ -328,7 +312,7 @@ def _count(path: Path, lines: list[str], what: str) -> int:
 
 
 def _numbers(path: Path, least: int, what: str) -> FloatArray:
-    values = floats(path, read_text(path, KIND).split(), "value {}")
+    values = floats_of_words(read_text(path, KIND).split(), path, "value {}")
     if len(values) < least:
         raise InputError(f"{path}: {len(values)} numbers, expected at least {least}: {what}.")
     return values

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from multimedia.media.camera import Sensor
-from multimedia.openptv.openptv_files import KIND, floats
+from multimedia.openptv.openptv_files import KIND
 from multimedia.openptv.plane_sets import PlaneCandidates, PlaneSet
-from photocore.arrays import FloatArray, IntArray
+from photocore.arrays import FloatArray, IntArray, floats_of_words
 from photocore.errors import InputError
 from photocore.textfile import read_text
 
@@ -39,7 +39,7 @@ def read_stems(path: Path) -> list[str]:
         If fewer stems follow than the first line announces.
     """
     lines = [line.strip() for line in read_text(path, KIND).splitlines() if line.strip()]
-    count = int(floats(path, lines[:1] or [""], "line 1 (number of planes)")[0])
+    count = int(floats_of_words(lines[:1] or [""], path, "line 1 (number of planes)")[0])
     stems = [line.replace("\\", "/") for line in lines[1 : 1 + count]]
     if count < 1 or len(stems) < count:
         raise InputError(
@@ -205,7 +205,7 @@ def _rows(path: Path, width: int) -> tuple[FloatArray, FloatArray]:
         if len(line) != width:
             raise InputError(f"{path}, line {place}: found {len(line)} values, expected {width}.")
     words = [word for line in lines for word in line]
-    table = floats(path, words, "value {}").reshape(-1, width)
+    table = floats_of_words(words, path, "value {}").reshape(-1, width)
     return table[:, 0], table[:, 1:]
 
 

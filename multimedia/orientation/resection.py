@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.media.camera import ANY_INTERIOR, EXTERIOR, Camera
-from multimedia.media.optical_media import OpticalMedia
-from multimedia.media.projection import Media, as_media, project_with_jacobian, refuse_pixels
+from multimedia.media.known_points import KnownPoints, camera_of, start_at
+from multimedia.media.projection import Media, as_media, refuse_pixels
 from multimedia.orientation.pose_starts import pose_starts
-from photocore.adjustment import OUTLIER_LIMIT, correlations, fit, minimise
+from photocore.adjustment import OUTLIER_LIMIT, Fit, correlations
+from photocore.adjustment.network import NetworkState
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import ConvergenceError, GeometryError, InputError
 
@@ -138,22 +139,21 @@ def resect(
         camera, object_points, image_points, sigma, len(names)
     )
     what = f"resection of camera {camera.name}" if camera.name else "resection"
-    problem = _ControlImages(control, image, sigmas, as_media(layers), names, what)
-    start = _best_start(camera, replace(problem, names=EXTERIOR))
-    result = fit(
-        start, problem.equations, problem.advance, names=names, what=what, rounding=problem.floor
-    )
-    _refuse_mirrored(result.state, result.sigma0, problem)
+    seen = KnownPoints(points=control, image=image, media=as_media(layers), sigma=sigmas, what=what)
+    start = camera_of(_best_start(camera, seen).state)
+    result = seen.network(names).solve(start_at(start))
+    adjusted = camera_of(result.state)
+    _refuse_mirrored(adjusted, result.sigma0, seen)
     shape = (len(used), 2)
     residuals, normed = np.full(shape, np.nan), np.full(shape, np.nan)
     residuals[used] = -result.residuals.reshape(-1, 2) * sigmas
     normed[used] = -result.standardised.reshape(-1, 2)
     covariance = result.linear.cofactor * result.sigma0**2
-    _refuse_flat(result.state, names, covariance, what)
+    _refuse_flat(adjusted, names, covariance, what)
     return Resection(
-        camera=result.state,
+        camera=adjusted,
         names=names,
-        covariance=_angle_covariance(result.state, names, covariance),
+        covariance=_angle_covariance(adjusted, names, covariance),
         residuals=residuals,
         standardised=normed,
         sigma0=result.sigma0,
@@ -162,78 +162,39 @@ def resect(
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _ControlImages:
-    """Control points, their images, and the parameters wanted."""
-
-    control: FloatArray
-    image: FloatArray
-    sigmas: FloatArray
-    interface: OpticalMedia
-    names: tuple[str, ...]
-    what: str
-
-    def equations(self, camera: Camera) -> tuple[FloatArray, FloatArray] | None:
-        """Return computed minus measured and its derivatives; None if a point is not seen."""
-        try:
-            seen = project_with_jacobian(
-                camera, self.control, self.interface, camera_names=self.names
-            )
-        except GeometryError:
-            return None
-        if not np.isfinite(seen.image).all():
-            return None
-        miss = (seen.image - self.image) / self.sigmas
-        jacobian = seen.by_camera / self.sigmas[:, :, None]
-        return miss.ravel(), jacobian.reshape(-1, len(self.names))
-
-    def is_beyond_doubt(self, cost: float) -> bool:
-        """Whether a pose fits so well that no other can: a body with depth, tiny residuals."""
-        spread = np.linalg.svd(self.control - self.control.mean(axis=0), compute_uv=False)
-        deep = spread[2] > DEEP * spread[0]
-        return bool(deep and cost < (FITS**2) * float((self.image**2).sum()))
-
-    @property
-    def floor(self) -> float:
-        """Residuals that are nothing but rounding."""
-        return 2e-16 * float(np.abs(self.image).max(initial=0.0))
-
-    def advance(self, camera: Camera, step: FloatArray) -> Camera | None:
-        """Return the camera after a step, None where there is no such camera."""
-        try:
-            return camera.stepped(self.names, step)
-        except (InputError, GeometryError):
-            return None
-
-    def cost(self, camera: Camera) -> float:
-        """Return the weighted square sum, infinite where a point is not seen."""
-        equations = self.equations(camera)
-        return np.inf if equations is None else float(equations[0] @ equations[0])
+def _is_beyond_doubt(seen: KnownPoints, pose: Fit[NetworkState]) -> bool:
+    """Whether a pose fits so well that no other can: a body with depth, tiny residuals."""
+    spread = np.linalg.svd(seen.points - seen.points.mean(axis=0), compute_uv=False)
+    deep = spread[2] > DEEP * spread[0]
+    return bool(deep and _cost(pose) < (FITS**2) * float((seen.image**2).sum()))
 
 
-def _best_start(camera: Camera, problem: _ControlImages) -> Camera:
+def _best_start(camera: Camera, seen: KnownPoints) -> Fit[NetworkState]:
     """Return the pose of the smallest square sum that any start leads to."""
-    poses: list[tuple[float, Camera]] = []
-    functions, count = (problem.equations, problem.advance), 1
-    starts = pose_starts(camera, problem.control, problem.image, problem.interface)
+    poses: list[Fit[NetworkState]] = []
+    network, count = seen.network(), 1
+    starts = pose_starts(camera, seen.points, seen.image, as_media(seen.media))
     for count, start in enumerate(starts, start=2):  # noqa: B007
         try:
-            pose = minimise(start, *functions, most=60, settle=1e-4, rounding=problem.floor)
+            poses.append(network.minimise(start_at(start), most=60, settle=1e-4))
         except GeometryError:  # from there the camera does not see all points
             continue
-        poses.append((float(pose.residuals @ pose.residuals), pose.state))
-        if problem.is_beyond_doubt(poses[-1][0]):
+        if _is_beyond_doubt(seen, poses[-1]):
             break
     if not poses:
         raise ConvergenceError(
-            f"{problem.what}: no position was found from which the camera sees all control points "
+            f"{seen.what}: no position was found from which the camera sees all control points "
             "through the interface. Check that image and object points belong together, the units "
             "(mm in the image), the principal distance, and on which side of the interface the "
             "normal points",
             iterations=count,
             residual=float("nan"),
         )
-    return min(poses, key=lambda pair: pair[0])[1]
+    return min(poses, key=_cost)
+
+
+def _cost(pose: Fit[NetworkState]) -> float:
+    return float(pose.residuals @ pose.residuals)
 
 
 def _checked_names(camera: Camera, estimate: Sequence[str]) -> tuple[str, ...]:
@@ -289,24 +250,21 @@ def _checked_points(
     return control, image, sigmas, used
 
 
-def _refuse_mirrored(camera: Camera, sigma0: float, problem: _ControlImages) -> None:
+def _refuse_mirrored(camera: Camera, sigma0: float, seen: KnownPoints) -> None:
     """Refuse a bad fit that becomes a good one when the control is mirrored."""
-    size = float(np.sqrt(np.mean(problem.image**2)))
+    size = float(np.sqrt(np.mean(seen.image**2)))
     if not sigma0 > 0.005 * size:
         return
-    normal = problem.interface.mirror_normal(problem.control)
-    offset = (problem.control - problem.control.mean(axis=0)) @ normal
-    mirrored = replace(
-        problem, control=problem.control - 2.0 * offset[:, None] * normal, names=EXTERIOR
-    )
+    normal = as_media(seen.media).mirror_normal(seen.points)
+    offset = (seen.points - seen.points.mean(axis=0)) @ normal
+    mirrored = replace(seen, points=seen.points - 2.0 * offset[:, None] * normal)
     try:
         other = _best_start(camera, mirrored)
     except ConvergenceError:
         return
-    count = 2 * len(problem.image) - len(EXTERIOR)
-    if count > 0 and np.sqrt(mirrored.cost(other) / count) < 0.2 * sigma0:
+    if other.sigma0 < 0.2 * sigma0:
         raise GeometryError(
-            f"{problem.what}: the control points fit the image only as in a mirror. One coordinate "
+            f"{seen.what}: the control points fit the image only as in a mirror. One coordinate "
             "system is left-handed, or x or y of the image points the wrong way: image x runs to "
             "the right, y up; X, Y, Z must be right-handed."
         )

@@ -46,12 +46,7 @@ class ObjectPoints:
         set_, count = object.__setattr__, len(self.ids)
         refuse_repeated(self.ids, "object points")
         set_(self, "xyz", read_only(np.reshape(self.xyz, (-1, 3)), "xyz", shape=(count, 3)))
-        sigma = np.full((count, 3), np.nan) if self.sigma is None else np.array(self.sigma, float)
-        if sigma.shape != (count, 3) or (sigma < 0).any():
-            raise InputError(f"sigma: expected shape ({count}, 3) and no negative values.")
-        sigma.setflags(write=False)
-        set_(self, "sigma", sigma)
-        set_(self, "groups", tuple(self.groups) or ("",) * count)
+        _set_sigma_and_groups(self, (count, 3), least=0.0, words="no negative values")
 
     def rows(self, ids: Sequence[str]) -> list[int]:
         """Return the row of each id, -1 where there is none."""
@@ -86,12 +81,8 @@ class ImagePoints:
         pairs = [f"{p} in {c}" for c, p in zip(self.cameras, self.ids, strict=True)]
         refuse_repeated(pairs, "image points")
         set_(self, "image", read_only(np.reshape(self.image, (-1, 2)), "image", shape=(count, 2)))
-        sigma = np.full((count, 2), np.nan) if self.sigma is None else np.array(self.sigma, float)
-        if sigma.shape != (count, 2) or (sigma <= 0).any():
-            raise InputError(f"sigma: expected shape ({count}, 2) and positive values.")
-        sigma.setflags(write=False)
-        set_(self, "sigma", sigma)
-        set_(self, "groups", tuple(self.groups) or ("",) * count)
+        above_zero = float(np.nextafter(0.0, 1.0))
+        _set_sigma_and_groups(self, (count, 2), least=above_zero, words="positive values")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -203,6 +194,18 @@ class Project:
                 f"no camera is called {name!r}; the project has {', '.join(self.camera_names)}."
             )
         return self.camera_names.index(name)
+
+
+def _set_sigma_and_groups(
+    points: ObjectPoints | ImagePoints, shape: tuple[int, int], *, least: float, words: str
+) -> None:
+    """Fill in and check what points may leave out."""
+    sigma = np.full(shape, np.nan) if points.sigma is None else np.array(points.sigma, float)
+    if sigma.shape != shape or (sigma < least).any():
+        raise InputError(f"sigma: expected shape {shape} and {words}.")
+    sigma.setflags(write=False)
+    object.__setattr__(points, "sigma", sigma)
+    object.__setattr__(points, "groups", tuple(points.groups) or ("",) * shape[0])
 
 
 def refuse_repeated(names: Sequence[str], what: str) -> None:

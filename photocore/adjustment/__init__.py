@@ -2,7 +2,7 @@
 
 from photocore.adjustment.blocks import BlockEquations
 from photocore.adjustment.dense import DenseEquations
-from photocore.adjustment.iteration import LARGEST, Fit, correlations, fit, minimise
+from photocore.adjustment.iteration import Fit, correlations, fit, minimise
 from photocore.adjustment.outliers import (
     OUTLIER_DISTANCE,
     OUTLIER_LIMIT,
@@ -11,7 +11,6 @@ from photocore.adjustment.outliers import (
 )
 
 __all__ = [
-    "LARGEST",
     "OUTLIER_DISTANCE",
     "OUTLIER_LIMIT",
     "BlockEquations",

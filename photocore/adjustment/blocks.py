@@ -13,7 +13,6 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_matrix, hstack
 
-from photocore.adjustment.dense import DenseEquations
 from photocore.arrays import BoolArray, FloatArray
 
 #: Eigenvalues of the scaled reduced normal matrix below this share of the largest mark undetermined
@@ -49,12 +48,6 @@ class BlockEquations:
     def unknowns(self) -> int:
         """Number of unknowns, free coordinates included."""
         return int(self.design.shape[1]) + int(self.free.sum())
-
-    def stacked(self) -> DenseEquations:
-        """Return the same equations with one dense matrix."""
-        points = self.eliminated.tocsc()[:, np.flatnonzero(self.free)]
-        jacobian = np.hstack([self.design.toarray(), points.toarray()])
-        return DenseEquations(residuals=self.residuals, jacobian=jacobian, free=self.free)
 
     @cached_property
     def _normal(self) -> tuple[FloatArray, FloatArray, FloatArray]:

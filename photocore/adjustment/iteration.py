@@ -21,8 +21,6 @@ State = TypeVar("State")
 Equations = tuple[FloatArray, FloatArray] | DenseEquations | BlockEquations | None
 Linear = DenseEquations | BlockEquations
 
-#: Largest number of unknowns solved as they are; beyond it the points are eliminated.
-LARGEST = 400
 #: Steps smaller than this share of what an unknown may vary by one sigma end the iteration.
 SETTLE = 1e-10
 #: The same where points are eliminated: normal equations see no smaller ones.
@@ -100,7 +98,6 @@ def minimise(
     most: int = 200,
     settle: float = SETTLE,
     rounding: float = 0.0,
-    largest: int = LARGEST,
 ) -> Fit[State]:
     """Go from a start to the least square sum.
 
@@ -121,8 +118,6 @@ def minimise(
     rounding : float
         Rounding error of a residual: ends when the residuals, or what a step changes of them,
         are nothing else.
-    largest : int
-        Unknowns beyond which `BlockEquations` are solved by elimination.
 
     Raises
     ------
@@ -137,7 +132,7 @@ def minimise(
     valleys, in which straight steps crawl. MINPACK and scipy know neither states that are no
     vectors (rotations), nor impossible ones, nor elimination.
     """
-    linear = _linear(equations(state), largest)
+    linear = _linear(equations(state))
     if linear is None:
         raise GeometryError(f"{what}: the start values are impossible.")
     damping, growth, curved = 1e-4, 2.0, False
@@ -156,7 +151,7 @@ def minimise(
                 rounding * np.sqrt(count)
             )
             following = advance(state, step)
-            new = None if following is None else _linear(equations(following), largest)
+            new = None if following is None else _linear(equations(following))
             new_cost = np.inf if new is None else float(new.residuals @ new.residuals)
             # A step that moves so little drops the square sum by less than its own rounding:
             # whether it went downhill cannot be seen, that it goes the right way is known.
@@ -184,12 +179,10 @@ def minimise(
     return Fit(state=state, linear=linear, iterations=number, settled=settled)
 
 
-def _linear(equations: Equations, largest: int) -> Linear | None:
+def _linear(equations: Equations) -> Linear | None:
     """Return equations in the form in which they are solved."""
     if isinstance(equations, tuple):
         return DenseEquations(residuals=equations[0], jacobian=equations[1])
-    if isinstance(equations, BlockEquations) and equations.unknowns <= largest:
-        return equations.stacked()
     return equations
 
 
@@ -204,7 +197,7 @@ def _bent(
 ) -> FloatArray:
     """Return a step that follows the curvature along it; the step itself where that is no help."""
     ahead = advance(state, probe * step)
-    beyond = None if ahead is None else _linear(equations(ahead), 0)
+    beyond = None if ahead is None else _linear(equations(ahead))
     if beyond is None:
         return step
     second = (beyond.residuals - linear.residuals) / probe - linear.change(step)
@@ -223,13 +216,12 @@ def fit(
     what: str,
     most: int = 200,
     rounding: float = 0.0,
-    largest: int = LARGEST,
 ) -> Fit[State]:
     """Adjust; refuse to return unknowns the data cannot determine.
 
     Parameters
     ----------
-    state, equations, advance, most, rounding, largest
+    state, equations, advance, most, rounding
         As for `minimise`.
     names : sequence of str
         Of the unknowns, for messages; free coordinates of points behind the others.
@@ -243,9 +235,7 @@ def fit(
     ConvergenceError
         If ``most`` steps do not settle it.
     """
-    result = minimise(
-        state, equations, advance, what=what, most=most, rounding=rounding, largest=largest
-    )
+    result = minimise(state, equations, advance, what=what, most=most, rounding=rounding)
     open_ = result.linear.undetermined(names)
     if open_:
         raise GeometryError(

@@ -8,7 +8,7 @@ that is eliminated, but for those that a row touches together with others.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -17,9 +17,13 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_matrix
 
 from photocore.adjustment.blocks import BlockEquations
-from photocore.adjustment.iteration import LARGEST, Fit, fit
+from photocore.adjustment.dense import DenseEquations
+from photocore.adjustment.iteration import SETTLE, Fit, Linear, fit, minimise
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.errors import GeometryError, InputError
+
+#: Largest number of unknowns solved as they are; beyond it the points are eliminated.
+LARGEST = 400
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -27,18 +31,17 @@ class NetworkState:
     """Blocks by kind and name, points (p, 3), and the sum of all steps of the labels, (u,)."""
 
     blocks: Mapping[str, Mapping[Any, Any]]
-    points: FloatArray
-    drift: FloatArray
+    points: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    drift: FloatArray = field(default_factory=lambda: np.zeros(1))
 
 
 class Rows:
     """Weighted residuals and derivatives as the terms enter them."""
 
-    def __init__(self, network: Network) -> None:
-        self.network, self.count = network, 0
+    def __init__(self, places: IntArray) -> None:
+        self.places, self.count = places, 0
         self.residuals: list[FloatArray] = []
-        self.design: list[list[FloatArray]] = [[np.zeros(0)] * 3]
-        self.eliminated: list[list[FloatArray]] = [[np.zeros(0)] * 3]
+        self.entries: list[tuple[IntArray, ArrayLike, ArrayLike]] = []
 
     def add(self, residuals: FloatArray) -> IntArray:
         """Add residuals of any shape; return the numbers of their rows, of the same shape."""
@@ -47,25 +50,26 @@ class Rows:
         return np.arange(self.count - residuals.size, self.count).reshape(residuals.shape)
 
     def by_label(self, rows: IntArray, columns: ArrayLike, values: ArrayLike) -> None:
-        """Enter derivatives of rows by columns, -1 for none; all broadcast."""
-        self._by(self.design, rows, columns, values)
+        """Enter derivatives of rows by columns, -1 for none: each once; all broadcast."""
+        self.entries.append((rows, columns, values))
 
     def by_points(self, rows: IntArray, which: IntArray, values: FloatArray) -> None:
         """Enter derivatives (..., 3) of rows (...) by points (...)."""
-        self.by_label(rows[..., None], self.network.kept[which], values)
-        self._by(self.eliminated, rows[..., None], self.network.places[which], values)
+        self.by_label(rows[..., None], self.places[which], values)
 
-    @staticmethod
-    def _by(parts: list[list[FloatArray]], *places: ArrayLike) -> None:
-        own = np.asarray(places[1]) >= 0
-        if own.all():
-            parts.append([part.ravel() for part in np.broadcast_arrays(*places)])
-        elif own.any():
-            *entries, own = np.broadcast_arrays(*places, own)
-            parts.append([part[own] for part in entries])
+    def dense(self, width: int) -> FloatArray:
+        """Return the entries as a matrix, shape (n, width)."""
+        matrix = np.zeros((width + 1, self.count)).T  # what has no column goes to the last
+        for rows, columns, values in self.entries:
+            matrix[rows, np.asarray(columns, np.int64)] = np.asarray(values)
+        return matrix[:, :-1]
 
-    def matrix(self, parts: list[list[FloatArray]], width: int) -> csr_matrix:
-        """Return entries as a matrix."""
+    def sparse(self, width: int) -> csr_matrix:
+        """Return the entries as a matrix of which most is zero, shape (n, width)."""
+        parts = [[np.zeros(0)] * 3]
+        for entry in self.entries:
+            some = [part.ravel() for part in np.broadcast_arrays(*entry)]
+            parts.append([part[some[1] >= 0] for part in some])
         rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
         return csr_matrix((values, (rows, columns)), shape=(self.count, width))
 
@@ -81,12 +85,12 @@ class Network:
     columns : mapping of str to mapping
         By kind and name, of each block's unknown parameters, by their own names; blocks may
         share some. What is not named is held.
-    free : ndarray of bool, shape (p, 3)
-        Coordinates of points that are eliminated.
-    kept : ndarray of int, shape (p, 3)
-        Columns of coordinates that are unknowns like others, else -1.
     terms : sequence of callable
         State and `Rows`, to which they add what they observe; False where it is impossible.
+    free : ndarray of bool, shape (p, 3)
+        Coordinates of points that may be eliminated.
+    kept : ndarray of int, shape (p, 3)
+        Columns of coordinates that are unknowns like others, else -1.
     step : callable
         Block, names and step to the block that is moved so; by default its own ``stepped``.
     moved : callable, optional
@@ -97,35 +101,48 @@ class Network:
         What is adjusted, for messages.
     rounding : float
     kind : type
-        Of the equations.
+        Of the equations, where points are eliminated.
+    largest : int
+        Unknowns beyond which they are; so many are solved as they are.
     """
 
     labels: Sequence[str]
     columns: Mapping[str, Mapping[Any, Mapping[Any, int]]]
-    free: BoolArray
-    kept: IntArray
     terms: Sequence[Callable[[Any, Rows], bool]]
+    free: BoolArray = field(default_factory=lambda: np.zeros((0, 3), dtype=bool))
+    kept: IntArray = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
     step: Callable[[Any, list[Any], FloatArray], Any] = lambda block, *step: block.stepped(*step)
     moved: Callable[[Any], Any] | None = None
     names: Sequence[str] = ()
     what: str = "adjustment"
     rounding: float = 0.0
     kind: type[BlockEquations] = BlockEquations
+    largest: int = LARGEST
+
+    @cached_property
+    def is_small(self) -> bool:
+        """Whether nothing is eliminated."""
+        return len(self.labels) + int(self.free.sum()) <= self.largest
 
     @cached_property
     def places(self) -> IntArray:
-        """Columns of the coordinates that are eliminated, else -1, shape (p, 3)."""
-        return np.where(self.free, np.arange(self.free.size).reshape(self.free.shape), -1)
+        """Columns of the coordinates, behind those of the labels if free, -1 for none, (p, 3)."""
+        number = np.cumsum(self.free) - 1 if self.is_small else np.arange(self.free.size)
+        return np.where(self.free, len(self.labels) + number.reshape(self.free.shape), self.kept)
 
-    def equations(self, state: NetworkState) -> BlockEquations | None:
+    def equations(self, state: NetworkState) -> Linear | None:
         """Return the equations at a state, None where one of the terms is impossible."""
-        rows = Rows(self)
+        rows, stay = Rows(self.places), len(self.labels)
         if not all(term(state, rows) for term in self.terms):
             return None
+        residuals = np.concatenate(rows.residuals)
+        if self.is_small:
+            jacobian = rows.dense(stay + int(self.free.sum()))
+            return DenseEquations(residuals=residuals, jacobian=jacobian, free=self.free)
+        design = rows.sparse(stay + self.free.size)
         return self.kind(
-            residuals=np.concatenate(rows.residuals),
-            design=rows.matrix(rows.design, len(self.labels)),
-            eliminated=rows.matrix(rows.eliminated, self.free.size), free=self.free,
+            residuals=residuals, design=design[:, :stay], eliminated=design[:, stay:],
+            free=self.free,
         )  # fmt: skip
 
     def advance(self, state: NetworkState, step: FloatArray) -> NetworkState | None:
@@ -145,9 +162,14 @@ class Network:
         state = replace(state, blocks=blocks, points=points, drift=state.drift + own)
         return state if self.moved is None else self.moved(state)
 
-    def solve(self, start: Any, *, largest: int = LARGEST) -> Fit[Any]:
+    def minimise(self, start: Any, *, most: int, settle: float = SETTLE) -> Fit[Any]:
+        """Return the state of the least square sum; see `photocore.adjustment.minimise`."""
+        road = (start, self.equations, self.advance)
+        return minimise(*road, what=self.what, most=most, settle=settle, rounding=self.rounding)
+
+    def solve(self, start: Any) -> Fit[Any]:
         """Return the state of the least square sum; see `photocore.adjustment.fit`."""
+        names = [*self.labels, *self.names]
         return fit(
-            start, self.equations, self.advance, names=[*self.labels, *self.names],
-            what=self.what, rounding=self.rounding, largest=largest,
-        )  # fmt: skip
+            start, self.equations, self.advance, names=names, what=self.what, rounding=self.rounding
+        )

@@ -110,7 +110,9 @@ def chain(rng: np.random.Generator, photos: int = 40, points: int = 150) -> dict
 def test_three_ways_to_solve_the_same_equations_agree():
     given = chain(np.random.default_rng(1))
     sparse, block = SparseEquations(**given), BlockEquations(**given)
-    dense = block.stacked()
+    points = given["eliminated"].toarray()[:, given["free"].ravel()]
+    jacobian = np.hstack([given["design"].toarray(), points])
+    dense = DenseEquations(residuals=given["residuals"], jacobian=jacobian, free=given["free"])
     assert sparse.undetermined([str(k) for k in range(240)]) == []
     assert sparse.step(0.0) == pytest.approx(dense.step(0.0), abs=1e-11)
     assert sparse.step(1e-3) == pytest.approx(block.step(1e-3), abs=1e-11)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -65,7 +65,7 @@ def gap(state, rows):
 def test_blocks_share_an_unknown_and_points_are_eliminated_or_kept(largest):
     """By hand: lengths 3 and 4 are told apart by noise alone; 3.5 takes 0.2 of it from each."""
     model, start = network(2, [rods, gap], kept=3)
-    got = model.solve(start, largest=largest)
+    got = replace(model, largest=largest).solve(start)
     a, b = (got.state.blocks["rod"][name] for name in "ab")
     assert a.length == b.length == pytest.approx(3.5)
     # Minimum of 4 (3.5 + x - 5)² + (x - 2)²: x = (4 * 1.5 + 2) / 5.
