@@ -170,7 +170,8 @@ def formulas(*, is_pair: bool = False, media: int = 0) -> Mapping[str, str]:
     parts["glass"] = "".join(f"+N(thick_{n})*n_used_1/n_used_{n}" for n in range(2, media))
     facts = {name for name, holds in (("pair", is_pair), ("media", media)) if holds}
     missing = _missing_formula(_PAIR_NEEDED if is_pair else _IDEAL_NEEDED, _stated(media))
-    return FORMULAS.lines("setup", facts, parts) | {"setup_missing": missing}
+    lines = FORMULAS.columns("setup", facts, parts, rows="lines")
+    return {line.key: line.formula for line in lines} | {"setup_missing": missing}
 
 
 def number_format(name: str) -> str:
