@@ -38,6 +38,14 @@ PRODUCTS = ("relief", "points", "ortho", "drawing", "view", "report")
 MOST_PRODUCTS = ("relief", "points", "drawing", "view", "report")
 #: The first step of every pair.
 FIRST_STEP = "align"
+#: How the file is called that a step makes before all others, behind the pair's name.
+MADE = {
+    "align": ".pair.json",
+    "relief": "_relief.tif",
+    "ortho": "_ortho.tif",
+    "drawing": ".tif",
+    "view": "_view.html",
+}
 #: Share of a pair's time that each step takes, measured on church_2.
 WEIGHTS = {
     "align": 0.22, "relief": 0.36, "points": 0.02, "ortho": 0.07, "drawing": 0.15, "view": 0.02,
@@ -93,35 +101,17 @@ class PairJob:
     @property
     def pair_path(self) -> Path:
         """The pair file that relief and drawings are made with."""
-        return self.own_pair_path if self.joint is None else self.joint / self.own_pair_path.name
+        own = self.product("align")
+        return own if self.joint is None else self.joint / own.name
 
-    @property
-    def own_pair_path(self) -> Path:
-        """The pair file that the first step makes."""
-        return self.folder / "align" / f"{self.title}.pair.json"
-
-    @property
-    def drawing_path(self) -> Path:
-        """The orthophoto of the drawing."""
-        return self.folder / "drawing" / f"{self.title}.tif"
-
-    @property
-    def relief_path(self) -> Path:
-        """The relief map."""
-        return self.folder / "relief" / f"{self.title}_relief.tif"
-
-    @property
-    def view_path(self) -> Path:
-        """The page that shows the relief in three dimensions."""
-        return self.folder / "view" / f"{self.title}_view.html"
+    def product(self, step: str) -> Path:
+        """Return the file that a step makes before all others."""
+        return self.folder / step / f"{self.title}{MADE[step]}"
 
     def ortho_path(self, steps: Sequence[str]) -> Path | None:
         """Return the orthophoto that these steps make, that of the drawing first."""
-        orthos = {
-            "drawing": self.drawing_path,
-            "ortho": self.folder / "ortho" / f"{self.title}_ortho.tif",
-        }
-        return next((path for step, path in orthos.items() if step in steps), None)
+        made = (step for step in ("drawing", "ortho") if step in steps)
+        return next(map(self.product, made), None)
 
     def memory(self) -> int:
         """Return the memory it needs at most; that of small photos where they cannot be read.
@@ -356,7 +346,7 @@ def _align_step(job: PairJob) -> Step:
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
         from bifocal.orientation.align_workflow import AlignOptions, align_photos
 
-        out = place / job.own_pair_path.name
+        out = place / job.product("align").name
         made = align_photos(
             job.far, job.near, out, AlignOptions.from_given({**options, **files}),
             picture=out.with_suffix("").with_suffix(".pair.png"),
@@ -379,7 +369,7 @@ def _relief_step(job: PairJob) -> Step:
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
 
-        out = place / job.relief_path.name
+        out = place / job.product("relief").name
         task = ReliefJob(
             out=out, preview=out.with_suffix(".png"), gsd=options.get("relief_gsd"),
             **_some(job, *MAP[1:]),
@@ -434,7 +424,7 @@ def _ortho_task(job: PairJob, options: Mapping[str, Any]) -> OrthoTask:
 
     return OrthoTask.from_given(
         {key: options[key] for key in (*PICTURE, "gsd") if key in options},
-        relief=job.relief_path,
+        relief=job.product("relief"),
     )
 
 
@@ -444,7 +434,7 @@ def _ortho_step(job: PairJob) -> Step:
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.orthophotos.ortho_workflow import make_ortho
 
-        out = place / f"{job.title}_ortho.tif"
+        out = place / job.product("ortho").name
         task = _ortho_task(job, options)
         return make_ortho(job.pair_path, out, task, progress=progress).remarks
 
@@ -478,7 +468,7 @@ def _view_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
         from bifocal.reports.view_workflow import view_relief
 
-        view_relief(job.relief_path, place / job.view_path.name, ortho=ortho, **options)
+        view_relief(job.product("relief"), place / job.product("view").name, ortho=ortho, **options)
         return ()
 
     after = ("relief",) if ortho is None else ("relief", ortho.parent.name)
@@ -494,8 +484,8 @@ def _report_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
         task = ReportTask(
             title=job.name, language=options.get("language", "en"), unit=options.get("unit", ""),
             scale=options.get("scale"), far=job.far,
-            relief=job.relief_path if "relief" in earlier else None,
-            ortho=job.ortho_path(earlier), view=job.view_path if "view" in earlier else None,
+            relief=job.product("relief") if "relief" in earlier else None,
+            ortho=job.ortho_path(earlier), view=job.product("view") if "view" in earlier else None,
             **tables_of(job),
         )  # fmt: skip
         outs = (place / f"{job.title}_report.html", place / f"{job.title}_report.pdf")

@@ -21,7 +21,7 @@ def joint_step(jobs: Sequence[PairJob]) -> Step:
     """Return the step that adjusts the pairs in one frame."""
     files: dict[str, Path] = {}
     for job in jobs:
-        parts = {"pair": job.own_pair_path, "far": job.far, "near": job.near}
+        parts = {"pair": job.product("align"), "far": job.far, "near": job.near}
         parts |= tables_of(job)
         files |= {f"{job.title} {role}": path for role, path in parts.items()}
     # One unit and precision of the tables for all: the survey file holds no two.
@@ -35,7 +35,7 @@ def joint_step(jobs: Sequence[PairJob]) -> Step:
             control=tuple(job.files.get("control") for job in jobs),
             check=tuple(job.files.get("check") for job in jobs), **options,
         )  # fmt: skip
-        paths = [job.own_pair_path for job in jobs]
+        paths = [job.product("align") for job in jobs]
         return tuple(adjust_pairs(paths, place, task, progress=progress).lines())
 
     return Step(name=JOINT, files=files, options=options, make=make)
@@ -49,13 +49,13 @@ def mosaic_step(jobs: Sequence[PairJob]) -> Step:
     InputError
         If fewer than two pairs have one.
     """
-    drawn = [job for job in jobs if job.drawing_path.is_file()]
+    drawn = [job for job in jobs if job.product("drawing").is_file()]
     if len(drawn) < 2:
         raise InputError(
             "mosaic: fewer than two pairs have a drawing; add drawing to their products."
         )
-    orthos = [job.drawing_path for job in drawn]
-    reliefs = [job.relief_path for job in drawn if job.relief_path.is_file()]
+    orthos = [job.product("drawing") for job in drawn]
+    reliefs = [job.product("relief") for job in drawn if job.product("relief").is_file()]
     files = {f"ortho {k}": path for k, path in enumerate(orthos)}
     files |= {f"relief {k}": path for k, path in enumerate(reliefs)}
 
