@@ -22,9 +22,9 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from bifocal import Control, Interior, Pair, Photo, SiteMeasures
-from bifocal.files.images import read_grey
 from bifocal.orientation.photo_alignment import align
 from photocore.errors import PhotogrammetryError
+from photocore.images import read_grey
 
 #: Points this near to the plane serve as wall points, those this far off it as others. [m]
 ON_WALL, OFF_WALL = 0.015, 0.3

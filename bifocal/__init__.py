@@ -50,4 +50,4 @@ GeometryError (a ValueError); ConvergenceError. Files in, files out: the command
 
 from photocore.public_names import public_names
 
-__getattr__, __dir__, __all__ = public_names(__name__, __file__)
+__all__ = public_names(__name__, __file__)

@@ -12,6 +12,7 @@ from photocore.errors import (
     PhotogrammetryError,
     WorkbookError,
 )
+from photocore.images import read_image, write_image
 
 from .calibration.board_calibration import Calibration
 from .calibration.board_photos import calibrate
@@ -25,7 +26,6 @@ from .equations import (
     relief_displacements,
     relief_from_displacement,
 )
-from .files.images import read_image, write_image
 from .files.provenance import recording
 from .matching.homologous_points import match
 from .matching.matches import Matches

@@ -10,7 +10,7 @@ import numpy as np
 import bifocal
 
 pair = bifocal.Pair.read(bifocal.SAMPLE / "facade.pair.json")
-far, near = (bifocal.read_image(bifocal.SAMPLE / name) for name in ("far.jpg", "near.jpg"))
+far, near = pair.photo1.image, pair.photo2.image
 
 relief = bifocal.dense_relief(pair, far, near, gsd=0.03, bounds=(-4, -2.5, 4, 2.5))
 ortho = bifocal.orthophoto(pair, far, relief, gsd=0.015)

@@ -14,9 +14,8 @@ The media
     critical_angle, refracted_angle, refracted_direction   Snell's law
 Radial shift
     radial_shift              where straight rays would see a point
-    radial_shift_ratio        the same, relative
     radial_shift_derivatives, ShiftDerivatives       with derivatives
-    ShiftTable                look-up table, same call
+    radial_shift_ratio, ShiftTable   relative; from a look-up table
     iterated_radius, best_over_compensation, ShiftIteration   the iteration as published
 Surfaces and rays
     FlatInterface, Interfaces what lies between camera and object
@@ -32,15 +31,12 @@ Cameras
     intersect, IntersectedPoints   points from image points, least squares
     intersect_rays, intersect_pairs   fast ways without precision
     PointStatus               why a point is missing or doubtful
-    epipolar_curve, EpipolarCurves    where a ray runs in another image
-    epipolar_candidates, Candidates   image points near it
+    epipolar_curve, EpipolarCurves, epipolar_candidates, Candidates   a ray in another image
     correspondences           which targets of several cameras are of one particle
-    bundle_adjust, Adjustment cameras, points and media together
-    Unknowns, ScaleBar        what it estimates and is told
+    bundle_adjust, Adjustment, Unknowns, ScaleBar    cameras, points and media together
 Bathymetry
     correct_bathymetry, CorrectedPoints   points from above the water
-    correct_lidar_beams       laser echoes
-    intersect_refracted_rays, RayIntersections       measured rays
+    correct_lidar_beams; intersect_refracted_rays, RayIntersections   laser echoes; measured rays
     mean_water_level, WaterLevel      the level from tie points
     wave_effect, WaveEffect   what waves do to points taken for flat water's
     Precision, BathymetryStatus       what goes in, what became of a point
@@ -66,4 +62,4 @@ GeometryError (a ValueError); ConvergenceError. Files in, files out: the command
 
 from photocore.public_names import public_names
 
-__getattr__, __dir__, __all__ = public_names(__name__, __file__)
+__all__ = public_names(__name__, __file__)

@@ -3,39 +3,23 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable
+import sys
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 
-def public_names(
-    package: str, file: str
-) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
-    """Return ``__getattr__``, ``__dir__`` and ``__all__`` of a package with a stub beside it.
+class Package(ModuleType):
+    """A package whose public names are attributes of its class: completion finds them there.
 
-    Parameters
-    ----------
-    package, file : str
-        Its ``__name__`` and ``__file__``.
-
-    Notes
-    -----
-    A name the stub lacks raises AttributeError with the nearest name there is; ``__version__`` is
-    that of the distribution.
+    ``dir`` and ``help`` look into the package alone, so its help is its table of contents. A name
+    it lacks raises AttributeError with the nearest there is; ``__version__`` is the distribution's.
     """
-    stub = ast.parse(Path(file).with_suffix(".pyi").read_text(encoding="utf-8"))
-    homes = {
-        alias.name: "." * node.level + (node.module or "")
-        for node in stub.body
-        if isinstance(node, ast.ImportFrom)
-        for alias in node.names
-    }
-    everything = sorted(homes)
 
-    def attribute(name: str) -> Any:
-        if name in homes:
-            return getattr(import_module(homes[name], package), name)
+    __all__: list[str]
+
+    def __getattr__(self, name: str) -> str:
         if name == "__version__":
             from importlib.metadata import version
 
@@ -44,11 +28,38 @@ def public_names(
             return version(DISTRIBUTION)
         from difflib import get_close_matches
 
-        near = get_close_matches(name, everything, n=1)
+        near = get_close_matches(name, self.__all__, n=1)
         hint = f"; did you mean '{near[0]}'?" if near else "."
         raise AttributeError(
-            f"{package} has no '{name}'{hint} Public names: help({package})",
+            f"{self.__name__} has no '{name}'{hint} Public names: help({self.__name__})",
             name=name,  # with it, Python adds no second guess of its own
         )
 
-    return attribute, lambda: list(everything), everything
+
+class PublicName:
+    """A public name: looks its value up where it lives."""
+
+    def __init__(self, package: str, home: str, name: str) -> None:
+        self.package, self.home, self.name = package, home, name
+
+    def __get__(self, instance: object, owner: type) -> Any:
+        return getattr(import_module(self.home, self.package), self.name)
+
+
+def public_names(package: str, file: str) -> list[str]:
+    """Give a package the names its stub has, and return them for its ``__all__``.
+
+    Parameters
+    ----------
+    package, file : str
+        Its ``__name__`` and ``__file__``.
+    """
+    stub = ast.parse(Path(file).with_suffix(".pyi").read_text(encoding="utf-8"))
+    names = {
+        alias.name: PublicName(package, "." * node.level + (node.module or ""), alias.name)
+        for node in stub.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    sys.modules[package].__class__ = type("Package", (Package,), dict(names))
+    return sorted(names)

@@ -23,13 +23,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bifocal import Lens, Pair, ReliefMap, read_image, solve
-from bifocal.files.images import image_info
 from bifocal.files.point_tables import read_survey_points
 from multimedia import PhotogrammetryError, read_experiment, read_project
 from multimedia.projects.dem import Dem
 from multimedia.projects.surface_files import read_water_surface
 from photocore.camera.boards import detect_board
 from photocore.cloud import open_cloud
+from photocore.images import image_info
 from photocore.raster import Window
 from tests.attack.site import make_site
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import inspect
+import pydoc
 import re
+import rlcompleter
 import subprocess
 import sys
 from importlib.metadata import version
@@ -31,7 +33,20 @@ PROMISED = {
 @pytest.mark.parametrize("package", PACKAGES, ids=lambda p: p.__name__)
 def test_what_is_promised_is_offered(package) -> None:
     assert set(PROMISED[package.__name__].split()) <= set(package.__all__)
-    assert set(package.__all__) <= set(dir(package))
+    assert set(package.__all__) <= set(dir(type(package)))
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda p: p.__name__)
+def test_help_is_the_table_of_contents_and_no_manual(package) -> None:
+    lines = pydoc.render_doc(package, renderer=pydoc.plaintext).splitlines()
+    assert len(lines) <= 90
+    assert not {"CLASSES", "FUNCTIONS"} & set(lines)
+
+
+def test_the_prompt_completes_public_names() -> None:
+    prompt = rlcompleter.Completer({"bifocal": bifocal, "multimedia": multimedia})
+    assert prompt.complete("bifocal.solv", 0) == "bifocal.solve("
+    assert prompt.complete("multimedia.radial_shift_r", 0) == "multimedia.radial_shift_ratio("
 
 
 @pytest.mark.parametrize(("package", "name"), NAMES)

@@ -15,10 +15,10 @@ import rasterio
 from benchmarks.peers.comparison import Comparison, Task, Tool
 from bifocal import Pair, Photo, calibrate, dense_relief
 from bifocal.calibration.workflow import undistorted
-from bifocal.files.images import read_image, write_image
 from bifocal.model.geotiff import create_raster
 from bifocal.model.grid import Grid
 from bifocal.model.lens import Lens
+from photocore.images import read_image, write_image
 from tests.scenes import bifocal_cameras, facade, render
 
 D1, D2 = 17.5, 9.5

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.calibration.board_calibration import Calibration, lens_of_views
-from bifocal.files.images import as_grey
+from bifocal.model.image import as_grey
 from photocore.arrays import ByteArray
 from photocore.camera.boards import (
     BoardView,

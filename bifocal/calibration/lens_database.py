@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.files.images import ImageInfo, image_info
 from bifocal.model.lens import Lens
 from photocore.arrays import FloatArray
 from photocore.camera.pinhole import camera_matrix
 from photocore.errors import InputError, MissingExtraError
+from photocore.images import ImageInfo, image_info
 
 #: Nodes of the tabulated profile; with 65 a cubic spline follows the map to 0.001 px.
 NODES = 65

@@ -20,11 +20,11 @@ from bifocal.calibration.plumb_line import (
     calibrate_from_lines,
     find_straight_edges,
 )
-from bifocal.files.images import ImageArray, image_info, read_grey, read_image, write_image
 from bifocal.model.lens import SIGMA_FOCAL, Lens
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
+from photocore.images import ImageArray, image_info, read_grey, read_image, write_image
 from photocore.output import all_or_none, check_all_writable, check_not_input, check_writable
 from photocore.tables import Column, read_table
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from bifocal.campaigns.pair_job import PairJob, tables_of
-from bifocal.files.images import image_info
 from bifocal.model.lens import Lens
 from bifocal.orientation.control_points import read_control
+from photocore.images import image_info
 from photocore.textfile import check_file, check_name
 
 

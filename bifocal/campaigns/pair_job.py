@@ -127,7 +127,7 @@ class PairJob:
 
         In bytes.
         """
-        from bifocal.files.images import image_info
+        from photocore.images import image_info
 
         pixels = 0
         for path in (self.far, self.near):

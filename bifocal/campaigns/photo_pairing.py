@@ -12,10 +12,10 @@ import cv2
 import numpy as np
 
 from bifocal.campaigns.survey_file import FORMAT
-from bifocal.files.images import ImageInfo, image_info, read_grey
 from bifocal.matching.features import Features, find_features, match_features
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
+from photocore.images import ImageInfo, image_info, read_grey
 from photocore.output import atomic_path, check_writable, relative_name
 
 ENDINGS = frozenset({".jpg", ".jpeg", ".png", ".tif", ".tiff"})

@@ -9,7 +9,6 @@ import numpy as np
 from bifocal.collimation.records import PickedControl, SurveyState
 from bifocal.collimation.stated_media import lacking, media_of
 from bifocal.collimation.wording import say, without_options
-from bifocal.files.images import ImageInfo
 from bifocal.model.interior_orientation import Interior
 from bifocal.model.orientation_precision import rates_of
 from bifocal.model.pair import Pair
@@ -22,6 +21,7 @@ from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
 from photocore.arrays import FloatArray
 from photocore.errors import PhotogrammetryError
+from photocore.images import ImageInfo
 
 #: Points that stand out or lie back by this part of the near distance are thought of.
 DEPTH = 0.05

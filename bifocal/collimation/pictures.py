@@ -11,7 +11,6 @@ import numpy as np
 from bifocal.collimation.pyramids import Pyramid, RectifiedPhoto, wall_grid
 from bifocal.collimation.records import Pixel
 from bifocal.collimation.tile_store import TileStore
-from bifocal.files.images import ImageArray, ImageInfo, image_info, read_image
 from bifocal.matching.snapping import snap
 from bifocal.matching.suggestions import radial_line, suggest
 from bifocal.model.geotiff import RasterReader
@@ -20,6 +19,7 @@ from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import InputError
+from photocore.images import ImageArray, ImageInfo, image_info, read_image
 from photocore.jsonfile import plain
 
 

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.collimation.fields import NOTES, FieldError, fields_of
-from bifocal.files.images import image_info
 from bifocal.workbook.pair_workflow import is_survey, read_pair
 from bifocal.workbook.reading.reader import read_survey
 from photocore.errors import InputError, PhotogrammetryError
+from photocore.images import image_info
 from photocore.workbook.reading.package import open_package
 
 #: Endings of photos looked for in a folder.

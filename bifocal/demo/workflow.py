@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.demo.samples import FACADE, PICK_SIGMA, Sample
-from bifocal.files.images import read_image
 from bifocal.files.strips import write_png
 from bifocal.model.geotiff import RasterReader, dpi_at_scale
 from bifocal.model.pair import Pair
@@ -26,6 +25,7 @@ from bifocal.workbook.workflow import solve
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
+from photocore.images import read_image
 from photocore.output import atomic_path
 
 #: Every so many pixels of the exact relief are asked what neglecting refraction would cost.

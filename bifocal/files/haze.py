@@ -15,10 +15,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.files.images import as_grey, read_grey, read_image
-from bifocal.model.image import as_photo, local_contrast, noise
+from bifocal.model.image import as_grey, as_photo, local_contrast, noise
 from bifocal.model.pair import Pair
 from photocore.arrays import ByteArray, Float32Array
+from photocore.images import read_grey, read_image
 
 #: Grey values that all but these percentiles are stretched to.
 DARKEST, BRIGHTEST, TAILS = 18.0, 238.0, (0.5, 99.5)

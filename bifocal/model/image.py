@@ -56,6 +56,23 @@ def as_photo(
     return np.ascontiguousarray(array)
 
 
+def as_grey(image: NDArray[np.generic], name: str) -> ByteArray:
+    """Return a photo as 8-bit grey values, shape (height, width).
+
+    Raises
+    ------
+    InputError
+        If it is not an image of 8 or 16 bits, or smaller than 16 pixels a side.
+    """
+    small = "is too small; at least 16 px a side are needed."
+    array = as_photo(image, name, smallest=16, fault=small)
+    if array.dtype == np.uint16:
+        # Cut, not rounded: grey values of 8 bits come back exact whether 256 or 257 widened them.
+        array = (array >> 8).astype(np.uint8)
+    # The plain mean of the channels has less noise than the luminance, which is mostly green.
+    return array if array.ndim == 2 else cv2.transform(array, np.full((1, 3), 1 / 3))
+
+
 def local_contrast(image: ByteArray | Float32Array) -> Float32Array:
     """Return the standard deviation within 15 px of a photo blurred by a pixel. [grey levels]"""
     quiet = cv2.GaussianBlur(image.astype(np.float32), (0, 0), QUIET_BLUR)

@@ -71,6 +71,10 @@ class Pair:
             size = whole if np.shape(self.orientation) == (whole, whole) else _IN_AIR
             matrix = orientation_precision.checked(self.orientation, size)
             object.__setattr__(self, "orientation", matrix)
+        for name in ("image1", "image2"):
+            photo = getattr(self, name)
+            if photo.folder != self.folder:
+                object.__setattr__(self, name, replace(photo, folder=self.folder))
         d1, d2 = self.image1.distance, self.image2.distance
         if d1 == d2:
             raise GeometryError(
@@ -331,6 +335,16 @@ class Pair:
         photos = (self.image1, self.image2)
         return min(photo.media.highest for photo in photos if photo.media)
 
+    @property
+    def photo1(self) -> Photo:
+        """The far photo; its `Photo.image` is the picture itself."""
+        return self.image1
+
+    @property
+    def photo2(self) -> Photo:
+        """The near photo; its `Photo.image` is the picture itself."""
+        return self.image2
+
     def photo(self, number: int) -> Photo:
         """Return image 1 or 2."""
         return self.image1 if number == 1 else self.image2
@@ -343,10 +357,9 @@ class Pair:
         InputError
             If the pair file names none.
         """
-        file = self.photo(number).file
-        if not file:
+        if not self.photo(number).file:
             raise InputError(f'the pair file names no photo for "image{number}": add its "file".')
-        return self.folder / file
+        return self.photo(number).path
 
     @property
     def photo_files(self) -> tuple[Path, ...]:

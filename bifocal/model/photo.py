@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from bifocal import rays
 from bifocal.media import MediaPath, interface_axes
@@ -73,6 +73,8 @@ class Photo:
         optical axis.
     extra : mapping
         Keys of the pair file this class does not use; kept.
+    folder : Path
+        Of the pair file.
     """
 
     plane_from_pixel: FloatArray
@@ -88,6 +90,7 @@ class Photo:
     z0: float | None = None
     interface_normal: FloatArray | None = None
     extra: Mapping[str, Any] = field(default_factory=dict)
+    folder: Path = Path()
     #: What the rays cross on their way; follows from the above.
     media: MediaPath | None = field(default=None, init=False)
 
@@ -145,6 +148,35 @@ class Photo:
                 "are in metres."
             )
         return path
+
+    @property
+    def path(self) -> Path:
+        """The image file.
+
+        Raises
+        ------
+        InputError
+            If none is named.
+        """
+        if not self.file:
+            raise InputError('the pair file names no photo here: add its "file".')
+        return self.folder / self.file
+
+    @property
+    def image(self) -> NDArray[Any]:
+        """The picture, upright as seen, shape (h, w, 3) or (h, w); read when it is asked for.
+
+        Raises
+        ------
+        InputError
+            If its file is not named, gone, no photo, or of another size than the pair was made
+            from.
+        """
+        from photocore.images import read_image
+
+        image = read_image(self.path)
+        self.check_size((image.shape[1], image.shape[0]), self.path)
+        return image
 
     @property
     def foot(self) -> rays.Foot:
@@ -364,6 +396,7 @@ class Photo:
                 **{name: data.pop(name, None) for name in ("image_size", *_OPTIONAL, *_MEDIA)},
                 layers=layers,
                 extra=data,
+                folder=folder,
             )
 
     def to_dict(self) -> dict[str, Any]:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from bifocal.files.haze import read_greys
-from bifocal.files.images import WRITTEN, ImageInfo, image_info
 from bifocal.model.basis import rests_on
 from bifocal.model.interior_orientation import Interior, lens_of_photo
 from bifocal.model.lens import Lens
@@ -26,6 +25,7 @@ from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
+from photocore.images import WRITTEN, ImageInfo, image_info
 from photocore.output import (
     all_or_none,
     check_all_writable,

@@ -9,12 +9,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.files.images import write_image
 from bifocal.model.interior_orientation import Images
 from bifocal.model.photo import Photo
 from bifocal.orientation.alignment import Alignment
 from bifocal.orientation.area_points import resampled
 from photocore.arrays import ByteArray, FloatArray
+from photocore.images import write_image
 
 #: Longer side of the picture. [px]
 WIDTH = 1600

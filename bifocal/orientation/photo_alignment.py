@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bifocal.files.haze import greys_through_water
-from bifocal.files.images import as_grey
+from bifocal.model.image import as_grey
 from bifocal.model.interior_orientation import Interior
 from bifocal.model.pair_media import PairMedia
 from bifocal.orientation.absolute_orientation import orient_pair

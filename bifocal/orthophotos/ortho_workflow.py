@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.files.images import ImageArray, photo_info, read_image
+from bifocal.files.photos import photo_info
 from bifocal.files.point_tables import read_survey_points
 from bifocal.model.geotiff import (
     RasterReader,
@@ -33,6 +33,7 @@ from bifocal.remarks import remark
 from photocore.arrays import ByteArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
+from photocore.images import ImageArray, read_image
 from photocore.output import check_ending, check_not_input, check_writable
 from photocore.reports.words import words_of
 

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.files.images import ImageArray, photo_info, read_image, to_eight_bit
+from bifocal.files.photos import photo_info
 from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
@@ -22,6 +22,7 @@ from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.cloud import write_cloud
 from photocore.errors import GeometryError
+from photocore.images import ImageArray, read_image, to_eight_bit
 from photocore.output import all_or_none, check_all_writable, check_ending, check_not_input
 
 _ROWS = 256

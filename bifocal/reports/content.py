@@ -10,7 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from bifocal.files.images import photo_info, read_image, to_eight_bit
+from bifocal.files.photos import photo_info
 from bifocal.files.strips import ROWS, colour_strips
 from bifocal.model.geotiff import RasterReader
 from bifocal.model.grid import Bounds
@@ -23,6 +23,7 @@ from bifocal.survey.solved_survey import SolvedSurvey
 from bifocal.workbook.workflow import solve
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.errors import InputError, located
+from photocore.images import read_image, to_eight_bit
 
 #: Longer side of pictures in a report. [px]
 SIDE = 1000

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.files.haze import read_greys
-from bifocal.files.images import photo_info
+from bifocal.files.photos import photo_info
 from bifocal.matching.matches import Matches
 from bifocal.matching.matching import MatchSettings, match_pair, precision
 from bifocal.model.basis import rests_on

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.files.images import image_info
 from bifocal.model.orientation_precision import of_distances
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
@@ -20,6 +19,7 @@ from bifocal.workbook.sources import BOOKS, described_pair
 from bifocal.workbook.workflow import solve
 from photocore.arrays import FloatArray, not_negative
 from photocore.errors import InputError, located
+from photocore.images import image_info
 from photocore.output import all_or_none, check_all_writable, check_ending, relative_name
 
 #: Standard deviation of a distance by tape: it ends at the lens, the ray in its entrance pupil. [m]

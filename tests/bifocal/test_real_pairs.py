@@ -10,7 +10,6 @@ from scipy.spatial import cKDTree
 
 from benchmarks.bench_orientation import RealPair
 from bifocal import MatchSettings, Pair, SiteMeasures, align
-from bifocal.files.images import image_info, read_grey
 from bifocal.matching.matching import match_pair, precision
 from bifocal.model.orientation_precision import pinhole
 from bifocal.orientation.align_workflow import (
@@ -20,6 +19,7 @@ from bifocal.orientation.align_workflow import (
     interior_of_photo,
 )
 from bifocal.workbook.match_workflow import match_photos
+from photocore.images import image_info, read_grey
 
 pytestmark = pytest.mark.acceptance
 #: Limits of the median error of relief. [m]

@@ -12,8 +12,8 @@ from bifocal.collimation.fields import SETUP
 from bifocal.collimation.live_orientation import LiveOrientation
 from bifocal.collimation.session import Session
 from bifocal.collimation.wording import say, without_options
-from bifocal.files.images import ImageInfo
 from bifocal.model.pair import Pair
+from photocore.images import ImageInfo
 from photocore.jsonfile import plain
 
 

@@ -12,8 +12,8 @@ from typing import BinaryIO
 from PIL import Image
 
 from bifocal.collimation.project import PHOTOS
-from bifocal.files.images import ImageInfo, image_info, read_image
 from photocore.errors import InputError
+from photocore.images import ImageInfo, image_info, read_image
 from photocore.output import atomic_path, free_path
 
 #: Photos of more pixels per byte than any camera writes are no photos. [px/byte, px]

@@ -15,11 +15,11 @@ from bifocal.campaigns import photo_pairing
 from bifocal.campaigns.pair_job import refusal, steps_of
 from bifocal.campaigns.survey_file import in_survey_words, read_survey_file
 from bifocal.campaigns.workflow import facade_job
-from bifocal.files.images import ImageInfo
 from bifocal.options import OF_PAIR
 from bifocal.orientation.align_workflow import AlignOptions
 from bifocal.orthophotos.ortho_workflow import OrthoTask
 from multimedia import Layers
+from photocore.images import ImageInfo
 from photocore.options import options_of
 from tests.bifocal.campaigns.sample_tables import FAR, NEAR
 from tests.builders.commands import bifocal_command as main

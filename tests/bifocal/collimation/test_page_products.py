@@ -17,8 +17,8 @@ from bifocal.collimation import job_process, job_tasks
 from bifocal.collimation.live_orientation import control_of, live_orientation
 from bifocal.collimation.project import find_files
 from bifocal.collimation.records import PickedControl, SurveyState
-from bifocal.files.images import image_info
 from bifocal.orientation.control_points import read_lengths
+from photocore.images import image_info
 from tests.page_session import (
     client_of,
     entries,

@@ -14,8 +14,8 @@ from click.testing import CliRunner
 from PIL import Image
 
 from bifocal import SAMPLE, InputError, read_image
-from bifocal.files import images
 from multimedia.projects.photos import read_photo
+from photocore import images
 from photocore.decoding import decoded, decoders_words
 from tests.builders.commands import bifocal_command as main
 

@@ -18,12 +18,13 @@ from bifocal import (
     write_image,
 )
 from bifocal.files.haze import greys_through_water, read_greys
-from bifocal.files.images import as_grey, read_grey
 from bifocal.matching import homologous_points
 from bifocal.matching.matching import match_pair
+from bifocal.model.image import as_grey
 from bifocal.orientation import align_workflow, photo_alignment
 from bifocal.orientation.align_workflow import AlignOptions, KnownLens
 from bifocal.orientation.orientation_stages import OrientedPair
+from photocore.images import read_grey
 from tests.scenes import RICH, Scene, bifocal_cameras, render
 from tests.scenes.rendering import Haze
 from tests.scenes.shapes import box

@@ -10,7 +10,8 @@ import pytest
 from PIL import Image
 
 from bifocal import InputError, read_image, write_image
-from bifocal.files.images import as_grey, image_info, to_eight_bit, turn_upright
+from bifocal.model.image import as_grey
+from photocore.images import image_info, to_eight_bit, turn_upright
 
 PICTURE = np.random.default_rng(7).integers(0, 255, (24, 36, 3), dtype=np.uint8)
 
@@ -123,7 +124,7 @@ def test_a_decompression_bomb_is_refused_by_its_header(tmp_path):
 def test_large_photos_are_read_by_strips_to_the_same_pixels(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str
 ) -> None:
-    from bifocal.files import images
+    from photocore import images
 
     photo = np.random.default_rng(6).integers(0, 255, (600, 70, 3), dtype=np.uint8)
     images.write_image(tmp_path / f"p{ending}", photo)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import importlib.util
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from bifocal import (
+    SAMPLE,
     FlagLimits,
     GeometryError,
     InputError,
@@ -20,6 +22,7 @@ from bifocal import (
     Photo,
     PointObservations,
     rays,
+    read_image,
     relief,
 )
 from bifocal.model.flags import point_flags
@@ -422,3 +425,15 @@ def test_the_semireal_check_points_are_met_to_a_fifth_of_a_millimetre(data_dir):
     away = np.hypot(*(rows[:, 1:3] - pair.zoom_centre).T) > 0.5
     assert np.abs(found.xyz[away, 2] - rows[away, 3]).max() < 2e-3
     assert np.median(np.abs(found.xyz[away] - rows[away, 1:4])) < 2e-4
+
+
+def test_the_photos_of_a_pair_give_their_pictures(tmp_path: Path) -> None:
+    pair = Pair.read(SAMPLE / "facade.pair.json")
+    picture = pair.photo1.image
+    assert picture.shape[1::-1] == pair.photo1.image_size
+    np.testing.assert_array_equal(picture, read_image(pair.photo_file(1)))
+    moved = replace(pair, folder=tmp_path)
+    with pytest.raises(InputError, match=re.escape(f"{moved.photo2.path}: no such image")):
+        _ = moved.photo2.image
+    with pytest.raises(InputError, match='add its "file"'):
+        _ = Pair.ideal(d1=2.0, d2=1.0).photo1.image

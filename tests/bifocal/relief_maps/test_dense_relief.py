@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bifocal import Grid, Pair, Photo, Quality, dense_relief
-from bifocal.files.images import as_grey
+from bifocal.model.image import as_grey
 from bifocal.orientation.adjustment.pair_observations import at
 from bifocal.relief_maps import edges, flow, forward_projection, seed
 from bifocal.relief_maps.dense_matching import _resampled

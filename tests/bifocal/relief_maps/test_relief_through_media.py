@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from bifocal import InputError, dense_relief, match, orthophoto
-from bifocal.files.images import as_grey
+from bifocal.model.image import as_grey
 from bifocal.rays import plane_position, point_on_ray, straight
 from bifocal.relief_maps import evidence
 from bifocal.relief_maps.frame import make_frame, offsets

@@ -17,8 +17,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.model.image import as_photo
-from bifocal.model.pair import Pair
 from photocore.arrays import ByteArray
 from photocore.decoding import decoded, decoders_words, refuse_damaged_jpeg
 from photocore.errors import InputError
@@ -123,19 +121,6 @@ def image_info(path: Path | str) -> ImageInfo:
         raise InputError(f"{path}: the image is damaged ({error}).") from error
 
 
-def photo_info(pair: Pair, number: int) -> ImageInfo:
-    """Return what photo 1 or 2 of a pair says of itself; see `image_info`.
-
-    Raises
-    ------
-    InputError
-        Also if it is of another size than the pair was made from.
-    """
-    info = image_info(pair.photo_file(number))
-    pair.photo(number).check_size(info.size, info.path)
-    return info
-
-
 def read_image(path: Path | str, *, grey: bool = False) -> ImageArray:
     """Return the upright pixels of a photo.
 
@@ -219,23 +204,6 @@ def to_eight_bit(image: ImageArray) -> NDArray[np.uint8]:
     if image.dtype == np.uint8:
         return image.astype(np.uint8, copy=False)
     return np.asarray(cv2.convertScaleAbs(image, alpha=1 / 257), dtype=np.uint8)
-
-
-def as_grey(image: NDArray[np.generic], name: str) -> ByteArray:
-    """Return a photo as 8-bit grey values, shape (height, width).
-
-    Raises
-    ------
-    InputError
-        If it is not an image of 8 or 16 bits, or smaller than 16 pixels a side.
-    """
-    small = "is too small; at least 16 px a side are needed."
-    array = as_photo(image, name, smallest=16, fault=small)
-    if array.dtype == np.uint16:
-        # Cut, not rounded: grey values of 8 bits come back exact whether 256 or 257 widened them.
-        array = (array >> 8).astype(np.uint8)
-    # The plain mean of the channels has less noise than the luminance, which is mostly green.
-    return array if array.ndim == 2 else cv2.transform(array, np.full((1, 3), 1 / 3))
 
 
 def write_image(path: Path | str, image: ImageArray, *, overwrite: bool = False) -> None:
