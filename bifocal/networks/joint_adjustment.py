@@ -274,7 +274,9 @@ class _System:
             }},
             free=np.broadcast_to(self.used[:, None], shape), kept=np.full(shape, -1),
             names=[f"{seen.ids[k]}: {axis}" for k in np.flatnonzero(self.used) for axis in "XYr"],
-            terms=(self._rays, self._known), step=_stepped, what="the pairs", rounding=ROUNDING,
+            terms=(self._rays, self._known),
+            step=lambda camera, at, step: camera.stepped(np.bincount(at, step, len(PARAMETERS))),
+            what="the pairs", rounding=ROUNDING,
             kind=SparseEquations, largest=0,
         )  # fmt: skip
 
@@ -303,25 +305,13 @@ class _System:
         return True
 
     def _known(self, state: NetworkState, rows: Rows) -> bool:
-        seen, (point, axis), along = self.seen, self.fixed.T, np.eye(3)
-        weight = 1.0 / seen.sigma_known[point, axis]
-        lines = rows.add((state.points[point, axis] - seen.known[point, axis]) * weight)
-        rows.by_points(lines, point, along[axis] * weight[:, None])
-        lines = rows.add(state.points[self.loose, 2] / self.reach)
-        rows.by_points(lines, self.loose, along[2] / self.reach)
-        focal, weight = self.focal, 1.0 / seen.sigma_focal[self.focal]
-        drift = (
-            np.log([state.blocks["camera"][k].matrix[0, 0] for k in focal])
-            - self.first_focal[focal]
-        )
-        rows.by_label(rows.add(drift * weight), self.column[focal, 0], weight)
+        seen, at, focal = self.seen, tuple(self.fixed.T), self.focal
+        rows.known(rows.places[at], (state.points - seen.known)[at], seen.sigma_known[at])
+        rows.known(rows.places[self.loose, 2], state.points[self.loose, 2], self.reach)
+        lengths = np.array([state.blocks["camera"][k].matrix[0, 0] for k in focal])
+        drift = np.log(lengths) - self.first_focal[focal]
+        rows.known(self.column[focal, 0], drift, seen.sigma_focal[focal])
         return True
-
-
-def _stepped(camera: Pinhole, places: list[int], step: FloatArray) -> Pinhole:
-    whole = np.zeros(len(PARAMETERS))
-    whole[places] = step
-    return camera.stepped(whole)
 
 
 def _sigma0(fit: Fit[NetworkState], system: _System) -> float:

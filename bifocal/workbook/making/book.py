@@ -28,7 +28,6 @@ from photocore.workbook.making.look import (
     BODY_FONT,
     DOUBT,
     GOOD,
-    HEAD_FONT,
     WARN_FONT,
     WRONG,
     colour_words,
@@ -54,8 +53,8 @@ FLAG_COLOURS = {
 _SCALE = 92
 #: Name of the column `use` of `Points`, for rules of other sheets, which may not name a table.
 USED = "points_use"
-#: Where the sketch of the cameras stands on the sheet `Readme`.
-_SKETCH = "C3"
+#: Printed rows of the sheet `Readme`.
+_README_ROWS = 34
 
 
 def write_book(path: Path | str, content: SurveyContent, *, overwrite: bool = False) -> None:
@@ -78,7 +77,9 @@ def build(content: SurveyContent) -> BookBuilder:
     builder = BookBuilder(language=content.language, words=WORDS)
     builder.book.properties.creator = "bifocal"
     builder.book.properties.title = "bifocal survey"
-    _readme(builder, media=bool(content.media_cells))
+    lines = readme(builder.language, media=bool(content.media_cells))
+    sketch = cameras_sketch(builder.word("nadir"), builder.word("sketch"))
+    builder.readme(lines, sketch, rows=_README_ROWS)
     setup_sheet(builder, content)
     cells = point_cells(content)
     _points(builder, content, cells)
@@ -90,22 +91,6 @@ def build(content: SurveyContent) -> BookBuilder:
     _log(builder, content)
     builder.open_at("Points" if content.points else "Readme")
     return builder
-
-
-def _readme(builder: BookBuilder, *, media: bool) -> None:
-    sheet = builder.sheet("Readme")
-    sheet.worksheet.column_dimensions["A"].width = 80
-    sheet.worksheet.column_dimensions["B"].width = 2
-    for row, line in enumerate(readme(builder.language, media=media), start=3):
-        heading = line.startswith("#")
-        sheet.text(f"A{row}", line.lstrip("#"), HEAD_FONT if heading else None)
-    sketch = cameras_sketch(builder.word("nadir"), builder.word("sketch"))
-    builder.drawings["Readme"] = sketch.part(_SKETCH)
-    # Nothing stands in the cells below the sketch: without this they would not be printed.
-    sheet.worksheet.print_area = "A1:C34"
-    sheet.worksheet.column_dimensions["C"].width = 50
-    sheet.finish(landscape=True, guarded=False)
-    sheet.worksheet.page_setup.fitToHeight = 1
 
 
 def _points(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
@@ -194,10 +179,8 @@ def _printed(sheet: SheetBuilder, area: str, content: SurveyContent) -> None:
 
 
 _BLOCK_PLACE = Alignment(wrap_text=True, vertical="top")
-#: The title block: cell, the cells it spans, its name.
-_BLOCKS = (
-    ("A2", "D2", "title_project"), ("E2", "I2", "title_survey"), ("J2", "O2", "title_units"),
-)  # fmt: skip
+#: The title block: the cells it spans, and the names of its formulas.
+_BLOCKS = {"A2:D2": "title_project", "E2:I2": "title_survey", "J2:O2": ""}
 
 
 def _title_block(sheet: SheetBuilder, content: SurveyContent, results: Cells) -> None:
@@ -213,25 +196,19 @@ def _title_block(sheet: SheetBuilder, content: SurveyContent, results: Cells) ->
     worst = None if content.check is None else content.check.accuracy
     shown = "" if worst is None or worst != worst else f"{round(worst, 3):g} m"
     points, rmse = book.word("points_solved"), book.word("worst_of_checks")
-    people += [
-        (f'"{points}: "&COUNT(tblResults[X])', f"{points}: {solved}"),
-    ]
-    survey += [
-        (
-            f'"{rmse}: "&IF(ISNUMBER(check_worst),ROUND(check_worst,3)&" m","")',
-            f"{rmse}: {shown}",
-        )
-    ]
-    for (left, right, name), lines in zip(_BLOCKS, (people, survey), strict=False):
-        text = "&CHAR(10)&".join(formula for formula, _ in lines)
-        value: CellValue = "\n".join(shown for _, shown in lines)
-        sheet.formula(left, text, value, name=name, font=BODY_FONT)
-        sheet.worksheet.merge_cells(f"{left}:{right}")
+    people.append((f'"{points}: "&COUNT(tblResults[X])', f"{points}: {solved}"))
+    live = f'"{rmse}: "&IF(ISNUMBER(check_worst),ROUND(check_worst,3)&" m","")'
+    survey.append((live, f"{rmse}: {shown}"))
+    for (area, name), lines in zip(_BLOCKS.items(), (people, survey, ()), strict=True):
+        left = area.partition(":")[0]
+        if lines:
+            text = "&CHAR(10)&".join(formula for formula, _ in lines)
+            value: CellValue = "\n".join(shown for _, shown in lines)
+            sheet.formula(left, text, value, name=name, font=BODY_FONT)
+        else:
+            sheet.word(left, "result_units")
+        sheet.worksheet.merge_cells(area)
         sheet.worksheet[left].alignment = _BLOCK_PLACE
-    left, right, _ = _BLOCKS[-1]
-    sheet.word(left, "result_units")
-    sheet.worksheet.merge_cells(f"{left}:{right}")
-    sheet.worksheet[left].alignment = _BLOCK_PLACE
     sheet.worksheet.row_dimensions[2].height = 42
 
 
