@@ -15,12 +15,11 @@ from bifocal.model.image import ImageArray
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
 from bifocal.model.surface import FlatSurface, MapSurface, Surface
-from bifocal.orthophotos import mask_tidying
 from bifocal.orthophotos.ortho_image import OrthoOptions, Orthophoto, Source
 from bifocal.orthophotos.pull_push import fill_holes
 from bifocal.orthophotos.rectify import SourcePhoto, footprint
 from bifocal.orthophotos.tuning import COMPOSE, TIDYING
-from bifocal.orthophotos.visibility import hidden_from
+from bifocal.orthophotos.visibility import hidden_from, tidied
 from bifocal.orthophotos.whole_picture import CompletedSurface
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, ByteArray, Float32Array
@@ -236,7 +235,7 @@ def _look(
         return _Look(np.zeros(shape, view.image.dtype), inside, np.zeros(grid.shape, bool))
     hidden = np.zeros(grid.shape, bool)
     if options.mask_hidden:
-        hidden = mask_tidying.tidied(hidden_from(surface, grid, view.photo.foot, relief)) & inside
+        hidden = tidied(hidden_from(surface, grid, view.photo.foot, relief)) & inside
     return _Look(view.sample(column, row, options.interpolation), inside, hidden)
 
 

@@ -1,4 +1,4 @@
-"""What a camera cannot see of a relief: a forward z-buffer over the reference plane."""
+"""What a camera cannot see of a relief: a forward z-buffer over the plane, its mask tidied."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.model.ray_field import RayField
 from bifocal.model.surface import EVERYWHERE, Surface
-from bifocal.orthophotos.tuning import VISIBILITY
+from bifocal.orthophotos.tuning import TIDYING, VISIBILITY
 from bifocal.rays import Foot, magnification, object_rays, plane_position, straight
 from photocore.arrays import BoolArray, Float32Array
 
@@ -341,3 +341,24 @@ def _above_ray(
         hidden[left[perhaps[step | (over[perhaps] > 0)]]] = True
         left = left[~hidden[left]]
     return hidden
+
+
+def tidied(hidden: BoolArray) -> BoolArray:
+    """Return a mask of hidden pixels without parts too small or too thin to be a shadow.
+
+    A shadow that is nowhere 3 x 3 px wide is what half a pixel of doubt about a step makes; a part
+    of fewer than `least_area` pixels cannot be told. Pinholes in the mask are closed likewise.
+    """
+    if not hidden.any():
+        return hidden
+    core = cv2.erode(hidden.astype(np.uint8), np.ones((3, 3), np.uint8), borderValue=1) > 0
+    _, label, stats, _ = cv2.connectedComponentsWithStats(hidden.astype(np.uint8), connectivity=8)
+    keep = np.zeros(len(stats), dtype=bool)
+    keep[np.unique(label[core & hidden])] = True
+    keep &= stats[:, cv2.CC_STAT_AREA] >= TIDYING.least_area
+    keep[0] = False
+    solid: BoolArray = keep[label]
+    _, label, stats, _ = cv2.connectedComponentsWithStats((~solid).astype(np.uint8), connectivity=4)
+    pinhole = stats[:, cv2.CC_STAT_AREA] < TIDYING.least_area
+    pinhole[0] = False
+    return solid | np.asarray(pinhole[label])

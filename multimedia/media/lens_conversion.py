@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from multimedia.media.camera import Camera
-from multimedia.media.known_points import KnownPoints, camera_of, start_at
+from multimedia.media.camera_observations import CameraObservations, camera_of, start_at
 from multimedia.media.projection import Media, project
 from photocore.arrays import FloatArray
 from photocore.camera.distortion import Brown
@@ -82,7 +82,7 @@ def nearest_camera(
         As for `project`.
     """
     what = f"camera {start.name} in the terms of another lens model"
-    seen = KnownPoints(
+    seen = CameraObservations(
         points=points, image=image, media=media, sigma=np.ones_like(image), what=what
     )
     return camera_of(seen.network(names).minimise(start_at(start), most=60).state)

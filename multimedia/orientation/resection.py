@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.media.camera import ANY_INTERIOR, EXTERIOR, Camera
-from multimedia.media.known_points import KnownPoints, camera_of, start_at
+from multimedia.media.camera_observations import CameraObservations, camera_of, start_at
 from multimedia.media.projection import Media, as_media, refuse_pixels
 from multimedia.orientation.pose_starts import pose_starts
 from photocore.adjustment import OUTLIER_LIMIT, Fit, correlations
@@ -139,7 +139,9 @@ def resect(
         camera, object_points, image_points, sigma, len(names)
     )
     what = f"resection of camera {camera.name}" if camera.name else "resection"
-    seen = KnownPoints(points=control, image=image, media=as_media(layers), sigma=sigmas, what=what)
+    seen = CameraObservations(
+        points=control, image=image, media=as_media(layers), sigma=sigmas, what=what
+    )
     start = camera_of(_best_start(camera, seen).state)
     result = seen.network(names).solve(start_at(start))
     adjusted = camera_of(result.state)
@@ -162,14 +164,14 @@ def resect(
     )
 
 
-def _is_beyond_doubt(seen: KnownPoints, pose: Fit[NetworkState]) -> bool:
+def _is_beyond_doubt(seen: CameraObservations, pose: Fit[NetworkState]) -> bool:
     """Whether a pose fits so well that no other can: a body with depth, tiny residuals."""
     spread = np.linalg.svd(seen.points - seen.points.mean(axis=0), compute_uv=False)
     deep = spread[2] > DEEP * spread[0]
     return bool(deep and _cost(pose) < (FITS**2) * float((seen.image**2).sum()))
 
 
-def _best_start(camera: Camera, seen: KnownPoints) -> Fit[NetworkState]:
+def _best_start(camera: Camera, seen: CameraObservations) -> Fit[NetworkState]:
     """Return the pose of the smallest square sum that any start leads to."""
     poses: list[Fit[NetworkState]] = []
     network, count = seen.network(), 1
@@ -250,7 +252,7 @@ def _checked_points(
     return control, image, sigmas, used
 
 
-def _refuse_mirrored(camera: Camera, sigma0: float, seen: KnownPoints) -> None:
+def _refuse_mirrored(camera: Camera, sigma0: float, seen: CameraObservations) -> None:
     """Refuse a bad fit that becomes a good one when the control is mirrored."""
     size = float(np.sqrt(np.mean(seen.image**2)))
     if not sigma0 > 0.005 * size:

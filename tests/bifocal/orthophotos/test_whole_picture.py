@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from bifocal import Grid, MapSurface, OrthoOptions, Pair, Photo, ReliefMap, Source, orthophoto
-from bifocal.orthophotos.mask_tidying import tidied
 from bifocal.orthophotos.tuning import TIDYING
+from bifocal.orthophotos.visibility import tidied
 from bifocal.orthophotos.whole_picture import CompletedSurface
 
 METRES = [[0.01, 0, -1.995], [0, -0.01, 1.995], [0, 0, 1]]

@@ -14,7 +14,7 @@ from photocore.errors import GeometryError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class KnownPoints:
+class CameraObservations:
     """Points without error of their own, and where one camera sees them.
 
     Attributes
@@ -61,11 +61,11 @@ class KnownPoints:
 
 
 def start_at(camera: Camera) -> NetworkState:
-    """Return the state of a network of `KnownPoints` with the camera as it is."""
+    """Return the state of a network of `CameraObservations` with the camera as it is."""
     return NetworkState(blocks={"camera": {0: camera}})
 
 
 def camera_of(state: NetworkState) -> Camera:
-    """Return the camera of a state of a network of `KnownPoints`."""
+    """Return the camera of a state of a network of `CameraObservations`."""
     camera: Camera = state.blocks["camera"][0]
     return camera
