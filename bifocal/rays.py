@@ -29,7 +29,14 @@ from photocore.camera.pinhole import Pinhole
 class Foot(NamedTuple):
     """A camera reduced to what relief needs: nadir on the plane and distance to it. [m]
 
-    ``media`` is what its rays cross on their way, None in air.
+    Attributes
+    ----------
+    nadir : ndarray, shape (2,)
+        Foot of the projection centre on the reference plane. [m]
+    distance : float
+        Of the projection centre from the plane. [m]
+    media : MediaPath or None
+        What its rays cross on their way; None in air.
     """
 
     nadir: FloatArray

@@ -24,11 +24,17 @@ class SightDerivatives(NamedTuple):
 
 
 class Sight(NamedTuple):
-    """Directions in which points are seen, and what follows for their images."""
+    """Directions in which points are seen, and what follows for their images.
 
-    #: Vectors in the camera frame and the camera's medium, of any length, shape (n, 3).
+    Attributes
+    ----------
+    vectors : ndarray, shape (n, 3)
+        In the camera frame and the camera's medium, of any length.
+    derivatives : callable
+        From the derivatives of the image by those vectors, (n, 2, 3), to those by everything else.
+    """
+
     vectors: FloatArray
-    #: From the derivatives of the image by those vectors, (n, 2, 3), to those by everything else.
     derivatives: Callable[[FloatArray], SightDerivatives]
 
 

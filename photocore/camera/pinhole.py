@@ -24,7 +24,17 @@ PARAMETERS = (
 
 
 class Pinhole(NamedTuple):
-    """Camera matrix (3, 3) [px], rotation camera from object frame (3, 3), centre (3,) [m]."""
+    """A camera without distortion.
+
+    Attributes
+    ----------
+    matrix : ndarray, shape (3, 3)
+        Camera matrix. [px]
+    rotation : ndarray, shape (3, 3)
+        Camera from object frame.
+    centre : ndarray, shape (3,)
+        Projection centre. [m]
+    """
 
     matrix: FloatArray
     rotation: FloatArray
@@ -57,7 +67,17 @@ class Pinhole(NamedTuple):
 
 
 class ProjectedPoints(NamedTuple):
-    """Pixels (n, 2) and their derivatives by the point (n, 2, 3) and by `PARAMETERS` (n, 2, 10)."""
+    """Where points are seen, with derivatives.
+
+    Attributes
+    ----------
+    pixels : ndarray, shape (n, 2)
+        Column and row. [px]
+    by_point : ndarray, shape (n, 2, 3)
+        Derivatives by the point. [px/m]
+    by_camera : ndarray, shape (n, 2, 10)
+        Derivatives by `PARAMETERS`.
+    """
 
     pixels: FloatArray
     by_point: FloatArray
