@@ -259,7 +259,7 @@ def seen_distance(camera: Foot) -> float:
         return camera.distance
     media = camera.media
     first = media.layers.indices[0]
-    heights = (media.z0, *media.layers.thicknesses, camera.distance - media.depth)
+    heights = (media.z0, *media.layers.thicknesses, camera.distance - media.last_interface)
     reduced = zip(heights, media.layers.indices, strict=True)
     return float(sum(height * first / index for height, index in reduced))
 

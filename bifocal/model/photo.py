@@ -139,13 +139,13 @@ class Photo:
                 "centre to the first interface, in metres."
             )
         turn = None if self.interface_normal is None else interface_axes(self.towards_camera)
-        path = MediaPath(layers=layers, z0=self.z0, distance=self.distance, turn=turn)
+        path = MediaPath(layers=layers, z0=self.z0, distance=self.distance, rotation=turn)
         if not path.holds(np.zeros(2), np.zeros(())):
             raise GeometryError(
-                f"z0: the last interface would lie {path.depth:g} m from the camera, behind the "
-                f"reference plane at {self.distance:g} m. z0 is measured from the camera centre to "
-                "the first interface, distance to the reference plane; both, and the thicknesses, "
-                "are in metres."
+                f"z0: the last interface would lie {path.last_interface:g} m from the camera, "
+                f"behind the reference plane at {self.distance:g} m. z0 is measured from the "
+                "camera centre to the first interface, distance to the reference plane; both, and "
+                "the thicknesses, are in metres."
             )
         return path
 
@@ -191,7 +191,7 @@ class Photo:
     @property
     def leans(self) -> bool:
         """Whether its interfaces lean against the reference plane."""
-        return self.media is not None and self.media.turn is not None
+        return self.media is not None and self.media.rotation is not None
 
     @property
     def towards_camera(self) -> FloatArray:

@@ -102,7 +102,7 @@ def check_room(media: PairMedia, cameras: Cameras) -> None:
             )
         if not path.holds(np.zeros(2), np.zeros(())):
             raise InputError(
-                f"--port: the last interface would lie {path.depth:.3f} m before camera "
+                f"--port: the last interface would lie {path.last_interface:.3f} m before camera "
                 f"{number + 1}, which stands {path.distance:.3f} m from the wall. --port is from "
                 "the camera's centre to the glass, in metres."
             )

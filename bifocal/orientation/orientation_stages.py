@@ -34,13 +34,13 @@ from bifocal.orientation.tie_points import (
     without_gross_ties,
 )
 from bifocal.orientation.tuning import TUNING
-from bifocal.orientation.walls.bend import WallBend
 from bifocal.orientation.walls.reference_plane import Face, choose_wall, onto_plane, rivals_in_words
 from bifocal.orientation.walls.wall_planes import (
     likely_wall,
     planes_of_any_direction,
     steep_rivals_in_words,
 )
+from bifocal.orientation.walls.wall_shape import WallShape
 from bifocal.remarks import remark
 from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import ByteArray
@@ -58,7 +58,7 @@ FREE = (1e-5, 1e-6)
 #: Relative standard deviation with which two photos of one lens have one principal distance.
 ONE_LENS = 1e-3
 #: Common points that take part, where each costs more than in air; fewer say nothing.
-MOST_BENT_TIES, FEWEST_TIES = 1000, 20
+MOST_REFRACTED_TIES, FEWEST_TIES = 1000, 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -100,7 +100,7 @@ class OrientedPair:
         Whether the user said which of them is the wall.
     tolerance : pair of float
         How far the wall may lie from the reference plane [m] and slope against it [m/m].
-    bend : WallBend
+    bend : WallShape
         How far the wall is from a plane between the photos.
     lines_off : bool
         Whether lines of the façade come out of the wall by more than they may.
@@ -114,7 +114,7 @@ class OrientedPair:
     faces: tuple[Face, ...] = ()
     wall_named: bool = False
     tolerance: tuple[float, float] = FREE
-    bend: WallBend = field(default_factory=WallBend)
+    shape: WallShape = field(default_factory=WallShape)
     lines_off: bool = False
 
     def readjusted(self, start: PairUnknowns | None = None, **changes: Any) -> OrientedPair:
@@ -202,10 +202,10 @@ def _with_ties(pair: OrientedPair, observations: PairObservations) -> OrientedPa
     return replace(pair, observations=ties).readjusted().settled()
 
 
-def with_bent_ties(pair: OrientedPair, ties: Ties) -> OrientedPair:
+def with_refracted_ties(pair: OrientedPair, ties: Ties) -> OrientedPair:
     """Return a pair oriented by control points through media with ties whose bent rays meet."""
     count = len(ties.seen1)
-    some = np.linspace(0, count - 1, min(count, MOST_BENT_TIES)).astype(int)
+    some = np.linspace(0, count - 1, min(count, MOST_REFRACTED_TIES)).astype(int)
     few = replace(
         ties, seen1=ties.seen1[some], seen2=ties.seen2[some], on_plane=ties.on_plane[some]
     )
@@ -219,7 +219,7 @@ def with_bent_ties(pair: OrientedPair, ties: Ties) -> OrientedPair:
             return pair.told(remark("orientation.hardly_through_media"))
         adjusted = adjust(base, adjusted)
     height = np.abs(tie_positions(base, adjusted)[:, 2])
-    on_wall = base.tie_used & (height < TUNING.bend_band * adjusted.cameras[0].centre[2])
+    on_wall = base.tie_used & (height < TUNING.shape_band * adjusted.cameras[0].centre[2])
     return replace(pair, observations=replace(base, wall=on_wall), adjusted=adjusted)
 
 

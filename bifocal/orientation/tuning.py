@@ -79,25 +79,25 @@ class Tuning:
     #: Beyond this it is refraction or a strong lens for certain. `MOST_BENT` is the limit of an
     #: honest pair: rendered façades reach 0.006 px, church_1 and church_2 0.10; rendered ones seen
     #: through half a metre of water in 17 m 0.22 and 0.43. Set after they were seen. [px]
-    strongly_bent: float = 1.0
+    strongly_curved: float = 1.0
     #: A face is what lies within this share of the far distance from its plane; where it holds
     #: fewer ties, or a smaller part of what a bent surface through all ties would hold, the wall
     #: itself is bent. Of six rendered façades flat faces hold 1.03 to 1.4 times as many as the best
     #: bent surface, walls bent by 1.8 to 14 px 0.1 to 0.6.
-    bend_band: float = 0.0025
+    shape_band: float = 0.0025
     fewest_on_face: int = 100
     face_holds: float = 0.8
     #: Faces tried.
     most_faces: int = 3
     #: Residuals that count less and less, at 3000 px of width [px], and the prior of the bend. The
     #: last tell one bent wall from parallel faces, which a bent surface meets along lines only.
-    bend_widths: tuple[float, ...] = (8.0, 5.0, 3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.3)
-    sigma_bend: float = 0.05
+    shape_widths: tuple[float, ...] = (8.0, 5.0, 3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.3)
+    sigma_shape: float = 0.05
     #: A bend so small that what it does is proportional to it.
-    small_bend: float = 1e-3
+    small_shape: float = 1e-3
     #: Ties used; side of the cells whose ties err alike, over half the diagonal.
-    bend_ties: int = 2500
-    bend_cell: float = 0.17
+    shape_ties: int = 2500
+    shape_cell: float = 0.17
 
 
 TUNING = Tuning()

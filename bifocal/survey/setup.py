@@ -13,8 +13,8 @@ from bifocal.model.homography import apply_homography
 from bifocal.model.pair import Pair
 from bifocal.precision import false_relief_of_scale
 from bifocal.remarks import remark
-from bifocal.survey.bent_radii import scale_ratio
 from bifocal.survey.observations import PointObservations
+from bifocal.survey.refracted_radii import scale_ratio
 from bifocal.survey.survey_media import SurveyMedia
 from photocore.arrays import FloatArray, positive
 from photocore.errors import GeometryError, InputError, located

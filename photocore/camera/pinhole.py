@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from photocore.arrays import FloatArray
-from photocore.camera.rotation import AXES_CROSS, by_turn, rotation_from_vector, skew
+from photocore.camera.rotation import AXES_CROSS, by_rotation, rotation_from_vector, skew
 
 #: What a camera is differentiated by: logarithms of fx and fy / fx, principal point [px], a small
 #: turn about the object frame's axes [rad], projection centre [m].
@@ -173,7 +173,7 @@ def project_with_jacobian(camera: Pinhole, xyz: FloatArray) -> ProjectedPoints:
     by_camera[:, 1, 1] = offset[:, 1]
     by_camera[:, :, 2:4] = np.eye(2)
     # Turned by a small v the camera sees R (P - C + v x (P - C)).
-    by_camera[:, :, 4:7] = by_turn(by_point, away)
+    by_camera[:, :, 4:7] = by_rotation(by_point, away)
     by_camera[:, :, 7:] = -by_point
     return ProjectedPoints(pixels, by_point, by_camera)
 

@@ -85,9 +85,9 @@ def precision_values(geo: Georeference | None) -> dict[str, CellValue]:
     if geo is None or geo.precision is None:
         return {}
     found, fit = geo.precision, geo.world_from_wall
-    carried = found.lever @ found.spread
+    carried = found.shift_rates @ found.spread
     variances = np.diag(found.covariance)
-    on_wall = fit.rotation.T @ found.lever / fit.scale
+    on_wall = fit.rotation.T @ found.shift_rates / fit.scale
     values = {"g_z_EN": float(found.covariance[0, 1])}
     for i, one in enumerate(SMALL):
         for j in range(i, 4):
@@ -95,7 +95,7 @@ def precision_values(geo: Georeference | None) -> dict[str, CellValue]:
     for i, (axis, name) in enumerate(zip("XYZ", "ENH", strict=True)):
         for j, small in enumerate(SMALL):
             values[f"g_t_{axis}{small}"] = float(on_wall[i, j])
-            values[f"g_v_{name}{small}"] = float(found.lever[i, j])
+            values[f"g_v_{name}{small}"] = float(found.shift_rates[i, j])
             values[f"g_u_{name}{small}"] = float(carried[i, j])
         values[f"g_z_{name}"] = float(variances[i])
     return dict(values)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bifocal.survey.space_similarity import SPACE_TURNS, SQUARINGS, SpaceSums
+from bifocal.survey.space_similarity import SPACE_STEPS, SQUARINGS, SpaceSums
 from bifocal.workbook.formulas.placed_formulas import entry
 from photocore.arrays import FloatArray
 from photocore.workbook.making.live_book import SheetBuilder
@@ -136,7 +136,7 @@ class SpaceBlock:
             value("left"),
         )  # fmt: skip
         entries = self._start()
-        for number in range(SPACE_TURNS):
+        for number in range(SPACE_STEPS):
             entries = self._turn(number, entries, reduced, left)
         self.entries = entries
 
@@ -208,7 +208,7 @@ class SpaceBlock:
         turn = None if self.sums is None else self.sums.turns[number]
         after = None
         if self.sums is not None:
-            last = number + 1 == SPACE_TURNS
+            last = number + 1 == SPACE_STEPS
             after = self.sums.entries if last else self.sums.turns[number + 1].entries
         put, b = self._put, entries.cells()
 
