@@ -24,7 +24,7 @@ def blanks(text):
 def sample(text):
     """Values for the blanks of a text."""
     return {
-        name: (3 if form[-1] == "d" else 0.4375) if form else f"P{place}"
+        name: {"d": 3, "s": "0.4"}.get(form[-1], 0.4375) if form else f"P{place}"
         for place, (name, form) in enumerate(blanks(text))
     }
 

@@ -408,13 +408,13 @@ def _ortho_step(job: PairJob) -> Step:
 
 
 def _drawing_step(job: PairJob) -> Step:
-    options = _some(job, *DRAWING, *PICTURE, "cog")
+    options = _some(job, *DRAWING, *PICTURE, "language", "cog")
     tables = {role: job.files[role] for role in ("control", "mark") if role in job.files}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver
 
-        drawing = {"scale": 50.0} | _some(job, *DRAWING)
+        drawing = {"scale": 50.0} | _some(job, *DRAWING, "language")
         wish = DeliverTask(title=job.name, **drawing, mark=job.files.get("mark"))
         task = _ortho_task(job, options)
         return deliver(job.pair_path, place, task, wish, progress=progress).ortho.remarks

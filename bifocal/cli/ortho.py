@@ -34,7 +34,7 @@ def command(
 
     if out is None and folder is None:
         raise click.UsageError("Give --out FILE, --deliver DIR or both.")
-    drawing = {name: given.pop(name) for name in (*DRAWING, "control")}
+    drawing = {name: given.pop(name) for name in (*DRAWING, "control", "language")}
     scale = drawing["scale"]
     if folder is not None and scale is None:
         raise click.UsageError("--deliver needs the scale of the drawing, e.g. --scale 1:50.")

@@ -111,7 +111,10 @@ def _deliver_options(session: Session, options: Options) -> dict[str, Any]:
         "out": str(folder),
         "overwrite": own,
         "title": title,
-        "drawing": _said(options, "scale", "dpi", "sheet", "sections"),
+        "drawing": {
+            **_said(options, "scale", "dpi", "sheet", "sections"),
+            "language": session.spoken,
+        },
         "mark": None if not _solved_points(session) else str(session.files.workbook.resolve()),
     }
 

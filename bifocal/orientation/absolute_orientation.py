@@ -26,7 +26,6 @@ from bifocal.orientation.approximate_orientation import (
 )
 from bifocal.orientation.as_set_up import check_room
 from bifocal.orientation.control_points import Control, SiteMeasures
-from bifocal.orientation.media_options import THROUGH_MEDIA
 from bifocal.orientation.media_report import media_remarks, refuse_impossible_media
 from bifocal.orientation.orientation_remarks import (
     WORST_FIT,
@@ -160,7 +159,7 @@ def _through_media(given: Given, lacking: str) -> OrientedPair:
     Common points say that their bent rays meet; the plane is that of the control points.
     """
     if not given.enough:
-        raise GeometryError(THROUGH_MEDIA)
+        raise GeometryError(remark("refused.through_media"))
     cameras, agree, interiors = approximate_cameras(given, None, True)
     if cameras[0].centre[2] < cameras[1].centre[2]:
         return _with_photos_exchanged(given)

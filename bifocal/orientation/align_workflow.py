@@ -20,8 +20,9 @@ from bifocal.orientation.alignment import Alignment, make_alignment, with_files
 from bifocal.orientation.alignment_picture import write_alignment_picture
 from bifocal.orientation.as_set_up import pair_as_set_up
 from bifocal.orientation.control_points import Control, SiteMeasures, read_control, read_lengths
-from bifocal.orientation.media_options import THROUGH_MEDIA, media_of
+from bifocal.orientation.media_options import media_of
 from bifocal.orientation.orientation_stages import PhotoInput
+from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.images import WRITTEN, ImageInfo, image_info
@@ -250,7 +251,7 @@ def _way(options: AlignOptions) -> tuple[str, AlignOptions]:
     if site.distance1 and site.distance2 and site.delta_d:
         raise InputError("give two of --distance1, --distance2 and --delta-d; the third follows.")
     if options.media and options.control is None and not options.as_set_up:
-        raise InputError(THROUGH_MEDIA)
+        raise InputError(remark("refused.through_media"))
     if options.as_set_up:
         if options.control is not None or options.auto:
             raise InputError("--as-set-up registers nothing: leave out --control and --auto.")
@@ -277,11 +278,8 @@ def _way(options: AlignOptions) -> tuple[str, AlignOptions]:
 def _check_focal(photos: tuple[PhotoInput, PhotoInput]) -> None:
     """Refuse a pair that only distances describe and whose lenses nobody knows."""
     if all(photo.interior.is_assumed for photo in photos):
-        raise InputError(
-            f"{photos[0].name} and {photos[1].name} do not tell their focal lengths (no EXIF "
-            "data). Give --focal1 and --focal2 with --sensor-width, e.g. --focal1 35 --focal2 19 "
-            "--sensor-width 22.7; or a length on the wall (--length)."
-        )
+        first, second = (photo.name for photo in photos)
+        raise InputError(remark("refused.no_exif", first=first, second=second))
 
 
 def _check_metres(options: AlignOptions) -> None:
@@ -292,10 +290,8 @@ def _check_metres(options: AlignOptions) -> None:
         given |= {"--distance1": site.distance1, "--distance2": site.distance2}
     for name, value in given.items():
         if value and value > FARTHEST_WALL:
-            raise InputError(
-                f"{name} {value:g} m is too far for a wall: is it in mm? Distances and lengths are "
-                f"in metres ({name} {value / 1000:g})."
-            )
+            about = {"name": name, "value": value, "meant": value / 1000}
+            raise InputError(remark("refused.length_in_mm", **about))
 
 
 def interior_of_photo(info: ImageInfo, data: KnownLens, number: int) -> Interior:
@@ -313,11 +309,8 @@ def interior_of_photo(info: ImageInfo, data: KnownLens, number: int) -> Interior
             # True and equivalent focal length together tell the pixel size.
             pitch = info.focal_length / info.focal_pixels
         if pitch is None:
-            raise InputError(
-                f"--focal{number} {data.focal:g} mm says nothing without the size of the sensor, "
-                f"which the EXIF data of {info.path.name} do not tell. Give --sensor-width (36 for "
-                "full frame, about 23 for APS-C) or --pixel-size."
-            )
+            about = {"number": number, "focal": data.focal, "name": info.path.name}
+            raise InputError(remark("refused.no_sensor", **about))
         focal, sigma = data.focal / pitch, SIGMA_NOMINAL
         source = f"--focal{number} {data.focal:g} mm"
     elif info.focal_length and exif:
@@ -325,7 +318,7 @@ def interior_of_photo(info: ImageInfo, data: KnownLens, number: int) -> Interior
         focal = info.focal_length / pitch
     elif info.focal_pixels:
         focal, sigma, pitch = info.focal_pixels, SIGMA_EQUIVALENT, None
-        source = f"EXIF, {info.focal_length_35:g} mm equivalent"
+        source = remark("orientation.exif_equivalent", focal=info.focal_length_35)
     else:
         return Interior.unknown(info.size)
     found = Interior.from_focal(
@@ -380,12 +373,9 @@ def _check_inside(control: Control, pixels: FloatArray, size: tuple[int, int], p
     outside = (pixels < -0.5).any(axis=1) | (pixels > [width, height]).any(axis=1)
     if outside.any():
         name, others = control.ids[int(np.flatnonzero(outside)[0])], int(outside.sum()) - 1
-        lie = f"and {others} more lie" if others else "lies"
-        raise InputError(
-            f'control point "{name}" {lie} outside the {photo} photo '
-            f"({width} x {height} px). Were the picks made on a photo of another size, or are far "
-            "and near exchanged?"
-        )
+        about = {"name": name, "photo": photo, "width": width, "height": height}
+        key = f"refused.{'more_' if others else ''}outside_photo"
+        raise InputError(remark(key, more=others, **about))
 
 
 def _write_lenses(

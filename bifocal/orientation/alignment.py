@@ -120,11 +120,11 @@ def make_alignment(
         deviations["relief_offset"] = offset
     used = observations.tie_used
     sigma_tie = robust_sigma(adjusted.tie_misfit[used]) if used.any() else observations.sigma_pick
-    words = orientation_in_words(
+    words: tuple[str, ...] = orientation_in_words(
         cameras, deviations, sigma_px=max(sigma_tie, 0.05), media=adjusted.media,
         fits=not any(text.startswith(MISFIT) for text in oriented.remarks),
     )  # fmt: skip
-    words = (*words, *media_in_words(adjusted, observations.media))
+    words += media_in_words(adjusted, observations.media)
     first, second = observations.interiors
     return Alignment(
         pair=Pair(image1=far, image2=near, orientation=covariance),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from bifocal.model.interior_orientation import Cameras
@@ -11,6 +13,7 @@ from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.orientation.adjustment.pair_observations import PairObservations, at
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair, Photos
+from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.camera.pinhole import Pinhole
 from photocore.errors import InputError
@@ -37,22 +40,12 @@ def pair_as_set_up(photos: Photos, site: SiteMeasures, media: PairMedia) -> Orie
     """
     d1, d2 = site.distances
     if not (d1 and d2):
-        raise InputError(
-            "--as-set-up takes the set-up as typed: give --distance1 and --distance2, or one of "
-            "them and --delta-d."
-        )
+        raise InputError(remark("refused.typed_distances"))
     if d1 <= d2:
-        raise InputError(
-            f"--distance1 {d1:g} m is not larger than --distance2 {d2:g} m: the far photo comes "
-            "first."
-        )
+        raise InputError(remark("refused.far_first", d1=d1, d2=d2))
     for number, photo in enumerate(photos, start=1):
         if photo.interior.is_assumed:
-            raise InputError(
-                f"--as-set-up needs the focal length of {photo.name}, which its EXIF data do not "
-                f"tell: give --focal{number} with --sensor-width or --pixel-size, or "
-                f"--lens{number}."
-            )
+            raise InputError(remark("refused.typed_focal", name=photo.name, number=number))
     square_on = np.diag([1.0, -1.0, -1.0])
     first, second = (
         Pinhole(photo.interior.matrix, square_on, np.array([0.0, 0.0, distance]))
@@ -75,9 +68,7 @@ def pair_as_set_up(photos: Photos, site: SiteMeasures, media: PairMedia) -> Orie
         observations=PairObservations(interiors=interiors, media=media),
         adjusted=adjusted,
         assumed=(
-            "the set-up exactly as typed: square to the wall, nadirs in the principal points, both "
-            f"photos at the typed scales; distances within {1000 * site.sigma:.0f} mm"
-            + ("; media as typed" if media else ""),
+            remark(f"orientation.as_typed{'_media' if media else ''}", within=1000 * site.sigma),
         ),
     )
 
@@ -93,19 +84,12 @@ def check_room(media: PairMedia, cameras: Cameras) -> None:
         path = media.path(number, camera)
         if not path:
             return
+        about: dict[str, Any] = {"number": number + 1, "distance": path.distance}
         if path.z0 < 0:
-            raise InputError(
-                f"--depth {media.depth:g} m: with {media.layers.thickness:g} m of media before it "
-                f"the first interface would lie behind camera {number + 1}, which stands "
-                f"{path.distance:.3f} m from the wall. --depth is from the last interface to the "
-                "wall; for a port that moves with the camera give --port."
-            )
+            about |= {"depth": media.depth, "thick": media.layers.thickness}
+            raise InputError(remark("refused.depth_room", **about))
         if not path.holds(np.zeros(2), np.zeros(())):
-            raise InputError(
-                f"--port: the last interface would lie {path.last_interface:.3f} m before camera "
-                f"{number + 1}, which stands {path.distance:.3f} m from the wall. --port is from "
-                "the camera's centre to the glass, in metres."
-            )
+            raise InputError(remark("refused.port_room", depth=path.last_interface, **about))
 
 
 def _of_typed(media: PairMedia, cameras: Cameras, sigma: float) -> FloatArray:

@@ -12,15 +12,6 @@ from photocore.adjustment.priors import parse_prior
 from photocore.errors import InputError
 from photocore.options import options_of
 
-#: How a pair through media is set up, and how not.
-THROUGH_MEDIA = (
-    "through glass or water a pair is set up by control points, at least four with X, Y and pixels "
-    "in each photo (--control FILE; distances may be given with it), or exactly as typed "
-    "(--as-set-up). From the photos alone (--auto, or distances without control) pairs are set up "
-    "in air only: bent rays leave neither epipolar lines nor planes what they are. Measure points "
-    "of the wall and off it, or set the cameras up square to it and give --as-set-up."
-)
-
 
 def media_of(given: Mapping[str, Any]) -> PairMedia:
     """Return media as options name them (``indices``, ``thicknesses``, ``port`` ...); none in air.

@@ -28,17 +28,16 @@ def media_in_words(adjusted: AdjustedPair, given: PairMedia) -> tuple[str, ...]:
     indices = ", ".join(f"{n:.4g}" for n in media.layers.indices)
     layers = ", ".join(f"{1000 * t:.4g} mm" for t in media.layers.thicknesses)
     z0 = [media.z0(number, camera) for number, camera in enumerate(adjusted.cameras)]
-    words = [
-        f"Through media of index {indices}{f' ({layers} between)' if layers else ''}: the first "
-        f"begins {z0[0]:.3f} m before the far and {z0[1]:.3f} m before the near camera, "
-        + ("with the camera." if media.depth is None else "and stays with the wall.")
-    ]
+    how = "with the camera" if media.depth is None else "and stays with the wall"
+    about = {"indices": indices, "far": z0[0], "near": z0[1], "how": how}
+    key = f"orientation.media{'_between' if layers else ''}"
+    words = [remark(key, layers=layers, **about)]
     for row, name in _estimated(adjusted, media):
         sigma = float(np.sqrt(adjusted.of_unknowns[row, row]))
-        words.append(
-            f"{name} came out {_shown(name, media.value(name))} ± {_shown(name, sigma)} "
-            f"(given {_shown(name, given.value(name))} ± {_shown(name, given.sigmas[name])})."
-        )
+        found = {"value": media.value(name), "sigma": sigma, "start": given.value(name)}
+        found |= {"prior": given.sigmas[name]}
+        shown = {what: _shown(name, number) for what, number in found.items()}
+        words.append(remark("orientation.media_found", name=name, **shown))
     return tuple(words)
 
 
@@ -77,21 +76,16 @@ def refuse_impossible_media(adjusted: AdjustedPair, given: PairMedia) -> None:
         if is_possible(value, start=start, sigma=sigma, least=least, most=most):
             continue
         own, twin = float(np.sqrt(adjusted.of_unknowns[row, row])), _twin(adjusted, media, row)
-        alike = (
-            f"; it goes with {twin[0]} (correlation {twin[1]:.2f})"
-            if twin and twin[1] > ALIKE / 2
-            else ""
-        )
         option, typical = name, typical_sigma(name, start)
         if name.startswith("lean"):
             option, typical = f"lean{name[-1]}", 1.0
             value, own, start = np.degrees([value, own, start]).tolist()
-        raise GeometryError(
-            f"{name} comes out as {value:.4g} ± {own:.2g}, {start:g} was given: the control "
-            f"points cannot carry it{alike}. Give what is known as a standard deviation (--prior "
-            f"{option}={typical:.3g}), measure points farther off the wall, or take {option} out "
-            "of --estimate. Check the focal lengths too: a wrong one looks like a wrong index."
-        )
+        about = {"name": name, "value": value, "own": own, "start": start, "option": option}
+        if twin and twin[1] > ALIKE / 2:
+            alike = {"twin": twin[0], "correlation": twin[1]}
+            told = remark("refused.media_value_alike", typical=typical, **about, **alike)
+            raise GeometryError(told)
+        raise GeometryError(remark("refused.media_value", typical=typical, **about))
 
 
 def _estimated(adjusted: AdjustedPair, media: PairMedia) -> list[tuple[int, str]]:

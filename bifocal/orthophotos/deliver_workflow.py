@@ -54,6 +54,7 @@ from photocore.output import (
     check_writable,
 )
 from photocore.provenance import program, today
+from photocore.reports.words import words_of
 from photocore.textfile import file_name
 
 #: Print resolution for which 1:50 makes pixels of 5.00 mm. [dpi]
@@ -88,6 +89,8 @@ class DeliverTask:
         ``x=1.5``, ``y=2`` or corners.
     contours : float, optional
         Between contour lines; None: about 1/25 of the relief. [m]
+    language : str
+        Of the sheets and sections.
     """
 
     scale: float
@@ -98,6 +101,7 @@ class DeliverTask:
     control: Path | None = None
     sections: Sequence[str] = ()
     contours: float | None = None
+    language: str = "en"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,7 +164,7 @@ def deliver(
         grid = planned_grid(pair, surface, task)
         drawing = Drawing(
             title=title, grid=grid, scale=scale, points=points, control=control,
-            notes=_notes(pair, grid, wish, task),
+            notes=_notes(pair, grid, wish, task), language=wish.language,
         )  # fmt: skip
         sheet = PrintSheet.fitting(drawing, wish.paper)
         measured = _measured(reader) or surface
@@ -169,7 +173,7 @@ def deliver(
             for number, cut in enumerate(wish.sections)
         )
         if cuts:
-            named = f"sections {'; '.join(cut.title for cut in cuts)}"
+            named = drawing.say("sections", titles="; ".join(cut.title for cut in cuts))
             drawing = replace(drawing, sections=cuts, notes=(*drawing.notes, named))
         relief = None
         if not isinstance(surface, FlatSurface):
@@ -183,8 +187,8 @@ def deliver(
         result = make_ortho(
             pair_path, place / f"{name}.tif", task, world_file=True, progress=progress
         )
-        guess = not_measured(result.shares)
-        told = (f"not measured: {guess}; last band of the .tif",) if guess else ()
+        guess = not_measured(result.shares, wish.language)
+        told = (drawing.say("guessed", shares=guess),) if guess else ()
         picture = replace(drawing, notes=(*told, *drawing.notes))
         missing = _pictures(place, name, picture, sheet, relief.lines if relief else ())
         if missing.names:
@@ -198,7 +202,7 @@ def deliver(
         for number, cut in enumerate(cuts, start=1):
             for writer, ending in ((write_section_dxf, "dxf"), (write_section_svg, "svg")):
                 target = place / f"{name}_section{number}.{ending}"
-                writer(target, cut, scale=scale, overwrite=False)
+                writer(target, cut, scale=scale, say=drawing.say)
         if out is not None and extra != (f"{name}.tif",):
             shutil.copyfile(place / f"{name}.tif", place / out.name if inside else copy)
         files = tuple(sorted(item.name for item in place.iterdir()))
@@ -331,9 +335,10 @@ def _draw_relief(
         limits=(low, high), beyond=relief.beyond, colours=tuple((r, g, b) for r, g, b in colours),
         guessed=share,
     )  # fmt: skip
-    words = f"relief {' to '.join(legend.words)} m, contour lines every {relief.interval:g} m"
+    lowest, highest = legend.words
+    words = drawing.say("contours", low=lowest, high=highest, interval=relief.interval)
     drawing = replace(
-        drawing, subtitle="Relief", contours=relief.lines, notes=(words, *drawing.notes),
+        drawing, kind="relief", contours=relief.lines, notes=(words, *drawing.notes),
         legend=legend,
     )  # fmt: skip
     _pictures(place, name, drawing, sheet, relief.lines)
@@ -399,14 +404,11 @@ def _points(source: Path | SurveyPoints | None) -> tuple[SurveyPoints | None, tu
 
 def _notes(pair: Pair, grid: Grid, wish: DeliverTask, task: OrthoTask) -> tuple[str, ...]:
     """Return the lines of the title block."""
-    relief = task.relief or task.points
-    dpi = dpi_at_scale(grid.gsd, wish.scale)
-    image = {"1": "far photo", "2": "near photo", "both": "both photos"}[task.image]
-    media = (f"seen through {media_words(pair.layers)}",) if pair.layers else ()
+    relief, say = task.relief or task.points, words_of("bifocal.orthophotos", wish.language)
     return (
-        f"pixel {grid.gsd * 1000:.4g} mm on the wall, {dpi:.4g} dpi on paper",
-        f"{image}, camera distances {pair.image1.distance:.3f} m and {pair.image2.distance:.3f} m",
-        *media,
-        f"relief: {relief.name if relief else f'plane at {task.plane:g} m'}",
+        say("pixel", size=grid.gsd * 1000, dpi=dpi_at_scale(grid.gsd, wish.scale)),
+        say(f"photo_{task.image}", d1=pair.image1.distance, d2=pair.image2.distance),
+        *((say("media", media=media_words(pair.layers)),) if pair.layers else ()),
+        say("relief_of", name=relief.name) if relief else say("relief_plane", plane=task.plane),
         f"{program()}, {today()}",
     )

@@ -13,6 +13,7 @@ from bifocal.model.grid import Grid
 from bifocal.model.points import SurveyPoints
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import InputError
+from photocore.reports.words import Words, words_of
 
 #: Paper sizes, width x height upright. [mm]
 PAPERS: Mapping[str, tuple[float, float]] = {
@@ -153,7 +154,8 @@ class Drawing:
 
     Attributes
     ----------
-    title, subtitle : str
+    title : str
+    kind : {"ortho", "relief"}
     grid : Grid
         Of the picture.
     scale : float
@@ -165,10 +167,11 @@ class Drawing:
         Lines for the title block.
     legend : Legend, optional
         Of a relief.
+    language : str
     """
 
     title: str
-    subtitle: str = "Orthophoto"
+    kind: str = "ortho"
     grid: Grid
     scale: float
     points: SurveyPoints | None = None
@@ -177,6 +180,12 @@ class Drawing:
     sections: tuple[Section, ...] = ()
     notes: tuple[str, ...] = field(default=())
     legend: Legend | None = None
+    language: str = "en"
+
+    @property
+    def say(self) -> Words:
+        """What gives the texts of the sheet in its language, by their keys."""
+        return words_of("bifocal.orthophotos", self.language)
 
     @property
     def paper_size(self) -> tuple[float, float]:
@@ -246,6 +255,11 @@ class PrintSheet:
             f"{wanted}. Choose a smaller scale (1:{drawing.scale * 2:g}), --bounds, or another "
             "--paper."
         )
+
+    def title(self, say: Words) -> str:
+        """Return the name of the sheet in the language of its drawing."""
+        paper, turned = self.name.split()
+        return say(turned, paper=paper)
 
     @property
     def frame(self) -> tuple[float, float, float, float]:

@@ -125,7 +125,7 @@ def _section_names(model: Any, drawing: Drawing, cut: Section, paper: float) -> 
 
 def _lay_out(document: Any, drawing: Drawing, sheet: PrintSheet) -> None:
     """Draw the sheet in paper space: its margins, and the model through a viewport at 1:scale."""
-    name = sheet.name
+    name = sheet.title(drawing.say)
     document.layouts.rename("Layout1", name)
     layout = document.paperspace(name)
     layout.page_setup(size=(sheet.width, sheet.height), margins=(0, 0, 0, 0), units="mm")

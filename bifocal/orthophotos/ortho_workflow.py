@@ -35,6 +35,7 @@ from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
 from photocore.images import ImageArray, read_image
 from photocore.output import check_ending, check_not_input, check_writable
+from photocore.reports.words import words_of
 
 #: What an orthophoto must be named.
 ORTHO_ENDING = "an orthophoto is written as GeoTIFF; name it .tif."
@@ -173,12 +174,10 @@ def make_ortho(
     )
 
 
-def not_measured(shares: dict[str, float]) -> str:
+def not_measured(shares: dict[str, float], language: str = "en") -> str:
     """Return in words how much of a picture was not measured; empty if all that is seen was."""
-    parts = {"interpolated": "on interpolated relief", "plane": "on the plane", "filled": "filled"}
-    return ", ".join(
-        f"{100 * shares[key]:.1f} % {where}" for key, where in parts.items() if shares[key]
-    )
+    say, parts = words_of("bifocal.orthophotos", language), ("interpolated", "plane", "filled")
+    return ", ".join(say(key, share=100 * shares[key]) for key in parts if shares[key])
 
 
 def _advice(shares: dict[str, float], task: OrthoTask) -> list[str]:

@@ -24,6 +24,7 @@ from bifocal.orthophotos.drawing import Section, multiples, round_step, signed
 from bifocal.orthophotos.dxf_canvas import DxfCanvas
 from photocore.arrays import FloatArray
 from photocore.output import atomic_path
+from photocore.reports.words import Words
 
 #: Layers and their colours (AutoCAD colour index).
 LAYERS = {
@@ -46,21 +47,21 @@ _ALONG, _ACROSS = 20.0, (10.0, 5.0)
 MARGIN, FOOT = 10.0, 19.0
 
 
-def write_section_dxf(path: Path, cut: Section, *, scale: float, overwrite: bool) -> None:
+def write_section_dxf(path: Path, cut: Section, *, scale: float, say: Words) -> None:
     """Write one section, 1:1 in metres: relief to the right (upright cut) or upwards."""
     document, model = new_drawing(LAYERS, point_style=3, point_size=3 * scale / 1000)
-    draw_section(DxfCanvas(model, scale / 1000), cut, scale)
-    with atomic_path(path, overwrite=overwrite) as temporary:
+    draw_section(DxfCanvas(model, scale / 1000), cut, scale, _title(cut, scale, say))
+    with atomic_path(path, overwrite=False) as temporary:
         save_drawing(document, temporary)
 
 
-def write_section_svg(path: Path, cut: Section, *, scale: float, overwrite: bool) -> None:
+def write_section_svg(path: Path, cut: Section, *, scale: float, say: Words) -> None:
     """Write one section as SVG that prints at 1:scale."""
     left, bottom, right, top = _extent(cut, scale)
-    canvas = _SvgCanvas(left - MARGIN, top + MARGIN)
-    draw_section(canvas, cut, scale)
+    canvas, title = _SvgCanvas(left - MARGIN, top + MARGIN), _title(cut, scale, say)
+    draw_section(canvas, cut, scale, title)
     bar = round_step(0.05 * scale) * 1000 / scale
-    width = max(right - left, bar, text_width(_words(cut, scale), 3.2)) + 2 * MARGIN
+    width = max(right - left, bar, text_width(title, 3.2)) + 2 * MARGIN
     height = top - bottom + 2 * MARGIN + FOOT
     text = (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.3f}mm" height="{height:.3f}mm" '
@@ -69,11 +70,11 @@ def write_section_svg(path: Path, cut: Section, *, scale: float, overwrite: bool
         + "\n".join(canvas.parts)
         + "\n</svg>\n"
     )
-    with atomic_path(path, overwrite=overwrite) as temporary:
+    with atomic_path(path, overwrite=False) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
-def draw_section(canvas: Canvas, cut: Section, scale: float) -> None:
+def draw_section(canvas: Canvas, cut: Section, scale: float, title: str) -> None:
     """Draw a section in millimetres on paper; (0, 0) is the place 0 on the wall's plane."""
     left, bottom, right, top = _extent(cut, scale)
     factor = 1000.0 / scale
@@ -104,13 +105,13 @@ def draw_section(canvas: Canvas, cut: Section, scale: float) -> None:
     names = ("r [m]", "Y [m]") if upright else ("X [m]" if cut.axis == "y" else "s [m]", "r [m]")
     canvas.text((right - text_width(names[0], 2.2), bottom - 6.8), names[0], _AXIS, size=2.2)
     canvas.text((left - MARGIN + 1, top + 2.5), names[1], _AXIS, size=2.2)
-    canvas.text((left, bottom - 11.5), _words(cut, scale), _NAME, size=3.2, bold=True)
+    canvas.text((left, bottom - 11.5), title, _NAME, size=3.2, bold=True)
     length = round_step(0.05 * scale)
     scale_bar(canvas, (left, bottom - 20.0), length, factor, _BAR)
 
 
-def _words(cut: Section, scale: float) -> str:
-    return f"Section {cut.title}, 1:{scale:g}"
+def _title(cut: Section, scale: float, say: Words) -> str:
+    return say("section", title=cut.title, scale=scale)
 
 
 def _extent(cut: Section, scale: float) -> tuple[float, float, float, float]:

@@ -59,7 +59,7 @@ class SheetMargins:
         self._title()
         left, bottom, _, _ = self.sheet.frame
         scale_bar(self.canvas, (left + 6, bottom + 8), self.drawing.bar_length(), self.factor, _BAR)
-        words = f"1:{self.drawing.scale:g}  (print at 100 %)"
+        words = self.drawing.say("print", scale=self.drawing.scale)
         self.canvas.text((left + 6, bottom + 3.8), words, _BAR, size=2.2)
         self._level()
         self._legend()
@@ -132,9 +132,9 @@ class SheetMargins:
         title = self.drawing.title
         top = bottom + STRIP
         self.canvas.text((block + 3, top - 8), title, _FRAME, size=fitting(title, 5.0), bold=True)
-        kind = f"{self.drawing.subtitle} 1:{self.drawing.scale:g}"
+        kind = f"{self.drawing.say(self.drawing.kind)} 1:{self.drawing.scale:g}"
         self.canvas.text((block + 3, top - 14), kind, _FRAME, size=3.5)
-        name = self.sheet.name
+        name = self.sheet.title(self.drawing.say)
         place = (right - 3 - text_width(name, 2.2), bottom + 2.5)
         self.canvas.text(place, name, _FRAME, size=2.2)
         lines = self.drawing.notes
@@ -155,7 +155,7 @@ class SheetMargins:
         arrow = left + 40
         line([(arrow, y - 3), (arrow, y + 4)], pen)
         line([(arrow - 1, y + 2), (arrow, y + 4), (arrow + 1, y + 2)], pen)
-        self.canvas.text((arrow + 2, y), "Y up", _FRAME, size=2.4)
+        self.canvas.text((arrow + 2, y), self.drawing.say("up"), _FRAME, size=2.4)
         xmin, ymin, _, ymax = self.drawing.grid.bounds
         if ymin <= 0 <= ymax:
             px, py = self.place(xmin, 0.0)
@@ -176,7 +176,7 @@ class SheetMargins:
             self.canvas.area(corners, Pen(layer="BIFOCAL_LEGEND", colour=colour))
         box(self.canvas, (x, y), wide, high, _FRAME)
         low, top = legend.words
-        ends = (("< " if legend.beyond[0] else "") + low, "0.00 wall",
+        ends = (("< " if legend.beyond[0] else "") + low, self.drawing.say("wall"),
                 ("> " if legend.beyond[1] else "") + f"{top} m")  # fmt: skip
         for share, words in zip((0.0, 0.5, 1.0), ends, strict=True):
             self.canvas.text((x + share * wide, y + 3), words, _FRAME, size=2.2, middle=True)
@@ -186,5 +186,5 @@ class SheetMargins:
         box(self.canvas, (x, y), 4, high, _FRAME)
         for step in range(3):
             self.canvas.line([(x + 1.4 * step, y), (x + 1.4 * step + 1.2, y + high)], _FRAME)
-        words = f"not measured {legend.guessed:.1%}"
+        words = self.drawing.say("not_measured", share=legend.guessed)
         self.canvas.text((x + 5, y + 0.3), words, _FRAME, size=2.2)

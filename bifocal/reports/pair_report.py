@@ -63,7 +63,7 @@ def pair_blocks(content: PairContent, say: Words) -> Iterator[Block]:
 
 def _geometry(content: PairContent, say: Words) -> Iterator[Block]:
     yield Heading(text=say("geometry"))
-    photos = (content.pair.image1, content.pair.image2)
+    photos, language = (content.pair.image1, content.pair.image2), content.task.language
     deviations = content.setup.get("standard_deviations", {})
 
     def with_sigma(value: float, key: str, unit: str, digits: int) -> str:
@@ -86,7 +86,10 @@ def _geometry(content: PairContent, say: Words) -> Iterator[Block]:
             *(_focal(float(focal[k - 1]), p.pixel_size, deviations.get(f"focal{k}"))
               for k, p in _both(photos)),
         ])  # fmt: skip
-        rows.append([say("focal_given"), *map(str, content.setup.get("interior", ("-", "-")))])
+        sources = content.setup.get("interior", ("-", "-"))
+        rows.append(
+            [say("focal_given"), *(in_language(str(source), language) for source in sources)]
+        )
     if content.photos:
         rows.append([
             say("gsd"), *(millimetres(seen.photo.gsd(seen.size)) for seen in content.photos),
@@ -103,9 +106,8 @@ def _geometry(content: PairContent, say: Words) -> Iterator[Block]:
     rows.append([say(key), f"{content.pair.base_factor:.2f} m", ""])
     yield TextTable(headings=[say("quantity"), say("far"), say("near")], rows=rows)
     yield from refraction_blocks(content, say)
-    if content.task.language == "en":
-        for sentence in content.setup.get("words", ()):
-            yield Paragraph(text=str(sentence), small=True)
+    for sentence in content.setup.get("words", ()):
+        yield Paragraph(text=in_language(str(sentence), language), small=True)
     yield Picture(
         draw=partial(figures.draw_plan, content=content, say=say),
         ratio=figures.plan_ratio(content),

@@ -15,8 +15,10 @@ from multimedia.refraction.water import (
 )
 from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
 from photocore.workbook.making.live_charts import scatter
+from photocore.workbook.making.live_columns import FormulaBook
 from photocore.workbook.making.look import HEAD_FONT
 
+FORMULAS = FormulaBook(__package__)
 #: Name, value, unit and limits of the cells to fill in.
 _GIVEN = (
     ("wavelength_nm", 550.0, "nm", (180, 1200)),
@@ -42,17 +44,19 @@ def write_index_sheet(book: BookBuilder) -> float:
     water: dict[str, Any] = {name.removesuffix("_m"): value for name, value, *_ in _GIVEN}
     slopes = water_index_derivatives(**water)
     n_w = float(slopes.refractive_index)
+    n_quan_fry = float(water_refractive_index(**water, formula=QUAN_FRY))
     results = (
-        ("n_w", "n_hoehle", _HOEHLE_FORMULA, n_w, ""),
-        ("n_w_quan_fry", "n_quan_fry", _QUAN_FRY_FORMULA,
-         float(water_refractive_index(**water, formula=QUAN_FRY)), ""),
-        ("dn_dT", "dn_dT", "-4E-5", float(slopes.d_temperature), "1/°C"),
-        ("dn_dS", "dn_dS", "4E-5*50", float(slopes.d_salinity), "1/%"),
-    )  # fmt: skip
+        ("n_hoehle", n_w, ""),
+        ("n_quan_fry", n_quan_fry, ""),
+        ("dn_dT", float(slopes.d_temperature), "1/°C"),
+        ("dn_dS", float(slopes.d_salinity), "1/%"),
+    )
+    *lines, inverse = FORMULAS.columns("index")
     sheet.headings(10, ("result", "description", "value", "unit"))
-    for row, (name, words, text, value, unit) in enumerate(results, start=11):
-        sheet.describe(row, (name, book.word(words)), unit)
-        sheet.formula(f"C{row}", text, value, form="0.000000", name=name if name == "n_w" else "")
+    for row, (line, (words, value, unit)) in enumerate(zip(lines, results, strict=True), start=11):
+        sheet.describe(row, (line.key, book.word(words)), unit)
+        name = line.key if line.key == "n_w" else ""
+        sheet.formula(f"C{row}", line.formula, value, form="0.000000", name=name)
     sheet.headings(16, ("inverse", "description", "value", "unit"))
     sheet.describe(17, ("n_measured", book.word("n_measured")))
     sheet.input("C17", _MEASURED, name="n_measured")
@@ -60,8 +64,9 @@ def write_index_sheet(book: BookBuilder) -> float:
     sheet.validate("C17", title="n_measured", prompt=prompt, limits=(1.2, 1.6))
     sheet.describe(18, ("salinity", book.word("salinity")), "%")
     warm = {key: value for key, value in water.items() if key != "salinity_percent"}
-    text = "((n_measured-1.338)/4E-5-486-0.003*depth_m+wavelength_nm+temperature_c)/50"
-    sheet.formula("C18", text, float(salinity_from_index(_MEASURED, **warm)), form="0.000")
+    sheet.formula(
+        "C18", inverse.formula, float(salinity_from_index(_MEASURED, **warm)), form="0.000"
+    )
     _over_light(sheet, water)
     sheet.finish(freeze="A5")
     return n_w
@@ -79,11 +84,9 @@ def _over_light(sheet: SheetBuilder, water: dict[str, Any]) -> None:
     for i, wavelength in enumerate(_LIGHT):
         row = _CHART_HEAD + 1 + i
         sheet.worksheet[f"A{row}"] = wavelength
-        for letter, text, found in (
-            ("C", _HOEHLE_FORMULA, hoehle), ("D", _QUAN_FRY_FORMULA, quan_fry),
-        ):  # fmt: skip
-            own = text.replace("wavelength_nm", f"$A{row}")
-            sheet.formula(f"{letter}{row}", own, float(found[i]), form="0.000000")
+        lines = FORMULAS.columns("index", parts={"light": f"$A{row}"}, rows="over_light")
+        for line, found in zip(lines, (hoehle, quan_fry), strict=True):
+            sheet.formula(f"{line.key}{row}", line.formula, float(found[i]), form="0.000000")
     last = _CHART_HEAD + len(_LIGHT)
     data = [
         Reference(sheet.worksheet, min_col=column, min_row=_CHART_HEAD + 1, max_row=last)
@@ -95,13 +98,3 @@ def _over_light(sheet: SheetBuilder, water: dict[str, Any]) -> None:
     chart.x_axis.scaling.min, chart.x_axis.scaling.max = 400, 700
     chart.height, chart.width = 6.5, 10.5
     sheet.worksheet.add_chart(chart, f"B{_CHART_HEAD}")
-
-
-_HOEHLE_FORMULA = "1.338+4E-5*(486+0.003*depth_m+50*salinity_percent-wavelength_nm-temperature_c)"
-#: Quan and Fry's Eq. (3) in the names of the sheet; their salinity is per mille.
-_QUAN_FRY_FORMULA = (
-    "1.31405+(0.0001779-0.00000105*temperature_c+0.000000016*temperature_c^2)*10*salinity_percent"
-    "-0.00000202*temperature_c^2"
-    "+(15.868+0.01155*10*salinity_percent-0.00423*temperature_c)/wavelength_nm"
-    "-4382/wavelength_nm^2+1145500/wavelength_nm^3"
-)

@@ -14,7 +14,7 @@ from openpyxl.utils import get_column_letter
 
 from multimedia.refraction.layers import HIGHEST_INDEX
 from multimedia.refraction.unrolled import STEPS, TOLERANCE, unrolled_shift
-from multimedia.workbook.index_sheet import write_index_sheet
+from multimedia.workbook.index_sheet import FORMULAS, write_index_sheet
 from multimedia.workbook.shift_points import IN_PLANE, ShiftPoints, ShiftResult, ShiftSetup
 from multimedia.workbook.shift_sketch import shift_sketch
 from multimedia.workbook.words import WORDS
@@ -265,7 +265,7 @@ def shift_columns(
     *,
     value: Callable[[str], str] = str,
     given: Collection[str] = INPUTS,
-) -> list[LiveColumn]:
+) -> tuple[LiveColumn, ...]:
     """Return every column of the table.
 
     Parameters
@@ -279,67 +279,21 @@ def shift_columns(
     given : collection of str
         The input columns there are.
     """
-    lengths = map(value, ("z_0", *(f"t_{i}" for i in range(1, layers - 1))))
-    heights = [*lengths, "[@ZP_u]"]
-    k = [f"{h}*{value(f'k_{i}')}" for i, h in enumerate(heights, start=1)]
-    q = [value(f"q_{i}") for i in range(1, layers + 1)]
-
-    def f(u: str) -> str:
-        return "+".join(f"{a}/SQRT(1+{b}*{u}^2)" for a, b in zip(k, q, strict=True))
-
-    def slope(u: str) -> str:
-        return "+".join(f"{a}/(1+{b}*{u}^2)^1.5" for a, b in zip(k, q, strict=True))
-
-    end = f"[@u{steps}]"
-    whole_row = "AND(COUNT([@R_u],[@ZP_u])=2,N([@ZP_u])>=0)"
-    radius, depth = _used(given, value)
-    columns = [
-        LiveColumn(key="id", width=11),
-        *(LiveColumn(key=key, form="General", width=11, limits=(-1e9, 1e9)) for key in "XYZ"),
-        *(LiveColumn(key=key, form="General", width=11, limits=(0, 1e9)) for key in ("R", "ZP")),
-        _live("R_u", radius, folded=True),
-        _live("ZP_u", depth, folded=True),
-        _live("u0", f'IF({whole_row},[@R_u]/({"+".join(k)}),"")', "0.000000", folded=True),
-    ]
-    for step in range(steps):
-        u = f"[@u{step}]"
-        text = f'IF({u}="","",{u}+([@R_u]-{u}*({f(u)}))/({slope(u)}))'
-        columns.append(_live(f"u{step + 1}", text, "0.000000", folded=True))
-    through = f"{value('k_1')}*{end}/SQRT(1+{q[0]}*{end}^2)"
-    columns += [
-        _live("Rbar", f'IF({end}="","",({"+".join(heights)})*{through})'),
-        _live("dR", f'IF({end}="","",[@Rbar]-[@R_u])'),
-    ]
-    for axis in "XY" if {"X", "Y"} <= set(given) else "":
-        centre = value(f"{axis}_0")
-        moved = f"{centre}+([@{axis}]-{centre})*IF([@R_u]=0,1,[@Rbar]/[@R_u])"
-        text = f'IF(OR({end}="",COUNT([@X],[@Y])<2),"",{moved})'
-        columns.append(_live(f"{axis}bar", text))
-    solved = f'IF(ABS([@resid])<={TOLERANCE:.0E}*[@R_u],"OK","CHECK")'
-    columns += [
-        _live("resid", f'IF({end}="","",{end}*({f(end)})-[@R_u])', "0.0E+00"),
-        _live("flag", f'IF(COUNT([@R_u],[@ZP_u])<2,"",IF([@ZP_u]<0,"DRY",{solved}))', "General"),
-    ]
-    return columns
-
-
-def _live(key: str, formula: str, form: str = "0.00000", *, folded: bool = False) -> LiveColumn:
-    return LiveColumn(key=key, kind="formula", formula=formula, form=form, width=12, folded=folded)
-
-
-def _used(given: Collection[str], value: Callable[[str], str]) -> tuple[str, str]:
-    """Return the formulas of the radius and depth used, from the input columns there are."""
-    radius, depth = '""', '""'
-    if {"X", "Y"} <= set(given):
-        off = f"([@X]-{value('X_0')})^2+([@Y]-{value('Y_0')})^2"
-        radius = f'IF(COUNT([@X],[@Y])=2,SQRT({off}),"")'
-    if "R" in given:
-        radius = f"IF(COUNT([@R])=1,[@R],{radius})"
-    if "Z" in given:
-        depth = 'IF(COUNT([@Z])=1,-[@Z],"")'
-    if "ZP" in given:
-        depth = f"IF(COUNT([@ZP])=1,[@ZP],{depth})"
-    return radius, depth
+    numbers = range(1, layers + 1)
+    heights = [*map(value, ("z_0", *(f"t_{i}" for i in numbers[:-2]))), "[@ZP_u]"]
+    k = [f"{height}*{value(f'k_{i}')}" for i, height in zip(numbers, heights, strict=True)]
+    bent = [f"(1+{value(f'q_{i}')}*{{1}}^2)" for i in numbers]
+    parts = {
+        **{name: value(name) for name in ("k_1", "q_1", "X_0", "Y_0")},
+        "last": str(steps),
+        "steps": " ".join(f"{i}:{i - 1}" for i in range(1, steps + 1)),
+        "flat": "+".join(k),
+        "heights": "+".join(heights),
+        "reach": "+".join(f"{a}/SQRT{b}" for a, b in zip(k, bent, strict=True)),
+        "slope": "+".join(f"{a}/{b}^1.5" for a, b in zip(k, bent, strict=True)),
+        "tolerance": f"{TOLERANCE:.0E}",
+    }
+    return FORMULAS.columns("shift", given, parts)
 
 
 def table_values(

@@ -418,9 +418,5 @@ def _height_at(
     away = np.linalg.norm(pixels - np.array(spot), axis=1)
     near = np.argsort(away)[:9]
     if len(near) < 9 or away[near[4]] > 0.06 * max(interior.image_size):
-        raise GeometryError(
-            f"--wall {spot[0]:g},{spot[1]:g}: hardly any detail is common to both photos there. "
-            "Name a spot of the far photo (column, row) with texture that both photos show, away "
-            "from the centre of zoom (the photo's middle)."
-        )
+        raise GeometryError(remark("refused.no_detail", column=spot[0], row=spot[1]))
     return float(np.median(heights[near]))

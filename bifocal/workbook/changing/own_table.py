@@ -21,8 +21,8 @@ from bifocal.workbook.changing.setup_update import (
 from bifocal.workbook.changing.update import refuse_earlier, store_named_cells
 from bifocal.workbook.content import SurveyContent, point_cells, result_cells
 from bifocal.workbook.formulas.columns import NEAR, ideal_points, pair_points
+from bifocal.workbook.formulas.georeference_values import precision_values
 from bifocal.workbook.formulas.placed_formulas import added_covariance
-from bifocal.workbook.formulas.precision_lines import precision_values
 from bifocal.workbook.formulas.setup_cells import TITLE_BLOCK, cells_of
 from bifocal.workbook.making.book import build
 from bifocal.workbook.reading.reader import TO_DEGREES, TO_MM

@@ -106,7 +106,7 @@ def planning(builder: BookBuilder, content: SurveyContent) -> None:
     )
 
     facts = planning_facts(media=content.media_cells, is_pair=content.is_pair)
-    lines = FORMULAS.lines("planning", facts)
+    lines = {line.key: line.formula for line in FORMULAS.columns("planning", facts, rows="lines")}
     sizes = content.sensor or (math.nan, math.nan)
     sheet.word("A6", "footprint")
     for row, (name, size) in enumerate(zip(_SENSOR, sizes, strict=True), start=4):

@@ -103,9 +103,14 @@ class FormulaBook:
         return tomllib.loads(text)
 
     def columns(
-        self, table: str, facts: Collection[str] = (), parts: Mapping[str, str] | None = None
+        self,
+        table: str,
+        facts: Collection[str] = (),
+        parts: Mapping[str, str] | None = None,
+        *,
+        rows: str = "columns",
     ) -> tuple[LiveColumn, ...]:
-        """Return the columns of a table.
+        """Return the columns of a table, or single formulas that are described alike.
 
         Parameters
         ----------
@@ -115,25 +120,17 @@ class FormulaBook:
             What holds.
         parts : mapping, optional
             Further parts of formulas.
+        rows : str
+            Which list of the section.
         """
-        formulas = self._formulas(table, facts, parts)
-        return tuple(formulas.expanded(self.content[table]["columns"], ()))
-
-    def lines(
-        self, table: str, facts: Collection[str] = (), parts: Mapping[str, str] | None = None
-    ) -> dict[str, str]:
-        """Return the single formulas of a section by their names, parameters as in `columns`."""
-        formulas = self._formulas(table, facts, parts)
-        lines = self.content[table]["lines"].items()
-        return {name: formulas.filled(chosen(text, facts)) for name, text in lines}
-
-    def _formulas(
-        self, table: str, facts: Collection[str], parts: Mapping[str, str] | None
-    ) -> _Formulas:
-        known = (self.content, self.content[table])
-        every = ChainMap(dict(parts or {}), *(part.get("parts", {}) for part in known[::-1]))
-        rows = {name: row for part in known for name, row in part.get("rows", {}).items()}
-        return _Formulas(facts, {name: chosen(text, facts) for name, text in every.items()}, rows)
+        own, shared = self.content[table], self.content
+        every = ChainMap(dict(parts or {}), own.get("parts", {}), shared["parts"])
+        formulas = _Formulas(
+            facts,
+            {name: chosen(text, facts) for name, text in every.items()},
+            ChainMap(own.get("rows", {}), shared.get("rows", {})),
+        )
+        return tuple(formulas.expanded(own[rows], ()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +148,7 @@ class _Formulas:
         for row in rows:
             if not holds(row.get("when", ""), self.facts):
                 continue
-            words = row["each"].split() if "each" in row else [None]
+            words = self.filled(row["each"]).split() if "each" in row else [None]
             for word in words:
                 own = given if word is None else (word, *(word.split(":") if ":" in word else word))
                 if "rows" in row:
