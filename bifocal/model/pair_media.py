@@ -32,7 +32,7 @@ from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX, typical_sigma
 from photocore.arrays import FloatArray, not_negative, positive
 from photocore.camera.pinhole import PARAMETERS, Pinhole, ProjectedPoints, ray_on_plane, triangulate
 from photocore.camera.rotation import rotation_from_vector
-from photocore.errors import InputError
+from photocore.errors import GeometryError, InputError
 
 #: Normal of one camera's interfaces: a direction in the plane frame, square to the optical axis, or
 #: None where they are parallel to the reference plane.
@@ -259,8 +259,14 @@ class PairMedia:
             return self.depth
         return self.port[int(name == "port2")]
 
-    def stepped(self, step: FloatArray) -> PairMedia | None:
-        """Return the media after a step of their unknowns; None where it leaves what can be."""
+    def stepped(self, step: FloatArray) -> PairMedia:
+        """Return the media after a step of their unknowns.
+
+        Raises
+        ------
+        GeometryError
+            If that leaves what media can be.
+        """
         if not self.sigmas:
             return self
         by_name = dict(zip(self.sigmas, step.tolist(), strict=True))
@@ -282,12 +288,10 @@ class PairMedia:
             lean @ rotation_from_vector([*(by_name.get(f"lean {a} {k}", 0.0) for a in "XY"), 0.0])
             for k, lean in enumerate(self.leans, start=1)
         )
-        if min(*thicknesses, *(port or ()), depth or 0.0, 0.0) < 0 or depth == 0:
-            return None
-        if min(lean[2, 2] for lean in leans) < STEEPEST:
-            return None
-        if min(indices) < LEAST_INDEX or max(indices) > MOST_INDEX:
-            return None
+        lost = min(*thicknesses, *(port or ()), depth or 0.0, 0.0) < 0 or depth == 0
+        lost |= min(lean[2, 2] for lean in leans) < STEEPEST
+        if lost or min(indices) < LEAST_INDEX or max(indices) > MOST_INDEX:
+            raise GeometryError("media: the step leads to what no media can be.")
         layers = Layers(indices=indices, thicknesses=thicknesses)
         return replace(self, layers=layers, port=port, depth=depth, leans=(leans[0], leans[1]))
 

@@ -274,7 +274,9 @@ class _System:
             }},
             free=np.broadcast_to(self.used[:, None], shape), kept=np.full(shape, -1),
             names=[f"{seen.ids[k]}: {axis}" for k in np.flatnonzero(self.used) for axis in "XYr"],
-            terms=(self._rays, self._known), step=_stepped, what="the pairs", rounding=ROUNDING,
+            terms=(self._rays, self._known),
+            step=lambda camera, at, step: camera.stepped(np.bincount(at, step, len(PARAMETERS))),
+            what="the pairs", rounding=ROUNDING,
             kind=SparseEquations, largest=0,
         )  # fmt: skip
 
@@ -316,12 +318,6 @@ class _System:
         )
         rows.by_label(rows.add(drift * weight), self.column[focal, 0], weight)
         return True
-
-
-def _stepped(camera: Pinhole, places: list[int], step: FloatArray) -> Pinhole:
-    whole = np.zeros(len(PARAMETERS))
-    whole[places] = step
-    return camera.stepped(whole)
 
 
 def _sigma0(fit: Fit[NetworkState], system: _System) -> float:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -123,20 +124,12 @@ class JointResult:
             if count:
                 said = ", ".join(f"{1000 * v:.1f}" if np.isfinite(v) else "-" for v in off)
                 lines.append(f"{count} {kind} points: RMS in X, Y, r {said} mm")
-        where: dict[str, int] = {}
-        for blunder in a.blunders:
-            where[blunder.where] = where.get(blunder.where, 0) + 1
         named = [b for b in a.blunders if not b.point.startswith("tie ")]
-        for b in named[:NAMED]:
-            lines.append(f"gross error: {b.point} in {b.where}, {b.test:.1f} times its sigma")
-        ties = {k: n for k, n in where.items() if k != "control"}
-        if ties:
-            worst = sorted(ties.items(), key=lambda item: -item[1])[:5]
-            lines.append("rays taken out: " + ", ".join(f"{n} in {k}" for k, n in worst))
-        for b in a.left_in[:NAMED]:
-            lines.append(
-                f"gross error LEFT IN: {b.point} in {b.where}, {b.test:.1f} times its sigma"
-            )
+        lines += [f"gross error: {_told(b)}" for b in named[:NAMED]]
+        photos = Counter(b.where for b in a.blunders if b.where != "control").most_common(5)
+        if photos:
+            lines.append("rays taken out: " + ", ".join(f"{n} in {k}" for k, n in photos))
+        lines += [f"gross error LEFT IN: {_told(b)}" for b in a.left_in[:NAMED]]
         return lines
 
     def to_dict(self) -> dict[str, Any]:
@@ -149,13 +142,13 @@ class JointResult:
             "rays": len(a.residuals),
             "rms_px": np.sqrt((a.residuals**2).mean(axis=0)),
             "points": list(self.points),
-            "blunders": [_plain(b) for b in a.blunders],
-            "left_in": [_plain(b) for b in a.left_in],
+            "blunders": [asdict(b) for b in a.blunders],
+            "left_in": [asdict(b) for b in a.left_in],
         }
 
 
-def _plain(blunder: Blunder) -> dict[str, Any]:
-    return {"point": blunder.point, "where": blunder.where, "test": blunder.test}
+def _told(blunder: Blunder) -> str:
+    return f"{blunder.point} in {blunder.where}, {blunder.test:.1f} times its sigma"
 
 
 def adjust_pairs(

@@ -296,10 +296,11 @@ def _fit(
 
     names = NAMES if used.sum() >= MINIMUM_FOR_TILT else NAMES[:4]
 
-    def equations(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-        _, mapped, jacobian = _mapped(values, q2[used])
+    def equations(values: FloatArray) -> adjustment.DenseEquations:
+        _, mapped, by = _mapped(values, q2[used])
         seen = weight[used] @ (mapped - q1[used])[:, :, None]
-        return seen.ravel(), (weight[used] @ jacobian).reshape(-1, len(names))
+        by = (weight[used] @ by).reshape(-1, len(names))
+        return adjustment.DenseEquations(residuals=seen.ravel(), jacobian=by)
 
     try:
         fit = adjustment.fit(

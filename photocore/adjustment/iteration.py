@@ -16,9 +16,7 @@ from photocore.arrays import FloatArray
 from photocore.errors import ConvergenceError, GeometryError
 
 State = TypeVar("State")
-#: Weighted residuals and their derivatives, shape (n,) and (n, u), or the equations of many
-#: points; None where impossible.
-Equations = tuple[FloatArray, FloatArray] | DenseEquations | BlockEquations | None
+#: Weighted residuals and their derivatives.
 Linear = DenseEquations | BlockEquations
 
 #: Steps smaller than this share of what an unknown may vary by one sigma end the iteration.
@@ -91,7 +89,7 @@ def correlations(covariance: FloatArray) -> FloatArray:
 
 def minimise(
     state: State,
-    equations: Callable[[State], Equations],
+    equations: Callable[[State], Linear | None],
     advance: Callable[[State, FloatArray], State | None],
     *,
     what: str = "adjustment",
@@ -106,7 +104,8 @@ def minimise(
     state : State
         Start; its equations must be possible.
     equations : callable
-        State to weighted residuals (computed minus measured) and their derivatives by the step.
+        State to weighted residuals (computed minus measured) and their derivatives by the step;
+        None where impossible.
     advance : callable
         State and step to the next state, None if that is impossible.
     what : str
@@ -132,7 +131,7 @@ def minimise(
     valleys, in which straight steps crawl. MINPACK and scipy know neither states that are no
     vectors (rotations), nor impossible ones, nor elimination.
     """
-    linear = _linear(equations(state))
+    linear = equations(state)
     if linear is None:
         raise GeometryError(f"{what}: the start values are impossible.")
     damping, growth, curved = 1e-4, 2.0, False
@@ -151,7 +150,7 @@ def minimise(
                 rounding * np.sqrt(count)
             )
             following = advance(state, step)
-            new = None if following is None else _linear(equations(following))
+            new = None if following is None else equations(following)
             new_cost = np.inf if new is None else float(new.residuals @ new.residuals)
             # A step that moves so little drops the square sum by less than its own rounding:
             # whether it went downhill cannot be seen, that it goes the right way is known.
@@ -179,16 +178,9 @@ def minimise(
     return Fit(state=state, linear=linear, iterations=number, settled=settled)
 
 
-def _linear(equations: Equations) -> Linear | None:
-    """Return equations in the form in which they are solved."""
-    if isinstance(equations, tuple):
-        return DenseEquations(residuals=equations[0], jacobian=equations[1])
-    return equations
-
-
 def _bent(
     state: State,
-    equations: Callable[[State], Equations],
+    equations: Callable[[State], Linear | None],
     advance: Callable[[State, FloatArray], State | None],
     linear: Linear,
     step: FloatArray,
@@ -197,7 +189,7 @@ def _bent(
 ) -> FloatArray:
     """Return a step that follows the curvature along it; the step itself where that is no help."""
     ahead = advance(state, probe * step)
-    beyond = None if ahead is None else _linear(equations(ahead))
+    beyond = None if ahead is None else equations(ahead)
     if beyond is None:
         return step
     second = (beyond.residuals - linear.residuals) / probe - linear.change(step)
@@ -209,7 +201,7 @@ def _bent(
 
 def fit(
     state: State,
-    equations: Callable[[State], Equations],
+    equations: Callable[[State], Linear | None],
     advance: Callable[[State, FloatArray], State | None],
     *,
     names: Sequence[str],

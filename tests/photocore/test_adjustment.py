@@ -14,8 +14,12 @@ X = np.arange(6.0)
 Y = np.array([1.1, 2.9, 5.2, 6.8, 9.1, 10.9])
 
 
+def dense(residuals, jacobian):
+    return DenseEquations(residuals=residuals, jacobian=jacobian)
+
+
 def line(state):
-    return state[0] + state[1] * X - Y, np.stack([np.ones_like(X), X], axis=1)
+    return dense(state[0] + state[1] * X - Y, np.stack([np.ones_like(X), X], axis=1))
 
 
 def move(state, step):
@@ -36,9 +40,8 @@ def test_a_straight_line_equals_the_textbook_formulas():
 
 def test_rosenbrocks_valley_is_followed_to_its_end():
     def valley(s):
-        return np.array([10 * (s[1] - s[0] ** 2), 1 - s[0]]), np.array(
-            [[-20 * s[0], 10], [-1, 0.0]]
-        )
+        misses = np.array([10 * (s[1] - s[0] ** 2), 1 - s[0]])
+        return dense(misses, np.array([[-20 * s[0], 10], [-1, 0.0]]))
 
     got = minimise(np.array([-1.2, 1.0]), valley, move)
     assert got.state == pytest.approx([1.0, 1.0], abs=1e-10)
@@ -47,7 +50,7 @@ def test_rosenbrocks_valley_is_followed_to_its_end():
 
 def test_the_unit_of_an_unknown_does_not_matter():
     def scaled(s):
-        return s[0] + 1e9 * s[1] * X - Y, np.stack([np.ones_like(X), 1e9 * X], axis=1)
+        return dense(s[0] + 1e9 * s[1] * X - Y, np.stack([np.ones_like(X), 1e9 * X], axis=1))
 
     plain = fit(np.zeros(2), line, move, names=("a", "b"), what="line")
     got = fit(np.zeros(2), scaled, move, names=("a", "b"), what="line")
@@ -56,11 +59,9 @@ def test_the_unit_of_an_unknown_does_not_matter():
 
 def test_unknowns_that_act_only_together_are_named():
     def double(s):
-        return (s[0] + s[1]) * X - Y, np.stack([X, X], axis=1)
+        return dense((s[0] + s[1]) * X - Y, np.stack([X, X], axis=1))
 
-    residuals, jacobian = double([0, 0])
-    equations = DenseEquations(residuals=residuals, jacobian=jacobian)
-    assert equations.undetermined(("a", "b")) == ["a", "b"]
+    assert double([0, 0]).undetermined(("a", "b")) == ["a", "b"]
     with pytest.raises(GeometryError, match="cannot determine a, b"):
         fit(np.zeros(2), double, move, names=("a", "b"), what="line")
 
@@ -78,7 +79,7 @@ def test_an_impossible_start_is_refused():
 
 def test_an_adjustment_that_does_not_settle_says_so():
     def runaway(s):
-        return np.exp(-s * 0.01), -0.01 * np.exp(-s * 0.01)[:, None]
+        return dense(np.exp(-s * 0.01), -0.01 * np.exp(-s * 0.01)[:, None])
 
     with pytest.raises(ConvergenceError, match="does not settle"):
         fit(np.zeros(1), runaway, move, names=("a",), what="decay", most=5)
@@ -112,14 +113,14 @@ def test_three_ways_to_solve_the_same_equations_agree():
     sparse, block = SparseEquations(**given), BlockEquations(**given)
     points = given["eliminated"].toarray()[:, given["free"].ravel()]
     jacobian = np.hstack([given["design"].toarray(), points])
-    dense = DenseEquations(residuals=given["residuals"], jacobian=jacobian, free=given["free"])
+    whole = DenseEquations(residuals=given["residuals"], jacobian=jacobian, free=given["free"])
     assert sparse.undetermined([str(k) for k in range(240)]) == []
-    assert sparse.step(0.0) == pytest.approx(dense.step(0.0), abs=1e-11)
+    assert sparse.step(0.0) == pytest.approx(whole.step(0.0), abs=1e-11)
     assert sparse.step(1e-3) == pytest.approx(block.step(1e-3), abs=1e-11)
     assert sparse.scale == pytest.approx(block.scale, rel=1e-12)
-    assert sparse.cofactor.diagonal() == pytest.approx(np.diag(dense.cofactor), rel=1e-10)
-    assert sparse.block_cofactor == pytest.approx(dense.block_cofactor, abs=1e-10)
-    assert sparse.redundancy_numbers == pytest.approx(dense.redundancy_numbers, abs=1e-10)
+    assert sparse.cofactor.diagonal() == pytest.approx(np.diag(whole.cofactor), rel=1e-10)
+    assert sparse.block_cofactor == pytest.approx(whole.block_cofactor, abs=1e-10)
+    assert sparse.redundancy_numbers == pytest.approx(whole.redundancy_numbers, abs=1e-10)
 
 
 def test_an_open_unknown_of_a_row_of_photos_is_named():

@@ -5,12 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bifocal.media import PointViews, view
-from bifocal.model.pair_media import PairMedia
-from bifocal.orientation.adjustment.pair_observations import (
-    Equations,
-    PairObservations,
-    PairUnknowns,
-)
+from bifocal.orientation.adjustment.pair_observations import PairObservations, PairUnknowns
 from photocore.arrays import FloatArray
 
 #: A coordinate that was not measured, as a standard deviation. [m]
@@ -38,16 +33,3 @@ def known_points(
     guess = np.where(flat & np.isfinite(single) & (control.xyz[:, 2:] == 0), single, guess)
     known = np.where(np.isfinite(control.xyz), control.xyz, np.nan_to_num(guess))
     return known, np.where(np.isfinite(control.xyz), control.sigma, UNKNOWN)
-
-
-def with_media_priors(cameras: Equations, given: PairMedia, state: PairMedia) -> Equations:
-    """Return the cameras' priors with those of the media, in the unknowns of both."""
-    values, by = cameras
-    known = {name: sigma for name, sigma in given.sigmas.items() if np.isfinite(sigma)}
-    rows = np.zeros((len(known), by.shape[1] + len(given.sigmas)))
-    off = np.zeros(len(known))
-    for row, (name, sigma) in enumerate(known.items()):
-        off[row] = (state.value(name) - given.value(name)) / sigma
-        rows[row, given.names.index(name)] = 1.0 / sigma
-    by = np.concatenate([by, np.zeros((len(by), len(given.sigmas)))], axis=1)
-    return np.concatenate([values, off]), np.concatenate([by, rows])

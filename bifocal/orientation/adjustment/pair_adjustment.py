@@ -14,7 +14,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from bifocal.model.orientation_precision import NAMES, rates_of
-from bifocal.orientation.adjustment.observed_points import known_points, views_of, with_media_priors
+from bifocal.orientation.adjustment.observed_points import known_points, views_of
 from bifocal.orientation.adjustment.pair_observations import (
     Equations,
     PairObservations,
@@ -23,7 +23,7 @@ from bifocal.orientation.adjustment.pair_observations import (
 )
 from bifocal.orientation.adjustment.refracted_ties import meeting_equations
 from bifocal.orientation.facade_lines import FacadeDirection
-from photocore import adjustment
+from photocore.adjustment.network import Network, NetworkState, Rows
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import (
     PARAMETERS,
@@ -93,23 +93,24 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
     GeometryError
         If the observations leave a parameter undetermined.
     """
-    free, names = observations.estimated, observations.names
+    free, names = np.flatnonzero(observations.estimated), observations.names
+    columns = np.arange(len(free))
 
-    def equations(state: PairUnknowns) -> Equations:
-        residuals, jacobian = pair_equations(observations, state)
-        return residuals, jacobian[:, free]
+    def everything(state: NetworkState, rows: Rows) -> bool:
+        residuals, by = pair_equations(observations, state.blocks["pair"][0])
+        rows.by_label(rows.add(residuals)[:, None], columns, by[:, free])
+        return True
 
-    def advance(state: PairUnknowns, step: FloatArray) -> PairUnknowns | None:
-        whole = np.zeros(len(names))
-        whole[free] = step
-        return state.stepped(whole)
-
-    asked = [name for name, estimated in zip(names, free, strict=True) if estimated]
-    start = PairUnknowns(cameras=start.cameras, radial=start.radial, media=start.media)
+    network = Network(
+        labels=[names[k] for k in free],
+        columns={"pair": {0: dict(zip(free.tolist(), columns, strict=True))}},
+        terms=[everything],
+        step=lambda pair, at, step: pair.stepped(np.bincount(at, step, len(names))),
+        what="the pair",
+        rounding=ROUNDING,
+    )
     try:
-        fit = adjustment.fit(
-            start, equations, advance, names=asked, what="the pair", rounding=ROUNDING
-        )
+        fit = network.solve(NetworkState(blocks={"pair": {0: start}}))
     except GeometryError:
         raise GeometryError(
             "the observations do not determine the cameras. Measure more control points, spread "
@@ -119,7 +120,7 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
     sigma0 = float(np.sqrt((fit.residuals @ fit.residuals) / redundancy))
     cofactor = np.zeros((len(names), len(names)))
     cofactor[np.ix_(free, free)] = fit.linear.cofactor
-    state = fit.state
+    state: PairUnknowns = fit.state.blocks["pair"][0]
     covariance = cofactor * max(sigma0, 1.0) ** 2
     by = state.media.by_unknowns()
     return AdjustedPair(
@@ -171,7 +172,7 @@ def evaluated(observations: PairObservations, adjusted: AdjustedPair) -> Adjuste
 def pair_equations(observations: PairObservations, state: PairUnknowns) -> Equations:
     """Return everything observed against computed in standard deviations, and derivatives."""
     used, wall = observations.tie_used, observations.wall
-    parts = [with_media_priors(_priors(observations, state), observations.media, state.media)]
+    parts = [_priors(observations, state)]
     if used.any():
         values, by = _tie_equations(observations, state, used)
         parts.append((values / observations.sigma_ties, by / observations.sigma_ties))
@@ -217,53 +218,48 @@ def line_test(line: FacadeDirection, adjusted: AdjustedPair) -> float:
 
 
 def _priors(observations: PairObservations, state: PairUnknowns) -> Equations:
-    """Return the lens's, the tape's and the plane's observations: all but the tilts are linear."""
-    values = state.values()
-    linear: list[tuple[dict[int, float], float, float]] = []
+    """Return what is known of lenses, media, distances and tilts: all but the tilts are linear."""
+    names, media = observations.names, observations.media
+    zoom, body = observations.sigma_zoom, observations.sigma_body
+    known: list[tuple[dict[str, float], float, float | None]] = []
     tilts, by_tilts = [], []
     for number, (interior, camera) in enumerate(
         zip(observations.interiors, state.cameras, strict=True), start=1
     ):
-        known = [
-            ("focal length", np.log(interior.focal), interior.sigma_focal),
-            ("aspect", np.log(interior.aspect), interior.sigma_aspect),
-            ("column", interior.centre[0], interior.sigma_centre),
-            ("row", interior.centre[1], interior.sigma_centre),
-            ("k1", 0.0, interior.sigma_radial),
-            ("k2", 0.0, interior.sigma_radial),
-        ]
-        linear += [({at(name, number): 1.0}, value, sigma) for name, value, sigma in known]
+        own = {
+            "focal length": (np.log(interior.focal), interior.sigma_focal),
+            "aspect": (np.log(interior.aspect), interior.sigma_aspect),
+            "column": (interior.centre[0], interior.sigma_centre),
+            "row": (interior.centre[1], interior.sigma_centre),
+            "k1": (0.0, interior.sigma_radial),
+            "k2": (0.0, interior.sigma_radial),
+        }
+        known += [({f"{name} {number}": 1.0}, *said) for name, said in own.items()]
         if observations.sigma_tilt is not None:
             axis, turn = camera.rotation[2], at("turn X", number)
             turned = skew(axis)
-            by = np.zeros((2, len(NAMES)))
+            by = np.zeros((2, len(names)))
             by[:, turn : turn + 3] = -(turned[:2] + np.outer(camera.tilt, turned[2])) / axis[2]
             tilts.append(camera.tilt / observations.sigma_tilt)
             by_tilts.append(by / observations.sigma_tilt)
-    body = observations.sigma_body
-    same = [("focal length", observations.sigma_zoom), ("column", body), ("row", body)]
-    same += [("aspect", None if body is None else SIGMA_ASPECT)]
-    if observations.sigma_zoom is not None and observations.estimated[at("k1", 1)]:
-        same += [("k1", SAME_LENS), ("k2", SAME_LENS)]
-    linear += [
-        ({at(name, 1): 1.0, at(name, 2): -1.0}, 0.0, sigma)
-        for name, sigma in same
-        if sigma is not None
-    ]
-    distances = {
-        "distance1": {at("Z", 1): 1.0},
-        "distance2": {at("Z", 2): 1.0},
-        "delta_d": {at("Z", 1): 1.0, at("Z", 2): -1.0},
-    }
-    linear += [(distances[name], *known) for name, known in observations.measured.items()]
-    linear = [row for row in linear if row[2] > 0]
-    jacobian = np.zeros((len(linear), len(NAMES)))
-    for row, (terms, _, sigma) in enumerate(linear):
-        jacobian[row, list(terms)] = np.array(list(terms.values())) / sigma
-    wanted = np.array([value / sigma for _, value, sigma in linear])
+    lens = SAME_LENS if zoom is not None and observations.estimated[at("k1", 1)] else None
+    aspect = None if body is None else SIGMA_ASPECT
+    same = {"focal length": zoom, "column": body, "row": body, "aspect": aspect}
+    same |= {"k1": lens, "k2": lens}
+    known += [({f"{name} 1": 1.0, f"{name} 2": -1.0}, 0.0, sigma) for name, sigma in same.items()]
+    far, near = {"Z 1": 1.0}, {"Z 2": 1.0}
+    distances = {"distance1": far, "distance2": near, "delta_d": {"Z 1": 1.0, "Z 2": -1.0}}
+    known += [(distances[name], *said) for name, said in observations.measured.items()]
+    known += [({k: 1.0}, media.value(k), s) for k, s in media.sigmas.items() if np.isfinite(s)]
+    rows = [(terms, value, sigma) for terms, value, sigma in known if sigma]
+    wanted, sigmas = np.array([row[1:] for row in rows]).reshape(-1, 2).T
+    jacobian = np.zeros((len(rows), len(names)))
+    for row, (terms, *_) in enumerate(rows):
+        jacobian[row, [names.index(name) for name in terms]] = list(terms.values())
+    values = np.array([*state.values(), *(state.media.value(name) for name in media.sigmas)])
     return (
-        np.concatenate([jacobian @ values - wanted, *tilts]),
-        np.concatenate([jacobian, *by_tilts]),
+        np.concatenate([(jacobian @ values - wanted) / sigmas, *tilts]),
+        np.concatenate([jacobian / sigmas[:, None], *by_tilts]),
     )
 
 

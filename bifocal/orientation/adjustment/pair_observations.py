@@ -135,11 +135,9 @@ class PairUnknowns:
     radial: FloatArray = field(default_factory=lambda: np.zeros((2, 2)))
     media: PairMedia = field(default_factory=PairMedia.none)
 
-    def stepped(self, step: FloatArray) -> PairUnknowns | None:
-        """Return the unknowns after a step of all names; None where media cannot be so."""
+    def stepped(self, step: FloatArray) -> PairUnknowns:
+        """Return the unknowns after a step of all names, as `PairMedia.stepped`."""
         media = self.media.stepped(step[len(NAMES) :])
-        if media is None:
-            return None
         parts = step[: len(NAMES)].reshape(2, len(CAMERA))
         first, second = (c.stepped(p) for c, p in zip(self.cameras, parts, strict=True))
         return PairUnknowns(

@@ -21,6 +21,7 @@ from bifocal.orientation.walls.reference_plane import faces
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import project
+from photocore.errors import GeometryError
 
 #: Draws of the cameras and media as uncertain as they are, and the bend that counts, in what they
 #: bend the wall by.
@@ -202,8 +203,9 @@ def _open(adjusted: AdjustedPair, size: tuple[int, int]) -> float:
     factor = vectors * np.sqrt(np.maximum(values, 0.0))
     squares = []
     for draw in np.random.default_rng(7).normal(size=(DRAWS, len(values))):
-        state = adjusted.stepped(factor @ draw)
-        if state is None:
+        try:
+            state = adjusted.stepped(factor @ draw)
+        except GeometryError:
             continue
         flat1, flat2 = straightened(state, seen1, seen2)
         known = np.isfinite(np.hstack([flat1, flat2])).all(axis=1)
