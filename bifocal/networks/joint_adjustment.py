@@ -305,18 +305,12 @@ class _System:
         return True
 
     def _known(self, state: NetworkState, rows: Rows) -> bool:
-        seen, (point, axis), along = self.seen, self.fixed.T, np.eye(3)
-        weight = 1.0 / seen.sigma_known[point, axis]
-        lines = rows.add((state.points[point, axis] - seen.known[point, axis]) * weight)
-        rows.by_points(lines, point, along[axis] * weight[:, None])
-        lines = rows.add(state.points[self.loose, 2] / self.reach)
-        rows.by_points(lines, self.loose, along[2] / self.reach)
-        focal, weight = self.focal, 1.0 / seen.sigma_focal[self.focal]
-        drift = (
-            np.log([state.blocks["camera"][k].matrix[0, 0] for k in focal])
-            - self.first_focal[focal]
-        )
-        rows.by_label(rows.add(drift * weight), self.column[focal, 0], weight)
+        seen, at, focal = self.seen, tuple(self.fixed.T), self.focal
+        rows.known(rows.places[at], (state.points - seen.known)[at], seen.sigma_known[at])
+        rows.known(rows.places[self.loose, 2], state.points[self.loose, 2], self.reach)
+        lengths = np.array([state.blocks["camera"][k].matrix[0, 0] for k in focal])
+        drift = np.log(lengths) - self.first_focal[focal]
+        rows.known(self.column[focal, 0], drift, seen.sigma_focal[focal])
         return True
 
 

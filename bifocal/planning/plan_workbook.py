@@ -2,59 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bifocal.media import media_words
+from bifocal.remarks import in_language
+from photocore.reports.words import Words, texts_of, words_of
 from photocore.workbook.making.newbook import new_workbook, save_book
 
 if TYPE_CHECKING:
-    from bifocal.model.pair_media import PairMedia
     from bifocal.planning.camera_plan import Plan
 
-_COLUMNS: tuple[tuple[str, str, str], ...] = (
-    ("pair", "Lenses", "@"),
-    ("d1", "d1 [m]", "0.000"),
-    ("d2", "d2 [m]", "0.000"),
-    ("delta_d", "delta_d [m]", "0.000"),
-    ("scale", "Scale 1:", "0"),
-    ("gsd", "Pixel on the wall [mm]", "0.00"),
-    ("width", "Photo covers, width [m]", "0.00"),
-    ("height", "Photo covers, height [m]", "0.00"),
-    ("photos", "Photos (across x up)", "@"),
-    ("sigma_rms", "sigma r, RMS radius [mm]", "0.0"),
-    ("sigma_corner", "sigma r, corner [mm]", "0.0"),
-    ("sigma_ortho", "sigma orthophoto [mm]", "0.0"),
-    ("uncertain", "Area of uncertainty, radius [m]", "0.00"),
-    ("share", "... of half diagonal", "0%"),
-    ("feasible", "Fits?", "@"),
-    ("note", "Note", "@"),
-)
-#: Columns of plans through media, after delta_d.
-_MEDIA_COLUMNS = (
-    ("z0_1", "Camera 1 to the first interface [m]", "0.000"),
-    ("z0_2", "Camera 2 to the first interface [m]", "0.000"),
-)
+_WORDS = "bifocal.planning"
 
 
-def _columns(plan: Plan) -> tuple[tuple[str, str, str], ...]:
-    """Return key, label and number format of every column."""
-    if not plan.media:
-        return _COLUMNS
-    after = [key for key, *_ in _COLUMNS].index("delta_d") + 1
-    return (*_COLUMNS[:after], *_MEDIA_COLUMNS, *_COLUMNS[after:])
-
-
-def _media_words(media: PairMedia) -> str:
-    """Return what the photos of a plan look through."""
-    if media.port is None:
-        stays = f"reference plane {media.depth:g} m behind the last interface"
-    else:
-        stays = f"port {media.port[0]:g} m before the cameras"
-    return f"; through media of {media_words(media.layers)}, {stays}; d counts all of them"
-
-
-def write_plan(path: Path | str, plan: Plan, *, overwrite: bool = False) -> None:
+def write_plan(
+    path: Path | str, plan: Plan, *, language: str = "en", overwrite: bool = False
+) -> None:
     """Write a plan as .xlsx: sheets ``Planning`` and ``Sigma r``, each with a chart.
 
     Raises
@@ -65,61 +30,66 @@ def write_plan(path: Path | str, plan: Plan, *, overwrite: bool = False) -> None
     from openpyxl import Workbook
 
     book = Workbook()
-    _stations_sheet(book.active, plan)
-    _grid_sheet(book.create_sheet("Sigma r"), plan)
+    _stations_sheet(book.active, plan, language)
+    _grid_sheet(book.create_sheet("Sigma r"), plan, words_of(_WORDS, language))
     with new_workbook(path, overwrite=overwrite) as temporary:
         save_book(book, temporary)
 
 
-def _stations_sheet(sheet: Any, plan: Plan) -> None:
+def _stations_sheet(sheet: Any, plan: Plan, language: str) -> None:
     """Fill the table of stations and the bar chart of expected precision."""
     from openpyxl.chart import BarChart, Reference
     from openpyxl.styles import Alignment, Font, PatternFill
     from openpyxl.worksheet.table import Table, TableStyleInfo
 
-    sheet.title = "Planning"
-    sheet["A1"] = "Camera stations for a bifocal pair; best first"
+    say, media = words_of(_WORDS, language), plan.media
+    formats = {
+        key: text["format"]
+        for key, text in texts_of(_WORDS).items()
+        if "format" in text and (media or not key.startswith("z0"))
+    }
+    sheet.title, sheet["A1"] = "Planning", say("title")
     sheet["A1"].font = Font(bold=True, size=14)
-    sensor = plan.sensor
-    sheet["A2"] = (
-        f"Sensor {sensor.width:g} x {sensor.height:g} mm, {sensor.columns} x {sensor.rows} px; "
-        f"picks precise to {plan.sigma_px:g} px; area of uncertainty: sigma r above "
-        f"{plan.sigma_r_max * 1000:.0f} mm"
-    ) + (_media_words(plan.media) if plan.media else "")
-    columns = _columns(plan)
-    for column, (key, label, _) in enumerate(columns, start=1):
+    sheet["A2"] = say(
+        "about", **asdict(plan.sensor), sigma=plan.sigma_px, limit=plan.sigma_r_max * 1000
+    )
+    if media:
+        kind, away = ("port", media.port[0]) if media.port else ("depth", media.depth)
+        sheet["A2"].value += say(kind, media=media_words(media.layers), depth=away)
+    for column, key in enumerate(formats, start=1):
         # Labels for people above, stable keys for formulas as the table's headings.
         sheet.cell(4, column, key).font = Font(color="808080", size=8)
-        cell = sheet.cell(3, column, label)
+        cell = sheet.cell(3, column, say(key))
         cell.alignment = Alignment(wrap_text=True, vertical="top")
-        sheet.column_dimensions[cell.column_letter].width = 44 if label == "Note" else 11
+        sheet.column_dimensions[cell.column_letter].width = 44 if key == "note" else 11
     sheet.row_dimensions[3].height = 45
     for row, station in enumerate(plan.stations, start=5):
         sheet.row_dimensions[row].height = 30 if station.note else 15
         values = (
             f"{station.c1:g}/{station.c2:g} mm", station.d1, station.d2, station.delta_d,
-            *((station.z0_1, station.z0_2) if plan.media else ()),
+            *((station.z0_1, station.z0_2) if media else ()),
             station.scale_number, station.gsd * 1000, *station.footprint,
             f"{station.photos[0]} x {station.photos[1]}", station.sigma_r_rms * 1000,
             station.sigma_r_corner * 1000, station.sigma_ortho * 1000, station.uncertain_radius,
-            station.uncertain_share, "yes" if station.feasible else "no", station.note,
+            station.uncertain_share, say("yes" if station.feasible else "no"),
+            in_language(station.note, language),
         )  # fmt: skip
-        for column, value in enumerate(values, start=1):
+        for column, (value, form) in enumerate(zip(values, formats.values(), strict=True), 1):
             cell = sheet.cell(row, column, value)
-            cell.number_format = columns[column - 1][2]
+            cell.number_format = form
             cell.alignment = Alignment(wrap_text=True, vertical="top")
             if station is plan.best:
                 cell.fill = PatternFill("solid", fgColor="E2F0D9")
     last = 4 + len(plan.stations)
     table = Table(
-        displayName="tblPlan", ref=f"A4:{sheet.cell(4, len(columns)).column_letter}{last}"
+        displayName="tblPlan", ref=f"A4:{sheet.cell(4, len(formats)).column_letter}{last}"
     )
     table.tableStyleInfo = TableStyleInfo(name="TableStyleLight1", showRowStripes=False)
     sheet.add_table(table)
     sheet.freeze_panes = "B5"
     chart = BarChart()
-    chart.title = "Expected sigma of the relief [mm]"
-    first = [key for key, *_ in columns].index("sigma_rms") + 1
+    chart.title = say("chart")
+    first = list(formats).index("sigma_rms") + 1
     figures = Reference(sheet, min_col=first, max_col=first + 2, min_row=4, max_row=last)
     chart.add_data(figures, titles_from_data=True)
     chart.set_categories(Reference(sheet, min_col=1, min_row=5, max_row=last))
@@ -130,17 +100,14 @@ def _stations_sheet(sheet: Any, plan: Plan) -> None:
     _fit_to_width(sheet)
 
 
-def _grid_sheet(sheet: Any, plan: Plan) -> None:
+def _grid_sheet(sheet: Any, plan: Plan, say: Words) -> None:
     """Fill sigma of r over the frame of the best pair, coloured by size."""
     from openpyxl.formatting.rule import ColorScaleRule
     from openpyxl.styles import Font
 
     best = plan.best
     x, y, sigma = plan.sigma_grid(best, columns=15, rows=11)
-    sheet["A1"] = (
-        f"sigma of r [mm] over the photo, {best.c1:g}/{best.c2:g} mm; X across, Y down [m] from "
-        "the nadir"
-    )
+    sheet["A1"] = say("grid", c1=best.c1, c2=best.c2)
     sheet["A1"].font = Font(bold=True)
     for column, value in enumerate(x, start=2):
         sheet.cell(3, column, float(value)).number_format = "0.00"

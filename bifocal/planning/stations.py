@@ -13,6 +13,7 @@ from bifocal.model.pair import Pair
 from bifocal.model.pair_media import PairMedia
 from bifocal.planning.camera_plan import CameraSensor, Plan, Station, planned_pair, sigma_at
 from bifocal.precision import base_factor, uncertainty_radius
+from bifocal.remarks import remark
 from photocore.arrays import positive
 from photocore.errors import GeometryError, InputError
 
@@ -174,10 +175,8 @@ def _station(
     if not feasible:
         assert free_space is not None
         reach = 1000 * free_space / c1
-        note = (
-            f"needs {d1:.2f} m, only {free_space:.2f} m are free; at most 1:{reach:.0f} "
-            f"({sensor.columns * sensor.pitch * reach / 1000:.1f} m of wall in one photo)"
-        )
+        wide = sensor.columns * sensor.pitch * reach / 1000
+        note = remark("plan.no_room", need=d1, free=free_space, scale=reach, wide=wide)
     return Station(
         c1=c1, c2=c2, d1=d1, d2=d2, delta_d=d1 - d2, scale_number=scale_number, gsd=gsd,
         footprint=footprint, photos=_photos(object_size, footprint),

@@ -19,6 +19,7 @@ def make_plan(
     sensor: CameraSensor,
     *,
     out: Path | None = None,
+    language: str = "en",
     overwrite: bool = False,
     **wishes: Any,
 ) -> Plan:
@@ -31,7 +32,7 @@ def make_plan(
         check_new_workbook(out, overwrite=overwrite)
     plan = plan_stations(focal_lengths, sensor, **wishes)
     if out is not None:
-        write_plan(out, plan, overwrite=overwrite)
+        write_plan(out, plan, language=language, overwrite=overwrite)
     return plan
 
 

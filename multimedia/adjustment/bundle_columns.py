@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -188,27 +189,23 @@ def with_common_values(project: Project, unknowns: Unknowns) -> Project:
     """
     media = dict(project.media)
     for item in (n for n in unknowns.media if n.startswith(OF_MATERIAL) and ":" not in n):
-        flat = {
-            name: interface
-            for name, interface in media.items()
-            if name in project.media_of and item in interface.parameter_names
-        }
-        values = [interface.value(item) for interface in flat.values()]
-        if len(set(values)) > 1:
-            mean = float(np.mean(values))
-            for name, interface in flat.items():
-                media[name] = interface.stepped([item], [mean - interface.value(item)])
-    cameras = list(project.cameras)
+        used = {k: m for k, m in media.items() if k in project.media_of}
+        media |= _alike({k: m for k, m in used.items() if item in m.parameter_names}, item)
+    cameras = dict(enumerate(project.cameras))
     groups: dict[str, list[int]] = {}
-    for k, camera in enumerate(cameras):
+    for k, camera in cameras.items():
         groups.setdefault(interior_group(camera.name, unknowns.shared_interior), []).append(k)
     for group in groups.values():
-        for item in set(unknowns.interior).intersection(
-            *(cameras[k].interior_names for k in group)
-        ):
-            values = [cameras[k].value(item) for k in group]
-            if len(set(values)) > 1:
-                mean = float(np.mean(values))
-                for k in group:
-                    cameras[k] = cameras[k].stepped([item], [mean - cameras[k].value(item)])
-    return replace(project, media=media, cameras=tuple(cameras))
+        own = [cameras[k].interior_names for k in group]
+        for item in set(unknowns.interior).intersection(*own):
+            cameras |= _alike({k: cameras[k] for k in group}, item)
+    return replace(project, media=media, cameras=tuple(cameras.values()))
+
+
+def _alike(blocks: dict[Any, Any], item: str) -> dict[Any, Any]:
+    """Return cameras or media with the mean of their values of a parameter."""
+    values = {name: block.value(item) for name, block in blocks.items()}
+    if len(set(values.values())) < 2:
+        return blocks
+    mean = float(np.mean(list(values.values())))
+    return {k: block.stepped([item], [mean - values[k]]) for k, block in blocks.items()}

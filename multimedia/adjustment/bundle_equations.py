@@ -144,13 +144,10 @@ class Bundle:
         return bool(np.isfinite(image).all())
 
     def _known(self, state: NetworkState, rows: Rows) -> bool:
-        point, axis = np.nonzero(np.isfinite(self.known_sigma))
-        weight = 1.0 / self.known_sigma[point, axis]
-        lines = rows.add((state.points[point, axis] - self.known[point, axis]) * weight)
-        rows.by_points(lines, point, np.eye(3)[axis] * weight[:, None])
+        at = np.nonzero(np.isfinite(self.known_sigma))
+        rows.known(rows.places[at], (state.points - self.known)[at], self.known_sigma[at])
         columns = np.array(list(self.columns.priors), dtype=np.int64)
-        weight = 1.0 / np.array(list(self.columns.priors.values()))
-        rows.by_label(rows.add(state.drift[columns] * weight), columns, weight)
+        rows.known(columns, state.drift[columns], np.array(list(self.columns.priors.values())))
         return True
 
     def _scale_bars(self, state: NetworkState, rows: Rows) -> bool:

@@ -14,7 +14,6 @@ from multimedia.adjustment.unknowns import Adjustment, decimals
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.interfaces import Interfaces
 from multimedia.media.surfaces import Cylinder, Plane, RefractingSurface, Sphere
-from photocore.adjustment import OUTLIER_LIMIT
 from photocore.arrays import FloatArray
 from photocore.provenance import program, provenance, today
 from photocore.reports.document import (
@@ -88,7 +87,7 @@ def adjustment_document(
 
 def _precision(result: Adjustment, say: Words) -> Iterator[Block]:
     project, suspects = result.project, result.suspects()
-    sigma = _point_sigma(result)
+    sigma = project.object_points.sigma
     free = sigma[np.linalg.norm(np.nan_to_num(sigma), axis=1) > 0]
     details = [say("no_suspects") if not suspects else say("some_suspects", count=len(suspects))]
     if len(free):
@@ -110,12 +109,6 @@ def _precision(result: Adjustment, say: Words) -> Iterator[Block]:
             redundancy=result.redundancy, iterations=result.iterations,
         )
     )  # fmt: skip
-
-
-def _point_sigma(result: Adjustment) -> FloatArray:
-    """Return the standard deviations of the object points, shape (p, 3)."""
-    sigma: FloatArray = np.sqrt(np.diagonal(result.point_covariance, axis1=1, axis2=2))
-    return sigma
 
 
 def _remarks(remarks: tuple[str, ...], say: Words) -> Iterator[Block]:
@@ -234,21 +227,19 @@ def _residuals(result: Adjustment, say: Words) -> Iterator[Block]:
 
 
 def _suspects(result: Adjustment, say: Words) -> Iterator[Block]:
-    worst = np.abs(np.nan_to_num(result.standardised)).max(axis=1, initial=0.0)
-    order = [int(row) for row in np.argsort(-worst) if worst[row] > OUTLIER_LIMIT]
-    if not order:
+    worst, images = result.gross_errors(), result.project.image_points
+    if not worst:
         return
     yield Heading(text=say("suspects"))
-    images = result.project.image_points
+    sizes = np.hypot(*result.residuals.T) * 1000
     rows = [
-        [images.ids[k], images.cameras[k], f"{np.hypot(*result.residuals[k]) * 1000:.1f}",
-         f"{worst[k]:.1f}"]
-        for k in order[:_SUSPECTS]
-    ]  # fmt: skip
+        [images.ids[k], images.cameras[k], f"{sizes[k]:.1f}", f"{test:.1f}"]
+        for k, test in worst[:_SUSPECTS]
+    ]
     heads = [say("point"), say("camera"), say("residual"), say("in_sigmas")]
     yield TextTable(headings=heads, rows=rows)
-    if len(order) > _SUSPECTS:
-        yield Paragraph(text=say("more_rows", count=len(order) - _SUSPECTS), small=True)
+    if len(worst) > _SUSPECTS:
+        yield Paragraph(text=say("more_rows", count=len(worst) - _SUSPECTS), small=True)
 
 
 def _correlations(result: Adjustment, say: Words) -> Iterator[Block]:
@@ -276,14 +267,18 @@ def _correlations(result: Adjustment, say: Words) -> Iterator[Block]:
 
 def _points(result: Adjustment, say: Words) -> Iterator[Block]:
     """Yield the adjusted points that were not fixed, the least precise first."""
-    points, sigma = result.project.object_points, _point_sigma(result)
-    size = np.linalg.norm(np.nan_to_num(sigma), axis=1)
+    points = result.project.object_points
+    size = np.linalg.norm(np.nan_to_num(points.sigma), axis=1)
     order = [int(j) for j in np.argsort(-size) if size[j] > 0]
     if not order:
         return
     yield Heading(text=say("object_points"))
     rows = [
-        [points.ids[j], *(f"{v:.5f}" for v in points.xyz[j]), *(f"{v:.2g}" for v in sigma[j])]
+        [
+            points.ids[j],
+            *(f"{v:.5f}" for v in points.xyz[j]),
+            *(f"{v:.2g}" for v in points.sigma[j]),
+        ]
         for j in order[:_POINTS]
     ]
     heads = [say("point"), "X", "Y", "Z", "sigma X", "sigma Y", "sigma Z"]

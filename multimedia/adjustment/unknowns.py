@@ -226,15 +226,19 @@ class Adjustment:
         """
         return standardised(4.13 * self.sigma_image, self.redundancy_numbers)
 
-    def suspects(self, limit: float = OUTLIER_LIMIT) -> list[str]:
-        """Return a sentence for each image point that looks like a gross error, worst first."""
+    def gross_errors(self) -> list[tuple[int, float]]:
+        """Return rows of image points that look like gross errors and their tests, worst first."""
         worst = np.abs(np.nan_to_num(self.standardised)).max(axis=1, initial=0.0)
+        order = np.argsort(-worst).tolist()
+        return [(row, float(worst[row])) for row in order if worst[row] > OUTLIER_LIMIT]
+
+    def suspects(self) -> list[str]:
+        """Return a sentence for each image point that looks like a gross error, worst first."""
         points = self.project.image_points
-        rows = [int(row) for row in np.argsort(-worst) if worst[row] > limit]
         return [
             f"point {points.ids[row]} in camera {points.cameras[row]}: residual "
-            f"{np.hypot(*self.residuals[row]) * 1000:.1f} um, {worst[row]:.1f} sigma"
-            for row in rows
+            f"{np.hypot(*self.residuals[row]) * 1000:.1f} um, {test:.1f} sigma"
+            for row, test in self.gross_errors()
         ]
 
 

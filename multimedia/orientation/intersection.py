@@ -144,14 +144,12 @@ def intersect(
     sigmas = _sigmas(cameras, sigma, image.shape)
     parts = [_block(cameras, image[:, p], sigmas[:, p], placed) for p in _parts(image)]
 
-    def whole(name: str, axis: int = 0) -> Any:
-        return np.concatenate([getattr(part, name) for part in parts], axis=axis)
-
-    return IntersectedPoints(
-        xyz=whole("xyz"), covariance=whole("covariance"), residuals=whole("residuals", 1),
-        standardised=whole("standardised", 1), sigma0=whole("sigma0"), rays=whole("rays"),
-        angle=whole("angle"), status=whole("status"),
-    )  # fmt: skip
+    by_camera = ("residuals", "standardised")
+    whole: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts], axis=int(name in by_camera))
+        for name in IntersectedPoints.__slots__
+    }
+    return IntersectedPoints(**whole)
 
 
 def _parts(image: FloatArray) -> list[slice]:

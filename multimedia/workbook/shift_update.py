@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -29,7 +28,6 @@ from photocore.workbook.changing.result_columns import (
     put_result_columns,
 )
 from photocore.workbook.making.live_book import BookBuilder
-from photocore.workbook.making.newbook import finished_parts
 from photocore.workbook.reading.grid import (
     TableArea,
     column_letters,
@@ -207,7 +205,7 @@ def _media_sheet(editor: WorkbookEditor, given: ShiftInput, setup: ShiftSetup) -
         places = {name: (title, *at) for name, at in media_places(count).items()}
         for name, value in values.items():
             typed = place_of(editor, name) or places[name]
-            if _stands(editor, typed) != value:
+            if editor.value_at(*typed) != value:
                 editor.put(*typed, value)
             if typed != places[name]:
                 editor.set_result(*places[name], value)
@@ -216,7 +214,7 @@ def _media_sheet(editor: WorkbookEditor, given: ShiftInput, setup: ShiftSetup) -
     links = {}
     for name, (sheet, cell) in given.places.items():
         own = (sheet, *split_cell(cell))
-        stands = _stands(editor, own)
+        stands = editor.value_at(*own)
         if name not in values or (stands != values[name] and place_of(editor, name) != own):
             continue
         if stands != values[name]:
@@ -225,17 +223,10 @@ def _media_sheet(editor: WorkbookEditor, given: ShiftInput, setup: ShiftSetup) -
     book = BookBuilder(language="en", words=WORDS)
     media = media_cells(book, setup, links=links)
     media.finish(landscape=True, guarded=False)
-    package = io.BytesIO()
-    book.book.save(package)
     title = editor.free_title("Media")
-    editor.add_sheets(finished_parts(package, results=book.results), {"Multimedia": title})
+    editor.add_sheets(book.parts(), {"Multimedia": title})
     editor.define(MEDIA, _reference(title, 5, 2))
     return title
-
-
-def _stands(editor: WorkbookEditor, place: tuple[str, int, int]) -> object:
-    sheet, row, column = place
-    return editor.grid(sheet).rows.get(row, {}).get(column)
 
 
 def _reference(sheet: str, row: int, column: int) -> str:

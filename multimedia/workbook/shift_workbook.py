@@ -97,7 +97,8 @@ def write_shift_workbook(
     check_new_workbook(path, overwrite=overwrite, other="" if points is None else "-result")
     book = BookBuilder(language=language, words=WORDS)
     book.book.properties.creator = book.book.properties.title = "multimedia"
-    _readme(book)
+    lines = [line for line in WORDS.readme(language) if line]
+    book.readme(lines, shift_sketch(book.word("sketch")), rows=len(lines) + 3)
     index = write_index_sheet(book)
     if points is None:
         indices = (*setup.layers.indices[:-1], index)
@@ -106,20 +107,6 @@ def write_shift_workbook(
     book.book.move_sheet("RefractiveIndex", 1)
     book.open_at("Multimedia")
     book.save(path, overwrite=overwrite)
-
-
-def _readme(book: BookBuilder) -> None:
-    sheet = book.sheet("Readme")
-    for letter, width in zip("ABC", (80, 2, 50), strict=True):
-        sheet.worksheet.column_dimensions[letter].width = width
-    lines = [line for line in WORDS.readme(book.language) if line]
-    for row, line in enumerate(lines, start=3):
-        sheet.text(f"A{row}", line.lstrip("#"), HEAD_FONT if line.startswith("#") else None)
-    book.drawings["Readme"] = shift_sketch(book.word("sketch")).part("C3")
-    sheet.finish(landscape=True, guarded=False)
-    # Nothing stands in the cells below the sketch: without this they would not be printed.
-    sheet.worksheet.print_area = f"A1:C{len(lines) + 3}"
-    sheet.worksheet.page_setup.fitToHeight = 1
 
 
 def _shift_sheet(

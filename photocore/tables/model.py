@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -130,6 +130,41 @@ class Table:
                 errors.append(self.error(row, key, message))
         return errors
 
+    def too_large(self, keys: Sequence[str], largest: float) -> list[CellError]:
+        """Return a complaint about each number beyond a limit: a slip, or a broken formula."""
+        return [
+            self.error(row, key, f"found {numbers[row]:g}, which is too large; correct it.")
+            for key, numbers in ((key, self.numbers(key)) for key in keys)
+            for row in np.flatnonzero(np.abs(numbers) > largest).tolist()
+        ]
+
+    def in_unit(
+        self, key: str, factors: Mapping[str, float], errors: list[CellError]
+    ) -> FloatArray:
+        """Return a column of numbers in the first of some units, complaining about any other.
+
+        Parameters
+        ----------
+        key : str
+            Of the column.
+        factors : mapping
+            Unit to what brings its numbers to the first.
+        errors : list
+            Takes the complaint.
+        """
+        wanted = next(iter(factors))
+        symbol = self.units.get(key) or wanted
+        if symbol not in factors:
+            errors.append(self.unit_error(key, symbol, wanted))
+        return self.numbers(key) * factors.get(symbol, 1.0)
+
+    def unit_error(self, key: str, symbol: str, wanted: str) -> CellError:
+        """Return the complaint about a heading with another unit than expected."""
+        message = (
+            f'the heading "{self.headings.get(key, key)}" says [{symbol}], expected [{wanted}].'
+        )
+        return CellError(message, file=self.file, sheet=self.sheet, column=key)
+
 
 @dataclass(slots=True, kw_only=True)
 class NamedValues:
@@ -169,6 +204,10 @@ class NamedValues:
         """Whether a value was found that is not blank."""
         value = self.values[key]
         return bool(value) if isinstance(value, str) else not np.isnan(value)
+
+    def given(self, key: str) -> float | None:
+        """Return a number, None where blank, absent or never asked for."""
+        return self.number(key) if key in self.values and self.has(key) else None
 
     def cell(self, key: str) -> str:
         """Return the name of the value's cell, empty where it was not found."""

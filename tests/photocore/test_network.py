@@ -87,3 +87,19 @@ def test_an_open_unknown_is_named_and_an_impossible_term_refused():
     model, start = network(1, [lambda *_: False])
     with pytest.raises(GeometryError, match="impossible"):
         model.solve(start)
+
+
+@pytest.mark.parametrize("count", [3, 600])
+def test_rows_are_assembled_alike_whether_few_or_many_dense_or_sparse(count):
+    values = np.random.default_rng(1).normal(size=(count, 2))
+
+    def many(_, rows):
+        rows.by_label(rows.add(np.ones(count))[::-1, None], [1, -1], values[:, :1])
+        rows.by_label(np.arange(count)[:, None], [2, 0], values)
+        return True
+
+    model, start = network(1, [many])
+    wanted = np.column_stack([values[:, 1], values[::-1, 0], values[:, 0], np.zeros(count)])
+    assert (model.equations(start).jacobian == wanted).all()
+    sparse = replace(model, largest=0).equations(start)
+    assert (sparse.design.toarray() == wanted[:, :3]).all()

@@ -119,9 +119,12 @@ def _links(editor: WorkbookEditor, survey: SurveyInput, given: Mapping[str, Any]
     links = {}
     for key, (sheet, cell) in survey.setup.places.items():
         row, column = split_cell(cell)
-        stands = editor.grid(sheet).rows.get(row, {}).get(column)
         named = place_of(editor, key) == (sheet, row, column)
-        if isinstance(stands, float) and not named and key not in replaced:
+        if (
+            isinstance(editor.value_at(sheet, row, column), float)
+            and not named
+            and key not in replaced
+        ):
             links[key] = f"{quoted_title(sheet)}!${column_letters(column)}${row}"
     return links
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping
 from typing import Any
 
@@ -16,7 +15,6 @@ from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.changing.editor import WorkbookEditor
 from photocore.workbook.changing.named_cells import place_of
 from photocore.workbook.making.live_book import BookBuilder
-from photocore.workbook.making.newbook import finished_parts
 from photocore.workbook.reading.grid import cell_name, quoted_title
 
 #: Options that have no cell of their own; those of the distances depend on each other.
@@ -57,10 +55,7 @@ def chart_sheet(editor: WorkbookEditor) -> str | None:
 
 def add_sheets(editor: WorkbookEditor, built: BookBuilder, titles: list[str]) -> None:
     """Add sheets of a survey workbook behind all others."""
-    package = io.BytesIO()
-    built.book.save(package)
-    content = finished_parts(package, blocks=built.blocks, results=built.results)
-    editor.add_sheets(content, {title: editor.free_title(title) for title in titles})
+    editor.add_sheets(built.parts(), {title: editor.free_title(title) for title in titles})
 
 
 def write_options(editor: WorkbookEditor, content: SurveyContent, given: Mapping[str, Any]) -> None:
@@ -101,7 +96,7 @@ def write_options(editor: WorkbookEditor, content: SurveyContent, given: Mapping
 def _holds(editor: WorkbookEditor, place: tuple[str, int, int], value: CellValue) -> bool:
     """Whether a cell holds a typed value, and no formula."""
     sheet, row, column = place
-    stands = editor.grid(sheet).rows.get(row, {}).get(column)
+    stands = editor.value_at(*place)
     model = editor.models(sheet, row).get(column)
     if stands is None and value == "mm":
         return True
@@ -114,8 +109,7 @@ def _distances(editor: WorkbookEditor, cells: dict[str, CellValue]) -> set[str]:
     first, second = cells.get("d_1"), cells.get("d_2")
     if d_1 is None or step is None or first is None or second is None:
         return {"d_1", "d_2"}
-    sheet, row, column = step
-    if not isinstance(editor.grid(sheet).rows.get(row, {}).get(column), int | float):
+    if not isinstance(editor.value_at(*step), int | float):
         return {"d_1", "d_2"}
     # The difference as people write it: 8.1, not 8.100000000000001.
     cells["delta_d"] = round(float(first) - float(second), 12)

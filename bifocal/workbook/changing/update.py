@@ -255,10 +255,9 @@ def _store_block(editor: WorkbookEditor, results: Mapping[str, CellValue], cells
 
 def _make_number(editor: WorkbookEditor, place: tuple[str, int, int], value: CellValue) -> None:
     """Turn a number that was typed as text into a number: formulas do not see it otherwise."""
-    sheet, row, column = place
-    stands = editor.grid(sheet).rows.get(row, {}).get(column)
-    if isinstance(stands, str) and isinstance(value, int | float) and value == value:
-        editor.set_value(sheet, row, column, value)
+    is_number = isinstance(value, int | float) and value == value
+    if is_number and isinstance(editor.value_at(*place), str):
+        editor.set_value(*place, value)
 
 
 def _result(value: CellValue) -> CellValue:

@@ -7,14 +7,15 @@ does the same and gives the numbers shown.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import repeat
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from bifocal.survey.space_similarity import SPACE_STEPS, SQUARINGS, SpaceSums
 from bifocal.workbook.formulas.placed_formulas import entry
-from photocore.arrays import FloatArray
 from photocore.workbook.making.live_book import SheetBuilder
 from photocore.workbook.making.look import LABEL_FONT
 from photocore.workbook.reading.grid import column_letters
@@ -28,6 +29,7 @@ BLOCK = "g_space_block"
 #: Steps range from 1E-13 to 1E+6; a column of usual width holds them so.
 STEP_FORM = "0.00E+00"
 _KEYS = tuple((axis, world) for axis in "XYZ" for world in "ENH")
+_NINE = range(len(_KEYS))
 #: Half-turn a times a column of B: for X, Y, Z which of a with which row, and what is taken off.
 _CROSS = ((1, 2, 2, 1), (2, 0, 0, 2), (0, 1, 1, 0))
 
@@ -61,6 +63,10 @@ class CellMatrix:
         """Return a row."""
         return f"{self.fixed(i, 0)}:{self.fixed(i, self.columns - 1)}"
 
+    def squared(self, i: int, j: int) -> str:
+        """Return an entry of the square of a symmetric matrix, brought to length 1."""
+        return f"SUMPRODUCT({self.column(i)},{self.column(j)})/SUMSQ({self.range})"
+
     @property
     def range(self) -> str:
         """All of it."""
@@ -72,69 +78,53 @@ class SpaceBlock:
 
     def __init__(self, sheet: SheetBuilder, sums: SpaceSums | None) -> None:
         self.sheet = sheet
-        self.sums = sums
         self.next = LEFT
+        self.values = _values(sums)
         self._write()
 
     def _put(
-        self,
-        label: str,
-        shape: tuple[int, int],
-        body: Callable[[int, int], str],
-        values: FloatArray | None,
+        self, label: str, shape: tuple[int, int], body: Callable[[int, int], str]
     ) -> CellMatrix:
-        """Write a matrix of formulas and return where it stands."""
-        left = self.next
-        self.next = left + shape[1]
-        matrix = CellMatrix(TOP, left, *shape)
-        self.sheet.text(f"{column_letters(left)}{TOP - 1}", label, LABEL_FONT)
-        shown = None if values is None else np.asarray(values, dtype=np.float64).reshape(shape)
-        for i in range(shape[0]):
-            for j in range(shape[1]):
-                value = None if shown is None else float(shown[i, j])
-                text = f'IF(g_space=1,{body(i, j)},"")'
-                self.sheet.formula(matrix.cell(i, j), text, value, form=STEP_FORM)
+        """Write a matrix of formulas, its values the next ones, and return where it stands."""
+        matrix = CellMatrix(TOP, self.next, *shape)
+        self.next += shape[1]
+        self.sheet.text(f"{column_letters(matrix.left)}{TOP - 1}", label, LABEL_FONT)
+        shown = next(self.values)
+        values = None if shown is None else np.asarray(shown, dtype=np.float64).reshape(shape)
+        for i, j in np.ndindex(shape):
+            value = None if values is None else float(values[i, j])
+            text = f'IF(g_space=1,{body(i, j)},"")'
+            self.sheet.formula(matrix.cell(i, j), text, value, form=STEP_FORM)
         return matrix
 
+    def _column(self, label: str, bodies: Sequence[str]) -> CellMatrix:
+        """Write a single column of formulas."""
+        return self._put(label, (len(bodies), 1), lambda i, _: bodies[i])
+
     def _write(self) -> None:
-        sums, put = self.sums, self._put
+        put = self._put
+        world = [f"tblGeo[c{name}]" for _, name in _KEYS]
+        axes = [axis for axis, _ in _KEYS]
 
-        def value(name: str) -> FloatArray | None:
-            return None if sums is None else np.asarray(getattr(sums, name))
+        def weight(one: str, other: str) -> str:
+            return f"tblGeo[p_{entry(one, other)}]"
 
-        def mixed_value(name: str) -> FloatArray | None:
-            return None if sums is None else np.asarray(getattr(sums, name)).T
+        def freed(i: int, j: int) -> str:
+            both = f"{weight(axes[i], axes[j])},{world[i]},{world[j]}"
+            return f"SUMPRODUCT({both})-SUMPRODUCT({mixed.row(i)},{self.shift.row(j)})"
 
-        def column(i: int, j: int) -> str:
-            return f"tblGeo[c{_KEYS[i][j]}]"
+        def solved(i: int, j: int) -> str:
+            row = (f"g_i_{entry('XYZ'[j], o)}*{mixed.fixed(i, n)}" for n, o in enumerate("XYZ"))
+            return "+".join(row)
 
-        mixed = put(
-            "L", (9, 3),
-            lambda i, j: f"SUMPRODUCT(tblGeo[p_{entry(_KEYS[i][0], 'XYZ'[j])}],{column(i, 1)})",
-            mixed_value("mixed"),
-        )  # fmt: skip
-        self.shift = put(
-            "F", (9, 3),
-            lambda i, j: "+".join(
-                f"g_i_{entry('XYZ'[j], other)}*{mixed.fixed(i, n)}" for n, other in enumerate("XYZ")
-            ),
-            mixed_value("shift"),
-        )  # fmt: skip
-        reduced = put(
-            "H", (9, 9),
-            lambda i, j: (
-                f"SUMPRODUCT(tblGeo[p_{entry(_KEYS[i][0], _KEYS[j][0])}],{column(i, 1)},"
-                f"{column(j, 1)})-SUMPRODUCT({mixed.row(i)},{self.shift.row(j)})"
-            ),
-            value("reduced"),
-        )  # fmt: skip
-        left = put(
-            "g", (9, 1),
-            lambda i, _: f"SUMPRODUCT(tblGeo[h_{_KEYS[i][0]}],{column(i, 1)})-("
-            + "+".join(f"{mixed.fixed(i, n)}*g_f_{axis}" for n, axis in enumerate("XYZ"))
-            + ")",
-            value("left"),
-        )  # fmt: skip
+        mixed = put("L", (9, 3), lambda i, j: f"SUMPRODUCT({weight(axes[i], 'XYZ'[j])},{world[i]})")
+        self.shift = put("F", (9, 3), solved)
+        reduced = put("H", (9, 9), freed)
+        means = (
+            "+".join(f"{mixed.fixed(i, n)}*g_f_{o}" for n, o in enumerate("XYZ")) for i in _NINE
+        )
+        rights = (f"SUMPRODUCT(tblGeo[h_{axes[i]}],{world[i]})" for i in _NINE)
+        left = self._column("g", [f"{r}-({m})" for r, m in zip(rights, means, strict=True)])
         entries = self._start()
         for number in range(SPACE_STEPS):
             entries = self._turn(number, entries, reduced, left)
@@ -142,13 +132,10 @@ class SpaceBlock:
 
     def _start(self) -> CellMatrix:
         """Write the unweighted rotation by Horn's matrix, and B of it."""
-        sums, put = self.sums, self._put
-        crossed = put(
-            "S", (9, 1), lambda i, _: f"SUMPRODUCT(tblGeo[c{_KEYS[i][0]}],"
-            f"tblGeo[c{_KEYS[i][1]}])", None if sums is None else sums.crossed,
-        )  # fmt: skip
-        cell = dict(zip(("".join(key) for key in _KEYS), crossed.cells(), strict=True))
-        xx, xy, xz, yx, yy, yz, zx, zy, zz = cell.values()
+        put = self._put
+        sums = [f"SUMPRODUCT(tblGeo[c{axis}],tblGeo[c{name}])" for axis, name in _KEYS]
+        crossed = self._column("S", sums)
+        xx, xy, xz, yx, yy, yz, zx, zy, zz = crossed.cells()
         bound = f"SQRT(3*SUMSQ({crossed.range}))"
         horn = (
             (f"{xx}+{yy}+{zz}+{bound}", f"{yz}-{zy}", f"{zx}-{xz}", f"{xy}-{yx}"),
@@ -156,60 +143,34 @@ class SpaceBlock:
             (f"{zx}-{xz}", f"{xy}+{yx}", f"{yy}-{xx}-{zz}+{bound}", f"{yz}+{zy}"),
             (f"{xy}-{yx}", f"{zx}+{xz}", f"{yz}+{zy}", f"{zz}-{xx}-{yy}+{bound}"),
         )
-        shown = [None] * (SQUARINGS + 1) if sums is None else list(sums.powers)
-        power = put("Q", (4, 4), lambda i, j: horn[i][j], shown[0])
-        for number in range(1, SQUARINGS + 1):
-            power = self._squared(power, shown[number])
+        power = put("Q", (4, 4), lambda i, j: horn[i][j])
+        for _ in range(SQUARINGS):
+            power = put("Q^2", (4, 4), power.squared)
         diagonal = [power.fixed(i, i) for i in range(4)]
         longest = f"MAX({','.join(diagonal)})"
-        chosen = None
-        if sums is not None:
-            chosen = sums.powers[-1][:, int(np.argmax(np.diag(sums.powers[-1])))]
-        column = put(
-            "q", (4, 1),
-            lambda i, _: "".join(
-                f"IF({diagonal[n]}={longest},{power.fixed(i, n)}," for n in range(3)
-            ) + power.fixed(i, 3) + ")))",
-            chosen,
-        )  # fmt: skip
+        tests = [f"IF({cell}={longest}," for cell in diagonal[:3]]
+
+        def chosen(i: int, _: int) -> str:
+            cases = "".join(f"{test}{power.fixed(i, n)}," for n, test in enumerate(tests))
+            return f"{cases}{power.fixed(i, 3)})))"
+
+        column = put("q", (4, 1), chosen)
         a, b, c, d = column.cells()
-        length = f"SUMSQ({column.range})"
         # R' row by row: world axes in the wall's frame.
         turned = (
-            f"({a}^2+{b}^2-{c}^2-{d}^2)", f"2*({b}*{c}+{a}*{d})", f"2*({b}*{d}-{a}*{c})",
-            f"2*({b}*{c}-{a}*{d})", f"({a}^2-{b}^2+{c}^2-{d}^2)", f"2*({c}*{d}+{a}*{b})",
-            f"2*({b}*{d}+{a}*{c})", f"2*({c}*{d}-{a}*{b})", f"({a}^2-{b}^2-{c}^2+{d}^2)",
-        )  # fmt: skip
-        start = put(
-            "R'", (9, 1), lambda i, _: f"{turned[i]}/{length}",
-            None if sums is None else sums.start,
-        )  # fmt: skip
+            *(f"({a}^2+{b}^2-{c}^2-{d}^2)", f"2*({b}*{c}+{a}*{d})", f"2*({b}*{d}-{a}*{c})"),
+            *(f"2*({b}*{c}-{a}*{d})", f"({a}^2-{b}^2+{c}^2-{d}^2)", f"2*({c}*{d}+{a}*{b})"),
+            *(f"2*({b}*{d}+{a}*{c})", f"2*({c}*{d}-{a}*{b})", f"({a}^2-{b}^2-{c}^2+{d}^2)"),
+        )
+        start = self._column("R'", [f"{cell}/SUMSQ({column.range})" for cell in turned])
         squares = "+".join(f"SUMSQ(tblGeo[c{axis}])" for axis in "XYZ")
-        scale = put(
-            "m", (1, 1), lambda *_: f"({squares})/SUMPRODUCT({start.range},{crossed.range})",
-            None if sums is None else np.array([sums.squares / (sums.start @ sums.crossed)]),
-        )  # fmt: skip
-        return put(
-            "B0", (9, 1), lambda i, _: f"{scale.fixed(0, 0)}*{start.fixed(i, 0)}",
-            None if sums is None else sums.turns[0].entries,
-        )  # fmt: skip
-
-    def _squared(self, power: CellMatrix, value: FloatArray | None) -> CellMatrix:
-        return self._put(
-            "Q^2", (4, 4),
-            lambda i, j: f"SUMPRODUCT({power.column(i)},{power.column(j)})/SUMSQ({power.range})",
-            value,
-        )  # fmt: skip
+        scale = self._column("m", [f"({squares})/SUMPRODUCT({start.range},{crossed.range})"])
+        return self._column("B0", [f"{scale.fixed(0, 0)}*{cell}" for cell in start.cells()])
 
     def _turn(
         self, number: int, entries: CellMatrix, reduced: CellMatrix, left: CellMatrix
     ) -> CellMatrix:
         """Write one turn and return B after it."""
-        turn = None if self.sums is None else self.sums.turns[number]
-        after = None
-        if self.sums is not None:
-            last = number + 1 == SPACE_STEPS
-            after = self.sums.entries if last else self.sums.turns[number + 1].entries
         put, b = self._put, entries.cells()
 
         def design(i: int, j: int) -> str:
@@ -222,32 +183,16 @@ class SpaceBlock:
                     return f"{'-' if sign < 0 else ''}{b[3 * other + world]}"
             return "0"
 
-        self.design = put("D", (9, 4), design, None if turn is None else turn.design)
-        product = put(
-            "HD", (9, 4),
-            lambda i, j: f"SUMPRODUCT({reduced.column(i)},{self.design.column(j)})",
-            None if turn is None else turn.product,
-        )  # fmt: skip
-        normal = put(
-            "N", (4, 4),
-            lambda i, j: f"SUMPRODUCT({self.design.column(i)},{product.column(j)})",
-            None if turn is None else turn.normal,
-        )  # fmt: skip
-        self.inverse = put(
-            "1/N", (4, 4), lambda i, j: f"INDEX(MINVERSE({normal.range}),{i + 1},{j + 1})",
-            None if turn is None else turn.inverse,
-        )  # fmt: skip
-        right = put(
-            "n", (4, 1),
-            lambda i, _: f"SUMPRODUCT({self.design.column(i)},{left.range})"
-            f"-SUMPRODUCT({self.design.column(i)},{product.column(3)})",
-            None if turn is None else turn.right,
-        )  # fmt: skip
-        step = put(
-            "step", (4, 1),
-            lambda i, _: f"SUMPRODUCT({self.inverse.column(i)},{right.range})",
-            None if turn is None else turn.step,
-        )  # fmt: skip
+        def product_of(one: CellMatrix, other: CellMatrix) -> Callable[[int, int], str]:
+            return lambda i, j: f"SUMPRODUCT({one.column(i)},{other.column(j)})"
+
+        self.design = slopes = put("D", (9, 4), design)
+        product = put("HD", (9, 4), product_of(reduced, slopes))
+        normal = put("N", (4, 4), product_of(slopes, product)).range
+        self.inverse = put("1/N", (4, 4), lambda i, j: f"INDEX(MINVERSE({normal}),{i + 1},{j + 1})")
+        own, now = product_of(slopes, left), product_of(slopes, product)
+        right = self._column("n", [f"{own(i, 0)}-{now(i, 3)}" for i in range(4)])
+        step = put("step", (4, 1), product_of(self.inverse, right))
         a = [f"{cell}/2" for cell in step.cells()[:3]]
 
         def crossed(i: int, cells: list[str]) -> str:
@@ -255,17 +200,11 @@ class SpaceBlock:
             one, first, other, second = _CROSS[axis]
             return f"{a[one]}*{cells[3 * first + world]}-{a[other]}*{cells[3 * second + world]}"
 
-        halfway = put(
-            "U", (9, 1), lambda i, _: f"{b[i]}+{crossed(i, b)}",
-            None if turn is None else turn.halfway,
-        )  # fmt: skip
-        u, turns = halfway.cells(), ",".join(step.cells()[:3])
-        stretch = f"EXP({step.fixed(3, 0)})"
-        return put(
-            f"B{number + 1}", (9, 1),
-            lambda i, _: f"{stretch}*({b[i]}+2/(1+SUMSQ({turns})/4)*({crossed(i, u)}))",
-            after,
-        )  # fmt: skip
+        u = self._column("U", [f"{b[i]}+{crossed(i, b)}" for i in _NINE]).cells()
+        turns, stretch = ",".join(step.cells()[:3]), f"EXP({step.fixed(3, 0)})"
+        twice = f"2/(1+SUMSQ({turns})/4)"
+        after = [f"{stretch}*({b[i]}+{twice}*({crossed(i, u)}))" for i in _NINE]
+        return self._column(f"B{number + 1}", after)
 
     def finish(self) -> None:
         """Fold the block away and name it as a whole."""
@@ -275,6 +214,20 @@ class SpaceBlock:
             width.outlineLevel, width.hidden = 1, True
         cells = f"${column_letters(LEFT)}${TOP}:${column_letters(last)}${TOP + 8}"
         self.sheet.book.define(BLOCK, f"'{self.sheet.worksheet.title}'!{cells}")
+
+
+def _values(sums: SpaceSums | None) -> Iterator[ArrayLike | None]:
+    """Yield what the matrices show, in the order in which they are put; None without a fit."""
+    if sums is None:
+        yield from repeat(None)
+        return
+    longest = int(np.argmax(np.diag(sums.powers[-1])))
+    yield from (sums.mixed.T, sums.shift.T, sums.reduced, sums.left, sums.crossed, *sums.powers)
+    yield from (sums.powers[-1][:, longest], sums.start, sums.squares / (sums.start @ sums.crossed))
+    for turn in sums.turns[:SPACE_STEPS]:
+        yield from (turn.entries, turn.design, turn.product, turn.normal, turn.inverse)
+        yield from (turn.right, turn.step, turn.halfway)
+    yield sums.entries
 
 
 def _axis_rows(j: int) -> Iterator[tuple[int, int, int]]:

@@ -28,7 +28,6 @@ from photocore.workbook.making.look import (
     BODY_FONT,
     DOUBT,
     GOOD,
-    HEAD_FONT,
     WARN_FONT,
     WRONG,
     colour_words,
@@ -54,8 +53,8 @@ FLAG_COLOURS = {
 _SCALE = 92
 #: Name of the column `use` of `Points`, for rules of other sheets, which may not name a table.
 USED = "points_use"
-#: Where the sketch of the cameras stands on the sheet `Readme`.
-_SKETCH = "C3"
+#: Printed rows of the sheet `Readme`.
+_README_ROWS = 34
 
 
 def write_book(path: Path | str, content: SurveyContent, *, overwrite: bool = False) -> None:
@@ -78,7 +77,9 @@ def build(content: SurveyContent) -> BookBuilder:
     builder = BookBuilder(language=content.language, words=WORDS)
     builder.book.properties.creator = "bifocal"
     builder.book.properties.title = "bifocal survey"
-    _readme(builder, media=bool(content.media_cells))
+    lines = readme(builder.language, media=bool(content.media_cells))
+    sketch = cameras_sketch(builder.word("nadir"), builder.word("sketch"))
+    builder.readme(lines, sketch, rows=_README_ROWS)
     setup_sheet(builder, content)
     cells = point_cells(content)
     _points(builder, content, cells)
@@ -90,22 +91,6 @@ def build(content: SurveyContent) -> BookBuilder:
     _log(builder, content)
     builder.open_at("Points" if content.points else "Readme")
     return builder
-
-
-def _readme(builder: BookBuilder, *, media: bool) -> None:
-    sheet = builder.sheet("Readme")
-    sheet.worksheet.column_dimensions["A"].width = 80
-    sheet.worksheet.column_dimensions["B"].width = 2
-    for row, line in enumerate(readme(builder.language, media=media), start=3):
-        heading = line.startswith("#")
-        sheet.text(f"A{row}", line.lstrip("#"), HEAD_FONT if heading else None)
-    sketch = cameras_sketch(builder.word("nadir"), builder.word("sketch"))
-    builder.drawings["Readme"] = sketch.part(_SKETCH)
-    # Nothing stands in the cells below the sketch: without this they would not be printed.
-    sheet.worksheet.print_area = "A1:C34"
-    sheet.worksheet.column_dimensions["C"].width = 50
-    sheet.finish(landscape=True, guarded=False)
-    sheet.worksheet.page_setup.fitToHeight = 1
 
 
 def _points(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:

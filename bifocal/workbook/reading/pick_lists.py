@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.survey.observations import PointObservations
-from bifocal.workbook.reading.known_reader import refuse_absurd
+from bifocal.workbook.reading.setup_reader import LARGEST
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, read_table
@@ -132,7 +132,7 @@ def _of_table(path: Path, decimal: Decimal | None) -> PickList:
         raise InputError(
             f"{path}: the picks of one photo need the headings id and x, y or col, row."
         )
-    refuse_absurd(table, keys, errors)
+    errors += table.too_large(keys, LARGEST)
     names = [name or "" for name in table.texts("id")]
     places = np.stack([table.numbers(key) for key in keys], axis=-1)
     for row, name in enumerate(names):

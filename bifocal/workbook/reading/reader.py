@@ -10,17 +10,10 @@ import numpy as np
 
 from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations
+from bifocal.survey.reference import KnownPoints
 from bifocal.survey.survey_input import SurveyInput, where_of, with_measured
-from bifocal.workbook.reading.known_reader import (
-    TO_M,
-    factor_of,
-    read_known,
-    refuse_absurd,
-    understood,
-    unit_error,
-)
-from bifocal.workbook.reading.setup_reader import is_general, read_setup
-from bifocal.workbook.words import LANGUAGES, word
+from bifocal.workbook.reading.setup_reader import LARGEST, is_general, read_setup
+from bifocal.workbook.words import LANGUAGES, headings, word
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import (
@@ -33,7 +26,9 @@ from photocore.tables import (
 )
 from photocore.tables.csvread import CsvFile
 from photocore.tables.headings import bare
+from photocore.tables.model import Kind
 from photocore.tables.numbers import Decimal
+from photocore.workbook.making.live_columns import TEXT_KEYS
 from photocore.workbook.reading.grid import SheetFile
 from photocore.workbook.reading.package import uncollected
 
@@ -49,6 +44,7 @@ _SHARED = {"x1": "x", "y1": "y", "x2": "x", "y2": "y"} | {
 _OTHER = {"col1": "i", "row1": "j", "col2": "i", "row2": "j"}
 TO_DEGREES = {"deg": 1.0, "gon": 0.9, "rad": float(np.degrees(1.0))}
 TO_MM = {"mm": 1.0, "cm": 10.0, "um": 1e-3, "m": 1000.0}
+_TO_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "dm": 0.1}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,6 +72,25 @@ class ReadOptions:
     given: Collection[str] = ()
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _KnownTable:
+    """Check or control points as read.
+
+    Attributes
+    ----------
+    points : KnownPoints
+    rows : tuple of int
+        Their rows in the sheet.
+    remarks, text_cells : tuple of str
+        What the user should know; cells whose number was typed as text.
+    """
+
+    points: KnownPoints = field(default_factory=KnownPoints)
+    rows: tuple[int, ...] = ()
+    remarks: tuple[str, ...] = ()
+    text_cells: tuple[str, ...] = ()
+
+
 def point_columns(*, shared: Sequence[str] = ()) -> list[Column]:
     """Return the columns of measured points with every heading that is understood.
 
@@ -88,8 +103,17 @@ def point_columns(*, shared: Sequence[str] = ()) -> list[Column]:
     columns = []
     for key in ("id", *_XY, *_POLAR, *_PIXELS, "use", "code", "note", "r_measured"):
         more = [_SHARED[key], *([_OTHER[key]] if key in _OTHER else [])] if key in shared else []
-        columns.append(understood(key, more=more, unit=_UNITS.get(key, "")))
+        columns.append(_understood(key, more=more, unit=_UNITS.get(key, "")))
     return columns
+
+
+def _understood(
+    key: str, *, more: Sequence[str] = (), unit: str = "", required: bool = False
+) -> Column:
+    """Return a column to read, with every heading that is understood."""
+    kind: Kind = "text" if key in TEXT_KEYS else "flag" if key == "use" else "number"
+    names = dict.fromkeys((*headings("columns", key), *more))
+    return Column(key, tuple(names), kind=kind, unit=unit, required=required)
 
 
 def column_map(text: str | None) -> dict[str, str]:
@@ -126,9 +150,9 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
     _require_coordinates(table, book, path)
     points, unit = _observations(table, errors)
     sheets = book if isinstance(book, SheetFile) else None
-    setup = read_setup(Path(path), sheets, options.decimal, errors, options.given)
-    check = read_known(book, "Check", ("X_ref", "Y_ref", "Z_ref"), errors, options.decimal)
-    control = read_known(book, "Georeference", ("E", "N", "H"), errors, options.decimal)
+    setup = read_setup(book, options.decimal, errors, options.given)
+    check = _known(book, "Check", ("X_ref", "Y_ref", "Z_ref"), errors, options.decimal)
+    control = _known(book, "Georeference", ("E", "N", "H"), errors, options.decimal)
     parts = (table, setup, check, control)
     model, language, is_ours = "auto", "en", False
     if sheets is not None:
@@ -157,6 +181,51 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
         known_rows=check.rows,
         control_rows=control.rows,
         remarks=tuple(dict.fromkeys(remarks)),
+    )
+
+
+def _known(
+    book: SheetFile | CsvFile,
+    sheet: str,
+    keys: tuple[str, str, str],
+    errors: list[CellError],
+    decimal: Decimal | None,
+) -> _KnownTable:
+    """Return check or control points of the sheet made for them; nothing where it is absent."""
+    if not isinstance(book, SheetFile):
+        return _KnownTable()
+    names = {bare(sheet), bare(f"tbl{sheet}"), "tblgeo" if sheet == "Georeference" else ""}
+    areas = [area for area in book.tables if bare(area.name) in names]
+    titles = [title for title in book.titles if bare(title) in names]
+    if not areas and not titles:
+        return _KnownTable()
+    table = read_table(
+        book,
+        [_understood(key, required=key == "id") for key in ("id", *keys, "use")],
+        name="Geo" if sheet == "Georeference" and areas else sheet,
+        sheet=areas[0].sheet if areas else titles[0],
+        decimal=decimal,
+        errors=errors,
+    )
+    faulty = {(error.sheet, error.cell) for error in errors}
+    errors += table.repeated("id")
+    errors += table.too_large(keys, LARGEST)
+    xyz = np.stack([table.in_unit(key, _TO_M, errors) for key in keys], axis=-1)
+    use = table.numbers("use")
+    rows = [i for i, name in enumerate(table.texts("id")) if name]
+    for i, name in enumerate(table.texts("id")):
+        own_complaint = (table.sheet, table.cell(i, "id")) in faulty
+        if not name and not own_complaint and not np.isnan(xyz[i]).all():
+            errors.append(table.error(i, "id", "coordinates without the name of a point."))
+    return _KnownTable(
+        points=KnownPoints(
+            ids=tuple(table.texts("id")[i] for i in rows),
+            xyz=xyz[rows],
+            use=(np.isnan(use) | (use != 0))[rows],
+        ),
+        rows=tuple(table.rows[i] for i in rows),
+        remarks=tuple(text for text in table.remarks if "rows directly below" not in text),
+        text_cells=tuple(table.text_cells),
     )
 
 
@@ -251,19 +320,17 @@ def _observations(table: Table, errors: list[CellError]) -> tuple[PointObservati
         about = {"cell": table.cell(0, "theta"), "heading": table.headings["theta"]}
         table.remarks.append(remark("survey.angle_as_theta", **about))
     errors += table.repeated("id")
-    refuse_absurd(table, (*_XY, *_POLAR, *_PIXELS, "r_measured"), errors)
+    errors += table.too_large((*_XY, *_POLAR, *_PIXELS, "r_measured"), LARGEST)
     use = table.numbers("use")
     used: BoolArray = np.isnan(use) | (use != 0)
     unit, factor = _unit_of_xy(table, errors)
-    xy = _stack(table, _XY) * factor
-    scales = [TO_MM, TO_MM, TO_DEGREES]
-    polar = _stack(table, _POLAR) * [
-        factor_of(table, key, factors, errors) for key, factors in zip(_POLAR, scales, strict=True)
-    ]
-    pixels = _stack(table, _PIXELS)
-    for key in _PIXELS:
-        factor_of(table, key, {"px": 1.0}, errors)
-    measured = table.numbers("r_measured") * factor_of(table, "r_measured", TO_M, errors)
+    units = dict(zip(_POLAR, (TO_MM, TO_MM, TO_DEGREES), strict=True))
+    units |= {key: {"px": 1.0} for key in _PIXELS} | {"r_measured": _TO_M}
+    columns = {key: table.in_unit(key, factors, errors) for key, factors in units.items()}
+    columns |= {key: table.numbers(key) * factor for key in _XY}
+    xy, polar, pixels = (
+        np.stack([columns[key] for key in keys], axis=-1) for keys in (_XY, _POLAR, _PIXELS)
+    )
     _check_rows(table, ids, used, xy, polar, pixels, faulty, errors)
     if errors:
         ids = [name or f"row {row}" for name, row in zip(ids, table.rows, strict=True)]
@@ -277,13 +344,9 @@ def _observations(table: Table, errors: list[CellError]) -> tuple[PointObservati
         use=used,
         code=tuple(table.texts("code")),
         note=tuple(table.texts("note")),
-        r_measured=measured,
+        r_measured=columns["r_measured"],
     )
     return points, unit
-
-
-def _stack(table: Table, keys: Sequence[str]) -> FloatArray:
-    return np.stack([table.numbers(key) for key in keys], axis=-1).reshape(-1, len(keys))
 
 
 def _unit_of_xy(table: Table, errors: list[CellError]) -> tuple[str, float]:
@@ -316,7 +379,7 @@ def _unit_of_xy(table: Table, errors: list[CellError]) -> tuple[str, float]:
     if symbol == "px":
         return "px", 1.0
     if symbol not in TO_MM:
-        errors.append(unit_error(table, next(iter(said)), symbol, "mm or px"))
+        errors.append(table.unit_error(next(iter(said)), symbol, "mm or px"))
         return "", 1.0
     return "mm", TO_MM[symbol]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable
-from pathlib import Path
 
 import numpy as np
 
@@ -28,16 +27,14 @@ from bifocal.workbook.formulas.setup_cells import (
     TITLE_BLOCK,
     TYPED_FORMULAS,
 )
-from bifocal.workbook.reading.known_reader import LARGEST
 from bifocal.workbook.words import headings, term
 from photocore.arrays import FloatArray
 from photocore.errors import CellError
 from photocore.tables import Column, NamedValues, read_named_values
+from photocore.tables.csvread import CsvFile
 from photocore.tables.model import Kind
 from photocore.tables.numbers import Decimal
 from photocore.workbook.reading.grid import SheetFile
-from photocore.workbook.reading.package import open_package
-from photocore.workbook.reading.xlsx import read_directory
 
 _NUMBERS = (
     *("c_1", "c_2", *PRINTS, "d_1", "d_2", "delta_d", "pitch"),
@@ -45,22 +42,24 @@ _NUMBERS = (
     *("nadir_1_col", "nadir_1_row", "nadir_2_col", "nadir_2_row", "sensor_w", "sensor_h"),
 )
 _TEXTS = ("input_unit", "pair_file", *PHOTOS)
+#: No coordinate of a photo or a map is larger.
+LARGEST = 1e9
 #: d_1 typed and d_2 + delta_d may differ by this much: a tape's millimetre.
 _AGREE = 0.0015
 
 
 def read_setup(
-    path: Path, book: SheetFile | None, decimal: Decimal | None, errors: list[CellError],
+    book: SheetFile | CsvFile,
+    decimal: Decimal | None,
+    errors: list[CellError],
     given: Collection[str],
-) -> SurveySetup:  # fmt: skip
+) -> SurveySetup:
     """Return the values of `Setup`.
 
     Parameters
     ----------
-    path : Path
-        The file, to look at formulas.
-    book : SheetFile or None
-        The open workbook; None for a text table, which has no set-up.
+    book : SheetFile or CsvFile
+        The open workbook, or a text table, which has no set-up.
     decimal : str or None
         Decimal separator of numbers typed as text.
     errors : list
@@ -68,8 +67,8 @@ def read_setup(
     given : collection of str
         Cells that options replace, by their names; ``pair`` replaces them all.
     """
-    if book is None:
-        return SurveySetup(where=path.name)
+    if not isinstance(book, SheetFile):
+        return SurveySetup(where=book.label)
     complaints: list[CellError] = []
     # In the workbook of a general pair sigma_s follows from sigma_px: nothing to read.
     columns = [c for c in _columns() if not (c.key == "sigma_s" and is_general(book))]
@@ -84,11 +83,11 @@ def read_setup(
         book, columns, sheet="Setup", decimal=decimal, errors=complaints, several=True, given=given
     )
     where = f"{book.label} › Setup" if "Setup" in book.titles else book.label
-    formulas = _formulas(path, values)
+    formulas = _formulas(book, values)
     defaults = {key for key in ("sigma_s", "sigma_r_max") if key in formulas}
     # Cells with the template's own formula are defaults, calculated or not.
     told = [e for e in complaints if e.column not in formulas]
-    number = {key: _number(values, key) for key in _NUMBERS if key not in defaults}
+    number = {key: values.given(key) for key in _NUMBERS if key not in defaults}
     _check_positive(values, number, told)
     media = _media(book, values, told)
     d1 = _distance(values, number, "d_1" in formulas, told)
@@ -156,7 +155,7 @@ def _media(book: SheetFile, values: NamedValues, errors: list[CellError]) -> Sur
     count = media_count(book.names)
     if not count:
         return None
-    cells = {name: _number(values, name) for name in media_names(count)}
+    cells = {name: values.given(name) for name in media_names(count)}
     media = SurveyMedia.of_cells(cells, count)
     complaints = {**_bad_indices(media), **_bad_thicknesses(media)}
     for name in HEIGHTS:
@@ -223,26 +222,17 @@ def _text(values: NamedValues, key: str) -> str:
     return values.text(key) if key in values.values else ""
 
 
-def _number(values: NamedValues, key: str) -> float | None:
-    return values.number(key) if key in values.values and values.has(key) else None
-
-
-def _formulas(path: Path, values: NamedValues) -> set[str]:
+def _formulas(book: SheetFile, values: NamedValues) -> set[str]:
     """Return which cells hold the template's own formula instead of a typed number."""
-    wanted = {key: values.places[key] for key in TYPED_FORMULAS if key in values.places}
-    if path.suffix.lower() not in (".xlsx", ".xlsm", ".xltx", ".xltm") or not wanted:
-        return set()
-    with open_package(path) as package:
-        directory = read_directory(path, package)
-        parts = {sheet.title: sheet.part for sheet in directory.sheets}
-        own = set()
-        for key, (sheet, cell) in wanted.items():
-            text = package.read(parts[sheet]).decode("utf-8", errors="replace")
-            match = re.search(rf'<(?:\w+:)?c r="{cell}"[^>]*><(?:\w+:)?f[^>]*>([^<]*)<', text)
-            # Those of older versions are a part of today's.
-            stands = _plain(match[1]) if match else ""
-            if stands.startswith("if(") and stands in _plain(TYPED_FORMULAS[key]):
-                own.add(key)
+    own = set()
+    for key in TYPED_FORMULAS.keys() & values.places.keys():
+        sheet, cell = values.places[key]
+        cell_at = rf'<(?:\w+:)?c r="{cell}"[^>]*><(?:\w+:)?f[^>]*>([^<]*)<'
+        match = re.search(cell_at, book.text(sheet))
+        # Those of older versions are a part of today's.
+        stands = _plain(match[1]) if match else ""
+        if stands.startswith("if(") and stands in _plain(TYPED_FORMULAS[key]):
+            own.add(key)
     return own
 
 

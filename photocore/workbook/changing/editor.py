@@ -28,7 +28,7 @@ from photocore.workbook.changing.graft import Graft
 from photocore.workbook.changing.splice import splice_sheet
 from photocore.workbook.changing.styles import StyleSheet
 from photocore.workbook.making.newbook import check_new_workbook, new_workbook
-from photocore.workbook.reading.grid import CellGrid, SheetFile, TableArea, cell_name
+from photocore.workbook.reading.grid import CellGrid, SheetFile, TableArea, Value, cell_name
 from photocore.workbook.reading.package import (
     check_header,
     open_package,
@@ -112,6 +112,10 @@ class WorkbookEditor:
         if self.file is None:
             self.file = open_xlsx(self.path, max_rows=2**20)
         return self.file.grid(title)
+
+    def value_at(self, title: str, row: int, column: int) -> Value | None:
+        """Return what stands in a cell of the file, None where it is blank."""
+        return self.grid(title).rows.get(row, {}).get(column)
 
     def set_value(self, title: str, row: int, column: int, value: CellValue) -> None:
         """Type a value into a cell; its format stays. None clears the cell."""

@@ -22,9 +22,8 @@ def place_of(editor: WorkbookEditor, name: str) -> tuple[str, int, int] | None:
 
 def type_value(editor: WorkbookEditor, place: tuple[str, int, int], value: CellValue) -> None:
     """Type a value unless it stands there already."""
-    sheet, row, column = place
-    if editor.grid(sheet).rows.get(row, {}).get(column) != value:
-        editor.set_value(sheet, row, column, value)
+    if editor.value_at(*place) != value:
+        editor.set_value(*place, value)
 
 
 def type_column(

@@ -34,7 +34,8 @@ from photocore.workbook.making.look import (
     new_book,
     prepare_page,
 )
-from photocore.workbook.making.newbook import RowBlock, finish_book, new_workbook
+from photocore.workbook.making.newbook import RowBlock, finish_book, finished_parts, new_workbook
+from photocore.workbook.making.sketch import Sketch
 from photocore.workbook.making.words import WordBook
 
 #: The values of a table's columns, by key.
@@ -92,6 +93,35 @@ class BookBuilder:
         for sheet in self.book.worksheets:
             sheet.sheet_view.tabSelected = sheet.title == title
         self.book.calculation.fullCalcOnLoad = True
+
+    def readme(self, lines: Sequence[str], sketch: Sketch, *, rows: int) -> None:
+        """Write the sheet `Readme`: paragraphs, "#" marks a heading, and a drawing beside them.
+
+        Parameters
+        ----------
+        lines : sequence of str
+            The paragraphs.
+        sketch : Sketch
+            The drawing.
+        rows : int
+            How many rows are printed.
+        """
+        sheet = self.sheet("Readme")
+        for letter, width in zip("ABC", (80, 2, 50), strict=True):
+            sheet.worksheet.column_dimensions[letter].width = width
+        for row, line in enumerate(lines, start=3):
+            sheet.text(f"A{row}", line.lstrip("#"), HEAD_FONT if line.startswith("#") else None)
+        self.drawings["Readme"] = sketch.part("C3")
+        sheet.finish(landscape=True, guarded=False)
+        # Nothing stands in the cells below the sketch: without this they would not be printed.
+        sheet.worksheet.print_area = f"A1:C{rows}"
+        sheet.worksheet.page_setup.fitToHeight = 1
+
+    def parts(self) -> dict[str, bytes]:
+        """Return the parts of the package, with the values in its formula cells."""
+        package = io.BytesIO()
+        self.book.save(package)
+        return finished_parts(package, blocks=self.blocks, results=self.results)
 
     def save(self, path: Path | str, *, overwrite: bool) -> None:
         """Write the workbook, whole or not at all, with the values in its formula cells."""

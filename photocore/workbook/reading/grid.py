@@ -125,6 +125,8 @@ class SheetFile:
         Defined names of single cells: lower-case name to (sheet, row, column).
     remarks : list of str
         What the user should know about the file as a whole.
+    text : callable
+        Returns the XML of one sheet by its name; empty where formulas are not told.
     """
 
     label: str
@@ -133,6 +135,7 @@ class SheetFile:
     tables: Sequence[TableArea] = ()
     names: dict[str, tuple[str, int, int]] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
+    text: Callable[[str], str] = lambda _: ""
     _grids: dict[str, CellGrid] = field(default_factory=dict)
 
     def grid(self, title: str) -> CellGrid:

@@ -7,7 +7,7 @@ import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
-from functools import lru_cache, partial
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from xml.etree.ElementTree import Element
 from xml.parsers import expat
@@ -111,6 +111,11 @@ def open_xlsx(path: Path, *, max_rows: int) -> SheetFile:
         with open_package(path) as package:
             return reader.read(package, title, parts[title])
 
+    @cache
+    def text(title: str) -> str:
+        with open_package(path) as package:
+            return read_part(path, package, parts[title]).decode("utf-8", errors="replace")
+
     visible_first = sorted(book.sheets, key=lambda sheet: sheet.hidden)
     return SheetFile(
         label=path.name,
@@ -119,6 +124,7 @@ def open_xlsx(path: Path, *, max_rows: int) -> SheetFile:
         tables=tables,
         names=_single_cells(book),
         remarks=_remarks(book),
+        text=text,
     )
 
 

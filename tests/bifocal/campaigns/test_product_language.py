@@ -25,8 +25,8 @@ ENGLISH = re.compile(
     r"only|each|photo|photos|wall|near|assumed|unknown|given|lines)(?![\w./-])",
     re.IGNORECASE,
 )
-#: Titles of papers.
-TITLES = re.compile(r'"On the accuracy[^"]*"|"?Bifocal pairs of images[^")]*[")]')
+#: Titles of papers, and keys, which are the same in every language.
+TITLES = re.compile(r'"On the accuracy[^"]*"|"?Bifocal pairs of images[^")]*[")]|^[a-z_\d]+$')
 
 
 def texts(path: Path) -> Iterator[str]:
@@ -78,3 +78,20 @@ def test_products_hold_no_english(tmp_path, language):
     assert done.exit_code == 0, done.stderr
     assert {path.suffix for path in out.rglob("*")} >= {".html", ".dxf", ".svg", ".xlsx"}
     assert not english(out)
+
+
+@pytest.mark.parametrize("language", ["it", "de"])
+@pytest.mark.parametrize(
+    "wishes",
+    [
+        "--focal 85 --object 12x8 --free-space 20",
+        "--scale 1:100 --indices 1,1.49,1.337 --thicknesses 0.01 --depth 0.9",
+        "--scale 1:100 --indices 1,1.49,1.337 --thicknesses 0.01 --port 0.1",
+    ],
+)
+def test_a_plan_holds_no_english(tmp_path, language, wishes):
+    out = tmp_path / "plan.xlsx"
+    words = f"plan --focal 35 --focal 18 --sensor 23.5x15.6 --pixels 6000x4000 {wishes}".split()
+    done = CliRunner().invoke(main, [*words, "--out", str(out), "--language", language])
+    assert done.exit_code == 0, done.stderr
+    assert not english(tmp_path)
