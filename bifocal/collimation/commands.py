@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from bifocal.collimation.fields import (
@@ -30,6 +31,7 @@ from bifocal.collimation.records import (
     SurveyState,
     TapedLength,
 )
+from bifocal.remarks import remark
 from bifocal.survey.observations import DOUBT_CODES
 from photocore.errors import InputError
 
@@ -67,11 +69,23 @@ def _known(command: Fields, before: Known | None) -> Known:
     return x, y, r
 
 
-def _point(state: SurveyState, command: Fields) -> PickedPoint:
-    name = command["name"]
-    if name not in state.points:
-        raise InputError(f"there is no point {name}.")
-    return state.points[name]
+def _named(kind: str, state: SurveyState, command: Fields) -> Any:
+    """Return the point, line or control point that a command names."""
+    named = getattr(state, kind).get(command["name"])
+    if named is None:
+        raise InputError(remark(f"page.no_{kind.removesuffix('s')}", name=command["name"]))
+    return named
+
+
+def _renamed(kind: str, state: SurveyState, command: Fields) -> tuple[Any, list[Change]]:
+    """Return what a command gives another name, and the changes; none where it has that name."""
+    before, new = _named(kind, state, command), command["new"]
+    if new == before.name:
+        return before, []
+    if new in getattr(state, kind):
+        raise InputError(remark(f"page.taken_{kind.removesuffix('s')}", name=new))
+    after = replace(before, name=new)
+    return before, [Change(kind, before.name, before, None), Change(kind, new, None, after)]
 
 
 def _pick(state: SurveyState, command: Fields) -> list[Change]:
@@ -79,7 +93,7 @@ def _pick(state: SurveyState, command: Fields) -> list[Change]:
     image, pixel = command["image"], pixel_of(command)
     before = state.points.get(name)
     if before is None and len(state.points) >= MOST_POINTS:
-        raise InputError(f"a survey holds at most {MOST_POINTS} points; begin another.")
+        raise InputError(remark("page.most_points", most=MOST_POINTS))
     after = (before or PickedPoint(name=name, order=state.next_order())).picked(image, pixel)
     if "doubtful" in command:  # a pick that is only moved stays what it is
         after = after.doubted(image, doubtful=command["doubtful"])
@@ -87,52 +101,39 @@ def _pick(state: SurveyState, command: Fields) -> list[Change]:
 
 
 def _unpick(state: SurveyState, command: Fields) -> list[Change]:
-    before = _point(state, command)
+    before = _named("points", state, command)
     after = before.picked(command["image"], None).doubted(command["image"], doubtful=False)
     gone = after.picks == (None, None) and after.reference is None
     return [Change("points", before.name, before, None if gone else after)]
 
 
 def _rename(state: SurveyState, command: Fields) -> list[Change]:
-    before, new = _point(state, command), command["new"]
-    if new == before.name:
-        return []
-    if new in state.points:
-        raise InputError(f"there is a point {new} already; choose another name.")
-    lines = [
-        Change("lines", line.name, line, replace(line, points=tuple(
-            new if name == before.name else name for name in line.points
-        )))
-        for line in state.lines.values() if before.name in line.points
-    ]  # fmt: skip
-    return [
-        Change("points", before.name, before, None),
-        Change("points", new, None, replace(before, name=new)),
-        *lines,
-    ]
+    before, changes = _renamed("points", state, command)
+    for line in state.lines.values() if changes else ():
+        names = tuple(command["new"] if name == before.name else name for name in line.points)
+        if names != line.points:
+            changes.append(Change("lines", line.name, line, replace(line, points=names)))
+    return changes
 
 
 def _type(state: SurveyState, command: Fields) -> list[Change]:
-    before, kind = _point(state, command), command["type"]
+    before, kind = _named("points", state, command), command["type"]
     if kind == before.type:
         return []
     if before.type == "doubtful" and kind != "plain":
-        raise InputError(
-            f"{before.name} was accepted in doubt: pick it by hand, or make it plain once you are "
-            "sure; then it may become another."
-        )
+        raise InputError(remark("page.in_doubt", name=before.name))
     return [Change("points", before.name, before, replace(before, code=CODES[kind]))]
 
 
 def _reference(state: SurveyState, command: Fields) -> list[Change]:
-    before = _point(state, command)
+    before = _named("points", state, command)
     known = _known(command, before.reference)
     after = replace(before, reference=None if known == (None, None, None) else known)
     return [Change("points", before.name, before, after)]
 
 
 def _delete(state: SurveyState, command: Fields) -> list[Change]:
-    before = _point(state, command)
+    before = _named("points", state, command)
     shorter = [
         Change("lines", line.name, line, None if len(rest) < 2 else replace(line, points=rest))
         for line in state.lines.values()
@@ -150,7 +151,7 @@ def _line_set(state: SurveyState, command: Fields) -> list[Change]:
     command = {"layer": "", "points": [], "closed": False, **command}
     layer, points = text_of(command, "layer"), command["points"]
     if len(points) < 2:
-        raise FieldError("points: a line joins two points or more.")
+        raise FieldError(remark("page.line_of_two"))
     unknown = [point for point in points if point not in state.points]
     if unknown:
         raise InputError(f"points: there is no point {unknown[0][:40]}.")
@@ -159,17 +160,8 @@ def _line_set(state: SurveyState, command: Fields) -> list[Change]:
 
 
 def _line_delete(state: SurveyState, command: Fields) -> list[Change]:
-    name = command["name"]
-    if name not in state.lines:
-        raise InputError(f"there is no line {name}.")
-    return [Change("lines", name, state.lines[name], None)]
-
-
-def _control(state: SurveyState, command: Fields) -> PickedControl:
-    name = command["name"]
-    if name not in state.control:
-        raise InputError(f"there is no control point {name}.")
-    return state.control[name]
+    line = _named("lines", state, command)
+    return [Change("lines", line.name, line, None)]
 
 
 def _control_name(state: SurveyState, command: Fields) -> str:
@@ -191,31 +183,23 @@ def _control_pick(state: SurveyState, command: Fields) -> list[Change]:
     pixel = None if command.get("column") is None else pixel_of(command)
     before = state.control.get(name)
     if before is None and pixel is None:
-        raise InputError(f"there is no control point {name}.")
+        raise InputError(remark("page.no_control", name=name))
     after = (before or PickedControl(name=name, order=state.next_order())).picked(image, pixel)
     return [Change("control", name, before, after)]
 
 
 def _control_rename(state: SurveyState, command: Fields) -> list[Change]:
-    before, new = _control(state, command), command["new"]
-    if new == before.name:
-        return []
-    if new in state.control:
-        raise InputError(f"there is a control point {new} already; choose another name.")
-    changes = [
-        Change("control", before.name, before, None),
-        Change("control", new, None, replace(before, name=new)),
-    ]
-    for key, tape in state.tapes.items():
+    before, changes = _renamed("control", state, command)
+    for key, tape in state.tapes.items() if changes else ():
+        ends = [command["new"] if e == before.name else e for e in (tape.start, tape.end)]
         if before.name in (tape.start, tape.end):
-            ends = [new if end == before.name else end for end in (tape.start, tape.end)]
             moved = replace(tape, start=ends[0], end=ends[1])
             changes += [Change("tapes", key, tape, None), _taped(state, moved)]
     return changes
 
 
 def _control_delete(state: SurveyState, command: Fields) -> list[Change]:
-    before = _control(state, command)
+    before = _named("control", state, command)
     tapes = [
         Change("tapes", key, tape, None)
         for key, tape in state.tapes.items()
@@ -245,19 +229,19 @@ def _tape_set(state: SurveyState, command: Fields) -> list[Change]:
     start, end = command["from"], command["to"]
     length, sigma = command.get("length"), command.get("sigma")
     if start == end:
-        raise InputError("from, to: a tape runs between two points.")
+        raise InputError(remark("page.tape_of_two"))
     if length is None:
-        raise FieldError("length: how long is it, in metres?")
+        raise FieldError(remark("page.tape_length"))
     missing = [name for name in (start, end) if name not in state.control]
     if missing:
-        raise InputError(f"there is no control point {missing[0]}; pick it first.")
+        raise InputError(remark("page.pick_control", name=missing[0]))
     return [_taped(state, TapedLength(start=start, end=end, length=length, sigma=sigma))]
 
 
 def _tape_delete(state: SurveyState, command: Fields) -> list[Change]:
     key = "|".join(sorted((command["from"], command["to"])))
     if key not in state.tapes:
-        raise InputError("there is no tape between these points.")
+        raise InputError(remark("page.no_tape"))
     return [Change("tapes", key, state.tapes[key], None)]
 
 
@@ -331,12 +315,8 @@ def _points_add(state: SurveyState, command: Fields) -> list[Change]:
     return changes
 
 
-def _stage_set(state: SurveyState, command: Fields) -> None:
-    state.stage = command["stage"]
-
-
-def _language_set(state: SurveyState, command: Fields) -> None:
-    state.language = command["language"]
+def _set(key: str, state: SurveyState, command: Fields) -> None:
+    setattr(state, key, command[key])
 
 
 _RECORDS: dict[Any, Callable[[SurveyState, Fields], list[Change]]] = {
@@ -361,6 +341,6 @@ _SETTINGS: dict[Any, Callable[[SurveyState, Fields], None]] = {
     "photo.set": _lens_set,
     "setup.set": _setup_set,
     "photos.exchange": _exchange,
-    "stage.set": _stage_set,
-    "language.set": _language_set,
+    "stage.set": partial(_set, "stage"),
+    "language.set": partial(_set, "language"),
 }

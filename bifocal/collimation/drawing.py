@@ -11,6 +11,7 @@ from bifocal.collimation.live_results import LiveResults
 from bifocal.collimation.records import SurveyState
 from bifocal.files.exports import export_points
 from bifocal.model.points import PointLine, SurveyPoints
+from bifocal.remarks import remark
 from photocore.errors import InputError
 
 
@@ -31,7 +32,7 @@ def drawn_points(
     rows = [] if results is None else [(point, results.row(point)) for point in points]
     solved = [(point, row) for point, row in rows if row is not None]
     if not solved:
-        raise InputError("there is nothing to draw yet: pick a point in both photos.")
+        raise InputError(remark("page.nothing_to_draw"))
     nan = float("nan")
 
     def number(value: float | None) -> float:

@@ -7,6 +7,7 @@ from typing import Any
 
 from bifocal.collimation.records import CODES, Pixel
 from bifocal.collimation.stated_media import INDICES, MEDIA
+from bifocal.remarks import remark
 from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX
 from photocore.errors import InputError
 from photocore.option_types import Number
@@ -32,10 +33,10 @@ def text_of(command: Fields, key: str) -> str:
     """Return a name: not blank, one line."""
     value = command.get(key)
     if not isinstance(value, str) or not value.strip():
-        raise FieldError(f"{key}: give a name.")
+        raise FieldError(remark("page.give_name", field=key))
     value = " ".join(value.split())
     if len(value) > LONGEST_NAME or not value.isprintable():
-        raise FieldError(f"{key}: a name of at most {LONGEST_NAME} letters, please.")
+        raise FieldError(remark("page.long_name", field=key, most=LONGEST_NAME))
     return value
 
 
@@ -75,7 +76,7 @@ def pixel_of(command: Fields) -> Pixel:
     """Return a pick. [px]"""
     column, row = number_of(command, "column"), number_of(command, "row")
     if column is None or row is None:
-        raise FieldError("column, row: a pick needs both.")
+        raise FieldError(remark("page.pick_needs_both"))
     return column, row
 
 

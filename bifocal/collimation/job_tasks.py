@@ -19,6 +19,7 @@ from bifocal.collimation.stated_media import lacking, media_as_dict, media_of
 from bifocal.collimation.wording import say, without_options
 from bifocal.options import OF_PAIR
 from bifocal.orientation.control_points import Control
+from bifocal.remarks import remark
 from photocore.errors import InputError
 from photocore.jsonfile import plain
 from photocore.output import free_path
@@ -54,7 +55,7 @@ def task_of(session: Session, kind: str, options: Options) -> dict[str, Any]:
     if kind == "align":
         return {"kind": kind, **_align_task(session, options)}
     if session.files.pair is None:
-        raise InputError("the photos are not oriented yet; align them and accept it first.")
+        raise InputError(remark("page.accept_first"))
     pair = {"kind": kind, "pair": str(session.files.pair.resolve())}
     if kind == "match":
         count = positive_of(options, "count") or 500
@@ -106,7 +107,7 @@ def _deliver_options(session: Session, options: Options) -> dict[str, Any]:
         folder = free_path(products.folder, f"{products.stem}-delivered")
     title = options.get("title") or ""
     if not isinstance(title, str) or len(title) > 120:
-        raise FieldError("title: a line of text.")
+        raise FieldError(remark("page.title_line"))
     return {
         "out": str(folder),
         "overwrite": own,
@@ -129,16 +130,13 @@ def _solved_points(session: Session) -> bool:
 def _align_task(session: Session, options: Options) -> dict[str, Any]:
     infos, state, products = session.pictures.infos, session.state, session.products
     if len(infos) != 2:
-        raise InputError("there are no photos yet; give two.")
+        raise InputError(remark("page.give_photos"))
     control, site = control_of(state), site_of(state)
     given = [site.distance1, site.distance2, site.delta_d]
     way = options.get("way") or ("control" if len(control.ids) else "auto")
     way = _through_media(session, way, given)
     if way == "auto" and not any(given) and not control.lengths:
-        raise InputError(
-            "nothing says how large the wall is: pick four control points with X and Y, or type "
-            "one distance to the wall."
-        )
+        raise InputError(remark("page.no_size"))
     tables: dict[str, Path | None] = {"control": None, "lengths": None}
     if way == "control":
         tables = _write_control(session, control)

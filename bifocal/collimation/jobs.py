@@ -128,7 +128,7 @@ class JobRunner:
         """
         job = self.jobs.get(number)
         if job is None:
-            raise InputError("there is no such job.")
+            raise InputError(remark("page.no_job"))
         with self._lock:
             if job.state == "running":
                 job.state = "cancelled"

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from bifocal.remarks import remark
 from photocore.errors import InputError
 
 
@@ -105,8 +106,7 @@ class Journal:
         except OSError as error:
             self._file.truncate(end)
             raise InputError(
-                f"{self.path}: could not be written ({error.strerror or error}); the last change "
-                "was not taken, all before it is safe. Free some space and repeat it."
+                remark("page.not_taken", path=self.path, why=error.strerror or error)
             ) from error
 
     def close(self) -> None:

@@ -15,10 +15,11 @@ from bifocal.model.pair import Pair
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.adjustment.observed_points import views_of
 from bifocal.orientation.adjustment.pair_observations import at
-from bifocal.orientation.align_workflow import SIGMA_ON_WALL, KnownLens, interior_of_photo
+from bifocal.orientation.align_workflow import KnownLens, interior_of_photo
 from bifocal.orientation.alignment import standard_deviations
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
+from bifocal.orientation.tuning import CONTROL
 from photocore.arrays import FloatArray
 from photocore.errors import PhotogrammetryError
 from photocore.images import ImageInfo
@@ -86,7 +87,7 @@ def control_of(state: SurveyState) -> Control:
     xyz = np.array([_known(point) for point in points]).reshape(-1, 3)
     sigma = np.full((len(points), 3), site.sigma_control)
     on_wall = np.isfinite(xyz[:, :2]).all(axis=1) & np.isnan(xyz[:, 2])
-    xyz[on_wall, 2], sigma[on_wall, 2] = 0.0, SIGMA_ON_WALL
+    xyz[on_wall, 2], sigma[on_wall, 2] = 0.0, CONTROL.sigma_on_wall
     index = {point.name: number for number, point in enumerate(points)}
     tapes = [tape for tape in state.tapes.values() if tape.start in index and tape.end in index]
     return Control(

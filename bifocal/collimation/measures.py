@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 
@@ -37,7 +38,7 @@ def measure(places: Sequence[Place]) -> dict[str, float | None]:
         If there are fewer than two points.
     """
     if len(places) < 2:
-        raise InputError("a measure runs between two points or more.")
+        raise InputError(remark("page.measure_of_two"))
     xyz = np.array([place[0] for place in places])
     covariances = [place[1] for place in places]
     whole = np.zeros((3 * len(places), 3 * len(places)))

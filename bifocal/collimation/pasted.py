@@ -8,6 +8,7 @@ import numpy as np
 
 from bifocal.collimation.records import Known, Picks, Pixel
 from bifocal.orientation.control_points import COLUMNS, METRES
+from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.tables import Table, read_table
@@ -27,16 +28,16 @@ def pasted_control(text: str) -> list[tuple[str, Known, Picks]]:
     """
     text = text.strip("\r\n")
     if not text.strip():
-        raise InputError("nothing was pasted; copy the rows of a table first.")
+        raise InputError(remark("page.nothing_pasted"))
     table = read_table(CsvFile("what was pasted", _with_headings(text)), COLUMNS)
     if not len(table) or len(table) > MOST_ROWS:
-        raise InputError(f"what was pasted holds {len(table)} points; expected 1 to {MOST_ROWS}.")
+        raise InputError(remark("page.pasted_many", count=len(table), most=MOST_ROWS))
     known = np.column_stack([_metres(table, key) for key in ("X", "Y", "r")])
     picks = np.column_stack([table.numbers(key) for key in ("col1", "row1", "col2", "row2")])
     rows = []
     for name, place, pixels in zip(table.texts("id"), known.tolist(), picks.tolist(), strict=True):
         if not name:
-            raise InputError("a pasted row has no name; the first column names the point.")
+            raise InputError(remark("page.pasted_nameless"))
         x, y, r = (None if math.isnan(value) else value for value in place)
         rows.append((name[:80], (x, y, r), (_pixel(pixels[:2]), _pixel(pixels[2:]))))
     return rows

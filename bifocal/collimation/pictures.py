@@ -17,6 +17,7 @@ from bifocal.model.geotiff import RasterReader
 from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
+from bifocal.remarks import remark
 from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import InputError
 from photocore.images import ImageArray, ImageInfo, image_info, read_image
@@ -101,7 +102,7 @@ class Pictures:
             If there are no two photos yet.
         """
         if len(self.pyramids) < 2:
-            raise InputError("there are no photos yet; give two.")
+            raise InputError(remark("page.give_photos"))
         return self.pyramids[0].halved(0), self.pyramids[1].halved(0)
 
     def needed_pair(self) -> Pair:
@@ -113,7 +114,7 @@ class Pictures:
             If the photos are not oriented yet.
         """
         if self.pair is None:
-            raise InputError("the photos are not oriented yet; align them first.")
+            raise InputError(remark("page.align_first"))
         return self.pair
 
     def suggest(self, image: int, pixel: Pixel) -> dict[str, Any]:

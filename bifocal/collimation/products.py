@@ -15,6 +15,7 @@ from bifocal.collimation.project import SurveyFiles
 from bifocal.model.geotiff import RasterReader
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
+from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.jsonfile import read_object, write_object
@@ -110,7 +111,7 @@ class Products:
         """
         path = self.current("relief")
         if path is None:
-            raise InputError("there is no relief yet; run it first.")
+            raise InputError(remark("page.no_relief"))
         version = _version(path)
         if self._relief is None or self._relief[0] != version:
             self._relief = version, ReliefMap.read(path)
@@ -141,7 +142,7 @@ class Products:
         relief = self.relief()
         length = float(np.linalg.norm(end - start))
         if not np.isfinite(length) or length > 1e5:
-            raise InputError("from, to: two places on the wall, in metres.")
+            raise InputError(remark("page.two_places"))
         count = int(np.clip(length / relief.gsd, 2, PROFILE_POINTS))
         along = np.linspace(0.0, 1.0, count)
         places = start + along[:, None] * (end - start)

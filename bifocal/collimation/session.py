@@ -28,6 +28,7 @@ from bifocal.collimation.workbook.setup import ideal_setup, pair_of
 from bifocal.collimation.workbook.sync import WorkbookSync
 from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
+from bifocal.remarks import remark
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.output import free_path, relative_name
 
@@ -112,10 +113,7 @@ class Session:
             Then.
         """
         if self.state.points or self.state.control:
-            raise InputError(
-                "points are picked already in the photos given before; begin another survey in "
-                "another folder for other photos."
-            )
+            raise InputError(remark("page.begun_before"))
 
     def propose(self, path: Path, report: Mapping[str, Any]) -> None:
         """Show the orientation that a job found; `align.accept` makes it the survey's own."""
@@ -183,7 +181,7 @@ class Session:
         """Make the proposed orientation the survey's own pair file."""
         path = self.proposed_path
         if path is None:
-            raise InputError("there is no orientation to accept; align the photos first.")
+            raise InputError(remark("page.no_orientation"))
         target = self.products.place("pair", ".pair.json")
         if path != target:
             accept_pair(path, target)
@@ -284,12 +282,9 @@ class Session:
         if op == "photos.exchange":
             pair = self.files.pair
             if len(self.pictures.infos) != 2:
-                raise InputError("there are no photos yet; give two.")
+                raise InputError(remark("page.give_photos"))
             if pair is not None and not self.products.is_own(pair):
-                raise InputError(
-                    f"{pair.name}: this survey was begun with it, photos are exchanged before they "
-                    "are oriented. Start with both photos in a folder of their own."
-                )
+                raise InputError(remark("page.begun_with_pair", name=pair.name))
             result = self._carry_out(command, write=True)
             self._exchange_photos()
             return result
@@ -332,7 +327,7 @@ class Session:
         if not back:
             source, target = target, source
         if not source:
-            raise InputError("there is nothing to undo." if back else "there is nothing to redo.")
+            raise InputError(remark(f"page.nothing_to_{'undo' if back else 'redo'}"))
         if write:
             self._write(command)
         changes = [change.reversed for change in reversed(source.pop())]
@@ -423,15 +418,13 @@ class Session:
         """Refuse picks outside their photos."""
         sizes = [info.size for info in self.pictures.infos]
         if len(sizes) < 2 and op.endswith(".pick"):
-            raise InputError("there are no photos yet; give two.")
+            raise InputError(remark("page.give_photos"))
         for change in changes:
             picks: Picks = getattr(change.after, "picks", (None, None))
             for image, (pick, size) in enumerate(zip(picks, sizes, strict=False), start=1):
                 if pick and not all(-0.5 <= p <= n - 0.5 for p, n in zip(pick, size, strict=True)):
-                    raise FieldError(
-                        f"column, row: the pick of {change.key} lies outside photo {image} "
-                        f"({size[0]} x {size[1]} px)."
-                    )
+                    about = {"name": change.key, "width": size[0], "height": size[1]}
+                    raise FieldError(remark("page.pick_outside", image=image, **about))
 
     # ---- listeners
 
@@ -480,10 +473,10 @@ class Session:
         for name in names:
             point = self.state.points.get(name)
             if point is None:
-                raise InputError(f"there is no point {name}.")
+                raise InputError(remark("page.no_point", name=name))
             place = None if self.results is None else self.results.place(point)
             if place is None:
-                raise InputError(f"point {name} is not picked in both photos yet.")
+                raise InputError(remark("page.point_in_one", name=name))
             places.append(place)
         return measure(places)
 

@@ -24,15 +24,12 @@ _ADVICE = tuple(
     )
 )
 
-
-@cache
-def _content() -> dict[str, dict[str, dict[str, str]]]:
-    return packaged(__package__, "words")
+_content = cache(packaged)
 
 
 def say(section: str, key: str, language: str, **fields: Any) -> str:
     """Return a sentence in a language, its fields filled in."""
-    return _content()[section][key][language].format(**fields)
+    return _content(__package__, "words")[section][key][language].format(**fields)
 
 
 def without_options(text: str, language: str = "en") -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from bifocal.files.dxf import add_ellipse, add_text, layer_name, new_drawing, save_drawing
 from bifocal.model.points import PointLine, SurveyPoints
+from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, not_negative
 from photocore.cloud import write_cloud
 from photocore.errors import InputError
@@ -99,7 +100,7 @@ def export_points(
     if not keep.all():
         missing = [name for name, wanted in zip(points.ids, keep, strict=True) if not wanted]
         shown = ", ".join(missing[:10]) + (" ..." if len(missing) > 10 else "")
-        remarks.append(f"{len(missing)} point(s) without coordinates left out: {shown}")
+        remarks.append(remark("export.left_out", count=len(missing), names=shown))
     points, coordinates = points.take(keep), coordinates[keep]
     if ending == ".csv":
         _write_csv(path, points, coordinates, order=order, flavour=flavour, overwrite=overwrite)

@@ -7,19 +7,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from bifocal.matching.tuning import CORNERS
 from photocore.arrays import Float32Array, FloatArray
-
-#: Edges are read between these distances from the corner: nearer, blur has rounded it. [px]
-NEAREST, FARTHEST = 3.0, 12.0
-#: Half the width of the strip along an edge that is read. [px]
-HALF_WIDTH = 3.0
-#: Least length of an edge that is seen, and least angle between two. [px, degrees]
-SHORTEST, LEAST_ANGLE = 4, 25.0
-#: Least gradient at an edge, against the strongest about the corner, and least contrast of a
-#: profile across an edge against the mean of its profiles. [-]
-LEAST_GRADIENT, LEAST_LIKENESS = 0.25, 0.4
-#: Smoothing leaves about one independent reading in three pixels of edge; found on drawn corners.
-PIXELS_PER_READING = 3.0
 
 
 class Edge(NamedTuple):
@@ -63,7 +52,7 @@ def crossing(grey: Float32Array, start: FloatArray) -> tuple[FloatArray, float] 
     -------
     tuple of ndarray, shape (2,), and float, or None
         The crossing and the standard deviation of its worse axis [px]; None where two edges of at
-        least `SHORTEST` px do not meet.
+        least `shortest` px do not meet.
 
     Notes
     -----
@@ -81,7 +70,7 @@ def crossing(grey: Float32Array, start: FloatArray) -> tuple[FloatArray, float] 
             return None
         across = np.linalg.inv([edge.normal for edge in edges])
         place = across @ [edge.offset for edge in edges]
-        if np.linalg.norm(place - start) > NEAREST + 0.5:
+        if np.linalg.norm(place - start) > CORNERS.nearest + 0.5:
             return None
         spread = across * [edge.sigma_at(place) for edge in edges]
     return place, float(np.linalg.norm(spread, 2))
@@ -91,7 +80,7 @@ def _edges(
     grey: Float32Array, coefficients: FloatArray, place: FloatArray
 ) -> tuple[Edge, Edge] | None:
     """Return the two strongest edges that run into a place; None if there are no two."""
-    reach = int(FARTHEST) + 1
+    reach = int(CORNERS.farthest) + 1
     column, row = np.round(place).astype(int)
     low = np.maximum([column - reach, row - reach], 0)
     part = grey[low[1] : row + reach + 1, low[0] : column + reach + 1].astype(np.float64)
@@ -104,31 +93,34 @@ def _edges(
     strength = np.linalg.norm(slope, axis=-1)
     away = points - place
     distance = np.linalg.norm(away, axis=-1)
-    strong = (distance > NEAREST) & (distance < FARTHEST)
+    strong = (distance > CORNERS.nearest) & (distance < CORNERS.farthest)
     if not strong.any():
         return None
-    strong &= strength > LEAST_GRADIENT * strength[strong].max()
+    strong &= strength > CORNERS.least_gradient * strength[strong].max()
     # The line through the pixel, along its edge, must run into the corner.
     missed = np.abs((slope * away).sum(axis=-1)) / np.maximum(strength, 1e-9)
-    strong &= missed < HALF_WIDTH / 2
+    strong &= missed < CORNERS.half_width / 2
     # An edge is told by the side it runs to, and by the side that is brighter.
     side = np.degrees(np.arctan2(away[..., 1], away[..., 0]))[strong]
     first = _strongest(side, strength[strong] ** 2)
     turned = np.abs((side - first + 180) % 360 - 180)
-    other = (turned > LEAST_ANGLE) & (turned < 180 - LEAST_ANGLE)
+    other = (turned > CORNERS.least_angle) & (turned < 180 - CORNERS.least_angle)
     if not other.any():
         return None
     second = _strongest(side[other], strength[strong][other] ** 2)
     between = np.radians(abs((second - first + 180) % 360 - 180))
     # From there on the other edge is far enough from the strip along this one.
-    nearest = max(NEAREST, float((NEAREST + HALF_WIDTH * np.cos(between)) / np.sin(between)))
-    if nearest > FARTHEST - SHORTEST:
+    nearest = max(
+        CORNERS.nearest,
+        float((CORNERS.nearest + CORNERS.half_width * np.cos(between)) / np.sin(between)),
+    )
+    if nearest > CORNERS.farthest - CORNERS.shortest:
         return None
     found = [_line(coefficients, place, np.radians(side), nearest) for side in (first, second)]
     if found[0] is None or found[1] is None:
         return None
     cosine = abs(float(found[0].normal @ found[1].normal))
-    return (found[0], found[1]) if cosine < np.cos(np.radians(LEAST_ANGLE)) else None
+    return (found[0], found[1]) if cosine < np.cos(np.radians(CORNERS.least_angle)) else None
 
 
 def _strongest(side: FloatArray, weight: FloatArray) -> float:
@@ -141,13 +133,13 @@ def _strongest(side: FloatArray, weight: FloatArray) -> float:
 def _line(coefficients: FloatArray, place: FloatArray, side: float, nearest: float) -> Edge | None:
     """Return the edge that runs from a place to a side, by profiles across it; None without one."""
     direction = np.array([np.cos(side), np.sin(side)])
-    centre = place + direction * (nearest + FARTHEST) / 2
-    across = np.arange(-HALF_WIDTH, HALF_WIDTH + 0.1, 0.25)
-    window = np.cos(across / (HALF_WIDTH + 0.25) * np.pi / 2) ** 2
+    centre = place + direction * (nearest + CORNERS.farthest) / 2
+    across = np.arange(-CORNERS.half_width, CORNERS.half_width + 0.1, 0.25)
+    window = np.cos(across / (CORNERS.half_width + 0.25) * np.pi / 2) ** 2
     for _ in range(8):
         normal = np.array([-direction[1], direction[0]])
         reach = float((centre - place) @ direction)
-        along = np.arange(nearest, FARTHEST + 0.1) - reach
+        along = np.arange(nearest, CORNERS.farthest + 0.1) - reach
         places = centre + along[:, None, None] * direction + across[:, None] * normal
         profiles = at_places(coefficients, places.reshape(-1, 2)).reshape(len(along), -1)
         # Each is the mean of all, moved: profile = a + b mean(x - off) to first order.
@@ -157,10 +149,12 @@ def _line(coefficients: FloatArray, place: FloatArray, side: float, nearest: flo
         middle = float(weight @ across / max(weight.sum(), 1e-9))
         design = np.stack([np.ones_like(across), mean_profile - mean_profile.mean(), slope], axis=1)
         _, likeness, moved = np.linalg.lstsq(design, profiles.T, rcond=None)[0]
-        read = likeness > LEAST_LIKENESS
-        if read.sum() < SHORTEST:
+        read = likeness > CORNERS.least_likeness
+        if read.sum() < CORNERS.shortest:
             return None
-        off = middle - np.clip(moved[read] / likeness[read], -HALF_WIDTH, HALF_WIDTH)
+        off = middle - np.clip(
+            moved[read] / likeness[read], -CORNERS.half_width, CORNERS.half_width
+        )
         where = along[read]
         mean = float(where.mean())
         square = float(((where - mean) ** 2).sum())
@@ -170,7 +164,7 @@ def _line(coefficients: FloatArray, place: FloatArray, side: float, nearest: flo
         centre = centre + mean * direction + shift * normal
         direction = direction + tilt * normal
         direction /= np.linalg.norm(direction)
-    scatter = float(np.sqrt(PIXELS_PER_READING * (rest @ rest) / (len(rest) - 2)))
+    scatter = float(np.sqrt(CORNERS.pixels_per_reading * (rest @ rest) / (len(rest) - 2)))
     normal = np.array([-direction[1], direction[0]])
     return Edge(
         normal=normal,

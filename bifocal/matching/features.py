@@ -10,23 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from bifocal.matching.tuning import FEATURES
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray, IntArray
-
-#: Photos are searched at full resolution up to this; larger ones are reduced to it. [px]
-FEATURE_PIXELS = 12e6
-#: SIFT doubles its input: strips of 2 MP need 0.5 GB, with a margin for what crosses their edge.
-STRIP_PIXELS, MARGIN = 2e6, 64
-#: Contrast from which a detail counts, and how many of the strongest are kept. Twice the contrast
-#: finds 60 % fewer on church_1, and hardly any on plaster.
-CONTRAST, STRONGEST = 0.01, 30_000
-#: The nearest descriptor is at most this share as far as the second: anywhere, on the line.
-DISTINCT, DISTINCT_ON_LINE = 0.85, 0.9
-#: On the line, descriptors agree at least so far (cosine).
-LEAST_ALIKE = 0.7
-#: A second candidate this near to the first is the same detail in another orientation. [px]
-SAME_PLACE = 1.5
-#: The same detail differs in size (logarithm) and turn from the usual by no more than this.
-SIZE_SLACK, TURN_SLACK = 0.55, 30.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -76,7 +61,7 @@ def stretch(image: ByteArray) -> ByteArray:
 
 
 def find_features(
-    image: ByteArray, *, limit: int = STRONGEST, budget: float = FEATURE_PIXELS
+    image: ByteArray, *, limit: int = FEATURES.strongest, budget: float = FEATURES.most_pixels
 ) -> Features:
     """Return the strongest features of a grey photo, found strip by strip.
 
@@ -93,13 +78,15 @@ def find_features(
     size = (round(image.shape[1] / reduction), round(image.shape[0] / reduction))
     small = image if reduction == 1.0 else cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     factor = np.array([image.shape[1] / small.shape[1], image.shape[0] / small.shape[0]])
-    detector: Any = cv2.SIFT.create(contrastThreshold=CONTRAST)
+    detector: Any = cv2.SIFT.create(contrastThreshold=FEATURES.contrast)
     height = small.shape[0]
-    edges = np.linspace(0, height, max(1, int(np.ceil(small.size / STRIP_PIXELS))) + 1).astype(int)
+    edges = np.linspace(
+        0, height, max(1, int(np.ceil(small.size / FEATURES.strip_pixels))) + 1
+    ).astype(int)
     keys, parts = [], []
     for top, bottom in pairwise(edges.tolist()):
-        start = max(top - MARGIN, 0)
-        strip = np.ascontiguousarray(small[start : min(bottom + MARGIN, height)])
+        start = max(top - FEATURES.margin, 0)
+        strip = np.ascontiguousarray(small[start : min(bottom + FEATURES.margin, height)])
         found = [
             key
             for key in detector.detect(strip, None)
@@ -147,10 +134,10 @@ def match_features(first: Features, second: Features) -> tuple[NDArray[np.intp],
         better = column_value > back_value
         back_value[better] = column_value[better]
         back[better] = column_best[better] + start
-        runner = _runner_up(part, best, second.pixels, SAME_PLACE * second.reduction)
+        runner = _runner_up(part, best, second.pixels, FEATURES.same_place * second.reduction)
         nearest[start : start + 2000] = best
         # |a - b|² = 2 - 2 a·b for unit vectors.
-        distinct[start : start + 2000] = (2 - 2 * value) < DISTINCT**2 * (2 - 2 * runner)
+        distinct[start : start + 2000] = (2 - 2 * value) < FEATURES.distinct**2 * (2 - 2 * runner)
     rows = np.arange(count)
     good = distinct & (back[nearest] == rows)
     return rows[good], nearest[good]
@@ -183,7 +170,7 @@ def alike(
     usual = np.arctan2(np.sin(turned).sum(), np.cos(turned).sum())
     away = np.abs((turned - usual + np.pi) % (2 * np.pi) - np.pi)
     size = np.abs(grown - np.median(grown)) if len(grown) else grown
-    return np.asarray((size < SIZE_SLACK) & (away < np.deg2rad(TURN_SLACK)))
+    return np.asarray((size < FEATURES.size_slack) & (away < np.deg2rad(FEATURES.turn_slack)))
 
 
 def match_along_lines(
@@ -270,7 +257,9 @@ def _best_on_segment(
     close &= np.abs(x2[None, :, 1] - x2[best, None, 1]) < across
     part[close] = -1.0
     runner = part.max(axis=1)
-    good = (value > LEAST_ALIKE) & ((2 - 2 * value) < DISTINCT_ON_LINE**2 * (2 - 2 * runner))
+    good = (value > FEATURES.least_alike) & (
+        (2 - 2 * value) < FEATURES.distinct_on_line**2 * (2 - 2 * runner)
+    )
     return (
         np.where(good, candidates[best], -1).astype(np.intp),
         np.where(good, value, -1.0).astype(np.float32),
@@ -297,10 +286,6 @@ def spread_evenly(
     return np.sort(order[by_rank[:count]]).astype(np.int64)
 
 
-#: Smaller photos hold no detail to speak of. [px]
-SMALLEST_SIDE = 16
-
-
 def sharpness(image: ByteArray) -> float:
     """Return how much fine detail a photo has against coarse detail, 0 (blurred) to about 1.
 
@@ -308,7 +293,7 @@ def sharpness(image: ByteArray) -> float:
     photo keeps its steepness at every scale, a blurred one has none left at the finest.
     """
     height, width = image.shape
-    if min(height, width) < SMALLEST_SIDE:
+    if min(height, width) < FEATURES.smallest_side:
         return 0.0
     part = image[height // 8 : -height // 8 or None, width // 8 : -width // 8 or None]
     if part.size > 4e6:

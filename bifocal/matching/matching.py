@@ -15,7 +15,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from bifocal.matching.features import (
-    FEATURE_PIXELS,
     Features,
     drop_repeated,
     find_features,
@@ -25,6 +24,7 @@ from bifocal.matching.features import (
 from bifocal.matching.matches import Matches
 from bifocal.matching.patches import PatchResult, refine, same_scale
 from bifocal.matching.targets import SurveyTargets, find_targets
+from bifocal.matching.tuning import FEATURES, MATCH
 from bifocal.model.flags import FlagLimits
 from bifocal.model.homography import apply_homography
 from bifocal.model.interior_orientation import Images
@@ -35,21 +35,6 @@ from bifocal.remarks import remark
 from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.errors import GeometryError
-
-#: A patch's own sigma is too good by this factor: neighbouring samples are not independent.
-OPTIMISM = 1.7
-#: Patches that agree less than this are not the same detail.
-LEAST_AGREEMENT = 0.8
-#: Fewer matched features than this are chance.
-FEWEST_MATCHED = 20
-#: A feature whose patch disagrees is kept this near to its line, and is so precise. [px]
-FEATURE_ACROSS, SIGMA_FEATURE = 0.7, 0.35
-#: Neighbours asked for support, how many must agree, and to what share of d1 in relief. On two
-#: castles 13 and 35 % of what stood out by 0.8 m was covered before, 91 and 82 % with it.
-NEIGHBOURS, SUPPORTERS, RELIEF_ALIKE = 8, 2, 0.005
-
-#: Relief looked for ends this near to the last interface; in air, to the near camera. [share]
-HIGHEST_SHARE = 0.999
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +57,7 @@ class MatchSettings:
     relief_range: tuple[float, float] | None = None
     features: bool = True
     targets: bool = True
-    budget: float = FEATURE_PIXELS
+    budget: float = FEATURES.most_pixels
 
 
 def match_pair(pair: Pair, images: Images, settings: MatchSettings | None = None) -> Matches:
@@ -94,7 +79,7 @@ def match_pair(pair: Pair, images: Images, settings: MatchSettings | None = None
     settings = settings or MatchSettings()
     near = pair.image2.distance
     low, high = settings.relief_range or (-0.5 * near, 0.4 * near)
-    reliefs = (low, min(high, HIGHEST_SHARE * pair.highest_relief))
+    reliefs = (low, min(high, MATCH.highest_share * pair.highest_relief))
     if not reliefs[0] < reliefs[1]:
         about = {"low": low, "seen": pair.highest_relief, "high": high}
         raise GeometryError(remark("match.relief_unseen", **about))
@@ -104,7 +89,7 @@ def match_pair(pair: Pair, images: Images, settings: MatchSettings | None = None
     if settings.features:
         parts.append(_feature_matches(pair, images, reliefs, settings))
     matches = _joined(parts)
-    few = settings.features and len(matches.ids) < FEWEST_MATCHED
+    few = settings.features and len(matches.ids) < MATCH.fewest_matched
     if not len(matches.ids) or few:
         raise GeometryError(remark("match.too_few", count=len(matches.ids)))
     return matches
@@ -120,7 +105,7 @@ def _feature_matches(
     keep = drop_repeated(pixels1, pixels2)
     pixels1, pixels2 = pixels1[keep], pixels2[keep]
     patches, misfit = refine_along_lines(pair, images, pixels1, pixels2)
-    sigma = np.hypot(OPTIMISM * patches.sigma, 0.02)
+    sigma = np.hypot(MATCH.optimism * patches.sigma, 0.02)
     on_line = patches.pixels2
     relief = relief_at(pair, pixels1, on_line)
     good = _accepted(pair, patches, misfit, sigma, relief, reliefs, pixels1)
@@ -131,13 +116,13 @@ def _feature_matches(
     seen = seen_at(pair, pixels1, np.where(inside, rest, 0.0))
     along = directions_at(pair, pixels1, np.where(inside, rest, 0.0))
     off = (pixels2 - seen)[:, 0] * -along[:, 1] + (pixels2 - seen)[:, 1] * along[:, 0]
-    inside &= good.sum() >= FEWEST_MATCHED  # else pair and photos do not belong together
-    kept = ~good & inside & (np.abs(off) < FEATURE_ACROSS * first.reduction)
+    inside &= good.sum() >= MATCH.fewest_matched  # else pair and photos do not belong together
+    kept = ~good & inside & (np.abs(off) < MATCH.feature_across * first.reduction)
     on_line = np.where(kept[:, None], seen, on_line)
     relief, misfit = np.where(kept, rest, relief), np.where(kept, off, misfit)
-    sigma = np.where(kept, SIGMA_FEATURE * first.reduction, sigma)
+    sigma = np.where(kept, MATCH.sigma_feature * first.reduction, sigma)
     good |= kept
-    good[good] = _relief_supported(pixels1[good], relief[good], RELIEF_ALIKE * pair.d1)
+    good[good] = _relief_supported(pixels1[good], relief[good], MATCH.relief_alike * pair.d1)
     chosen = np.flatnonzero(good)
     chosen = chosen[spread_evenly(pixels1[chosen], sigma[chosen], images[0].shape, settings.count)]
     order = np.lexsort((pixels1[chosen, 0], pixels1[chosen, 1] // 100))
@@ -160,12 +145,12 @@ def _feature_matches(
 
 def _relief_supported(pixels: FloatArray, relief: FloatArray, alike: float) -> BoolArray:
     """Return which points have two or more of their eight neighbours at like relief."""
-    count = min(NEIGHBOURS + 1, len(pixels))
-    if count <= SUPPORTERS:
+    count = min(MATCH.neighbours + 1, len(pixels))
+    if count <= MATCH.supporters:
         return np.ones(len(pixels), dtype=bool)
     near = cKDTree(pixels).query(pixels, count)[1][:, 1:]
     apart = np.abs(relief[near] - relief[:, None])
-    return np.asarray((apart < alike).sum(axis=1) >= SUPPORTERS)
+    return np.asarray((apart < alike).sum(axis=1) >= MATCH.supporters)
 
 
 def precision(matches: Matches) -> float:
@@ -225,8 +210,8 @@ def _target_matches(pair: Pair, images: Images, reliefs: tuple[float, float]) ->
     relief = relief_at(pair, pixels1, pixels2)
     on_line = seen_at(pair, pixels1, relief)
     off = np.linalg.norm(pixels2 - on_line, axis=1)
-    sigma = np.where(own, 0.02, np.hypot(OPTIMISM * patches.sigma, 0.03))
-    good = (patches.zncc > LEAST_AGREEMENT) & (own | patches.converged) & np.isfinite(relief)
+    sigma = np.where(own, 0.02, np.hypot(MATCH.optimism * patches.sigma, 0.03))
+    good = (patches.zncc > MATCH.least_agreement) & (own | patches.converged) & np.isfinite(relief)
     good &= (relief > reliefs[0]) & (relief < reliefs[1]) & (sigma < 0.3)
     order = np.flatnonzero(good)
     order = order[np.lexsort((pixels1[order, 0], pixels1[order, 1] // 100))]
@@ -376,7 +361,7 @@ def refine_along_lines(
         [px]
     """
     relief = np.nan_to_num(relief_at(pair, pixels1, pixels2))
-    highest = min(0.9 * pair.image2.distance, HIGHEST_SHARE * pair.highest_relief)
+    highest = min(0.9 * pair.image2.distance, MATCH.highest_share * pair.highest_relief)
     relief = np.clip(relief, -3 * pair.image2.distance, highest)
     # On the line, at the relief nearest to the approximate match.
     start = seen_at(pair, pixels1, relief)
@@ -403,7 +388,7 @@ def _accepted(
     pixels1: FloatArray,
 ) -> BoolArray:
     """Return which matches to believe."""
-    good = patches.converged & (patches.zncc > LEAST_AGREEMENT) & (sigma < 0.5)
+    good = patches.converged & (patches.zncc > MATCH.least_agreement) & (sigma < 0.5)
     good &= np.isfinite(misfit) & (relief > reliefs[0]) & (relief < reliefs[1])
     if not good.any():
         return np.asarray(good)

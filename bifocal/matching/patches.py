@@ -7,12 +7,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from bifocal.matching.tuning import PATCHES
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
-
-#: Half the window, in samples: 15 x 15 samples of the coarser photo.
-HALF = 7
-#: Farther from the start than this a match is lost. [px]
-REACH = 4.0
 
 
 class PatchResult(NamedTuple):
@@ -118,7 +114,7 @@ def _refine_part(
     local = np.where(known[:, None, None], local, np.eye(2))
     scale = np.sqrt(np.abs(np.linalg.det(local)))
     step = np.maximum(1.0, 1.0 / np.clip(scale, 0.1, 10.0))
-    axis = np.arange(-HALF - 1, HALF + 2, dtype=np.float64)
+    axis = np.arange(-PATCHES.half - 1, PATCHES.half + 2, dtype=np.float64)
     wide = np.stack(np.meshgrid(axis, axis), axis=-1)
     # Sampled one ring wider, for the gradient.
     first = _sample(image1, pixels1[:, None, None] + wide[None] * step[:, None, None, None])
@@ -131,7 +127,7 @@ def _refine_part(
     gradient /= step[:, None, None]
     inverse = np.linalg.inv(local)
     columns = gradient @ (inverse @ directions)
-    weight = np.exp(-(grid**2).sum(1) / (2 * (0.75 * HALF) ** 2))
+    weight = np.exp(-(grid**2).sum(1) / (2 * (0.75 * PATCHES.half) ** 2))
     weight /= weight.sum()
     design = np.concatenate([np.ones((count, len(grid), 1)), template[:, :, None], columns], axis=2)
     normal = np.einsum("nij,i,nik->njk", design, weight, design)
@@ -158,7 +154,7 @@ def _refine_part(
         position[index] -= np.einsum("nij,nj->ni", directions[index], shift)
         size = np.abs(shift).max(axis=1)
         converged[index[size < 0.02]] = True
-        lost = np.linalg.norm(position[index] - pixels2[index], axis=1) > REACH
+        lost = np.linalg.norm(position[index] - pixels2[index], axis=1) > PATCHES.reach
         lost |= terms[:, 1] <= 0
         active[index[(size < 0.003) | lost]] = False
         converged[index[lost]] = False

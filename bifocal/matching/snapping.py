@@ -8,27 +8,9 @@ import cv2
 import numpy as np
 
 from bifocal.matching.corners import at_places, crossing
-from bifocal.matching.targets import LARGEST, find_targets
+from bifocal.matching.targets import find_targets
+from bifocal.matching.tuning import SNAPPING, TARGETS
 from photocore.arrays import ByteArray, Float32Array, FloatArray
-
-#: Radii of the patches in which symmetry is looked for: targets of 6 to 50 px. [px]
-RADII = (4.0, 5.5, 7.5, 10.5, 14.5, 20.0, 27.0)
-#: Precision of a target's centre, as in `bifocal match`. [px]
-TARGET_SIGMA = 0.02
-#: How far a pick may lie from what it is snapped to, at most. [px]
-FARTHEST = 16.0
-#: What is less symmetric, in correlation, or of less contrast is no target. [-, grey levels]
-LEAST_SYMMETRY, LEAST_CONTRAST = 0.9, 20.0
-#: Nor is what is less precise than this. [px]
-WORST_TARGET = 0.06
-#: Grey levels of noise assumed for the precision of a corner; of a photo at low ISO.
-NOISE = 3.0
-#: No edge is straighter than that. [px]
-BEST_CORNER = 0.03
-#: Half the window of a corner's measurement. [px]
-_HALF = 5
-#: Best and worst precision that is told. [px]
-_BEST, _WORST = 0.01, 1.0
 
 
 class Snapped(NamedTuple):
@@ -59,7 +41,7 @@ def snap(image: ByteArray, pixel: tuple[float, float], radius: float) -> Snapped
     pixel : tuple of float
         The pick. [px]
     radius : float
-        How far off the centre may lie; at most `FARTHEST`. [px]
+        How far off the centre may lie; at most `farthest`. [px]
 
     Notes
     -----
@@ -68,13 +50,13 @@ def snap(image: ByteArray, pixel: tuple[float, float], radius: float) -> Snapped
     places near the pick and all sizes, that is taken whose centre would be known best: with the
     grey values g and what is left of the symmetry, ``s0² / sum((2 dg/dx)²)``.
     """
-    pick, radius = np.array(pixel), min(float(radius), FARTHEST)
-    reach = int(np.ceil(radius + 1.5 * LARGEST))
+    pick, radius = np.array(pixel), min(float(radius), SNAPPING.farthest)
+    reach = int(np.ceil(radius + 1.5 * TARGETS.largest))
     low = np.maximum(np.round(pick).astype(int) - reach, 0)
     high = np.round(pick).astype(int) + reach + 1
     part = image[low[1] : high[1], low[0] : high[0]]
     nothing = Snapped(pixel[0], pixel[1], "none", None)
-    if min(part.shape[:2], default=0) < 4 * _HALF:
+    if min(part.shape[:2], default=0) < 4 * SNAPPING.half:
         return nothing
     if part.ndim == 3:
         part = np.asarray(cv2.transform(part, np.full((1, 3), 1 / 3)), dtype=np.uint8)
@@ -83,7 +65,9 @@ def snap(image: ByteArray, pixel: tuple[float, float], radius: float) -> Snapped
         found = find(grey, pick - low, radius)
         if found is not None:
             column, row = (found[0] + low).tolist()
-            return Snapped(column, row, kind, float(np.clip(found[1], _BEST, _WORST)))
+            return Snapped(
+                column, row, kind, float(np.clip(found[1], SNAPPING.best, SNAPPING.worst))
+            )
     return nothing
 
 
@@ -97,7 +81,7 @@ def _known_target(
     away[[kind == "chequer" for kind in targets.kinds]] = np.inf
     if not len(away) or away.min() > radius:
         return None
-    return targets.pixels[int(away.argmin())], TARGET_SIGMA
+    return targets.pixels[int(away.argmin())], SNAPPING.target_sigma
 
 
 def _target(grey: ByteArray, pick: FloatArray, radius: float) -> tuple[FloatArray, float] | None:
@@ -110,7 +94,7 @@ def _target(grey: ByteArray, pick: FloatArray, radius: float) -> tuple[FloatArra
     rows, columns = np.mgrid[0:height, 0:width]
     near = np.hypot(columns - pick[0], rows - pick[1]) <= radius
     best: tuple[float, FloatArray, float] | None = None
-    for size in RADII:
+    for size in SNAPPING.radii:
         margin = int(size) + 1
         inside = near & (columns >= margin) & (columns < width - margin)
         inside &= (rows >= margin) & (rows < height - margin)
@@ -126,7 +110,7 @@ def _target(grey: ByteArray, pick: FloatArray, radius: float) -> tuple[FloatArra
     from scipy.ndimage import spline_filter
 
     refined = _refined(spline_filter(values.astype(np.float64)), best[1], best[2])
-    if refined is None or refined[1] > WORST_TARGET:
+    if refined is None or refined[1] > SNAPPING.worst_target:
         return None
     place = _disc_centre(grey, refined[0])
     return (place, refined[1]) if np.linalg.norm(place - pick) <= radius + 1.0 else None
@@ -136,10 +120,10 @@ def _disc_centre(grey: ByteArray, place: FloatArray) -> FloatArray:
     """Return the centroid of a disc about its centre of symmetry; that itself if it is none."""
     rows, columns = np.mgrid[0 : grey.shape[0], 0 : grey.shape[1]]
     away = np.hypot(columns - place[0], rows - place[1])
-    steps = np.arange(0.0, RADII[-1])
+    steps = np.arange(0.0, SNAPPING.radii[-1])
     profile = np.array([np.median(grey[np.abs(away - r) < 0.8]) for r in steps])
-    edges = np.flatnonzero(np.abs(profile - profile[0]) > LEAST_CONTRAST)
-    if not len(edges) or not 2 <= edges[0] <= RADII[-1] / 1.6:
+    edges = np.flatnonzero(np.abs(profile - profile[0]) > SNAPPING.least_contrast)
+    if not len(edges) or not 2 <= edges[0] <= SNAPPING.radii[-1] / 1.6:
         return place
     size = float(edges[0])
     inner, plate = (
@@ -147,7 +131,7 @@ def _disc_centre(grey: ByteArray, place: FloatArray) -> FloatArray:
         (away > size + 1.5) & (away < max(1.6 * size + 0.5, size + 3.0)),
     )
     low, high = float(np.median(grey[inner])), float(np.median(grey[plate]))
-    if abs(high - low) < 2 * LEAST_CONTRAST or grey[inner].std() > 0.2 * abs(high - low):
+    if abs(high - low) < 2 * SNAPPING.least_contrast or grey[inner].std() > 0.2 * abs(high - low):
         return place
     share = np.clip((high - grey.astype(np.float64)) / (high - low), 0.0, 1.0)
     if (share[plate] > 0.5).mean() > 0.1:  # a cross or a chequer
@@ -188,8 +172,12 @@ def _symmetry(
     xx, yy, xy = (gx * gx).sum(1), (gy * gy).sum(1), (gx * gy).sum(1)
     least = (xx + yy) / 2 - np.sqrt(((xx - yy) / 2) ** 2 + xy**2)
     with np.errstate(divide="ignore", invalid="ignore"):
-        sigma = np.sqrt(np.maximum(left, NOISE**2) / least)
-    good = (correlation > LEAST_SYMMETRY - 0.15) & (np.sqrt(power) > LEAST_CONTRAST) & (least > 0)
+        sigma = np.sqrt(np.maximum(left, SNAPPING.noise**2) / least)
+    good = (
+        (correlation > SNAPPING.least_symmetry - 0.15)
+        & (np.sqrt(power) > SNAPPING.least_contrast)
+        & (least > 0)
+    )
     return np.where(good, sigma, np.inf)
 
 
@@ -221,19 +209,19 @@ def _refined(values: FloatArray, start: FloatArray, size: float) -> tuple[FloatA
             normal = design.T @ (weight[:, None] * design) + 1e-6 * np.eye(4)
             step = -np.linalg.solve(normal, design.T @ (weight * difference))
             rest = difference + design @ step
-            spread = max(1.4826 * float(np.median(np.abs(rest))), NOISE)
+            spread = max(1.4826 * float(np.median(np.abs(rest))), SNAPPING.noise)
             weight = 1.0 / (1.0 + (rest / (3 * spread)) ** 2)
         place = place + np.clip(step[:2], -1.0, 1.0)
         if np.linalg.norm(place - start) > 2.5:
             return None
         if turn > 4 and np.abs(step[:2]).max() < 1e-3:
             break
-    left = max(float(np.sqrt((weight * rest**2).sum() / weight.sum())), NOISE)
+    left = max(float(np.sqrt((weight * rest**2).sum() / weight.sum())), SNAPPING.noise)
     sigma = left * float(np.sqrt(np.linalg.inv(normal)[[0, 1], [0, 1]].max()))
     mean = float(np.mean([one, other]))
     power = float(np.mean([(one - mean) ** 2, (other - mean) ** 2]))
     symmetry = 1.0 - float((weight * rest**2).sum() / weight.sum()) / max(2 * power, 1e-9)
-    if symmetry < LEAST_SYMMETRY or np.sqrt(power) < LEAST_CONTRAST:
+    if symmetry < SNAPPING.least_symmetry or np.sqrt(power) < SNAPPING.least_contrast:
         return None
     return place, sigma
 
@@ -256,13 +244,17 @@ def _corner(grey: ByteArray, pick: FloatArray, radius: float) -> tuple[FloatArra
     fine = cv2.cornerSubPix(
         grey,
         start.astype(np.float32).reshape(1, 1, 2),
-        (_HALF, _HALF),
+        (SNAPPING.half, SNAPPING.half),
         (-1, -1),
         (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 60, 1e-4),
     )
     found = crossing(smooth, np.asarray(fine, dtype=np.float64).reshape(2))
-    if found is None or found[1] > _WORST or np.linalg.norm(found[0] - start) > _HALF:
+    if (
+        found is None
+        or found[1] > SNAPPING.worst
+        or np.linalg.norm(found[0] - start) > SNAPPING.half
+    ):
         return None
     if np.linalg.norm(found[0] - pick) > radius + 1.0:
         return None
-    return found[0], max(found[1], BEST_CORNER)
+    return found[0], max(found[1], SNAPPING.best_corner)

@@ -8,46 +8,13 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from bifocal.matching.matching import (
-    LEAST_AGREEMENT,
-    OPTIMISM,
-    directions_at,
-    local_zoom,
-    seen_at,
-)
+from bifocal.matching.matching import directions_at, local_zoom, seen_at
 from bifocal.matching.patches import PatchResult, refine, same_scale
+from bifocal.matching.tuning import MATCH, SUGGESTIONS
 from bifocal.model.pair import Pair
 from bifocal.rays import point_on_ray, relief_from_zoom, zoom_factor
 from photocore.arrays import ByteArray, Float32Array, FloatArray
 from photocore.errors import InputError
-
-#: Relief searched, in parts of the near distance; as `bifocal match` does.
-NEAREST, FARTHEST = 0.4, -0.5
-#: What stands nearer to the last interface than this share of its height is not looked for.
-BEFORE_MEDIA = 0.99
-#: Half the window of the search, in samples of the coarser photo: wider than that of the match.
-HALF = 10
-#: Samples along the line: so many pixels apart, at most so many; the match reaches 4 px.
-STEP, MOST = 1.0, 3000
-#: A second place this much worse in correlation leaves no doubt.
-CLEAR = 0.1
-#: Suggestions of this quality are taken without asking back.
-KEPT = 0.5
-#: Where one half of the window fits this much better elsewhere nearby, it shows another surface: on
-#: the sample pair 8.8 % of the kept ones (half of them picked at steps) were more than 1 px wrong,
-#: with this 5.2 %; of the right ones 97 % stay. Matching back from the other photo found none of
-#: them: both ways the window sees the surface beside the pick.
-BETTER_BESIDE = 0.05
-#: Nearby: beyond the match's own peak, within reach of a step. [px]
-PEAK, BESIDE = 2.0, 30.0
-#: A part of the window that agrees less offers no place.
-LEAST_OFFER = 0.6
-#: Places nearer to each other are one. [px]
-APART = 3.0
-#: A place far off the wall has to correlate better: by this much per near distance.
-OFF_WALL = 0.2
-#: Best precision of a match; neighbouring samples are not independent. [px]
-_BEST = 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -167,23 +134,23 @@ def suggest(
     relief implies; then least-squares matching along the line (`bifocal.matching.patches`).
     """
     own, other = images[image - 1], images[2 - image]
-    low, high = relief_range or (FARTHEST * pair.d2, NEAREST * pair.d2)
+    low, high = relief_range or (SUGGESTIONS.farthest * pair.d2, SUGGESTIONS.nearest * pair.d2)
     reliefs = _reliefs(pair, image, pixel, (low, high), other.shape)
     there = seen_in_other(pair, image, pixel, reliefs)
     search = _Search.along(pair, (own, other), image, pixel, reliefs, there)
     correlation, *halves = search.correlation()
     if not np.isfinite(correlation).any():
         raise InputError("too near to the rim of a photo for a suggestion; pick it by hand.")
-    judged = correlation - OFF_WALL * np.abs(reliefs) / pair.d2
+    judged = correlation - SUGGESTIONS.off_wall * np.abs(reliefs) / pair.d2
     best = int(np.nanargmax(judged))
     apart = np.linalg.norm(there - there[best], axis=1) > search.radius / 2
     second_best = float(np.nanmax(np.where(apart, judged, -1.0))) if apart.any() else -1.0
     match = search.match(best)
-    clear = float(np.clip((judged[best] - second_best) / CLEAR, 0.0, 1.0))
+    clear = float(np.clip((judged[best] - second_best) / SUGGESTIONS.clear, 0.0, 1.0))
     agreement = float(np.clip((match.score - 0.5) / 0.5, 0.0, 1.0))
     quality = agreement * (0.3 + 0.7 * clear) * (1.0 if match.fits else 0.3)
     away = np.linalg.norm(there - match.pixel, axis=1)
-    kept = match.fits and match.score > LEAST_AGREEMENT and quality >= KEPT
+    kept = match.fits and match.score > MATCH.least_agreement and quality >= SUGGESTIONS.kept
     kept = kept and _one_surface(halves, away)
     return Suggestion(
         pixel=match.pixel,
@@ -228,13 +195,13 @@ class _Search:
         """Return the search among places of these reliefs."""
         local = _zooms(pair, image, np.broadcast_to(pixel, there.shape), there, reliefs)
         scale = float(np.median(np.sqrt(np.abs(np.linalg.det(local)))))
-        reach = (HALF + 3) * max(1.0, 1.0 / scale) + 4
+        reach = (SUGGESTIONS.half + 3) * max(1.0, 1.0 / scale) + 4
         first, corner1 = _crop(images[0], pixel[None], reach)
         second, corner2 = _crop(images[1], there, reach * max(1.0, scale) * 1.5)
         return cls(
             pair=pair, image=image, pixel=pixel, reliefs=reliefs, there=there, local=local,
             smooth=same_scale(first, second, local), corners=(corner1, corner2),
-            radius=HALF * max(1.0, scale),
+            radius=SUGGESTIONS.half * max(1.0, scale),
         )  # fmt: skip
 
     def correlation(self) -> FloatArray:
@@ -249,7 +216,7 @@ class _Search:
         result, misfit, across = _refined(
             self.smooth, self.pixel - corner1, self.there[row] - corner2, self.local[row], along
         )
-        sigma = float(np.hypot(OPTIMISM * result.sigma[0], _BEST))
+        sigma = float(np.hypot(MATCH.optimism * result.sigma[0], SUGGESTIONS.best))
         fits = bool(result.converged[0]) and abs(misfit) < 2.0 and sigma < 0.5
         # As `bifocal match` does: the misfit stays in the point, for the survey to judge.
         pixel = result.pixels2[0] + corner2 + (across * misfit if fits else 0.0)
@@ -261,17 +228,17 @@ def _others(search: _Search, curves: list[FloatArray], pixel: FloatArray) -> tup
     offers, taken = list[tuple[float, FloatArray]](), [pixel]
     for curve in curves:
         away = np.linalg.norm(search.there - pixel, axis=1)
-        near = np.max(curve, where=(away < PEAK) & np.isfinite(curve), initial=-1.0)
-        free = (away > APART) & np.isfinite(curve)
+        near = np.max(curve, where=(away < SUGGESTIONS.peak) & np.isfinite(curve), initial=-1.0)
+        free = (away > SUGGESTIONS.apart) & np.isfinite(curve)
         if not free.any():
             continue
         index = int(np.argmax(np.where(free, curve, -1.0)))
-        if curve[index] < max(near - BETTER_BESIDE, LEAST_OFFER):
+        if curve[index] < max(near - SUGGESTIONS.better_beside, SUGGESTIONS.least_offer):
             continue
         match = search.match(index)
         # The whole window does not always settle where half of it fits.
         place = match.pixel if match.fits else search.there[index]
-        if min(np.linalg.norm(place - one) for one in taken) > APART:
+        if min(np.linalg.norm(place - one) for one in taken) > SUGGESTIONS.apart:
             taken.append(place)
             offers.append((float(curve[index]), place))
     return tuple(place for _, place in sorted(offers, key=lambda offer: -offer[0]))
@@ -279,10 +246,10 @@ def _others(search: _Search, curves: list[FloatArray], pixel: FloatArray) -> tup
 
 def _one_surface(halves: list[FloatArray], away: FloatArray) -> bool:
     """Whether all halves of the window fit at the match, not one of them beside it."""
-    at, beside = away < PEAK, (away > PEAK) & (away < BESIDE)
+    at, beside = away < SUGGESTIONS.peak, (away > SUGGESTIONS.peak) & (away < SUGGESTIONS.beside)
     return all(
         np.max(half, where=at & np.isfinite(half), initial=-1.0)
-        > np.max(half, where=beside & np.isfinite(half), initial=-1.0) - BETTER_BESIDE
+        > np.max(half, where=beside & np.isfinite(half), initial=-1.0) - SUGGESTIONS.better_beside
         for half in halves
     )
 
@@ -294,10 +261,12 @@ def _reliefs(
     probe = _even(pair, ends, 33)
     places = seen_in_other(pair, image, pixel, probe)
     length = float(np.nansum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
-    count = int(np.clip(length / STEP, 33, MOST))
+    count = int(np.clip(length / SUGGESTIONS.step, 33, SUGGESTIONS.most))
     reliefs = _even(pair, ends, count)
     places = seen_in_other(pair, image, pixel, reliefs)
-    inside = (places > HALF).all(axis=1) & (places < np.array(shape[1::-1]) - HALF).all(axis=1)
+    inside = (places > SUGGESTIONS.half).all(axis=1) & (
+        places < np.array(shape[1::-1]) - SUGGESTIONS.half
+    ).all(axis=1)
     if not inside.any():
         raise InputError("the other photo does not show this place.")
     return np.asarray(reliefs[inside])
@@ -306,7 +275,7 @@ def _reliefs(
 def _even(pair: Pair, ends: tuple[float, float], count: int) -> FloatArray:
     """Return reliefs whose places are evenly apart on the line, below the last interface. [m]"""
     d1, d2 = pair.straight_distances
-    top = min(ends[1], BEFORE_MEDIA * pair.highest_relief) if pair.layers else ends[1]
+    top = min(ends[1], SUGGESTIONS.before_media * pair.highest_relief) if pair.layers else ends[1]
     factors = zoom_factor(np.array([ends[0], top]), d1=d1, d2=d2)
     return relief_from_zoom(np.linspace(factors[0], factors[1], count), d1=d1, d2=d2)
 
@@ -333,9 +302,9 @@ def _correlation(
     """
     scale = np.sqrt(np.abs(np.linalg.det(local)))
     step = float(np.median(np.maximum(1.0, 1.0 / np.clip(scale, 0.1, 10.0))))
-    axis = np.arange(-HALF, HALF + 1, dtype=np.float64)
+    axis = np.arange(-SUGGESTIONS.half, SUGGESTIONS.half + 1, dtype=np.float64)
     grid = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
-    weight = np.exp(-(grid**2).sum(1) / (2 * (0.75 * HALF) ** 2))
+    weight = np.exp(-(grid**2).sum(1) / (2 * (0.75 * SUGGESTIONS.half) ** 2))
     column, row = grid.T
     parts = np.array([column < np.inf, column <= 0, column >= 0, row <= 0, row >= 0])
     weights = (weight * parts).astype(np.float32).T

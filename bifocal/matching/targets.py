@@ -9,14 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from bifocal.matching.tuning import TARGETS
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
 
-#: Diameters of discs looked for. [px]
-SMALLEST, LARGEST = 5.0, 120.0
-#: Grey levels between a disc and its plate.
-LEAST_CONTRAST = 40.0
-#: How far the grey of a chequer's sectors may be from their medians, share of the contrast.
-UNEVEN = 0.06
 #: Families of coded markers looked for, most common first.
 FAMILIES = ("DICT_4X4_250", "DICT_5X5_250", "DICT_6X6_250", "DICT_APRILTAG_36h11")
 
@@ -100,7 +95,9 @@ def _round_ones(stats: NDArray[np.int32], shape: tuple[int, ...], box: int) -> B
     left, top, width, height, area = stats.T.astype(np.float64)
     largest = np.maximum(width, height)
     fill = area / np.maximum(width * height, 1)
-    good = (np.minimum(width, height) >= SMALLEST) & (largest <= min(LARGEST, 0.75 * box))
+    good = (np.minimum(width, height) >= TARGETS.smallest) & (
+        largest <= min(TARGETS.largest, 0.75 * box)
+    )
     # A digital disc fills pi/4 of its box, small ones somewhat more.
     good &= (np.minimum(width, height) > 0.5 * largest) & (fill > 0.68) & (fill < 0.90)
     margin = largest
@@ -124,7 +121,11 @@ def _measure(
         return None
     low, high = float(np.median(inner)), float(np.median(ring))
     contrast = high - low
-    if contrast < LEAST_CONTRAST or ring.std() > 0.2 * contrast or inner.std() > 0.2 * contrast:
+    if (
+        contrast < TARGETS.least_contrast
+        or ring.std() > 0.2 * contrast
+        or inner.std() > 0.2 * contrast
+    ):
         return None
     darkness = np.clip((high - part) / contrast, 0.0, 1.0)
     # Noise of the plate must not pull the centroid: only the disc and its soft edge count.
@@ -192,7 +193,7 @@ def _crossing(
         ].astype(np.float64)
         off = np.minimum(np.abs(around - low), np.abs(around - high))
         same = (around > (low + high) / 2) == bright
-        if np.median(off) > UNEVEN * (high - low) or same.mean() < 0.8:
+        if np.median(off) > TARGETS.uneven * (high - low) or same.mean() < 0.8:
             return None
     y, x = np.mgrid[-3:4, -3:4].astype(np.float64)
     design = np.stack([x * x, y * y, x * y, x, y, np.ones_like(x)], axis=-1).reshape(-1, 6)

@@ -10,8 +10,8 @@ import numpy as np
 
 from bifocal.model.pair import Pair
 from bifocal.networks.joint_ties import SharedPoints
-from bifocal.orientation.align_workflow import SIGMA_ON_WALL
 from bifocal.orientation.control_points import Control, read_control
+from bifocal.orientation.tuning import CONTROL
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import InputError
 
@@ -63,7 +63,7 @@ def named_positions(
             # That a check point without relief is on the wall is nothing to check by.
             part = read_control(
                 path, sigma=sigma, unit=unit,
-                sigma_plane=None if role == "check" else SIGMA_ON_WALL,
+                sigma_plane=None if role == "check" else CONTROL.sigma_on_wall,
                 unnamed=f"{name_of(paths[index])}, {role} ",
             )  # fmt: skip
             if pairs[index].exchanged:

@@ -28,7 +28,6 @@ from bifocal.orientation.as_set_up import check_room
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.media_report import media_remarks, refuse_impossible_media
 from bifocal.orientation.orientation_remarks import (
-    WORST_FIT,
     assumptions,
     control_remarks,
     distance_remarks,
@@ -38,8 +37,6 @@ from bifocal.orientation.orientation_remarks import (
     wall_remarks,
 )
 from bifocal.orientation.orientation_stages import (
-    ONE_LENS,
-    WALL_LIMIT,
     OrientedPair,
     Photos,
     control_alone,
@@ -47,19 +44,14 @@ from bifocal.orientation.orientation_stages import (
     oriented_in_stages,
     with_refracted_ties,
 )
-from bifocal.orientation.slips import MOST, Fitted, Typed, slip_of
-from bifocal.orientation.starts.photo_order import SURE
+from bifocal.orientation.slips import Fitted, Typed, slip_of
 from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.tie_points import likely_on_wall
-from bifocal.orientation.tuning import TUNING
+from bifocal.orientation.tuning import BEND, CONTROL, ORDER, REMARKS, SLIPS, STAGES, TIES
 from bifocal.orientation.walls.wall_shape import WallShape, shape_between
 from bifocal.remarks import remark
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.errors import ConvergenceError, GeometryError, PhotogrammetryError
-
-#: Distances that control through media leaves so uncertain are not found from common points either,
-#: without focal lengths: 44 % ends at 10 %.
-HOPELESS = 0.6
 
 
 def orient_pair(
@@ -109,7 +101,7 @@ def _oriented(given: Given) -> OrientedPair:
         given = replace(given, settled=True)
     if ties is not None and not enough:
         order = order_of(given, ties)
-        if order < -SURE:
+        if order < -ORDER.sure:
             return _with_photos_exchanged(given, typed_stay=True)
         remarks = (*remarks, *order_remarks(order, given.names))
     cameras, agree, interiors = approximate_cameras(given, ties, enough)
@@ -129,7 +121,7 @@ def _oriented(given: Given) -> OrientedPair:
         given = replace(given, site=replace(site, parallel=flat))
     observations = observations_of(given, interiors, ties, agree)
     if one_lens:
-        observations = replace(observations, sigma_zoom=ONE_LENS)
+        observations = replace(observations, sigma_zoom=STAGES.one_lens)
     start = PairUnknowns(cameras=cameras)
     if ties is not None:
         start = replace(start, radial=np.array([[ties.radial, 0.0]] * 2))
@@ -146,9 +138,9 @@ def _oriented(given: Given) -> OrientedPair:
         right = _mended_by_ties(given, ties, pair.observations)
         if right is not None:
             return right
-    certain = pair.shape.px - CERTAIN * pair.shape.sigma > TUNING.strongly_curved
+    certain = pair.shape.px - CERTAIN * pair.shape.sigma > BEND.strongly_curved
     bent = hopeless_shape(pair.observations, pair.shape) if certain and not enough else ""
-    if bent and likely_on_wall(pair.observations, pair.adjusted) < TUNING.fewest_on_wall:
+    if bent and likely_on_wall(pair.observations, pair.adjusted) < TIES.fewest_on_wall:
         raise GeometryError(bent)  # what holds a bent wall by small chances only is none
     return _with_words(pair, given, remarks)
 
@@ -168,12 +160,12 @@ def _through_media(given: Given, lacking: str) -> OrientedPair:
     start = PairUnknowns(cameras=cameras, media=given.media)
     pair = control_alone(observations, start, named=given.site.wall is not None)
     shares = [pair.adjusted.sigma("Z", n) / pair.adjusted.cameras[n - 1].centre[2] for n in (1, 2)]
-    if lacking and max(shares) > HOPELESS:
+    if lacking and max(shares) > CONTROL.hopeless:
         raise GeometryError(f"the control points alone do not tell the distances, and {lacking}.")
     ties, remarks = ties_of(given, needed=False)
-    note = "the media as given, no common points: control points alone"
+    note = remark("orientation.assumed_media_control")
     if ties is not None:
-        pair, note = with_refracted_ties(pair, ties), "the media as given"
+        pair, note = with_refracted_ties(pair, ties), remark("orientation.assumed_media")
         every, size = np.ones(len(ties.seen1), dtype=bool), interiors[0].image_size
         bend = shape_between(pair.adjusted, ties.seen1, ties.seen2, every, size)
         pair = replace(pair, shape=bend)
@@ -306,7 +298,7 @@ def _by_control(given: Given, ties: Ties | None) -> Fitted | None:
     except (GeometryError, ConvergenceError):
         return None
     adjusted, used = pair.adjusted, pair.observations.pick_used
-    test = np.minimum(adjusted.control_test[given.control.positioned], MOST)
+    test = np.minimum(adjusted.control_test[given.control.positioned], SLIPS.most)
     square = float((test**2).mean()) + _pulled(pair) / (4 * len(test))
     if ties is not None:
         off = contradiction(adjusted.cameras, ties) / (2 * ties.tolerance)
@@ -328,11 +320,17 @@ def _by_ties(given: Given, ties: Ties, seen: PairObservations) -> Fitted | None:
         pair = oriented_in_stages(seen, start, (first, second), given.site, with_control=False)
     except (GeometryError, ConvergenceError):
         return None
-    fine = WORST_FIT / 3 * max(interiors[0].image_size) / 3000
+    fine = REMARKS.worst_fit / 3 * max(interiors[0].image_size) / 3000
     assert far is not None
     assert near is not None
-    lines = max((test for _, test in lines_tested(pair, (far, near))), default=0.0) / WALL_LIMIT
-    squares = (pair.observations.sigma_tie / fine) ** 2, _pulled(pair) / 2, min(lines, MOST) ** 2
+    lines = (
+        max((test for _, test in lines_tested(pair, (far, near))), default=0.0) / STAGES.wall_limit
+    )
+    squares = (
+        (pair.observations.sigma_tie / fine) ** 2,
+        _pulled(pair) / 2,
+        min(lines, SLIPS.most) ** 2,
+    )
     misfit = float(np.sqrt(sum(squares)))
     return Fitted(misfit=misfit, cameras=pair.adjusted.cameras, lost=~pair.observations.pick_used)
 

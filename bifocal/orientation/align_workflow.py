@@ -22,6 +22,7 @@ from bifocal.orientation.as_set_up import pair_as_set_up
 from bifocal.orientation.control_points import Control, SiteMeasures, read_control, read_lengths
 from bifocal.orientation.media_options import media_of
 from bifocal.orientation.orientation_stages import PhotoInput
+from bifocal.orientation.tuning import CONTROL
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
@@ -33,11 +34,6 @@ from photocore.output import (
     check_not_input,
     relative_name,
 )
-
-#: A wall point given without r lies on the plane to this. [m]
-SIGMA_ON_WALL = 0.005
-#: Nominal focal lengths are rounded and change with focus; 35 mm equivalents are rounder still.
-SIGMA_NOMINAL, SIGMA_EQUIVALENT = 0.02, 0.04
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -311,13 +307,13 @@ def interior_of_photo(info: ImageInfo, data: KnownLens, number: int) -> Interior
         if pitch is None:
             about = {"number": number, "focal": data.focal, "name": info.path.name}
             raise InputError(remark("refused.no_sensor", **about))
-        focal, sigma = data.focal / pitch, SIGMA_NOMINAL
+        focal, sigma = data.focal / pitch, CONTROL.sigma_nominal
         source = f"--focal{number} {data.focal:g} mm"
     elif info.focal_length and exif:
-        pitch, sigma, source = exif, SIGMA_NOMINAL, f"EXIF, {info.focal_length:g} mm"
+        pitch, sigma, source = exif, CONTROL.sigma_nominal, f"EXIF, {info.focal_length:g} mm"
         focal = info.focal_length / pitch
     elif info.focal_pixels:
-        focal, sigma, pitch = info.focal_pixels, SIGMA_EQUIVALENT, None
+        focal, sigma, pitch = info.focal_pixels, CONTROL.sigma_equivalent, None
         source = remark("orientation.exif_equivalent", focal=info.focal_length_35)
     else:
         return Interior.unknown(info.size)
@@ -334,7 +330,7 @@ def _control(options: AlignOptions, sizes: tuple[tuple[int, int], tuple[int, int
         control = read_control(
             options.control,
             sigma=options.site.sigma_control,
-            sigma_plane=SIGMA_ON_WALL,
+            sigma_plane=CONTROL.sigma_on_wall,
             unit=options.unit,
             columns=options.columns,
         )
@@ -356,7 +352,7 @@ def _with_length(
     """Return control with two more points on the wall and the length between them."""
     count = len(control.ids)
     ends = np.array(length[0], dtype=np.float64).reshape(2, 2)
-    sigmas = np.full((2, 3), max(sigma, SIGMA_ON_WALL))
+    sigmas = np.full((2, 3), max(sigma, CONTROL.sigma_on_wall))
     return Control(
         ids=(*control.ids, "length, one end", "length, other end"),
         xyz=np.concatenate([control.xyz, [[np.nan, np.nan, 0.0]] * 2]),

@@ -19,13 +19,14 @@ from bifocal.model.pair_media import PairMedia
 from bifocal.model.photo import Photo
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.orientation.adjustment.pair_observations import PairObservations, at
-from bifocal.orientation.facade_lines import LEAST_IN_LINE, facade_rotation
+from bifocal.orientation.facade_lines import facade_rotation
 from bifocal.orientation.media_report import media_in_words
 from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput, Photos
 from bifocal.orientation.tie_points import (
     tie_positions,
 )
+from bifocal.orientation.tuning import LINES
 from bifocal.orientation.walls.reference_plane import zero_sigma
 from bifocal.remarks import remark
 from photocore.adjustment.outliers import robust_sigma
@@ -175,7 +176,7 @@ def _facade_axes(
             (0.0, 0.0) if photo.grey is None else facade_rotation(photo.grey, far, photo.interior)
         )
         note = remark("orientation.axes_along_facade")
-        if share < LEAST_IN_LINE:
+        if share < LINES.least_in_line:
             turn, note = 0.0, remark("orientation.axis_as_photo")
     cosine, sine = np.cos(turn), np.sin(turn)
     return np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]]), note

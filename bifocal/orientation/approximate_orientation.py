@@ -23,16 +23,13 @@ from bifocal.orientation.starts.relative_orientation import (
 )
 from bifocal.orientation.starts.space_resection import resect
 from bifocal.orientation.tie_points import with_ties
+from bifocal.orientation.tuning import CONTROL
 from bifocal.remarks import remark
 from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import BoolArray
 from photocore.camera.pinhole import fundamental, ray_on_plane
 from photocore.camera.similarity import Similarity, fit_plane
 from photocore.errors import GeometryError, located
-
-#: Logarithms of a ratio of distances so far apart contradict each other; tilted cameras change the
-#: scale over the wall.
-UNLIKE = 0.15
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -91,7 +88,7 @@ def order_of(given: Given, ties: Ties) -> float:
     either = (np.log([ratio * scale, ratio / scale]) - taped).tolist()
     if not (d1 and d2):  # the far camera is any farther
         either = [min(off, 0.0) for off in either]
-    as_given, turned = (assumed or abs(off) < UNLIKE for off in either)
+    as_given, turned = (assumed or abs(off) < CONTROL.unlike for off in either)
     if not turned:
         return np.inf
     return first_is_far((far, near), ties) if as_given else -np.inf

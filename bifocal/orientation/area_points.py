@@ -13,13 +13,9 @@ from bifocal import rays
 from bifocal.model.interior_orientation import Images
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.orientation.adjustment.pair_observations import PairObservations
+from bifocal.orientation.tuning import AREA
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.camera.pinhole import project, ray_on_plane
-
-#: Pixels of the rectified photos.
-AREA = 1.0e6
-#: Points asked of the whole area.
-POINTS = 3000
 
 
 def even_points(
@@ -46,7 +42,7 @@ def even_points(
     q2 = grid + flow * np.array([gsd, -gsd])
     feet = [rays.Foot(c.centre[:2], float(c.centre[2])) for c in (far, near)]
     trusted = _trusted(first, second, flow, grid, rays.zoom_centre(feet[0], feet[1]))
-    step = max(2, round(np.sqrt(grid.shape[0] * grid.shape[1] / POINTS)))
+    step = max(2, round(np.sqrt(grid.shape[0] * grid.shape[1] / AREA.points)))
     chosen = np.zeros_like(trusted)
     chosen[step // 2 :: step, step // 2 :: step] = True
     chosen &= trusted
@@ -61,7 +57,7 @@ def _grid(observations: PairObservations, adjusted: AdjustedPair) -> tuple[Float
     ties = observations.straight_ties(adjusted.radial)[0][observations.tie_used]
     seen = ray_on_plane(adjusted.cameras[0], ties)[:, :2]
     low, high = np.nanpercentile(seen, [1, 99], axis=0)
-    gsd = float(np.sqrt(np.prod(high - low) / AREA))
+    gsd = float(np.sqrt(np.prod(high - low) / AREA.pixels))
     x = np.arange(low[0], high[0], gsd)
     y = np.arange(high[1], low[1], -gsd)
     return np.stack(np.meshgrid(x, y), axis=-1), gsd

@@ -10,32 +10,17 @@ import numpy as np
 
 from bifocal.model.homography import apply_homography
 from bifocal.model.interior_orientation import Cameras, Images, Interior, Interiors
+from bifocal.orientation.tuning import LINES
 from bifocal.remarks import remark
 from photocore.arrays import ByteArray, FloatArray
 from photocore.camera.distortion import RadialDivision
 from photocore.camera.pinhole import Pinhole, plane_from_pixel
 
-#: Lines farther than this from the photo's own upright are not asked for the axes. [deg]
-WIDEST = 20.0
-#: With a smaller share of their length along its axes the photo's lines are no façade's.
-LEAST_IN_LINE = 0.25
-#: Photos are searched for lines at this size. [px]
-SEARCHED = 1.5e6
-#: Lines that feed the tilt are no shorter than this share of the photo's width, lie no farther than
-#: this from upright or level [deg], and are so many at least.
-SHORTEST, ASTRAY, FEWEST_LINES = 0.02, 12.0, 40
-#: Directions tried for their common direction, and the width in which lines agree on it. [deg]
-TRIED, AGREE = 4.0, 0.25
 #: How far the lines of a façade as a whole come out of its wall. On two real pairs (church_1,
 #: church_2) eight directions came out 0.03 to 0.27 degrees off, 0.2 in the root mean square, where
 #: their own scatter says 0.05: sills and cornices are not level, and some belong to other faces.
 #: Not used to find it: 0.27 on a third church (semireal_church), 0.06 on six renderings. [rad]
 BUILT = np.deg2rad(0.2)
-#: Lines within the same of so many by so many parts of a photo err together.
-PARTS = 5
-#: Lines that turn the plane off more of the wall's details than this are not the wall's: of the
-#: 457 on a bumpy wall of a phone's photos (berlin_1) they left 27 and then none.
-WALL_KEPT = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -71,7 +56,7 @@ class FacadeDirection:
 
 def line_segments(image: ByteArray) -> FloatArray:
     """Return both ends of straight edges of a grey photo, shape (n, 2, 2). [px]"""
-    reduction = max(1.0, float(np.sqrt(image.size / SEARCHED)))
+    reduction = max(1.0, float(np.sqrt(image.size / LINES.searched)))
     size = (round(image.shape[1] / reduction), round(image.shape[0] / reduction))
     small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     lines = cv2.createLineSegmentDetector().detect(small)[0]
@@ -95,7 +80,7 @@ def facade_rotation(image: ByteArray, camera: Pinhole, interior: Interior) -> tu
     turn : float
         Counter-clockwise turn to apply to the plane frame's axes. [rad]
     share : float
-        Share of line length within 1° of it or of its perpendicular; below `LEAST_IN_LINE`
+        Share of line length within 1° of it or of its perpendicular; below `least_in_line`
         trust nothing.
     """
     seen = interior.ideal(line_segments(image).reshape(-1, 2))
@@ -105,11 +90,11 @@ def facade_rotation(image: ByteArray, camera: Pinhole, interior: Interior) -> tu
     along = ends[:, 1] - ends[:, 0]
     length = np.hypot(along[:, 0], along[:, 1])
     degrees = (np.rad2deg(np.arctan2(along[:, 1], along[:, 0])) + 45.0) % 90.0 - 45.0
-    near = (np.abs(degrees) < WIDEST) & (length > 0.01 * camera.centre[2])
+    near = (np.abs(degrees) < LINES.widest) & (length > 0.01 * camera.centre[2])
     degrees, weight = degrees[near], length[near] ** 1.5
     if len(degrees) < 20:
         return 0.0, 0.0
-    trial = np.arange(-WIDEST, WIDEST, 0.05)
+    trial = np.arange(-LINES.widest, LINES.widest, 0.05)
     votes = np.exp(-0.5 * ((trial[:, None] - degrees) / 0.4) ** 2) @ weight
     best = trial[votes.argmax()]
     for _ in range(3):
@@ -130,7 +115,7 @@ def lines_of_photos(
         Distortions on top of the lenses'.
     """
     turn, share = facade_rotation(images[0], cameras[0], interiors[0])
-    if share < LEAST_IN_LINE:
+    if share < LINES.least_in_line:
         return []
     parts = zip(images, cameras, interiors, radial, (turn, turn), (1, 2), strict=True)
     return [line for part in parts for line in facade_directions(*part)]
@@ -173,8 +158,8 @@ def facade_directions(
     and then by least squares in which lines that do not agree count nothing.
     """
     ends = line_segments(image)
-    ends = ends[np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > SHORTEST * image.shape[1]]
-    part = np.floor(ends.mean(axis=1) / image.shape[::-1] * PARTS) @ [PARTS, 1]
+    ends = ends[np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > LINES.shortest * image.shape[1]]
+    part = np.floor(ends.mean(axis=1) / image.shape[::-1] * LINES.parts) @ [LINES.parts, 1]
     seen = radial.undistort(interior.ideal(ends.reshape(-1, 2)))
     flat = np.column_stack([seen, np.ones(len(seen))])
     cosine, sine = np.cos(turn), np.sin(turn)
@@ -189,9 +174,9 @@ def facade_directions(
     normals, part, length = normals[some] / length[some, None], part[some], length[some]
     out = []
     for name, axis in (("upright", 1), ("level", 0)):
-        near = np.abs(normals[:, axis]) < np.sin(np.deg2rad(ASTRAY))
+        near = np.abs(normals[:, axis]) < np.sin(np.deg2rad(LINES.astray))
         found, scatter, count = _common_direction(normals[near], length[near], part[near], axis)
-        if count >= FEWEST_LINES:
+        if count >= LINES.fewest:
             sigma = float(np.sqrt(2.0) * np.hypot(BUILT, scatter))
             out.append(
                 FacadeDirection(
@@ -224,15 +209,17 @@ def _common_direction(
     count : int
     """
     direction = np.eye(3)[axis]
-    if len(normals) < FEWEST_LINES:
+    if len(normals) < LINES.fewest:
         return direction, np.inf, 0
     fixed, free = normals[:, axis], normals[:, [1 - axis, 2]]
-    steps = np.deg2rad(np.arange(-TRIED, TRIED + 0.01, 0.5))
+    steps = np.deg2rad(np.arange(-LINES.tried, LINES.tried + 0.01, 0.5))
     trials = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     away = fixed[:, None] + free @ trials.T
     votes = length @ np.exp(-0.5 * (away / np.deg2rad(0.4)) ** 2)
     found = trials[int(votes.argmax())]
-    for width in np.deg2rad([2.4 * AGREE, 1.6 * AGREE, AGREE, AGREE, AGREE]):
+    for width in np.deg2rad(
+        [2.4 * LINES.agree, 1.6 * LINES.agree, LINES.agree, LINES.agree, LINES.agree]
+    ):
         left = fixed + free @ found
         weight = length / (1.0 + (left / width) ** 2) ** 2 * (np.abs(left) < 3 * width)
         normal = (free * weight[:, None]).T @ free + 1e-12 * np.eye(2)
@@ -245,6 +232,6 @@ def _common_direction(
     spread = inverse @ (parts.T @ parts) @ inverse * count / max(count - 1, 1)
     direction = direction.copy()
     direction[[1 - axis, 2]] = found
-    agree = np.abs(fixed + free @ found) < np.deg2rad(2 * AGREE)
+    agree = np.abs(fixed + free @ found) < np.deg2rad(2 * LINES.agree)
     unit = direction / np.linalg.norm(direction)
     return unit, float(np.sqrt(spread[1, 1])), int(agree.sum())

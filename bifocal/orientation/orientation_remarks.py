@@ -8,21 +8,9 @@ from bifocal.orientation.adjustment.pair_observations import PairObservations
 from bifocal.orientation.alignment import standard_deviations, wall_relief
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair
-from bifocal.orientation.starts.photo_order import SURE
-from bifocal.orientation.tuning import TUNING
+from bifocal.orientation.tuning import BEND, ORDER, REMARKS
 from bifocal.orientation.walls.wall_shape import WallShape, shape_in_words
 from bifocal.remarks import remark
-
-#: Common points that fit their lines no better than this, at 3000 px of width, do not fit. Clean
-#: pairs reach 0.19, a phone pair with its lens estimated 0.4. [px]
-WORST_FIT = 0.6
-#: Relief whose size is known no better than this calls for a tape: nine points with 0.45 m of
-#: relief and no lens give 2 to 4 %, a tape of 2 cm 0.4 %.
-WORST_SCALE = 0.01
-#: The wall is found in a part of the photo only if so much of it lies in so few of nine zones.
-MOST_OF_WALL, FEW_ZONES = 0.95, 3
-#: Beyond this many standard deviations an adjusted value contradicts what was given.
-CONTRADICTS = 3.0
 
 
 def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
@@ -31,14 +19,16 @@ def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
     remarks = [_shape_of(observations, pair.shape)]
     unit = max(observations.interiors[0].image_size) / 3000
     sigma = observations.sigma_tie
-    if observations.tie_used.sum() >= 20 and sigma > WORST_FIT * unit:
+    if observations.tie_used.sum() >= 20 and sigma > REMARKS.worst_fit * unit:
         remarks.append(remark("orientation.misses_lines", sigma=sigma))
     lenses = observations.interiors
     changes = [
         float(np.log(camera.matrix[0, 0] / interior.focal))
         for interior, camera in zip(lenses, adjusted.cameras, strict=True)
     ]
-    limits = [np.inf if lens.is_assumed else CONTRADICTS * lens.sigma_focal for lens in lenses]
+    limits = [
+        np.inf if lens.is_assumed else REMARKS.contradicts * lens.sigma_focal for lens in lenses
+    ]
     pulled = np.flatnonzero(np.abs(changes) > limits)
     both = len(pulled) == 2 and changes[0] * changes[1] < 0  # one wrong lens pulls both
     for n in pulled:
@@ -51,7 +41,7 @@ def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
         ("far", "near"), adjusted.cameras, (site.distance1, site.distance2), strict=True
     ):
         off = float(camera.centre[2]) - (given or 0.0)
-        if given and abs(off) > CONTRADICTS * site.sigma:
+        if given and abs(off) > REMARKS.contradicts * site.sigma:
             sigmas, key = abs(off) / site.sigma, f"orientation.distance_contradicts_{name}"
             remarks.append(remark(key, off=off, given=given, sigmas=sigmas))
     return [text for text in remarks if text]
@@ -69,12 +59,12 @@ def _shape_of(observations: PairObservations, shape: WallShape) -> str:
 
 def hopeless_shape(observations: PairObservations, shape: WallShape) -> str:
     """Return that the wall is bent, if that is certainly by more than an honest lens does."""
-    return _shape_of(observations, shape) if shape.px > TUNING.strongly_curved else ""
+    return _shape_of(observations, shape) if shape.px > BEND.strongly_curved else ""
 
 
 def order_remarks(order: float, names: tuple[str, str]) -> list[str]:
     """Return that the photos do not tell which of them is the near one."""
-    if order > SURE:
+    if order > ORDER.sure:
         return []
     return [remark("orientation.near_unsure", name=names[1])]
 
@@ -87,8 +77,8 @@ def wall_remarks(pair: OrientedPair) -> list[str]:
     if not zones:
         return [remark("orientation.no_wall")]
     held = np.cumsum([zone["points"] for zone in zones])
-    most = int(np.searchsorted(held, MOST_OF_WALL * held[-1])) + 1
-    if most > FEW_ZONES:
+    most = int(np.searchsorted(held, REMARKS.most_of_wall * held[-1])) + 1
+    if most > REMARKS.few_zones:
         return []
     named = ", ".join(zone["zone"] for zone in zones[:most])
     count = {"count": int(held[most - 1]), "all": int(held[-1])}
@@ -114,7 +104,7 @@ def distance_remarks(pair: OrientedPair) -> list[str]:
     """Return which distances are poorly determined, and what that does to relief."""
     remarks: list[str] = []
     share = standard_deviations(pair.adjusted)["relief_scale"]
-    if not pair.observations.measured and share > WORST_SCALE:
+    if not pair.observations.measured and share > REMARKS.worst_scale:
         remarks.append(remark("orientation.no_tape", share=100 * share, size=1000 * share))
     for number, camera in enumerate(pair.adjusted.cameras, start=1):
         distance, sigma = float(camera.centre[2]), pair.adjusted.sigma("Z", number)

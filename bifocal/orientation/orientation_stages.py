@@ -33,7 +33,7 @@ from bifocal.orientation.tie_points import (
     with_wall,
     without_gross_ties,
 )
-from bifocal.orientation.tuning import TUNING
+from bifocal.orientation.tuning import BEND, LINES, STAGES, WALLS
 from bifocal.orientation.walls.reference_plane import Face, choose_wall, onto_plane, rivals_in_words
 from bifocal.orientation.walls.wall_planes import (
     likely_wall,
@@ -49,16 +49,6 @@ from photocore.errors import GeometryError
 
 #: "Image plane parallel to the wall" when nothing contradicts it. [rad]
 SIGMA_PARALLEL = np.deg2rad(0.3)
-UNEVEN = 0.004  #: A wall's face slopes by this against the plane it was meant to be. [m/m]
-#: Control points of so small a relief, in their sigma, say that they lie on the wall; it is
-#: believed if its plane is no further from theirs, in sigma.
-ON_WALL, WALL_LIMIT = 4.0, 3.0
-#: The wall is the reference plane itself. [m, m/m]
-FREE = (1e-5, 1e-6)
-#: Relative standard deviation with which two photos of one lens have one principal distance.
-ONE_LENS = 1e-3
-#: Common points that take part, where each costs more than in air; fewer say nothing.
-MOST_REFRACTED_TIES, FEWEST_TIES = 1000, 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -113,7 +103,7 @@ class OrientedPair:
     remarks: tuple[str, ...] = ()
     faces: tuple[Face, ...] = ()
     wall_named: bool = False
-    tolerance: tuple[float, float] = FREE
+    tolerance: tuple[float, float] = STAGES.free
     shape: WallShape = field(default_factory=WallShape)
     lines_off: bool = False
 
@@ -159,7 +149,7 @@ def oriented_in_stages(
     else:
         # Distances count from the wall, and which face that is shows only in the relative model.
         few = _relative_measures(observations)
-        first = with_wall(replace(observations, measured=few), start, FREE, known=True)
+        first = with_wall(replace(observations, measured=few), start, STAGES.free, known=True)
         pair = OrientedPair(
             observations=first, adjusted=adjust(first, start), wall_named=named
         ).settled()
@@ -205,7 +195,7 @@ def _with_ties(pair: OrientedPair, observations: PairObservations) -> OrientedPa
 def with_refracted_ties(pair: OrientedPair, ties: Ties) -> OrientedPair:
     """Return a pair oriented by control points through media with ties whose bent rays meet."""
     count = len(ties.seen1)
-    some = np.linspace(0, count - 1, min(count, MOST_REFRACTED_TIES)).astype(int)
+    some = np.linspace(0, count - 1, min(count, STAGES.most_bent_ties)).astype(int)
     few = replace(
         ties, seen1=ties.seen1[some], seen2=ties.seen2[some], on_plane=ties.on_plane[some]
     )
@@ -215,11 +205,11 @@ def with_refracted_ties(pair: OrientedPair, ties: Ties) -> OrientedPair:
         # Control leaves the rays uncertain by some pixels: the majority shows by how much.
         sigma = robust_sigma(adjusted.tie_misfit[base.tie_used])
         base = without_gross_ties(base, adjusted, sigma=sigma)
-        if base.tie_used.sum() < FEWEST_TIES:
+        if base.tie_used.sum() < STAGES.fewest_ties:
             return pair.told(remark("orientation.hardly_through_media"))
         adjusted = adjust(base, adjusted)
     height = np.abs(tie_positions(base, adjusted)[:, 2])
-    on_wall = base.tie_used & (height < TUNING.shape_band * adjusted.cameras[0].centre[2])
+    on_wall = base.tie_used & (height < BEND.band * adjusted.cameras[0].centre[2])
     return replace(pair, observations=replace(base, wall=on_wall), adjusted=adjusted)
 
 
@@ -261,7 +251,7 @@ def _one_zoom(pair: OrientedPair) -> OrientedPair:
     sigma = float(np.hypot(adjusted.sigma("focal length", 1), adjusted.sigma("focal length", 2)))
     if abs(difference) > min(3 * sigma, 0.03) or sigma > 0.05:
         return pair
-    return pair.readjusted(sigma_zoom=ONE_LENS)
+    return pair.readjusted(sigma_zoom=STAGES.one_lens)
 
 
 def _unbent(pair: OrientedPair) -> OrientedPair:
@@ -315,7 +305,7 @@ def _facing_the_wall(pair: OrientedPair, site: SiteMeasures) -> OrientedPair:
         return pair
     question = steep_rivals_in_words(planes, wall, seen, site)
     pair = pair.told(question) if question else pair
-    if wall.slope <= TUNING.face_slope:
+    if wall.slope <= WALLS.face_slope:
         return pair
     cameras = onto_plane(
         adjusted.cameras, np.array([wall.offset, *-wall.normal[:2]]) / wall.normal[2]
@@ -325,7 +315,9 @@ def _facing_the_wall(pair: OrientedPair, site: SiteMeasures) -> OrientedPair:
     scale = 1.0 if known is None else known[0] / float(far.centre[2])
     cameras = far._replace(centre=scale * far.centre), near._replace(centre=scale * near.centre)
     start = evaluated(ties, replace(adjusted, cameras=cameras))
-    return replace(pair, observations=with_wall(ties, start, FREE)).readjusted(start).settled()
+    return (
+        replace(pair, observations=with_wall(ties, start, STAGES.free)).readjusted(start).settled()
+    )
 
 
 def _on_the_wall(pair: OrientedPair, images: Images, site: SiteMeasures) -> OrientedPair:
@@ -368,7 +360,7 @@ def _on_the_wall(pair: OrientedPair, images: Images, site: SiteMeasures) -> Orie
     pair = replace(pair, faces=tuple(faces))
     pair = pair.told(*(text for text in [rivals_in_words(faces, site)] if text))
     start = evaluated(ties, replace(adjusted, cameras=onto_plane(adjusted.cameras, plane)))
-    ties = with_wall(ties, start, FREE)
+    ties = with_wall(ties, start, STAGES.free)
     return replace(pair, observations=ties).readjusted(start).settled()
 
 
@@ -390,15 +382,15 @@ def _with_lines(pair: OrientedPair, images: Images) -> OrientedPair:
     old, adjusted = pair.observations, pair.adjusted
     tested = lines_tested(pair, images)
     for line, test in tested:
-        if test > WALL_LIMIT:
+        if test > STAGES.wall_limit:
             words = facade_lines.contradiction_in_words(line, adjusted.cameras, test)
             pair = replace(pair.told(words), lines_off=True)
-    kept = tuple(line for line, test in tested if test <= WALL_LIMIT)
+    kept = tuple(line for line, test in tested if test <= STAGES.wall_limit)
     try:
         turned = pair.readjusted(lines=kept).settled() if kept else pair
     except GeometryError:  # no tie was left on the wall
         return pair.told(remark("orientation.lines_off_wall"))
-    stays = turned.observations.wall.sum() >= facade_lines.WALL_KEPT * old.wall.sum()
+    stays = turned.observations.wall.sum() >= LINES.wall_kept * old.wall.sum()
     return turned if stays else pair.told(remark("orientation.lines_off_wall"))
 
 
@@ -423,7 +415,9 @@ def _with_named_wall(pair: OrientedPair) -> OrientedPair:
     control = observations.control
     height, sigma = control.xyz[:, 2], control.sigma[:, 2]
     with np.errstate(invalid="ignore"):
-        on = control.positioned & observations.pick_used & (np.abs(height) <= ON_WALL * sigma)
+        on = (
+            control.positioned & observations.pick_used & (np.abs(height) <= STAGES.on_wall * sigma)
+        )
     if on.sum() < 3:
         return pair
     spread = np.linalg.svd(control.xyz[on, :2] - control.xyz[on, :2].mean(axis=0))[1]
@@ -437,7 +431,7 @@ def _with_named_wall(pair: OrientedPair) -> OrientedPair:
     if not walled.wall.any():
         return pair.told(remark("orientation.little_on_control_plane"))
     test = wall_test(walled, pair.adjusted)
-    if test > WALL_LIMIT:
+    if test > STAGES.wall_limit:
         return pair.told(remark("orientation.other_plane", test=test))
     return replace(pair, observations=walled).readjusted()
 
@@ -459,7 +453,7 @@ def _parallel_if_so(pair: OrientedPair, most: float) -> OrientedPair:
     if sigma < SIGMA_PARALLEL / 2:
         # Better than any wall is flat: the reference plane is then parallel to the image planes
         # and touches the wall, which may slope against it.
-        tolerance = (1e-4, UNEVEN)
+        tolerance = (1e-4, STAGES.uneven)
         pair = replace(pair, tolerance=tolerance)
         observations = with_wall(pair.observations, pair.adjusted, tolerance)
         changes["wall_rows"], changes["wall"] = observations.wall_rows, observations.wall
@@ -485,6 +479,6 @@ def _care(cameras: Cameras) -> float:
     focal = 1.0 / np.hypot(1.0 / far.matrix[0, 0], 1.0 / near.matrix[0, 0])
     keystone = float(np.abs(centred[2, :2]).max() * focal)
     turn = abs(float(np.arctan2(centred[1, 0] - centred[0, 1], centred[0, 0] + centred[1, 1])))
-    if keystone > UNEVEN:
+    if keystone > STAGES.uneven:
         return SIGMA_PARALLEL
     return float(np.clip(1.5 * turn, np.deg2rad(0.02), SIGMA_PARALLEL))

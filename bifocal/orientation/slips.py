@@ -10,19 +10,10 @@ import numpy as np
 
 from bifocal.model.interior_orientation import Cameras, Interiors
 from bifocal.orientation.control_points import Control, SiteMeasures
+from bifocal.orientation.tuning import SLIPS
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray
 
-#: What was typed is doubted where it misses by so many times what it may: with clean control
-#: church_1, church_2 and semireal_church come to 0.7 to 1.7, with a slip to 4 and more.
-DOUBTED = 2.0
-#: A slip is believed that fits so many times better, and to this; a mirror image that lays the
-#: camera on its side, and a focal length of any size, are believed if nothing fits nearly so well.
-BETTER, FITS, CLEARLY = 3.0, 3.0, 1.3
-#: Beyond so many standard deviations control points contradict a focal length.
-CERTAIN = 4.0
-#: A point that misses by more says no more. [sigma]
-MOST = 10.0
 FILM = 36.0  #: Width of 35-mm film. [mm]
 
 
@@ -48,12 +39,14 @@ class Fitted:
 
         Both fits with all points: then the sum of squares tells, as precise as the points are.
         """
-        before, count = MOST if now is None else now.misfit, 4 * len(self.lost)
+        before, count = SLIPS.most if now is None else now.misfit, 4 * len(self.lost)
         if now is not None and not (self.lost.any() or now.lost.any()):
             surplus = count * (before**2 - self.misfit**2)
-            if self.misfit < DOUBTED and surplus > CERTAIN**2 * max(1.0, self.misfit**2):
+            if self.misfit < SLIPS.doubted and surplus > SLIPS.certain**2 * max(
+                1.0, self.misfit**2
+            ):
                 return True
-        return self.misfit < min(FITS, before / BETTER)
+        return self.misfit < min(SLIPS.fits, before / SLIPS.better)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -80,7 +73,7 @@ def slip_of(
         Whether control points tell; else the common points do.
     """
     now = fitted(typed)
-    fits = now is not None and now.misfit < DOUBTED
+    fits = now is not None and now.misfit < SLIPS.doubted
     if fits and not by_control:
         return None
     lenses, tables = [*_of_lenses(typed, free=by_control and not fits)], list[Slip]()
@@ -98,7 +91,7 @@ def slip_of(
     if not found:
         return None
     least, best = min(found, key=lambda one: one[0])
-    alike = [s.words for misfit, s in found if misfit < CLEARLY * least and not s.mended]
+    alike = [s.words for misfit, s in found if misfit < SLIPS.clearly * least and not s.mended]
     return best if best.mended else replace(best, words=" Or: ".join(alike))
 
 
@@ -113,7 +106,7 @@ def _explaining(
             lying = sum(camera.rotation[0, 0] for camera in tried.cameras) < 0.7
             tilts = [np.rad2deg(np.arccos(-c.rotation[2, 2])) for c in tried.cameras]
             words = slip.words.replace("<tilts>", " and ".join(f"{tilt:.0f}" for tilt in tilts))
-            misfit = tried.misfit * slip.handicap * (CLEARLY**2 if lying else 1.0)
+            misfit = tried.misfit * slip.handicap * (SLIPS.clearly**2 if lying else 1.0)
             found.append((misfit, replace(slip, words=words)))
     return found
 
@@ -153,7 +146,7 @@ def _of_lenses(typed: Typed, *, free: bool) -> Iterator[Slip]:
     if free and len(typed.control.ids) > 5 and typed.site.distances == (None, None):
         loose = replace(first, sigma_focal=0.5), replace(second, sigma_focal=0.5)
         words = remark("slips.focals_contradict", first=first.source, second=second.source)
-        yield Slip(meant=replace(typed, interiors=loose), words=words, handicap=CLEARLY)
+        yield Slip(meant=replace(typed, interiors=loose), words=words, handicap=SLIPS.clearly)
 
 
 def _of_site(typed: Typed) -> Iterator[Slip]:

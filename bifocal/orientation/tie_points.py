@@ -12,7 +12,7 @@ from bifocal.model.interior_orientation import Cameras, Images, Interiors
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair, wall_equations
 from bifocal.orientation.adjustment.pair_observations import PairObservations, PairUnknowns
 from bifocal.orientation.starts.relative_orientation import Ties, supported
-from bifocal.orientation.tuning import TUNING
+from bifocal.orientation.tuning import TIES, WALLS
 from bifocal.orientation.walls.reference_plane import NarrowFace, narrow_face
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.arrays import BoolArray, FloatArray
@@ -85,7 +85,7 @@ def without_gross_ties(
     sigma : float
         Precision of a tie's coordinate. [px]
     """
-    sigma = max(sigma, TUNING.best_tie)
+    sigma = max(sigma, TIES.best)
     used = np.abs(adjusted.tie_misfit) < OUTLIER_LIMIT * sigma
     xyz = tie_positions(observations, adjusted)
     lowest = min(camera.centre[2] for camera in adjusted.cameras)
@@ -102,7 +102,7 @@ def with_support(observations: PairObservations, adjusted: AdjustedPair) -> Pair
     width = max(observations.interiors[0].image_size)
     keep = np.zeros(len(seen1), dtype=bool)
     keep[used[supported(seen1[used], parallax, width)]] = True
-    if keep.sum() < TUNING.fewest_on_wall:
+    if keep.sum() < TIES.fewest_on_wall:
         return observations
     return replace(observations, tie_used=keep, wall=observations.wall & keep)
 
@@ -151,13 +151,13 @@ def with_wall(
     """
     xyz, metres, sigma, face = _wall_of(observations, state)
     if known:
-        rough = TUNING.rough_band * float(state.cameras[0].centre[2])
+        rough = WALLS.rough_band * float(state.cameras[0].centre[2])
         on_wall = observations.wall & np.isfinite(xyz).all(axis=1) & np.isfinite(metres)
         face = replace(face, roughness=rough, chance=on_wall.astype(float))
     seen = observations.tie1[face.members]
     cell = np.floor(seen / (0.1 * max(observations.interiors[0].image_size)))
     cells = len(np.unique(cell, axis=0))
-    if face.chance.sum() < TUNING.fewest_on_wall or cells < TUNING.fewest_cells:
+    if face.chance.sum() < TIES.fewest_on_wall or cells < TIES.fewest_cells:
         return replace(
             observations,
             wall=np.zeros_like(face.members),
@@ -192,7 +192,7 @@ def _wall_of(
     known = observations.tie_used & np.isfinite(xyz).all(axis=1) & np.isfinite(metres)
     sigma = np.hypot(np.sqrt(2.0) * observations.sigma_tie * np.abs(metres), 1e-6)
     face = narrow_face(
-        xyz[known], sigma[known], band=TUNING.rough_band * float(state.cameras[0].centre[2])
+        xyz[known], sigma[known], band=WALLS.rough_band * float(state.cameras[0].centre[2])
     )
     chance = np.zeros(len(xyz))
     chance[known] = face.chance

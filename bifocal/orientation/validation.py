@@ -12,17 +12,10 @@ from bifocal.model.photo import FARTHEST_WALL
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.starts.relative_orientation import Ties, rotation_only
+from bifocal.orientation.tuning import VALIDATION
 from bifocal.remarks import remark
 from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import GeometryError, InputError
-
-#: Below this a photo is blurred (sharp photos: 0.3 to 0.6; blurred by 3 px: below 0.17).
-BLURRED = 0.15
-#: The distances must differ by this share; relief errors grow with its inverse.
-LEAST_CHANGE = 0.03
-#: Lenses for façades bend less than this in the corner, as a share of the half diagonal: compact
-#: cameras reach 11 %.
-MOST_DISTORTION = 0.25
 
 
 class SamePhotoError(GeometryError):
@@ -32,7 +25,7 @@ class SamePhotoError(GeometryError):
 def check_sharp(name: str, image: ByteArray) -> None:
     """Refuse a blurred photo."""
     value = sharpness(image)
-    if value < BLURRED:
+    if value < VALIDATION.blurred:
         raise GeometryError(
             f"{name}: the photo is blurred (fine detail {value:.2f}, a sharp photo has 0.3). Take "
             "it again from a tripod, focused on the wall; nothing later can make up for it."
@@ -119,9 +112,9 @@ def check_distortion(radial: FloatArray, interior: Interior) -> None:
     bend = float(square * (radial[0] + square * radial[1]))
     # r / (1 + bend), so that a bend of -1 and below folds the photo over.
     moved = abs(bend / (1 + bend)) if bend > -0.9 else np.inf
-    if moved > MOST_DISTORTION and interior.is_assumed:
+    if moved > VALIDATION.most_distortion and interior.is_assumed:
         raise GeometryError(remark("refused.no_focals"))
-    if moved > MOST_DISTORTION:
+    if moved > VALIDATION.most_distortion:
         share = min(100 * moved, 999)
         raise GeometryError(remark("refused.distortion", share=share, k1=radial[0]))
 
@@ -131,9 +124,9 @@ def check_movement(adjusted: AdjustedPair) -> None:
     first, second = adjusted.cameras
     d1, d2 = float(first.centre[2]), float(second.centre[2])
     moved = float(np.linalg.norm(first.centre - second.centre))
-    if moved < LEAST_CHANGE * d1:
+    if moved < VALIDATION.least_change * d1:
         raise GeometryError(remark("refused.one_place", apart=moved, distance=d1))
-    if abs(d1 - d2) < LEAST_CHANGE * max(d1, d2):
+    if abs(d1 - d2) < VALIDATION.least_change * max(d1, d2):
         raise GeometryError(remark("refused.one_distance", d1=d1, d2=d2))
 
 

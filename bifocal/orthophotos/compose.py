@@ -19,22 +19,12 @@ from bifocal.orthophotos import mask_tidying
 from bifocal.orthophotos.ortho_image import OrthoOptions, Orthophoto, Source
 from bifocal.orthophotos.pull_push import fill_holes
 from bifocal.orthophotos.rectify import SourcePhoto, footprint
+from bifocal.orthophotos.tuning import COMPOSE, TIDYING
 from bifocal.orthophotos.visibility import hidden_from
 from bifocal.orthophotos.whole_picture import CompletedSurface
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, ByteArray, Float32Array
 from photocore.errors import InputError
-
-#: Side of the windows an orthophoto is made in; larger ones repeat less of their surroundings,
-#: smaller ones need less memory. [px]
-TILE = 1024
-#: How far around a window colours are sought to fill holes. [px]
-_FILL_REACH = 128
-#: Pixels this near to a hole and this much before it belong to what hides it. [px, m]
-_FILL_SIDE, _BEFORE = 65, 0.02
-#: Image 2 is only preferred to image 1 where its pixels are finer than this: its orthophoto error
-#: is d1 / d2 times larger (sigma_m d1 / (d1 - d2) against sigma_m d2 / (d1 - d2)).
-_FINER = 0.6
 
 
 class Tile(NamedTuple):
@@ -194,7 +184,7 @@ def render(
     """Yield (column, row, tile) of an orthophoto, each in memory that does not grow with it."""
     if options.complete:
         surface = CompletedSurface(surface, grid)
-    for column, row, window in grid.tiles(TILE):
+    for column, row, window in grid.tiles(COMPOSE.tile):
         yield column, row, render_window(views, surface, window, options)
 
 
@@ -203,9 +193,9 @@ def render_window(
 ) -> Tile:
     """Return one window of an orthophoto."""
     close = options.fill or options.complete
-    margin = _FILL_REACH if close else 0
+    margin = COMPOSE.fill_reach if close else 0
     if options.mask_hidden:
-        margin = max(margin, mask_tidying.MARGIN)
+        margin = max(margin, TIDYING.margin)
     if len(views) > 1:
         margin = max(margin, math.ceil(2 * options.feather))
     wide = window
@@ -281,7 +271,7 @@ def _share_of_first(
     for view in views:
         pixel = view.photo.pixels_from_plane(middle)
         sizes.append(math.sqrt(abs(float(np.linalg.det(view.photo.metres_per_pixel(pixel)[0])))))
-    if sizes[1] < _FINER * sizes[0]:
+    if sizes[1] < COMPOSE.finer * sizes[0]:
         return np.where(second, np.float32(0), np.float32(1))
     if feather == 0:
         return first.astype(np.float32)
@@ -305,8 +295,8 @@ def _fill(
         return image, source
     known = source > 0
     depth = np.where(holes & ~np.isnan(relief), relief, np.float32(-1e6))
-    around = cv2.dilate(depth, np.ones((_FILL_SIDE, _FILL_SIDE), np.uint8))
-    before = (around > -1e6) & (relief > around + np.float32(_BEFORE))
+    around = cv2.dilate(depth, np.ones((COMPOSE.fill_side, COMPOSE.fill_side), np.uint8))
+    before = (around > -1e6) & (relief > around + np.float32(COMPOSE.before))
     image, done = fill_holes(image, known & ~before, holes)
     if (holes & ~done).any():
         # Nothing of the surface behind is in sight: better the colours of what hides it than none.

@@ -14,43 +14,10 @@ from bifocal.model.grid import Grid
 from bifocal.model.surface import Surface
 from bifocal.orthophotos.canvas import text_width
 from bifocal.orthophotos.drawing import Contour, multiples, signed
+from bifocal.orthophotos.tuning import CONTOURS
 from photocore.arrays import BoolArray, Float32Array, FloatArray
 from photocore.errors import InputError
 from photocore.shrinkage import shrink_noise
-
-#: Relief detail worth drawing, on paper. [mm]
-DETAIL = 0.4
-#: Half windows of the smoothing, counted in such details: features of 3 mm and more stay.
-_WINDOWS = (2, 4)
-#: More contour levels than this are a mistake of unit.
-_MOST_LEVELS = 2000
-#: Side of the largest raster contours are drawn from. [px]
-_LARGEST = 4000
-#: Relief is compared so far to both sides of a line, and on average over so much of it: a line that
-#: wanders over a flat wall has nothing higher on its one side. On paper. [mm]
-_ASIDE, _STRETCH = 2.0, 8.0
-#: And so far, where as much less will do: on a flat strip that is narrower than 2 x 2 mm a line of
-#: its own level would lean on the steps at both its edges.
-_NEAR = 0.8
-#: What must lie between both sides of a line, in standard deviations of one pixel. The sigma of a
-#: relief map is that of a pixel and rather too large; the mean of a stretch is far better known.
-_CLEAR = 1.0
-#: And in intervals: where the next line would be 40 mm away on paper, this one says nothing, and on
-#: a wall at its own level it follows the last tenth of a millimetre.
-_SLOPE = 2 * _ASIDE / 40.0
-#: And this share of it on either side.
-_EITHER = 0.25
-#: Lines shorter than this are no form of the wall. On paper. [mm]
-_SHORTEST = 8.0
-#: Between points of a line. On paper. [mm]
-_SPACING = 0.5
-#: Every so many levels a thick line.
-_EACH = 5
-#: Height of labels, the line that a label needs, and between labels of a line. On paper. [mm]
-LABEL_SIZE, _ROOM, _BETWEEN = 1.8, 14.0, 110.0
-#: A line shorter than this does without a label where one of its level stands within that: joints
-#: and stones of one level would be labelled each. On paper. [mm]
-_SHORT, _NEIGHBOUR = 60.0, 40.0
 
 
 class ContourLabel(NamedTuple):
@@ -97,19 +64,19 @@ def contours(
         return ()
     spread = np.zeros_like(relief) if sigma is None else np.nan_to_num(sigma.window(coarse))
     if sigma is not None:
-        relief = shrink_noise(relief, spread, _WINDOWS)
+        relief = shrink_noise(relief, spread, CONTOURS.windows)
     low, high = float(np.nanmin(relief)), float(np.nanmax(relief))
-    if (high - low) / interval > _MOST_LEVELS:
+    if (high - low) / interval > CONTOURS.most_levels:
         raise InputError(
             f"contours every {interval:g} m make {(high - low) / interval:.0f} levels; choose a "
             "larger interval."
         )
     paper = scale / 1000.0  # metres on the wall per millimetre on paper
     generator = contour_generator(z=np.ma.masked_invalid(relief), name="serial")
-    least = np.maximum(_CLEAR * spread, np.float32(_SLOPE * interval))
+    least = np.maximum(CONTOURS.clear * spread, np.float32(CONTOURS.slope * interval))
     lines = []
     for level in multiples(low, high, interval).tolist():
-        index = round(level / interval) % _EACH == 0
+        index = round(level / interval) % CONTOURS.each == 0
         for line in generator.lines(level):
             even = _evenly(np.asarray(line), paper / coarse.gsd)
             for part in _clear_parts(even, relief, least, paper / coarse.gsd):
@@ -120,8 +87,8 @@ def contours(
 
 def contour_grid(grid: Grid, scale: float) -> Grid:
     """Return the grid contour lines are drawn from: the finest detail worth drawing."""
-    largest = max(grid.shape) * grid.gsd / _LARGEST
-    return Grid.from_bounds(grid.bounds, gsd=max(grid.gsd, DETAIL / 1000 * scale, largest))
+    largest = max(grid.shape) * grid.gsd / CONTOURS.largest
+    return Grid.from_bounds(grid.bounds, gsd=max(grid.gsd, CONTOURS.detail / 1000 * scale, largest))
 
 
 def contour_labels(lines: Sequence[Contour], scale: float) -> list[ContourLabel]:
@@ -135,23 +102,23 @@ def contour_labels(lines: Sequence[Contour], scale: float) -> list[ContourLabel]
         line = contour.line / paper
         along = _lengths(line)
         words = signed(contour.level, digits)
-        need = text_width(words, LABEL_SIZE) + 1.0
-        if along[-1] < max(_ROOM, 2 * need):
+        need = text_width(words, CONTOURS.label_size) + 1.0
+        if along[-1] < max(CONTOURS.room, 2 * need):
             continue
-        count = max(1, round(along[-1] / _BETWEEN))
+        count = max(1, round(along[-1] / CONTOURS.between))
         for number in range(count):
             ends = along[-1] * np.array([number, number + 1]) / count
             middle, angle = _straightest(
                 line, along, (ends[0] + need / 2, ends[1] - need / 2), need
             )
             gaps = np.hypot(*(taken - middle).T)
-            alike = (levels == contour.level) & (gaps < _NEIGHBOUR)
-            if (gaps < need + 1.0).any() or (along[-1] < _SHORT and alike.any()):
+            alike = (levels == contour.level) & (gaps < CONTOURS.neighbour)
+            if (gaps < need + 1.0).any() or (along[-1] < CONTOURS.short and alike.any()):
                 continue
             taken, levels = np.vstack([taken, middle]), np.append(levels, contour.level)
             # On the line, not above it: down by half the height of a digit.
             turn = math.radians(angle)
-            base = middle + 0.36 * LABEL_SIZE * np.array([math.sin(turn), -math.cos(turn)])
+            base = middle + 0.36 * CONTOURS.label_size * np.array([math.sin(turn), -math.cos(turn)])
             place = float(base[0] * paper), float(base[1] * paper)
             labels.append(ContourLabel(place, angle, words))
     return labels
@@ -188,7 +155,7 @@ def _lengths(line: FloatArray) -> FloatArray:
 def _evenly(line: FloatArray, factor: float) -> FloatArray:
     """Return a line with points at equal distances; factor: pixels per millimetre on paper."""
     along = _lengths(line)
-    count = max(2, math.ceil(along[-1] / (_SPACING * factor)) + 1)
+    count = max(2, math.ceil(along[-1] / (CONTOURS.spacing * factor)) + 1)
     places = np.linspace(0, along[-1], count)
     return np.stack([np.interp(places, along, line[:, k]) for k in (0, 1)], axis=-1)
 
@@ -197,7 +164,7 @@ def _clear_parts(
     line: FloatArray, relief: Float32Array, least: Float32Array, factor: float
 ) -> list[FloatArray]:
     """Return the parts of a line, in pixels, that are long enough and between unequal sides."""
-    shortest = round(_SHORTEST / _SPACING)
+    shortest = round(CONTOURS.shortest / CONTOURS.spacing)
     if len(line) <= shortest:
         return []
     direction = np.gradient(line, axis=0)
@@ -205,9 +172,9 @@ def _clear_parts(
     normal = factor * np.stack([-direction[:, 1], direction[:, 0]], axis=-1)
     level, wanted = _looked_up(relief, line), np.nan_to_num(_looked_up(least, line))
     clear = np.ones(len(line), bool)
-    for aside, stretch in ((_ASIDE, _STRETCH), (_NEAR, 4 * _NEAR)):
+    for aside, stretch in ((CONTOURS.aside, CONTOURS.stretch), (CONTOURS.near, 4 * CONTOURS.near)):
         left, right = (_looked_up(relief, line + way * aside * normal) for way in (1, -1))
-        clear &= _rises(left, right, level, wanted * aside / _ASIDE, stretch)
+        clear &= _rises(left, right, level, wanted * aside / CONTOURS.aside, stretch)
     bounds = [0, *(np.flatnonzero(np.diff(clear)) + 1).tolist(), len(clear)]
     return [
         line[a:b] for a, b in pairwise(bounds)
@@ -220,7 +187,7 @@ def _rises(
     stretch: float,
 ) -> BoolArray:  # fmt: skip
     """Return where the relief beside a line differs from side to side by more than is wanted."""
-    side = max(3, round(stretch / _SPACING))
+    side = max(3, round(stretch / CONTOURS.spacing))
     padded = (side // 2, side - 1 - side // 2)
 
     def averaged(rise: Float32Array, instead: Float32Array) -> FloatArray:
@@ -232,7 +199,7 @@ def _rises(
     up, down = averaged(left - level, level - right), averaged(level - right, left - level)
     way = np.sign(up + down)
     # A line at the foot of a step follows what the flat wall does at its own level.
-    either = np.minimum(up * way, down * way) > _EITHER * wanted
+    either = np.minimum(up * way, down * way) > CONTOURS.either * wanted
     return np.asarray((np.abs(up + down) > wanted) & either)
 
 

@@ -24,7 +24,6 @@ from bifocal.model.pair import Pair
 from bifocal.model.points import SurveyPoints
 from bifocal.model.relief_map import Quality
 from bifocal.model.surface import FlatSurface, MapSurface, Surface
-from bifocal.orthophotos.compose import TILE
 from bifocal.orthophotos.contour_lines import contour_grid, contours
 from bifocal.orthophotos.drawing import Contour, Drawing, Legend, PrintSheet, round_step
 from bifocal.orthophotos.drawing_files import write_drawing
@@ -42,6 +41,7 @@ from bifocal.orthophotos.section_files import write_section_dxf, write_section_s
 from bifocal.orthophotos.sections import section, section_letter
 from bifocal.orthophotos.shading import colour_limits, shaded, tints, unmeasured
 from bifocal.orthophotos.tiles import RasterResult
+from bifocal.orthophotos.tuning import COMPOSE, CONTOURS
 from bifocal.remarks import remark
 from photocore.arrays import Float32Array, positive
 from photocore.cli import Progress, no_progress
@@ -59,8 +59,6 @@ from photocore.textfile import file_name
 
 #: Print resolution for which 1:50 makes pixels of 5.00 mm. [dpi]
 DPI = 254.0
-#: More contour levels than this are made only where their interval is asked for.
-_MOST_AUTOMATIC = 500
 #: Every picture is written with its world file, for the web, for CAD and on a sheet.
 PICTURE_ENDINGS = ("tif", "tfw", "png", "dxf", "pdf")
 #: What is no part of the name of a pair's file.
@@ -296,7 +294,7 @@ def _prepared(
     limits, beyond = colour_limits(shown)
     # A phantom far off a flat wall must not make more levels than can be drawn.
     span = float(np.ptp(whole[np.isfinite(whole)])) if np.isfinite(whole).any() else 0.0
-    least = max((limits[1] - limits[0]) / 12, span / _MOST_AUTOMATIC, 0.001)
+    least = max((limits[1] - limits[0]) / 12, span / CONTOURS.most_automatic, 0.001)
     interval = wish.contours or round_step(least)
     lines = contours(
         surface, drawing.grid, interval=interval, scale=drawing.scale,
@@ -322,7 +320,7 @@ def _draw_relief(
         place / f"{name}.tif", grid, bands=3, dtype=np.uint8, colour=True, world_file=True,
         dpi=dpi_at_scale(grid.gsd, drawing.scale), overviews=True,
     ) as writer:  # fmt: skip
-        for column, row, part in grid.tiles(TILE):
+        for column, row, part in grid.tiles(COMPOSE.tile):
             picture, known = shaded(
                 relief.surface, part, limits=(low, high), measured=measured, scale=drawing.scale
             )
@@ -353,7 +351,7 @@ def _write_values(path: Path, relief: _Relief, grid: Grid) -> None:
         path, grid, bands=bands, dtype=np.float32, nodata=float("nan"),
         names=RELIEF_BANDS[:bands], overviews=True, world_file=True,
     ) as writer:  # fmt: skip
-        for column, row, part in grid.tiles(TILE):
+        for column, row, part in grid.tiles(COMPOSE.tile):
             r = relief.surface.window(part)
             layers = [r]
             if reader is not None and bands > 1:

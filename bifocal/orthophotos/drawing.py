@@ -11,6 +11,7 @@ import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.model.points import SurveyPoints
+from bifocal.orthophotos.tuning import SHEET
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import InputError
 from photocore.reports.words import Words, words_of
@@ -23,14 +24,6 @@ PAPERS: Mapping[str, tuple[float, float]] = {
     "A1": (594, 841),
     "A0": (841, 1189),
 }
-#: White around the frame: wider on the left, for binding. [mm]
-LEFT, MARGIN = 20.0, 10.0
-#: Room between the frame and the picture for the numbers of the grid. [mm]
-BAND = 9.0
-#: From the edge of the picture to the letter of a section, outside of the grid's numbers. [mm]
-BEYOND = 6.8
-#: Height of the strip with title, scale bar and level mark. [mm]
-STRIP = 34.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -197,7 +190,7 @@ class Drawing:
         """Return whether a section's end is so near the edge that its letter stands beyond it."""
         xmin, ymin, xmax, ymax = self.grid.bounds
         gaps = np.abs([end[0] - xmin, end[0] - xmax, end[1] - ymin, end[1] - ymax])
-        return bool(gaps.min() * 1000.0 / self.scale < BEYOND)
+        return bool(gaps.min() * 1000.0 / self.scale < SHEET.beyond)
 
     def grid_step(self) -> float:
         """Return the spacing of grid crosses: about 5 cm on paper, a round number. [m]"""
@@ -241,7 +234,10 @@ class PrintSheet:
             If it does not fit the paper asked for, or not even A0.
         """
         wide, high = drawing.paper_size
-        need = (wide + LEFT + MARGIN + 2 * BAND, high + 2 * MARGIN + 2 * BAND + STRIP)
+        need = (
+            wide + SHEET.left + SHEET.margin + 2 * SHEET.band,
+            high + 2 * SHEET.margin + 2 * SHEET.band + SHEET.strip,
+        )
         for name, (short, long) in PAPERS.items():
             if paper is not None and name != paper:
                 continue
@@ -264,13 +260,13 @@ class PrintSheet:
     @property
     def frame(self) -> tuple[float, float, float, float]:
         """Left, bottom, right, top of the frame from the sheet's lower left corner. [mm]"""
-        return LEFT, MARGIN, self.width - MARGIN, self.height - MARGIN
+        return SHEET.left, SHEET.margin, self.width - SHEET.margin, self.height - SHEET.margin
 
     def origin(self, drawing: Drawing) -> tuple[float, float]:
         """Return the lower left corner of the picture, centred above the strip. [mm]"""
         left, bottom, right, top = self.frame
         wide, high = drawing.paper_size
-        return (left + right - wide) / 2, (bottom + STRIP + top - high) / 2
+        return (left + right - wide) / 2, (bottom + SHEET.strip + top - high) / 2
 
 
 def round_step(length: float) -> float:

@@ -10,10 +10,11 @@ import numpy as np
 
 from bifocal.files.dxf import add_text, dashed, new_drawing, save_drawing, turned
 from bifocal.model.points import SurveyPoints
-from bifocal.orthophotos.contour_lines import LABEL_SIZE, contour_labels
+from bifocal.orthophotos.contour_lines import contour_labels
 from bifocal.orthophotos.drawing import Drawing, PrintSheet, Section
 from bifocal.orthophotos.dxf_canvas import DxfCanvas
 from bifocal.orthophotos.sheet_margins import SheetMargins
+from bifocal.orthophotos.tuning import CONTOURS, SHEET
 from photocore.output import atomic_path
 
 #: Layers and their colours (AutoCAD colour index).
@@ -33,11 +34,6 @@ LAYERS = {
     "BIFOCAL_LEGEND": 7,
     "BIFOCAL_VIEWPORT": 8,
 }
-
-
-#: Strokes of a section line repeat after this, and labels stand so far above their contour lines.
-#: On paper. [mm]
-_CUT, _ABOVE = 8.6, 0.6
 
 
 def write_drawing(
@@ -80,7 +76,7 @@ def write_drawing(
     _points(model, drawing.control, "BIFOCAL_CONTROL", 2.0 * paper)
     _contours(model, drawing, paper)
     for cut in drawing.sections:
-        style = {"layer": "BIFOCAL_SECTION_LINES", **dashed(model, "DASHDOT", _CUT * paper)}
+        style = {"layer": "BIFOCAL_SECTION_LINES", **dashed(model, "DASHDOT", SHEET.cut * paper)}
         model.add_lwpolyline(cut.path.tolist(), dxfattribs=style)
         _section_names(model, drawing, cut, paper)
     document.set_modelspace_vport(
@@ -99,9 +95,11 @@ def _contours(model: Any, drawing: Drawing, paper: float) -> None:
         model.add_lwpolyline(contour.line.tolist(), dxfattribs=style)
     for label in contour_labels(drawing.contours, drawing.scale):
         # Above the line, for nothing hides the line behind a text of CAD.
-        turn, lift = math.radians(label.angle), (0.36 * LABEL_SIZE + _ABOVE) * paper
+        turn, lift = math.radians(label.angle), (0.36 * CONTOURS.label_size + SHEET.above) * paper
         place = label.place[0] - lift * math.sin(turn), label.place[1] + lift * math.cos(turn)
-        entity = add_text(model, label.words, place, LABEL_SIZE * paper, "BIFOCAL_CONTOUR_TEXT")
+        entity = add_text(
+            model, label.words, place, CONTOURS.label_size * paper, "BIFOCAL_CONTOUR_TEXT"
+        )
         turned(entity, label.angle, middle=True)
 
 

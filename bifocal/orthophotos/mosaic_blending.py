@@ -14,25 +14,12 @@ from numpy.typing import NDArray
 
 from bifocal.model.grid import SAME_PIXEL, Bounds, Grid, bounds_of
 from bifocal.orthophotos.pull_push import fill_holes
+from bifocal.orthophotos.tuning import BLENDING
 from photocore.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from photocore.errors import InputError
 
-#: Sides of the rasters on which seams and exposure are worked out: a part of the mosaic's own, so
-#: that the work grows with it, but no less and no more than these. [px]
-COARSE_SHARE, COARSE_LEAST, COARSE = 1 / 3, 400, 1600
-#: Levels of the blending pyramid; colours fade over about 2^(levels + 1) px, detail over two.
-LEVELS = 5
 #: Surroundings of a window that its blending needs; a multiple of 2^LEVELS. [px]
-HALO = 2 ** (LEVELS + 2)
-#: Seams keep this far from holes, which lie behind steps of the relief. [coarse px]
-_SHY = 6.0
-#: Relief that changes by more than this per metre is an edge to a seam.
-_EDGE_SLOPE = 0.5
-_LEAST_OVERLAP = 50
-#: An overlap that tells whether layers show one wall; the least that varies on it (share of the
-#: range of colours, or metres); and the least correlation of what varies, near zero for
-#: pictures of different things.
-_TELLING, _CONTRAST, _ALIKE = 5000, 0.02, 0.1
+HALO = 2 ** (BLENDING.levels + 2)
 
 
 #: A layer's values, shape (h, w, bands), and which of them are valid, shape (h, w).
@@ -139,14 +126,14 @@ def _likeness(
     fine = [_detail(image, seen) for image, seen in zip(images, valid, strict=True)]
     for i, j in combinations(range(len(images)), 2):
         both = valid[i] & valid[j]
-        if np.count_nonzero(both) < _TELLING:
+        if np.count_nonzero(both) < BLENDING.telling:
             continue
         a, b = fine[i][both], fine[j][both]
         spread = float(a.std()), float(b.std())
-        if min(spread) < _CONTRAST:
+        if min(spread) < BLENDING.contrast:
             continue
         likeness = float(np.mean((a - a.mean()) * (b - b.mean()))) / (spread[0] * spread[1])
-        if likeness < _ALIKE:
+        if likeness < BLENDING.alike:
             raise InputError(
                 f"rasters {i + 1} and {j + 1} overlap but have nothing in common (correlation "
                 f"{likeness:+.2f}): their X and Y are not of one frame. Orient their pairs by "
@@ -195,7 +182,9 @@ def plan_mosaic(
     Soille, "Morphological image compositing", 2006) that runs where the layers agree, away from
     edges of the relief and from holes, which lie right behind such edges.
     """
-    side = min(max(COARSE_SHARE * max(grid.shape), COARSE_LEAST), COARSE)
+    side = min(
+        max(BLENDING.coarse_share * max(grid.shape), BLENDING.coarse_least), BLENDING.coarse_most
+    )
     coarse = Grid.from_bounds(grid.bounds, gsd=grid.gsd * max(1.0, max(grid.shape) / side))
     images, valid = zip(*(_onto(layer, coarse) for layer in layers), strict=True)
     likeness = _likeness(images, valid)
@@ -309,12 +298,12 @@ def _gains(
     differences = {}
     for i, j in combinations(range(count), 2):
         both = valid[i] & valid[j]
-        if np.count_nonzero(both) < _LEAST_OVERLAP:
+        if np.count_nonzero(both) < BLENDING.least_overlap:
             continue
         a, b = images[i][both], images[j][both]
         differences[i, j] = float(np.median(a[:, 0] - b[:, 0]))
         usable = ((a > 0.02) & (a < 0.98) & (b > 0.02) & (b < 0.98)).all(axis=1)
-        if not wanted or np.count_nonzero(usable) < _LEAST_OVERLAP:
+        if not wanted or np.count_nonzero(usable) < BLENDING.least_overlap:
             continue
         ratio = np.median(np.log(a[usable]) - np.log(b[usable]), axis=0)
         weight = math.sqrt(np.count_nonzero(usable))
@@ -354,12 +343,12 @@ def _seams(
     for seen in valid:
         holes = cv2.morphologyEx(seen.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((31, 31)))
         near = cv2.distanceTransform((~((holes > 0) & ~seen)).astype(np.uint8), cv2.DIST_L2, 3)
-        cost += np.exp(-near / np.float32(_SHY))
+        cost += np.exp(-near / np.float32(BLENDING.shy))
     if relief is not None:
         dy, dx = np.gradient(np.nan_to_num(relief), gsd)
-        edge = (np.hypot(dx, dy) > _EDGE_SLOPE).astype(np.uint8)
+        edge = (np.hypot(dx, dy) > BLENDING.edge_slope).astype(np.uint8)
         near = cv2.distanceTransform(1 - edge, cv2.DIST_L2, 3)
-        cost += 2 * np.exp(-near / np.float32(_SHY))
+        cost += 2 * np.exp(-near / np.float32(BLENDING.shy))
     # Watersheds run along crests, seams along the valleys of the cost: turn it over.
     level = (1e4 / (0.05 + cost)).astype(np.int32)
     flooded = watershed(level, markers, mask=any_valid)
@@ -408,8 +397,8 @@ def _blended(
     for k, raw in images.items():
         image = np.where(valid[k][:, :, None], raw, plain)
         share = (owner == k).astype(np.float32)
-        for level in range(LEVELS + 1):
-            last = level == LEVELS
+        for level in range(BLENDING.levels + 1):
+            last = level == BLENDING.levels
             small = image if last else cv2.pyrDown(image)
             size = (image.shape[1], image.shape[0])
             detail = image if last else image - cv2.pyrUp(small, dstsize=size).reshape(image.shape)
@@ -423,8 +412,8 @@ def _blended(
             if not last:
                 image = small.reshape(*small.shape[:2], -1)
                 share = cv2.pyrDown(share)
-    out = total[LEVELS] / np.maximum(weights[LEVELS], 1e-9)[:, :, None]
-    for level in range(LEVELS - 1, -1, -1):
+    out = total[BLENDING.levels] / np.maximum(weights[BLENDING.levels], 1e-9)[:, :, None]
+    for level in range(BLENDING.levels - 1, -1, -1):
         detail = total[level] / np.maximum(weights[level], 1e-9)[:, :, None]
         size = (detail.shape[1], detail.shape[0])
         out = cv2.pyrUp(out, dstsize=size).reshape(detail.shape) + detail

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from bifocal.model.geotiff import RasterReader, check_relief, create_raster
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.surface import MapSurface
-from bifocal.orthophotos.compose import TILE
 from bifocal.orthophotos.mosaic_blending import (
     SeamPlan,
     Seen,
@@ -23,17 +22,13 @@ from bifocal.orthophotos.mosaic_blending import (
     plan_mosaic,
 )
 from bifocal.orthophotos.tiles import RasterResult, write_tiles
+from bifocal.orthophotos.tuning import BLENDING, COMPOSE
 from bifocal.remarks import remark
 from photocore.arrays import Float32Array, IntArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import check_ending, check_not_input, check_writable
 
-#: A relief map that differs from its neighbour by more is pointed out. [m]
-_RELIEF_STEP = 0.005
-#: Inputs less alike on their overlap are asked about: two churches' pairs have +0.76 to +0.88
-#: (orthophotos), +0.30 to +0.78 (relief maps); a façade moved along by 1.3 m has +0.05 to +0.30.
-_WEAK = 0.5
 #: Numbers of inputs must fit the 8-bit source band.
 _MOST_INPUTS = 255
 
@@ -120,7 +115,7 @@ def make_mosaic(
         names = [first.names[i - 1] for i in layers[0].kept]
 
         def tiles() -> Iterator[tuple[int, int, NDArray[Any], IntArray]]:
-            for column, row, window in grid.tiles(TILE):
+            for column, row, window in grid.tiles(COMPOSE.tile):
                 image, owner = mosaic_window(layers, seams, window, blend=blend)
                 yield column, row, image, owner + 1
 
@@ -196,14 +191,14 @@ def _remarks(
     if not seams.differences:
         remarks.append(remark("mosaic.no_overlap"))
     for (i, j), difference in seams.differences.items():
-        if values and abs(difference) > _RELIEF_STEP:
+        if values and abs(difference) > BLENDING.relief_step:
             gap = 1000 * abs(difference)
             where = "before" if difference > 0 else "behind"
             remarks.append(
                 remark("mosaic.step", name=names[i], gap=gap, where=where, other=names[j])
             )
     for (i, j), likeness in seams.likeness.items():
-        if likeness < _WEAK:
+        if likeness < BLENDING.weak:
             told = remark("mosaic.little_alike", name=names[i], other=names[j], likeness=likeness)
             remarks.append(told)
     if not values:

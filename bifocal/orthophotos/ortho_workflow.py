@@ -29,6 +29,7 @@ from bifocal.orthophotos.radiometry import corrected_photo, match_exposure
 from bifocal.orthophotos.rectify import SourcePhoto
 from bifocal.orthophotos.tiles import RasterResult, write_tiles
 from bifocal.orthophotos.triangles import TriangleSurface
+from bifocal.orthophotos.tuning import PIXELS
 from bifocal.remarks import remark
 from photocore.arrays import ByteArray
 from photocore.cli import Progress, no_progress
@@ -39,16 +40,6 @@ from photocore.reports.words import words_of
 
 #: What an orthophoto must be named.
 ORTHO_ENDING = "an orthophoto is written as GeoTIFF; name it .tif."
-#: A pixel this many times finer or coarser than the photo's own is asked back about.
-FINEST, COARSEST = 1 / 16, 40.0
-#: So is one this much finer that makes so many pixels that it takes minutes.
-FINE, MANY_PIXELS = 1 / 5.5, 25_000_000
-#: So are orthophotos of more pixels than this.
-MOST_PIXELS = 4_000_000_000
-#: Orthophotos of more pixels get reduced copies inside the file, for fast display.
-OVERVIEWS_FROM = 50_000_000
-#: An empty share of a picture from which ways to fill it are named.
-WORTH_A_REMARK = 0.1
 #: Flags of points that say nothing about the relief.
 _USELESS = frozenset({"UNCERTAIN", "NADIR", "OFF-RADIAL", "CHECK"})
 
@@ -157,7 +148,7 @@ def make_ortho(
             dpi=dpi_at_scale(grid.gsd, task.scale) if task.scale else None,
             crs_name=str(pair.extra.get("name") or "Facade plane"),
             tags=_tags(pair, task),
-            overviews=total > OVERVIEWS_FROM if task.overviews is None else task.overviews,
+            overviews=total > PIXELS.overviews_from if task.overviews is None else task.overviews,
             world_file=world_file,
         ) as writer:
             counts = write_tiles(
@@ -182,7 +173,7 @@ def not_measured(shares: dict[str, float], language: str = "en") -> str:
 
 def _advice(shares: dict[str, float], task: OrthoTask) -> list[str]:
     """Return what could be done about the empty part of a picture."""
-    if shares["none"] < WORTH_A_REMARK or task.options.complete:
+    if shares["none"] < PIXELS.worth_a_remark or task.options.complete:
         return []
     ways = []
     if task.image != "both":
@@ -269,8 +260,8 @@ def _grid(pair: Pair, first: int, size: tuple[int, int], surface: Surface, task:
     own = pair.photo(first).gsd(size)
     ratio = grid.gsd / own
     pixels = grid.width * grid.height
-    strange = not FINEST <= ratio <= COARSEST or pixels > MOST_PIXELS
-    strange = strange or (ratio < FINE and pixels > MANY_PIXELS)
+    strange = not PIXELS.finest <= ratio <= PIXELS.coarsest or pixels > PIXELS.most
+    strange = strange or (ratio < PIXELS.fine and pixels > PIXELS.many)
     if strange and not task.any_size:
         about = {"size": 1000 * grid.gsd, "width": grid.width, "height": grid.height}
         told = bytes_in_words(3 * pixels)

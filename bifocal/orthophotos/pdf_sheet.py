@@ -19,16 +19,15 @@ import numpy as np
 from bifocal.files.strips import colour_strips, predicted
 from bifocal.model.geotiff import RasterReader
 from bifocal.orthophotos.canvas import BLUE, WHITE, Colour, Pen, Place, text_width
-from bifocal.orthophotos.contour_lines import LABEL_SIZE, contour_labels
-from bifocal.orthophotos.drawing import STRIP, Drawing, PrintSheet
+from bifocal.orthophotos.contour_lines import contour_labels
+from bifocal.orthophotos.drawing import Drawing, PrintSheet
 from bifocal.orthophotos.sheet_margins import SheetMargins
+from bifocal.orthophotos.tuning import CONTOURS, SHEET
 from photocore.output import atomic_path
 from photocore.provenance import Provenance, provenance
 
 #: PDF's own unit in millimetres: 72 to the inch.
 _UNITS_PER_MM = 72 / 25.4
-#: More points than this are drawn smaller, and their names further apart.
-_MANY = 60
 #: Dark red: seen on both colours of the relief and on stone.
 _RED: Colour = (110, 20, 20)
 _CONTOUR = Pen(layer="", width=0.1, colour=_RED)
@@ -244,14 +243,14 @@ class _Page:
             self.canvas.line(line, _INDEX if contour.index else _CONTOUR)
         for label in contour_labels(self.drawing.contours, self.drawing.scale):
             place = self.margins.place(*label.place)
-            how = {"size": LABEL_SIZE, "middle": True, "angle": label.angle}
+            how = {"size": CONTOURS.label_size, "middle": True, "angle": label.angle}
             self.canvas.label(place, label.words, _INDEX, **how)
 
     def _label(self, place: Place, words: str, *, size: float) -> None:
         """Write on the picture, moved inwards where the frame would cut it."""
         left, bottom, right, top = self.sheet.frame
         x = max(left + 1, min(place[0], right - 1 - text_width(words, size)))
-        y = max(bottom + STRIP + 1, min(place[1], top - 1 - size))
+        y = max(bottom + SHEET.strip + 1, min(place[1], top - 1 - size))
         self.canvas.label((x, y), words, _NAME, size=size)
 
     def _points(self) -> None:
@@ -259,7 +258,7 @@ class _Page:
         for points, size in ((self.drawing.control, 1.6), (self.drawing.points, 1.0)):
             if points is None:
                 continue
-            if len(points.ids) > _MANY:
+            if len(points.ids) > SHEET.many:
                 size /= 2
             for name, (x, y, _) in zip(points.ids, points.xyz.tolist(), strict=True):
                 if np.isfinite(x) and np.isfinite(y):
@@ -292,7 +291,7 @@ class _Page:
             self.nameless += 1
             return
         # Where points are many, names take a share of the picture, not all of it.
-        clear = 3.0 if len(self.labels) > _MANY else 0.0
+        clear = 3.0 if len(self.labels) > SHEET.many else 0.0
         self.labels.append((beside - clear, beside + wide + clear, py - clear, py + 2.0 + clear))
         self._label((beside, py + 0.4), name, size=2.0)
 

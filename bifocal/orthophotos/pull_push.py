@@ -8,10 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from bifocal.orthophotos.tuning import COLOURS
 from photocore.arrays import BoolArray, Float32Array
-
-#: Halvings of the picture; holes up to 2^8 px wide are closed.
-_LEVELS = 8
 
 
 def fill_holes(
@@ -36,7 +34,7 @@ def fill_holes(
     colour: NDArray[Any] = image.astype(np.float32)
     colour[~known] = 0
     levels = [(colour, weight)]
-    for _ in range(_LEVELS):
+    for _ in range(COLOURS.halvings):
         if min(weight.shape) < 2:
             break
         size = ((weight.shape[1] + 1) // 2, (weight.shape[0] + 1) // 2)

@@ -19,19 +19,11 @@ from bifocal.model.image import ImageArray, as_photo
 from bifocal.model.photo import Photo
 from bifocal.model.surface import Surface
 from bifocal.orthophotos.rectify import ChromaticShift, SourcePhoto
+from bifocal.orthophotos.tuning import COLOURS
 from bifocal.orthophotos.visibility import hidden_from
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, Float32Array, FloatArray
 from photocore.errors import InputError
-
-#: Largest coefficient of vignetting; lenses have some tenths.
-STEEPEST = 100.0
-#: Side of the grid on which two photos are compared. [px]
-_COMPARE = 400
-#: Fewer common pixels than this say nothing about colours.
-_LEAST_COMMON = 500
-#: Rows corrected at a time.
-_ROWS = 256
 
 
 def corrected_photo(
@@ -85,11 +77,12 @@ def devignetted(image: ImageArray, photo: Photo, model: str) -> ImageArray:
         return _scaled(image, lambda square: (1 + np.float32(share) * square) ** 2)
     try:
         k1, k2, k3 = (float(value) for value in model.split(","))
-        if not max(abs(k1), abs(k2), abs(k3)) <= STEEPEST:
+        if not max(abs(k1), abs(k2), abs(k3)) <= COLOURS.steepest:
             raise ValueError(model)
     except ValueError:
         raise InputError(
-            f"vignetting: {model!r} is neither cos4 nor three numbers k1,k2,k3 up to {STEEPEST:g}."
+            f"vignetting: {model!r} is neither cos4 nor three numbers k1,k2,k3 up to "
+            f"{COLOURS.steepest:g}."
         ) from None
 
     def gain(square: Float32Array) -> Float32Array:
@@ -149,7 +142,7 @@ def match_exposure(
     with rho the distance from the middle of photo 2: exposure, white balance, gamma and the
     difference in vignetting.
     """
-    factor = max(1.0, max(grid.shape) / _COMPARE)
+    factor = max(1.0, max(grid.shape) / COLOURS.compare)
     coarse = Grid.from_bounds(grid.bounds, gsd=grid.gsd * factor)
     relief = surface.window(coarse)
     samples, usable, positions = [], np.ones(coarse.shape, bool), []
@@ -161,7 +154,7 @@ def match_exposure(
         samples.append(colours.reshape(*coarse.shape, -1))
         positions.append((column, row))
     usable &= np.logical_and.reduce([((s > 0.03) & (s < 0.97)).all(axis=-1) for s in samples])
-    if np.count_nonzero(usable) < _LEAST_COMMON:
+    if np.count_nonzero(usable) < COLOURS.least_common:
         return second, remark("ortho.not_matched")
     centre, radius = _middle(second.size)
     column, row = positions[1]
@@ -227,8 +220,8 @@ def _by_rows(
     limit = np.iinfo(image.dtype).max
     x = ((np.arange(width) - centre[0]) ** 2).astype(np.float32)
     y = ((np.arange(height) - centre[1]) ** 2).astype(np.float32)
-    for top in range(0, height, _ROWS):
-        rows = slice(top, top + _ROWS)
+    for top in range(0, height, COLOURS.rows):
+        rows = slice(top, top + COLOURS.rows)
         square = (x[None, :] + y[rows, None]) / np.float32(radius**2)
         value = change(image[rows], square)
         out[rows] = np.rint(value.clip(0, limit)).astype(image.dtype)

@@ -13,13 +13,11 @@ from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.model.image import ImageArray, as_photo
 from bifocal.model.photo import Photo
 from bifocal.orthophotos.ortho_image import Interpolation
+from bifocal.orthophotos.tuning import RECTIFICATION
 from bifocal.rays import apparent_magnification, plane_position
 from photocore.arrays import BoolArray, Float32Array, FloatArray
 from photocore.errors import GeometryError, InputError
 
-#: Distortion is tabulated every so many ideal pixels and interpolated linearly in between; for a
-#: 19 mm zoom (44 px in the corner) that is true to 0.001 px.
-_LENS_STEP = 8
 #: cv2.remap addresses pixels with 16 bits.
 _REMAP_LIMIT = 32_000
 
@@ -284,23 +282,23 @@ class LensTable:
         """Tabulate over the ideal pixels that the photo shows."""
         assert photo.lens is not None
         ideal = photo.lens.undistort(_rim(size, outwards=1.0, points=65))
-        low = np.floor(np.nanmin(ideal, axis=0)) - _LENS_STEP
-        high = np.ceil(np.nanmax(ideal, axis=0)) + _LENS_STEP
+        low = np.floor(np.nanmin(ideal, axis=0)) - RECTIFICATION.lens_step
+        high = np.ceil(np.nanmax(ideal, axis=0)) + RECTIFICATION.lens_step
         if not (np.isfinite(low).all() and (high - low).max() < 20 * max(size)):
             raise GeometryError(
                 "the lens file bends the rim of this photo beyond all bounds; calibrate again "
                 "with board photos that reach into the corners."
             )
-        x = np.arange(low[0], high[0] + _LENS_STEP, _LENS_STEP)
-        y = np.arange(low[1], high[1] + _LENS_STEP, _LENS_STEP)
+        x = np.arange(low[0], high[0] + RECTIFICATION.lens_step, RECTIFICATION.lens_step)
+        y = np.arange(low[1], high[1] + RECTIFICATION.lens_step, RECTIFICATION.lens_step)
         points = np.stack(np.meshgrid(x, y), axis=-1)
         shift = (photo.lens.distort(points) - points).astype(np.float32)
         return cls(np.ascontiguousarray(shift), float(low[0]), float(low[1]))
 
     def distort(self, column: FloatArray, row: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return raw positions of ideal ones; NaN where the photo cannot show them."""
-        u = ((column - self.left) * (1 / _LENS_STEP)).astype(np.float32)
-        v = ((row - self.top) * (1 / _LENS_STEP)).astype(np.float32)
+        u = ((column - self.left) * (1 / RECTIFICATION.lens_step)).astype(np.float32)
+        v = ((row - self.top) * (1 / RECTIFICATION.lens_step)).astype(np.float32)
         outside = (math.nan, math.nan)
         shift = cv2.remap(self.shift, u, v, cv2.INTER_LINEAR, borderValue=outside)
         return column + shift[:, :, 0], row + shift[:, :, 1]

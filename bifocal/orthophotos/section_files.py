@@ -22,6 +22,7 @@ from bifocal.orthophotos.canvas import (
 )
 from bifocal.orthophotos.drawing import Section, multiples, round_step, signed
 from bifocal.orthophotos.dxf_canvas import DxfCanvas
+from bifocal.orthophotos.tuning import PROFILE
 from photocore.arrays import FloatArray
 from photocore.output import atomic_path
 from photocore.reports.words import Words
@@ -40,11 +41,6 @@ _AXIS = Pen(layer="BIFOCAL_AXES", width=0.13)
 _WALL = Pen(layer="BIFOCAL_AXES", width=0.13, colour=BLUE, dashes=(4.0, 1.5))
 _NAME = Pen(layer="BIFOCAL_SECTION_NAME")
 _BAR = Pen(layer="BIFOCAL_SCALEBAR")
-#: Between values of the axes: along the wall, and of the relief, to the right and upwards; about.
-#: On paper. [mm]
-_ALONG, _ACROSS = 20.0, (10.0, 5.0)
-#: White around the profile, for the values, and below it, for name and scale bar. [mm]
-MARGIN, FOOT = 10.0, 19.0
 
 
 def write_section_dxf(path: Path, cut: Section, *, scale: float, say: Words) -> None:
@@ -58,11 +54,11 @@ def write_section_dxf(path: Path, cut: Section, *, scale: float, say: Words) -> 
 def write_section_svg(path: Path, cut: Section, *, scale: float, say: Words) -> None:
     """Write one section as SVG that prints at 1:scale."""
     left, bottom, right, top = _extent(cut, scale)
-    canvas, title = _SvgCanvas(left - MARGIN, top + MARGIN), _title(cut, scale, say)
+    canvas, title = _SvgCanvas(left - PROFILE.margin, top + PROFILE.margin), _title(cut, scale, say)
     draw_section(canvas, cut, scale, title)
     bar = round_step(0.05 * scale) * 1000 / scale
-    width = max(right - left, bar, text_width(title, 3.2)) + 2 * MARGIN
-    height = top - bottom + 2 * MARGIN + FOOT
+    width = max(right - left, bar, text_width(title, 3.2)) + 2 * PROFILE.margin
+    height = top - bottom + 2 * PROFILE.margin + PROFILE.foot
     text = (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.3f}mm" height="{height:.3f}mm" '
         f'viewBox="0 0 {width:.3f} {height:.3f}" font-family="Helvetica, Arial, sans-serif">\n'
@@ -81,15 +77,15 @@ def draw_section(canvas: Canvas, cut: Section, scale: float, title: str) -> None
     upright = cut.axis == "x"
     along, across = ((bottom, top), (left, right)) if upright else ((left, right), (bottom, top))
     box(canvas, (left, bottom), right - left, top - bottom, _AXIS)
-    relief_step = _ACROSS[0 if upright else 1]
+    relief_step = PROFILE.across[0 if upright else 1]
     for low, high, paper, vertical in (
-        (*along, _ALONG, upright), (*across, relief_step, not upright)
+        (*along, PROFILE.along, upright), (*across, relief_step, not upright)
     ):  # fmt: skip
         step = round_step(paper / factor)
         digits = max(0, -math.floor(math.log10(step) + 1e-9))
         for value in multiples(low / factor, high / factor, step).tolist():
             at = value * factor
-            words = f"{value:.{digits}f}" if paper == _ALONG else signed(value, digits)
+            words = f"{value:.{digits}f}" if paper == PROFILE.along else signed(value, digits)
             if vertical:
                 canvas.line([(left - 1.2, at), (left, at)], _AXIS)
                 place = (left - 1.8 - text_width(words, 2.0), at - 0.7)
@@ -104,7 +100,7 @@ def draw_section(canvas: Canvas, cut: Section, scale: float, title: str) -> None
         canvas.line(places, _PROFILE if measured else _GUESSED)
     names = ("r [m]", "Y [m]") if upright else ("X [m]" if cut.axis == "y" else "s [m]", "r [m]")
     canvas.text((right - text_width(names[0], 2.2), bottom - 6.8), names[0], _AXIS, size=2.2)
-    canvas.text((left - MARGIN + 1, top + 2.5), names[1], _AXIS, size=2.2)
+    canvas.text((left - PROFILE.margin + 1, top + 2.5), names[1], _AXIS, size=2.2)
     canvas.text((left, bottom - 11.5), title, _NAME, size=3.2, bold=True)
     length = round_step(0.05 * scale)
     scale_bar(canvas, (left, bottom - 20.0), length, factor, _BAR)
@@ -121,7 +117,7 @@ def _extent(cut: Section, scale: float) -> tuple[float, float, float, float]:
 
     def rounded(values: FloatArray) -> tuple[float, float]:
         """Return a range that holds the values and 0, to half a division more."""
-        step = round_step(_ACROSS[0 if cut.axis == "x" else 1] / factor) / 2
+        step = round_step(PROFILE.across[0 if cut.axis == "x" else 1] / factor) / 2
         low, high = min(values.min(), 0.0), max(values.max(), 0.0)
         return (math.floor(low / step - 1e-6) * step * factor,
                 math.ceil(high / step + 1e-6) * step * factor)  # fmt: skip

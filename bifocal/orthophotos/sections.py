@@ -10,11 +10,9 @@ import numpy as np
 from bifocal.model.grid import Grid
 from bifocal.model.surface import Surface
 from bifocal.orthophotos.drawing import Section
+from bifocal.orthophotos.tuning import PROFILE
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
-
-#: Points of a section that are looked up together.
-_TOGETHER = 64
 
 
 def section(
@@ -68,13 +66,13 @@ def section_letter(number: int) -> str:
 def sample(surface: Surface, points: FloatArray, *, gsd: float) -> FloatArray:
     """Return relief at points of a path, shape (n,); nearest pixel of the given size. [m]"""
     relief = np.full(len(points), np.nan)
-    for first in range(0, len(points), _TOGETHER):
-        part = points[first : first + _TOGETHER]
+    for first in range(0, len(points), PROFILE.together):
+        part = points[first : first + PROFILE.together]
         low, high = part.min(axis=0), part.max(axis=0)
         width, height = (math.ceil((high[k] - low[k]) / gsd) + 1 for k in (0, 1))
         window = Grid(x0=float(low[0]), y0=float(high[1]), gsd=gsd, width=width, height=height)
         column, row = np.rint(window.pixel_of(part)).astype(np.int64).T
-        relief[first : first + _TOGETHER] = surface.window(window)[row, column]
+        relief[first : first + PROFILE.together] = surface.window(window)[row, column]
     return relief
 
 

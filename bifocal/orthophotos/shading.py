@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from bifocal.model.grid import Grid
 from bifocal.model.surface import Surface
+from bifocal.orthophotos.tuning import SHADING
 from photocore.arrays import BoolArray, ByteArray, Float32Array
 
 #: Tints from the farthest to the nearest: blue behind the wall, the wall itself nearly white, sand
@@ -17,13 +18,6 @@ _TINTS = np.array(
 )
 #: Direction to the light: upper left, 45 degrees high.
 _LIGHT = np.array([-0.5, 0.5, 0.7071])
-
-
-#: Of relief that was not measured: how pale its colours become, and how dark its lines are.
-_PALE, _LINES = 0.45, 0.55
-#: Distance and width of the lines; what is narrower than this is not paler, either, and what is
-#: narrower than that bears no lines, which would be a rash of dashes. On paper. [mm]
-_PERIOD, _STROKE, _NARROW, _LINED = 1.5, 0.2, 1.0, 2.5
 
 
 def tints(relief: NDArray[np.floating], limits: tuple[float, float]) -> Float32Array:
@@ -67,7 +61,10 @@ def _unmeasured(
     surface: Surface, measured: Surface, grid: Grid, scale: float
 ) -> tuple[BoolArray, BoolArray]:
     """Return where relief was not measured, and where that is broad enough for lines."""
-    small, large = (max(3, round(wide / 1000 * scale / grid.gsd) | 1) for wide in (_NARROW, _LINED))
+    small, large = (
+        max(3, round(wide / 1000 * scale / grid.gsd) | 1)
+        for wide in (SHADING.narrow, SHADING.lined)
+    )
     wide = grid.window(-large, -large, grid.width + 2 * large, grid.height + 2 * large)
     mask = np.isfinite(surface.window(wide)) & np.isnan(measured.window(wide))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (small, small))
@@ -114,13 +111,13 @@ def shaded(
         guessed, broad = _unmeasured(surface, measured, grid, scale)
         rows, columns = np.nonzero(guessed)
         pixel = 1000 * grid.gsd / scale  # on paper [mm]
-        period = max(4, round(_PERIOD * np.sqrt(2) / pixel))
-        stroke = max(1, round(_STROKE * np.sqrt(2) / pixel))
+        period = max(4, round(SHADING.period * np.sqrt(2) / pixel))
+        stroke = max(1, round(SHADING.stroke * np.sqrt(2) / pixel))
         # Counted from the plane's origin, so that the lines go on from tile to tile.
         first = round((grid.x0 - grid.y0) / grid.gsd)
         lined = ((rows + columns + first) % period < stroke) & broad[rows, columns]
-        pale = picture[rows, columns] * (1 - _PALE) + 255 * _PALE
-        picture[rows, columns] = np.where(lined[:, None], pale * _LINES, pale)
+        pale = picture[rows, columns] * (1 - SHADING.pale) + 255 * SHADING.pale
+        picture[rows, columns] = np.where(lined[:, None], pale * SHADING.lines, pale)
     picture[~known] = 255
     colours = np.clip(np.rint(picture), 0, 255).astype(np.uint8)
     return colours, np.where(known, np.uint8(255), np.uint8(0))

@@ -15,7 +15,8 @@ from bifocal.orthophotos.canvas import (
     scale_bar,
     text_width,
 )
-from bifocal.orthophotos.drawing import BAND, BEYOND, STRIP, Drawing, PrintSheet, Section, multiples
+from bifocal.orthophotos.drawing import Drawing, PrintSheet, Section, multiples
+from bifocal.orthophotos.tuning import SHEET
 
 _FRAME = Pen(layer="BIFOCAL_FRAME")
 _THICK = Pen(layer="BIFOCAL_FRAME", width=0.5)
@@ -23,10 +24,6 @@ _RULE = Pen(layer="BIFOCAL_FRAME", width=0.35)
 _BAR = Pen(layer="BIFOCAL_SCALEBAR")
 _PAPER = Pen(layer="BIFOCAL_SECTION_LINES", colour=WHITE)
 _MARK = Pen(layer="BIFOCAL_SECTION_LINES", width=0.5, colour=BLUE)
-#: From the end of a section within the picture to its letter. [mm]
-_WITHIN = 3.0
-#: Size of the letters. [mm]
-_LETTER = 3.0
 
 
 class SheetMargins:
@@ -72,7 +69,7 @@ class SheetMargins:
     def _frame(self) -> None:
         left, bottom, right, top = self.sheet.frame
         box(self.canvas, (left, bottom), right - left, top - bottom, _THICK)
-        self.canvas.line([(left, bottom + STRIP), (right, bottom + STRIP)], _RULE)
+        self.canvas.line([(left, bottom + SHEET.strip), (right, bottom + SHEET.strip)], _RULE)
         box(self.canvas, self.origin, *self.drawing.paper_size, _FRAME)
 
     def _ticks(self) -> None:
@@ -102,7 +99,7 @@ class SheetMargins:
             if not (beyond or self.within):
                 continue
             x, y = self.place(*end.tolist())
-            away = BEYOND if beyond else _WITHIN
+            away = SHEET.beyond if beyond else SHEET.within
             self.canvas.line([(x, y), (x + 1.5 * outwards[0], y + 1.5 * outwards[1])], _MARK)
             tip = np.array([x, y]) + away * outwards
             look = cut.looking()
@@ -111,10 +108,8 @@ class SheetMargins:
                 near, far = tip - 1.9 * look, tip + 3.7 * look
                 rim = [near - 1.9 * side, far - 1.9 * side, far + 1.9 * side, near + 1.9 * side]
                 self.canvas.area([(float(a), float(b)) for a, b in rim], _PAPER)
-            self.canvas.text(
-                (float(tip[0]), float(tip[1]) - 0.36 * _LETTER), cut.letter, _MARK, size=_LETTER,
-                bold=True, middle=True,
-            )  # fmt: skip
+            at, size = (float(tip[0]), float(tip[1]) - 0.36 * SHEET.letter), SHEET.letter
+            self.canvas.text(at, cut.letter, _MARK, size=size, bold=True, middle=True)
             foot = tip + 2.0 * look
             corners = [foot - 0.8 * side, foot + 0.8 * side, foot + 1.4 * look]
             self.canvas.area([(float(a), float(b)) for a, b in corners], _MARK)
@@ -122,7 +117,7 @@ class SheetMargins:
     def _title(self) -> None:
         left, bottom, right, _ = self.sheet.frame
         block = left + 0.44 * (right - left)
-        self.canvas.line([(block, bottom), (block, bottom + STRIP)], _RULE)
+        self.canvas.line([(block, bottom), (block, bottom + SHEET.strip)], _RULE)
         room = right - block - 5
 
         def fitting(text: str, size: float) -> float:
@@ -130,7 +125,7 @@ class SheetMargins:
             return round(min(size, room / (1.08 * LETTER_WIDTH * max(len(text), 1))), 3)
 
         title = self.drawing.title
-        top = bottom + STRIP
+        top = bottom + SHEET.strip
         self.canvas.text((block + 3, top - 8), title, _FRAME, size=fitting(title, 5.0), bold=True)
         kind = f"{self.drawing.say(self.drawing.kind)} 1:{self.drawing.scale:g}"
         self.canvas.text((block + 3, top - 14), kind, _FRAME, size=3.5)
@@ -147,7 +142,7 @@ class SheetMargins:
         """Draw the level mark: the triangle that says how high Y = 0 is, and where up is."""
         line = self.canvas.line
         left, bottom, _, _ = self.sheet.frame
-        x, y = left + 8, bottom + STRIP - 7
+        x, y = left + 8, bottom + SHEET.strip - 7
         pen = Pen(layer="BIFOCAL_FRAME", width=0.25)
         line([(x - 2.2, y + 3), (x + 2.2, y + 3), (x, y), (x - 2.2, y + 3)], pen)
         line([(x - 4, y), (x + 22, y)], pen)
@@ -159,7 +154,7 @@ class SheetMargins:
         xmin, ymin, _, ymax = self.drawing.grid.bounds
         if ymin <= 0 <= ymax:
             px, py = self.place(xmin, 0.0)
-            tip = px - BAND + 2.2
+            tip = px - SHEET.band + 2.2
             line([(tip - 1.4, py + 2), (tip + 1.4, py + 2), (tip, py), (tip - 1.4, py + 2)], _FRAME)
 
     def _legend(self) -> None:

@@ -11,16 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.model.grid import Bounds, Grid, bounds_of
+from bifocal.orthophotos.tuning import TRIANGLES
 from photocore.arrays import Float32Array, FloatArray, IntArray, as_points
 from photocore.errors import InputError
 
-#: Times a breakline is halved where the triangles still cross it; 2^10 pieces are finer than any
-#: orthophoto.
-_HALVINGS = 10
 #: Fixed-point bits of the polygon rasteriser: corners to 1/256 px.
 _BITS = 8
-#: Points closer than this to another are the same. [m]
-_SAME = 1e-6
 
 
 class TriangleSurface:
@@ -57,7 +53,7 @@ class TriangleSurface:
                 f"points: {len(points)} different ones are too few; three or more span a surface."
             )
         try:
-            for _ in range(_HALVINGS):
+            for _ in range(TRIANGLES.halvings):
                 # QJ would move points; Qhull's default merges flat triangles exactly.
                 triangles = Delaunay(points[:, :2]).simplices
                 points, breaklines, crossed = _halved(points, breaklines, triangles)
@@ -121,7 +117,7 @@ def _without_doubles(
 ) -> tuple[FloatArray, list[list[int]]]:
     """Return points of different X, Y; the highest of doubles stays, as a camera would see it."""
     order = np.lexsort((-points[:, 2], points[:, 1], points[:, 0]))
-    keys = np.rint(points[:, :2] / _SAME).astype(np.int64)
+    keys = np.rint(points[:, :2] / TRIANGLES.same).astype(np.int64)
     _, first, inverse = np.unique(keys[order], axis=0, return_index=True, return_inverse=True)
     new_of_old = np.empty(len(points), np.int64)
     new_of_old[order] = inverse.ravel()

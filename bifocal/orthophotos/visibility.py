@@ -12,29 +12,9 @@ from numpy.typing import NDArray
 from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.model.ray_field import RayField
 from bifocal.model.surface import EVERYWHERE, Surface
+from bifocal.orthophotos.tuning import VISIBILITY
 from bifocal.rays import Foot, magnification, object_rays, plane_position, straight
 from photocore.arrays import BoolArray, Float32Array
-
-#: A pixel of the buffer is a candidate when another on its ray lies this much farther in. [px]
-_MARGIN = 1.0
-#: On surfaces that are seen at a grazing angle neighbours this far apart share a cell. [px]
-_SURE = 5.0
-#: Shadows shorter than this cannot be told from the half pixel to which steps are known. [px]
-_LEAST_SHADOW = 0.35
-#: A step lies anywhere between two pixel centres; shadows are taken this much longer than from the
-#: middle, which on rendered walls finds 99 % of the hidden pixels at 0.27 % false alarms. [px]
-_RIM = 0.5
-#: A rise of this many times the ray's own within a pixel is a step.
-_STEEP = 1.0
-#: Where a ray is compared with the relief: distances from the pixel, and from its occluder. [px]
-_BESIDE = (1.25, 1.75)
-_AROUND = (-2.0, -1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0)
-#: Windows with surroundings of more pixels are halved, down to this side. [px]
-_LARGEST, _SMALLEST = 2_000_000, 200
-#: Through media neighbours on a flat part lie up to this much farther apart than on the axis.
-_BENT = 1.3
-#: No more than this many points are inserted between two neighbours.
-_MOST_STEPS = 400
 
 
 def hidden_from(surface: Surface, grid: Grid, camera: Foot, relief: Float32Array) -> BoolArray:
@@ -64,7 +44,7 @@ def hidden_from(surface: Surface, grid: Grid, camera: Foot, relief: Float32Array
     if limits is None:
         return np.zeros(grid.shape, bool)
     wide, column, row = limits
-    if wide.width * wide.height > _LARGEST and min(grid.shape) >= 2 * _SMALLEST:
+    if wide.width * wide.height > VISIBILITY.largest and min(grid.shape) >= 2 * VISIBILITY.smallest:
         # Far from the nadir of a fine orthophoto the surroundings outgrow the window: halve it.
         hidden = np.zeros(grid.shape, bool)
         for left, top, part in grid.tiles((max(grid.shape) + 1) // 2):
@@ -80,7 +60,7 @@ def hidden_from(surface: Surface, grid: Grid, camera: Foot, relief: Float32Array
     _, high = surface.extremes(EVERYWHERE)
     largest = float(magnification(high, straight(camera).distance))
     if camera.media is not None:
-        largest *= _BENT
+        largest *= VISIBILITY.bent
     return _hidden(relief_wide, wide, camera, (column, row), grid.shape, largest)
 
 
@@ -289,7 +269,7 @@ def _join(
     at = np.nonzero(gap > 1)
     if not len(at[0]):
         return
-    count = np.minimum(np.ceil(gap[at]), _MOST_STEPS).astype(np.int64)
+    count = np.minimum(np.ceil(gap[at]), VISIBILITY.most_steps).astype(np.int64)
     index = np.repeat(np.arange(len(count)), count)
     part = np.arange(len(index)) - np.repeat(np.cumsum(count) - count, count)
     t = ((part + 1) / (count + 1)[index]).astype(np.float32)
@@ -306,14 +286,14 @@ def _sharpen(around: _Surroundings, buffer: _Buffer) -> BoolArray:
     """
     core, rho = around.core, around.rho[around.core]
     ahead = rho - buffer.nearest[buffer.cells]
-    hidden = ahead > np.float32(_MARGIN)
+    hidden = ahead > np.float32(VISIBILITY.margin)
     flags, square = hidden.astype(np.uint8), np.ones((3, 3), np.uint8)
-    sure = (cv2.erode(flags, square) > 0) & (ahead > np.float32(_SURE))
+    sure = (cv2.erode(flags, square) > 0) & (ahead > np.float32(VISIBILITY.sure))
     unsure = (cv2.dilate(flags, square) > 0) & ~sure
     known = np.where(np.isnan(around.relief), np.float32(-1e9), around.relief)
     rise = cv2.dilate(known, square)[core] - around.relief[core]
     depth = around.distance - around.relief[core]
-    unsure |= rise * rho > np.float32(_LEAST_SHADOW) * depth
+    unsure |= rise * rho > np.float32(VISIBILITY.least_shadow) * depth
     unsure &= rho > 0  # nothing lies between the nadir and the camera
     row, column = np.nonzero(unsure & ~sure)
     if not len(row):
@@ -346,16 +326,18 @@ def _above_ray(
         inside = (i >= 0) & (i < rows) & (j >= 0) & (j < columns)
         return around.relief[i.clip(0, rows - 1), j.clip(0, columns - 1)], inside
 
-    near = [np.full(len(row), t, np.float32) for t in _BESIDE]
+    near = [np.full(len(row), t, np.float32) for t in VISIBILITY.beside]
     left = np.arange(len(row))
-    for t_all in [*near, *(to_occluder + np.float32(shift) for shift in _AROUND)]:
+    for t_all in [*near, *(to_occluder + np.float32(shift) for shift in VISIBILITY.around)]:
         t, ray = t_all[left], slope[left]
         above, inside = height(left, t)
         over = above - r[left] - ray * t
-        perhaps = np.nonzero(inside & (t >= _BESIDE[0]) & (over > -np.float32(_RIM) * ray))[0]
+        perhaps = np.nonzero(
+            inside & (t >= VISIBILITY.beside[0]) & (over > -np.float32(VISIBILITY.rim) * ray)
+        )[0]
         # The benefit of the doubt is a step's only: a slope just short of the ray's hides nothing.
         below, _ = height(left[perhaps], t[perhaps] - 1)
-        step = above[perhaps] - below > np.float32(_STEEP) * ray[perhaps]
+        step = above[perhaps] - below > np.float32(VISIBILITY.steep) * ray[perhaps]
         hidden[left[perhaps[step | (over[perhaps] > 0)]]] = True
         left = left[~hidden[left]]
     return hidden

@@ -11,15 +11,8 @@ from bifocal.model.grid import Bounds, Grid
 from bifocal.model.surface import Surface
 from bifocal.orthophotos.ortho_image import Source
 from bifocal.orthophotos.pull_push import fill_holes
+from bifocal.orthophotos.tuning import WHOLE
 from photocore.arrays import ByteArray, Float32Array
-
-#: Longer side of the raster relief is interpolated on. [px]
-_SIDE = 512
-#: Distance from known relief, as shares of the picture's longer side, over which interpolated
-#: relief goes over into the plane: a wall goes on, a porch does not.
-_NEAR, _FAR = 0.03, 0.1
-#: This near to known relief the interpolation starts from its very pixels. [px]
-_SEAM = 48.0
 
 
 class CompletedSurface:
@@ -35,7 +28,7 @@ class CompletedSurface:
 
     def __init__(self, surface: Surface, grid: Grid) -> None:
         self.surface = surface
-        step = max(1.0, max(grid.shape) / _SIDE)
+        step = max(1.0, max(grid.shape) / WHOLE.side)
         self._grid = Grid.from_bounds(grid.bounds, gsd=grid.gsd * step)
         relief = surface.window(self._grid)
         known = np.isfinite(relief)
@@ -44,7 +37,7 @@ class CompletedSurface:
         if known.any() and not known.all():
             filled, done = fill_holes(self._relief, known, ~known)
             away = cv2.distanceTransform((~known).astype(np.uint8), cv2.DIST_L2, 5)
-            near, far = (share * max(self._grid.shape) for share in (_NEAR, _FAR))
+            near, far = (share * max(self._grid.shape) for share in (WHOLE.near, WHOLE.far))
             share = np.clip((far - away) / max(far - near, 1.0), 0, 1)
             self._share = np.where(known | done, share, 0).astype(np.float32)
             self._relief = np.where(self._share > 0, filled * self._share, 0).astype(np.float32)
@@ -58,7 +51,7 @@ class CompletedSurface:
         rest = self._at(self._relief, grid)
         if unknown.all():
             return rest
-        deep = cv2.distanceTransform(unknown.astype(np.uint8), cv2.DIST_L2, 3) > _SEAM
+        deep = cv2.distanceTransform(unknown.astype(np.uint8), cv2.DIST_L2, 3) > WHOLE.seam
         relief[deep] = rest[deep]
         relief, _ = fill_holes(relief, ~unknown | deep, unknown & ~deep)
         return np.where(np.isnan(relief), rest, relief)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from photocore.errors import InputError
+from photocore.remarks import remark
 
 #: A medium adjusted by more than this many of its prior sigmas is another one, or nonsense.
 FARTHEST = 5.0
@@ -51,9 +52,7 @@ def is_possible(value: float, *, start: float, sigma: float, least: float, most:
 
 def hardly_determined(label: str, *, start: float, sigma: float) -> str:
     """Return that an unknown rests on its prior alone."""
-    return (
-        f"{label}: the data hardly carry it; it rests on what was given, {start:g} ± {sigma:.2g}."
-    )
+    return remark("adjustment.hardly_determined", label=label, start=start, sigma=sigma)
 
 
 def parse_prior(text: str) -> tuple[str, float]:

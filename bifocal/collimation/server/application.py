@@ -52,16 +52,12 @@ def application(session: Session, token: str) -> Guard:
     app = Starlette(
         routes=routes,
         exception_handlers={
-            FieldError: _wrong_field, PhotogrammetryError: _refused, HTTPException: _plain_error,
+            PhotogrammetryError: _refused, HTTPException: _plain_error,
             TooLarge: _too_large, OSError: _refused, Exception: _fault,
         },
     )  # fmt: skip
     app.state.session, app.state.token, app.state.assets = session, token, Assets()
     return Guard(app, token)  # outside of all: what fails is answered under its rules too
-
-
-async def _wrong_field(request: Request, error: Exception) -> Response:  # noqa: ARG001
-    return answer({"error": str(error)}, 400)
 
 
 async def _fault(request: Request, error: Exception) -> Response:  # noqa: ARG001
@@ -70,7 +66,8 @@ async def _fault(request: Request, error: Exception) -> Response:  # noqa: ARG00
 
 async def _refused(request: Request, error: Exception) -> Response:
     spoken = request.app.state.session.spoken
-    return answer({"error": in_language(str(error), spoken)}, 422)
+    status = 400 if isinstance(error, FieldError) else 422
+    return answer({"error": in_language(str(error), spoken)}, status)
 
 
 async def _plain_error(request: Request, error: Exception) -> Response:  # noqa: ARG001

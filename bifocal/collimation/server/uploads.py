@@ -12,6 +12,7 @@ from typing import BinaryIO
 from PIL import Image
 
 from bifocal.collimation.project import PHOTOS
+from bifocal.remarks import remark
 from photocore.errors import InputError
 from photocore.images import ImageInfo, image_info, read_image
 from photocore.output import atomic_path, free_path
@@ -35,7 +36,7 @@ def take_photos(folder: Path, sent: Sequence[tuple[str, BinaryIO]]) -> tuple[Pat
         If they are not two photos; nothing is written then.
     """
     if len(sent) != 2:
-        raise InputError(f"expected two photos, got {len(sent)}.")
+        raise InputError(remark("page.two_photos", count=len(sent)))
     with tempfile.TemporaryDirectory() as place:
         checked = []
         for number, (name, file) in enumerate(sent):
@@ -59,7 +60,7 @@ def safe_name(name: str) -> str:
     stem, dot, ending = last.rpartition(".")
     ending = f".{ending.lower()}"
     if not dot or ending not in PHOTOS:
-        raise InputError(f"{last[:60]}: is no photo (JPEG, PNG or TIFF).")
+        raise InputError(remark("page.no_photo", name=last[:60]))
     letters = "".join(c if c.isascii() and (c.isalnum() or c in "-_") else "_" for c in stem)
     return f"{letters.strip('_')[:80] or 'photo'}{ending}"
 
@@ -96,15 +97,12 @@ def _refuse_bomb(path: Path) -> None:
             with Image.open(path) as image:
                 width, height = image.size
     except Image.DecompressionBombError:
-        raise InputError(
-            f"{path.name}: is larger than the page takes (178 MP); start the page with its file: "
-            "bifocal pick FAR NEAR"
-        ) from None
+        raise InputError(remark("page.too_large", name=path.name)) from None
     except (OSError, SyntaxError, ValueError):
         return
     if width * height > FROM and width * height > EMPTIEST * size:
         raise InputError(
-            f"{path.name}: claims {width} x {height} px in {size // 1024} kB; that is no photo."
+            remark("page.bomb", name=path.name, width=width, height=height, size=size // 1024)
         )
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from bifocal.collimation.records import PickedPoint
 from bifocal.collimation.workbook.rows import change_rows, read_rows
+from bifocal.remarks import remark
 from bifocal.workbook.pair_workflow import read_pair
 from photocore.errors import InputError, PhotogrammetryError
 
@@ -45,7 +46,7 @@ def change_in_process(
         )  # fmt: skip
         answer = json.loads(done.stdout)
     except (OSError, ValueError, subprocess.TimeoutExpired):
-        raise InputError(f"{path.name}: could not be written; it will be tried again.") from None
+        raise InputError(remark("page.book_not_written", name=path.name)) from None
     if "error" in answer:
         raise InputError(answer["error"])
 

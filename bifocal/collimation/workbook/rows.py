@@ -16,6 +16,7 @@ from bifocal.collimation.records import Known, PickedPoint, Picks, Pixel
 from bifocal.collimation.workbook.setup import typed_setup
 from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
+from bifocal.remarks import remark
 from bifocal.survey.survey_input import SurveyInput
 from bifocal.survey.survey_media import MOST, SurveyMedia, media_names
 from bifocal.workbook.changing.update import update_book
@@ -202,7 +203,7 @@ def change_rows(
             shutil.copyfile(typed, ready)
         check_not_open(path)
         if digest_of(path) != before:
-            raise InputError(f"{path.name}: was changed by another program just now.")
+            raise InputError(remark("page.book_changed", name=path.name))
         if keep:
             kept_copy(path)
 

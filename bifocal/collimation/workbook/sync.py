@@ -21,6 +21,7 @@ from bifocal.collimation.workbook.rows import (
 )
 from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
+from bifocal.remarks import remark
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.output import check_not_open
 
@@ -192,7 +193,7 @@ class WorkbookSync:
             else:
                 change_in_process(path, points, pair_path, keep=keep)
         elif survey.files.pair_is_workbook:
-            raise InputError(f"{path.name}: is not there any more; it holds the set-up.")
+            raise InputError(remark("page.book_gone", name=path.name))
         else:
             if not any(point.is_complete for point in points):
                 return

@@ -13,16 +13,9 @@ import numpy as np
 from bifocal.model.homography import apply_homography
 from bifocal.model.interior_orientation import Images
 from bifocal.orientation.starts.relative_orientation import Ties
+from bifocal.orientation.tuning import ORDER
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import homogeneous
-
-#: Longer side of the pictures that are compared, and blocks a side for the scatter. [px]
-SIDE, BLOCKS = 1500, 10
-#: Steps of parallax are looked for between places so far apart, above so much. [px]
-REACH, STEP = 6.0, 2.0
-#: So many standard deviations are believed: the rendered church 9, church_1 4; the sample 2.6 and
-#: church_2, seen from 18 degrees beside the axis, -1.5 tell nothing.
-SURE = 4.0
 
 
 def first_is_far(images: Images, ties: Ties) -> float:
@@ -54,7 +47,7 @@ def first_is_far(images: Images, ties: Ties) -> float:
 def _on_the_plane(images: Images, ties: Ties) -> tuple[Images, BoolArray, FloatArray]:
     """Return the first photo, the second laid over it by the plane, where both are, the centre."""
     height, width = images[0].shape
-    part = min(1.0, SIDE / max(height, width))
+    part = min(1.0, ORDER.side / max(height, width))
     size = round(width * part), round(height * part)
     moved = np.diag([part, part, 1.0]) @ np.linalg.inv(ties.homography)
     coarser = 1 / np.sqrt(abs(np.linalg.det(moved[:2, :2] / moved[2, 2])))
@@ -65,10 +58,14 @@ def _on_the_plane(images: Images, ties: Ties) -> tuple[Images, BoolArray, FloatA
     reduced = cv2.resize(images[0], size, interpolation=cv2.INTER_AREA)
     laid = cv2.warpPerspective(second, moved, size)
     # Parallax runs along lines that meet in the centre of zoom.
-    places = homogeneous(part * ties.pixels1 / SIDE)
-    lines = np.cross(places, homogeneous(apply_homography(moved, ties.pixels2) / SIDE))
+    places = homogeneous(part * ties.pixels1 / ORDER.side)
+    lines = np.cross(places, homogeneous(apply_homography(moved, ties.pixels2) / ORDER.side))
     centre = np.linalg.svd(lines, full_matrices=False)[2][2]
-    return (equal(reduced), equal(laid)), np.asarray(inside > 0), SIDE * centre[:2] / centre[2]
+    return (
+        (equal(reduced), equal(laid)),
+        np.asarray(inside > 0),
+        ORDER.side * centre[:2] / centre[2],
+    )
 
 
 def _change(pictures: Images, away: FloatArray, fair: BoolArray) -> tuple[float, float]:
@@ -85,9 +82,9 @@ def _change(pictures: Images, away: FloatArray, fair: BoolArray) -> tuple[float,
     outwards = cv2.medianBlur((moved * away).sum(axis=-1), 5)
     inner, outer = (
         cv2.remap(outwards, places + reach * away, None, cv2.INTER_LINEAR)
-        for reach in (-REACH, REACH)
+        for reach in (-ORDER.reach, ORDER.reach)
     )
-    steps = np.clip(inner - outer - STEP, 0, 10) * fair
+    steps = np.clip(inner - outer - ORDER.step, 0, 10) * fair
     found = cv2.remap(second, places + moved, None, cv2.INTER_LINEAR)
     detail, other = (
         picture - cv2.GaussianBlur(picture, (0, 0), 6)
@@ -96,7 +93,8 @@ def _change(pictures: Images, away: FloatArray, fair: BoolArray) -> tuple[float,
     usual = cv2.GaussianBlur(np.abs(detail), (0, 0), 8) + 4
     replaced = steps * np.minimum(np.abs(detail - other), 40) / usual
     part, whole = (
-        cv2.resize(v, (BLOCKS, BLOCKS), interpolation=cv2.INTER_AREA) for v in (replaced, steps)
+        cv2.resize(v, (ORDER.blocks, ORDER.blocks), interpolation=cv2.INTER_AREA)
+        for v in (replaced, steps)
     )
     with np.errstate(divide="ignore", invalid="ignore"):
         share = part.sum() / whole.sum()

@@ -23,7 +23,7 @@ from bifocal.matching.features import (
 )
 from bifocal.model.homography import apply_homography
 from bifocal.model.interior_orientation import Cameras, Interiors
-from bifocal.orientation.tuning import TUNING
+from bifocal.orientation.tuning import TIES
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import Pinhole, fundamental, homogeneous, triangulate
 from photocore.errors import GeometryError
@@ -87,7 +87,7 @@ def find_ties(
     x1, x2 = straight[0].pixels[rows1], straight[1].pixels[rows2]
     agree, matrix = _one_geometry(x1, x2, tolerance)
     count = int(agree.sum())
-    if count < TUNING.fewest_matches or count < 0.08 * len(x1):
+    if count < TIES.fewest_matches or count < 0.08 * len(x1):
         raise GeometryError(
             f"{names[0]} and {names[1]} have too little in common ({count} matching details of "
             f"{min(len(first.pixels), len(second.pixels))}): they show different walls, or one is "
@@ -103,15 +103,15 @@ def find_ties(
     width = max(interiors[0].image_size)
     kept = np.flatnonzero(drop_repeated(x1, x2))
     kept = kept[supported(x1[kept], x2[kept] - apply_homography(homography, x1[kept]), width)]
-    if len(kept) < TUNING.fewest_matches:
+    if len(kept) < TIES.fewest_matches:
         kept = np.arange(len(x1))
     # Strongest first: rank serves as precision.
     shape = interiors[0].image_size[::-1]
-    kept = kept[spread_evenly(x1[kept], rows1[kept].astype(np.float64), shape, TUNING.most_ties)]
+    kept = kept[spread_evenly(x1[kept], rows1[kept].astype(np.float64), shape, TIES.most)]
     x1, x2, rows1, rows2 = x1[kept], x2[kept], rows1[kept], rows2[kept]
     homography, on_plane = _dominant_plane(x1, x2, 1.5 * tolerance, 8000)
     count = len(x1)
-    if on_plane.sum() < max(TUNING.fewest_on_plane * count, 20):
+    if on_plane.sum() < max(TIES.fewest_on_plane * count, 20):
         raise GeometryError(
             f"no plane: only {int(on_plane.sum())} of {count} common points lie on one plane. The "
             "method needs a wall as reference. Frame the photos so that the wall fills them, or "
@@ -142,7 +142,7 @@ def _neighbours(
     first: Features, second: Features, interiors: Interiors
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], float]:
     """Return nearest neighbours: of the strongest features, or of all; the distortion scanned."""
-    for count in (TUNING.first_tried, max(len(first.pixels), len(second.pixels))):
+    for count in (TIES.first_tried, max(len(first.pixels), len(second.pixels))):
         rows1, rows2 = match_features(first.strongest(count), second.strongest(count))
         ideal = interiors[0].ideal(first.pixels[rows1]), interiors[1].ideal(second.pixels[rows2])
         keep = drop_repeated(*ideal)
@@ -150,7 +150,7 @@ def _neighbours(
         radial = scanned_radial(*ideal, interiors)
         x1, x2 = (i.radial(radial).undistort(x) for i, x in zip(interiors, ideal, strict=True))
         agree, _ = _one_geometry(x1, x2, _tolerance(first, second, interiors))
-        if agree.sum() >= TUNING.enough or count >= max(len(first.pixels), len(second.pixels)):
+        if agree.sum() >= TIES.enough or count >= max(len(first.pixels), len(second.pixels)):
             break
     return rows1, rows2, radial
 
@@ -162,14 +162,14 @@ def scanned_radial(x1: FloatArray, x2: FloatArray, interiors: Interiors) -> floa
     """
     if (
         not all(interior.sigma_radial > 0 for interior in interiors)
-        or len(x1) < TUNING.fewest_matches
+        or len(x1) < TIES.fewest_matches
     ):
         return 0.0
     some = np.linspace(0, len(x1) - 1, min(len(x1), 1500)).astype(int)
     x1, x2 = x1[some], x2[some]
-    wide = TUNING.truncated * max(max(interiors[0].image_size) / 3000, 0.3)
+    wide = TIES.truncated * max(max(interiors[0].image_size) / 3000, 0.3)
     costs = []
-    trials = np.concatenate([[0.0], np.linspace(*TUNING.scanned)])
+    trials = np.concatenate([[0.0], np.linspace(*TIES.scanned)])
     for k in trials:
         y1, y2 = (i.radial(k).undistort(x) for i, x in zip(interiors, (x1, x2), strict=True))
         cv2.setRNGSeed(7)
@@ -180,7 +180,7 @@ def scanned_radial(x1: FloatArray, x2: FloatArray, interiors: Interiors) -> floa
         misfit = epipolar_distance(matrix, y1, y2)
         costs.append(float(np.minimum(misfit, 3 * wide).sum()))
     best = int(np.argmin(costs))
-    return float(trials[best]) if costs[best] < TUNING.believed * costs[0] else 0.0
+    return float(trials[best]) if costs[best] < TIES.believed * costs[0] else 0.0
 
 
 def epipolar_distance(matrix: FloatArray, x1: FloatArray, x2: FloatArray) -> FloatArray:
@@ -205,7 +205,7 @@ def _along_lines(
         normal = line[:, :2] / length
         seen = apply_homography(homography, first.pixels)
         foot = seen - normal * ((seen * normal).sum(axis=1) + line[:, 2] / length[:, 0])[:, None]
-    reach = TUNING.along * float(np.ptp(second.pixels[:, 0]))
+    reach = TIES.along * float(np.ptp(second.pixels[:, 0]))
     along = reach * np.column_stack([-normal[:, 1], normal[:, 0]])
     left = np.linalg.svd(matrix)[0][:, 2]
     scale = left[2] if abs(left[2]) > 1e-9 * np.abs(left[:2]).max() else 1e-9
@@ -233,12 +233,12 @@ def supported(pixels: FloatArray, parallax: FloatArray, width: int) -> BoolArray
     A wrong tie may satisfy its epipolar line by chance, a surface is smooth: fifty wrong ties of
     2200 turned a relative orientation by 0.5 to 1.4 degrees, and its covariance did not show it.
     """
-    count = min(TUNING.neighbours + 1, len(pixels))
+    count = min(TIES.neighbours + 1, len(pixels))
     if count < 2:
         return np.zeros(len(pixels), dtype=bool)
     near = cKDTree(pixels).query(pixels, count)[1][:, 1:]
     apart = np.linalg.norm(parallax[near] - parallax[:, None], axis=2)
-    return np.asarray((apart < TUNING.alike * width / 3000).sum(axis=1) >= TUNING.supporters)
+    return np.asarray((apart < TIES.alike * width / 3000).sum(axis=1) >= TIES.supporters)
 
 
 def _one_geometry(

@@ -10,15 +10,10 @@ import numpy as np
 from bifocal import rays
 from bifocal.model.interior_orientation import Interior
 from bifocal.model.pair_media import PairMedia
+from bifocal.orientation.tuning import RESECTION
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import Pinhole, camera_matrix, cameras_seeing, project
 from photocore.errors import GeometryError
-
-#: Picks that miss by more than this share of the image width are gross, whatever the lens.
-GROSS_SHARE = 0.006
-#: Rounds in which points are put where they seem to be; it settles in three to six. Then the
-#: camera moves by less than a share of its distance.
-ROUNDS, SETTLED = 12, 1e-5
 
 
 def resect(
@@ -74,7 +69,7 @@ def resect(
     known = replace(
         interior, focal=interior.focal * ratio, sigma_focal=min(interior.sigma_focal, 0.02)
     )
-    for _ in range(ROUNDS):
+    for _ in range(RESECTION.rounds):
         there = np.zeros(len(xyz), dtype=bool)
         if media.z0(number, camera) >= 0:
             seeming = _seeming(camera, media, number, xyz)
@@ -88,7 +83,7 @@ def resect(
         camera, fits = _in_air(seeming[there], pixels[there], known)
         agree = there.copy()
         agree[there] = fits
-        if np.linalg.norm(camera.centre - before) < SETTLED * before[2]:
+        if np.linalg.norm(camera.centre - before) < RESECTION.settled * before[2]:
             break
     return camera, agree
 
@@ -119,7 +114,7 @@ def _in_air(xyz: FloatArray, pixels: FloatArray, interior: Interior) -> tuple[Pi
         matrix = camera_matrix(interior.focal * factor, interior.aspect, *interior.centre)
         for candidate in _candidates(xyz, pixels, matrix, generator):
             misfit = np.linalg.norm(pixels - project(candidate, xyz), axis=1)
-            share = np.nan_to_num(misfit, nan=1e6) / (GROSS_SHARE * width)
+            share = np.nan_to_num(misfit, nan=1e6) / (RESECTION.gross_share * width)
             # Robust cost that still prefers the more precise of two solutions, and at equal fit the
             # lens that is nearer to what is known.
             cost = float((np.minimum(share, 1.0) ** 2).sum())

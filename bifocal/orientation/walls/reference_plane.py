@@ -13,7 +13,7 @@ import numpy as np
 
 from bifocal.model.interior_orientation import Cameras, Interior, Interiors
 from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orientation.tuning import TUNING
+from bifocal.orientation.tuning import WALLS
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.camera.rotation import rotation_from_vector
@@ -68,7 +68,7 @@ def faces(heights: FloatArray, pixels: FloatArray, *, band: float) -> list[Face]
         offset = float(np.median(heights[members]))
         if members.sum() < 0.05 * count:
             break
-        if all(abs(offset - other.offset) > TUNING.faces_apart * band for other in planes):
+        if all(abs(offset - other.offset) > WALLS.faces_apart * band for other in planes):
             planes.append(
                 Face(offset, float(members.sum() / count), _midst(pixels, np.flatnonzero(members)))
             )
@@ -118,7 +118,7 @@ def choose_wall(
     GeometryError
         If no point lies near the spot named.
     """
-    band = TUNING.face_band * float(cameras[0].centre[2])
+    band = WALLS.face_band * float(cameras[0].centre[2])
     plane = largest_plane(xyz, band=band)
     heights = _heights(xyz, plane)
     offset = 0.0
@@ -130,7 +130,7 @@ def choose_wall(
         offset = by_ratio
     elif is_one_scale(interiors, site):
         planes = faces(heights, pixels, band=band)
-        fair = [f for f in planes if f.share >= TUNING.comparable * planes[0].share]
+        fair = [f for f in planes if f.share >= WALLS.comparable * planes[0].share]
         if fair:
             offset = min(fair, key=lambda f: abs(scale_difference(cameras, plane, f.offset))).offset
     if offset:
@@ -165,15 +165,15 @@ def _face_by_ratio(
     sigma: float,
 ) -> float | None:
     """Return the offset of the face whose distances have the measured ratio; None: cannot tell."""
-    planes = faces(heights, pixels, band=TUNING.face_band * float(cameras[0].centre[2]))
-    fair = [face for face in planes if face.share >= TUNING.fair * planes[0].share]
+    planes = faces(heights, pixels, band=WALLS.face_band * float(cameras[0].centre[2]))
+    fair = [face for face in planes if face.share >= WALLS.fair * planes[0].share]
     tests = _ratio_tests(fair, cameras, plane, site, sigma)
     if len(fair) < 2 or not tests.any():
         return None
     order = np.argsort(tests)
     # The nearest must fit, and the next must not.
-    if tests[order[0]] > TUNING.face_fits or tests[order[1]] < max(
-        TUNING.face_fits, 2 * tests[order[0]]
+    if tests[order[0]] > WALLS.face_fits or tests[order[1]] < max(
+        WALLS.face_fits, 2 * tests[order[0]]
     ):
         return None
     return fair[int(order[0])].offset
@@ -198,7 +198,7 @@ def largest_plane(xyz: FloatArray, *, band: float) -> FloatArray:
     extent = np.ptp(sample[:, :2], axis=0).prod()
     wide = np.abs(area) > 0.02 * extent
     planes = np.linalg.solve(design[wide], corners[wide][..., 2:])[..., 0]
-    planes = planes[np.abs(planes[:, 1:]).max(axis=1) < TUNING.face_slope]
+    planes = planes[np.abs(planes[:, 1:]).max(axis=1) < WALLS.face_slope]
     planes = np.concatenate([np.zeros((1, 3)), planes])
     lifted = np.column_stack([np.ones(len(sample)), sample[:, :2]])
     scores = [
@@ -290,7 +290,7 @@ def narrow_face(xyz: FloatArray, sigma: FloatArray, *, band: float) -> NarrowFac
     design = some[triples]
     wide = np.abs(np.linalg.det(design)) > 0.02 * np.ptp(some[:, 1:], axis=0).prod()
     planes = np.linalg.solve(design[wide], height[triples][wide][..., None])[..., 0]
-    planes = planes[np.abs(planes[:, 1:]).max(axis=1) < TUNING.face_slope]
+    planes = planes[np.abs(planes[:, 1:]).max(axis=1) < WALLS.face_slope]
     planes = np.concatenate([np.zeros((1, 3)), planes])
     tested = generator.choice(len(height), min(len(height), 2000), replace=False)
     away = height[tested] - planes @ some[tested].T
@@ -357,7 +357,7 @@ def _core(
         square = (away - offsets[:, None]) ** 2 - spread**2
         extra = (tell * square).sum(axis=1) / np.maximum(tell.sum(axis=1), 1e-300)
         widths[0] = np.sqrt(max(extra[0], least**2))
-        widths[1:] = np.sqrt(np.maximum(extra[1:], (TUNING.wider * widths[0]) ** 2))
+        widths[1:] = np.sqrt(np.maximum(extra[1:], (WALLS.wider * widths[0]) ** 2))
     likelihood = float(np.log(density).sum()) - 1.5 * shallow * float(np.log(len(height)))
     return likelihood, plane, float(widths[0]), chance[0]
 
@@ -368,7 +368,7 @@ def is_one_scale(interiors: Interiors, site: SiteMeasures) -> bool:
     if not (site.parallel and d1 and d2) or any(interior.is_assumed for interior in interiors):
         return False
     ratio = interiors[1].focal / d2 * d1 / interiors[0].focal
-    return abs(float(np.log(ratio))) < TUNING.one_scale
+    return abs(float(np.log(ratio))) < WALLS.one_scale
 
 
 def scale_difference(cameras: Cameras, plane: FloatArray, offset: float) -> float:
@@ -379,8 +379,8 @@ def scale_difference(cameras: Cameras, plane: FloatArray, offset: float) -> floa
 
 def rivals(planes: Sequence[Face]) -> list[Face]:
     """Return the faces that may as well be the wall."""
-    likely = [face for face in planes[1:] if face.chance >= TUNING.unlikely * planes[0].chance]
-    return [face for face in likely if face.share >= TUNING.comparable * planes[0].share]
+    likely = [face for face in planes[1:] if face.chance >= WALLS.unlikely * planes[0].chance]
+    return [face for face in likely if face.share >= WALLS.comparable * planes[0].share]
 
 
 def zero_sigma(planes: Sequence[Face]) -> float:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orientation.tuning import TUNING
+from bifocal.orientation.tuning import WALLS
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
 
@@ -61,14 +61,14 @@ def planes_of_any_direction(
     centres : pair of ndarray, shape (3,)
         Projection centres. [m]
     """
-    band = TUNING.rough_band * float(centres[0][2])
+    band = WALLS.rough_band * float(centres[0][2])
     generator = np.random.default_rng(7)
     free, found = np.ones(len(xyz), dtype=bool), []
-    for _ in range(TUNING.most_planes):
+    for _ in range(WALLS.most_planes):
         left = np.flatnonzero(free)
         if len(left) < 20:
             break
-        corners = xyz[generator.choice(left, (TUNING.triples, 3))]
+        corners = xyz[generator.choice(left, (WALLS.triples, 3))]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         size = np.linalg.norm(normals, axis=1)
         normals = normals[size > 0] / size[size > 0, None]
@@ -135,7 +135,7 @@ def likely_wall(
     if not planes:
         return None
     d1, d2 = site.distances
-    fair = [p for p in planes if p.share >= TUNING.fair * planes[0].share]
+    fair = [p for p in planes if p.share >= WALLS.fair * planes[0].share]
     if site.wall is not None:
         nearest = np.argsort(np.linalg.norm(pixels - np.array(site.wall), axis=1))[:15]
         chosen = max(planes, key=lambda p: int(p.members[nearest].sum()))
@@ -145,13 +145,13 @@ def likely_wall(
         ratios = [np.log(p.distance(centres[0]) / p.distance(centres[1])) for p in fair]
         tests = np.abs(np.array(ratios) - np.log(d1 / d2)) / sigma
         limits = [
-            TUNING.plane_contradicted if p.slope <= TUNING.face_slope else TUNING.face_fits
+            WALLS.plane_contradicted if p.slope <= WALLS.face_slope else WALLS.face_fits
             for p in fair
         ]
         fair = [p for p, test, most in zip(fair, tests, limits, strict=True) if test < most] or fair
     best = max(fair, key=lambda p: p.share)
     present = [
-        p for p in fair if p.slope <= TUNING.face_slope and TUNING.fuller * p.share >= best.share
+        p for p in fair if p.slope <= WALLS.face_slope and WALLS.fuller * p.share >= best.share
     ]
     return max(present, key=lambda p: p.share) if present else best
 
@@ -165,8 +165,8 @@ def steep_rivals_in_words(
         p
         for p in planes
         if p is not chosen
-        and p.share >= TUNING.comparable * chosen.share
-        and float(p.normal @ chosen.normal) < np.cos(np.arctan(TUNING.face_slope))
+        and p.share >= WALLS.comparable * chosen.share
+        and float(p.normal @ chosen.normal) < np.cos(np.arctan(WALLS.face_slope))
     ]
     if not others or site.wall is not None or (d1 and d2):
         return ""

@@ -16,16 +16,12 @@ from bifocal.model.homography import apply_homography
 from bifocal.orientation.adjustment.observed_points import views_of
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.orientation.adjustment.pair_observations import PairUnknowns
-from bifocal.orientation.tuning import TUNING
+from bifocal.orientation.tuning import BEND, WALLS
 from bifocal.orientation.walls.reference_plane import faces
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import project
 from photocore.errors import GeometryError
-
-#: Draws of the cameras and media as uncertain as they are, and the bend that counts, in what they
-#: bend the wall by.
-DRAWS, BEYOND = 24, 2.0
 
 
 class WallShape(NamedTuple):
@@ -79,7 +75,7 @@ def wall_shape(
     asked = np.flatnonzero(np.ones(len(pixels1), dtype=bool) if face is None else face)
     if len(asked) < 30:
         return WallShape(), 0.0
-    some = asked[np.linspace(0, len(asked) - 1, min(len(asked), TUNING.shape_ties)).astype(int)]
+    some = asked[np.linspace(0, len(asked) - 1, min(len(asked), BEND.ties)).astype(int)]
     middle, half = (np.array(size) - 1) / 2.0, float(np.hypot(*size)) / 2
     everywhere = (pixels1 - middle) / half
     x1, x2 = everywhere[some], pixels2[some]
@@ -97,10 +93,10 @@ def wall_shape(
                 continue
             held = support
             radii = (everywhere**2).sum(axis=1, keepdims=True)
-            seen = apply_homography(fitted, everywhere * (1.0 + TUNING.small_shape * radii))
+            seen = apply_homography(fitted, everywhere * (1.0 + BEND.small * radii))
             flat, _ = cv2.findHomography(everywhere, seen, 0)
             apart = np.linalg.norm(seen - apply_homography(flat, everywhere), axis=1)
-            by_k = float(np.sqrt((apart**2).mean())) / unit / TUNING.small_shape
+            by_k = float(np.sqrt((apart**2).mean())) / unit / BEND.small
             answer = WallShape(abs(k) * by_k, sigma * by_k)
     return answer, held * len(asked) / len(some)
 
@@ -125,19 +121,18 @@ def shape_of_wall(
     """
     whole, held = wall_shape(pixels1, pixels2, size)
     known = np.flatnonzero(np.isfinite(height))
-    known = known[:: len(known) // TUNING.shape_ties + 1]
-    found = faces(height[known], pixels1[known], band=TUNING.face_band)[: TUNING.most_faces]
+    known = known[:: len(known) // BEND.ties + 1]
+    found = faces(height[known], pixels1[known], band=WALLS.face_band)[: BEND.most_faces]
     near = [
-        np.abs(height - offset) < TUNING.shape_band
-        for offset in (0.0, *(face.offset for face in found))
+        np.abs(height - offset) < BEND.band for offset in (0.0, *(face.offset for face in found))
     ]
     own = [
         wall_shape(pixels1, pixels2, size, face)
         for face in near
-        if face.sum() >= TUNING.fewest_on_face
+        if face.sum() >= BEND.fewest_on_face
     ]
     bend, most = max(own, key=lambda one: one[1], default=(whole, 0.0))
-    return bend if most >= TUNING.face_holds * held else whole
+    return bend if most >= BEND.face_holds * held else whole
 
 
 def shape_between(
@@ -171,7 +166,7 @@ def shape_between(
         return WallShape()
     bend = shape_of_wall(flat1[used], flat2[used], size, height[used])
     if isinstance(state, AdjustedPair) and state.media:
-        return bend if bend.px > BEYOND * _open(state, size) else WallShape()
+        return bend if bend.px > BEND.beyond * _open(state, size) else WallShape()
     return bend
 
 
@@ -202,7 +197,7 @@ def _open(adjusted: AdjustedPair, size: tuple[int, int]) -> float:
     values, vectors = np.linalg.eigh(adjusted.of_unknowns)
     factor = vectors * np.sqrt(np.maximum(values, 0.0))
     squares = []
-    for draw in np.random.default_rng(7).normal(size=(DRAWS, len(values))):
+    for draw in np.random.default_rng(7).normal(size=(BEND.draws, len(values))):
         try:
             state = adjusted.stepped(factor @ draw)
         except GeometryError:
@@ -222,9 +217,9 @@ def _fitted(
 ) -> tuple[FloatArray, float, float, float]:
     """Return homography, k, its sigma and the support of the robust x2 = H (x1 (1 + k rho²))."""
     square = (x1**2).sum(axis=1)
-    cell = np.unique(np.floor(x1 / TUNING.shape_cell), axis=0, return_inverse=True)[1].ravel()
+    cell = np.unique(np.floor(x1 / BEND.cell), axis=0, return_inverse=True)[1].ravel()
     matrix = matrix / matrix[2, 2]
-    for width in np.repeat(TUNING.shape_widths, 2) * unit:
+    for width in np.repeat(BEND.widths, 2) * unit:
         bent = np.column_stack([x1 * (1.0 + k * square[:, None]), np.ones(len(x1))])
         carried = bent @ matrix.T
         seen = carried[:, :2] / carried[:, 2:]
@@ -240,8 +235,8 @@ def _fitted(
         normal = (rows * root[:, None]).T @ rows
         pulls = (rows * (root * left.ravel())[:, None]).reshape(-1, 2, 9).sum(axis=1)
         right = pulls.sum(axis=0)
-        normal[8, 8] += (unit / TUNING.sigma_shape) ** 2
-        right[8] -= k * (unit / TUNING.sigma_shape) ** 2
+        normal[8, 8] += (unit / BEND.sigma) ** 2
+        right[8] -= k * (unit / BEND.sigma) ** 2
         step = np.linalg.lstsq(normal, right, rcond=None)[0]
         matrix = matrix + np.append(step[:8], 0.0).reshape(3, 3)
         k += float(step[8])
@@ -270,7 +265,7 @@ def shape_in_words(
         return ""
     lens = "lens_known" if with_lens else "certain_lens"
     reason = remark(f"orientation.reason_{'media' if through_media else lens}")
-    if bend.px <= TUNING.strongly_curved:
+    if bend.px <= BEND.strongly_curved:
         reason = remark("orientation.reason_probably", reason=reason)
     return remark(
         "orientation.bent", px=bend.px, sigma=bend.sigma, most=MOST_BENT, reason=reason,

@@ -112,3 +112,23 @@ def test_text_with_a_number_is_a_number_and_what_is_no_field_is_not_written(tmp_
         last = json.loads(session.journal.path.read_text().splitlines()[-1])
         assert (last["image"], last["column"], last["row"]) == (1, 12.5, 7.0)
         assert "roof" not in last
+
+
+@pytest.mark.parametrize(
+    ("language", "command", "status", "said"),
+    [
+        ("it", {"op": "point.pick", "image": 1, "column": 9e4, "row": 5}, 400,
+         "colonna, riga: la collimazione di P01 è fuori dalla foto 1 (1536 x 1024 px)."),
+        ("de", {"op": "point.delete", "name": "Q9"}, 422, "es gibt keinen Punkt Q9."),
+        ("it", {"op": "undo"}, 422, "non c'è nulla da annullare."),
+        ("de", {"op": "control.rename", "name": "C1", "new": "C2"}, 422,
+         "es gibt keinen Passpunkt C1."),
+    ],
+)  # fmt: skip
+def test_a_refusal_is_told_in_the_language_of_the_page(
+    tmp_path, language: str, command, status: int, said: str
+) -> None:
+    with opened(sample_folder(tmp_path)) as session:
+        session.command({"op": "language.set", "language": language})
+        answer = client_of(session).post("/api/command", json=command)
+        assert (answer.status_code, answer.json()["error"]) == (status, said)

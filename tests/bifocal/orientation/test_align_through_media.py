@@ -32,6 +32,7 @@ from bifocal.model.orientation_precision import NAMES, from_dict, names_of
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.orientation_stages import PhotoInput, with_refracted_ties
 from bifocal.orientation.starts.relative_orientation import Ties
+from bifocal.orientation.tuning import CONTROL
 from bifocal.orientation.walls.wall_shape import WallShape, shape_in_words
 from multimedia import Layers
 from tests.builders.commands import bifocal_command as main
@@ -584,7 +585,7 @@ def test_unknown_lenses_are_named_where_control_does_not_make_up_for_them(
     monkeypatch, kind, seed, count, relief, said
 ):
     """Before photos are matched: control off the wall by 2 to 5 cm, picked to 0.3 px."""
-    monkeypatch.setattr("bifocal.orientation.absolute_orientation.HOPELESS", 0.3)
+    monkeypatch.setattr(CONTROL, "hopeless", 0.3)
     monkeypatch.setattr(
         "bifocal.orientation.absolute_orientation.ties_of", lambda *_, **__: pytest.fail("matched")
     )

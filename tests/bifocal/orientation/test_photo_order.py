@@ -17,8 +17,9 @@ from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.align_workflow import AlignOptions, KnownLens, _way, align_photos
 from bifocal.orientation.approximate_orientation import Given, order_of
 from bifocal.orientation.orientation_stages import PhotoInput
-from bifocal.orientation.starts.photo_order import SURE, first_is_far
+from bifocal.orientation.starts.photo_order import first_is_far
 from bifocal.orientation.starts.relative_orientation import Ties
+from bifocal.orientation.tuning import ORDER
 from photocore.camera.pinhole import plane_transfer
 from tests.bifocal.orientation.layered_wall import SIZE, camera, relief_at, take
 from tests.builders.pinholes import project
@@ -60,13 +61,13 @@ def ties(first, second) -> Ties:
 
 
 def test_what_is_hidden_shows_which_photo_is_the_far_one(views) -> None:
-    assert first_is_far((views.far, views.near), ties(FAR, NEAR)) > SURE
-    assert first_is_far((views.near, views.far), ties(NEAR, FAR)) < -SURE
+    assert first_is_far((views.far, views.near), ties(FAR, NEAR)) > ORDER.sure
+    assert first_is_far((views.near, views.far), ties(NEAR, FAR)) < -ORDER.sure
 
 
 def test_a_flat_wall_shows_no_order() -> None:
     flat = take(FAR, NEAR, boards=())
-    assert abs(first_is_far((flat.far, flat.near), ties(FAR, NEAR))) < SURE
+    assert abs(first_is_far((flat.far, flat.near), ties(FAR, NEAR))) < ORDER.sure
 
 
 def test_lenses_alike_leave_no_order_to_ask(views, monkeypatch) -> None:
@@ -86,7 +87,7 @@ def test_the_order_is_asked_where_a_lens_is_unknown(views, known) -> None:
     lens = replace(first.interior, is_typed=False) if known else Interior.unknown(SIZE)
     photos = replace(first, interior=lens), replace(second, interior=Interior.unknown(SIZE))
     given = Given(photos=photos, control=Control(), site=SITE)
-    assert order_of(given, ties(NEAR, FAR)) < -SURE
+    assert order_of(given, ties(NEAR, FAR)) < -ORDER.sure
 
 
 @pytest.mark.acceptance

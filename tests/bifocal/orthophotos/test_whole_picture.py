@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from bifocal import Grid, MapSurface, OrthoOptions, Pair, Photo, ReliefMap, Source, orthophoto
-from bifocal.orthophotos.mask_tidying import LEAST_AREA, tidied
+from bifocal.orthophotos.mask_tidying import tidied
+from bifocal.orthophotos.tuning import TIDYING
 from bifocal.orthophotos.whole_picture import CompletedSurface
 
 METRES = [[0.01, 0, -1.995], [0, -0.01, 1.995], [0, 0, 1]]
@@ -33,7 +34,7 @@ def test_specks_and_hair_lines_are_no_shadows_and_pinholes_are_closed():
     wanted = np.zeros_like(hidden)
     wanted[50:60, 10:90] = True
     np.testing.assert_array_equal(kept, wanted)
-    assert LEAST_AREA > 16
+    assert TIDYING.least_area > 16
 
 
 def test_a_completed_surface_goes_on_from_the_known_to_the_plane():
