@@ -20,7 +20,7 @@ from bifocal.workbook.changing.setup_update import (
 )
 from bifocal.workbook.changing.update import refuse_earlier, store_named_cells
 from bifocal.workbook.content import SurveyContent, point_cells, result_cells
-from bifocal.workbook.formulas.columns import NEAR, ideal_points, pair_points
+from bifocal.workbook.formulas.columns import FORMULAS, NEAR, ideal_points, pair_points
 from bifocal.workbook.formulas.georeference_values import precision_values
 from bifocal.workbook.formulas.placed_formulas import added_covariance
 from bifocal.workbook.formulas.setup_cells import TITLE_BLOCK, cells_of
@@ -177,9 +177,7 @@ def _columns(table: OwnTable, content: SurveyContent) -> list[ResultColumn]:
             continue
         results.append(_column(column, cells[column.key]))
     if content.georeference is not None:
-        world = result_cells(content, cells)
-        results += _world(content.georeference, world)
-        results += _world_sigmas(content, cells, world)
+        results += _world(content, cells, result_cells(content, cells))
     return results
 
 
@@ -195,77 +193,46 @@ def _column(column: LiveColumn, values: Sequence[CellValue]) -> ResultColumn:
     )
 
 
-def _world(geo: Georeference, cells: Mapping[str, Sequence[CellValue]]) -> list[ResultColumn]:
-    """Return the world coordinates; the transformation stands in their formulas as numbers."""
-    fit, columns = geo.world_from_wall, []
-    origin = np.asarray(geo.origin) + np.asarray(geo.offset)
-    for i, name in enumerate("ENH"):
-        turned = "+".join(
-            f"({factor!r})*([@{axis}]-({centre!r}))"
-            for axis, factor, centre in zip(
-                "XYZ", fit.rotation[i].tolist(), fit.source_centre.tolist(), strict=True
-            )
-        )
-        columns.append(
-            ResultColumn(
-                key=name,
-                heading=f"{name} [m]",
-                values=cells[name],
-                formula=f'IF(COUNT([@X],[@Y],[@Z])=3,{float(origin[i])!r}+{fit.scale!r}*({turned}),"")',
-                number_format="0.000",
-            )
-        )
-    return columns
-
-
-def _world_sigmas(
+def _world(
     content: SurveyContent,
     cells: Mapping[str, Sequence[CellValue]],
     world: Mapping[str, Sequence[CellValue]],
 ) -> list[ResultColumn]:
-    """Return sigma_E, sigma_N, sigma_H and what their formulas need, numbers as in `_world`."""
+    """Return E, N, H, their sigmas and what these need; the transformation stands as numbers."""
     geo, table = content.georeference, content.table
-    if geo is None or table is None or geo.precision is None or table.covariance is None:
-        return []
-    fit, numbers = geo.world_from_wall, precision_values(geo)
+    assert geo is not None
+    assert table is not None
     used = {name for name, is_used in zip(geo.ids, geo.used, strict=True) if is_used}
     shared: list[CellValue] = [-1 if name in used else 1 for name in table.ids]
-    columns = [ResultColumn(key="shared", heading="shared", values=shared)]
-    kept, factor = ("k_", "sigma_px^2*") if content.is_pair else ("cov_", "")
-    near = {name: f"[@n_{name}]" for name in "ENH"}
+    facts = {"pair"} if content.is_pair else set[str]()
+    facts |= {"2D"} if geo.model == "2D" else set()
+    lists = ["columns"]
+    if geo.precision is not None and table.covariance is not None:
+        lists.append("sigmas")
+    parts, values = _numbers(geo), {**cells, **world, "shared": shared}
+    columns = (c for rows in lists for c in FORMULAS.columns("own_world", facts, parts, rows=rows))
+    return [_column(column, values[column.key]) for column in columns]
+
+
+def _numbers(geo: Georeference) -> dict[str, str]:
+    """Return the numbers of the transformation as parts of formulas."""
+    fit, numbers = geo.world_from_wall, precision_values(geo)
+    origin, centre = np.asarray(geo.origin) + np.asarray(geo.offset), fit.source_centre.tolist()
+    near, parts = {name: f"[@n_{name}]" for name in "ENH"}, {"scale": repr(fit.scale)}
     for i, name in enumerate("ENH"):
         row = (fit.scale * fit.rotation[i]).tolist()
-        turned = "+".join(
-            f"({turn!r})*([@{axis}]-({centre!r}))"
-            for turn, axis, centre in zip(row, "XYZ", fit.source_centre.tolist(), strict=True)
-        )
-        columns.append(
-            ResultColumn(
-                key=f"n_{name}",
-                heading=f"n_{name} [m]",
-                values=cells[f"n_{name}"],
-                formula=f'IF(COUNT([@X],[@Y],[@Z])=3,{float(geo.offset[i])!r}+{turned},"")',
-            )
-        )
-    for i, name in enumerate("ENH"):
-        row = (fit.scale * fit.rotation[i]).tolist()
-        own = "+".join(
-            f"({(1 if a == b else 2) * row[a] * row[b]!r})*[@{kept}{key}]"
+        for kind, factors in (("turned", fit.rotation[i].tolist()), ("scaled", row)):
+            terms = zip(factors, "XYZ", centre, strict=True)
+            text = "+".join(f"({factor!r})*([@{axis}]-({at!r}))" for factor, axis, at in terms)
+            parts[f"{kind}_{name}"] = text
+        parts |= {f"origin_{name}": repr(float(origin[i])), f"t_{name}": repr(float(geo.offset[i]))}
+        parts[f"own_{name}"] = "+".join(
+            f"({(1 if a == b else 2) * row[a] * row[b]!r})*{{kept {key}}}"
             for key, (a, b) in ENTRIES.items()
         )
-        added = re.sub(
-            r"g_[zuw]_[A-Z]+", lambda m: f"({numbers[m[0]]!r})", added_covariance(name, name, near)
+        parts[f"added_{name}"] = re.sub(
+            r"g_[zuw]_[A-Z]+",
+            lambda m: f"({numbers[m[0]]!r})" if numbers else "",
+            added_covariance(name, name, near),
         )
-        sign = "1" if geo.model == "2D" and name == "H" else "[@shared]"
-        common = f"+N([@o_{name}])^2" if content.is_pair else ""
-        variance = f"{factor}({own})+{sign}*({added}){common}"
-        columns.append(
-            ResultColumn(
-                key=f"sigma_{name}",
-                heading=f"sigma_{name} [m]",
-                values=world[f"sigma_{name}"],
-                formula=f'IF(COUNT([@n_E],[@cov_XX])=2,SQRT(MAX(0,{variance})),"")',
-                number_format="0.0000",
-            )
-        )
-    return columns
+    return parts

@@ -179,10 +179,8 @@ def _printed(sheet: SheetBuilder, area: str, content: SurveyContent) -> None:
 
 
 _BLOCK_PLACE = Alignment(wrap_text=True, vertical="top")
-#: The title block: cell, the cells it spans, its name.
-_BLOCKS = (
-    ("A2", "D2", "title_project"), ("E2", "I2", "title_survey"), ("J2", "O2", "title_units"),
-)  # fmt: skip
+#: The title block: the cells it spans, and the names of its formulas.
+_BLOCKS = {"A2:D2": "title_project", "E2:I2": "title_survey", "J2:O2": ""}
 
 
 def _title_block(sheet: SheetBuilder, content: SurveyContent, results: Cells) -> None:
@@ -198,25 +196,19 @@ def _title_block(sheet: SheetBuilder, content: SurveyContent, results: Cells) ->
     worst = None if content.check is None else content.check.accuracy
     shown = "" if worst is None or worst != worst else f"{round(worst, 3):g} m"
     points, rmse = book.word("points_solved"), book.word("worst_of_checks")
-    people += [
-        (f'"{points}: "&COUNT(tblResults[X])', f"{points}: {solved}"),
-    ]
-    survey += [
-        (
-            f'"{rmse}: "&IF(ISNUMBER(check_worst),ROUND(check_worst,3)&" m","")',
-            f"{rmse}: {shown}",
-        )
-    ]
-    for (left, right, name), lines in zip(_BLOCKS, (people, survey), strict=False):
-        text = "&CHAR(10)&".join(formula for formula, _ in lines)
-        value: CellValue = "\n".join(shown for _, shown in lines)
-        sheet.formula(left, text, value, name=name, font=BODY_FONT)
-        sheet.worksheet.merge_cells(f"{left}:{right}")
+    people.append((f'"{points}: "&COUNT(tblResults[X])', f"{points}: {solved}"))
+    live = f'"{rmse}: "&IF(ISNUMBER(check_worst),ROUND(check_worst,3)&" m","")'
+    survey.append((live, f"{rmse}: {shown}"))
+    for (area, name), lines in zip(_BLOCKS.items(), (people, survey, ()), strict=True):
+        left = area.partition(":")[0]
+        if lines:
+            text = "&CHAR(10)&".join(formula for formula, _ in lines)
+            value: CellValue = "\n".join(shown for _, shown in lines)
+            sheet.formula(left, text, value, name=name, font=BODY_FONT)
+        else:
+            sheet.word(left, "result_units")
+        sheet.worksheet.merge_cells(area)
         sheet.worksheet[left].alignment = _BLOCK_PLACE
-    left, right, _ = _BLOCKS[-1]
-    sheet.word(left, "result_units")
-    sheet.worksheet.merge_cells(f"{left}:{right}")
-    sheet.worksheet[left].alignment = _BLOCK_PLACE
     sheet.worksheet.row_dimensions[2].height = 42
 
 

@@ -81,13 +81,9 @@ def _equal_scales(chart: ScatterChart, cells: Cells) -> None:
         axis.majorUnit = step
     chart.height, chart.width = 12.5, 13.5
     # A square: left to themselves, spreadsheets stretch X, which has room where Y has a title.
-    side = 9.7
-    chart.layout = Layout(
-        ManualLayout(
-            layoutTarget="inner", xMode="edge", yMode="edge", x=0.18, y=0.1,
-            w=side / chart.width, h=side / chart.height,
-        )
-    )  # fmt: skip
+    size = {"w": 9.7 / chart.width, "h": 9.7 / chart.height}
+    inner = ManualLayout(layoutTarget="inner", xMode="edge", yMode="edge", x=0.18, y=0.1, **size)
+    chart.layout = Layout(inner)
 
 
 def _round_step(rough: float) -> float:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.survey.observations import PointObservations
+from bifocal.workbook.reading.reader import TO_MM
 from bifocal.workbook.reading.setup_reader import LARGEST
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
@@ -25,7 +26,6 @@ _COLUMNS = (
     Column("col", aliases=("column", "col1", "col2", "i", "u", "pixel x"), unit="px"),
     Column("row", aliases=("row1", "row2", "line", "j", "v", "pixel y"), unit="px"),
 )
-_TO_MM = {"mm": 1.0, "cm": 10.0, "um": 1e-3, "m": 1000.0}
 #: A text further from a point than this share of the drawing is not its name.
 _NEAR = 0.05
 
@@ -145,14 +145,14 @@ def _of_table(path: Path, decimal: Decimal | None) -> PickList:
     if errors:
         raise WorkbookError(errors)
     symbol = "px" if keys[0] == "col" else table.units.get("x", "")
-    factor = _TO_MM.get(symbol, 1.0)
-    if symbol not in (*_TO_MM, "px", ""):
+    factor = TO_MM.get(symbol, 1.0)
+    if symbol not in (*TO_MM, "px", ""):
         raise InputError(f"{path}: coordinates in {symbol}; give them in px or mm.")
     keep = np.array([bool(name) for name in names]) & ~np.isnan(places).any(axis=1)
     return PickList(
         ids=tuple(name for name, kept in zip(names, keep, strict=True) if kept),
         places=places[keep] * factor,
-        unit="mm" if symbol in _TO_MM else symbol,
+        unit="mm" if symbol in TO_MM else symbol,
         file=path,
     )
 

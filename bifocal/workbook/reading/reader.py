@@ -37,9 +37,7 @@ _PIXELS = ("col1", "row1", "col2", "row2")
 #: Units expected where neither heading nor cell says one; that of x1..y2 depends on `Setup`.
 _UNITS = {"theta": "deg", "r_measured": "m", "s1": "mm", "s2": "mm"} | dict.fromkeys(_PIXELS, "px")
 #: Coordinates of both photos under one heading each, in the order of the photos.
-_SHARED = {"x1": "x", "y1": "y", "x2": "x", "y2": "y"} | {
-    "col1": "col", "row1": "row", "col2": "col", "row2": "row"
-}  # fmt: skip
+_SHARED = {key: key.rstrip("12") for key in (*_XY, *_PIXELS)}
 #: Headings of image coordinates in other programs: i counts columns, j rows.
 _OTHER = {"col1": "i", "row1": "j", "col2": "i", "row2": "j"}
 TO_DEGREES = {"deg": 1.0, "gon": 0.9, "rad": float(np.degrees(1.0))}
