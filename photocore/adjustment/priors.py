@@ -52,7 +52,7 @@ def is_possible(value: float, *, start: float, sigma: float, least: float, most:
 
 def hardly_determined(label: str, *, start: float, sigma: float) -> str:
     """Return that an unknown rests on its prior alone."""
-    return remark("adjustment.hardly_determined", label=label, start=start, sigma=sigma)
+    return remark("adjustment.hardly_carried", label=label, start=start, sigma=sigma)
 
 
 def parse_prior(text: str) -> tuple[str, float]:
