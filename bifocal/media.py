@@ -93,7 +93,7 @@ class MediaPath:
         Camera centre to the first interface, along its normal. [m]
     distance : float
         Camera centre to the reference plane. [m]
-    turn : ndarray, shape (3, 3), or None
+    rotation : ndarray, shape (3, 3), or None
         Axes of the interfaces in the plane frame, one a row, their normal towards the camera the
         last; None where they are parallel to the reference plane.
     """

@@ -13,7 +13,7 @@ from photocore.adjustment.priors import (
     LEAST_INDEX,
     MOST_INDEX,
     UNCARRIED,
-    hardly_determined,
+    hardly_carried,
     is_possible,
     typical_sigma,
 )
@@ -49,7 +49,7 @@ def media_remarks(adjusted: AdjustedPair, given: PairMedia) -> tuple[str, ...]:
     for row, name in _estimated(adjusted, media):
         prior, own = given.sigmas[name], float(np.sqrt(adjusted.of_unknowns[row, row]))
         if own > UNCARRIED * prior * factor:
-            told.append(_hardly_determined(name, given.value(name), prior))
+            told.append(_hardly_carried(name, given.value(name), prior))
         if (twin := _twin(adjusted, media, row)) and twin[1] > ALIKE:
             about = {"name": name, "twin": twin[0], "correlation": twin[1]}
             told.append(remark("orientation.hardly_told_apart", **about))
@@ -113,9 +113,9 @@ def _shown(name: str, value: float) -> str:
     return f"{value:.4f}" if name.startswith("index") else f"{1000 * value:.1f} mm"
 
 
-def _hardly_determined(name: str, start: float, sigma: float) -> str:
-    """Return `hardly_determined`, of a lean in degrees."""
+def _hardly_carried(name: str, start: float, sigma: float) -> str:
+    """Return `hardly_carried`, of a lean in degrees."""
     if name.startswith("lean"):
         start, sigma = np.degrees([start, sigma]).tolist()
-        return hardly_determined(f"{name} [degrees]", start=start, sigma=sigma)
-    return hardly_determined(name, start=start, sigma=sigma)
+        return hardly_carried(f"{name} [degrees]", start=start, sigma=sigma)
+    return hardly_carried(name, start=start, sigma=sigma)

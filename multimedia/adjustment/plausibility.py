@@ -16,7 +16,7 @@ from multimedia.projects.model import Project
 from photocore.adjustment.priors import (
     ALIKE,
     UNCARRIED,
-    hardly_determined,
+    hardly_carried,
     is_possible,
 )
 from photocore.arrays import FloatArray, IntArray
@@ -236,7 +236,7 @@ def _uncarried(project: Project, columns: BundleColumns, result: Adjustment) -> 
     for item in media_unknowns(project, columns.labels, columns.media):
         prior, own = columns.priors.get(item.column), result.sigma(item.label)
         if prior is not None and own > UNCARRIED * prior * result.model_error:
-            yield hardly_determined(item.label, start=item.start, sigma=prior)
+            yield hardly_carried(item.label, start=item.start, sigma=prior)
 
 
 def alike_remarks(result: Adjustment) -> Iterator[str]:

@@ -50,7 +50,7 @@ def is_possible(value: float, *, start: float, sigma: float, least: float, most:
     return max(least, start - reach) < value < min(most, start + reach)
 
 
-def hardly_determined(label: str, *, start: float, sigma: float) -> str:
+def hardly_carried(label: str, *, start: float, sigma: float) -> str:
     """Return that an unknown rests on its prior alone."""
     return remark("adjustment.hardly_carried", label=label, start=start, sigma=sigma)
 

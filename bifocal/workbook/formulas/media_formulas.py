@@ -55,11 +55,11 @@ def setup_formulas(media: int, *, is_pair: bool) -> dict[str, str]:
             f"c_rays_{image}": lens,
         }
     stated = ",".join(f"index_{n}" for n in range(2, media + 1))
-    base_factor = 'IF(reach_1=reach_2,"",reach_1*reach_2/(reach_1-reach_2))'
+    lever = 'IF(reach_1=reach_2,"",reach_1*reach_2/(reach_1-reach_2))'
     formulas |= {
         "r_top": f'IF(COUNT(d_1,d_2)<2,"",IF(COUNT({stated})=0,MIN(d_1,d_2),'
         "MIN(behind_1,behind_2)))",
-        "b_lever": f'IF(COUNT(d_1,d_2)=2,{base_factor},"")',
+        "b_lever": f'IF(COUNT(d_1,d_2)=2,{lever},"")',
         "mm_1": "IF(COUNT(m_1,m_2)=2,1000/m_1,1)",
         "m_seen": 'IF(COUNT(c_1,c_2,d_1)=3,1000*seen_1/c_rays_1,"")',
     }
