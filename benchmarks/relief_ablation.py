@@ -75,10 +75,11 @@ def aside(camera: SceneCamera, place: tuple[float, float]) -> SceneCamera:
     return replace(camera, centre=centre, rotation=rotation)
 
 
-def shots(name: str):
-    """Return a rendered scene."""
+def shots(name: str, size: tuple[int, int] = (1536, 1024), coarser: int = 1):
+    """Return a rendered scene, with pixels that are so many times coarser."""
     layout, seed, palette, pixel, d2, exposure = SCENES[name]
-    cameras = bifocal_cameras(size=(1536, 1024), pixel=pixel, d2=d2)
+    pixel *= coarser
+    cameras = bifocal_cameras(size=size, pixel=pixel, d2=d2)
     if "side" in name:
         sides = aside(cameras.far, (8.0, -1.5)), aside(cameras.near, (8.5, -1.5))
         cameras = CameraPair(

@@ -225,10 +225,15 @@ def remark(message: str) -> None:
 
 
 def print_result(
-    data: object, lines: Iterable[str], *, as_json: bool, remarks: Iterable[str] = ()
+    data: object,
+    lines: Iterable[str],
+    *,
+    as_json: bool,
+    remarks: Iterable[str] = (),
+    notes: Iterable[str] = (),
 ) -> None:
-    """Print remarks on stderr, then the result on stdout: as JSON, or the lines for people."""
-    for message in remarks:
+    """Print remarks and notes on stderr, then the result on stdout: as JSON, or for people."""
+    for message in (*remarks, *(f"Note: {note}" for note in notes)):
         remark(message)
     if as_json:
         print_json(data)

@@ -157,23 +157,31 @@ LIMITS = (
 
 
 @cache
-def _tables(package: str) -> tuple[dict[str, Any], dict[str, str]]:
-    """Return what commands share, that of `photocore` too, and each command's text, unparsed."""
+def _texts(package: str) -> tuple[str, ...]:
+    """Return the parts of a package's ``options.toml``: what commands share, and each command."""
     path = Path(str(import_module(package).__file__)).with_name("options.toml")
-    common, *commands = re.split(r"^(?=\[\w+\]$)", path.read_text("utf-8"), flags=re.MULTILINE)
-    tables = tomllib.loads(common)
+    return tuple(re.split(r"^(?=\[\w+\]$)", path.read_text("utf-8"), flags=re.MULTILINE))
+
+
+@cache
+def _shared(package: str) -> dict[str, Any]:
+    """Return the tables that commands share, those of `photocore` among them."""
+    tables = tomllib.loads(_texts(package)[0])
     if package != "photocore":
-        tables["shared"] = _tables("photocore")[0]["shared"] | tables["shared"]
-    return tables, {text[1 : text.index("]")]: text for text in commands}
+        tables["shared"] = _shared("photocore")["shared"] | tables["shared"]
+    return tables
 
 
 @cache
 def _table(package: str, name: str) -> dict[str, Any]:
-    """Return the table of a command, or one that several share."""
-    tables, commands = _tables(package)
-    if name in commands:
-        tables = tomllib.loads(commands[name])
-    return dict(tables[name])
+    """Return the table of a command, or one that several share; no other command's is parsed."""
+    text = next((part for part in _texts(package) if part.startswith(f"[{name}]\n")), None)
+    return dict((_shared(package) if text is None else tomllib.loads(text))[name])
+
+
+def program(package: str) -> dict[str, Any]:
+    """Return what the group of a package's commands says of itself and of each of them."""
+    return _table(package, "program")
 
 
 @cache

@@ -44,6 +44,7 @@ NOT_RUN = {
     "python benchmarks/bench_delivery.py": MINUTES,
     "python benchmarks/bench_relief.py": MINUTES,
     "python benchmarks/relief_ablation.py": MINUTES,
+    "python benchmarks/relief_tuning.py": MINUTES,
     "python benchmarks/bench_shift.py": MINUTES,
     "python -m benchmarks.bench_page 100": MINUTES,
     "python -m benchmarks.peers": MINUTES,

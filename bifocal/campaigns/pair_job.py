@@ -9,6 +9,7 @@ import os
 import time
 import traceback
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -37,6 +38,14 @@ PRODUCTS = ("relief", "points", "ortho", "drawing", "view", "report")
 MOST_PRODUCTS = ("relief", "points", "drawing", "view", "report")
 #: The first step of every pair.
 FIRST_STEP = "align"
+#: How the file is called that a step makes before all others, behind the pair's name.
+MADE = {
+    "align": ".pair.json",
+    "relief": "_relief.tif",
+    "ortho": "_ortho.tif",
+    "drawing": ".tif",
+    "view": "_view.html",
+}
 #: Share of a pair's time that each step takes, measured on church_2.
 WEIGHTS = {
     "align": 0.22, "relief": 0.36, "points": 0.02, "ortho": 0.07, "drawing": 0.15, "view": 0.02,
@@ -92,35 +101,17 @@ class PairJob:
     @property
     def pair_path(self) -> Path:
         """The pair file that relief and drawings are made with."""
-        return self.own_pair_path if self.joint is None else self.joint / self.own_pair_path.name
+        own = self.product("align")
+        return own if self.joint is None else self.joint / own.name
 
-    @property
-    def own_pair_path(self) -> Path:
-        """The pair file that the first step makes."""
-        return self.folder / "align" / f"{self.title}.pair.json"
-
-    @property
-    def drawing_path(self) -> Path:
-        """The orthophoto of the drawing."""
-        return self.folder / "drawing" / f"{self.title}.tif"
-
-    @property
-    def relief_path(self) -> Path:
-        """The relief map."""
-        return self.folder / "relief" / f"{self.title}_relief.tif"
-
-    @property
-    def view_path(self) -> Path:
-        """The page that shows the relief in three dimensions."""
-        return self.folder / "view" / f"{self.title}_view.html"
+    def product(self, step: str) -> Path:
+        """Return the file that a step makes before all others."""
+        return self.folder / step / f"{self.title}{MADE[step]}"
 
     def ortho_path(self, steps: Sequence[str]) -> Path | None:
         """Return the orthophoto that these steps make, that of the drawing first."""
-        orthos = {
-            "drawing": self.drawing_path,
-            "ortho": self.folder / "ortho" / f"{self.title}_ortho.tif",
-        }
-        return next((path for step, path in orthos.items() if step in steps), None)
+        made = (step for step in ("drawing", "ortho") if step in steps)
+        return next(map(self.product, made), None)
 
     def memory(self) -> int:
         """Return the memory it needs at most; that of small photos where they cannot be read.
@@ -189,11 +180,16 @@ def steps_of(job: PairJob) -> list[Step]:
 
 def plan_of(job: PairJob, hashes: FileHashes) -> list[tuple[str, str]]:
     """Return each step of a pair with ``keep``, ``make``, or why it cannot run."""
+    return plan_of_steps(job.folder, steps_of(job), hashes)
+
+
+def plan_of_steps(parent: Path, steps: Sequence[Step], hashes: FileHashes) -> list[tuple[str, str]]:
+    """Return steps whose folders lie in ``parent`` with ``keep``, ``make``, or what is wrong."""
     plan: list[tuple[str, str]] = []
     earlier: dict[str, StepRecord] = {}
     stale = False
-    for step in steps_of(job):
-        folder = job.folder / step.name
+    for step in steps:
+        folder = parent / step.name
         record = read_record(folder)
         try:
             key = "" if stale else step_key(step, earlier, hashes)
@@ -216,45 +212,85 @@ def run_pair(job: PairJob, progress: Progress = no_progress) -> PairOutcome:
     """
     import cv2
 
-    start = time.perf_counter()
+    steps = steps_of(job)
+    total = sum(WEIGHTS[step.name] for step in steps)
+    parts = []
+    behind = 0.0
+    for step in steps:
+        part = _part_of(progress, behind / total, WEIGHTS[step.name] / total, step.name)
+        parts.append((step, part))
+        behind += WEIGHTS[step.name]
     hashes = FileHashes(job.folder / ".hashes.json")
-    done: list[str] = []
-    kept: list[str] = []
-    remarks: list[str] = []
-    failed, message = "align", ""
+    where, day = f"pair {job.name}, ", job.date or None
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:
-        steps = steps_of(job)
-        total = sum(WEIGHTS[step.name] for step in steps)
-        records: dict[str, StepRecord] = {}
-        behind = 0.0
-        for step in steps:
-            failed = step.name
-            part = _part_of(progress, behind / total, WEIGHTS[step.name] / total, step.name)
-            part(0.0, 1.0)
+        return run_steps(
+            job.name, job.folder, parts, hashes, overwrite=job.overwrite, day=day, where=where
+        )
+    finally:
+        cv2.setNumThreads(threads)
+
+
+def run_steps(
+    name: str,
+    parent: Path,
+    steps: Sequence[tuple[Step, Progress]],
+    hashes: FileHashes,
+    *,
+    overwrite: bool,
+    day: str | None = None,
+    where: str = "",
+) -> PairOutcome:
+    """Run the steps whose results are not in their folders yet; errors become the outcome.
+
+    Parameters
+    ----------
+    name : str
+        That of the outcome.
+    parent : Path
+        Where the folders of the steps lie.
+    steps : sequence of (Step, Progress)
+        Each with what is told how far it is.
+    hashes : FileHashes
+    overwrite : bool
+        Replace files that were changed after they were made.
+    day : str, optional
+        That the files bear.
+    where : str
+        What an error belongs to.
+    """
+    start = time.perf_counter()
+    done: list[str] = []
+    kept: list[str] = []
+    remarks: list[str] = []
+    records: dict[str, StepRecord] = {}
+    failed = message = ""
+    try:
+        for step, progress in steps:
+            failed, folder = step.name, parent / step.name
+            progress(0.0, 1.0)
             key = step_key(step, records, hashes)
-            record = read_record(job.folder / step.name)
-            if record is not None and is_current(job.folder / step.name, record, key, hashes):
+            record = read_record(folder)
+            if record is not None and is_current(folder, record, key, hashes):
                 kept.append(step.name)
             else:
-                rasters = cloud_optimised(bool(job.options.get("cog")))
-                with recording(step.described(), day=job.date or None), rasters:
+                rasters = cloud_optimised(bool(step.options.get("cog")))
+                with recording(step.described(), day=day), rasters:
                     record = run_step(
-                        job.folder, step, key, hashes, progress=part, overwrite=job.overwrite
+                        parent, step, key, hashes, progress=progress, overwrite=overwrite
                     )
                 done.append(step.name)
             records[step.name] = record
             remarks += [f"{step.name}: {remark}" for remark in record.remarks]
-            behind += WEIGHTS[step.name]
         failed = ""
-    except Exception as error:  # one pair's fault, whatever it is, must not stop the others
-        message = failure_message(error, f"pair {job.name}, step {failed}", job.folder)
+    except Exception as error:  # one fault, whatever it is, must not stop the other pairs
+        message = failure_message(error, f"{where}step {failed}", parent)
     finally:
-        cv2.setNumThreads(threads)
-        hashes.save()
+        with suppress(OSError):
+            hashes.save()
     return PairOutcome(
-        name=job.name, done=tuple(done), kept=tuple(kept), failed_step=failed, message=message,
+        name=name, done=tuple(done), kept=tuple(kept), failed_step=failed, message=message,
         remarks=tuple(remarks), seconds=time.perf_counter() - start,
     )  # fmt: skip
 
@@ -310,7 +346,7 @@ def _align_step(job: PairJob) -> Step:
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
         from bifocal.orientation.align_workflow import AlignOptions, align_photos
 
-        out = place / job.own_pair_path.name
+        out = place / job.product("align").name
         made = align_photos(
             job.far, job.near, out, AlignOptions.from_given({**options, **files}),
             picture=out.with_suffix("").with_suffix(".pair.png"),
@@ -333,7 +369,7 @@ def _relief_step(job: PairJob) -> Step:
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
 
-        out = place / job.relief_path.name
+        out = place / job.product("relief").name
         task = ReliefJob(
             out=out, preview=out.with_suffix(".png"), gsd=options.get("relief_gsd"),
             **_some(job, *MAP[1:]),
@@ -388,7 +424,7 @@ def _ortho_task(job: PairJob, options: Mapping[str, Any]) -> OrthoTask:
 
     return OrthoTask.from_given(
         {key: options[key] for key in (*PICTURE, "gsd") if key in options},
-        relief=job.relief_path,
+        relief=job.product("relief"),
     )
 
 
@@ -398,7 +434,7 @@ def _ortho_step(job: PairJob) -> Step:
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.orthophotos.ortho_workflow import make_ortho
 
-        out = place / f"{job.title}_ortho.tif"
+        out = place / job.product("ortho").name
         task = _ortho_task(job, options)
         return make_ortho(job.pair_path, out, task, progress=progress).remarks
 
@@ -432,7 +468,7 @@ def _view_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
         from bifocal.reports.view_workflow import view_relief
 
-        view_relief(job.relief_path, place / job.view_path.name, ortho=ortho, **options)
+        view_relief(job.product("relief"), place / job.product("view").name, ortho=ortho, **options)
         return ()
 
     after = ("relief",) if ortho is None else ("relief", ortho.parent.name)
@@ -448,8 +484,8 @@ def _report_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
         task = ReportTask(
             title=job.name, language=options.get("language", "en"), unit=options.get("unit", ""),
             scale=options.get("scale"), far=job.far,
-            relief=job.relief_path if "relief" in earlier else None,
-            ortho=job.ortho_path(earlier), view=job.view_path if "view" in earlier else None,
+            relief=job.product("relief") if "relief" in earlier else None,
+            ortho=job.ortho_path(earlier), view=job.product("view") if "view" in earlier else None,
             **tables_of(job),
         )  # fmt: skip
         outs = (place / f"{job.title}_report.html", place / f"{job.title}_report.pdf")

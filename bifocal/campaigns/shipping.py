@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from bifocal.campaigns.pair_job import PairJob, PairOutcome, run_pair
 from bifocal.campaigns.step_store import receive_step
@@ -47,11 +48,14 @@ class ShippedPair:
 
 def found_anywhere(job: PairJob) -> PairJob:
     """Return a job whose paths are absolute: a worker's current folder is another."""
-    return replace(
-        job, folder=job.folder.absolute(), far=job.far.absolute(), near=job.near.absolute(),
-        files={role: path.absolute() for role, path in job.files.items()},
-        joint=None if job.joint is None else job.joint.absolute(),
-    )  # fmt: skip
+    return _moved(job, Path.absolute)
+
+
+def _moved(job: PairJob, there: Callable[[Path], Path]) -> PairJob:
+    """Return a job with its files and folders elsewhere."""
+    files = {role: there(path) for role, path in job.files.items()}
+    own: dict[str, Any] = {name: there(getattr(job, name)) for name in ("folder", "far", "near")}
+    return replace(job, files=files, joint=job.joint and there(job.joint), **own)
 
 
 def packed(job: PairJob) -> Parcel:
@@ -87,16 +91,7 @@ def run_parcel(parcel: Parcel) -> ShippedPair:
         for name, content in parcel.files.items():
             (root / name).parent.mkdir(parents=True, exist_ok=True)
             (root / name).write_bytes(content)
-
-        def here(path: Path) -> Path:
-            return root / path.relative_to(parcel.root)
-
-        sent = parcel.job
-        job = replace(
-            sent, folder=here(sent.folder), far=here(sent.far), near=here(sent.near),
-            files={role: here(path) for role, path in sent.files.items()},
-            joint=None if sent.joint is None else here(sent.joint),
-        )  # fmt: skip
+        job = _moved(parcel.job, lambda path: root / path.relative_to(parcel.root))
         outcome = run_pair(job)
         steps = {
             step: {

@@ -236,15 +236,11 @@ def _files(folder: Path) -> list[Path]:
 def _changed_files(
     folder: Path, record: StepRecord, hashes: FileHashes, *, missing_too: bool
 ) -> list[str]:
-    changed = []
-    for name, digest in record.outputs.items():
-        path = folder / name
-        if not path.is_file():
-            if missing_too:
-                changed.append(name)
-        elif hashes(path) != digest:
-            changed.append(name)
-    return changed
+    return [
+        name
+        for name, digest in record.outputs.items()
+        if (hashes(folder / name) != digest if (folder / name).is_file() else missing_too)
+    ]
 
 
 def _refuse_open(folder: Path) -> None:

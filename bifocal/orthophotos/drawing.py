@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib.resources import files
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -16,14 +19,10 @@ from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import InputError
 from photocore.reports.words import Words, words_of
 
-#: Paper sizes, width x height upright. [mm]
-PAPERS: Mapping[str, tuple[float, float]] = {
-    "A4": (210, 297),
-    "A3": (297, 420),
-    "A2": (420, 594),
-    "A1": (594, 841),
-    "A0": (841, 1189),
-}
+#: Papers, width and height upright [mm]; layers of drawings and sections, with their colours.
+TABLES: Mapping[str, Mapping[str, Any]] = tomllib.loads(
+    files("bifocal.orthophotos").joinpath("drawing.toml").read_text("utf-8")
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -238,7 +237,7 @@ class PrintSheet:
             wide + SHEET.left + SHEET.margin + 2 * SHEET.band,
             high + 2 * SHEET.margin + 2 * SHEET.band + SHEET.strip,
         )
-        for name, (short, long) in PAPERS.items():
+        for name, (short, long) in TABLES["papers"].items():
             if paper is not None and name != paper:
                 continue
             ways = [("portrait", (short, long)), ("landscape", (long, short))]

@@ -11,29 +11,11 @@ import numpy as np
 from bifocal.files.dxf import add_text, dashed, new_drawing, save_drawing, turned
 from bifocal.model.points import SurveyPoints
 from bifocal.orthophotos.contour_lines import contour_labels
-from bifocal.orthophotos.drawing import Drawing, PrintSheet, Section
+from bifocal.orthophotos.drawing import TABLES, Drawing, PrintSheet, Section
 from bifocal.orthophotos.dxf_canvas import DxfCanvas
 from bifocal.orthophotos.sheet_margins import SheetMargins
 from bifocal.orthophotos.tuning import CONTOURS, SHEET
 from photocore.output import atomic_path
-
-#: Layers and their colours (AutoCAD colour index).
-LAYERS = {
-    "BIFOCAL_IMAGE": 7,
-    "BIFOCAL_POINTS": 7,
-    "BIFOCAL_NAMES": 3,
-    "BIFOCAL_CONTROL": 1,
-    "BIFOCAL_GRID": 8,
-    "BIFOCAL_SCALEBAR": 7,
-    "BIFOCAL_CONTOURS": 30,
-    "BIFOCAL_CONTOURS_INDEX": 30,
-    "BIFOCAL_CONTOUR_TEXT": 30,
-    "BIFOCAL_SECTION_LINES": 5,
-    "BIFOCAL_SECTION_NAMES": 5,
-    "BIFOCAL_FRAME": 7,
-    "BIFOCAL_LEGEND": 7,
-    "BIFOCAL_VIEWPORT": 8,
-}
 
 
 def write_drawing(
@@ -49,7 +31,9 @@ def write_drawing(
         File of the picture beside the drawing.
     """
     # Points are crosses in circles of 3 mm on paper.
-    document, model = new_drawing(LAYERS, point_style=34, point_size=3 * drawing.scale / 1000)
+    document, model = new_drawing(
+        TABLES["layers"], point_style=34, point_size=3 * drawing.scale / 1000
+    )
     grid = drawing.grid
     xmin, ymin, xmax, ymax = grid.bounds
     if image_name is not None:

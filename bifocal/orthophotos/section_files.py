@@ -20,21 +20,13 @@ from bifocal.orthophotos.canvas import (
     scale_bar,
     text_width,
 )
-from bifocal.orthophotos.drawing import Section, multiples, round_step, signed
+from bifocal.orthophotos.drawing import TABLES, Section, multiples, round_step, signed
 from bifocal.orthophotos.dxf_canvas import DxfCanvas
 from bifocal.orthophotos.tuning import PROFILE
 from photocore.arrays import FloatArray
 from photocore.output import atomic_path
 from photocore.reports.words import Words
 
-#: Layers and their colours (AutoCAD colour index).
-LAYERS = {
-    "BIFOCAL_SECTIONS": 5,
-    "BIFOCAL_SECTIONS_GUESSED": 8,
-    "BIFOCAL_AXES": 8,
-    "BIFOCAL_SECTION_NAME": 7,
-    "BIFOCAL_SCALEBAR": 7,
-}
 _PROFILE = Pen(layer="BIFOCAL_SECTIONS", width=0.25)
 _GUESSED = Pen(layer="BIFOCAL_SECTIONS_GUESSED", width=0.18, colour=GREY, dashes=(1.5, 1.0))
 _AXIS = Pen(layer="BIFOCAL_AXES", width=0.13)
@@ -45,7 +37,9 @@ _BAR = Pen(layer="BIFOCAL_SCALEBAR")
 
 def write_section_dxf(path: Path, cut: Section, *, scale: float, say: Words) -> None:
     """Write one section, 1:1 in metres: relief to the right (upright cut) or upwards."""
-    document, model = new_drawing(LAYERS, point_style=3, point_size=3 * scale / 1000)
+    document, model = new_drawing(
+        TABLES["section_layers"], point_style=3, point_size=3 * scale / 1000
+    )
     draw_section(DxfCanvas(model, scale / 1000), cut, scale, _title(cut, scale, say))
     with atomic_path(path, overwrite=False) as temporary:
         save_drawing(document, temporary)

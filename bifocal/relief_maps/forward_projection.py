@@ -350,7 +350,7 @@ def fill_small(bands: MapBands, holes: BoolArray) -> None:
     distance, label = cv2.distanceTransformWithLabels(
         unknown.astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
-    fill = holes & unknown & (distance <= PROJECTION.deepest_hole)
+    fill = holes & unknown & (distance <= PROJECTION.fringe_hidden)
     known = np.flatnonzero(~unknown)
     if not len(known) or not fill.any():
         return

@@ -93,7 +93,7 @@ def _count(
     low, count = classes
     r = relief[use]
     cell = place[use] * count + ((r - low) / LEVELS.class_height).astype(np.int64)
-    share = 1 / np.maximum(sigma[use], np.float32(LEVELS.best)) ** 2
+    share = 1 / np.maximum(sigma[use], np.float32(LEVELS.reaches[0] / 2)) ** 2
     # A full square: fewer blocks at the corners would draw a slope to the middle of its block.
     side = (LEVELS.surroundings, LEVELS.surroundings)
 

@@ -60,7 +60,7 @@ def drawn_in(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
     rims = _falling(frame, bands, grid)
     rims, raised = _measured_inwards(bands, rims)
     across, down = _directions(bands.r, rims)
-    clear = across * rims.u + down * rims.v > RIMS.along_radius
+    clear = across * rims.u + down * rims.v > 0  # others cast no shadow
     if clear.any():
         rims, normal = rims.only(clear), (across[clear], down[clear])
         _lower(bands, rims, _edges(frame, grid, rims, raised[clear], normal), normal)
@@ -102,7 +102,7 @@ def _measured_inwards(bands: MapBands, rims: _Rims) -> tuple[_Rims, Float32Array
         found = bands.quality[places] == Quality.MEASURED
         found &= np.abs(relief - part.own) < RIMS.same * fall
         raised[left[found]], nearest[left[found]] = relief[found], step
-        search = ~found & (relief > part.behind + RIMS.ends * fall)
+        search = ~found & (relief > part.behind + RIMS.same * fall)
         left, part, fall = left[search], part.only(search), fall[search]
     rims = rims._replace(reach=np.minimum(rims.reach, nearest))
     return rims.only(nearest > 0), raised[nearest > 0]

@@ -15,7 +15,7 @@ import numpy as np
 from bifocal.model.grid import Grid
 from bifocal.relief_maps.forward_projection import MapBands, shown_by_first
 from bifocal.relief_maps.frame import Frame, offsets, values_at
-from bifocal.relief_maps.tuning import SNAPPING
+from bifocal.relief_maps.tuning import SMOOTHING, SNAPPING
 from photocore.arrays import Float32Array, FloatArray, IntArray
 
 
@@ -83,7 +83,7 @@ def _steps(
     Where a step falls outwards photo 1 sees behind it, and flow has found it as well as its edge
     (façades 81 and 83: of pixels moved there as many were right before as after).
     """
-    least = np.float32(max(SNAPPING.step, 4 * gsd))
+    least = np.float32(max(SMOOTHING.least_step, 4 * gsd))
     quiet = cv2.GaussianBlur(relief, (0, 0), 1.0)
     row, column = np.nonzero(bounds[0] - bounds[1] > least)
     slopes = [cv2.Sobel(quiet, cv2.CV_32F, *way, ksize=3, scale=0.125) for way in ((1, 0), (0, 1))]

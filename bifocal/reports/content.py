@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -123,10 +124,7 @@ class PairContent:
         if self.solution is None:
             return False
         compared = np.asarray(np.isfinite(self.solution.check.errors).any(axis=1))
-        ids = (
-            name for name, is_one in zip(self.solution.check.ids, compared, strict=True) if is_one
-        )
-        return not self.control_ids.intersection(ids)
+        return not self.control_ids.intersection(compress(self.solution.check.ids, compared))
 
     def map_errors(self) -> FloatArray:
         """Return map minus known relief at measured pixels of the compared points. [m]"""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
@@ -52,28 +53,28 @@ def solve_control(
     """
     tables = [(path, code) for path, code in ((control, CONTROL), (check, CHECK)) if path]
     parts = [_read(path, exchanged, unit) for path, _ in tables]
-    codes = [
-        code for part, (_, code) in zip(parts, tables, strict=True) for _ in range(len(part.ids))
-    ]
+    counts = np.array([len(part.ids) for part in parts], dtype=int)
+    codes = np.repeat([code for _, code in tables], counts)
     ids = [name for part in parts for name in part.ids]
     twice = sorted({name for name in ids if ids.count(name) > 1}) if check else []
     if twice:
         raise InputError(f"{check}: {', '.join(twice[:5])} is in {control} too; give other names.")
-    pixels1 = np.concatenate([part.pixels1 for part in parts] or [np.zeros((0, 2))])
-    pixels2 = np.concatenate([part.pixels2 for part in parts] or [np.zeros((0, 2))])
-    xyz = np.concatenate([part.xyz for part in parts] or [np.zeros((0, 3))])
+    pixels1, pixels2, xyz = (
+        np.concatenate([getattr(part, name) for part in parts] or [np.zeros((0, size))])
+        for name, size in (("pixels1", 2), ("pixels2", 2), ("xyz", 3))
+    )
     seen = np.isfinite(np.hstack([pixels1, pixels2])).all(axis=1)
     if not seen.any():
         raise InputError(
             f"{control or check}: no point was picked in both photos; nothing to measure."
         )
     points = PointObservations(
-        ids=tuple(name for name, is_seen in zip(ids, seen, strict=True) if is_seen),
+        ids=tuple(compress(ids, seen)),
         pixels1=pixels1[seen],
         pixels2=pixels2[seen],
-        code=tuple(code for code, is_seen in zip(codes, seen, strict=True) if is_seen),
+        code=tuple(codes[seen].tolist()),
     )
-    compared = np.array([code == CHECK for code in points.code], dtype=bool)
+    compared = codes[seen] == CHECK
     if not compared.any():
         compared[:] = True
     known = KnownPoints(ids=points.ids, xyz=xyz[seen], use=compared)

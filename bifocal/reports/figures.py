@@ -66,9 +66,8 @@ def draw_plan(figure: Any, content: PairContent, say: Words) -> None:
         axes.plot([first[0], zoom], [first[1], 0], color="0.4", lw=0.8, ls=":")
     axes.plot([low, high], [0, 0], color="black", lw=4, solid_capstyle="butt")
     axes.annotate(say("wall"), (high, 0), (4, 4), textcoords="offset points", fontsize=8)
-    axes.set_aspect("equal")
     margin = 0.08 * (high - low)
-    axes.set_xlim(low - margin, high + 2 * margin)
+    axes.set(aspect="equal", xlim=(low - margin, high + 2 * margin))
     axes.set_ylim(-0.05 * first[1], 1.1 * first[1])
     axes.set_xlabel("X [m]", fontsize=8)
     axes.set_ylabel(say("distance_axis"), fontsize=8)
@@ -180,10 +179,8 @@ def draw_relief(figure: Any, content: PairContent, say: Words) -> None:
             guessed.astype(float), levels=[0.5, 1.5], hatches=["...."], colors="none",
             extent=_extent(relief.bounds), origin="upper", alpha=0.0,
         )  # fmt: skip
-    bar = figure.colorbar(image, cax=figure.add_axes(_BAR), extend="both")
-    bar.set_label(say("relief_axis"), fontsize=8)
-    bar.ax.tick_params(labelsize=7)
-    bar.ax.axhline(0, color="black", lw=1)
+    bar = _colour_bar(figure, image, say("relief_axis"), extend="both")
+    bar.axhline(0, color="black", lw=1)
     _scale_bar(axes, relief.bounds)
 
 
@@ -204,9 +201,7 @@ def draw_sigma(figure: Any, content: PairContent, say: Words, limit: float) -> N
             sigma, extent=_extent(relief.bounds), cmap="cividis",
             norm=LogNorm(max(low, 0.01), max(high, 1.5 * low, 0.02)), interpolation="nearest",
         )  # fmt: skip
-        bar = figure.colorbar(image, cax=figure.add_axes(_BAR), extend="both")
-        bar.set_label(say("sigma_axis"), fontsize=8)
-        bar.ax.tick_params(labelsize=7, which="both")
+        _colour_bar(figure, image, say("sigma_axis"), extend="both")
         if (sigma[good] > 1000 * limit).any() and (sigma[good] < 1000 * limit).any():
             axes.contour(
                 np.where(good, sigma, np.nan), levels=[1000 * limit], colors="red", linewidths=1.2,
@@ -230,8 +225,7 @@ def draw_errors(figure: Any, content: PairContent, say: Words) -> None:
     if content.ortho is not None:
         picture, extent = content.ortho
         axes.imshow(picture, extent=_extent(extent), alpha=0.35, interpolation="antialiased")
-        axes.set_xlim(bounds[0], bounds[2])
-        axes.set_ylim(bounds[1], bounds[3])
+        axes.set(xlim=bounds[::2], ylim=bounds[1::2])
     zoom = error_zoom(content)
     reach = max(float(np.abs(errors[:, 2]).max(initial=0.0)), 1e-4) * 1000
     dots = axes.scatter(
@@ -243,9 +237,7 @@ def draw_errors(figure: Any, content: PairContent, say: Words) -> None:
             places[:, 0], places[:, 1], errors[:, 0] * zoom, errors[:, 1] * zoom, angles="xy",
             scale_units="xy", scale=1, width=0.004, color="black", zorder=4,
         )  # fmt: skip
-    bar = figure.colorbar(dots, cax=figure.add_axes(_BAR))
-    bar.set_label(say("error_of"), fontsize=8)
-    bar.ax.tick_params(labelsize=7)
+    _colour_bar(figure, dots, say("error_of"))
     _scale_bar(axes, bounds)
 
 
@@ -312,14 +304,19 @@ def _reduced(relief: ReliefMap) -> ReliefMap:
 
 def _plane_axes(figure: Any, bounds: Bounds, place: tuple[float, float, float, float]) -> Any:
     axes = figure.add_axes(place)
-    x_min, y_min, x_max, y_max = bounds
-    axes.set_aspect("equal")
-    axes.set_xlim(x_min, x_max)
-    axes.set_ylim(y_min, y_max)
+    axes.set(aspect="equal", xlim=bounds[::2], ylim=bounds[1::2])
     axes.set_xlabel("X [m]", fontsize=8)
     axes.set_ylabel("Y [m]", fontsize=8)
     axes.tick_params(labelsize=8)
     return axes
+
+
+def _colour_bar(figure: Any, image: Any, label: str, **more: Any) -> Any:
+    """Draw the bar of what has colours; return its axes."""
+    bar = figure.colorbar(image, cax=figure.add_axes(_BAR), **more)
+    bar.set_label(label, fontsize=8)
+    bar.ax.tick_params(labelsize=7, which="both")
+    return bar.ax
 
 
 def _extent(bounds: Bounds) -> tuple[float, float, float, float]:

@@ -66,44 +66,31 @@ def _geometry(content: PairContent, say: Words) -> Iterator[Block]:
     photos, language = (content.pair.image1, content.pair.image2), content.task.language
     deviations = content.setup.get("standard_deviations", {})
 
-    def with_sigma(value: float, key: str, unit: str, digits: int) -> str:
-        sigma = deviations.get(key)
-        spread = f" ± {sigma:.{digits}f}" if isinstance(sigma, int | float) else ""
-        return f"{value:.{digits}f}{spread} {unit}"
+    rows: list[list[str]] = []
 
-    rows = [[say("file"), *(Path(photo.file).name or "-" for photo in photos)]]
-    rows.append([
-        say("distance"),
-        *(with_sigma(p.distance, f"distance{k}", "m", 3) for k, p in _both(photos)),
-    ])  # fmt: skip
-    rows.append([
-        say("nadir"), *(f"{p.nadir[0]:.3f}, {p.nadir[1]:.3f} m" for p in photos),
-    ])  # fmt: skip
-    focal = content.setup.get("focal_px")
-    if focal:
-        rows.append([
-            say("focal_found"),
-            *(_focal(float(focal[k - 1]), p.pixel_size, deviations.get(f"focal{k}"))
-              for k, p in _both(photos)),
-        ])  # fmt: skip
+    def add(key: str, *cells: str) -> None:
+        rows.append([say(key), *cells])
+
+    add("file", *(Path(photo.file).name or "-" for photo in photos))
+    add("distance", *(
+        f"{photo.distance:.3f}{_spread(deviations.get(f'distance{k}'), 3)} m"
+        for k, photo in enumerate(photos, start=1)
+    ))  # fmt: skip
+    add("nadir", *(f"{photo.nadir[0]:.3f}, {photo.nadir[1]:.3f} m" for photo in photos))
+    if focal := content.setup.get("focal_px"):
+        add("focal_found", *(
+            _focal(float(focal[k - 1]), photo.pixel_size, deviations.get(f"focal{k}"))
+            for k, photo in enumerate(photos, start=1)
+        ))  # fmt: skip
         sources = content.setup.get("interior", ("-", "-"))
-        rows.append(
-            [say("focal_given"), *(in_language(str(source), language) for source in sources)]
-        )
+        add("focal_given", *(in_language(str(source), language) for source in sources))
     if content.photos:
-        rows.append([
-            say("gsd"), *(millimetres(seen.photo.gsd(seen.size)) for seen in content.photos),
-        ])  # fmt: skip
-        rows.append([
-            say("tilt"),
-            *(f"{figures.tilt_of(seen.photo, seen):.2f}°" for seen in content.photos),
-        ])  # fmt: skip
-    layers, key = content.pair.layers, "base"
-    if layers:
-        key = "base_media"
-        rows.append([say("media"), media_words(layers), ""])
-        rows.append([say("z0"), *(f"{photo.z0 or 0.0:.3f} m" for photo in photos)])
-    rows.append([say(key), f"{content.pair.base_factor:.2f} m", ""])
+        add("gsd", *(millimetres(seen.photo.gsd(seen.size)) for seen in content.photos))
+        add("tilt", *(f"{figures.tilt_of(seen.photo, seen):.2f}°" for seen in content.photos))
+    if layers := content.pair.layers:
+        add("media", media_words(layers), "")
+        add("z0", *(f"{photo.z0 or 0.0:.3f} m" for photo in photos))
+    add("base_media" if layers else "base", f"{content.pair.base_factor:.2f} m", "")
     yield TextTable(headings=[say("quantity"), say("far"), say("near")], rows=rows)
     yield from refraction_blocks(content, say)
     for sentence in content.setup.get("words", ()):
@@ -115,14 +102,13 @@ def _geometry(content: PairContent, say: Words) -> Iterator[Block]:
     )
 
 
-def _both(photos: Sequence[Any]) -> Iterator[tuple[int, Any]]:
-    return iter(enumerate(photos, start=1))
+def _spread(sigma: float | None, digits: int) -> str:
+    return f" ± {sigma:.{digits}f}" if isinstance(sigma, int | float) else ""
 
 
 def _focal(pixels: float, pitch: float | None, sigma: float | None) -> str:
-    spread = f" ± {sigma:.1f}" if isinstance(sigma, int | float) else ""
     length = f" ({pixels * pitch:.2f} mm)" if pitch else ""
-    return f"{pixels:.1f}{spread} px{length}"
+    return f"{pixels:.1f}{_spread(sigma, 1)} px{length}"
 
 
 def _photos(content: PairContent, say: Words) -> Iterator[Block]:

@@ -9,10 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from multimedia.adjustment.bundle_columns import place_columns, with_common_values
-from multimedia.adjustment.bundle_equations import (
-    Bundle,
-    ImageObservations,
-)
+from multimedia.adjustment.bundle_equations import Bundle, ImageObservations
 from multimedia.adjustment.interior_choice import choose_interior, with_interior
 from multimedia.adjustment.media_unknowns import WITH_VALUE
 from multimedia.adjustment.plausibility import (

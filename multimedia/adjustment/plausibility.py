@@ -13,12 +13,7 @@ from multimedia.adjustment.media_unknowns import media_unknowns
 from multimedia.adjustment.unknowns import Adjustment
 from multimedia.media.camera import ANY_INTERIOR, EXTERIOR
 from multimedia.projects.model import Project
-from photocore.adjustment.priors import (
-    ALIKE,
-    UNCARRIED,
-    hardly_carried,
-    is_possible,
-)
+from photocore.adjustment.priors import ALIKE, UNCARRIED, hardly_carried, is_possible
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import GeometryError
 from photocore.reports.words import words_of

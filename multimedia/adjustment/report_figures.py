@@ -64,9 +64,7 @@ def draw_vectors(figure: Any, result: Adjustment, cameras: Sequence[Camera], say
                 *place[chosen].T, *(miss[chosen] * zoom).T, angles="xy", scale_units="xy",
                 scale=1, width=width, color=colour,
             )  # fmt: skip
-        axes.set_aspect("equal")
-        axes.set_xlim(-reach, reach)
-        axes.set_ylim(-reach, reach)
+        axes.set(aspect="equal", xlim=(-reach, reach), ylim=(-reach, reach))
         axes.axhline(0, color="0.7", lw=0.6, zorder=0)
         axes.axvline(0, color="0.7", lw=0.6, zorder=0)
         if camera.sensor is not None:

@@ -34,5 +34,4 @@ def command(source: Path, target: Path, as_json: bool, **options: Any) -> None:
     ]
     lines = [text_table(("camera", "looks through", "image points"), rows)]
     lines.append(f"Written: {target} ({done.target})")
-    notes = (f"Note: {line}" for line in done.remarks)
-    print_result(data, lines, as_json=as_json, remarks=notes)
+    print_result(data, lines, as_json=as_json, notes=done.remarks)

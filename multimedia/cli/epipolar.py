@@ -31,8 +31,7 @@ def command(
 
     result = epipolar_project(project, out=out, picture=picture, **options)
     data = {name: getattr(result, name) for name in ("z_range", "curves", "candidates")}
-    notes = (f"Note: {line}" for line in result.remarks)
-    print_result(data, _lines(result), as_json=as_json, remarks=notes)
+    print_result(data, _lines(result), as_json=as_json, notes=result.remarks)
     tell_written(out, picture)
 
 

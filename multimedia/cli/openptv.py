@@ -52,5 +52,4 @@ def command(
     if imported.particles:
         lines.append(f"{imported.particles} particles of the stored frame")
     lines += [f"Written: {file}" for file in imported.files]
-    notes = (f"Note: {line}" for line in project.remarks)
-    print_result(data, lines, as_json=as_json, remarks=notes)
+    print_result(data, lines, as_json=as_json, notes=project.remarks)

@@ -22,8 +22,7 @@ def command(project: Path, as_json: bool, **options: Any) -> None:
 
     resected = resect_project(project, **options)
     data = resected_as_dict(resected)
-    notes = (f"Note: {line}" for line in resected.remarks)
-    print_result(data, _lines(data["cameras"]), as_json=as_json, remarks=notes)
+    print_result(data, _lines(data["cameras"]), as_json=as_json, notes=resected.remarks)
     for what, key in (("Project", "out"), ("Residuals", "residuals")):
         if options[key] is not None:
             remark(f"{what} written to {options[key]}")

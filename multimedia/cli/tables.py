@@ -24,8 +24,7 @@ def show(table: PointTable, *, as_json: bool, out: Path | None, digits: Mapping[
     if len(shown) < len(records):
         lines.append(f"... and {len(records) - len(shown)} more")
     data = {"points": records, "summary": list(table.summary)}
-    notes = (f"Note: {line}" for line in table.remarks)
-    print_result(data, [*lines, *table.summary], as_json=as_json, remarks=notes)
+    print_result(data, [*lines, *table.summary], as_json=as_json, notes=table.remarks)
     if out is not None:
         remark(f"Table written to {out}")
 

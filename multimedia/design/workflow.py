@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -260,10 +260,6 @@ def as_dict(design: Design) -> dict[str, Any]:
             {"model": name, "rms": rms, "largest": largest} for name, rms, largest in design.models
         ],
         "colour_seam_mm": design.seam,
-        "planarity": [
-            {"kind": d.kind, "size": d.size, "wavelength": d.wavelength, "shift": d.shift,
-             "largest": d.largest, "allowed": d.allowed, "left_out": d.left_out}
-            for d in design.planarity
-        ],
+        "planarity": [asdict(deviation) for deviation in design.planarity],
         "remarks": design.remarks,
     }  # fmt: skip

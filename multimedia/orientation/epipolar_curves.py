@@ -192,9 +192,8 @@ def epipolar_candidates(
         _near(polygons[k : k + size], points[k : k + size], seen, tolerance, k)
         for k in range(0, len(polygons), size)
     ]
-    names = ("curves", "targets", "distance", "points")
-    whole = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-    return Candidates(**whole)
+    names = Candidates.__slots__
+    return Candidates(**{k: np.concatenate([getattr(part, k) for part in parts]) for k in names})
 
 
 def _ends(

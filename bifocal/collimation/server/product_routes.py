@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, cast
 
 from starlette.datastructures import UploadFile
 from starlette.exceptions import HTTPException
@@ -13,10 +14,11 @@ from starlette.routing import Route
 from bifocal.collimation.drawing import points_drawing
 from bifocal.collimation.fields import FieldError, number_of
 from bifocal.collimation.job_tasks import start_job
+from bifocal.collimation.live_results import LiveResults
+from bifocal.collimation.pictures import Pictures
 from bifocal.collimation.server.requests import answer, in_thread, json_body, session_of
 from bifocal.collimation.server.state_view import state_of
 from bifocal.collimation.server.uploads import take_photos
-from bifocal.collimation.session import Session
 from bifocal.collimation.uncertainty import precision_contours, uncertainty_picture
 from photocore.arrays import FloatArray, as_points
 
@@ -104,27 +106,19 @@ def _place(body: dict[str, Any], key: str) -> FloatArray:
     return place
 
 
-async def _uncertainty(request: Request) -> Response:
+async def _of_precision(request: Request, work: Callable[[Pictures, LiveResults], Any]) -> Any:
     session = session_of(request)
     session.pictures.needed_pair()
+    return await in_thread(lambda: work(session.pictures, cast(LiveResults, session.results)))
 
-    def picture(session: Session) -> bytes:
-        assert session.results is not None
-        return uncertainty_picture(session.pictures, session.results)
 
-    data = await in_thread(picture, session)
+async def _uncertainty(request: Request) -> Response:
+    data = await _of_precision(request, uncertainty_picture)
     return Response(data, media_type="image/png", headers=_FRESH)
 
 
 async def _contours(request: Request) -> Response:
-    session = session_of(request)
-    session.pictures.needed_pair()
-
-    def lines(session: Session) -> list[dict[str, Any]]:
-        assert session.results is not None
-        return precision_contours(session.pictures, session.results)
-
-    return answer(await in_thread(lines, session))
+    return answer(await _of_precision(request, precision_contours))
 
 
 ROUTES = [

@@ -7,7 +7,7 @@ from typing import Any
 
 from bifocal.workbook.content import SurveyContent, setup_cells
 from bifocal.workbook.formulas.columns import adjustment_names
-from bifocal.workbook.formulas.setup_cells import TITLE_BLOCK, TYPED_FORMULAS, cells_of, groups
+from bifocal.workbook.formulas.setup_cells import TITLE_BLOCK, cells_of, formulas, groups
 from bifocal.workbook.making.charts import HEAD, KEYS, LEFT
 from bifocal.workbook.words import word
 from photocore.errors import InputError
@@ -114,7 +114,7 @@ def _distances(editor: WorkbookEditor, cells: dict[str, CellValue]) -> set[str]:
     # The difference as people write it: 8.1, not 8.100000000000001.
     cells["delta_d"] = round(float(first) - float(second), 12)
     own = editor.models(d_1[0], d_1[1]).get(d_1[2])
-    follows = own is not None and own.formula.replace(" ", "") == TYPED_FORMULAS["d_1"]
+    follows = own is not None and own.formula.replace(" ", "") == formulas()["d_1"]
     return {"d_2", "delta_d"} if follows else {"d_1", "d_2", "delta_d"}
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from bifocal.model.pair import Pair
 from bifocal.rays import seen_distance
-from bifocal.survey.survey_media import SurveyMedia, thickness_names
+from bifocal.survey.survey_media import SurveyMedia
 from photocore.workbook.changing.cells import CellValue
 
 #: What may be typed as refractive index: vacuum to germanium.
@@ -26,46 +26,6 @@ def calculated_names(media: int, *, is_pair: bool) -> tuple[str, ...]:
     rays = () if is_pair else ("c_rays_1", "c_rays_2", "mm_1", "m_seen")
     both = tuple(f"{name}_{image}" for name in ("behind", "seen", "reach") for image in "12")
     return (*_used(media), *both, "r_top", *rays)
-
-
-def larger(image: int | str) -> str:
-    """Return the formula of how much larger a print is than its sensor; blank is 1."""
-    return f"IF(COUNT(enlargement_{image})=1,enlargement_{image},1)"
-
-
-def setup_formulas(media: int, *, is_pair: bool) -> dict[str, str]:
-    """Return the formulas of the sheet `Setup` that media add or change.
-
-    Blank cells are air: a medium without an index has that of the one before it.
-    """
-    if not media:
-        return {}
-    formulas = {"n_used_1": "IF(COUNT(index_1)=1,index_1,1)"}
-    for n in range(2, media + 1):
-        formulas[f"n_used_{n}"] = f"IF(COUNT(index_{n})=1,index_{n},n_used_{n - 1})"
-    inner = "".join(f"-N({name})" for name in thickness_names(media))
-    for image in "12":
-        glass = "".join(f"+N(thick_{n})*n_used_1/n_used_{n}" for n in range(2, media))
-        seen = f"N(z0_{image}){glass}+behind_{image}*n_used_1/n_used_{media}"
-        lens = f'IF(COUNT(c_1,c_2)=2,c_{image}*{larger(image)},IF(COUNT(d_{image})=1,d_{image},""))'
-        formulas |= {
-            f"behind_{image}": f'IF(COUNT(d_{image})=1,d_{image}-N(z0_{image}){inner},"")',
-            f"seen_{image}": f'IF(COUNT(d_{image})=1,{seen},"")',
-            f"reach_{image}": f'IF(COUNT(d_{image})=1,seen_{image}*n_used_{media}/n_used_1,"")',
-            f"c_rays_{image}": lens,
-        }
-    stated = ",".join(f"index_{n}" for n in range(2, media + 1))
-    lever = 'IF(reach_1=reach_2,"",reach_1*reach_2/(reach_1-reach_2))'
-    formulas |= {
-        "r_top": f'IF(COUNT(d_1,d_2)<2,"",IF(COUNT({stated})=0,MIN(d_1,d_2),'
-        "MIN(behind_1,behind_2)))",
-        "b_lever": f'IF(COUNT(d_1,d_2)=2,{lever},"")',
-        "mm_1": "IF(COUNT(m_1,m_2)=2,1000/m_1,1)",
-        "m_seen": 'IF(COUNT(c_1,c_2,d_1)=3,1000*seen_1/c_rays_1,"")',
-    }
-    if not is_pair:
-        formulas["k_12"] = "IF(COUNT(m_1,m_2)=2,(seen_2/c_rays_2)/(seen_1/c_rays_1),1)"
-    return formulas
 
 
 def setup_values(

@@ -6,8 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from bifocal.model.flags import SIGMA_PIXEL, UNCERTAIN_SHARE
 from bifocal.survey.setup import SCALE_TOLERANCE, SIGMA_PRINT, SIGMA_RADIAL
-from bifocal.survey.survey_media import HEIGHTS, index_names, media_names
-from bifocal.workbook.formulas.media_formulas import calculated_names, larger, setup_formulas
+from bifocal.survey.survey_media import HEIGHTS, index_names, media_names, thickness_names
+from bifocal.workbook.formulas.columns import FORMULAS
+from bifocal.workbook.formulas.media_formulas import calculated_names
 from photocore.workbook.changing.cells import CellValue
 
 Groups = tuple[tuple[str, ...], ...]
@@ -20,39 +21,11 @@ IDEAL_NADIRS = ("nadir_1_col", "nadir_1_row", "nadir_2_col", "nadir_2_row")
 TITLE_BLOCK = ("project", "client", "surveyor", "survey_date")
 #: How many times larger than on the sensor the images are that were measured.
 PRINTS = ("enlargement_1", "enlargement_2")
-#: Cells that hold texts.
-TEXTS = ("pair_file", *PHOTOS, *TITLE_BLOCK)
 _CHECKS = ("setup_missing", "check_order", "check_scale")
-#: Cells of an ideal pair, group by group; the last group is calculated, the others are typed.
-IDEAL_GROUPS: Groups = (
-    (
-        *("c_1", "c_2", "d_2", "delta_d", "d_1", "input_unit", *PRINTS, "pitch"),
-        *IDEAL_NADIRS,
-        *PHOTOS,
-    ),
-    ("sigma_s", "sigma_r_max", "k_off", "k_plane"),
-    TITLE_BLOCK,
-    (
-        *_CHECKS,
-        *("m_1", "m_2", "k_12", "b_lever", "unit_x", "unit_y"),
-        *("off_x1", "off_y1", "off_x2", "off_y2"),
-    ),
-)
 MATRICES: Groups = tuple(
     tuple(f"h{image}_{row}{column}" for row in "123" for column in "123") for image in "12"
 )
 NADIRS: Groups = tuple(tuple(f"n{image}_{axis}" for axis in "xy") for image in "12")
-#: The same of a pair given by homographies.
-PAIR_GROUPS: Groups = (
-    (
-        *("pair_file", "d_2", "delta_d", "d_1", *NADIRS[0], *NADIRS[1]),
-        *("c_1", "c_2", "pitch", "input_unit", *PHOTOS),
-    ),
-    ("sigma_px", "sigma_r_max", "k_off", "k_plane", "pixel_wall"),
-    TITLE_BLOCK,
-    *MATRICES,
-    (*_CHECKS[:2], "m_1", "b_lever", "e_x", "e_y", "sigma_s"),
-)
 #: The cells of options that are not called as these.
 _OPTION_CELLS = {
     **{f"{name}{k}": (f"{name}_{k}",) for name in ("d", "c", "enlargement") for k in "12"},
@@ -60,24 +33,8 @@ _OPTION_CELLS = {
     "unit": ("input_unit",),
     "model": ("g_model",),
 }
-#: Number formats.
-FORMS: Mapping[str, str] = {
-    **dict.fromkeys(("d_1", "d_2", "delta_d", "b_lever"), "0.000"),
-    **dict.fromkeys(("pitch", "sigma_s", "k_12"), "0.000000"),
-    **dict.fromkeys(("m_1", "m_2", "m_seen", "mm_1"), "0.00"),
-    **{f"{name}_{image}": "0.000" for name in ("behind", "seen", "reach") for image in "12"},
-    "sigma_r_max": "0.0000",
-    **dict.fromkeys((*PHOTOS, *TITLE_BLOCK), "@"),
-}
-#: Typed numbers that must be above zero; of the others the sheet only asks that they are numbers.
-POSITIVE = ("c_1", "c_2", "d_1", "d_2", "pitch", "sigma_s", "sigma_px", "sigma_r_max", *PRINTS)
 #: Cells that are yellow and hold a formula until something is typed over it.
-TYPED_FORMULAS: Mapping[str, str] = {
-    "d_1": 'IF(COUNT(d_2,delta_d)=2,d_2+delta_d,"")',
-    "sigma_s": f"IF(MAX({','.join(PRINTS)})>1,{SIGMA_PRINT:g},"
-    f"IF(COUNT(pitch)=1,{SIGMA_PIXEL:g}*pitch,{SIGMA_RADIAL:g}))",
-    "sigma_r_max": f'IF(COUNT(d_1,d_2)=2,{UNCERTAIN_SHARE:g}*MIN(d_1,d_2),"")',
-}
+TYPED_FORMULAS = ("d_1", "sigma_s", "sigma_r_max")
 #: What a set-up needs: what to type, the cells that then hold numbers, for which input unit.
 _NEEDED = (
     ("d_2", ("d_2",), ""),
@@ -175,37 +132,6 @@ def state(cells: Mapping[str, CellValue], words: Mapping[str, str]) -> str:
 #: Keys of the sentences about the set-up.
 STATES = ("state_ready", "state_missing", "state_order", "state_scale")
 
-#: How far the scales of the photos are apart, whatever those of their prints.
-_OFF = f"ABS(k_12*{larger(2)}/{larger(1)}-1)"
-
-_CHECK_FORMULAS: Mapping[str, str] = {
-    "check_order": 'IF(COUNT(d_1,d_2)<2,"",IF(d_1>d_2,"OK","CHECK"))',
-    "check_scale": f'IF(COUNT(m_1,m_2)<2,"",IF({_OFF}<={SCALE_TOLERANCE:g},"OK","CHECK"))',
-}
-IDEAL_FORMULAS: Mapping[str, str] = {
-    **TYPED_FORMULAS,
-    **_CHECK_FORMULAS,
-    "setup_missing": _missing_formula(_IDEAL_NEEDED),
-    "m_1": f'IF(COUNT(c_1,d_1)=2,1000*d_1/(c_1*{larger(1)}),"")',
-    "m_2": f'IF(COUNT(c_2,d_2)=2,1000*d_2/(c_2*{larger(2)}),"")',
-    "k_12": "IF(COUNT(m_1,m_2)=2,m_2/m_1,1)",
-    "b_lever": 'IF(COUNT(d_1,d_2)=2,IF(d_1=d_2,"",d_1*d_2/(d_1-d_2)),"")',
-    "unit_x": 'IF(input_unit="px",pitch,1)',
-    "unit_y": 'IF(input_unit="px",-pitch,1)',
-    "off_x1": 'IF(input_unit="px",nadir_1_col,0)',
-    "off_y1": 'IF(input_unit="px",nadir_1_row,0)',
-    "off_x2": 'IF(input_unit="px",nadir_2_col,0)',
-    "off_y2": 'IF(input_unit="px",nadir_2_row,0)',
-}
-PAIR_FORMULAS: Mapping[str, str] = {
-    **{key: IDEAL_FORMULAS[key] for key in ("d_1", "sigma_r_max", "b_lever", "check_order")},
-    "setup_missing": _missing_formula(_PAIR_NEEDED),
-    "sigma_s": 'IF(COUNT(pixel_wall)=1,sigma_px*pixel_wall/m_1,"")',
-    "m_1": "IF(COUNT(c_1)=1,1000*d_1/c_1,1000)",
-    "e_x": "(d_1*n2_x-d_2*n1_x)/(d_1-d_2)",
-    "e_y": "(d_1*n2_y-d_2*n1_y)/(d_1-d_2)",
-}
-
 
 def _stated(media: int) -> tuple[str, ...]:
     """Return the indices that tell that light is bent, with cells for so many media."""
@@ -222,20 +148,41 @@ def groups(*, is_pair: bool, media: int) -> Groups:
     media : int
         How many media there are cells for; 0 in air.
     """
-    first, *others, last = PAIR_GROUPS if is_pair else IDEAL_GROUPS
+    cells = FORMULAS.content["setup"]["pair" if is_pair else "ideal"]
+    first, *others, last = (tuple(group.split()) for group in cells)
     if not media:
         return (first, *others, last)
     return (first, media_names(media), *others, (*last, *calculated_names(media, is_pair=is_pair)))
 
 
-def formulas(*, is_pair: bool, media: int) -> Mapping[str, str]:
-    """Return the formulas of `Setup` by name."""
-    own = PAIR_FORMULAS if is_pair else IDEAL_FORMULAS
-    if not media:
-        return own
-    needed = _PAIR_NEEDED if is_pair else _IDEAL_NEEDED
-    missing = _missing_formula(needed, _stated(media))
-    return {**own, **setup_formulas(media, is_pair=is_pair), "setup_missing": missing}
+def formulas(*, is_pair: bool = False, media: int = 0) -> Mapping[str, str]:
+    """Return the formulas of `Setup` by name; there may be more than cells for them."""
+    limits = {
+        "sigma_print": SIGMA_PRINT,
+        "sigma_pixel": SIGMA_PIXEL,
+        "sigma_radial": SIGMA_RADIAL,
+        "uncertain_share": UNCERTAIN_SHARE,
+        "scale_tolerance": SCALE_TOLERANCE,
+    }
+    parts = {name: f"{value:g}" for name, value in limits.items()}
+    parts |= {"last": str(media), "stated": ",".join(_stated(media))}
+    parts["inner"] = "".join(f"-N({name})" for name in thickness_names(media))
+    parts["glass"] = "".join(f"+N(thick_{n})*n_used_1/n_used_{n}" for n in range(2, media))
+    facts = {name for name, holds in (("pair", is_pair), ("media", media)) if holds}
+    missing = _missing_formula(_PAIR_NEEDED if is_pair else _IDEAL_NEEDED, _stated(media))
+    lines = FORMULAS.columns("setup", facts, parts, rows="lines")
+    return {line.key: line.formula for line in lines} | {"setup_missing": missing}
+
+
+def number_format(name: str) -> str:
+    """Return how the cell of a name shows what it holds."""
+    forms = FORMULAS.content["setup"]["forms"]
+    return next((form for form, names in forms.items() if name in names.split()), "General")
+
+
+def is_one_of(kind: str, name: str) -> bool:
+    """Tell whether a cell holds one of the ``texts``, or must be ``positive``."""
+    return name in FORMULAS.content["setup"][kind].split()
 
 
 def may_be_zero(name: str) -> bool:

@@ -10,13 +10,12 @@ from bifocal.workbook.content import SurveyContent, setup_cells
 from bifocal.workbook.formulas.columns import adjustment_names
 from bifocal.workbook.formulas.media_formulas import INDEX_LIMITS
 from bifocal.workbook.formulas.setup_cells import (
-    FORMS,
-    POSITIVE,
     STATES,
-    TEXTS,
     formulas,
     groups,
+    is_one_of,
     may_be_zero,
+    number_format,
     state,
     state_formula,
 )
@@ -73,7 +72,7 @@ def _setup_cell(
     told = known.in_language(sheet.book.language).format(n=name[-1]) if known else matrix
     unit = known.unit if known else ""
     sheet.describe(row, (name, told), unit)
-    cell, form, value = f"C{row}", FORMS.get(name, "General"), cells.get(name)
+    cell, form, value = f"C{row}", number_format(name), cells.get(name)
     sheet.worksheet[cell].alignment = Alignment(horizontal="right")
     if typed:
         _validate(sheet, cell, name, f"{told} [{unit}]" if unit else told)
@@ -102,10 +101,10 @@ def _validate(sheet: SheetBuilder, cell: str, name: str, prompt: str) -> None:
     """Tell what a cell of `Setup` is for, and refuse what cannot be meant."""
     if name == "input_unit":
         sheet.validate(cell, title=name, prompt=prompt, choices="mm,px")
-    elif name in TEXTS:
+    elif is_one_of("texts", name):
         sheet.validate(cell, title=name, prompt=prompt)
     else:
-        above = name in POSITIVE
+        above = is_one_of("positive", name)
         limits = None if above else _NUMBERS
         if name.startswith("index_"):
             limits = INDEX_LIMITS

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import fields
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +28,8 @@ from bifocal.workbook.formulas.setup_cells import (
     PRINTS,
     TITLE_BLOCK,
     TYPED_FORMULAS,
+    cells_of,
+    formulas,
 )
 from bifocal.workbook.words import headings, term
 from photocore.arrays import FloatArray
@@ -83,39 +87,29 @@ def read_setup(
         book, columns, sheet="Setup", decimal=decimal, errors=complaints, several=True, given=given
     )
     where = f"{book.label} › Setup" if "Setup" in book.titles else book.label
-    formulas = _formulas(book, values)
-    defaults = {key for key in ("sigma_s", "sigma_r_max") if key in formulas}
+    live = _formulas(book, values)
+    defaults = {key for key in ("sigma_s", "sigma_r_max") if key in live}
     # Cells with the template's own formula are defaults, calculated or not.
-    told = [e for e in complaints if e.column not in formulas]
+    told = [e for e in complaints if e.column not in live]
     number = {key: values.given(key) for key in _NUMBERS if key not in defaults}
     _check_positive(values, number, told)
     media = _media(book, values, told)
-    d1 = _distance(values, number, "d_1" in formulas, told)
+    d1 = _distance(values, number, "d_1" in live, told)
     unit = _unit(values, told)
     # What options replace may hold anything, as all beside another pair that is not our workbook.
     is_idle = "pair" in given and "d_1" not in book.names
     errors += [] if is_idle else [error for error in told if error.column not in given]
     matrices, nadirs = _general(values)
     return SurveySetup(
-        taking=Taking(
+        taking=_stated(
+            Taking,
+            number,
             d1=d1,
             d2=_near(number, d1),
-            c1=number["c_1"],
-            c2=number["c_2"],
-            enlargement1=number["enlargement_1"],
-            enlargement2=number["enlargement_2"],
-            pitch=number["pitch"],
             nadir1=_place(number["nadir_1_col"], number["nadir_1_row"]),
             nadir2=_place(number["nadir_2_col"], number["nadir_2_row"]),
         ),
-        measuring=Measuring(
-            unit=unit,
-            sigma_s=number.get("sigma_s"),
-            sigma_px=number["sigma_px"],
-            sigma_r_max=number.get("sigma_r_max"),
-            k_off=number["k_off"],
-            k_plane=number["k_plane"],
-        ),
+        measuring=_stated(Measuring, number, unit=unit),
         sensor=_place(number["sensor_w"], number["sensor_h"]),
         pair_file=_text(values, "pair_file"),
         photo1=_text(values, "photo_1").strip(),
@@ -130,6 +124,12 @@ def read_setup(
         remarks=tuple(values.remarks),
         text_cells=tuple(values.text_cells),
     )
+
+
+def _stated(kind: type[Any], number: Mapping[str, float | None], **known: object) -> Any:
+    """Return what numbers state of the taking or measuring, besides what is known."""
+    names = {f.name for f in fields(kind)} - known.keys()
+    return kind(**known, **{name: number.get(*cells_of([name])) for name in names})
 
 
 def _adjusted(book: SheetFile) -> tuple[FloatArray | None, FloatArray | None]:
@@ -225,13 +225,13 @@ def _text(values: NamedValues, key: str) -> str:
 def _formulas(book: SheetFile, values: NamedValues) -> set[str]:
     """Return which cells hold the template's own formula instead of a typed number."""
     own = set()
-    for key in TYPED_FORMULAS.keys() & values.places.keys():
+    for key in values.places.keys() & set(TYPED_FORMULAS):
         sheet, cell = values.places[key]
         cell_at = rf'<(?:\w+:)?c r="{cell}"[^>]*><(?:\w+:)?f[^>]*>([^<]*)<'
         match = re.search(cell_at, book.text(sheet))
         # Those of older versions are a part of today's.
         stands = _plain(match[1]) if match else ""
-        if stands.startswith("if(") and stands in _plain(TYPED_FORMULAS[key]):
+        if stands.startswith("if(") and stands in _plain(formulas()[key]):
             own.add(key)
     return own
 

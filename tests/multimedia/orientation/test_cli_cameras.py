@@ -21,7 +21,7 @@ from multimedia import (
     read_project,
     write_project,
 )
-from multimedia.cli.main import SUMMARIES, main
+from multimedia.cli.main import main
 from multimedia.orientation.workflow import intersect_project
 from tests.multimedia.tank import LAYERS, cameras, control, images
 
@@ -61,7 +61,7 @@ def test_help_has_units_defaults_and_an_example(name):
     assert f"multimedia {name}" in text
     from importlib import import_module
 
-    assert import_module(f"multimedia.cli.{name}").command.short_help == SUMMARIES[name]
+    assert import_module(f"multimedia.cli.{name}").command.short_help == main.summaries[name]
 
 
 def test_project_prints_pixels_and_writes_a_table(tank, tmp_path):

@@ -1,0 +1,78 @@
+"""What each tuned number of dense relief does: errors with half of it and twice it, one at a time.
+
+    python benchmarks/relief_tuning.py [STAGE ...]
+
+Rendered scenes of `relief_ablation` that nothing was tuned on, small enough for some hundred runs
+each: half an hour for all numbers on one core. A dot is no change, neither is a line left out.
+"""
+
+from __future__ import annotations
+
+import sys
+from unittest.mock import patch
+
+import cv2
+
+from benchmarks.relief_ablation import FIGURES, figures, shots
+from bifocal.relief_maps import flow
+from bifocal.relief_maps.tuning import TUNING
+
+#: Size of the photos, and how much coarser their pixels are than those of the ablation.
+SCENES = {
+    "facade": ((768, 512), 2),
+    "plaster facade": ((768, 512), 2),
+    "church": ((768, 512), 2),
+    "plaster balcony": ((900, 600), 1),
+}
+#: Stages whose numbers change the flow, or the frame it is found in.
+UPSTREAM = {"coarse", "exposure", "flow", "frame", "limits", "refinement", "seed"}
+
+
+def scaled(value, factor):
+    """Return a number, or numbers, times a factor; integers stay so, odd ones odd."""
+    if isinstance(value, tuple):
+        return tuple(scaled(part, factor) for part in value)
+    if isinstance(value, int):
+        return max(1, round(value * factor)) | (value % 2 if value > 1 else 0)
+    return value * factor
+
+
+def sweep(name: str, stages: list[str]) -> None:
+    """Print how the figures of a scene change with each number of the stages."""
+    shot, measure, kept = shots(name, *SCENES[name]), flow.measure, {}
+
+    def once(frame, coarse, **options):
+        key = frame.grid.shape
+        if key not in kept:
+            kept[key] = measure(frame, coarse, **options)
+        return kept[key]
+
+    with patch.object(flow, "measure", once):
+        base = figures(shot)
+    print(f"\n{name:34s}" + " ".join(f"{heading:>11s}" for heading in FIGURES))
+    print(" " * 34 + " ".join(f"{value:11.3f}" for value in base.values()))
+    for stage in stages or vars(TUNING):
+        numbers = getattr(TUNING, stage)
+        for number, value in vars(numbers).copy().items():
+            for factor in (0.5, 2.0):
+                measured = measure if stage in UPSTREAM else once
+                label = f"  {stage}.{number} x {factor:g}"
+                with (
+                    patch.object(numbers, number, scaled(value, factor)),
+                    patch.object(flow, "measure", measured),
+                ):
+                    try:
+                        found = figures(shot)
+                    except (ValueError, cv2.error) as error:
+                        print(f"{label:34s}cannot be: {str(error).splitlines()[0]}")
+                        continue
+                changes = [found[heading] - base[heading] for heading in FIGURES]
+                if any(changes):
+                    cells = (f"{c:+11.3f}" if abs(c) >= 5e-4 else f"{'.':>11s}" for c in changes)
+                    print(f"{label:34s}" + " ".join(cells), flush=True)
+
+
+if __name__ == "__main__":
+    cv2.setNumThreads(1)
+    for scene in SCENES:
+        sweep(scene, sys.argv[1:])
