@@ -25,7 +25,7 @@ import numpy as np
 from multimedia import Camera, FlatInterface, Layers, radial_shift_ratio
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import Pinhole, project_with_jacobian
-from photocore.camera.rotation import by_turn
+from photocore.camera.rotation import by_rotation
 
 #: What a path is differentiated by after its indices and thicknesses: the way to the first
 #: interface [m], a small turn of the interfaces about the axes of the plane frame [rad].
@@ -49,7 +49,7 @@ class ObjectRays(NamedTuple):
     slope: FloatArray
 
 
-class RadialWays(NamedTuple):
+class RadialRays(NamedTuple):
     """What media parallel to the plane make of tan beta_1 = t of rays, shape (...).
 
     Attributes
@@ -93,7 +93,7 @@ class MediaPath:
         Camera centre to the first interface, along its normal. [m]
     distance : float
         Camera centre to the reference plane. [m]
-    turn : ndarray, shape (3, 3), or None
+    rotation : ndarray, shape (3, 3), or None
         Axes of the interfaces in the plane frame, one a row, their normal towards the camera the
         last; None where they are parallel to the reference plane.
     """
@@ -101,28 +101,29 @@ class MediaPath:
     layers: Layers
     z0: float
     distance: float
-    turn: FloatArray | None = None
+    rotation: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        if self.turn is not None:
-            self.turn.setflags(write=False)
+        if self.rotation is not None:
+            self.rotation.setflags(write=False)
 
     @property
-    def depth(self) -> float:
+    def last_interface(self) -> float:
         """Camera centre to the last interface, along its normal. [m]"""
         return self.z0 + self.layers.thickness
 
     @property
     def highest(self) -> float:
         """Relief of the last interface over the nadir. [m]"""
-        return self.distance - self.depth / (1.0 if self.turn is None else float(self.turn[2, 2]))
+        cosine = 1.0 if self.rotation is None else float(self.rotation[2, 2])
+        return self.distance - self.last_interface / cosine
 
     def holds(self, offset: FloatArray, relief: FloatArray) -> BoolArray:
         """Return which points, (X, Y) from the nadir and r, lie behind the last interface."""
         below = self.distance - relief
-        if self.turn is not None:
-            below = below * self.turn[2, 2] - offset @ self.turn[2, :2]
-        return np.asarray(below - self.depth >= -_ROUNDING * self.distance)
+        if self.rotation is not None:
+            below = below * self.rotation[2, 2] - offset @ self.rotation[2, :2]
+        return np.asarray(below - self.last_interface >= -_ROUNDING * self.distance)
 
     def trace(self, away: FloatArray) -> ObjectRays:
         """Return the rays of apparent positions (from the nadir, on the reference plane).
@@ -146,18 +147,19 @@ class MediaPath:
         unit = np.eye(2)
         of_arm = arm[..., None, None] * unit + (2 * by_arm)[..., None, None] * outer
         of_slope = bend[..., None, None] * unit + (2 * by_bend)[..., None, None] * outer
-        if self.turn is None:
+        if self.rotation is None:
             return rays, of_arm / self.distance, of_slope / -self.distance
         by_away = self._tangent_by_away(away, tangent)
         start, way = of_arm @ by_away, of_slope @ by_away
-        turn = self.turn
+        turn = self.rotation
         along = self._along(tangent * bend[..., None])
         # E = C + Q^T (e, -depth), w = Q^T (t, -1); slope = w_xy / w_z, A = E_xy - E_z slope.
         by_way = turn[:2].T @ way  # (..., 3, 2)
         by_start = turn[:2].T @ start
         down = along[..., 2, None, None]
         by_slope = (by_way[..., :2, :] - rays.slope[..., :, None] * by_way[..., 2:, :]) / down
-        height = (self._turned_back(tangent * arm[..., None], -self.depth)[..., 2]) + self.distance
+        back = self._turned_back(tangent * arm[..., None], -self.last_interface)
+        height = back[..., 2] + self.distance
         by_position = (
             by_start[..., :2, :]
             - rays.slope[..., :, None] * by_start[..., 2:, :]
@@ -188,27 +190,27 @@ class MediaPath:
         The arm carries the tangent to the reference plane, or with tilted interfaces to the last
         of them.
         """
-        tangent = away / self.distance if self.turn is None else self._tangent(away)
+        tangent = away / self.distance if self.rotation is None else self._tangent(away)
         (arm, by_arm), (bend, by_bend) = self._ways((tangent * tangent).sum(-1))
-        if self.turn is None:
+        if self.rotation is None:
             rays = ObjectRays(tangent * arm[..., None], tangent * -bend[..., None])
         else:
             rays = self._lines(tangent * arm[..., None], tangent * bend[..., None])
         return rays, tangent, (arm, by_arm), (bend, by_bend)
 
-    def radial_ways(self, tangent: FloatArray) -> RadialWays:
+    def radial_rays(self, tangent: FloatArray) -> RadialRays:
         """Return what interfaces parallel to the reference plane make of tan beta_1."""
         square = tangent * tangent
         (arm, by_arm), (bend, by_bend) = self._ways(square)
-        return RadialWays(arm, bend, arm + 2 * square * by_arm, bend + 2 * square * by_bend)
+        return RadialRays(arm, bend, arm + 2 * square * by_arm, bend + 2 * square * by_bend)
 
     def _ways(
         self, square: FloatArray
     ) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
         """Return arm and k_m of tan² beta_1, each with its derivative by it."""
         first = self.layers.indices[0]
-        heights = [*self.layers.thicknesses, self.distance - self.depth]
-        if self.turn is not None:
+        heights = [*self.layers.thicknesses, self.distance - self.last_interface]
+        if self.rotation is not None:
             heights[-1] = 0.0
         arm, by_arm = np.full_like(square, self.z0), np.zeros_like(square)
         bend, by_bend = np.ones_like(square), np.zeros_like(square)
@@ -243,10 +245,10 @@ class MediaPath:
         Maas 2015, Eqs. (1) and (2): the radial shift, in the frame of the interfaces.
         """
         below = self.distance - relief
-        if self.turn is None:
+        if self.rotation is None:
             radius = np.hypot(offset[..., 0], offset[..., 1])
             return np.asarray(offset * (self.steepness(radius, below) * self.distance)[..., None])
-        point = np.concatenate([offset, -below[..., None]], axis=-1) @ self.turn.T
+        point = np.concatenate([offset, -below[..., None]], axis=-1) @ self.rotation.T
         along, below = point[..., :2], -point[..., 2]
         with np.errstate(invalid="ignore", divide="ignore"):
             radius = np.hypot(along[..., 0], along[..., 1])
@@ -261,7 +263,7 @@ class MediaPath:
 
         NaN for points before the last interface. Radii count from the foot of the camera's normal.
         """
-        behind = below - self.depth
+        behind = below - self.last_interface
         behind = np.where(behind >= -_ROUNDING * self.distance, np.maximum(behind, 0.0), np.nan)
         ratio = radial_shift_ratio(radius, z0=self.z0, zp=behind, layers=self.layers)
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -277,8 +279,8 @@ class MediaPath:
         *before, last = self.layers.indices
         heights = [self.z0, *self.layers.thicknesses]
         reduced = sum(h * last / index for h, index in zip(heights, before, strict=True))
-        normal = np.array([0.0, 0.0, 1.0]) if self.turn is None else self.turn[2]
-        return np.asarray((reduced - self.depth) * normal)
+        normal = np.array([0.0, 0.0, 1.0]) if self.rotation is None else self.rotation[2]
+        return np.asarray((reduced - self.last_interface) * normal)
 
     @property
     def near_axis(self) -> float:
@@ -287,8 +289,8 @@ class MediaPath:
 
     def _turned_back(self, along: FloatArray, down: float) -> FloatArray:
         """Return vectors of the interfaces' frame in the plane frame, shape (..., 3)."""
-        assert self.turn is not None
-        return np.asarray(along @ self.turn[:2] + down * self.turn[2])
+        assert self.rotation is not None
+        return np.asarray(along @ self.rotation[:2] + down * self.rotation[2])
 
     def _along(self, tangent: FloatArray) -> FloatArray:
         """Return directions of the plane frame from tangents along the interfaces."""
@@ -296,21 +298,21 @@ class MediaPath:
 
     def _tangent(self, away: FloatArray) -> FloatArray:
         """Return tan beta_1 along tilted interfaces; NaN for rays that do not run towards them."""
-        assert self.turn is not None
-        way = away @ self.turn[:, :2].T - self.distance * self.turn[:, 2]
+        assert self.rotation is not None
+        way = away @ self.rotation[:, :2].T - self.distance * self.rotation[:, 2]
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.where(way[..., 2:] < 0, way[..., :2] / -way[..., 2:], np.nan)
 
     def _tangent_by_away(self, away: FloatArray, tangent: FloatArray) -> FloatArray:
         """Return the derivative of `_tangent`, shape (..., 2, 2)."""
-        assert self.turn is not None
-        down = away @ self.turn[2, :2] - self.distance * self.turn[2, 2]
-        change = self.turn[:2, :2] + tangent[..., :, None] * self.turn[2, :2]
+        assert self.rotation is not None
+        down = away @ self.rotation[2, :2] - self.distance * self.rotation[2, 2]
+        change = self.rotation[:2, :2] + tangent[..., :, None] * self.rotation[2, :2]
         return np.asarray(change / -down[..., None, None])
 
     def _lines(self, start: FloatArray, tangent: FloatArray) -> ObjectRays:
         """Return rays that leave tilted interfaces as lines over relief."""
-        place, way = self._turned_back(start, -self.depth), self._along(tangent)
+        place, way = self._turned_back(start, -self.last_interface), self._along(tangent)
         with np.errstate(invalid="ignore", divide="ignore"):
             slope = np.where(way[..., 2:] < 0, way[..., :2] / way[..., 2:], np.nan)
         return ObjectRays(place[..., :2] - (place[..., 2:] + self.distance) * slope, slope)
@@ -363,11 +365,11 @@ def view(camera: Pinhole, path: MediaPath | None, xyz: FloatArray) -> PointViews
     if path is None:
         seen = project_with_jacobian(camera, xyz)
         return PointViews(*seen, np.zeros((len(xyz), 2, 0)))
-    normal = np.array([0.0, 0.0, 1.0]) if path.turn is None else path.turn[2]
+    normal = np.array([0.0, 0.0, 1.0]) if path.rotation is None else path.rotation[2]
     if path.z0 < 0:
         xyz = np.full_like(xyz, np.nan)
     slack = _ROUNDING * path.distance
-    depth = max(path.depth, path.layers.thickness) + slack
+    depth = max(path.last_interface, path.layers.thickness) + slack
     interface = FlatInterface(
         layers=path.layers, point=-depth * normal, normal=normal, moves_with_camera=True
     )
@@ -380,7 +382,7 @@ def view(camera: Pinhole, path: MediaPath | None, xyz: FloatArray) -> PointViews
     by_thickness, by_index = moved.by_media[..., :thin], moved.by_media[..., thin:-1]
     nearer = moved.by_media[..., -1:]
     by_camera = seen.by_camera
-    leaning = by_turn(moved.by_point, xyz - camera.centre) - by_camera[:, :, 4:7]
+    leaning = by_rotation(moved.by_point, xyz - camera.centre) - by_camera[:, :, 4:7]
     by_camera[:, :, 7:] = -moved.by_point
     by_media = np.concatenate([by_index, by_thickness - nearer, -nearer, leaning], axis=2)
     return PointViews(seen.pixels, moved.by_point, by_camera, by_media)

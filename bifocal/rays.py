@@ -29,7 +29,14 @@ from photocore.camera.pinhole import Pinhole
 class Foot(NamedTuple):
     """A camera reduced to what relief needs: nadir on the plane and distance to it. [m]
 
-    ``media`` is what its rays cross on their way, None in air.
+    Attributes
+    ----------
+    nadir : ndarray, shape (2,)
+        Foot of the projection centre on the reference plane. [m]
+    distance : float
+        Of the projection centre from the plane. [m]
+    media : MediaPath or None
+        What its rays cross on their way; None in air.
     """
 
     nadir: FloatArray
@@ -252,7 +259,7 @@ def seen_distance(camera: Foot) -> float:
         return camera.distance
     media = camera.media
     first = media.layers.indices[0]
-    heights = (media.z0, *media.layers.thicknesses, camera.distance - media.depth)
+    heights = (media.z0, *media.layers.thicknesses, camera.distance - media.last_interface)
     reduced = zip(heights, media.layers.indices, strict=True)
     return float(sum(height * first / index for height, index in reduced))
 

@@ -207,7 +207,17 @@ def to_eight_bit(image: ImageArray) -> NDArray[np.uint8]:
 
 
 def write_image(path: Path | str, image: ImageArray, *, overwrite: bool = False) -> None:
-    """Write RGB, RGBA or grey pixels as the ending says (.png, .jpg, .tif), whole or not at all."""
+    """Write RGB, RGBA or grey pixels as the ending says (.png, .jpg, .tif), whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+        Its ending tells the format.
+    image : ndarray of uint8 or uint16, shape (h, w), (h, w, 3) or (h, w, 4)
+        The pixels.
+    overwrite : bool
+        Whether an existing file may be replaced.
+    """
     path = Path(path)
     ending = path.suffix.lower()
     check_ending(path, "images are written as .png, .jpg or .tif.", *WRITTEN)

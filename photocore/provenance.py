@@ -92,6 +92,11 @@ def recording(command: str, *, day: str | None = None) -> Iterator[None]:
         Date that outputs bear, year-month-day; default that of the recording around this one,
         else today.
 
+    Yields
+    ------
+    None
+        The outputs are written within.
+
     Raises
     ------
     InputError

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import inspect
 import pydoc
 import re
@@ -111,6 +112,31 @@ def test_public_functions_are_documented_in_full(name: str) -> None:
         assert f"{part}\n{'-' * len(part)}\n" in text
     for parameter in inspect.signature(function).parameters:
         assert re.search(rf"^(.*, )?{parameter}(,.*)? : ", text, re.M), parameter
+
+
+def _described(text: str, name: str) -> bool:
+    return re.search(rf"^(.*, )?\**{name}(,.*)?( : .*)?$", text, re.M) is not None
+
+
+@pytest.mark.parametrize(("package", "name"), NAMES)
+def test_every_name_says_what_it_takes_and_gives(package, name: str) -> None:
+    value = getattr(package, name)
+    text = inspect.getdoc(value) or ""
+    if inspect.isclass(value):
+        text = "\n".join(inspect.getdoc(kind) or "" for kind in value.__mro__[:-1])
+        fields = (
+            [f.name for f in dataclasses.fields(value) if f.init and f.name[0] != "_"]
+            if (dataclasses.is_dataclass(value))
+            else getattr(value, "_fields", ())
+        )
+        assert not fields or re.search(r"^(Parameters|Attributes)\n-+$", text, re.M)
+        assert [field for field in fields if not _described(text, field)] == []
+    elif inspect.isfunction(value):
+        signature = inspect.signature(value)
+        assert not signature.parameters or "Parameters\n----------\n" in text
+        assert [key for key in signature.parameters if not _described(text, key)] == []
+        gives = signature.return_annotation not in ("None", None)
+        assert not gives or re.search(r"^(Returns|Yields)\n-+$", text, re.M)
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,8 @@ from bifocal.model.interior_orientation import Interior
 from bifocal.model.orientation_precision import rates_of
 from bifocal.model.pair import Pair
 from bifocal.orientation.absolute_orientation import orient_pair
+from bifocal.orientation.adjustment.observed_points import views_of
 from bifocal.orientation.adjustment.pair_observations import at
-from bifocal.orientation.adjustment.seen_points import views_of
 from bifocal.orientation.align_workflow import KnownLens, interior_of_photo
 from bifocal.orientation.alignment import standard_deviations
 from bifocal.orientation.control_points import Control, SiteMeasures

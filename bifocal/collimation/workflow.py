@@ -78,6 +78,11 @@ def page_server(
     language : {"en", "it", "de"}
         Of the page.
 
+    Yields
+    ------
+    PageServer
+        Its address and the session behind it.
+
     Raises
     ------
     InputError

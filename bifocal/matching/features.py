@@ -23,7 +23,7 @@ class Features:
     pixels : ndarray, shape (n, 2)
     size : ndarray, shape (n,)
         Diameter. [px]
-    turn : ndarray, shape (n,)
+    direction : ndarray, shape (n,)
         Direction of the strongest gradient. [deg]
     descriptors : ndarray, shape (n, 128), float32
     reduction : float
@@ -32,7 +32,7 @@ class Features:
 
     pixels: FloatArray
     size: FloatArray
-    turn: FloatArray
+    direction: FloatArray
     descriptors: Float32Array
     reduction: float
 
@@ -42,7 +42,7 @@ class Features:
             self,
             pixels=self.pixels[:count],
             size=self.size[:count],
-            turn=self.turn[:count],
+            direction=self.direction[:count],
             descriptors=self.descriptors[:count],
         )
 
@@ -109,7 +109,7 @@ def find_features(
     return Features(
         pixels=(table[:, :2] + 0.5) * factor - 0.5,
         size=table[:, 2] * factor.mean(),
-        turn=table[:, 3],
+        direction=table[:, 3],
         descriptors=np.sqrt(descriptors).astype(np.float32),
         reduction=reduction,
     )
@@ -166,7 +166,7 @@ def alike(
 ) -> BoolArray:
     """Return which matches differ in size and turn no more than one pair of photos can explain."""
     grown = np.log(second.size[rows2] / first.size[rows1])
-    turned = np.deg2rad(second.turn[rows2] - first.turn[rows1])
+    turned = np.deg2rad(second.direction[rows2] - first.direction[rows1])
     usual = np.arctan2(np.sin(turned).sum(), np.cos(turned).sum())
     away = np.abs((turned - usual + np.pi) % (2 * np.pi) - np.pi)
     size = np.abs(grown - np.median(grown)) if len(grown) else grown

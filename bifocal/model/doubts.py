@@ -24,7 +24,7 @@ MISFIT = "THE MODEL DOES NOT FIT"
 NO_NUMBER = (LookupError, TypeError, ValueError, ZeroDivisionError)
 
 
-def bend_is_certain(px: float, sigma: float) -> bool:
+def shape_is_certain(px: float, sigma: float) -> bool:
     """Return whether a wall bent by so much between the photos says that the model does not fit."""
     return px - CERTAIN * sigma > MOST_BENT
 
@@ -74,5 +74,5 @@ def _bend(setup: Any) -> float:
     """Return by how much the wall is certainly bent between the photos, else 0. [px]"""
     with suppress(*NO_NUMBER):
         bend, sigma = float(setup["wall_bend_px"]), float(setup.get("wall_bend_sigma_px") or 0.0)
-        return bend if bend_is_certain(bend, sigma) else 0.0
+        return bend if shape_is_certain(bend, sigma) else 0.0
     return 0.0

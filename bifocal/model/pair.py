@@ -62,10 +62,7 @@ class Pair:
 
     def __post_init__(self) -> None:
         if self.image1.layers != self.image2.layers:
-            raise InputError(
-                "layers: both photos of a pair look through the same media; state `layers` once, "
-                "for the pair."
-            )
+            raise InputError(remark("pair.two_layers"))
         if self.orientation is not None:
             whole = len(orientation_precision.names_of(self.layers))
             size = whole if np.shape(self.orientation) == (whole, whole) else _IN_AIR
@@ -77,10 +74,7 @@ class Pair:
                 object.__setattr__(self, name, replace(photo, folder=self.folder))
         d1, d2 = self.image1.distance, self.image2.distance
         if d1 == d2:
-            raise GeometryError(
-                f"both cameras stand {d1:g} m from the plane: relief cannot be told from two "
-                "photos taken at the same distance. Check `distance` of image1 and image2."
-            )
+            raise GeometryError(remark("pair.one_distance", d=d1))
         if d1 < d2:
             far, near = self.image2, self.image1
             object.__setattr__(self, "image1", far)
@@ -297,11 +291,7 @@ class Pair:
             Naming it.
         """
         if self.leans:
-            raise InputError(
-                f"{what} is not made through ports that lean (`interface_normal`): it needs media "
-                "parallel to the reference plane. Single points are matched and solved through "
-                "them by `match` and `solve`, to a text table (.csv)."
-            )
+            raise InputError(remark("pair.leaning_ports", what=what))
 
     @property
     def d1(self) -> float:

@@ -340,7 +340,7 @@ class PairMedia:
             layers=self.layers,
             z0=self.z0(number, camera),
             distance=float(camera.centre[2]),
-            turn=None if normal is None else interface_axes(normal),
+            rotation=None if normal is None else interface_axes(normal),
         )
 
     def foot(self, number: int, camera: Pinhole) -> Foot:

@@ -17,6 +17,7 @@ from bifocal.model.homography import apply_homography, homography_jacobian
 from bifocal.model.intersection import PlanePicks
 from bifocal.model.lens import Lens
 from bifocal.model.orientation_precision import pinhole
+from bifocal.remarks import remark
 from multimedia import Layers
 from photocore.arrays import (
     BoolArray,
@@ -100,10 +101,7 @@ class Photo:
         scaled = matrix / (np.abs(matrix).max() or 1.0)
         # The image is some 1e4 px across: what matters is rank after bringing it to unit size.
         if abs(np.linalg.det(scaled @ np.diag([1e4, 1e4, 1.0]))) < 1e-12:
-            raise GeometryError(
-                "plane_from_pixel: the homography is singular; it would squeeze the photo onto a "
-                "line. Check the nine numbers, or make the pair again with `bifocal align`."
-            )
+            raise GeometryError(remark("photo.singular"))
         set_(self, "plane_from_pixel", matrix)
         set_(self, "nadir", read_only(self.nadir, "nadir", shape=(2,)))
         set_(self, "distance", positive(self.distance, "distance", unit="m"))
@@ -134,19 +132,12 @@ class Photo:
             If z0 is missing, or the object's medium would begin behind the reference plane.
         """
         if self.z0 is None:
-            raise InputError(
-                "z0 is missing: photos taken through layers need the distance from the camera "
-                "centre to the first interface, in metres."
-            )
+            raise InputError(remark("photo.no_z0"))
         turn = None if self.interface_normal is None else interface_axes(self.towards_camera)
-        path = MediaPath(layers=layers, z0=self.z0, distance=self.distance, turn=turn)
+        path = MediaPath(layers=layers, z0=self.z0, distance=self.distance, rotation=turn)
         if not path.holds(np.zeros(2), np.zeros(())):
-            raise GeometryError(
-                f"z0: the last interface would lie {path.depth:g} m from the camera, behind the "
-                f"reference plane at {self.distance:g} m. z0 is measured from the camera centre to "
-                "the first interface, distance to the reference plane; both, and the thicknesses, "
-                "are in metres."
-            )
+            about = {"depth": path.last_interface, "distance": self.distance}
+            raise GeometryError(remark("photo.interface_behind", **about))
         return path
 
     @property
@@ -191,7 +182,7 @@ class Photo:
     @property
     def leans(self) -> bool:
         """Whether its interfaces lean against the reference plane."""
-        return self.media is not None and self.media.turn is not None
+        return self.media is not None and self.media.rotation is not None
 
     @property
     def towards_camera(self) -> FloatArray:
@@ -343,10 +334,7 @@ class Photo:
         middle = np.array([[(size[0] - 1) / 2, (size[1] - 1) / 2]])
         area = abs(float(np.linalg.det(self.metres_per_pixel(middle)[0])))
         if not (np.isfinite(area) and area > 0):
-            raise GeometryError(
-                "the middle of the photo does not look at the reference plane; check "
-                "plane_from_pixel."
-            )
+            raise GeometryError(remark("photo.looks_away"))
         return float(np.sqrt(area))
 
     @classmethod
@@ -437,8 +425,5 @@ def _checked_normal(value: FloatArray) -> FloatArray:
     """
     normal = read_only(value, "interface_normal", shape=(3,))
     if not normal[2] > 0.1 * float(np.linalg.norm(normal)):
-        raise GeometryError(
-            f"interface_normal: {normal.tolist()} does not point from the object to the camera; "
-            "it is (X, Y, r) in the plane frame, (0, 0, 1) for glass parallel to the plane."
-        )
+        raise GeometryError(remark("photo.interface_normal", normal=normal.tolist()))
     return normal

@@ -40,7 +40,7 @@ def straightened(photo: Photo, features: Features) -> Features:
     )
 
 
-def bent_again(photo: Photo, pixels: FloatArray) -> FloatArray:
+def refracted_again(photo: Photo, pixels: FloatArray) -> FloatArray:
     """Return the raw pixels of straightened features."""
     if not photo.refracted:
         return pixels

@@ -18,7 +18,7 @@ from bifocal.model.pair_media import PairMedia
 from bifocal.model.photo import Photo
 from bifocal.networks.joint_adjustment import Blunder, JointAdjustment, adjust_jointly
 from bifocal.networks.joint_control import NamedPositions, name_of, named_positions
-from bifocal.networks.joint_media import bent_again, straightened
+from bifocal.networks.joint_media import refracted_again, straightened
 from bifocal.networks.joint_observations import JointObservations, of_one_camera, with_rays
 from bifocal.networks.joint_ties import (
     SharedPoints,
@@ -305,7 +305,7 @@ def _as_taken(photos: Sequence[Photo], ties: SharedPoints) -> SharedPoints:
     pixels = ties.pixels.copy()
     for index, photo in enumerate(photos):
         rays = ties.photo == index
-        pixels[rays] = bent_again(photo, ties.pixels[rays])
+        pixels[rays] = refracted_again(photo, ties.pixels[rays])
     return replace(ties, pixels=pixels)
 
 

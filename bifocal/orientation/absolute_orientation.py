@@ -31,7 +31,7 @@ from bifocal.orientation.orientation_remarks import (
     assumptions,
     control_remarks,
     distance_remarks,
-    hopeless_bend,
+    hopeless_shape,
     model_remarks,
     order_remarks,
     wall_remarks,
@@ -42,13 +42,13 @@ from bifocal.orientation.orientation_stages import (
     control_alone,
     lines_tested,
     oriented_in_stages,
-    with_bent_ties,
+    with_refracted_ties,
 )
 from bifocal.orientation.slips import Fitted, Typed, slip_of
 from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.tie_points import likely_on_wall
 from bifocal.orientation.tuning import BEND, CONTROL, ORDER, REMARKS, SLIPS, STAGES, TIES
-from bifocal.orientation.walls.bend import WallBend, bend_between
+from bifocal.orientation.walls.wall_shape import WallShape, shape_between
 from bifocal.remarks import remark
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.errors import ConvergenceError, GeometryError, PhotogrammetryError
@@ -133,13 +133,13 @@ def _oriented(given: Given) -> OrientedPair:
             return right
         # Photos through glass or water may fit no cameras at all: then that is the reason.
         raise _reason(error, observations, start, lacking) from error
-    pair = _without_gross(replace(pair, bend=_bend(pair.observations, pair.adjusted)))
+    pair = _without_gross(replace(pair, shape=_bend(pair.observations, pair.adjusted)))
     if model_remarks(pair, given.site) or pair.lines_off:
         right = _mended_by_ties(given, ties, pair.observations)
         if right is not None:
             return right
-    certain = pair.bend.px - CERTAIN * pair.bend.sigma > BEND.strongly_bent
-    bent = hopeless_bend(pair.observations, pair.bend) if certain and not enough else ""
+    certain = pair.shape.px - CERTAIN * pair.shape.sigma > BEND.strongly_curved
+    bent = hopeless_shape(pair.observations, pair.shape) if certain and not enough else ""
     if bent and likely_on_wall(pair.observations, pair.adjusted) < TIES.fewest_on_wall:
         raise GeometryError(bent)  # what holds a bent wall by small chances only is none
     return _with_words(pair, given, remarks)
@@ -165,10 +165,10 @@ def _through_media(given: Given, lacking: str) -> OrientedPair:
     ties, remarks = ties_of(given, needed=False)
     note = remark("orientation.assumed_media_control")
     if ties is not None:
-        pair, note = with_bent_ties(pair, ties), remark("orientation.assumed_media")
+        pair, note = with_refracted_ties(pair, ties), remark("orientation.assumed_media")
         every, size = np.ones(len(ties.seen1), dtype=bool), interiors[0].image_size
-        bend = bend_between(pair.adjusted, ties.seen1, ties.seen2, every, size)
-        pair = replace(pair, bend=bend)
+        bend = shape_between(pair.adjusted, ties.seen1, ties.seen2, every, size)
+        pair = replace(pair, shape=bend)
     pair = _without_gross(replace(pair, assumed=(*pair.assumed, note)))
     refuse_impossible_media(pair.adjusted, given.media)
     check_room(pair.adjusted.media, pair.adjusted.cameras)
@@ -192,10 +192,10 @@ def _with_words(pair: OrientedPair, given: Given, remarks: tuple[str, ...]) -> O
     return replace(pair, remarks=told, assumed=assumed)
 
 
-def _bend(observations: PairObservations, state: PairUnknowns) -> WallBend:
+def _bend(observations: PairObservations, state: PairUnknowns) -> WallShape:
     """Return how far the wall is from a plane between the photos."""
     seen, size = observations.straight_ties(state.radial), observations.interiors[0].image_size
-    return bend_between(state, *seen, observations.tie_used, size)
+    return shape_between(state, *seen, observations.tie_used, size)
 
 
 def _reason(
@@ -203,9 +203,9 @@ def _reason(
 ) -> PhotogrammetryError:
     """Return why no cameras were found: that the wall is bent where it strongly is, or the error.
 
-    Features as first found are good to a pixel; only a bend beyond `Tuning.strongly_bent` counts.
+    Features as first found are good to a pixel; only a bend beyond `Tuning.strongly_curved` counts.
     """
-    bent = hopeless_bend(observations, _bend(observations, state))
+    bent = hopeless_shape(observations, _bend(observations, state))
     return GeometryError(bent) if bent else _with_lacking(error, lacking)
 
 

@@ -19,7 +19,7 @@ from bifocal.model.pair_media import PairMedia
 from bifocal.model.photo import Photo
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.orientation.adjustment.pair_observations import PairObservations, at
-from bifocal.orientation.facade_lines import facade_turn
+from bifocal.orientation.facade_lines import facade_rotation
 from bifocal.orientation.media_report import media_in_words
 from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput, Photos
@@ -173,7 +173,7 @@ def _facade_axes(
         note = remark(f"orientation.axis_{'y' if vertical else 'x'}_along_line")
     else:
         turn, share = (
-            (0.0, 0.0) if photo.grey is None else facade_turn(photo.grey, far, photo.interior)
+            (0.0, 0.0) if photo.grey is None else facade_rotation(photo.grey, far, photo.interior)
         )
         note = remark("orientation.axes_along_facade")
         if share < LINES.least_in_line:
@@ -285,8 +285,8 @@ def _diagnostics(
             }
             for line in observations.lines
         ],
-        "wall_bend_px": oriented.bend.px if np.isfinite(oriented.bend.px) else None,
-        "wall_bend_sigma_px": oriented.bend.sigma if np.isfinite(oriented.bend.px) else None,
+        "wall_bend_px": oriented.shape.px if np.isfinite(oriented.shape.px) else None,
+        "wall_bend_sigma_px": oriented.shape.sigma if np.isfinite(oriented.shape.px) else None,
         "focal_given_px": [interior.focal for interior in observations.interiors],
         "doubts": [text for text in oriented.remarks if text.partition(":")[0].isupper()],
         "wall_relief_mm": wall_relief(oriented),

@@ -89,7 +89,7 @@ def check_room(media: PairMedia, cameras: Cameras) -> None:
             about |= {"depth": media.depth, "thick": media.layers.thickness}
             raise InputError(remark("refused.depth_room", **about))
         if not path.holds(np.zeros(2), np.zeros(())):
-            raise InputError(remark("refused.port_room", depth=path.depth, **about))
+            raise InputError(remark("refused.port_room", depth=path.last_interface, **about))
 
 
 def _of_typed(media: PairMedia, cameras: Cameras, sigma: float) -> FloatArray:

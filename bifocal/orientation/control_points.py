@@ -84,10 +84,24 @@ class Control:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SiteMeasures:
-    """Distances measured on site, None where not measured [m], and a spot of the wall.
+    """What was measured on site beside the control points, and what is known of the photos.
 
-    ``wall`` is a pixel (column, row) of the far photo that shows the wall. [px] ``ordered`` says
-    that the photos are in the order in which the user wants them, whatever they show.
+    Attributes
+    ----------
+    distance1, distance2, delta_d : float or None
+        Of the cameras from the wall, and their difference; None where not measured. [m]
+    sigma : float
+        Of the distances. [m]
+    parallel : bool
+        Whether both photos were taken parallel to the wall.
+    sigma_control : float
+        Of the coordinates of control points. [m]
+    sigma_pick : float
+        Of their pixels. [px]
+    wall : (float, float) or None
+        Column and row of a pixel of the far photo that shows the wall. [px]
+    ordered : bool
+        Whether the photos are in the order in which the user wants them, whatever they show.
     """
 
     distance1: float | None = None

@@ -66,7 +66,7 @@ def line_segments(image: ByteArray) -> FloatArray:
     return np.asarray((ends + 0.5) * reduction - 0.5)
 
 
-def facade_turn(image: ByteArray, camera: Pinhole, interior: Interior) -> tuple[float, float]:
+def facade_rotation(image: ByteArray, camera: Pinhole, interior: Interior) -> tuple[float, float]:
     """Return the turn that makes the façade's lines upright and level, and their agreement.
 
     Parameters
@@ -114,7 +114,7 @@ def lines_of_photos(
     radial : pair of RadialDivision
         Distortions on top of the lenses'.
     """
-    turn, share = facade_turn(images[0], cameras[0], interiors[0])
+    turn, share = facade_rotation(images[0], cameras[0], interiors[0])
     if share < LINES.least_in_line:
         return []
     parts = zip(images, cameras, interiors, radial, (turn, turn), (1, 2), strict=True)
@@ -147,7 +147,7 @@ def facade_directions(
     radial : RadialDivision
         Distortion on top of the lens's.
     turn : float
-        From `facade_turn`: how far the façade's axes are turned against the frame's. [rad]
+        From `facade_rotation`: how far the façade's axes are turned against the frame's. [rad]
     number : int
         1 or 2, of the camera.
 

@@ -9,14 +9,14 @@ from bifocal.orientation.alignment import standard_deviations, wall_relief
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair
 from bifocal.orientation.tuning import BEND, ORDER, REMARKS
-from bifocal.orientation.walls.bend import WallBend, bend_in_words
+from bifocal.orientation.walls.wall_shape import WallShape, shape_in_words
 from bifocal.remarks import remark
 
 
 def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
     """Return where photos and what was given contradict each other, with the likely reason."""
     observations, adjusted = pair.observations, pair.adjusted
-    remarks = [_bend_of(observations, pair.bend)]
+    remarks = [_shape_of(observations, pair.shape)]
     unit = max(observations.interiors[0].image_size) / 3000
     sigma = observations.sigma_tie
     if observations.tie_used.sum() >= 20 and sigma > REMARKS.worst_fit * unit:
@@ -47,19 +47,19 @@ def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
     return [text for text in remarks if text]
 
 
-def _bend_of(observations: PairObservations, bend: WallBend) -> str:
+def _shape_of(observations: PairObservations, shape: WallShape) -> str:
     """Return that the wall is bent, if it certainly is."""
-    return bend_in_words(
-        bend,
+    return shape_in_words(
+        shape,
         with_lens=any(i.is_calibrated or i.sigma_radial > 0 for i in observations.interiors),
         through_media=bool(observations.media),
         left_out=not observations.pick_used.all(),
     )
 
 
-def hopeless_bend(observations: PairObservations, bend: WallBend) -> str:
+def hopeless_shape(observations: PairObservations, shape: WallShape) -> str:
     """Return that the wall is bent, if that is certainly by more than an honest lens does."""
-    return _bend_of(observations, bend) if bend.px > BEND.strongly_bent else ""
+    return _shape_of(observations, shape) if shape.px > BEND.strongly_curved else ""
 
 
 def order_remarks(order: float, names: tuple[str, str]) -> list[str]:

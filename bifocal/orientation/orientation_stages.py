@@ -34,13 +34,13 @@ from bifocal.orientation.tie_points import (
     without_gross_ties,
 )
 from bifocal.orientation.tuning import BEND, LINES, STAGES, WALLS
-from bifocal.orientation.walls.bend import WallBend
 from bifocal.orientation.walls.reference_plane import Face, choose_wall, onto_plane, rivals_in_words
 from bifocal.orientation.walls.wall_planes import (
     likely_wall,
     planes_of_any_direction,
     steep_rivals_in_words,
 )
+from bifocal.orientation.walls.wall_shape import WallShape
 from bifocal.remarks import remark
 from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import ByteArray
@@ -90,7 +90,7 @@ class OrientedPair:
         Whether the user said which of them is the wall.
     tolerance : pair of float
         How far the wall may lie from the reference plane [m] and slope against it [m/m].
-    bend : WallBend
+    bend : WallShape
         How far the wall is from a plane between the photos.
     lines_off : bool
         Whether lines of the façade come out of the wall by more than they may.
@@ -104,7 +104,7 @@ class OrientedPair:
     faces: tuple[Face, ...] = ()
     wall_named: bool = False
     tolerance: tuple[float, float] = STAGES.free
-    bend: WallBend = field(default_factory=WallBend)
+    shape: WallShape = field(default_factory=WallShape)
     lines_off: bool = False
 
     def readjusted(self, start: PairUnknowns | None = None, **changes: Any) -> OrientedPair:
@@ -192,7 +192,7 @@ def _with_ties(pair: OrientedPair, observations: PairObservations) -> OrientedPa
     return replace(pair, observations=ties).readjusted().settled()
 
 
-def with_bent_ties(pair: OrientedPair, ties: Ties) -> OrientedPair:
+def with_refracted_ties(pair: OrientedPair, ties: Ties) -> OrientedPair:
     """Return a pair oriented by control points through media with ties whose bent rays meet."""
     count = len(ties.seen1)
     some = np.linspace(0, count - 1, min(count, STAGES.most_bent_ties)).astype(int)

@@ -75,7 +75,7 @@ def _reach(surface: Surface, grid: Grid, camera: Foot) -> tuple[Grid, int, int] 
     if math.isnan(low):
         return None
     if camera.media is not None:
-        box = _bent_reach(surface, grid, camera, low)
+        box = _refracted_reach(surface, grid, camera, low)
         return None if box is None else _grown(grid, box)
     left, bottom, right, top = bounds
     farthest = max(
@@ -96,7 +96,7 @@ def _reach(surface: Surface, grid: Grid, camera: Foot) -> tuple[Grid, int, int] 
     return _grown(grid, _towards(bounds, camera, share))
 
 
-def _bent_reach(surface: Surface, grid: Grid, camera: Foot, low: float) -> Bounds | None:
+def _refracted_reach(surface: Surface, grid: Grid, camera: Foot, low: float) -> Bounds | None:
     """Return a window's box grown by all that can hide a part of it from a camera through media.
 
     None if nothing can. A ray rises from a hidden point at ``low`` to the highest relief.

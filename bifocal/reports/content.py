@@ -67,7 +67,7 @@ class ReportTask:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SeenPhoto:
+class ReportedPhoto:
     """A photo made small: its pixels, the full size [px], and pixels per pixel of the picture."""
 
     photo: Photo
@@ -90,7 +90,7 @@ class PairContent:
         Diagnostics that `align` left in the pair file; empty without.
     solution : SolvedSurvey or None
         Points measured, and what they were compared with.
-    photos : tuple of SeenPhoto
+    photos : tuple of ReportedPhoto
         Far and near one; empty where there are no files.
     relief : ReliefMap or None
     ortho : (picture, bounds) or None
@@ -103,7 +103,7 @@ class PairContent:
     source: Path
     setup: Mapping[str, Any]
     solution: SolvedSurvey | None
-    photos: tuple[SeenPhoto, ...]
+    photos: tuple[ReportedPhoto, ...]
     relief: ReliefMap | None
     ortho: tuple[ByteArray, Bounds] | None
     ortho_gsd: float
@@ -209,7 +209,7 @@ def _with_photos(pair: Pair, path: Path) -> Pair:
     return replace(pair, folder=named.folder, **images)
 
 
-def _photos(pair: Pair) -> tuple[SeenPhoto, ...]:
+def _photos(pair: Pair) -> tuple[ReportedPhoto, ...]:
     """Return both photos made small; none where a file is not named or not there."""
     photos = []
     for number in (1, 2):
@@ -222,7 +222,7 @@ def _photos(pair: Pair) -> tuple[SeenPhoto, ...]:
         size = (round(width / reduction), round(height / reduction))
         picture = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
         photos.append(
-            SeenPhoto(photo=photo, picture=picture, size=(width, height), reduction=reduction)
+            ReportedPhoto(photo=photo, picture=picture, size=(width, height), reduction=reduction)
         )
     return tuple(photos)
 

@@ -9,7 +9,7 @@ import numpy as np
 from bifocal.model.grid import Bounds
 from bifocal.model.photo import Photo
 from bifocal.model.relief_map import Quality, ReliefMap
-from bifocal.reports.content import SIDE, PairContent, SeenPhoto
+from bifocal.reports.content import SIDE, PairContent, ReportedPhoto
 from photocore.arrays import FloatArray
 from photocore.reports.words import Words
 
@@ -124,7 +124,7 @@ def _footprint(content: PairContent, number: int) -> tuple[float, float]:
     return (float(x.min()), float(x.max())) if len(x) else (-1.0, 1.0)
 
 
-def draw_photo(figure: Any, content: PairContent, seen: SeenPhoto, number: int) -> None:
+def draw_photo(figure: Any, content: PairContent, seen: ReportedPhoto, number: int) -> None:
     """Draw a photo with its points: where they were picked."""
     axes = figure.add_axes((0.01, 0.01, 0.98, 0.98))
     shape = seen.picture.shape
@@ -343,7 +343,7 @@ def _scale_bar(axes: Any, bounds: Bounds) -> None:
     )  # fmt: skip
 
 
-def tilt_of(photo: Photo, seen: SeenPhoto) -> float:
+def tilt_of(photo: Photo, seen: ReportedPhoto) -> float:
     """Return the angle between the wall's normal and the ray of a photo's middle. [deg]"""
     width, height = seen.size
     middle = photo.apparent_from_pixels(np.array([(width - 1) / 2, (height - 1) / 2]))

@@ -276,9 +276,9 @@ def _mapped(values: FloatArray, q2: FloatArray) -> tuple[FloatArray, FloatArray,
     matrix[:2, :2], matrix[:2, 2] = stretch * turn, values[2:4]
     matrix[2, :2] = values[4:] if len(values) == 6 else 0.0
     mapped = apply_homography(matrix, q2)
-    by_turn = stretch * np.array([[-sine, cosine], [-cosine, -sine]])
+    by_rotation = stretch * np.array([[-sine, cosine], [-cosine, -sine]])
     shift = np.broadcast_to(np.eye(2), (len(q2), 2, 2))
-    columns = [(q2 @ turn.T)[..., None], (q2 @ by_turn.T)[..., None], shift]
+    columns = [(q2 @ turn.T)[..., None], (q2 @ by_rotation.T)[..., None], shift]
     if len(values) == 6:
         columns.append(-mapped[:, :, None] * q2[:, None, :])
     scale = q2 @ matrix[2, :2] + 1.0

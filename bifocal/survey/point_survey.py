@@ -14,9 +14,15 @@ from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.precision import point_covariance, sigma_relief
 from bifocal.rays import in_line, meeting_of, object_rays, zoom_centre
-from bifocal.survey.bent_radii import bent_radii, carried_rays, length, met_rays, scale_ratio
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.radii import Radii
+from bifocal.survey.refracted_radii import (
+    length,
+    met_rays,
+    ray_columns,
+    refracted_radii,
+    scale_ratio,
+)
 from bifocal.survey.relief_table import ReliefTable, entries
 from photocore.arrays import FloatArray
 
@@ -129,7 +135,7 @@ def solve_points(
             limits=limits,
         ),
         standardised=radii.standardised,
-        carried=radii.carried,
+        formula_cells=radii.formula_cells,
         image_scale=first.scale_number,
         sigma_px=radii.sigma_px,
         pair=None if pair.whole_orientation is None else pair,
@@ -139,7 +145,7 @@ def solve_points(
 def _doubted(radii: Radii, points: PointObservations, d1: float, sigma: float) -> Radii:
     """Return radii whose doubtful points may lie anywhere on the ray of the far photo. [m]"""
     spread = np.where(points.in_doubt, sigma, 0.0)
-    carried, angle = dict(radii.carried), np.radians(radii.own_theta)
+    carried, angle = dict(radii.formula_cells), np.radians(radii.own_theta)
     slope = carried.get("t1", radii.own1 / d1)  # through media, of the bent ray
     outwards = carried.get("t1x", slope * np.sin(angle)), carried.get("t1y", slope * np.cos(angle))
     rate = [-part * radii.scale_number / 1000 for part in outwards]
@@ -153,7 +159,7 @@ def _doubted(radii: Radii, points: PointObservations, d1: float, sigma: float) -
         radii,
         sigma_r=np.hypot(radii.sigma_r, spread),
         covariance=radii.covariance + own,
-        carried=carried,
+        formula_cells=carried,
     )
 
 
@@ -203,7 +209,7 @@ def _measured_radii(
     )  # fmt: skip
     if not first.refracted:
         return found
-    return bent_radii(found, (first, second), (s1, s2 / k12), sigma)
+    return refracted_radii(found, (first, second), (s1, s2 / k12), sigma)
 
 
 def _adjusted_radii(
@@ -251,7 +257,7 @@ def _adjusted_radii(
     bent = None
     if pair.refracted:
         bent = met_rays(fitted, (moved1, moved2), (own1, own2), to_mm, solved.xyz[:, 2])
-        carried |= carried_rays(picks, places, fitted, q, to_mm)
+        carried |= ray_columns(picks, places, fitted, q, to_mm)
     s1 = length(moved1)
     return Radii(
         scale_number=scale_number,
@@ -267,7 +273,7 @@ def _adjusted_radii(
         sigma_r=np.hypot(solved.sigma_px * k_r, o_r),
         covariance=solved.covariance + common,
         sigma_px=float(solved.sigma_px),
-        carried=carried
+        formula_cells=carried
         | {
             "k_q": k_q,
             "k_w": k_q * scale_number / 1000,

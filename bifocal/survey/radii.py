@@ -9,7 +9,7 @@ from typing import NamedTuple
 from photocore.arrays import BoolArray, FloatArray
 
 
-class BentRays(NamedTuple):
+class RefractedRays(NamedTuple):
     """What Eqs. (1) to (7) become through media, shape (n,).
 
     Lengths in mm at the scale of image 1: ``ds``, ``den`` [mm/m], displacements ``e1`` and ``e2``,
@@ -46,5 +46,5 @@ class Radii:
     sigma_r: FloatArray
     covariance: FloatArray
     sigma_px: float | None = None
-    carried: Mapping[str, FloatArray] = field(default_factory=dict)
-    bent: BentRays | None = None
+    formula_cells: Mapping[str, FloatArray] = field(default_factory=dict)
+    bent: RefractedRays | None = None

@@ -31,7 +31,7 @@ class ReliefTable:
         One of `bifocal.model.flags.FLAGS` per point.
     standardised : ndarray, shape (n,)
         Misfit across the radius over its standard deviation; NaN where it cannot be tested.
-    carried : mapping of str to ndarray, shape (n,)
+    formula_cells : mapping of str to ndarray, shape (n,)
         For points measured in raw pixels of a general pair: positions carried to the plane
         ``x1 y1 x2 y2`` [mm at image scale, from the zoom centre], least-squares gains
         ``g1x g1y g2x g2y`` [mm per mm of q], ``k_q`` [mm/px], ``k_w`` (the same on the wall) and
@@ -49,7 +49,7 @@ class ReliefTable:
     columns: Mapping[str, FloatArray]
     flags: tuple[str, ...]
     standardised: FloatArray
-    carried: Mapping[str, FloatArray]
+    formula_cells: Mapping[str, FloatArray]
     image_scale: float | None
     sigma_px: float | None = None
     pair: Pair | None = None
@@ -75,9 +75,9 @@ class ReliefTable:
     @property
     def own_covariance(self) -> FloatArray | None:
         """Its part that is each point's own, from the picks, shape (n, 3, 3). [m²]"""
-        if self.sigma_px is None or "k_XX" not in self.carried:
+        if self.sigma_px is None or "k_XX" not in self.formula_cells:
             return self.covariance
-        return np.asarray(self.sigma_px**2 * symmetric(self.carried, "k_"))
+        return np.asarray(self.sigma_px**2 * symmetric(self.formula_cells, "k_"))
 
     def effect_of_orientation(self, xyz: FloatArray) -> FloatArray | None:
         """Return what errors common to all points move them by, shape (n, 3, k) [m]; None if none.

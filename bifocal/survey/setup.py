@@ -13,8 +13,8 @@ from bifocal.model.homography import apply_homography
 from bifocal.model.pair import Pair
 from bifocal.precision import false_relief_of_scale
 from bifocal.remarks import remark
-from bifocal.survey.bent_radii import scale_ratio
 from bifocal.survey.observations import PointObservations
+from bifocal.survey.refracted_radii import scale_ratio
 from bifocal.survey.survey_media import SurveyMedia
 from photocore.arrays import FloatArray, positive
 from photocore.errors import GeometryError, InputError, located
@@ -214,28 +214,16 @@ class SurveySetup:
         own = self.taking
         missing = [name for name, value in (("d_1", own.d1), ("d_2", own.d2)) if value is None]
         if own.d1 is None or own.d2 is None:
-            raise InputError(
-                f"no value for {', '.join(missing)}. Fill in the sheet Setup (d_2 and delta_d, or "
-                "d_1), or give --d1 and --d2 in metres, or a pair file with --pair."
-                f"{''.join(f' {remark}' for remark in self.remarks)}"
-            )
+            lacking = remark("setup.no_distances", names=", ".join(missing))
+            raise InputError(" ".join((lacking, *self.remarks)))
         if self.unit == "px" and own.enlargements != (1.0, 1.0):
-            raise InputError(
-                "enlargement_1, enlargement_2: these are of prints measured in mm. Type 1 for "
-                "pixels, and as pitch their size on the sensor (of a scan: over its enlargement)."
-            )
+            raise InputError(remark("setup.enlargement_in_pixels"))
         if self.unit == "px" and own.pitch is None:
-            raise InputError("pitch: the size of a pixel [mm/px] is needed to read pixels.")
+            raise InputError(remark("setup.no_pitch"))
         if self.unit == "px" and (own.nadir1 is None or own.nadir2 is None):
-            raise InputError(
-                "coordinates in pixels need the nadir points of both images (nadir_1_col, "
-                "nadir_1_row, nadir_2_col, nadir_2_row); fill them in."
-            )
+            raise InputError(remark("setup.no_nadirs"))
         if own.d1 == own.d2:
-            raise GeometryError(
-                f"d_1 and d_2 are both {own.d1:g} m: relief cannot be told from two photos taken "
-                "at the same distance. Check d_1, d_2 and delta_d."
-            )
+            raise GeometryError(remark("setup.one_distance", d=own.d1))
         if (own.c1 is None) != (own.c2 is None):
             raise InputError("c_1 and c_2: give both principal distances or none.")
         for name, value in (("pitch", own.pitch), ("sigma_r_max", self.measuring.sigma_r_max)):
@@ -246,10 +234,7 @@ class SurveySetup:
         if not self.media:
             return pair
         if self.refracted and own.c1 is None:
-            raise InputError(
-                "c_1 and c_2, the principal distances [mm], are needed: how far a ray is bent "
-                "follows from its angle, s / c."
-            )
+            raise InputError(remark("setup.media_without_c"))
         photos = []
         for number, photo in enumerate(pair.as_given, start=1):
             layers, z0 = self.media.through(number)
@@ -306,18 +291,9 @@ class SurveySetup:
         apart = abs(share * enlarged + enlarged - 1.0)
         if apart > tolerance:
             place = f"{self.where}: " if self.where else ""
-            if self.refracted:
-                raise GeometryError(
-                    f"{place}the scales of the photos, as seen through the media near the axis, "
-                    f"differ by {apart:.1%}: a bifocal pair has the same scale in both "
-                    "photos. Check c, d, z0 and the indices; of photos taken so, allow it with "
-                    "--scale-tolerance (`bifocal plan` places cameras at equal scale)."
-                )
-            raise GeometryError(
-                f"{place}c_1/d_1 = {own.c1 / own.d1:.4g} and c_2/d_2 = {own.c2 / own.d2:.4g} "
-                f"differ by {apart:.1%}: a bifocal pair has the same scale in both photos. "
-                f"Check c_1, c_2, d_1 and d_2 (tolerance {tolerance:.1%}, --scale-tolerance)."
-            )
+            about = {"apart": apart, "first": own.c1 / own.d1, "second": own.c2 / own.d2}
+            name = "setup.scales_through_media" if self.refracted else "setup.scales"
+            raise GeometryError(f"{place}{remark(name, tolerance=tolerance, **about)}")
         if abs(share) < 1e-4:
             return ""
         far, near = max(own.d1, own.d2), min(own.d1, own.d2)

@@ -26,7 +26,15 @@ Corrections = tuple[FloatArray | None, FloatArray | None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorldPoints:
-    """Solved points in the world; NaN, or None, where there are no control points."""
+    """Solved points in the world; NaN, or None, where there are no control points.
+
+    Attributes
+    ----------
+    table : ReliefTable
+        The points in the wall's frame.
+    georeference : Georeference or None
+        The way from there to the world.
+    """
 
     table: ReliefTable
     georeference: Georeference | None

@@ -34,7 +34,7 @@ from bifocal.survey.remarks import (
 from bifocal.survey.setup import SCALE_TOLERANCE, SurveySetup
 from bifocal.survey.solved_survey import Corrections, SolvedSurvey
 from bifocal.survey.survey_input import SurveyInput
-from bifocal.survey.survey_media import UNBENT
+from bifocal.survey.survey_media import AIR
 from bifocal.survey.tolerances import RULES, ToleranceRule
 from bifocal.survey.units import (
     as_pixels,
@@ -160,7 +160,7 @@ def _with_centre(
 
     Through media relief spreads from no one point: the nadirs stay as stated.
     """
-    if pair.layers not in (None, UNBENT):
+    if pair.layers not in (None, AIR):
         return pair, ()
     rows = points.use & ~points.on_plane
     first, second = (

@@ -18,13 +18,13 @@ from photocore.camera.similarity import Similarity
 from photocore.errors import GeometryError
 
 #: Turns of Gauss-Newton: from the unweighted fit five reach rounding on walls that lean or lie.
-SPACE_TURNS = 6
+SPACE_STEPS = 6
 #: Squarings of Horn's matrix: its first eigenvector then counts 1024 times its own share.
 SQUARINGS = 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SpaceTurn:
+class SpaceStep:
     """One turn of Gauss-Newton on rotation vector and logarithm of the scale.
 
     Attributes
@@ -73,7 +73,7 @@ class SpaceSums:
         Horn's matrix, made positive, and its squares, each of trace 1.
     start : ndarray, shape (9,)
         R' of the unweighted fit.
-    turns : tuple of SpaceTurn
+    turns : tuple of SpaceStep
     entries : ndarray, shape (9,)
         B as found.
     """
@@ -91,7 +91,7 @@ class SpaceSums:
     squares: float
     powers: tuple[FloatArray, ...]
     start: FloatArray
-    turns: tuple[SpaceTurn, ...]
+    turns: tuple[SpaceStep, ...]
     entries: FloatArray
 
     @property
@@ -172,10 +172,10 @@ def _rotation_of_power(power: FloatArray) -> FloatArray:
 
 def _turns(
     reduced: FloatArray, left: FloatArray, entries: FloatArray
-) -> tuple[tuple[SpaceTurn, ...], FloatArray]:
+) -> tuple[tuple[SpaceStep, ...], FloatArray]:
     """Return every turn of Gauss-Newton and the entries that the last one leads to."""
     turns = []
-    for _ in range(SPACE_TURNS):
+    for _ in range(SPACE_STEPS):
         matrix = entries.reshape(3, 3)
         # d(R B) = omega x B, column by column; the scale multiplies all.
         design = np.stack(
@@ -197,7 +197,7 @@ def _turns(
         half = skew(step[:3] / 2)
         halfway = matrix + half @ matrix
         turns.append(
-            SpaceTurn(
+            SpaceStep(
                 entries=entries, halfway=halfway.reshape(9), design=design, product=product,
                 normal=normal, inverse=inverse, right=right, step=step,
             )

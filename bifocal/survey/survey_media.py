@@ -12,7 +12,7 @@ from photocore.errors import InputError
 #: Media a workbook can be prepared for, from the camera to the object.
 FEWEST, MOST = 2, 6
 #: Light that is nowhere bent, where the cells of a workbook with media are blank.
-UNBENT = Layers(indices=(1.0, 1.0))
+AIR = Layers(indices=(1.0, 1.0))
 
 
 def index_names(media: int) -> tuple[str, ...]:
@@ -96,7 +96,7 @@ class SurveyMedia:
             If the pair looks through more.
         """
         layers = photos[0].layers
-        if layers is None or layers == UNBENT:
+        if layers is None or layers == AIR:
             return cls.blank(media) if media else None
         count = len(layers.indices)
         if media and count > media:
@@ -151,7 +151,7 @@ class SurveyMedia:
         """
         layers, z0 = self.layers, self.z0[number - 1]
         if layers is None:
-            return UNBENT, 0.0
+            return AIR, 0.0
         if z0 is None:
             raise InputError(
                 f"z0_{number} is blank: type how far it is from the centre of camera {number} to "

@@ -22,13 +22,13 @@ class TransformationPrecision:
     """Covariance of a transformation to the world, about a whole-metre origin there.
 
     A wrong transformation moves a point n metres from the origin by
-    ``shift + turn x n + stretch n``, where ``shift = own - lever (turn, stretch)``.
+    ``shift + turn x n + stretch n``, where ``shift = own - shift_rates (turn, stretch)``.
 
     Attributes
     ----------
     own : ndarray, shape (3, 3)
         Covariance of the part of the shift that is independent of the rest. [m²]
-    lever : ndarray, shape (3, 4)
+    shift_rates : ndarray, shape (3, 4)
         What turns about E, N, H and the logarithm of the scale shift. [m]
     spread : ndarray, shape (4, 4)
         Covariance of turns [rad²] and logarithm of the scale.
@@ -37,15 +37,15 @@ class TransformationPrecision:
     """
 
     own: FloatArray
-    lever: FloatArray
+    shift_rates: FloatArray
     spread: FloatArray
     gain: FloatArray
 
     @property
     def covariance(self) -> FloatArray:
         """Of shift E, N, H, turns about E, N, H and logarithm of the scale, shape (7, 7)."""
-        mixed = -self.lever @ self.spread
-        shift = self.own - mixed @ self.lever.T
+        mixed = -self.shift_rates @ self.spread
+        shift = self.own - mixed @ self.shift_rates.T
         return np.block([[shift, mixed], [mixed.T, self.spread]])
 
     def of_points(self, near: FloatArray) -> FloatArray:
@@ -105,11 +105,11 @@ def precision_of(
     most of it is taken up by the fit itself.
     """
     spread: FloatArray
-    lever: FloatArray
+    shift_rates: FloatArray
     if isinstance(sums, SpaceSums):
-        spread, lever = sums.turns[-1].inverse, sums.shift @ sums.turns[-1].design
+        spread, shift_rates = sums.turns[-1].inverse, sums.shift @ sums.turns[-1].design
     else:
-        spread, lever = _of_direction(sums)
+        spread, shift_rates = _of_direction(sums)
     inverse = sums.inverse.copy()
     if model == "2D":
         inverse[2, 2] = 0.0
@@ -123,18 +123,18 @@ def precision_of(
         slopes = _design(turned)[:, :, 3:][:, :, list(_UNKNOWNS[model])]
         pulled = np.einsum("nab,nbk->ak", sums.weights, effect)
         moved = np.einsum("nai,nab,nbk->ik", slopes, sums.weights, effect)
-        unknowns = spread @ (moved - lever.T @ pulled)
-        gain = np.vstack([to_world @ (inverse @ pulled - lever @ unknowns), into @ unknowns])
+        unknowns = spread @ (moved - shift_rates.T @ pulled)
+        gain = np.vstack([to_world @ (inverse @ pulled - shift_rates @ unknowns), into @ unknowns])
     return TransformationPrecision(
         own=to_world @ inverse @ to_world.T,
-        lever=to_world @ lever @ into.T,
+        shift_rates=to_world @ shift_rates @ into.T,
         spread=into @ spread @ into.T,
         gain=gain,
     )
 
 
 def _of_direction(sums: WeightedSums) -> tuple[FloatArray, FloatArray]:
-    """Return covariance and lever of the turn in plan and the logarithm of the scale.
+    """Return covariance and shift_rates of the turn in plan and the logarithm of the scale.
 
     A small turn w and stretch k change ``p = m cos, q = m sin`` by ``w q + k p`` and
     ``-w p + k q``.
@@ -144,7 +144,7 @@ def _of_direction(sums: WeightedSums) -> tuple[FloatArray, FloatArray]:
     turn = (q**2 * qq + 2 * p * q * pq + p**2 * pp) / below
     both = (p * q * qq - (q**2 - p**2) * pq - p * q * pp) / below
     stretch = (p**2 * qq - 2 * p * q * pq + q**2 * pp) / below
-    lever = np.stack(
+    shift_rates = np.stack(
         [sums.shift[:, 0] * q - sums.shift[:, 1] * p, sums.mean - sums.constants], axis=-1
     )
-    return np.array([[turn, both], [both, stretch]]), lever
+    return np.array([[turn, both], [both, stretch]]), shift_rates

@@ -10,6 +10,7 @@ import numpy as np
 
 from bifocal.model.pair import Pair
 from bifocal.model.photo import FARTHEST_WALL, Photo
+from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.setup import SurveySetup
@@ -55,38 +56,20 @@ def refuse_wrong_unit(
     if setup.unit == "mm":
         limit = LARGEST_MM if taking.c1 is None else WIDEST * max(c or 0.0 for c in taking.c_used)
         radial = points.polar[points.use & ~points.is_cartesian][:, :2]
-        for values, what, mend in (
-            (
-                typed,
-                "coordinates",
-                "Set the input unit to px and fill in pitch and the nadir points.",
-            ),
-            (radial, "radial distances", "Multiply them by the size of a pixel [mm/px]."),
-        ):
-            size = _typical(values)
-            if size > limit:
-                raise InputError(
-                    f"{where}: {what} of {size:.4g} mm lie outside any photo taken with this lens "
-                    f"(limit {limit:.4g} mm): they look like pixels, while {place} says mm. {mend}"
-                )
+        for values, what in ((typed, "coordinates"), (radial, "radii")):
+            if (size := _typical(values)) > limit:
+                seems = remark(f"units.{what}_in_pixels", size=size, limit=limit, place=place)
+                raise InputError(f"{where}: {seems}")
         return
     first, second = taking.nadir1 or (0.0, 0.0), taking.nadir2 or (0.0, 0.0)
     nadir = max(abs(value) for value in (*first, *second))
     largest = float(np.nanmax(np.abs(typed))) if typed.size else np.inf
     reach = largest * (taking.pitch or np.inf)
-    sight = ""
     if nadir > 2 * CORNER_PX and largest < CORNER_PX:
-        sight = (
-            f"no coordinate exceeds {largest:.4g} px although the nadir points lie at "
-            f"({first[0]:g}, {first[1]:g}) px: they"
-        )
-    elif nadir == 0 and reach < 0.01 * (taking.c1 or 20.0):
-        sight = f"all points lie within {reach:.3g} mm of the nadir: the coordinates"
-    if sight:
-        raise InputError(
-            f"{where}: {sight} look like millimetres, while {place} says px. Set the input unit "
-            "to mm."
-        )
+        about = {"largest": largest, "x": first[0], "y": first[1], "place": place}
+        raise InputError(f"{where}: {remark('units.far_from_nadir', **about)}")
+    if nadir == 0 and reach < 0.01 * (taking.c1 or 20.0):
+        raise InputError(f"{where}: {remark('units.all_at_nadir', reach=reach, place=place)}")
 
 
 def _typical(values: FloatArray) -> float:
@@ -102,9 +85,9 @@ def refuse_not_above_zero(**options: Any) -> None:
             continue
         option = f"--{name.replace('_', '-')}"
         if as_floats(value, option).ndim:
-            raise InputError(f"{option}: expected one number for the whole survey.")
+            raise InputError(f"{option}: {remark('units.one_number')}")
         if not value > 0:
-            raise InputError(f"{option}: must be a number above zero, got {value:g}.")
+            raise InputError(f"{option}: {remark('units.above_zero', value=value)}")
 
 
 def refuse_far_stations(
@@ -131,12 +114,9 @@ def refuse_far_stations(
             continue
         place = f"--{key}" if key in options else f"{where}: {key[0]}_{key[1]}"
         # 9500 is 9.5 m in millimetres; 950 is 9.5 m in centimetres and 0.95 m in millimetres.
-        per_metre, unit = (1000.0, "millimetres") if value >= 2000.0 else (100.0, "centimetres")
-        raise InputError(
-            f"{place} = {value:g} m: distances to the wall are in metres (c in millimetres), and "
-            f"this looks like {unit}. Type {value / per_metre:g} if that is meant; d_1 also "
-            "counts delta_d."
-        )
+        unit, per_metre = ("millimetres", 1000.0) if value >= 2000.0 else ("centimetres", 100.0)
+        meant = remark(f"units.in_{unit}", meant=value / per_metre)
+        raise InputError(f"{place} = {value:g} m: {meant}")
 
 
 def refuse_pixels(xy: FloatArray, c: float, where: str) -> None:
@@ -149,11 +129,7 @@ def refuse_pixels(xy: FloatArray, c: float, where: str) -> None:
     """
     size = _typical(xy)
     if size > WIDEST * c:
-        raise InputError(
-            f"{where}: coordinates of {size:.4g} mm lie outside any photo of principal "
-            f"distance {c:g} mm: they look like pixels. Head the columns col1 row1 col2 row2, or "
-            "say --unit px."
-        )
+        raise InputError(f"{where}: {remark('units.pixels', size=size, c=c)}")
 
 
 def refuse_millimetres(pair: Pair, points: PointObservations, where: str) -> None:
@@ -169,10 +145,8 @@ def refuse_millimetres(pair: Pair, points: PointObservations, where: str) -> Non
         return
     nadirs = [photo.pixels_from_plane(photo.nadir) for photo in (pair.image1, pair.image2)]
     if np.nanmax(np.abs(nadirs)) > 2 * CORNER_PX:
-        raise InputError(
-            f"{where}: no pixel coordinate exceeds {np.nanmax(np.abs(pixels)):.4g} px: they look "
-            "like millimetres. Give raw pixels, or head the columns x1 [mm] ... y2 [mm]."
-        )
+        seems = remark("units.millimetres", largest=np.nanmax(np.abs(pixels)))
+        raise InputError(f"{where}: {seems}")
 
 
 def refuse_contradiction(points: PointObservations, table: ReliefTable, where: str) -> None:
@@ -187,12 +161,8 @@ def refuse_contradiction(points: PointObservations, table: ReliefTable, where: s
     far = int((miss > CONTRADICTION).sum())
     if len(miss) < 3 or 2 * far <= len(miss):
         return
-    raise GeometryError(
-        f"{where}: at {far} of {len(miss)} points the two picks miss each other across the radius "
-        f"by more than {CONTRADICTION:g} sigma, so the columns of the photos do not belong "
-        "together: columns of equal heading (say with --columns which is which), coordinates not "
-        "counted from the nadir points, photos turned against each other, or names mixed up."
-    )
+    about = {"far": far, "count": len(miss), "limit": CONTRADICTION}
+    raise GeometryError(f"{where}: {remark('units.contradiction', **about)}")
 
 
 def as_pixels(pair: Pair, points: PointObservations, where: str, unit: str) -> PointObservations:
@@ -225,22 +195,15 @@ def as_pixels(pair: Pair, points: PointObservations, where: str, unit: str) -> P
 def _refuse_polar(pair: Pair, points: PointObservations, rows: BoolArray, where: str) -> None:
     """Refuse radial distances that say not where in the photos a point is."""
     if np.isnan(points.polar[rows, 2]).any():
-        raise InputError(f"{where}: theta is needed beside s1 and s2 to use them with a pair file.")
+        raise InputError(f"{where}: {remark('units.no_theta')}")
     if not np.allclose(pair.image1.nadir, pair.image2.nadir, atol=1e-9):
-        raise GeometryError(
-            f"{where}: the cameras of this pair have different nadir points, so s1 and"
-            " s2 do not share one direction theta; measure x1 y1 x2 y2 or pixels."
-        )
+        raise GeometryError(f"{where}: {remark('units.two_nadirs')}")
 
 
 def _pixels_of_mm(photo: Photo, key: str, xy: FloatArray, where: str) -> FloatArray:
     """Return pixels of image coordinates in mm from the nadir, y up."""
     c = photo.principal_distance
     if c is None:
-        raise InputError(
-            f"{where}: coordinates in mm need the principal distance of each photo; "
-            f'add "principal_distance" [mm] to {key} in the pair file, or give pixels '
-            "(col1 row1 col2 row2)."
-        )
+        raise InputError(f"{where}: {remark('units.no_principal_distance', image=key)}")
     refuse_pixels(xy, c, where)
     return photo.pixels_from_apparent(photo.nadir + xy * photo.distance / c)

@@ -229,9 +229,9 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
         if key in ("q", "theta_used"):
             blank = np.isnan(values)
         cells[key] = _unless(blank, values)
-    cells |= {key: inputs(values) for key, values in table.carried.items()}
-    for key in {"g1", "g2"} & table.carried.keys():
-        cells[key] = _unless(incomplete, table.carried[key])
+    cells |= {key: inputs(values) for key, values in table.formula_cells.items()}
+    for key in {"g1", "g2"} & table.formula_cells.keys():
+        cells[key] = _unless(incomplete, table.formula_cells[key])
     placed = content.placed
     cells |= {key: inputs(placed.near[:, i]) for i, key in enumerate(NEAR[:3])}
     mixed = placed.covariance
@@ -262,9 +262,9 @@ def _radial_variances(content: SurveyContent, blank: BoolArray) -> dict[str, lis
     near, far = table["s2_used"] / d2, table["s1_used"] / d1
     with np.errstate(divide="ignore", invalid="ignore"):
         g1, g2, aside = 1 - r / d1, (1 - r / d2) * k12, 1 - r / d1
-        if "t1" in table.carried:
-            near, far, g1, g2 = (table.carried[key] for key in ("t2", "t1", "g1", "g2"))
-            aside = table["s_c"] / (table.carried["tan1"] * (first.principal_distance or d1))
+        if "t1" in table.formula_cells:
+            near, far, g1, g2 = (table.formula_cells[key] for key in ("t2", "t1", "g1", "g2"))
+            aside = table["s_c"] / (table.formula_cells["tan1"] * (first.principal_distance or d1))
         v1, v2 = (g1 * sigma / den) ** 2, (g2 * sigma / den) ** 2
     if content.points is not None:
         v2 += np.where(content.points.in_doubt, DOUBTFUL_SHARE * min(d1, d2), 0.0) ** 2

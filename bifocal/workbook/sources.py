@@ -111,7 +111,7 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
     """Return the pair whose homographies `Setup` holds, with the lenses of its pair file.
 
     Where that file is not read a remark says that pixels count as free of lens distortion. Media
-    are those of the workbook, where it has cells for them (`UNBENT` where these are blank), else
+    are those of the workbook, where it has cells for them (`AIR` where these are blank), else
     those of the file.
     """
     taking = setup.taking

@@ -15,7 +15,7 @@ from multimedia.projects.model import Project
 from photocore.adjustment import BlockEquations
 from photocore.adjustment.network import LARGEST, Network, NetworkState, Rows
 from photocore.arrays import BoolArray, FloatArray, IntArray
-from photocore.camera.rotation import by_turn, skew
+from photocore.camera.rotation import by_rotation, skew
 from photocore.errors import GeometryError
 
 #: A motion of everything is a datum defect if it moves image points by less than this share of
@@ -136,7 +136,7 @@ class Bundle:
             rows.by_label(at, list(through.values()), view.by_interface * weight)
             for plate, pose in state.blocks["plate"].items():
                 on = self.plate_of[which] == plate
-                turned = by_turn(by_point[on], points[on] - pose.centre)
+                turned = by_rotation(by_point[on], points[on] - pose.centre)
                 by_pose = np.concatenate([by_point[on], turned], axis=2)
                 rows.by_label(at[on], list(place.plates[plate].values()), by_pose)
             rows.by_points(lines[own], which[:, None], by_point)

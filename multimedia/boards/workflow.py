@@ -24,7 +24,7 @@ _FLAT = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FoundBoards:
+class DetectedBoards:
     """What was found.
 
     Attributes
@@ -61,7 +61,7 @@ def find_boards(
     square: float,
     overwrite: bool = False,
     progress: Progress = no_progress,
-) -> FoundBoards:
+) -> DetectedBoards:
     """Find a board in photos and write the project with its points.
 
     Parameters
@@ -116,7 +116,7 @@ def find_boards(
             )
     project = with_boards(project, views, square=square, numbered=pattern == "charuco")
     write_project(out, project, overwrite=overwrite)
-    return FoundBoards(project=project, views=tuple(views), without=tuple(without))
+    return DetectedBoards(project=project, views=tuple(views), without=tuple(without))
 
 
 def _camera_and_pose(project: Project, photo: Path) -> tuple[str, str]:

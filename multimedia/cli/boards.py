@@ -9,7 +9,7 @@ from photocore.cli import print_result, progress_bar, text_table
 from photocore.options import declared
 
 if TYPE_CHECKING:
-    from multimedia.boards.workflow import FoundBoards
+    from multimedia.boards.workflow import DetectedBoards
 
 
 @declared
@@ -40,7 +40,7 @@ def command(
     print_result(data, lines, as_json=as_json, remarks=notes)
 
 
-def _counts(found: FoundBoards) -> dict[str, tuple[int, int]]:
+def _counts(found: DetectedBoards) -> dict[str, tuple[int, int]]:
     """Return boards and points of each camera."""
     return {
         name: (

@@ -173,6 +173,11 @@ def object_grid(
     count : int
         Points along X, along Y, and levels.
 
+    Returns
+    -------
+    ndarray, shape (count³, 3)
+        Points below the last face, Z negative. [object unit]
+
     Examples
     --------
     >>> object_grid((2.0, 1.0), (0.1, 0.5), count=2)[0].tolist()
@@ -211,6 +216,11 @@ def ring_of_cameras(
         Point in the object's medium that they aim at as it appears.
     principal_distance : float
         [mm]
+
+    Returns
+    -------
+    tuple of Camera
+        Evenly round the cone.
     """
     cameras = []
     target = as_points(target, "target", dimension=3)
@@ -255,6 +265,22 @@ def compare_placements(
     """Return the expected precision of rings of cameras of different opening.
 
     Angles under which a camera cannot see all points are left out.
+
+    Parameters
+    ----------
+    count, distance, interface, principal_distance
+        As in `ring_of_cameras`.
+    points : ndarray, shape (n, 3)
+        Object points. [object unit]
+    sigma_image : float
+        Of image coordinates. [mm]
+    half_angles : sequence of float
+        Openings to try. [rad]
+
+    Returns
+    -------
+    tuple of Placement
+        One for each opening that works.
 
     Raises
     ------
@@ -315,6 +341,11 @@ def calibration_costs(
         Noise of image coordinates in water over that in air: blur, dispersion, turbidity.
     interior : sequence of str
         What a calibration estimates.
+
+    Returns
+    -------
+    CalibrationCosts
+        Errors and precision of each of the three cases.
 
     Notes
     -----

@@ -69,7 +69,17 @@ class CalibrationCosts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Placement:
-    """One way to place the cameras and what it gives: half angle [rad], RMS sigmas, ray angle."""
+    """One way to place the cameras and what it gives.
+
+    Attributes
+    ----------
+    half_angle : float
+        Opening of the ring of cameras. [rad]
+    sigma : tuple of float
+        RMS standard deviations of X, Y, Z. [object unit]
+    angle : float
+        Between the rays that meet in a point. [rad]
+    """
 
     half_angle: float
     sigma: tuple[float, ...]

@@ -75,6 +75,11 @@ def convert(
     overwrite : bool
         Whether existing files may be replaced.
 
+    Returns
+    -------
+    Conversion
+        What was read, what was written, and what could not be kept.
+
     Raises
     ------
     InputError

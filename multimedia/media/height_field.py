@@ -172,7 +172,7 @@ class HeightField(RefractingSurface):
         steepness = np.sqrt(1 + (slope * slope).sum(-1))
         return np.column_stack([-slope, np.ones(len(slope))]) / steepness[:, None]
 
-    def turn(self, points: FloatArray, normals: FloatArray, steps: FloatArray) -> FloatArray:
+    def curvature(self, points: FloatArray, normals: FloatArray, steps: FloatArray) -> FloatArray:
         """Return the change of the unit normal along tangent steps, shape (n, k, 3)."""
         bend = self.slopes(points[:, :2])[1]
         change = np.zeros_like(steps)

@@ -140,7 +140,7 @@ class Interfaces(SurfaceSequence, OpticalMedia):
         return paths.vertices[..., -1, :], paths.directions[..., -1, :]
 
     @property
-    def bends_in_object(self) -> bool:
+    def curves_in_object(self) -> bool:
         """Whether the index of the last medium changes with depth."""
         return self.is_graded
 
@@ -237,7 +237,7 @@ class Interfaces(SurfaceSequence, OpticalMedia):
             own = (
                 SurfaceMotion(shift=axis)
                 if k < 3
-                else SurfaceMotion(turn=axis, pivot=camera.centre)
+                else SurfaceMotion(rotation=axis, pivot=camera.centre)
             )
             motions.append(tuple(own if moves else None for moves in self.with_camera))
         for k, name in enumerate(names, start=pose):

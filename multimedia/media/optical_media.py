@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from multimedia.media.camera import Camera
 from photocore.arrays import FloatArray
-from photocore.camera.rotation import by_turn
+from photocore.camera.rotation import by_rotation
 from photocore.errors import InputError
 
 
@@ -24,11 +24,17 @@ class SightDerivatives(NamedTuple):
 
 
 class Sight(NamedTuple):
-    """Directions in which points are seen, and what follows for their images."""
+    """Directions in which points are seen, and what follows for their images.
 
-    #: Vectors in the camera frame and the camera's medium, of any length, shape (n, 3).
+    Attributes
+    ----------
+    vectors : ndarray, shape (n, 3)
+        In the camera frame and the camera's medium, of any length.
+    derivatives : callable
+        From the derivatives of the image by those vectors, (n, 2, 3), to those by everything else.
+    """
+
     vectors: FloatArray
-    #: From the derivatives of the image by those vectors, (n, 2, 3), to those by everything else.
     derivatives: Callable[[FloatArray], SightDerivatives]
 
 
@@ -58,7 +64,7 @@ class OpticalMedia(ABC):
         return self
 
     @property
-    def bends_in_object(self) -> bool:
+    def curves_in_object(self) -> bool:
         """Whether rays are curved in the object's medium itself; not unless a subclass says so."""
         return False
 
@@ -184,5 +190,5 @@ def by_pose(
     # Turning the camera by a small vector v of the world: R^T d changes by R^T (d x v), as
     # turning -d by v would; then v back from the camera frame to the world.
     turned, vectors = turning
-    by_vector = by_turn(turned, -vectors) @ camera.rotation.T
+    by_vector = by_rotation(turned, -vectors) @ camera.rotation.T
     return by_point, np.concatenate([-by_point, by_vector], axis=-1)

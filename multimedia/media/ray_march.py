@@ -169,7 +169,7 @@ def _carried(
     slide = (toward @ normal[:, :, None])[..., 0] / cos_a[:, None]
     step = free + slide[..., None] * met.heading[:, None, :]
     along = step if velocity is None else step - velocity
-    turned = interfaces.surfaces[number].turn(met.place, met.outward, along)
+    turned = interfaces.surfaces[number].curvature(met.place, met.outward, along)
     turned = np.where(flipped, -turned, turned)
     if spin is not None and spin.any():
         turned = turned + (normal @ skew(spin).transpose(0, 2, 1)).transpose(1, 0, 2)
@@ -196,7 +196,7 @@ def _surface_changes(
     for k, motion in enumerate(motions, start=2):
         if motion is not None:
             velocity[:, k] = motion.velocity(met.place, met.outward)
-            spin[k] = motion.turn
+            spin[k] = motion.rotation
     return velocity, spin
 
 

@@ -41,7 +41,7 @@ class SurfaceMotion:
     ----------
     shift : ndarray, shape (3,)
         Of the pivot.
-    turn : ndarray, shape (3,)
+    rotation : ndarray, shape (3,)
         Rotation vector about the pivot. [rad]
     pivot : ndarray, shape (3,)
     growth : float
@@ -49,27 +49,27 @@ class SurfaceMotion:
     """
 
     shift: FloatArray = field(default_factory=lambda: np.zeros(3))
-    turn: FloatArray = field(default_factory=lambda: np.zeros(3))
+    rotation: FloatArray = field(default_factory=lambda: np.zeros(3))
     pivot: FloatArray = field(default_factory=lambda: np.zeros(3))
     growth: float = 0.0
 
     def velocity(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Return how points that stick to the surface move, shape (n, 3)."""
         moved: FloatArray = np.broadcast_to(self.shift, points.shape)
-        if self.turn.any():
-            moved = moved + (points - self.pivot) @ skew(self.turn).T
+        if self.rotation.any():
+            moved = moved + (points - self.pivot) @ skew(self.rotation).T
         return moved + self.growth * normals if self.growth else moved
 
     def seen_from(self, rotation: FloatArray, centre: FloatArray) -> SurfaceMotion:
         """Return the change in the frame in which a point of this one is rotation x + centre."""
         return SurfaceMotion(
-            shift=rotation @ self.shift, turn=rotation @ self.turn,
+            shift=rotation @ self.shift, rotation=rotation @ self.rotation,
             pivot=rotation @ self.pivot + centre, growth=self.growth,
         )  # fmt: skip
 
     def applied(self, surface: RefractingSurface, step: float) -> RefractingSurface:
         """Return the surface after a step of the parameter."""
-        turned = rotation_from_vector(step * self.turn)
+        turned = rotation_from_vector(step * self.rotation)
         moved = surface.moved(turned, step * self.shift + self.pivot - turned @ self.pivot)
         if isinstance(moved, Sphere | Cylinder):
             return replace(moved, radius=moved.radius + step * self.growth)
@@ -158,7 +158,7 @@ class Body:
         direction = tangents_of(along)[int(kind[-1]) - 1]
         if kind.startswith("shift"):
             return SurfaceMotion(shift=direction)
-        return SurfaceMotion(turn=direction, pivot=last.point)
+        return SurfaceMotion(rotation=direction, pivot=last.point)
 
 
 def bodies_of(

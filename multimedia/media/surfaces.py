@@ -42,7 +42,7 @@ class RefractingSurface(ABC):
         """Return the unit normals at points of the surface, shape (n, 3)."""
 
     @abstractmethod
-    def turn(self, points: FloatArray, normals: FloatArray, steps: FloatArray) -> FloatArray:
+    def curvature(self, points: FloatArray, normals: FloatArray, steps: FloatArray) -> FloatArray:
         """Return how the unit normals change when points of the surface move along it.
 
         ``steps`` are k tangent vectors per point, shape (n, k, 3); so is the result.
@@ -151,7 +151,7 @@ class Plane(RigidSurface):
         """Return the one normal for every point."""
         return np.broadcast_to(self.normal, points.shape)
 
-    def turn(self, points: FloatArray, normals: FloatArray, steps: FloatArray) -> FloatArray:  # noqa: ARG002
+    def curvature(self, points: FloatArray, normals: FloatArray, steps: FloatArray) -> FloatArray:  # noqa: ARG002
         """Return zero: the normal of a plane never turns."""
         return np.zeros_like(steps)
 
@@ -188,7 +188,7 @@ class _RoundSurface(RigidSurface):
         """Return the outward radii."""
         return self._offset(points) / self.radius
 
-    def turn(self, points: FloatArray, normals: FloatArray, steps: FloatArray) -> FloatArray:  # noqa: ARG002
+    def curvature(self, points: FloatArray, normals: FloatArray, steps: FloatArray) -> FloatArray:  # noqa: ARG002
         """Return the radial part of the steps, over the radius."""
         return self._radial(steps) / self.radius
 

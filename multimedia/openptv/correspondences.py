@@ -92,7 +92,7 @@ def correspondences(
     return xyz[kept], numbers[kept], misfit[kept]
 
 
-def found_by_chance(
+def expected_by_chance(
     cameras: Sequence[Camera],
     targets: Sequence[FloatArray],
     media: Sequence[Media],
@@ -131,7 +131,7 @@ def is_chance(found: FloatArray, chance: FloatArray) -> bool:
     Parameters
     ----------
     found, chance : ndarray, shape (cameras + 1,)
-        Particles by the number of cameras that saw them, and those of `found_by_chance`.
+        Particles by the number of cameras that saw them, and those of `expected_by_chance`.
     """
     from scipy.stats import binom
 

@@ -91,6 +91,11 @@ def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experi
     swap_indices : bool
         Exchange the indices of glass and water.
 
+    Returns
+    -------
+    Experiment
+        Its project, targets and particles.
+
     Raises
     ------
     InputError
@@ -155,6 +160,15 @@ def write_experiment(
     """Write cal/*.ori, *.addpar, *_targets, the calibration body and parameters/ptv.par.
 
     Lengths are written in mm, whatever the unit of the project.
+
+    Parameters
+    ----------
+    folder : path
+        New, or an existing one.
+    project : Project
+        What is written.
+    overwrite : bool
+        Whether existing files may be replaced.
 
     Returns
     -------

@@ -50,7 +50,17 @@ class ControlParameters:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class DetectedTargets:
-    """Detected targets of one image: pixels (column, row), pixel counts, correspondence numbers."""
+    """Detected targets of one image.
+
+    Attributes
+    ----------
+    pixels : ndarray, shape (n, 2)
+        Column and row. [px]
+    counts : ndarray of int, shape (n,)
+        Pixels of each target.
+    numbers : ndarray of int, shape (n,)
+        Correspondence numbers.
+    """
 
     pixels: FloatArray
     counts: IntArray

@@ -12,7 +12,7 @@ import numpy as np
 from multimedia.openptv.correspondences import (
     TOLERANCE,
     correspondences,
-    found_by_chance,
+    expected_by_chance,
     is_chance,
 )
 from multimedia.openptv.openptv_files import read_targets, rt_is_text
@@ -102,7 +102,7 @@ def find_particles(
     frame: Any = (content.cameras, places, content.interfaces)
     xyz, numbers, misfit = correspondences(*frame, tolerance=tolerance, fewest=fewest)
     seen_by = np.bincount((numbers >= 0).sum(axis=1), minlength=len(names) + 1).astype(float)
-    chance = found_by_chance(*frame, tolerance=tolerance, fewest=fewest)
+    chance = expected_by_chance(*frame, tolerance=tolerance, fewest=fewest)
     if is_chance(seen_by, chance):
         raise InputError(
             f"{project}: {len(xyz)} particles would be found, and {chance.sum():.0f} where the "

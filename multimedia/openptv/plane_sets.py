@@ -31,7 +31,15 @@ class PlaneSet:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlaneCandidates:
-    """What one camera has: sets per position, the likeliest first, and sets of all positions."""
+    """What one camera has.
+
+    Attributes
+    ----------
+    positions : tuple of tuple of PlaneSet
+        Sets of each position of the plane, the likeliest first.
+    together : tuple of PlaneSet
+        Sets of all positions.
+    """
 
     positions: tuple[tuple[PlaneSet, ...], ...]
     together: tuple[PlaneSet, ...]

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from multimedia.media.camera import Camera
 from multimedia.media.projection import Media, as_media, project
-from multimedia.orientation.object_rays import image_rays, refuse_bent_rays
+from multimedia.orientation.object_rays import image_rays, refuse_curved_rays
 from photocore.arrays import FloatArray, IntArray, as_points, positive
 from photocore.errors import InputError
 
@@ -130,7 +130,7 @@ def epipolar_curve(
         raise InputError(f"vertices: expected 2 to {_MOST}, found {vertices}.")
     positive(chord_error, "chord_error", unit="mm")
     second = as_media(second)
-    refuse_bent_rays([as_media(first)], "epipolar")
+    refuse_curved_rays([as_media(first)], "epipolar")
     flat = measured.reshape(-1, 2)
     origins, directions = image_rays(camera, flat, first)
     near, far = _ends(origins, directions, low, high)

@@ -25,7 +25,7 @@ from multimedia.orientation.object_rays import (
     inverse_3x3,
     largest_angle,
     nearest_points,
-    refuse_bent_rays,
+    refuse_curved_rays,
     times,
 )
 from multimedia.orientation.point_status import PointStatus
@@ -173,7 +173,7 @@ def intersect_rays(
         Exact for exact image points; else every ray counts alike, near or far.
     """
     image, placed = _checked(cameras, image_points, layers)
-    refuse_bent_rays(placed, "intersect_rays")
+    refuse_curved_rays(placed, "intersect_rays")
     xyz = np.empty((image.shape[1], 3))
     for part in _parts(image):
         rays = [image_rays(c, p[part], m) for c, p, m in zip(cameras, image, placed, strict=True)]
@@ -198,7 +198,7 @@ def intersect_pairs(
         Mean distance between the rays of the pairs. [object unit]
     """
     image, placed = _checked(cameras, image_points, layers)
-    refuse_bent_rays(placed, "intersect_pairs")
+    refuse_curved_rays(placed, "intersect_pairs")
     xyz, apart = np.empty((image.shape[1], 3)), np.empty(image.shape[1])
     for part in _parts(image):
         xyz[part], apart[part] = _pair_block(cameras, image[:, part], placed)

@@ -60,7 +60,7 @@ def image_rays(
     return origins.reshape(shape), rays.reshape(shape)
 
 
-def refuse_bent_rays(media: Sequence[OpticalMedia], what: str) -> None:
+def refuse_curved_rays(media: Sequence[OpticalMedia], what: str) -> None:
     """Refuse media in which what takes rays for straight lines would be wrong.
 
     Raises
@@ -68,7 +68,7 @@ def refuse_bent_rays(media: Sequence[OpticalMedia], what: str) -> None:
     InputError
         If the index changes with depth.
     """
-    if any(item.bends_in_object for item in media):
+    if any(item.curves_in_object for item in media):
         raise InputError(
             f"{what}: in water whose index changes with depth rays are curves, and this takes them "
             "for straight lines. Use project, resect, intersect or adjust, or leave the gradient "

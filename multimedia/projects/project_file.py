@@ -69,6 +69,16 @@ _HEAD = """\
 def read_project(path: Path | str) -> Project:
     """Read a project file and its tables.
 
+    Parameters
+    ----------
+    path : path
+        The project file (.toml).
+
+    Returns
+    -------
+    Project
+        With the points of its tables.
+
     Raises
     ------
     InputError
@@ -112,6 +122,15 @@ def write_project(path: Path | str, project: Project, *, overwrite: bool = False
 
     The tables are called after the project: ``tank.toml`` goes with ``tank_object_points.csv``
     and ``tank_image_points.csv``.
+
+    Parameters
+    ----------
+    path : path
+        The project file (.toml).
+    project : Project
+        What is written.
+    overwrite : bool
+        Whether existing files may be replaced.
 
     Returns
     -------

@@ -23,7 +23,15 @@ Range = tuple[float, float]
 
 
 class Term(NamedTuple):
-    """One term: coefficient and the powers of wavelength, temperature, salinity and depth."""
+    """One term of a formula.
+
+    Attributes
+    ----------
+    coefficient : float
+        In units of the powers.
+    wavelength, temperature, salinity, depth : int
+        Powers of each, in nm, °C, per cent and m.
+    """
 
     coefficient: float
     wavelength: int = 0

@@ -286,7 +286,16 @@ class Brown:
 class RadialDivision(NamedTuple):
     """Radial distortion of a lens that is unknown: ideal = c + (seen - c) / (1 + q).
 
-    q = k1 rho^2 + k2 rho^4, rho the seen radius over the principal distance; c is the centre [px].
+    q = k1 rho^2 + k2 rho^4, rho the seen radius over the principal distance.
+
+    Attributes
+    ----------
+    k1, k2 : float
+        Coefficients. [-]
+    centre : ndarray, shape (2,)
+        Column and row about which it is radial. [px]
+    focal : float
+        Principal distance. [px]
 
     Examples
     --------

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from photocore.arrays import FloatArray
-from photocore.camera.rotation import AXES_CROSS, by_turn, rotation_from_vector, skew
+from photocore.camera.rotation import AXES_CROSS, by_rotation, rotation_from_vector, skew
 
 #: What a camera is differentiated by: logarithms of fx and fy / fx, principal point [px], a small
 #: turn about the object frame's axes [rad], projection centre [m].
@@ -24,7 +24,17 @@ PARAMETERS = (
 
 
 class Pinhole(NamedTuple):
-    """Camera matrix (3, 3) [px], rotation camera from object frame (3, 3), centre (3,) [m]."""
+    """A camera without distortion.
+
+    Attributes
+    ----------
+    matrix : ndarray, shape (3, 3)
+        Camera matrix. [px]
+    rotation : ndarray, shape (3, 3)
+        Camera from object frame.
+    centre : ndarray, shape (3,)
+        Projection centre. [m]
+    """
 
     matrix: FloatArray
     rotation: FloatArray
@@ -57,7 +67,17 @@ class Pinhole(NamedTuple):
 
 
 class ProjectedPoints(NamedTuple):
-    """Pixels (n, 2) and their derivatives by the point (n, 2, 3) and by `PARAMETERS` (n, 2, 10)."""
+    """Where points are seen, with derivatives.
+
+    Attributes
+    ----------
+    pixels : ndarray, shape (n, 2)
+        Column and row. [px]
+    by_point : ndarray, shape (n, 2, 3)
+        Derivatives by the point. [px/m]
+    by_camera : ndarray, shape (n, 2, 10)
+        Derivatives by `PARAMETERS`.
+    """
 
     pixels: FloatArray
     by_point: FloatArray
@@ -153,7 +173,7 @@ def project_with_jacobian(camera: Pinhole, xyz: FloatArray) -> ProjectedPoints:
     by_camera[:, 1, 1] = offset[:, 1]
     by_camera[:, :, 2:4] = np.eye(2)
     # Turned by a small v the camera sees R (P - C + v x (P - C)).
-    by_camera[:, :, 4:7] = by_turn(by_point, away)
+    by_camera[:, :, 4:7] = by_rotation(by_point, away)
     by_camera[:, :, 7:] = -by_point
     return ProjectedPoints(pixels, by_point, by_camera)
 

@@ -91,7 +91,7 @@ def skew(vectors: ArrayLike) -> FloatArray:
     return (a @ AXES_CROSS.reshape(9, 3).T).reshape(*a.shape, 3)
 
 
-def by_turn(rows: FloatArray, arms: FloatArray) -> FloatArray:
+def by_rotation(rows: FloatArray, arms: FloatArray) -> FloatArray:
     """Return derivatives by a small turn v of arms: ``row . (v x arm) = (arm x row) . v``.
 
     Parameters

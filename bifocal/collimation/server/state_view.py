@@ -142,7 +142,7 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
                     "z0": media.z0,
                     "distance": photo.distance,
                     "nadir": photo.nadir,
-                    "turn": media.turn,
+                    "turn": media.rotation,
                 },
             }
         )

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from bifocal.model.orientation_precision import NAMES, rates_of
+from bifocal.orientation.adjustment.observed_points import known_points, views_of
 from bifocal.orientation.adjustment.pair_observations import (
     Equations,
     PairObservations,
@@ -21,7 +22,6 @@ from bifocal.orientation.adjustment.pair_observations import (
     at,
 )
 from bifocal.orientation.adjustment.refracted_ties import meeting_equations
-from bifocal.orientation.adjustment.seen_points import known_points, views_of
 from bifocal.orientation.facade_lines import FacadeDirection
 from photocore.adjustment.network import Network, NetworkState, Rows
 from photocore.arrays import BoolArray, FloatArray

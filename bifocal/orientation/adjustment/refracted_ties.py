@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from bifocal.model.orientation_precision import rates_of
+from bifocal.orientation.adjustment.observed_points import views_of
 from bifocal.orientation.adjustment.pair_observations import (
     Equations,
     PairObservations,
     PairUnknowns,
 )
-from bifocal.orientation.adjustment.seen_points import views_of
 from photocore.arrays import BoolArray
 
 #: Steps to the point nearest to both rays; the first is good to a thousandth of the misfit.

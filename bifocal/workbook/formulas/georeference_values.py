@@ -117,8 +117,8 @@ def precision_values(geo: Georeference | None) -> dict[str, CellValue]:
         return {}
     found, fit = geo.precision, geo.world_from_wall
     values = _entries("g_w_", SMALL, SMALL, found.spread)
-    values |= _entries("g_t_", "XYZ", SMALL, fit.rotation.T @ found.lever / fit.scale)
-    values |= _entries("g_v_", "ENH", SMALL, found.lever)
-    values |= _entries("g_u_", "ENH", SMALL, found.lever @ found.spread)
+    values |= _entries("g_t_", "XYZ", SMALL, fit.rotation.T @ found.shift_rates / fit.scale)
+    values |= _entries("g_v_", "ENH", SMALL, found.shift_rates)
+    values |= _entries("g_u_", "ENH", SMALL, found.shift_rates @ found.spread)
     values |= {f"g_z_{name}": float(found.covariance[i, i]) for i, name in enumerate("ENH")}
     return {**values, "g_z_EN": float(found.covariance[0, 1])}

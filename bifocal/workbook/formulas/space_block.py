@@ -14,7 +14,7 @@ from itertools import repeat
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bifocal.survey.space_similarity import SPACE_TURNS, SQUARINGS, SpaceSums
+from bifocal.survey.space_similarity import SPACE_STEPS, SQUARINGS, SpaceSums
 from bifocal.workbook.formulas.placed_formulas import entry
 from photocore.workbook.making.live_book import SheetBuilder
 from photocore.workbook.making.look import LABEL_FONT
@@ -126,7 +126,7 @@ class SpaceBlock:
         rights = (f"SUMPRODUCT(tblGeo[h_{axes[i]}],{world[i]})" for i in _NINE)
         left = self._column("g", [f"{r}-({m})" for r, m in zip(rights, means, strict=True)])
         entries = self._start()
-        for number in range(SPACE_TURNS):
+        for number in range(SPACE_STEPS):
             entries = self._turn(number, entries, reduced, left)
         self.entries = entries
 
@@ -224,7 +224,7 @@ def _values(sums: SpaceSums | None) -> Iterator[ArrayLike | None]:
     longest = int(np.argmax(np.diag(sums.powers[-1])))
     yield from (sums.mixed.T, sums.shift.T, sums.reduced, sums.left, sums.crossed, *sums.powers)
     yield from (sums.powers[-1][:, longest], sums.start, sums.squares / (sums.start @ sums.crossed))
-    for turn in sums.turns[:SPACE_TURNS]:
+    for turn in sums.turns[:SPACE_STEPS]:
         yield from (turn.entries, turn.design, turn.product, turn.normal, turn.inverse)
         yield from (turn.right, turn.step, turn.halfway)
     yield sums.entries

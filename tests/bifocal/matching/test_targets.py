@@ -92,7 +92,7 @@ def test_a_feature_has_a_partner_on_its_line_that_is_alike_and_has_no_rival():
 
     def features(pixels, descriptors):
         return Features(
-            pixels=pixels, size=np.ones(len(pixels)), turn=np.zeros(len(pixels)),
+            pixels=pixels, size=np.ones(len(pixels)), direction=np.zeros(len(pixels)),
             descriptors=descriptors.astype(np.float32), reduction=1.0,
         )  # fmt: skip
 

@@ -149,7 +149,7 @@ def test_a_port_that_leans_by_nothing_is_parallel():
     layers = Layers(**AQUARIUM)
     plain = MediaPath(layers=layers, z0=0.05, distance=1.9)
     turned = MediaPath(
-        layers=layers, z0=0.05, distance=1.9, turn=interface_axes(np.array([0, 0, 1.0]))
+        layers=layers, z0=0.05, distance=1.9, rotation=interface_axes(np.array([0, 0, 1.0]))
     )
     away = POINTS[:, :2]
     for one, other in zip(

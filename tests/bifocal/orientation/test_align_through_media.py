@@ -30,10 +30,10 @@ from bifocal import (
 from bifocal.media import interface_axes, view
 from bifocal.model.orientation_precision import NAMES, from_dict, names_of
 from bifocal.orientation.absolute_orientation import orient_pair
-from bifocal.orientation.orientation_stages import PhotoInput, with_bent_ties
+from bifocal.orientation.orientation_stages import PhotoInput, with_refracted_ties
 from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.tuning import CONTROL
-from bifocal.orientation.walls.bend import WallBend, bend_in_words
+from bifocal.orientation.walls.wall_shape import WallShape, shape_in_words
 from multimedia import Layers
 from tests.builders.commands import bifocal_command as main
 from tests.builders.pinholes import camera_matrix, project, rotation_from_vector
@@ -342,7 +342,7 @@ def test_common_points_say_that_their_bent_rays_meet():
         pixels1=seen[0], pixels2=seen[1], seen1=seen[0], seen2=seen[1], homography=np.eye(3),
         on_plane=np.zeros(160, dtype=bool), tolerance=0.3,
     )  # fmt: skip
-    pair = with_bent_ties(alone, ties)
+    pair = with_refracted_ties(alone, ties)
     used = pair.observations.tie_used
     assert used[12:].all()
     assert used[:12].sum() <= 2  # some lie on their line by chance
@@ -429,7 +429,7 @@ def test_the_derivatives_through_media_are_those_of_the_view(leans):
             layers=Layers(indices=tuple(np.array(layers.indices) + index),
                           thicknesses=(0.01 + glass,)),
             z0=0.05 + z0, distance=float(moved.centre[2]),
-            turn=turn if turn is None and not change[5:].any()
+            rotation=turn if turn is None and not change[5:].any()
             else (np.eye(3) if turn is None else turn) @ rotation_from_vector(change[5:]),
         )  # fmt: skip
 
@@ -563,11 +563,13 @@ def test_parameters_of_a_covariance_that_are_no_list_are_refused(stated):
 
 
 def test_a_bent_wall_proposes_the_options_for_media():
-    assert "--indices with --port or --depth" in bend_in_words(WallBend(3.0, 0.1), with_lens=False)
-    assert "media are not as given" in bend_in_words(
-        WallBend(3.0, 0.1), with_lens=True, through_media=True
+    assert "--indices with --port or --depth" in shape_in_words(
+        WallShape(3.0, 0.1), with_lens=False
     )
-    assert "may be good" in bend_in_words(WallBend(3.0, 0.1), with_lens=True, left_out=True)
+    assert "media are not as given" in shape_in_words(
+        WallShape(3.0, 0.1), with_lens=True, through_media=True
+    )
+    assert "may be good" in shape_in_words(WallShape(3.0, 0.1), with_lens=True, left_out=True)
 
 
 def test_ports_and_depth_exclude_each_other():

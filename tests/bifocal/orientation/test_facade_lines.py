@@ -7,7 +7,7 @@ import pytest
 from bifocal import Interior, Pinhole, RadialDivision
 from bifocal.orientation.facade_lines import (
     FacadeDirection,
-    facade_turn,
+    facade_rotation,
     lines_of_photos,
 )
 from tests.builders.pinholes import camera_matrix, project, rotation_from_vector
@@ -90,7 +90,7 @@ def test_a_turned_facade_is_turned_first() -> None:
     radial = RadialDivision(0.0, MATRIX[:2, 2], 1500.0)
     true = view(0.8, 0.0, 6.0)
     interior = Interior.from_focal(1500.0, image_size=SIZE, sigma=1e-3, source="test")
-    turn, share = facade_turn(drawn(true, radial), view(0, 0, 0), interior)
+    turn, share = facade_rotation(drawn(true, radial), view(0, 0, 0), interior)
     assert abs(np.rad2deg(turn)) == pytest.approx(6.0, abs=0.2)
     assert share > 0.5
     lines = found((drawn(true, radial),) * 2, (view(0, 0, 0),) * 2, radial)

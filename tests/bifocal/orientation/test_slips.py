@@ -10,10 +10,10 @@ from bifocal.orientation.absolute_orientation import _with_words, orient_pair
 from bifocal.orientation.adjustment.pair_observations import PairObservations
 from bifocal.orientation.alignment import make_alignment
 from bifocal.orientation.approximate_orientation import Given
-from bifocal.orientation.orientation_remarks import hopeless_bend, model_remarks
+from bifocal.orientation.orientation_remarks import hopeless_shape, model_remarks
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.slips import slip_of
-from bifocal.orientation.walls.bend import WallBend
+from bifocal.orientation.walls.wall_shape import WallShape
 from tests.bifocal.orientation.layered_wall import SIZE, camera
 from tests.bifocal.orientation.test_pair_adjustment import POINTS
 from tests.builders.pinholes import project
@@ -179,8 +179,8 @@ def test_a_doubt_comes_first_and_leaves_nothing_called_good() -> None:
     pair = orient_pair(photos(), control=control(), site=SiteMeasures())
     given = Given(photos=photos(), control=control(), site=SiteMeasures())
     told = [
-        _with_words(replace(pair, remarks=(), bend=bend), given, ("Something else.",))
-        for bend in (WallBend(0.1, 0.01), WallBend(3.0, 0.1))
+        _with_words(replace(pair, remarks=(), shape=bend), given, ("Something else.",))
+        for bend in (WallShape(0.1, 0.01), WallShape(3.0, 0.1))
     ]
     fine, bent = (make_alignment(one, photos(), way="control") for one in told)
     assert "relief is good to" in " ".join(fine.words)
@@ -225,8 +225,8 @@ def test_a_distance_is_contradicted_beyond_three_standard_deviations_only() -> N
 def test_a_bend_that_is_not_certain_refuses_nothing() -> None:
     """The refusal was empty then."""
     seen = PairObservations(interiors=(photos()[0].interior, photos()[1].interior))
-    assert not hopeless_bend(seen, WallBend(1.2, 0.6))
-    assert hopeless_bend(seen, WallBend(3.0, 0.6)).startswith("THE MODEL DOES NOT FIT")
+    assert not hopeless_shape(seen, WallShape(1.2, 0.6))
+    assert hopeless_shape(seen, WallShape(3.0, 0.6)).startswith("THE MODEL DOES NOT FIT")
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,13 @@ from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import make_alignment
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.starts.relative_orientation import Ties, supported
-from bifocal.orientation.walls.bend import WallBend, bend_in_words, bend_of_wall, wall_bend
 from bifocal.orientation.walls.reference_plane import narrow_face
+from bifocal.orientation.walls.wall_shape import (
+    WallShape,
+    shape_in_words,
+    shape_of_wall,
+    wall_shape,
+)
 from tests.bifocal.orientation.layered_wall import SIZE as WALL_SIZE
 from tests.bifocal.orientation.layered_wall import camera as wall_camera
 from tests.bifocal.orientation.layered_wall import take
@@ -38,24 +43,24 @@ def wall_ties(k: float, *, seed: int = 1, relief: float = 0.3) -> tuple[np.ndarr
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_flat_wall_is_not_bent_and_a_distorted_one_is(seed: int) -> None:
-    assert wall_bend(*wall_ties(0.0, seed=seed), SIZE)[0].px < 0.1
-    bent = wall_bend(*wall_ties(-0.15, seed=seed), SIZE)[0]
+    assert wall_shape(*wall_ties(0.0, seed=seed), SIZE)[0].px < 0.1
+    bent = wall_shape(*wall_ties(-0.15, seed=seed), SIZE)[0]
     assert bent.is_certain
     assert bent.sigma < 0.1 * bent.px
-    assert "calibrate" in bend_in_words(bent, with_lens=False)
-    assert "glass or water" in bend_in_words(bent, with_lens=True)
+    assert "calibrate" in shape_in_words(bent, with_lens=False)
+    assert "glass or water" in shape_in_words(bent, with_lens=True)
 
 
 @pytest.mark.parametrize(("px", "sigma"), [(0.1, 0.0), (0.23, 0.02), (np.nan, np.nan)])
 def test_a_bend_no_greater_than_its_own_uncertainty_is_not_told(px: float, sigma: float) -> None:
-    assert bend_in_words(WallBend(px, sigma), with_lens=False) == ""
-    assert bend_in_words(WallBend(px + 0.2, sigma), with_lens=False) != "" or np.isnan(px)
+    assert shape_in_words(WallShape(px, sigma), with_lens=False) == ""
+    assert shape_in_words(WallShape(px + 0.2, sigma), with_lens=False) != "" or np.isnan(px)
 
 
 def test_the_bend_counts_at_one_size_of_photo() -> None:
     first, second = wall_ties(-0.15)
-    half = wall_bend(first / 2 - 0.25, second / 2 - 0.25, (SIZE[0] // 2, SIZE[1] // 2))[0]
-    assert half.px == pytest.approx(wall_bend(first, second, SIZE)[0].px, rel=0.15)
+    half = wall_shape(first / 2 - 0.25, second / 2 - 0.25, (SIZE[0] // 2, SIZE[1] // 2))[0]
+    assert half.px == pytest.approx(wall_shape(first, second, SIZE)[0].px, rel=0.15)
 
 
 def seen_in_both(heights: Callable[[np.ndarray], np.ndarray], *, seed: int = 2, k: float = 0.0):
@@ -73,8 +78,8 @@ def test_relief_before_the_wall_does_not_bend_it() -> None:
     """Mouldings that stand out more towards top and bottom read as a bend of all ties."""
     moulded = np.random.default_rng(2).random(3000) < 0.8
     x1, x2, height = seen_in_both(lambda at: np.where(moulded, 0.03 * np.abs(at[:, 1]), 0.0))
-    assert wall_bend(x1, x2, SIZE)[0].is_certain
-    assert not bend_of_wall(x1, x2, SIZE, height).is_certain
+    assert wall_shape(x1, x2, SIZE)[0].is_certain
+    assert not shape_of_wall(x1, x2, SIZE, height).is_certain
 
 
 @pytest.mark.parametrize("seed", range(10, 13))
@@ -82,16 +87,16 @@ def test_two_parallel_faces_are_no_bent_wall(seed: int) -> None:
     # Piers on both sides, 15 cm before the wall between them: all ties bend by 2.5 px.
     piers = lambda at: np.where(np.abs(at[:, 0]) > 2.5, 0.15, 0.0)  # noqa: E731
     x1, x2, height = seen_in_both(piers, seed=seed)
-    assert wall_bend(x1, x2, SIZE)[0].px > 1.0
+    assert wall_shape(x1, x2, SIZE)[0].px > 1.0
     for plane in (0.0, 0.01):  # that of the wall, and one between the faces
-        assert bend_of_wall(x1, x2, SIZE, height - plane).px < 0.1
+        assert shape_of_wall(x1, x2, SIZE, height - plane).px < 0.1
 
 
 @pytest.mark.parametrize("seed", range(10, 13))
 def test_a_bent_wall_behind_another_face_is_told(seed: int) -> None:
     faced = lambda at: np.where(np.floor(1.1 * at[:, 0]) % 3 == 0, 0.13, 0.0)  # noqa: E731
     x1, x2, height = seen_in_both(faced, seed=seed, k=-0.02)
-    assert bend_of_wall(x1, x2, SIZE, height).is_certain
+    assert shape_of_wall(x1, x2, SIZE, height).is_certain
 
 
 def bent_pair(k: tuple[float, float], way: str, seed: int, monkeypatch: pytest.MonkeyPatch):
@@ -231,7 +236,9 @@ def test_one_detail_in_two_orientations_is_no_rival_of_itself() -> None:
 
     def features(places: np.ndarray, descriptors: np.ndarray) -> Features:
         ones = np.ones(len(places))
-        return Features(pixels=places, size=ones, turn=ones, descriptors=descriptors, reduction=1.0)
+        return Features(
+            pixels=places, size=ones, direction=ones, descriptors=descriptors, reduction=1.0
+        )
 
     # Each twice: another orientation of the same place has nearly the same descriptor.
     twice = features(

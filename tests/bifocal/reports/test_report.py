@@ -16,7 +16,7 @@ from click.testing import CliRunner
 
 from bifocal import SAMPLE, Grid
 from bifocal.model.geotiff import create_raster
-from bifocal.orientation.walls.bend import WallBend, bend_in_words
+from bifocal.orientation.walls.wall_shape import WallShape, shape_in_words
 from bifocal.remarks import in_language, remark
 from bifocal.reports.accuracy import accuracy_blocks
 from bifocal.reports.content import read_content
@@ -209,10 +209,10 @@ def test_without_check_points_the_figure_is_called_optimistic(tables, tmp_path):
 @pytest.mark.parametrize("language", ["it", "de"])
 def test_no_english_is_left_in_a_report_full_of_remarks(tables, tmp_path, language):
     pair = json.loads(PAIR.read_text(encoding="utf-8"))
-    bent = WallBend(px=0.8, sigma=0.1)
+    bent = WallShape(px=0.8, sigma=0.1)
     values = {"share": 2.0, "size": 20.0, "number": 1, "count": 6, "name": "C7", "sigmas": 5.0}
     keys = ("no_tape", "few_control", "gross_control", "lines_off_wall", "no_wall")
-    doubts = [bend_in_words(bent, with_lens=True)]
+    doubts = [shape_in_words(bent, with_lens=True)]
     doubts += [remark(f"orientation.{key}", **values) for key in keys]
     lens = remark("orientation.normal_lens")
     assumed = [remark("orientation.assumed_focal", number=1, source=lens)]

@@ -15,7 +15,7 @@ def table(z):
     columns = {"X": np.zeros(n), "Y": np.ones(n), "Z": np.array(z, dtype=float)}
     return ReliefTable(
         ids=tuple(f"P{i}" for i in range(n)), columns=columns, flags=("OK",) * n,
-        standardised=np.zeros(n), carried={}, image_scale=500.0,
+        standardised=np.zeros(n), formula_cells={}, image_scale=500.0,
     )  # fmt: skip
 
 

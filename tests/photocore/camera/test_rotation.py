@@ -7,7 +7,7 @@ import pytest
 
 from photocore.camera.rotation import (
     angles_from_rotation,
-    by_turn,
+    by_rotation,
     nearest_rotation,
     rotation_from_vector,
     rotation_vector_from_angle_rates,
@@ -70,6 +70,6 @@ def test_the_derivative_by_a_turn_is_the_change_of_a_row_times_the_turned_arm():
     rng = np.random.default_rng(8)
     rows, arms, turn = rng.normal(size=(4, 2, 3)), rng.normal(size=(4, 3)), rng.normal(size=3)
     wanted = np.einsum("nmi,ni->nm", rows, np.cross(turn, arms))
-    np.testing.assert_allclose(by_turn(rows, arms) @ turn, wanted, atol=40 * EPS)
+    np.testing.assert_allclose(by_rotation(rows, arms) @ turn, wanted, atol=40 * EPS)
     np.testing.assert_allclose(skew(turn) @ arms[0], np.cross(turn, arms[0]), atol=8 * EPS)
     np.testing.assert_allclose((skew(arms) @ turn), np.cross(arms, turn), atol=8 * EPS)

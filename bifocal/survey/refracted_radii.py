@@ -10,7 +10,7 @@ from bifocal.media import MediaPath, ObjectRays
 from bifocal.model.intersection import PlanePicks
 from bifocal.model.photo import Photo
 from bifocal.rays import seen_distance
-from bifocal.survey.radii import BentRays, Radii
+from bifocal.survey.radii import Radii, RefractedRays
 from photocore.arrays import FloatArray
 
 
@@ -23,7 +23,7 @@ def scale_ratio(first: Photo, second: Photo) -> float:
     return of_second / (seen_distance(first.foot) / (first.principal_distance or first.distance))
 
 
-def bent_radii(
+def refracted_radii(
     radii: Radii, photos: tuple[Photo, Photo], measured: tuple[FloatArray, FloatArray], sigma: float
 ) -> Radii:
     """Return radial distances on the photos of an ideal pair as media bend their rays.
@@ -59,7 +59,7 @@ def bent_radii(
         tangent = own * per_mm
         path = photo.media
         assert isinstance(path, MediaPath)
-        way = path.radial_ways(tangent)
+        way = path.radial_rays(tangent)
         s.append(tangent * way.arm * to_mm)
         t.append(tangent * way.bend * to_mm)
         ways.append((way.pace * per_mm * to_mm, way.turn * per_mm * to_mm))
@@ -68,7 +68,7 @@ def bent_radii(
     lost = np.isnan(s[0]) | np.isnan(s[1])
     s1, s2, t1, t2 = (np.where(lost, np.nan, values) for values in (*s, *t))
     ds, den = s2 - s1, t2 - t1
-    highest = min(p.distance - p.media.depth for p in photos if p.media is not None)
+    highest = min(p.distance - p.media.last_interface for p in photos if p.media is not None)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where((s1 > 0) & (den != 0), ds / den, np.nan)
         r = np.where(ratio <= highest, ratio, np.nan)
@@ -96,8 +96,8 @@ def bent_radii(
         own2=s2,
         sigma_r=np.sqrt(v1 + v2),
         covariance=np.moveaxis(np.array(rows), 2, 0),
-        carried=carried,
-        bent=BentRays(ds, den, r, t1 * r, t2 * r, place),
+        formula_cells=carried,
+        bent=RefractedRays(ds, den, r, t1 * r, t2 * r, place),
     )
 
 
@@ -112,7 +112,7 @@ def met_rays(
     own: tuple[FloatArray, FloatArray],
     to_mm: float,
     solved: FloatArray,
-) -> BentRays:
+) -> RefractedRays:
     """Return what Eq. (6) becomes for rays through media; NaN where the relief solved is.
 
     ``feet`` and ``own`` are where they meet the plane, from one point and from each nadir. [mm]
@@ -127,10 +127,10 @@ def met_rays(
         foot + ray.slope * (to_mm * relief)[:, None] for foot, ray in zip(own, rays, strict=True)
     ]
     e1, e2 = (length(foot) - length(place) for foot, place in zip(own, places, strict=True))
-    return BentRays(ds, den, relief, np.asarray(e1), np.asarray(e2), places[0])
+    return RefractedRays(ds, den, relief, np.asarray(e1), np.asarray(e2), places[0])
 
 
-def carried_rays(
+def ray_columns(
     picks: tuple[PlanePicks, PlanePicks],
     places: list[ObjectRays],
     fitted: list[ObjectRays],
@@ -160,8 +160,8 @@ def carried_rays(
     for image, (pick, place, moved) in enumerate(both, start=1):
         tangent = (pick.positions - pick.foot.nadir) / pick.foot.distance
         media = pick.foot.media
-        if media is not None and media.turn is None:
-            way = media.radial_ways(length(tangent))
+        if media is not None and media.rotation is None:
+            way = media.radial_rays(length(tangent))
             columns |= {f"arm{image}": way.arm, f"bend{image}": way.bend}
         with np.errstate(divide="ignore", invalid="ignore"):
             gain = np.where((q != 0)[:, None], (moved.slope - place.slope) / q[:, None], 0.0)

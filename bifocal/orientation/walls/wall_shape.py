@@ -11,11 +11,11 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from bifocal.model.doubts import MOST_BENT, bend_is_certain
+from bifocal.model.doubts import MOST_BENT, shape_is_certain
 from bifocal.model.homography import apply_homography
+from bifocal.orientation.adjustment.observed_points import views_of
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.orientation.adjustment.pair_observations import PairUnknowns
-from bifocal.orientation.adjustment.seen_points import views_of
 from bifocal.orientation.tuning import BEND, WALLS
 from bifocal.orientation.walls.reference_plane import faces
 from bifocal.remarks import remark
@@ -24,7 +24,7 @@ from photocore.camera.pinhole import project
 from photocore.errors import GeometryError
 
 
-class WallBend(NamedTuple):
+class WallShape(NamedTuple):
     """How far a wall is from a plane between the photos, and its standard deviation.
 
     Attributes
@@ -39,12 +39,12 @@ class WallBend(NamedTuple):
     @property
     def is_certain(self) -> bool:
         """Whether the model does not fit, beyond what the wall's own unevenness explains."""
-        return bend_is_certain(self.px, self.sigma)
+        return shape_is_certain(self.px, self.sigma)
 
 
-def wall_bend(
+def wall_shape(
     pixels1: FloatArray, pixels2: FloatArray, size: tuple[int, int], face: BoolArray | None = None
-) -> tuple[WallBend, float]:
+) -> tuple[WallShape, float]:
     """Return how far the wall between two photos is from a plane, and how many ties say so.
 
     Parameters
@@ -58,7 +58,7 @@ def wall_bend(
 
     Returns
     -------
-    bend : WallBend
+    bend : WallShape
         Root mean square distance of ``x2 = H (x1 (1 + k rho²))`` from its best homography; NaN with
         fewer than 30 ties.
     held : float
@@ -74,13 +74,13 @@ def wall_bend(
     unit = max(size) / 3000.0
     asked = np.flatnonzero(np.ones(len(pixels1), dtype=bool) if face is None else face)
     if len(asked) < 30:
-        return WallBend(), 0.0
+        return WallShape(), 0.0
     some = asked[np.linspace(0, len(asked) - 1, min(len(asked), BEND.ties)).astype(int)]
     middle, half = (np.array(size) - 1) / 2.0, float(np.hypot(*size)) / 2
     everywhere = (pixels1 - middle) / half
     x1, x2 = everywhere[some], pixels2[some]
     square = (x1**2).sum(axis=1)
-    held, answer = -1.0, WallBend()
+    held, answer = -1.0, WallShape()
     for start in (0.0, -0.06, -0.03, 0.03, 0.06) if face is None else (0.0,):
         bent = x1 * (1.0 + start * square[:, None])
         for width in (1.5, 6.0):
@@ -97,29 +97,29 @@ def wall_bend(
             flat, _ = cv2.findHomography(everywhere, seen, 0)
             apart = np.linalg.norm(seen - apply_homography(flat, everywhere), axis=1)
             by_k = float(np.sqrt((apart**2).mean())) / unit / BEND.small
-            answer = WallBend(abs(k) * by_k, sigma * by_k)
+            answer = WallShape(abs(k) * by_k, sigma * by_k)
     return answer, held * len(asked) / len(some)
 
 
-def bend_of_wall(
+def shape_of_wall(
     pixels1: FloatArray, pixels2: FloatArray, size: tuple[int, int], height: FloatArray
-) -> WallBend:
+) -> WallShape:
     """Return how far the wall is from a plane, as far as the ties of one face tell.
 
     Parameters
     ----------
     pixels1, pixels2, size
-        As of `wall_bend`.
+        As of `wall_shape`.
     height : ndarray, shape (n,)
         Of the ties over the reference plane, as a share of the far distance; NaN where unknown.
 
     Returns
     -------
-    WallBend
+    WallShape
         That of the fullest face parallel to the reference plane, if it holds as many ties as a
         bent surface through all of them: two faces look like one bent wall. Else of all ties.
     """
-    whole, held = wall_bend(pixels1, pixels2, size)
+    whole, held = wall_shape(pixels1, pixels2, size)
     known = np.flatnonzero(np.isfinite(height))
     known = known[:: len(known) // BEND.ties + 1]
     found = faces(height[known], pixels1[known], band=WALLS.face_band)[: BEND.most_faces]
@@ -127,7 +127,7 @@ def bend_of_wall(
         np.abs(height - offset) < BEND.band for offset in (0.0, *(face.offset for face in found))
     ]
     own = [
-        wall_bend(pixels1, pixels2, size, face)
+        wall_shape(pixels1, pixels2, size, face)
         for face in near
         if face.sum() >= BEND.fewest_on_face
     ]
@@ -135,10 +135,10 @@ def bend_of_wall(
     return bend if most >= BEND.face_holds * held else whole
 
 
-def bend_between(
+def shape_between(
     state: PairUnknowns, pixels1: FloatArray, pixels2: FloatArray, used: BoolArray,
     size: tuple[int, int],
-) -> WallBend:  # fmt: skip
+) -> WallShape:  # fmt: skip
     """Return how far the wall is from a plane between photos, freed of refraction where it is.
 
     Parameters
@@ -154,8 +154,8 @@ def bend_between(
 
     Returns
     -------
-    WallBend
-        As of `bend_of_wall`; NaN too where it is no more than cameras and media, as uncertain as
+    WallShape
+        As of `shape_of_wall`; NaN too where it is no more than cameras and media, as uncertain as
         they are, leave open. [px, at 3000 px of width]
     """
     height = state.media.meeting(state.cameras, pixels1, pixels2)[:, 2] / state.cameras[0].centre[2]
@@ -163,10 +163,10 @@ def bend_between(
     if state.media:
         used = used & np.isfinite(np.hstack([flat1, flat2])).all(axis=1)
     if used.sum() < 30:
-        return WallBend()
-    bend = bend_of_wall(flat1[used], flat2[used], size, height[used])
+        return WallShape()
+    bend = shape_of_wall(flat1[used], flat2[used], size, height[used])
     if isinstance(state, AdjustedPair) and state.media:
-        return bend if bend.px > BEND.beyond * _open(state, size) else WallBend()
+        return bend if bend.px > BEND.beyond * _open(state, size) else WallShape()
     return bend
 
 
@@ -246,14 +246,14 @@ def _fitted(
     return matrix, k, float(np.linalg.norm(apart @ of_k)), float(weight.sum())
 
 
-def bend_in_words(
-    bend: WallBend, *, with_lens: bool, through_media: bool = False, left_out: bool = False
+def shape_in_words(
+    bend: WallShape, *, with_lens: bool, through_media: bool = False, left_out: bool = False
 ) -> str:
     """Return the warning that the model does not fit; empty if the wall is flat enough.
 
     Parameters
     ----------
-    bend : WallBend
+    bend : WallShape
     with_lens : bool
         Whether the lens was calibrated, or estimated from the photos.
     through_media : bool
@@ -265,7 +265,7 @@ def bend_in_words(
         return ""
     lens = "lens_known" if with_lens else "certain_lens"
     reason = remark(f"orientation.reason_{'media' if through_media else lens}")
-    if bend.px <= BEND.strongly_bent:
+    if bend.px <= BEND.strongly_curved:
         reason = remark("orientation.reason_probably", reason=reason)
     return remark(
         "orientation.bent", px=bend.px, sigma=bend.sigma, most=MOST_BENT, reason=reason,
