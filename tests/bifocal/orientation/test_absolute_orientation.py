@@ -5,10 +5,9 @@ import numpy as np
 import pytest
 
 from bifocal import Control, GeometryError, Interior, SiteMeasures
-from bifocal.orientation.absolute_orientation import orient_pair
-from bifocal.orientation.orientation_stages import PhotoInput
 from photocore.camera.pinhole import triangulate
 from tests.bifocal.orientation.layered_wall import BOARDS, SIZE, camera, photograph, relief_at, take
+from tests.builders.orientation import PhotoInput, orient_pair
 from tests.builders.pinholes import project
 
 FAR = camera(16.0, turn_deg=(0.3, -0.2, 0.15), shift=(5.0, -4.0))

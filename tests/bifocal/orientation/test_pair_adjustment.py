@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from bifocal import Control, GeometryError, InputError, Interior, SiteMeasures
-from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.adjustment.pair_adjustment import adjust, line_test, pair_equations
 from bifocal.orientation.adjustment.pair_observations import (
     NAMES,
@@ -17,12 +16,12 @@ from bifocal.orientation.adjustment.pair_observations import (
 )
 from bifocal.orientation.approximate_orientation import plausible_focals
 from bifocal.orientation.facade_lines import FacadeDirection, contradiction_in_words
-from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.starts.space_resection import resect
 from bifocal.orientation.tie_points import with_wall
 from bifocal.orientation.walls.reference_plane import NarrowFace
 from tests.bifocal.orientation.layered_wall import SIZE, camera
+from tests.builders.orientation import PhotoInput, orient_pair
 from tests.builders.pinholes import project
 
 FAR = camera(16.0, offset=(0.4, -0.2), turn_deg=(8.0, -20.0, 1.0), shift=(4.0, -3.0))

@@ -13,15 +13,14 @@ import pytest
 
 from bifocal import Control, GeometryError, Interior, SiteMeasures
 from bifocal.collimation.job_tasks import task_of
-from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.align_workflow import AlignOptions, KnownLens, _way, align_photos
 from bifocal.orientation.approximate_orientation import Given, order_of
-from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.starts.photo_order import first_is_far
 from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.tuning import ORDER
 from photocore.camera.pinhole import plane_transfer
 from tests.bifocal.orientation.layered_wall import SIZE, camera, relief_at, take
+from tests.builders.orientation import PhotoInput, orient_pair
 from tests.builders.pinholes import project
 from tests.page_session import opened, sample_folder
 

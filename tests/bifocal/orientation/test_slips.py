@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from bifocal import Control, GeometryError, Interior, SiteMeasures
-from bifocal.orientation.absolute_orientation import _with_words, orient_pair
+from bifocal.orientation.absolute_orientation import _with_words
 from bifocal.orientation.adjustment.pair_observations import PairObservations
 from bifocal.orientation.alignment import make_alignment
 from bifocal.orientation.approximate_orientation import Given
 from bifocal.orientation.orientation_remarks import hopeless_shape, model_remarks
-from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.slips import slip_of
 from bifocal.orientation.walls.wall_shape import WallShape
 from tests.bifocal.orientation.layered_wall import SIZE, camera
 from tests.bifocal.orientation.test_pair_adjustment import POINTS
+from tests.builders.orientation import PhotoInput, orient_pair
 from tests.builders.pinholes import project
 
 #: Turned to the wall, and square to it.

@@ -8,9 +8,7 @@ import pytest
 
 from bifocal import Control, GeometryError, Interior, Pair, Pinhole, RadialDivision, SiteMeasures
 from bifocal.matching.features import Features, match_features
-from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import make_alignment
-from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.starts.relative_orientation import Ties, supported
 from bifocal.orientation.walls.reference_plane import narrow_face
 from bifocal.orientation.walls.wall_shape import (
@@ -22,6 +20,7 @@ from bifocal.orientation.walls.wall_shape import (
 from tests.bifocal.orientation.layered_wall import SIZE as WALL_SIZE
 from tests.bifocal.orientation.layered_wall import camera as wall_camera
 from tests.bifocal.orientation.layered_wall import take
+from tests.builders.orientation import PhotoInput, orient_pair
 from tests.scenes import SetupErrors, bifocal_cameras
 
 SIZE = (3072, 2048)
