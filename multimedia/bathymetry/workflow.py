@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -128,14 +129,11 @@ def _corrector(
     job: Job, cloud: Cloud, surface: WaterSurface
 ) -> tuple[Callable[[CloudPiece], CorrectedPoints], list[str]]:
     """Return the function that corrects one piece of a cloud, and what the user should know."""
-    corrected = partial(
-        correct_bathymetry, water_level=surface, index=job.index, precision=job.precision
-    )
+    water: dict[str, Any] = {"water_level": surface, "refractive_index": job.index}
+    corrected = partial(correct_bathymetry, **water, precision=job.precision)
     if job.beams:
         sensor = _sensor_positions(job, cloud)
-        beams = partial(
-            correct_lidar_beams, water_level=surface, index=job.index, group_index=job.group_index
-        )
+        beams = partial(correct_lidar_beams, **water, group_index=job.group_index)
         return lambda piece: beams(sensor(piece), piece.xyz), []
     if job.cameras is None:
         return lambda piece: corrected(piece.xyz), []
@@ -304,7 +302,7 @@ def _correct_window(
         result = correct_bathymetry(
             points,
             water_level=surface,
-            index=job.index,
+            refractive_index=job.index,
             cameras=centres,
             max_angle=None if centres is None else job.max_angle,
             precision=job.precision,
@@ -353,7 +351,7 @@ def _correct_rays(job: Job) -> Outcome:
         table.origins,
         table.directions,
         water_level=surface,
-        index=job.index,
+        refractive_index=job.index,
         sigma_direction=job.sigma_direction,
     )
     outcome = Outcome()
