@@ -129,7 +129,7 @@ def correct_bathymetry(
         xyz=result[0].reshape(xyz.shape),
         depth=result[1].reshape(shape),
         status=result[2].reshape(shape),
-        covariance=result[3].reshape(*shape, 3, 3) if precision.is_given else None,
+        covariance=result[3].reshape(*shape, 3, 3) if precision != Precision() else None,
     )
 
 
@@ -165,7 +165,7 @@ def _correct_block(
         points, ok, weak = _solve(task, xyz[rows])
         xyz[rows[~weak]] = np.where(ok[~weak, None], points[~weak], np.nan)
         status[rows[~weak]] = np.where(ok[~weak], BathymetryStatus.RAYS, BathymetryStatus.FAILED)
-        if precision.is_given:
+        if precision != Precision():
             good = np.flatnonzero(ok & ~weak)
             covariance[rows[good]] = _propagate(task.take(good), points[good], precision)
     depth = np.maximum(surface.height_at(xyz[:, :2]) - xyz[:, 2], 0.0)

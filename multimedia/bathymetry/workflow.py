@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from multimedia.bathymetry.corrected_points import (
     CorrectedPoints,
+    Precision,
     WaterSurface,
     checked_water_index,
     status_labels,
@@ -97,7 +97,7 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
     surface = read_water_surface(job.water_level, waves=job.waves)
     correct, remarks = _corrector(job, cloud, surface)
     outcome = Outcome(remarks=[*cloud.remarks, *remarks])
-    is_precise = job.precision.is_given and not job.beams
+    is_precise = job.precision != Precision() and not job.beams
     gained = {
         name: kind for name, kind in _GAINED.items() if is_precise or not name.startswith("sigma")
     }
@@ -129,12 +129,15 @@ def _corrector(
     job: Job, cloud: Cloud, surface: WaterSurface
 ) -> tuple[Callable[[CloudPiece], CorrectedPoints], list[str]]:
     """Return the function that corrects one piece of a cloud, and what the user should know."""
-    water: dict[str, Any] = {"water_level": surface, "refractive_index": job.index}
-    corrected = partial(correct_bathymetry, **water, precision=job.precision)
+    corrected = partial(
+        correct_bathymetry, water_level=surface, refractive_index=job.index, precision=job.precision
+    )
     if job.beams:
         sensor = _sensor_positions(job, cloud)
-        beams = partial(correct_lidar_beams, **water, group_index=job.group_index)
-        return lambda piece: beams(sensor(piece), piece.xyz), []
+        beams = partial(
+            correct_lidar_beams, refractive_index=job.index, group_index=job.group_index
+        )
+        return lambda piece: beams(sensor(piece), piece.xyz, water_level=surface), []
     if job.cameras is None:
         return lambda piece: corrected(piece.xyz), []
     remarks = []
@@ -268,7 +271,7 @@ def _correct_dem(job: Job, progress: Progress) -> Outcome:
                 )
         level = " ".join((job.water_level, *job.waves))
         tags = {"REFRACTION_INDEX": f"{job.index:g}", "REFRACTION_WATER_LEVEL": level}
-        bands = ("height", "sigma") if job.precision.is_given else ("height",)
+        bands = ("height", "sigma") if job.precision != Precision() else ("height",)
         windows = list(dem.windows(WINDOW))
         with dem.copy(job.target, bands=bands, tags=tags, overwrite=job.overwrite) as write:
             margin = 0  # widened when a window needs more, and kept for the next
