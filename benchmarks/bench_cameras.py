@@ -41,7 +41,7 @@ RNG = np.random.default_rng(20240601)
 LAYERS = Layers(indices=(1.0, 1.5, 1.34), thicknesses=(10.0,))
 # OpenPTV measures the glass from the origin, which must lie in the water: Z = 0 is 250 mm down.
 WALL = FlatInterface(layers=LAYERS, point=(0, 0, 250.0))
-SENSOR = Sensor(width=4000, height=4000, pitch=np.full(2, 0.012), origin=np.full(2, 2000.0))
+SENSOR = Sensor(width=4000, height=4000, pixel_size=np.full(2, 0.012), origin=np.full(2, 2000.0))
 EYES = ((0.1, 0.0, 750.0), (300, 30, 700), (-300, -20, 700), (10, 310, 700))
 CAMERAS = [
     replace(

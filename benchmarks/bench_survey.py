@@ -39,7 +39,7 @@ def write_workbook(path, rows):
     from bifocal.survey.observations import PointObservations
     from bifocal.workbook.template_workflow import write_survey
 
-    pair = Pair.ideal(d1=D1, d2=D2, c1=C1, c2=C2, pitch=0.004)
+    pair = Pair.ideal(d1=D1, d2=D2, c1=C1, c2=C2, pixel_size=0.004)
     pixels1, pixels2 = pair.project(truth(rows))
     ids = tuple(f"P{i}" for i in range(rows))
     points = PointObservations(ids=ids, pixels1=pixels1, pixels2=pixels2)

@@ -148,7 +148,7 @@ def _boards(folder: Path) -> None:
         cv2.imwrite(str(photos[-1]), image)
     camera = Camera(
         centre=np.zeros(3), rotation=np.eye(3), principal_distance=2.85, name="cam1",
-        sensor=Sensor(width=eye.width, height=eye.height, pitch=np.array([0.008, 0.008])),
+        sensor=Sensor(width=eye.width, height=eye.height, pixel_size=np.array([0.008, 0.008])),
     )  # fmt: skip
     port = FlatInterface(
         layers=Layers(indices=(1.0, 1.5, 1.337), thicknesses=(8.0,)), point=(0, 0, -46.0),

@@ -114,7 +114,7 @@ class Pair:
         d2: float,
         c1: float | None = None,
         c2: float | None = None,
-        pitch: float | None = None,
+        pixel_size: float | None = None,
         nadir1: ArrayLike = (0.0, 0.0),
         nadir2: ArrayLike = (0.0, 0.0),
         sigma: float | None = None,
@@ -127,13 +127,13 @@ class Pair:
             Distances of the projection centres to the reference plane. [m]
         c1, c2 : float, optional
             Principal distances; without both, image millimetres count as metres on the wall. [mm]
-        pitch : float, optional
+        pixel_size : float, optional
             Size of a pixel. Without it, image coordinates are millimetres from the nadir point,
             y up; with it they are pixels (column, row). [mm/px]
         nadir1, nadir2 : array_like, shape (2,)
-            (column, row) of the nadir points; used with ``pitch``. [px]
+            (column, row) of the nadir points; used with ``pixel_size``. [px]
         sigma : float, optional
-            Measuring precision of an image coordinate. [px, or mm without ``pitch``]
+            Measuring precision of an image coordinate. [px, or mm without ``pixel_size``]
 
         Raises
         ------
@@ -162,8 +162,8 @@ class Pair:
             positive(d, f"d{image}", unit="m")
             metres = 1.0 if c is None else d / positive(c, f"c{image}", unit="mm")
             matrix = np.diag([metres, metres, 1.0])
-            if pitch is not None:
-                scale = metres * positive(pitch, "pitch", unit="mm")
+            if pixel_size is not None:
+                scale = metres * positive(pixel_size, "pixel_size", unit="mm")
                 column, row = as_points(nadir, f"nadir{image}", dimension=2)
                 matrix = np.array(
                     [[scale, 0, -scale * column], [0, -scale, scale * row], [0, 0, 1]]
@@ -175,7 +175,7 @@ class Pair:
                     distance=d,
                     sigma_pixel=sigma,
                     principal_distance=c,
-                    pixel_size=pitch,
+                    pixel_size=pixel_size,
                 )
             )
         return cls(image1=photos[0], image2=photos[1])

@@ -182,7 +182,7 @@ def planned_pair(
     sigma_px: float,
 ) -> Pair:  # fmt: skip
     """Return the planned pair, square to the wall, its pixels counted from the middle."""
-    pair = Pair.ideal(d1=d[0], d2=d[1], c1=c[0], c2=c[1], pitch=pitch, sigma=sigma_px)
+    pair = Pair.ideal(d1=d[0], d2=d[1], c1=c[0], c2=c[1], pixel_size=pitch, sigma=sigma_px)
     if not media:
         return pair
     square_on = np.diag([1.0, -1.0, -1.0])

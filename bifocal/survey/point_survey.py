@@ -41,7 +41,7 @@ def solve_points(
     ----------
     pair : Pair
         Any pair for raw pixels; for image coordinates and radial distances an ideal one, whose
-        image coordinates are millimetres (`bifocal.Pair.ideal` without ``pitch``).
+        image coordinates are millimetres (`bifocal.Pair.ideal` without ``pixel_size``).
     points : PointObservations
         With ``pixels1, pixels2``, or else with ``xy1, xy2`` or ``polar`` in millimetres.
     sigma_px : float, optional

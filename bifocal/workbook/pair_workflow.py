@@ -176,8 +176,8 @@ def _ideal(setup: SurveySetup, folder: Path) -> Pair:
             remarks.append(remark("survey.nadir_assumed", number=number))
         nadirs.append(nadir)
     pair = Pair.ideal(
-        d1=taking.d1 or np.nan, d2=taking.d2 or np.nan, c1=taking.c1, c2=taking.c2, pitch=pitch,
-        nadir1=nadirs[0], nadir2=nadirs[1], sigma=setup.precision / pitch,
+        d1=taking.d1 or np.nan, d2=taking.d2 or np.nan, c1=taking.c1, c2=taking.c2,
+        pixel_size=pitch, nadir1=nadirs[0], nadir2=nadirs[1], sigma=setup.precision / pitch,
     )  # fmt: skip
     photos = [
         replace(photo, file=name, image_size=size, plane_from_pixel=_corrected(photo, matrix))

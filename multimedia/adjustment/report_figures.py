@@ -39,7 +39,7 @@ def vector_zoom(result: Adjustment) -> float:
 def _reach(result: Adjustment, camera: Camera) -> float:
     """Return the half side of the square that shows a camera's image. [mm]"""
     if camera.sensor is not None:
-        sides = np.array([camera.sensor.width, camera.sensor.height]) * camera.sensor.pitch
+        sides = np.array([camera.sensor.width, camera.sensor.height]) * camera.sensor.pixel_size
         return 0.55 * float(sides.max())
     place = result.project.image_points.image[measured_rows(result, camera)]
     return 1.1 * float(np.abs(place).max(initial=1e-3))

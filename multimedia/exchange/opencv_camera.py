@@ -105,7 +105,7 @@ def camera_of(
         )
     width, height = lens.image_size
     sensor = Sensor(
-        width=width, height=height, pitch=np.array([pitch, pitch * (fx / fy)]),  # type: ignore[arg-type]
+        width=width, height=height, pixel_size=np.array([pitch, pitch * (fx / fy)]),  # type: ignore[arg-type]
     )  # fmt: skip
     turn = nearest_rotation(rotation)
     distortion: Distortion
@@ -166,7 +166,7 @@ def opencv_of(camera: Camera) -> OpencvCamera:
             )
     lens, c = camera.distortion, camera.principal_distance
     matrix = np.eye(3)
-    matrix[[0, 1], [0, 1]] = c / sensor.pitch * [lens.scale, 1.0]
+    matrix[[0, 1], [0, 1]] = c / sensor.pixel_size * [lens.scale, 1.0]
     matrix[:2, 2] = sensor.pixel_from_image(camera.principal_point)
     rotation = FLIP @ camera.rotation.T
     if isinstance(lens, Fisheye):

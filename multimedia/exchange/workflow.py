@@ -53,7 +53,7 @@ def convert(
     target: Path,
     *,
     form: str | None = None,
-    pitch: float = PITCH,
+    pixel_size: float = PITCH,
     unit: str = "m",
     overwrite: bool = False,
 ) -> Conversion:
@@ -68,7 +68,7 @@ def convert(
         .toml for a project file; otherwise ``form`` or the ending tells the format.
     form : str, optional
         One of `FORMATS`; None: by the ending of the target, none being COLMAP's.
-    pitch : float
+    pixel_size : float
         Width of a pixel, which the other programs do not know. [mm]
     unit : str
         Of their lengths, where they do not say.
@@ -98,7 +98,7 @@ def convert(
         raise InputError(
             f"{target}: name the format with --to: {', '.join(FORMATS)}; or end the name in .toml."
         )
-    kind, project = read_any(source, pitch=pitch, unit=unit)
+    kind, project = read_any(source, pitch=pixel_size, unit=unit)
     if wanted == "project":
         write_project(target, project, overwrite=overwrite)
         said: tuple[str, ...] = ()

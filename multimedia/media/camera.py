@@ -46,7 +46,7 @@ class Sensor:
     ----------
     width, height : int
         [px]
-    pitch : ndarray, shape (2,)
+    pixel_size : ndarray, shape (2,)
         Width and height of a pixel. [mm]
     origin : ndarray, shape (2,)
         (column, row) of the origin of the image coordinates, by default the centre of the
@@ -54,14 +54,14 @@ class Sensor:
 
     Examples
     --------
-    >>> sensor = Sensor(width=1280, height=1024, pitch=[0.012, 0.012])
+    >>> sensor = Sensor(width=1280, height=1024, pixel_size=[0.012, 0.012])
     >>> sensor.image_from_pixel([639.5, 500.0]).tolist()
     [0.0, 0.138]
     """
 
     width: int
     height: int
-    pitch: FloatArray
+    pixel_size: FloatArray
     origin: FloatArray = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
@@ -71,29 +71,29 @@ class Sensor:
             if size != round(size):
                 raise InputError(f"sensor {name}: must be a whole number of pixels, got {size:g}.")
             set_(self, name, round(size))
-        pitch = np.broadcast_to(as_floats(self.pitch, "pitch"), (2,))
-        if not (pitch >= SMALLEST_PIXEL).all():
+        sides = np.broadcast_to(as_floats(self.pixel_size, "pitch"), (2,))
+        if not (sides >= SMALLEST_PIXEL).all():
             raise InputError(
-                f"pitch: a pixel is {pitch} mm wide and high; both must be {SMALLEST_PIXEL:g} or "
+                f"pitch: a pixel is {sides} mm wide and high; both must be {SMALLEST_PIXEL:g} or "
                 "more."
             )
         origin = ((self.width - 1) / 2, (self.height - 1) / 2)
-        set_(self, "pitch", read_only(pitch, "pitch", shape=(2,)))
+        set_(self, "pixel_size", read_only(sides, "pitch", shape=(2,)))
         set_(self, "origin", read_only(origin if self.origin is None else self.origin, "origin"))
 
     @property
     def half_diagonal(self) -> float:
         """Distance from the centre to a corner. [mm]"""
-        return float(np.hypot(*(np.array([self.width, self.height]) * self.pitch)) / 2)
+        return float(np.hypot(*(np.array([self.width, self.height]) * self.pixel_size)) / 2)
 
     def image_from_pixel(self, pixels: ArrayLike) -> FloatArray:
         """Return image coordinates of (column, row), shape (..., 2). [mm]"""
         offset = as_points(pixels, "pixels", dimension=2) - self.origin
-        return offset * (self.pitch * (1.0, -1.0))
+        return offset * (self.pixel_size * (1.0, -1.0))
 
     def pixel_from_image(self, image: ArrayLike) -> FloatArray:
         """Return (column, row) of image coordinates, shape (..., 2). [px]"""
-        scaled = as_points(image, "image", dimension=2) / (self.pitch * (1.0, -1.0))
+        scaled = as_points(image, "image", dimension=2) / (self.pixel_size * (1.0, -1.0))
         return scaled + self.origin
 
 

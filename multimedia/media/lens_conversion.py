@@ -100,7 +100,7 @@ def farthest_miss(
 
     ``scale`` multiplies what the camera projects; infinite where a point is not seen.
     """
-    pitch = camera.described_sensor().pitch
+    pitch = camera.described_sensor().pixel_size
     miss = (project(camera, points, media) * scale - image) / pitch
     largest = float(np.linalg.norm(miss, axis=1).max())
     return largest if np.isfinite(largest) else np.inf

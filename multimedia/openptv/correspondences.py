@@ -175,7 +175,7 @@ def _misfits(
     if not len(xyz):
         return np.empty(0)
     squares = np.stack([
-        (((project(c, xyz, m) - i) / s.pitch) ** 2).sum(axis=-1)
+        (((project(c, xyz, m) - i) / s.pixel_size) ** 2).sum(axis=-1)
         for c, m, s, i in zip(cameras, media, sensors, image, strict=True)
     ])  # fmt: skip
     with np.errstate(invalid="ignore"):  # a proposal that no camera sees has no misfit

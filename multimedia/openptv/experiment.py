@@ -137,7 +137,7 @@ def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experi
         media=media,
         media_of=media_of,
         object_points=body,
-        sigma_image=0.5 * float(control.sensor.pitch.mean()),
+        sigma_image=0.5 * float(control.sensor.pixel_size.mean()),
         unit="mm",
         name=folder.resolve().name,
         extra={"source": f"OpenPTV {control_path.name}, {source}" if source else "OpenPTV"},
@@ -212,7 +212,7 @@ def write_experiment(
     assert layers is not None  # a project has at least one camera
     thickness = layers.thicknesses[0] * factor
     lines += ["1", "0", "1", str(sensor.width), str(sensor.height)]
-    lines += [f"{v:.17g}" for v in (*sensor.pitch, 0, *layers.indices, thickness)]
+    lines += [f"{v:.17g}" for v in (*sensor.pixel_size, 0, *layers.indices, thickness)]
     files["parameters/ptv.par"] = "\n".join(lines) + "\n"
     if project.object_points.ids:
         files["cal/calblock.txt"] = "".join(

@@ -82,10 +82,10 @@ def common_sensor(cameras: Sequence[Camera]) -> Sensor:
         shape = np.sqrt(lens.scale**2 - np.sin(lens.shear) ** 2) / np.cos(lens.shear)
         if lens.convention is Convention.PHOTOGRAMMETRIC:
             shape = 1.0 / lens.scale
-        ratios.append(float(sensor.pitch[1] / sensor.pitch[0] * shape))
-    pitch = np.array([first.pitch[0], first.pitch[0] * np.median(ratios)])
+        ratios.append(float(sensor.pixel_size[1] / sensor.pixel_size[0] * shape))
+    pitch = np.array([first.pixel_size[0], first.pixel_size[0] * np.median(ratios)])
     size = np.array([first.width, first.height])
-    return Sensor(width=first.width, height=first.height, pitch=pitch, origin=size / 2)
+    return Sensor(width=first.width, height=first.height, pixel_size=pitch, origin=size / 2)
 
 
 def in_openptvs_terms(
@@ -206,7 +206,7 @@ def glass_vector(camera: Camera, wall: FlatInterface) -> FloatArray:
 def _start(camera: Camera, own: Sensor, sensor: Sensor) -> tuple[Camera, float]:
     """Return the camera with the same coefficients in OpenPTV's terms, and scx."""
     lens = brown_of(camera, "OpenPTV")
-    stretch = float(sensor.pitch[0] / own.pitch[0])
+    stretch = float(sensor.pixel_size[0] / own.pixel_size[0])
     scale = lens.scale * stretch
     turn = float(np.arcsin(np.sin(lens.shear) / lens.scale))
     shift = sensor.image_from_pixel(own.origin) / scale

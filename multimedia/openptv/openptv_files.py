@@ -95,7 +95,10 @@ def read_control(path: Path) -> ControlParameters:
         images=tuple(names[0::2]),
         calibration_images=tuple(names[1::2]),
         sensor=Sensor(
-            width=width, height=height, pitch=np.array(pitch), origin=np.array([width, height]) / 2
+            width=width,
+            height=height,
+            pixel_size=np.array(pitch),
+            origin=np.array([width, height]) / 2,
         ),
         field=int(values[7]),
         indices=tuple(values[8:11]),

@@ -90,7 +90,7 @@ def read_set(crd: Path, fix: Path, *, sensor: Sensor, label: str, source: str) -
         )
     if len(places) < _FEWEST:
         raise InputError(f"{crd}: holds {len(places)} points; expected at least {_FEWEST}.")
-    half = np.array([sensor.width, sensor.height]) * sensor.pitch / 2
+    half = np.array([sensor.width, sensor.height]) * sensor.pixel_size / 2
     in_mm = (places < 0).any() and (np.abs(places) <= 1.01 * half).all()
     image = places if in_mm else sensor.image_from_pixel(places)
     if not (np.abs(image) <= 1.01 * half).all():

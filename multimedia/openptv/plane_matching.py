@@ -239,4 +239,4 @@ def _pixels(camera: Camera, found: Resection) -> float:
 
 
 def _pitch(camera: Camera) -> FloatArray:
-    return camera.described_sensor("matching planes needs its sensor.").pitch
+    return camera.described_sensor("matching planes needs its sensor.").pixel_size

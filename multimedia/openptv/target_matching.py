@@ -59,7 +59,7 @@ def match_targets(
             result = resect(state, control, image, interface)
         except (GeometryError, ConvergenceError, InputError):
             return partner
-        miss = np.linalg.norm(result.residuals[seen] / sensor.pitch, axis=1)
+        miss = np.linalg.norm(result.residuals[seen] / sensor.pixel_size, axis=1)
         state = result.camera
         limit = min(radius, max(LEAST_RADIUS, WIDEST_MISFIT * float(np.median(miss))))
         again = _nearest(state, control, targets, interface, limit)
@@ -102,11 +102,11 @@ def is_chance(
         visible = project(found.camera, control, interface)
     except (GeometryError, ConvergenceError, InputError):
         return True
-    miss = float(np.median(np.linalg.norm(found.residuals / camera.sensor.pitch, axis=1)))
+    miss = float(np.median(np.linalg.norm(found.residuals / camera.sensor.pixel_size, axis=1)))
     radius = max(LEAST_RADIUS, WIDEST_MISFIT * miss)
     apart = float(np.median(cKDTree(targets).query(targets, k=2)[0][:, 1]))
     share = min(1.0, np.pi * radius**2 / apart**2) if apart > 0 else 1.0
-    half = np.array([camera.sensor.width, camera.sensor.height]) * camera.sensor.pitch / 2
+    half = np.array([camera.sensor.width, camera.sensor.height]) * camera.sensor.pixel_size / 2
     inside = (np.abs(visible) <= half).all(axis=1)
     return bool(seen.sum() <= _BEYOND_CHANCE * share * inside.sum())
 

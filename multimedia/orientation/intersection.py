@@ -381,7 +381,7 @@ def _sigmas(
     """Return standard deviations of all image coordinates. [mm]"""
     if sigma is None:
         given = [
-            SIGMA_IMAGE if c.sensor is None else SIGMA_PIXEL * float(c.sensor.pitch.mean())
+            SIGMA_IMAGE if c.sensor is None else SIGMA_PIXEL * float(c.sensor.pixel_size.mean())
             for c in cameras
         ]
         return np.broadcast_to(np.array(given)[:, None, None], shape)

@@ -262,7 +262,7 @@ def _sigmas(table: Table, coordinates: Sequence[str], cameras: Sequence[Camera])
         sigma[:, axis] = table.numbers(key) * factor
         if unit == "px" and key in table.present:
             sigma[:, axis] *= [
-                camera.described_sensor(_IN_PIXELS).pitch[axis] for camera in cameras
+                camera.described_sensor(_IN_PIXELS).pixel_size[axis] for camera in cameras
             ]
     return sigma
 

@@ -250,7 +250,7 @@ def _sigma(data: dict[str, Any], cameras: tuple[Camera, ...]) -> float:
         value = FileSection(data, "project").number("sigma_image")
         del data["sigma_image"]
         return positive(value, "sigma_image", unit="mm")
-    pitches = [camera.sensor.pitch.mean() for camera in cameras if camera.sensor is not None]
+    pitches = [camera.sensor.pixel_size.mean() for camera in cameras if camera.sensor is not None]
     return SIGMA_PIXEL * float(np.mean(pitches)) if pitches else SIGMA_IMAGE
 
 
@@ -409,7 +409,7 @@ def _camera_data(camera: Camera, media: str) -> dict[str, Any]:
         data["sensor"] = {
             "width": camera.sensor.width,
             "height": camera.sensor.height,
-            "pitch": camera.sensor.pitch.tolist(),
+            "pitch": camera.sensor.pixel_size.tolist(),
             "origin": camera.sensor.origin.tolist(),
         }
     return data
@@ -425,7 +425,7 @@ def _sensor(value: Any, where: str) -> Sensor:
         raise InputError(f"{where}: a pitch of {size.tolist()} mm? Typical are 0.002 to 0.03 mm.")
     origin = section.numbers("origin", (2,)) if "origin" in section else None
     width, height = (section.number(key) for key in ("width", "height"))
-    return Sensor(width=width, height=height, pitch=size, origin=origin)  # type: ignore[arg-type]
+    return Sensor(width=width, height=height, pixel_size=size, origin=origin)  # type: ignore[arg-type]
 
 
 def _distortion(value: Any, where: str, c: float) -> Distortion:

@@ -8,7 +8,7 @@ import numpy as np
 
 from multimedia import Brown, Camera, Layers, Sensor, project
 
-SENSOR = Sensor(width=1280, height=1024, pitch=np.array([0.012, 0.012]))
+SENSOR = Sensor(width=1280, height=1024, pixel_size=np.array([0.012, 0.012]))
 LAYERS = Layers(indices=(1.0, 1.5, 1.337), thicknesses=(10.0,))
 EYES = ((20.0, 10.0, 520.0), (300.0, 30.0, 450.0), (-300.0, -20.0, 450.0), (10.0, 310.0, 450.0))
 LENS = Brown(k1=2e-5, p1=1e-5, p2=-2e-5, scale=1.0005)

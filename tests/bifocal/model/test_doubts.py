@@ -9,7 +9,13 @@ from bifocal import Grid, Pair
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
 
 PAIR = Pair.ideal(
-    d1=17.5, d2=9.5, c1=35, c2=19, pitch=0.0074, nadir1=(1535.5, 1023.5), nadir2=(1535.5, 1023.5)
+    d1=17.5,
+    d2=9.5,
+    c1=35,
+    c2=19,
+    pixel_size=0.0074,
+    nadir1=(1535.5, 1023.5),
+    nadir2=(1535.5, 1023.5),
 )
 WALL = np.array([[3.0, -1.0, 0.1], [2.0, 1.0, 0.2], [-5.0, 3.0, -0.2]])
 BENT = {

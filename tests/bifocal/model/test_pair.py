@@ -68,7 +68,7 @@ def test_projected_points_are_intersected_where_they_were(pair):
 
 def test_pixels_of_an_ideal_pair_are_counted_right_and_down_from_its_nadir_points():
     pair = Pair.ideal(
-        d1=17.5, d2=9.5, c1=35, c2=19, pitch=0.0074, nadir1=(1536, 1024), nadir2=(1500, 1000)
+        d1=17.5, d2=9.5, c1=35, c2=19, pixel_size=0.0074, nadir1=(1536, 1024), nadir2=(1500, 1000)
     )
     # By hand: 0.0074 mm * 0.5 m/mm = 3.7 mm on the wall; 100 px right and 50 px up of the nadir.
     for photo, pixel in ((pair.image1, (1636, 974)), (pair.image2, (1600, 950))):
@@ -80,7 +80,7 @@ def test_pixels_of_an_ideal_pair_are_counted_right_and_down_from_its_nadir_point
     [
         ({"d2": -9.5}, "^d2: must be above zero"),
         ({"c1": 0.0}, "^c1: must be above zero"),
-        ({"nadir2": (1.0, 2.0, 3.0), "pitch": 0.0074}, "^nadir2: "),
+        ({"nadir2": (1.0, 2.0, 3.0), "pixel_size": 0.0074}, "^nadir2: "),
     ],
 )
 def test_a_wrong_value_of_an_ideal_pair_is_named(wrong, message):

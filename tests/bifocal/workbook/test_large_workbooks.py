@@ -58,7 +58,7 @@ def test_rows_added_to_a_large_table_get_short_formulas(tmp_path, monkeypatch):
 
 def write_many(path, count):
     """Write a survey of random points in raw pixels."""
-    pair = Pair.ideal(d1=17.5, d2=9.5, c1=35.0, c2=19.0, pitch=0.004)
+    pair = Pair.ideal(d1=17.5, d2=9.5, c1=35.0, c2=19.0, pixel_size=0.004)
     xyz = np.random.default_rng(7).uniform((-5, -3, -1), (5, 3, 1), (count, 3))
     pixels1, pixels2 = pair.project(xyz)
     ids = tuple(f"P{i}" for i in range(count))

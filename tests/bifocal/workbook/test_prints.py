@@ -101,7 +101,7 @@ def test_pixels_and_enlargements_exclude_each_other(tmp_path):
 
 
 def test_the_page_picks_on_the_photos_whatever_was_measured_on_prints():
-    pair = Pair.ideal(d1=17.5, d2=9.5, c1=35, c2=19, pitch=0.005)
+    pair = Pair.ideal(d1=17.5, d2=9.5, c1=35, c2=19, pixel_size=0.005)
     lenses = SurveySetup(taking=Taking(**CAMERAS, pitch=0.005))
     prints = lenses.but(**SIZES)
     assert completed(prints, pair).taking.c_used == (35, 19)

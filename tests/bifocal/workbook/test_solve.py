@@ -41,7 +41,7 @@ def test_columns_of_coordinates_give_the_points_back():
 
 def test_columns_of_pixels_with_a_pair_give_the_points_back():
     nadirs = {"nadir1": (1536.25, 1023.75), "nadir2": (1530.0, 1020.5)}
-    pair = Pair.ideal(**LENSES, pitch=0.0074, **nadirs)
+    pair = Pair.ideal(**LENSES, pixel_size=0.0074, **nadirs)
     picks = dict(zip(("col1", "row1", "col2", "row2"), np.hstack(pair.project(XYZ)).T, strict=True))
     survey = solve(picks, pair=pair)
     assert survey.table.xyz == pytest.approx(XYZ, abs=1e-11)
@@ -51,7 +51,9 @@ def test_columns_of_pixels_with_a_pair_give_the_points_back():
 
 def test_rows_of_every_kind_in_one_table_are_solved_with_a_pair():
     """By hand: s is the length of x, y, and theta runs clockwise from +y."""
-    pair = Pair.ideal(**LENSES, pitch=0.0074, nadir1=(1536.25, 1023.75), nadir2=(1530.0, 1020.5))
+    pair = Pair.ideal(
+        **LENSES, pixel_size=0.0074, nadir1=(1536.25, 1023.75), nadir2=(1530.0, 1020.5)
+    )
     picks = dict(zip(("col1", "row1", "col2", "row2"), np.hstack(pair.project(XYZ)).T, strict=True))
     table = picks | columns(XYZ)
     table["s1"], table["s2"] = (np.hypot(table[f"x{k}"], table[f"y{k}"]) for k in (1, 2))
@@ -69,7 +71,7 @@ def test_rows_of_every_kind_in_one_table_are_solved_with_a_pair():
 
 
 def test_a_survey_says_whether_its_picks_are_given_found_or_assumed():
-    pair = Pair.ideal(**LENSES, pitch=0.0074)
+    pair = Pair.ideal(**LENSES, pixel_size=0.0074)
     rng = np.random.default_rng(1)
     xyz = np.column_stack([rng.uniform(-4, 4, 30), rng.uniform(-2, 2, 30), rng.uniform(0, 1, 30)])
     pixels = np.hstack(pair.project(xyz)) + rng.normal(0, 0.4, (30, 4))
@@ -89,7 +91,7 @@ def test_a_survey_says_whether_its_picks_are_given_found_or_assumed():
 
 @pytest.mark.parametrize("wrong", [0.0, 0.3])
 def test_blunders_do_not_spoil_the_precision_found_for_the_other_picks(wrong):
-    pair = Pair.ideal(**LENSES, pitch=0.0074)
+    pair = Pair.ideal(**LENSES, pixel_size=0.0074)
     rng = np.random.default_rng(6)
     xyz = rng.uniform(-1, 1, (400, 3)) * [4, 2, 1]
     pixels = np.hstack(pair.project(xyz)) + rng.normal(0, 0.4, (400, 4))
@@ -102,7 +104,7 @@ def test_blunders_do_not_spoil_the_precision_found_for_the_other_picks(wrong):
 
 def test_picks_of_long_tails_are_as_good_as_those_kept():
     # One in five is three times as bad: the root mean square of both is 0.4 sqrt(0.8 + 0.2 * 9).
-    pair = Pair.ideal(**LENSES, pitch=0.0074)
+    pair = Pair.ideal(**LENSES, pixel_size=0.0074)
     rng = np.random.default_rng(7)
     xyz = rng.uniform(-1, 1, (2000, 3)) * [4, 2, 1]
     worse = np.where(rng.random((2000, 1)) < 0.2, 3.0, 1.0)

@@ -72,7 +72,9 @@ def test_a_wrong_index_shows_over_depth_where_no_other_unknown_takes_it_up(proje
 
 def test_the_residuals_lie_within_the_rim_of_the_sensor(adjusted):
     """The outer edges of its pixels, in the axes of the image; nothing where none is known."""
-    sensor = multimedia.Sensor(width=400, height=300, pitch=[0.05, 0.05], origin=[199.5, 120.0])
+    sensor = multimedia.Sensor(
+        width=400, height=300, pixel_size=[0.05, 0.05], origin=[199.5, 120.0]
+    )
     cameras = [replace(adjusted.project.cameras[0], sensor=sensor), adjusted.project.cameras[1]]
     project = replace(adjusted.project, cameras=(*cameras, *adjusted.project.cameras[2:]))
     figure = Figure()

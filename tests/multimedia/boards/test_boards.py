@@ -186,7 +186,7 @@ def _image(points: np.ndarray) -> np.ndarray:
     return np.array(found)
 
 
-SENSOR = Sensor(width=1280, height=1024, pitch=np.array([0.006, 0.006]))
+SENSOR = Sensor(width=1280, height=1024, pixel_size=np.array([0.006, 0.006]))
 PORT = FlatInterface(
     layers=Layers(indices=(1.0, 1.5, 1.337), thicknesses=(8.0,)), point=(0.0, 0.0, -46.0),
     normal=(0.0, 0.0, 1.0), moves_with_camera=True,

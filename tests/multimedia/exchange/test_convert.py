@@ -34,7 +34,7 @@ from multimedia import (
 )
 from tests.builders.commands import multimedia_command as main
 
-SENSOR = Sensor(width=1936, height=1216, pitch=np.array([0.00345, 0.00346]))
+SENSOR = Sensor(width=1936, height=1216, pixel_size=np.array([0.00345, 0.00346]))
 RNG = np.random.default_rng(31)
 POINTS = RNG.uniform((-0.3, -0.2, -0.5), (0.3, 0.2, -0.1), (30, 3))
 LENS = Brown(k1=-2e-4, k2=3e-6, p1=2e-5, p2=-3e-5)
@@ -115,7 +115,7 @@ def test_colmap_sees_the_same_pixels_and_comes_back(tmp_path, lens):
     assert done.remarks == ()
     for k, camera in enumerate(content.cameras):
         assert np.abs(colmap_pixels(tmp_path / "model", k, POINTS) - pixels(camera)).max() < 1e-9
-    convert(tmp_path / "model", tmp_path / "back.toml", pitch=0.00345)
+    convert(tmp_path / "model", tmp_path / "back.toml", pixel_size=0.00345)
     back = read_project(tmp_path / "back.toml")
     assert back.camera_names == content.camera_names
     for got, want in zip(back.cameras, content.cameras, strict=True):
@@ -211,7 +211,7 @@ def test_colmaps_ports_bend_rays_as_ours(tmp_path, name):
     rows = [
         line.split() for line in (tmp_path / "model" / "cameras.txt").read_text().splitlines()[1:]
     ]
-    convert(tmp_path / "model", tmp_path / "back.toml", pitch=0.00345)
+    convert(tmp_path / "model", tmp_path / "back.toml", pixel_size=0.00345)
     back = read_project(tmp_path / "back.toml")
     trace = dome_ray if name == "dome" else flat_port_ray
     for k, camera in enumerate(views):

@@ -42,7 +42,7 @@ from tests.rounding import EPS
 mp.mp.dps = 40
 TERMS = {"k1": -0.02, "k2": 0.006, "k3": -0.003, "k4": 0.0005}
 LENS = Fisheye(**TERMS, scale=1.002)
-SENSOR = Sensor(width=1600, height=1200, pitch=np.array([0.003, 0.0031]))
+SENSOR = Sensor(width=1600, height=1200, pixel_size=np.array([0.003, 0.0031]))
 WATER = FlatInterface(layers=Layers(indices=(1.0, 1.5, 1.337), thicknesses=(0.01,)))
 INTERIOR = ("c", "xh", "yh", "k1", "k2", "k3", "k4", "scale")
 
@@ -221,7 +221,7 @@ def test_other_programs_give_the_same_pixels_back(target, tmp_path) -> None:
         (tmp_path / target).mkdir()
     form = {"model": "colmap", "cameras.xml": "metashape"}.get(target, "opencv")
     convert(tmp_path / "tank.toml", tmp_path / target, form=form)
-    convert(tmp_path / target, tmp_path / "back.toml", pitch=0.003)
+    convert(tmp_path / target, tmp_path / "back.toml", pixel_size=0.003)
     for old, new in zip(
         straight.cameras, read_project(tmp_path / "back.toml").cameras, strict=True
     ):
