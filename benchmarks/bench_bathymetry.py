@@ -83,14 +83,14 @@ def main() -> None:
             print(f"{title}, {count} points, {rays} rays, balanced {how}:")
             report("as measured", apparent, true, 0.0, rays)
             start = time.process_time()
-            nadir = mm.correct_bathymetry(apparent, water_level=LEVEL, index=N).xyz
+            nadir = mm.correct_bathymetry(apparent, water_level=LEVEL, refractive_index=N).xyz
             report("nadir, times n", nadir, true, time.process_time() - start, rays)
             start = time.process_time()
             peer = dietrich(apparent, cameras, seen)
             worse = report("Dietrich 2017", peer, true, time.process_time() - start, rays)
             start = time.process_time()
             ours = mm.correct_bathymetry(
-                apparent, water_level=surface, index=N, cameras=cameras, visible=seen
+                apparent, water_level=surface, refractive_index=N, cameras=cameras, visible=seen
             ).xyz
             ok = np.isfinite(ours).all(-1)
             z = report("multimedia", ours[ok], true[ok], time.process_time() - start, rays)

@@ -2,5 +2,5 @@
 
 from photocore.remarks import Remarks
 
-remark = Remarks("photocore", "bifocal")
+remark = Remarks("photocore", "multimedia", "bifocal")
 in_language = remark.in_language

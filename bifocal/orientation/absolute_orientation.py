@@ -92,7 +92,7 @@ def _oriented(given: Given) -> OrientedPair:
     given = given.with_interiors(interiors)
     enough = given.enough
     if lacking and not enough and None in site.distances:
-        raise GeometryError(f"{lacking}, or both distances, or four control points.")
+        raise GeometryError(remark("refused.focal_or_distances", lacking=lacking))
     ties, remarks = ties_of(given, needed=not enough)
     if enough and not given.settled:
         right = _typed_right(given, lambda one: _by_control(one, ties), by_control=True)
@@ -161,7 +161,7 @@ def _through_media(given: Given, lacking: str) -> OrientedPair:
     pair = control_alone(observations, start, named=given.site.wall is not None)
     shares = [pair.adjusted.sigma("Z", n) / pair.adjusted.cameras[n - 1].centre[2] for n in (1, 2)]
     if lacking and max(shares) > CONTROL.hopeless:
-        raise GeometryError(f"the control points alone do not tell the distances, and {lacking}.")
+        raise GeometryError(remark("refused.control_alone", lacking=lacking))
     ties, remarks = ties_of(given, needed=False)
     note = remark("orientation.assumed_media_control")
     if ties is not None:
@@ -213,7 +213,7 @@ def _with_lacking(error: PhotogrammetryError, lacking: str) -> PhotogrammetryErr
     """Return an error with what is ``lacking`` of the lenses, unless it says so itself."""
     if not lacking or "--focal1" in str(error):
         return error
-    return GeometryError(f"{error} The likely reason: {lacking}.")
+    return GeometryError(remark("refused.likely_reason", error=error, reason=lacking))
 
 
 def _mended_by_ties(given: Given, ties: Ties | None, seen: PairObservations) -> OrientedPair | None:

@@ -13,7 +13,6 @@ from photocore.adjustment.priors import (
     LEAST_INDEX,
     MOST_INDEX,
     UNCARRIED,
-    hardly_carried,
     is_possible,
     typical_sigma,
 )
@@ -114,8 +113,8 @@ def _shown(name: str, value: float) -> str:
 
 
 def _hardly_carried(name: str, start: float, sigma: float) -> str:
-    """Return `hardly_carried`, of a lean in degrees."""
+    """Return that an unknown rests on its prior alone; a lean is told in degrees."""
     if name.startswith("lean"):
         start, sigma = np.degrees([start, sigma]).tolist()
-        return hardly_carried(f"{name} [degrees]", start=start, sigma=sigma)
-    return hardly_carried(name, start=start, sigma=sigma)
+        return remark("orientation.lean_hardly_carried", label=name, start=start, sigma=sigma)
+    return remark("adjustment.hardly_carried", label=name, start=start, sigma=sigma)

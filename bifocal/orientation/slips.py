@@ -92,7 +92,7 @@ def slip_of(
         return None
     least, best = min(found, key=lambda one: one[0])
     alike = [s.words for misfit, s in found if misfit < SLIPS.clearly * least and not s.mended]
-    return best if best.mended else replace(best, words=" Or: ".join(alike))
+    return best if best.mended else replace(best, words=remark("slips.or").join(alike))
 
 
 def _explaining(

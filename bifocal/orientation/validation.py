@@ -49,15 +49,10 @@ def check_different(name1: str, name2: str, images: Images) -> None:
 
 def unknown_lenses(interiors: Interiors, names: tuple[str, str]) -> str:
     """Return of which photos nobody knows the focal length, and what to give; or nothing."""
-    unknown = [name for name, i in zip(names, interiors, strict=True) if i.is_assumed]
-    if not unknown:
-        return ""
-    alone = [number for number, i in enumerate(interiors, start=1) if i.is_assumed]
-    missing = f"; --focal{alone[0]} is missing" if len(alone) == 1 else ""
-    return (
-        f"the focal lengths are unknown (no EXIF) of {' and '.join(unknown)}{missing}. Give --lens "
-        "or --focal1 and --focal2 with --sensor-width or --pixel-size"
-    )
+    unknown = [side for side, interior in enumerate(interiors) if interior.is_assumed]
+    if len(unknown) == len(names):
+        return remark("refused.unknown_focals", first=names[0], second=names[1])
+    return "".join(remark("refused.unknown_focal", name=names[k], number=k + 1) for k in unknown)
 
 
 def is_flat(

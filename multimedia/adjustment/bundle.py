@@ -24,6 +24,7 @@ from multimedia.orientation.calibration_covariance import with_covariance
 from multimedia.orientation.intersection import intersect
 from multimedia.orientation.plate_poses import FEWEST, plate_pose
 from multimedia.projects.model import ObjectPoints, Project
+from multimedia.remarks import remark
 from photocore.adjustment import Fit, huber_weights
 from photocore.adjustment.network import NetworkState
 from photocore.arrays import BoolArray, FloatArray, IntArray
@@ -75,7 +76,7 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
     if unknowns.interior == AUTO:
         chosen = choose_interior(project, unknowns, bundle_adjust)
         result = bundle_adjust(project, with_interior(unknowns, chosen))
-        choice = f"Interior parameters that the data carry: {', '.join(chosen) or 'none'}."
+        choice = remark("bundle.chosen", names=", ".join(chosen) or "none")
         return replace(result, remarks=(choice, *result.remarks))
     bundle, remarks = prepare(project, unknowns)
     columns = bundle.columns
@@ -189,11 +190,11 @@ def _used_points(
         alone += [name for name in known - plates if 0 < rays[name] < 2]
     unseen = [name for name in control.ids if rays[name] == 0]
     remarks = []
-    for names, why in ((alone, "measured in one camera only"), (unseen, "measured in no camera")):
+    for names, cameras in ((alone, "one camera only"), (unseen, "no camera")):
         if names:
             shown = ", ".join(names[:8]) + (" ..." if len(names) > 8 else "")
-            points = "point" if len(names) == 1 else "points"
-            remarks.append(f"{len(names)} {points} {why}, left out: {shown}")
+            told = {"points": "point" if len(names) == 1 else "points", "cameras": cameras}
+            remarks.append(remark("bundle.left_out", count=len(names), names=shown, **told))
     dropped = set(alone)
     rows = [row for row, name in enumerate(images.ids) if name not in dropped]
     on_bars = {end for bar in unknowns.scale_bars for end in (bar.first, bar.second)}

@@ -13,7 +13,8 @@ from multimedia.adjustment.media_unknowns import media_unknowns
 from multimedia.adjustment.unknowns import Adjustment
 from multimedia.media.camera import ANY_INTERIOR, EXTERIOR
 from multimedia.projects.model import Project
-from photocore.adjustment.priors import ALIKE, UNCARRIED, hardly_carried, is_possible
+from multimedia.remarks import remark
+from photocore.adjustment.priors import ALIKE, UNCARRIED, is_possible
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import GeometryError
 from photocore.reports.words import words_of
@@ -136,13 +137,7 @@ def with_model_error(
         covariance=result.covariance * effect,
         point_covariance=result.point_covariance * effect,
         model_error=factor,
-        remarks=(
-            *result.remarks,
-            *remarks,
-            f"Residuals of neighbouring points are alike: the model lacks something (lens terms, a "
-            f"tilt, an index, gross errors). All sigmas were made {factor:.1f} times larger, the "
-            "least that this costs.",
-        ),
+        remarks=(*result.remarks, *remarks, remark("bundle.neighbours_alike", factor=factor)),
     )
 
 
@@ -185,21 +180,11 @@ def _worst_group(
     """Return what to say of the group that is off most, and what would free it."""
     label, camera, rows = groups[int(np.argmax(ratios))]
     mean = np.hypot(*result.residuals[rows].mean(axis=0)) * 1000
-    off = (
-        f"off by {mean:.1f} um on average in camera {camera}, {np.sqrt(ratios.max()):.0f} "
-        "standard errors"
-    )
+    off = {"mean": mean, "camera": camera, "errors": np.sqrt(ratios.max())}
     if label not in result.project.object_points.groups:
-        return (
-            f"Points {label} {result.project.unit} before the camera are {off}: depth is not "
-            "modelled. An index, the place of the glass (--media index3,offset) or c may free it."
-        )
-    if label in plates:
-        return f"Points of plate {label} are {off}: it is bent, or measured wrongly."
-    return (
-        f"Points of plate {label} are {off}: they are not where their coordinates say. --plate "
-        f"{label} frees the pose of the plate."
-    )
+        near, far = label.split(" to ")
+        return remark("bundle.depth_off", near=near, far=far, unit=result.project.unit, **off)
+    return remark(f"bundle.plate_{'bent' if label in plates else 'moved'}", plate=label, **off)
 
 
 def _cells(place: FloatArray, size: int) -> Iterator[IntArray]:
@@ -231,7 +216,8 @@ def _uncarried(project: Project, columns: BundleColumns, result: Adjustment) -> 
     for item in media_unknowns(project, columns.labels, columns.media):
         prior, own = columns.priors.get(item.column), result.sigma(item.label)
         if prior is not None and own > UNCARRIED * prior * result.model_error:
-            yield hardly_carried(item.label, start=item.start, sigma=prior)
+            told = {"label": item.label, "start": item.start, "sigma": prior}
+            yield remark("adjustment.hardly_carried", **told)
 
 
 def alike_remarks(result: Adjustment) -> Iterator[str]:
@@ -295,16 +281,10 @@ def _insignificant(result: Adjustment) -> Iterator[str]:
         labels = [label for label in result.names if label.rpartition(":")[2] == name]
         if labels and significance(result, labels, neutral) > RISK_PARAMETER:
             whose = ", ".join(label.rpartition(":")[0] for label in labels[:_SHOWN])
-            yield (
-                f"{name} is not significant at 1 % ({whose}): leave it out of --interior, or say "
-                "--interior auto."
-            )
+            yield remark("bundle.insignificant", name=name, whose=whose)
     for label in result.names:
         if label.endswith("gradient") and significance(result, [label]) > RISK_PARAMETER:
-            yield (
-                f"{label} is not significant at 1 %: the water may be the same at all depths; "
-                "leave it out of --media."
-            )
+            yield remark("bundle.no_gradient", name=label)
 
 
 def significance(

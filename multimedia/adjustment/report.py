@@ -14,6 +14,7 @@ from multimedia.adjustment.unknowns import Adjustment, decimals
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.interfaces import Interfaces
 from multimedia.media.surfaces import Cylinder, Plane, RefractingSurface, Sphere
+from multimedia.remarks import in_language
 from photocore.arrays import FloatArray
 from photocore.provenance import program, provenance, today
 from photocore.reports.document import (
@@ -51,7 +52,7 @@ def write_adjustment_report(
     title : str
         By default that of the project.
     language : str
-        ``en``, ``it`` or ``de``; remarks of the program are English.
+        ``en``, ``it`` or ``de``.
     notes : tuple of str
         Remarks besides those of the adjustment.
     overwrite : bool
@@ -79,7 +80,8 @@ def adjustment_document(
         if part is _precision:
             # What is alike has a section of its own.
             alike = set(alike_remarks(result))
-            told = [text for text in (*notes, *result.remarks) if text not in alike]
+            said = [text for text in (*notes, *result.remarks) if text not in alike]
+            told = [in_language(text, language) for text in said]
             blocks += _remarks((*told, *([say("see_correlations")] if alike else [])), say)
     blocks += _provenance(say)
     return Document(title=title, language=language, subject=made, blocks=tuple(blocks))

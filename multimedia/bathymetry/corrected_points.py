@@ -53,11 +53,6 @@ class Precision:
         for name in ("index", "level", "point"):
             not_negative(getattr(self, name), f"sigma of the {name}")
 
-    @property
-    def is_given(self) -> bool:
-        """Whether there is anything to carry through."""
-        return self.index > 0 or self.level > 0 or self.point > 0
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CorrectedPoints:

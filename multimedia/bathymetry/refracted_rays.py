@@ -60,7 +60,7 @@ def intersect_refracted_rays(
     directions: ArrayLike,
     *,
     water_level: float | WaterSurface,
-    index: float,
+    refractive_index: float,
     sigma_direction: float = 1e-4,
 ) -> RayIntersections:
     """Refract measured rays at the water surface and intersect them.
@@ -72,7 +72,7 @@ def intersect_refracted_rays(
         point does not have. [m]
     water_level : float or WaterSurface
         Height of the water [m] or a surface.
-    index : float
+    refractive_index : float
         Refractive index of the water relative to the air.
     sigma_direction : float
         Standard deviation of a direction across the ray: image precision over principal distance.
@@ -90,7 +90,8 @@ def intersect_refracted_rays(
     32.03 degrees: they cross 1 / tan(32.03 deg) = 1.5986 m below the surface.
 
     >>> rays = intersect_refracted_rays(
-    ...     [[[-2, 0, 1], [2, 0, 1]]], [[[1, 0, -1], [-1, 0, -1]]], water_level=0, index=4 / 3)
+    ...     [[[-2, 0, 1], [2, 0, 1]]], [[[1, 0, -1], [-1, 0, -1]]],
+    ...     water_level=0, refractive_index=4 / 3)
     >>> print(rays.xyz.round(4) + 0.0)
     [[ 0.      0.     -1.5986]]
     """
@@ -99,7 +100,7 @@ def intersect_refracted_rays(
     start, heading = np.broadcast_arrays(start, heading)
     if start.ndim != 3:
         raise InputError(f"origins: expected shape (points, rays, 3), found {start.shape}.")
-    surface, n_water = as_water_surface(water_level), checked_water_index(index)
+    surface, n_water = as_water_surface(water_level), checked_water_index(refractive_index)
     with np.errstate(invalid="ignore", divide="ignore"):
         heading = heading / np.linalg.norm(heading, axis=-1, keepdims=True)
     given = np.isfinite(start + heading).all(-1)
@@ -163,7 +164,7 @@ def correct_lidar_beams(
     points: ArrayLike,
     *,
     water_level: float | WaterSurface,
-    index: float,
+    refractive_index: float,
     group_index: float | None = None,
 ) -> CorrectedPoints:
     """Correct laser echoes from under water for refraction and for the slower light.
@@ -176,11 +177,11 @@ def correct_lidar_beams(
         Echoes computed as if all of the way were air: they give direction and range. [m]
     water_level : float or WaterSurface
         Height of the water [m] or a surface.
-    index : float
+    refractive_index : float
         Refractive index that bends the beam, relative to the air.
     group_index : float, optional
-        Index that slows the pulse; the same as ``index`` unless given (in water at 532 nm it is
-        about 0.02 to 0.03 higher).
+        Index that slows the pulse; the same as ``refractive_index`` unless given (in water at
+        532 nm it is about 0.02 to 0.03 higher).
 
     Returns
     -------
@@ -191,7 +192,7 @@ def correct_lidar_beams(
     --------
     Straight down from 10 m, an echo 4 m under the surface by time of flight lies 3 m under it:
 
-    >>> beam = correct_lidar_beams([0, 0, 10], [0, 0, -4], water_level=0, index=4 / 3)
+    >>> beam = correct_lidar_beams([0, 0, 10], [0, 0, -4], water_level=0, refractive_index=4 / 3)
     >>> print(beam.xyz.round(9))
     [ 0.  0. -3.]
     """
@@ -200,7 +201,7 @@ def correct_lidar_beams(
     )
     shape = echo.shape
     start, echo = start.reshape(-1, 3), echo.reshape(-1, 3)
-    surface, n_water = as_water_surface(water_level), checked_water_index(index)
+    surface, n_water = as_water_surface(water_level), checked_water_index(refractive_index)
     with located("" if group_index is None else "group index"):
         slowed = n_water if group_index is None else checked_water_index(group_index)
     finite = np.asarray(np.isfinite(start + echo).all(-1))

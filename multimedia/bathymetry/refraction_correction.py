@@ -49,7 +49,7 @@ def correct_bathymetry(
     points: ArrayLike,
     *,
     water_level: float | WaterSurface,
-    index: float,
+    refractive_index: float,
     cameras: ArrayLike | None = None,
     visible: ArrayLike | csr_array | None = None,
     max_angle: float | None = None,
@@ -64,7 +64,7 @@ def correct_bathymetry(
         [m]
     water_level : float or WaterSurface
         Height of the water [m], or a `Plane`, `RasterSurface`, `MeshSurface` or `WaveSurface`.
-    index : float
+    refractive_index : float
         Refractive index of the water relative to the air, 1.33 to 1.35.
     cameras : array_like, shape (m, 3), optional
         Projection centres, above the water. Without them every point is treated as if seen from
@@ -105,14 +105,14 @@ def correct_bathymetry(
     Mandlburger 2024, Table 1):
 
     >>> apparent = [0.3, 0.2, 1.8075 - 0.1957]
-    >>> result = correct_bathymetry(apparent, water_level=1.8075, index=1.33575)
+    >>> result = correct_bathymetry(apparent, water_level=1.8075, refractive_index=1.33575)
     >>> print(round(float(result.xyz[2]) - apparent[2], 4))
     -0.0657
     """
     xyz = as_points(points, "points", dimension=3)
     shape = xyz.shape[:-1]
     flat = xyz.reshape(-1, 3)
-    surface, n_water = as_water_surface(water_level), checked_water_index(index)
+    surface, n_water = as_water_surface(water_level), checked_water_index(refractive_index)
     centres = _checked_cameras(cameras, surface)
     seen = VisiblePoints.checked(visible, centres, max_angle, shape)
     precision = precision or Precision()
@@ -129,7 +129,7 @@ def correct_bathymetry(
         xyz=result[0].reshape(xyz.shape),
         depth=result[1].reshape(shape),
         status=result[2].reshape(shape),
-        covariance=result[3].reshape(*shape, 3, 3) if precision.is_given else None,
+        covariance=result[3].reshape(*shape, 3, 3) if precision != Precision() else None,
     )
 
 
@@ -165,7 +165,7 @@ def _correct_block(
         points, ok, weak = _solve(task, xyz[rows])
         xyz[rows[~weak]] = np.where(ok[~weak, None], points[~weak], np.nan)
         status[rows[~weak]] = np.where(ok[~weak], BathymetryStatus.RAYS, BathymetryStatus.FAILED)
-        if precision.is_given:
+        if precision != Precision():
             good = np.flatnonzero(ok & ~weak)
             covariance[rows[good]] = _propagate(task.take(good), points[good], precision)
     depth = np.maximum(surface.height_at(xyz[:, :2]) - xyz[:, 2], 0.0)

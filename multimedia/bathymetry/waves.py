@@ -61,7 +61,7 @@ def wave_effect(
     cameras: ArrayLike,
     *,
     water_level: float,
-    index: float,
+    refractive_index: float,
     wave: WaveSurface,
     phases: int = PHASES,
 ) -> WaveEffect:
@@ -75,7 +75,7 @@ def wave_effect(
         At least two projection centres, all photos taken at one instant. [m]
     water_level : float
         Height of the flat water that is assumed. [m]
-    index : float
+    refractive_index : float
         Refractive index of the water relative to the air.
     wave : WaveSurface
         The real surface; its phases are shifted through a full turn.
@@ -106,7 +106,7 @@ def wave_effect(
 
     >>> swell = WaveSurface.sinusoid(0.0, amplitude=0.01, wavelength=1.0)
     >>> effect = wave_effect([[0, 0, -2.0]], [[-5, 0, 20], [5, 0, 20]],
-    ...                      water_level=0.0, index=1.34, wave=swell)
+    ...                      water_level=0.0, refractive_index=1.34, wave=swell)
     >>> print(effect.rms.round(3))
     [[0.    0.023 0.003]]
     """
@@ -118,8 +118,10 @@ def wave_effect(
     errors = np.empty((phases, len(true), 3))
     for number in range(phases):
         moved = replace(wave, phase=wave.phase + 2 * np.pi * number / phases)
-        real = Interfaces(surfaces=(moved,), indices=(1.0, index))
+        real = Interfaces(surfaces=(moved,), indices=(1.0, refractive_index))
         rays = aim_rays(centres, true[:, None], real).directions[..., 0, :]
-        points_seen = intersect_refracted_rays(origins, rays, water_level=water_level, index=index)
+        points_seen = intersect_refracted_rays(
+            origins, rays, water_level=water_level, refractive_index=refractive_index
+        )
         errors[number] = points_seen.xyz - true
     return WaveEffect(errors=errors)

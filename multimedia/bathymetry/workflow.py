@@ -10,6 +10,7 @@ from scipy.sparse import csr_array
 
 from multimedia.bathymetry.corrected_points import (
     CorrectedPoints,
+    Precision,
     WaterSurface,
     checked_water_index,
     status_labels,
@@ -96,7 +97,7 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
     surface = read_water_surface(job.water_level, waves=job.waves)
     correct, remarks = _corrector(job, cloud, surface)
     outcome = Outcome(remarks=[*cloud.remarks, *remarks])
-    is_precise = job.precision.is_given and not job.beams
+    is_precise = job.precision != Precision() and not job.beams
     gained = {
         name: kind for name, kind in _GAINED.items() if is_precise or not name.startswith("sigma")
     }
@@ -129,14 +130,14 @@ def _corrector(
 ) -> tuple[Callable[[CloudPiece], CorrectedPoints], list[str]]:
     """Return the function that corrects one piece of a cloud, and what the user should know."""
     corrected = partial(
-        correct_bathymetry, water_level=surface, index=job.index, precision=job.precision
+        correct_bathymetry, water_level=surface, refractive_index=job.index, precision=job.precision
     )
     if job.beams:
         sensor = _sensor_positions(job, cloud)
         beams = partial(
-            correct_lidar_beams, water_level=surface, index=job.index, group_index=job.group_index
+            correct_lidar_beams, refractive_index=job.index, group_index=job.group_index
         )
-        return lambda piece: beams(sensor(piece), piece.xyz), []
+        return lambda piece: beams(sensor(piece), piece.xyz, water_level=surface), []
     if job.cameras is None:
         return lambda piece: corrected(piece.xyz), []
     remarks = []
@@ -270,7 +271,7 @@ def _correct_dem(job: Job, progress: Progress) -> Outcome:
                 )
         level = " ".join((job.water_level, *job.waves))
         tags = {"REFRACTION_INDEX": f"{job.index:g}", "REFRACTION_WATER_LEVEL": level}
-        bands = ("height", "sigma") if job.precision.is_given else ("height",)
+        bands = ("height", "sigma") if job.precision != Precision() else ("height",)
         windows = list(dem.windows(WINDOW))
         with dem.copy(job.target, bands=bands, tags=tags, overwrite=job.overwrite) as write:
             margin = 0  # widened when a window needs more, and kept for the next
@@ -304,7 +305,7 @@ def _correct_window(
         result = correct_bathymetry(
             points,
             water_level=surface,
-            index=job.index,
+            refractive_index=job.index,
             cameras=centres,
             max_angle=None if centres is None else job.max_angle,
             precision=job.precision,
@@ -353,7 +354,7 @@ def _correct_rays(job: Job) -> Outcome:
         table.origins,
         table.directions,
         water_level=surface,
-        index=job.index,
+        refractive_index=job.index,
         sigma_direction=job.sigma_direction,
     )
     outcome = Outcome()

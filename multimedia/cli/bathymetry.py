@@ -35,7 +35,7 @@ def command(source: Path, target: Path, beams: bool, as_json: bool, **wishes: An
         raise click.UsageError("--beams and --cameras exclude each other.")
     kinds = ("index", "level", "point")
     precision = Precision(**{kind: wishes.pop(f"sigma_{kind}") for kind in kinds})
-    if precision.is_given and (beams or wishes["rays"]):
+    if precision != Precision() and (beams or wishes["rays"]):
         raise click.UsageError(
             "--sigma-index, --sigma-level and --sigma-point are not for --beams and --rays."
         )

@@ -66,9 +66,9 @@ class Interfaces(SurfaceSequence, OpticalMedia):
                 surface.moved(np.eye(3), np.zeros(3))  # refuses what is not rigid
 
     @classmethod
-    def flat_water(cls, level: float, *, index: float, air: float = 1.0) -> Interfaces:
+    def flat_water(cls, level: float, *, refractive_index: float, air: float = 1.0) -> Interfaces:
         """Return the horizontal water surface Z = level under air."""
-        return cls(surfaces=(Plane.level(level),), indices=(air, index))
+        return cls(surfaces=(Plane.level(level),), indices=(air, refractive_index))
 
     @classmethod
     def parallel(

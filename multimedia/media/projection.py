@@ -56,7 +56,7 @@ def as_media(given: Media) -> OpticalMedia:
     return FlatInterface(layers=given) if isinstance(given, Layers) else given
 
 
-def project(camera: Camera, points: ArrayLike, layers: Media = None) -> FloatArray:
+def project(camera: Camera, points: ArrayLike, media: Media = None) -> FloatArray:
     r"""Image coordinates of object points seen through the media.
 
     Parameters
@@ -65,7 +65,7 @@ def project(camera: Camera, points: ArrayLike, layers: Media = None) -> FloatArr
         Exterior and interior orientation.
     points : array_like, shape (..., 3)
         X, Y, Z. [unit of the camera's centre]
-    layers : Layers, FlatInterface, Interfaces or None
+    media : Layers, FlatInterface, Interfaces or None
         Bare `Layers` have their last face in the plane Z = 0 with the camera above and the
         points below; a `FlatInterface` lies anywhere; `Interfaces` of any form are ray-traced.
         None: straight rays.
@@ -104,7 +104,7 @@ def project(camera: Camera, points: ArrayLike, layers: Media = None) -> FloatArr
     [3.8532, 0.0]
     """
     xyz = as_points(points, "points", dimension=3)
-    media = as_media(layers)
+    media = as_media(media)
     flat = _known(xyz.reshape(-1, 3))
     image: FloatArray = np.empty((len(flat), 2))
     for start in range(0, max(len(flat), 1), BLOCK):
@@ -118,12 +118,12 @@ def _known(points: FloatArray) -> FloatArray:
     return np.where(np.isinf(points), np.nan, points) if np.isinf(points).any() else points
 
 
-def projection_status(camera: Camera, points: ArrayLike, layers: Media = None) -> list[str]:
+def projection_status(camera: Camera, points: ArrayLike, media: Media = None) -> list[str]:
     """Return why each point is or is not seen.
 
     Parameters
     ----------
-    camera, points, layers
+    camera, points, media
         As for `project`; points of shape (n, 3).
 
     Returns
@@ -134,7 +134,7 @@ def projection_status(camera: Camera, points: ArrayLike, layers: Media = None) -
         ``outside the lens model`` or ``outside the sensor`` (still projected).
     """
     xyz = as_points(points, "points", dimension=3).reshape(-1, 3)
-    vectors, reasons = as_media(layers).seen(camera, _known(xyz))
+    vectors, reasons = as_media(media).seen(camera, _known(xyz))
     image = _image_of(vectors, camera)
     outside: BoolArray = np.zeros(len(xyz), dtype=bool)
     if camera.sensor is not None:
@@ -156,7 +156,7 @@ def projection_status(camera: Camera, points: ArrayLike, layers: Media = None) -
 def project_with_jacobian(
     camera: Camera,
     points: FloatArray,
-    layers: Media = None,
+    media: Media = None,
     *,
     camera_names: Sequence[str] = (),
     interface_names: Sequence[str] = (),
@@ -165,7 +165,7 @@ def project_with_jacobian(
 
     Parameters
     ----------
-    camera, layers
+    camera, media
         As for `project`.
     points : ndarray, shape (n, 3)
         Object points.
@@ -179,7 +179,7 @@ def project_with_jacobian(
     Projection
     """
     exterior = any(name in EXTERIOR for name in camera_names)
-    sight = as_media(layers).sight(camera, points, exterior=exterior, names=interface_names)
+    sight = as_media(media).sight(camera, points, exterior=exterior, names=interface_names)
     image, by_seen, by_interior = _through_lens(camera, sight.vectors, camera_names)
     by_point, by_exterior, by_interface = sight.derivatives(by_seen)
     by_camera = np.empty((len(points), 2, len(camera_names)))

@@ -75,7 +75,7 @@ def trace_rays(origins: ArrayLike, directions: ArrayLike, interfaces: SurfaceSeq
     A ray that meets water at 45 degrees goes on at asin(sin 45 / 1.3333) = 32.03 degrees:
 
     >>> from multimedia import Interfaces
-    >>> water = Interfaces.flat_water(0.0, index=4 / 3)
+    >>> water = Interfaces.flat_water(0.0, refractive_index=4 / 3)
     >>> path = trace_rays([0.0, 0.0, 1.0], [1.0, 0.0, -1.0], water)
     >>> path.vertices.round(9).tolist(), np.degrees(np.arcsin(path.directions[1, 0])).round(2)
     ([[1.0, 0.0, 0.0]], np.float64(32.03))
@@ -125,7 +125,7 @@ def aim_rays(
     A point 1.5 m deep, seen from 1 m above the water: the ray of `trace_rays` goes through it.
 
     >>> from multimedia import Interfaces
-    >>> water = Interfaces.flat_water(0.0, index=4 / 3)
+    >>> water = Interfaces.flat_water(0.0, refractive_index=4 / 3)
     >>> point = [1 + 1.5 * np.tan(np.arcsin(np.sin(np.pi / 4) * 0.75)), 0, -1.5]
     >>> aim_rays([0, 0, 1], point, water).vertices.round(12).tolist()
     [[1.0, 0.0, 0.0]]

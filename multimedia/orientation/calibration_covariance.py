@@ -11,6 +11,7 @@ from multimedia.media.camera import ANY_INTERIOR, EXTERIOR
 from multimedia.media.projection import project_with_jacobian
 from multimedia.orientation.intersection import IntersectedPoints
 from multimedia.projects.model import Project
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 
@@ -39,9 +40,8 @@ def with_covariance(
     rows = list(columns.values())
     part = covariance[np.ix_(rows, rows)]
     if len(rows) > LARGEST or not np.isfinite(part).all():
-        why = "is too large for the project file" if len(rows) > LARGEST else "is not known"
-        said = f"The covariance of cameras and media {why}: `intersect` counts image noise alone."
-        return replace(project, extra=extra), (said,)
+        why = "too_large" if len(rows) > LARGEST else "unknown"
+        return replace(project, extra=extra), (remark(f"bundle.covariance_{why}"),)
     if rows:
         extra[KEY] = {
             name: " ".join(map(repr, [_value(project, name), *part[k, : k + 1].tolist()]))

@@ -68,7 +68,7 @@ def epipolar_curve(
     camera: Camera,
     image_points: ArrayLike,
     other: Camera,
-    layers: Media | tuple[Media, Media] = None,
+    media: Media | tuple[Media, Media] = None,
     *,
     z_range: tuple[float, float],
     chord_error: float = 5e-4,
@@ -84,7 +84,7 @@ def epipolar_curve(
         Measured image coordinates. [mm]
     other : Camera
         The camera in whose image the curves are wanted.
-    layers : Layers, FlatInterface, Interfaces, None, or a pair of these
+    media : Layers, FlatInterface, Interfaces, None, or a pair of these
         What both cameras look through, or each of them.
     z_range : tuple of float
         Planes Z = constant of the world between which the object lies. [object unit]
@@ -122,7 +122,7 @@ def epipolar_curve(
     (4, 2)
     """
     measured = as_points(image_points, "image_points", dimension=2)
-    first, second = layers if isinstance(layers, tuple) else (layers, layers)
+    first, second = media if isinstance(media, tuple) else (media, media)
     low, high = sorted(float(z) for z in z_range)
     if not (np.isfinite([low, high]).all() and high > low):
         raise InputError(f"z_range: {z_range} is no range of depths.")

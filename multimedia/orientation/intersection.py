@@ -96,7 +96,7 @@ class IntersectedPoints:
 def intersect(
     cameras: Sequence[Camera],
     image_points: ArrayLike,
-    layers: Media | Sequence[Media] = None,
+    media: Media | Sequence[Media] = None,
     *,
     sigma: ArrayLike | None = None,
 ) -> IntersectedPoints:
@@ -108,7 +108,7 @@ def intersect(
         At least two.
     image_points : array_like, shape (cameras, n, 2)
         Measured image coordinates; NaN where a camera did not see a point. [mm]
-    layers : Layers, FlatInterface, Interfaces, None, or a sequence of these
+    media : Layers, FlatInterface, Interfaces, None, or a sequence of these
         What the cameras look through, one for all or one each.
     sigma : array_like, broadcast to shape (cameras, n, 2), optional
         Standard deviations of the image coordinates; by default half a pixel of each camera's
@@ -140,7 +140,7 @@ def intersect(
     >>> intersect(pair, seen, water).xyz.round(9).tolist()
     [[0.01, 0.02, -0.1]]
     """
-    image, placed = _checked(cameras, image_points, layers)
+    image, placed = _checked(cameras, image_points, media)
     sigmas = _sigmas(cameras, sigma, image.shape)
     parts = [_block(cameras, image[:, p], sigmas[:, p], placed) for p in _parts(image)]
 
@@ -158,13 +158,13 @@ def _parts(image: FloatArray) -> list[slice]:
 
 
 def intersect_rays(
-    cameras: Sequence[Camera], image_points: ArrayLike, layers: Media | Sequence[Media] = None
+    cameras: Sequence[Camera], image_points: ArrayLike, media: Media | Sequence[Media] = None
 ) -> FloatArray:
     """Return the points nearest to the rays in the object's medium: fast, linear, no precision.
 
     Parameters
     ----------
-    cameras, image_points, layers
+    cameras, image_points, media
         As for `intersect`.
 
     Returns
@@ -172,7 +172,7 @@ def intersect_rays(
     ndarray, shape (n, 3)
         Exact for exact image points; else every ray counts alike, near or far.
     """
-    image, placed = _checked(cameras, image_points, layers)
+    image, placed = _checked(cameras, image_points, media)
     refuse_curved_rays(placed, "intersect_rays")
     xyz = np.empty((image.shape[1], 3))
     for part in _parts(image):
@@ -182,13 +182,13 @@ def intersect_rays(
 
 
 def intersect_pairs(
-    cameras: Sequence[Camera], image_points: ArrayLike, layers: Media | Sequence[Media] = None
+    cameras: Sequence[Camera], image_points: ArrayLike, media: Media | Sequence[Media] = None
 ) -> tuple[FloatArray, FloatArray]:
     """Return the mean of the midpoints of all pairs of rays, as OpenPTV's point positions.
 
     Parameters
     ----------
-    cameras, image_points, layers
+    cameras, image_points, media
         As for `intersect`.
 
     Returns
@@ -197,7 +197,7 @@ def intersect_pairs(
     distance : ndarray, shape (n,)
         Mean distance between the rays of the pairs. [object unit]
     """
-    image, placed = _checked(cameras, image_points, layers)
+    image, placed = _checked(cameras, image_points, media)
     refuse_curved_rays(placed, "intersect_pairs")
     xyz, apart = np.empty((image.shape[1], 3)), np.empty(image.shape[1])
     for part in _parts(image):
@@ -356,7 +356,7 @@ def _assembled(
 
 
 def _checked(
-    cameras: Sequence[Camera], image_points: ArrayLike, layers: Media | Sequence[Media]
+    cameras: Sequence[Camera], image_points: ArrayLike, media: Media | Sequence[Media]
 ) -> tuple[FloatArray, list[OpticalMedia]]:
     """Return image points and what each camera looks through."""
     if len(cameras) < 2:
@@ -367,9 +367,9 @@ def _checked(
             f"image_points: expected shape ({len(cameras)} cameras, n points, 2), found "
             f"{image.shape}. Use NaN where a camera did not see a point."
         )
-    media = list(layers) if isinstance(layers, Sequence) else [layers] * len(cameras)
+    media = list(media) if isinstance(media, Sequence) else [media] * len(cameras)
     if len(media) != len(cameras):
-        raise InputError(f"layers: expected one per camera ({len(cameras)}), found {len(media)}.")
+        raise InputError(f"media: expected one per camera ({len(cameras)}), found {len(media)}.")
     for camera, points in zip(cameras, image, strict=True):
         refuse_pixels(camera, points)
     return image, [as_media(item) for item in media]

@@ -16,7 +16,7 @@ from photocore.errors import InputError
 
 
 def image_rays(
-    camera: Camera, image_points: ArrayLike, layers: Media = None
+    camera: Camera, image_points: ArrayLike, media: Media = None
 ) -> tuple[FloatArray, FloatArray]:
     """Follow image points through the media into the object's medium.
 
@@ -26,7 +26,7 @@ def image_rays(
         Exterior and interior orientation.
     image_points : array_like, shape (..., 2)
         Measured image coordinates. [mm]
-    layers : Layers, FlatInterface, Interfaces or None
+    media : Layers, FlatInterface, Interfaces or None
         As for `project`.
 
     Returns
@@ -56,7 +56,7 @@ def image_rays(
     directions[:, :2] = ideal
     directions[:, 2] = -camera.principal_distance
     shape = (*measured.shape[:-1], 3)
-    origins, rays = as_media(layers).object_rays(camera, directions)
+    origins, rays = as_media(media).object_rays(camera, directions)
     return origins.reshape(shape), rays.reshape(shape)
 
 

@@ -78,7 +78,7 @@ def resect(
     camera: Camera,
     object_points: ArrayLike,
     image_points: ArrayLike,
-    layers: Media = None,
+    media: Media = None,
     *,
     estimate: Sequence[str] = EXTERIOR,
     sigma: ArrayLike | None = None,
@@ -94,7 +94,7 @@ def resect(
         Control points, error-free. [object unit]
     image_points : array_like, shape (n, 2)
         Measured image coordinates; NaN where a point was not measured. [mm]
-    layers : Layers, FlatInterface, Interfaces or None
+    media : Layers, FlatInterface, Interfaces or None
         As for `project`.
     estimate : sequence of str
         Parameters to determine: the exterior orientation and any of c, xh, yh, k1, k2, k3, p1,
@@ -140,7 +140,7 @@ def resect(
     )
     what = f"resection of camera {camera.name}" if camera.name else "resection"
     seen = CameraObservations(
-        points=control, image=image, media=as_media(layers), sigma=sigmas, what=what
+        points=control, image=image, media=as_media(media), sigma=sigmas, what=what
     )
     start = camera_of(_best_start(camera, seen).state)
     result = seen.network(names).solve(start_at(start))

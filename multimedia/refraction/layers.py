@@ -9,6 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray, as_floats
 from photocore.errors import GeometryError, InputError, located
 
@@ -143,15 +144,13 @@ class Layers:
         outer = max(self.indices[0], self.indices[-1])
         for place, index in enumerate(self.indices[1:-1], start=2):
             if THINNEST_LIQUID < index < outer:
-                doubts.append(
-                    f"medium {place} (n = {index:g}) bends light less than the liquid next to it "
-                    f"(n = {outer:g}), which no glass does: are the two indices swapped?"
-                )
+                doubts.append(remark("layers.swapped", place=place, index=index, liquid=outer))
         for place, index in enumerate(self.indices, start=1):
             if index > DIAMOND:
-                doubts.append(f"medium {place} has index {index:g}, more than diamond's {DIAMOND}.")
+                told = {"place": place, "index": index, "most": DIAMOND}
+                doubts.append(remark("layers.beyond_diamond", **told))
         if len(set(self.indices)) == 1:
-            doubts.append("all media have the same index: nothing is refracted.")
+            doubts.append(remark("layers.all_alike"))
         return tuple(doubts)
 
     def remarks_about(self, *, z0: ArrayLike, zp: ArrayLike) -> tuple[str, ...]:
@@ -167,15 +166,10 @@ class Layers:
         doubts = list(self.remarks)
         thick = max(self.thicknesses, default=0.0)
         if thick > 10 * distance > 0:
-            doubts.append(
-                f"a layer is {thick:g} thick, but camera and point are only {distance:g} apart "
-                "beside it: are the thicknesses in mm and the rest in m?"
-            )
+            doubts.append(remark("layers.thick_in_mm", thick=thick, distance=distance))
         if 0 < thick < 2e-6 * distance:
-            doubts.append(
-                f"the thickest layer is {thick:g}, a {distance / thick:.0e}th of the distance "
-                f"{distance:g}: are the thicknesses in m and the rest in mm?"
-            )
+            told = {"thick": thick, "distance": distance, "share": distance / thick}
+            doubts.append(remark("layers.thick_in_m", **told))
         return tuple(doubts)
 
 

@@ -331,7 +331,7 @@ def water_index_sigma(
 
 
 def salinity_from_index(
-    index: ArrayLike,
+    refractive_index: ArrayLike,
     *,
     wavelength_nm: ArrayLike,
     temperature_c: ArrayLike,
@@ -342,7 +342,7 @@ def salinity_from_index(
 
     Parameters
     ----------
-    index : array_like, shape (...)
+    refractive_index : array_like, shape (...)
         Refractive index. [-]
     wavelength_nm, temperature_c, depth, formula
         As in `water_refractive_index`.
@@ -369,11 +369,11 @@ def salinity_from_index(
     """
     given = _checked(wavelength_nm, temperature_c, 0.0, depth)
     constant, slope, _ = _powers_of(2, formula, given)
-    return np.asarray((as_floats(index, "index") - constant) / slope)
+    return np.asarray((as_floats(refractive_index, "refractive_index") - constant) / slope)
 
 
 def temperature_from_index(
-    index: ArrayLike,
+    refractive_index: ArrayLike,
     *,
     wavelength_nm: ArrayLike,
     salinity_percent: ArrayLike,
@@ -384,7 +384,7 @@ def temperature_from_index(
 
     Parameters
     ----------
-    index : array_like, shape (...)
+    refractive_index : array_like, shape (...)
         Refractive index. [-]
     wavelength_nm, salinity_percent, depth, formula
         As in `water_refractive_index`.
@@ -414,7 +414,7 @@ def temperature_from_index(
     """
     given = _checked(wavelength_nm, 0.0, salinity_percent, depth)
     constant, slope, bend = _powers_of(1, formula, given)
-    rest = constant - as_floats(index, "index")
+    rest = constant - as_floats(refractive_index, "refractive_index")
     with np.errstate(invalid="ignore"):
         # Citardauq's form of the warm root: no cancellation, and no special case where bend = 0.
         return np.asarray(2 * rest / (-slope + np.sqrt(slope**2 - 4 * bend * rest)))

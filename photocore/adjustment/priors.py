@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from photocore.errors import InputError
-from photocore.remarks import remark
 
 #: A medium adjusted by more than this many of its prior sigmas is another one, or nonsense.
 FARTHEST = 5.0
@@ -48,11 +47,6 @@ def is_possible(value: float, *, start: float, sigma: float, least: float, most:
     """
     reach = FARTHEST * sigma
     return max(least, start - reach) < value < min(most, start + reach)
-
-
-def hardly_carried(label: str, *, start: float, sigma: float) -> str:
-    """Return that an unknown rests on its prior alone."""
-    return remark("adjustment.hardly_carried", label=label, start=start, sigma=sigma)
 
 
 def parse_prior(text: str) -> tuple[str, float]:

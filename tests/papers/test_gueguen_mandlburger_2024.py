@@ -31,7 +31,7 @@ ROUNDING = 0.1
 def corrected_height(*, level: float, index: float, apparent_depth: float) -> float:
     """Return Z of a point that appears ``apparent_depth`` below the paper's water level."""
     point = [0.0, 0.0, LEVEL - apparent_depth]
-    return float(mm.correct_bathymetry(point, water_level=level, index=index).xyz[2])
+    return float(mm.correct_bathymetry(point, water_level=level, refractive_index=index).xyz[2])
 
 
 def test_the_index_of_section_3_3_is_1_33575() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,9 +12,11 @@ from matplotlib.figure import Figure
 import multimedia
 from multimedia.adjustment.report import adjustment_document
 from multimedia.adjustment.report_figures import depth_and_radial, draw_vectors
-from photocore.reports.document import Picture, TextTable
+from photocore.reports.document import Paragraph, Picture, TextTable
 from photocore.reports.words import words_of
 
+#: Words of English sentences that are neither Italian nor German.
+ENGLISH = re.compile(r"\b(the|of|is|are|with|which|from|not|were|for|only|points?|measured)\b")
 LAYERS = multimedia.Layers(indices=(1.0, 1.5, 1.337), thicknesses=(0.01,))
 
 
@@ -99,3 +102,30 @@ def test_the_tables_hold_media_unknowns_and_what_is_alike(adjusted):
     assert float(value) == pytest.approx(matrix, abs=6e-4)
     assert abs(matrix) > 0.9
     assert sum(isinstance(block, Picture) for block in blocks) == 3
+
+
+@pytest.fixture(scope="module")
+def remarked(project) -> multimedia.Adjustment:
+    """Return an adjustment on which there is much to say."""
+    swapped = multimedia.FlatInterface(layers=replace(LAYERS, indices=(1.0, 1.2, 1.337)))
+    images = project.image_points
+    rows = [k for k, name in enumerate(images.ids) if name not in ("p0", "p1")]
+    images = multimedia.ImagePoints(
+        cameras=tuple(images.cameras[k] for k in rows),
+        ids=tuple(images.ids[k] for k in rows),
+        image=images.image[rows],
+    )
+    unknowns = multimedia.Unknowns(interior=("k1",), fixed_cameras=project.camera_names)
+    remarks = tuple(f"media.tank: {said}" for said in swapped.remarks)
+    result = multimedia.bundle_adjust(replace(project, image_points=images), unknowns)
+    return replace(result, remarks=(*remarks, *result.remarks))
+
+
+@pytest.mark.parametrize("language", ["it", "de"])
+def test_remarks_are_in_the_language_of_the_report(remarked, language):
+    said = {"which no glass does", "left out: p0, p1", "before the camera", "neighbouring", "k1"}
+    assert all(any(words in remark for remark in remarked.remarks) for words in said)
+    blocks = adjustment_document(remarked, language=language).blocks
+    texts = [block.text for block in blocks if isinstance(block, Paragraph)]
+    assert any(text.startswith("media.tank: ") for text in texts)
+    assert not [text for text in texts if ENGLISH.search(text)]

@@ -60,7 +60,7 @@ def share_of_depth(error: np.ndarray, true: np.ndarray) -> float:
 def test_points_balanced_in_the_images_return_to_the_truth(name: str) -> None:
     true, cameras, apparent, visible = survey(SURFACES[name])
     result = mm.correct_bathymetry(
-        apparent, water_level=SURFACES[name], index=N, cameras=cameras, visible=visible
+        apparent, water_level=SURFACES[name], refractive_index=N, cameras=cameras, visible=visible
     )
     assert (result.status == mm.BathymetryStatus.RAYS).all()
     np.testing.assert_allclose(result.xyz, true, atol=1e-9)
@@ -71,7 +71,7 @@ def test_points_balanced_in_space_return_within_1_percent_of_depth_and_in_plan(n
     # The correction cannot know how the survey weighted its rays; this is the other usual way.
     true, cameras, apparent, visible = survey(SURFACES[name], by_image=False)
     result = mm.correct_bathymetry(
-        apparent, water_level=SURFACES[name], index=N, cameras=cameras, visible=visible
+        apparent, water_level=SURFACES[name], refractive_index=N, cameras=cameras, visible=visible
     )
     error = result.xyz - true
     assert share_of_depth((apparent - true)[:, 2], true) > 0.30
@@ -81,7 +81,7 @@ def test_points_balanced_in_space_return_within_1_percent_of_depth_and_in_plan(n
 
 def test_the_nadir_correction_leaves_what_the_rays_take_away() -> None:
     true, _, apparent, _ = survey(SURFACES["flat"])
-    nadir = mm.correct_bathymetry(apparent, water_level=102.5, index=N)
+    nadir = mm.correct_bathymetry(apparent, water_level=102.5, refractive_index=N)
     assert 0.05 < share_of_depth((nadir.xyz - true)[:, 2], true) < 0.2
     assert (nadir.xyz[:, :2] == apparent[:, :2]).all()
     assert (nadir.status == mm.BathymetryStatus.NADIR).all()
@@ -94,7 +94,7 @@ def test_exact_rays_meet_at_the_true_point_within_1e_9_m(name: str) -> None:
     origins = np.where(visible[..., None], cameras, np.nan)
     headings = mm.aim_rays(cameras, true[:, None], water).directions[..., 0, :]
     found = mm.intersect_refracted_rays(
-        origins, 3.7 * headings, water_level=SURFACES[name], index=N
+        origins, 3.7 * headings, water_level=SURFACES[name], refractive_index=N
     )
     np.testing.assert_allclose(found.xyz, true, atol=1e-9)
     assert found.misfit.max() < 1e-9
@@ -105,7 +105,7 @@ def test_rays_to_a_dry_point_are_not_refracted() -> None:
     centres = np.array([[-5.0, 0, 20], [5, 0, 20]])
     rock = np.array([0.5, 1.0, 0.3])
     found = mm.intersect_refracted_rays(
-        centres[None], (rock - centres)[None], water_level=0.0, index=N
+        centres[None], (rock - centres)[None], water_level=0.0, refractive_index=N
     )
     np.testing.assert_allclose(found.xyz[0], rock, atol=1e-12)
     assert found.status[0] == mm.BathymetryStatus.DRY
@@ -115,7 +115,11 @@ def test_map_coordinates_cost_no_accuracy() -> None:
     true, cameras, apparent, visible = survey(SURFACES["flat"])
     shift = np.array([512_345.0, 5_278_901.0, 0.0])
     result = mm.correct_bathymetry(
-        apparent + shift, water_level=102.5, index=N, cameras=cameras + shift, visible=visible
+        apparent + shift,
+        water_level=102.5,
+        refractive_index=N,
+        cameras=cameras + shift,
+        visible=visible,
     )
     np.testing.assert_allclose(result.xyz - shift, true, atol=3e-8)
 
@@ -126,7 +130,11 @@ def test_the_unit_of_length_does_not_matter(factor: float) -> None:
     plane = SURFACES["tilted"]
     scaled = mm.Plane(point=factor * plane.point, normal=plane.normal)
     result = mm.correct_bathymetry(
-        factor * apparent, water_level=scaled, index=N, cameras=factor * cameras, visible=visible
+        factor * apparent,
+        water_level=scaled,
+        refractive_index=N,
+        cameras=factor * cameras,
+        visible=visible,
     )
     np.testing.assert_allclose(result.xyz / factor, true, atol=1e-9)
 
@@ -143,14 +151,21 @@ def test_turning_the_scene_about_the_vertical_turns_the_result() -> None:
         phase=wave.phase,
     )
     result = mm.correct_bathymetry(
-        apparent @ turn.T, water_level=turned, index=N, cameras=cameras @ turn.T, visible=visible
+        apparent @ turn.T,
+        water_level=turned,
+        refractive_index=N,
+        cameras=cameras @ turn.T,
+        visible=visible,
     )
     np.testing.assert_allclose(result.xyz, true @ turn.T, atol=1e-9)
 
 
 def test_cameras_in_one_line_of_sight_fix_no_point_and_are_not_used_to() -> None:
     result = mm.correct_bathymetry(
-        [[0.0, 0.0, -1.0]], water_level=0.0, index=N, cameras=[[0, 0, 10.0], [0, 0, 20.0]]
+        [[0.0, 0.0, -1.0]],
+        water_level=0.0,
+        refractive_index=N,
+        cameras=[[0, 0, 10.0], [0, 0, 20.0]],
     )
     assert result.status[0] == mm.BathymetryStatus.NADIR
     assert result.xyz[0].tolist() == [0.0, 0.0, -N]
@@ -158,7 +173,7 @@ def test_cameras_in_one_line_of_sight_fix_no_point_and_are_not_used_to() -> None
 
 def test_dry_points_stay_to_the_last_bit_and_shapes_are_kept() -> None:
     points = np.array([[[0.1, 0.2, 102.6], [0.3, 0.4, 100.1]], [[1, 2, 102.5], [3, 4, 103]]])
-    result = mm.correct_bathymetry(points, water_level=102.5, index=N)
+    result = mm.correct_bathymetry(points, water_level=102.5, refractive_index=N)
     assert result.xyz.shape == (2, 2, 3)
     assert result.status.tolist() == [[0, 1], [0, 0]]
     np.testing.assert_array_equal(result.xyz[result.status == 0], points[result.status == 0])
@@ -168,7 +183,11 @@ def test_dry_points_stay_to_the_last_bit_and_shapes_are_kept() -> None:
 def test_an_index_of_one_changes_nothing() -> None:
     _, cameras, apparent, visible = survey(SURFACES["tilted"], count=20)
     result = mm.correct_bathymetry(
-        apparent, water_level=SURFACES["tilted"], index=1.0, cameras=cameras, visible=visible
+        apparent,
+        water_level=SURFACES["tilted"],
+        refractive_index=1.0,
+        cameras=cameras,
+        visible=visible,
     )
     np.testing.assert_allclose(result.xyz, apparent, atol=1e-9)
 
@@ -178,7 +197,7 @@ def test_points_with_one_camera_get_the_nadir_correction_and_say_so() -> None:
     visible[3] = False
     visible[3, 0] = True
     result = mm.correct_bathymetry(
-        apparent, water_level=102.5, index=N, cameras=cameras, visible=visible
+        apparent, water_level=102.5, refractive_index=N, cameras=cameras, visible=visible
     )
     assert result.status[3] == mm.BathymetryStatus.NADIR
     assert result.xyz[3, 2] == pytest.approx(102.5 - N * (102.5 - apparent[3, 2]))
@@ -187,7 +206,7 @@ def test_points_with_one_camera_get_the_nadir_correction_and_say_so() -> None:
 def test_points_outside_a_modelled_surface_are_left_and_named() -> None:
     raster = mm.RasterSurface(raster=np.zeros((4, 4)), xy_from_cell=[[1, 0, 0], [0, -1, 3]])
     result = mm.correct_bathymetry(
-        [[1.5, 1.5, -1.0], [9.0, 1.5, -1.0]], water_level=raster, index=N
+        [[1.5, 1.5, -1.0], [9.0, 1.5, -1.0]], water_level=raster, refractive_index=N
     )
     assert result.status.tolist() == [mm.BathymetryStatus.NADIR, mm.BathymetryStatus.NO_SURFACE]
     assert result.xyz[1].tolist() == [9.0, 1.5, -1.0]
@@ -199,14 +218,14 @@ def test_the_covariance_agrees_with_finite_differences_of_the_whole_correction()
     def corrected(points=apparent, lift=0.0, index=N):
         surface = SURFACES["tilted"].shifted([0, 0, lift])
         return mm.correct_bathymetry(
-            points, water_level=surface, index=index, cameras=cameras, visible=visible
+            points, water_level=surface, refractive_index=index, cameras=cameras, visible=visible
         ).xyz
 
     precision = mm.Precision(index=0.001, level=0.02, point=0.01)
     result = mm.correct_bathymetry(
         apparent,
         water_level=SURFACES["tilted"],
-        index=N,
+        refractive_index=N,
         cameras=cameras,
         visible=visible,
         precision=precision,
@@ -230,7 +249,7 @@ def test_sigma_of_the_nadir_correction_by_hand() -> None:
     result = mm.correct_bathymetry(
         [0.0, 0.0, -2.0],
         water_level=0.0,
-        index=N,
+        refractive_index=N,
         precision=mm.Precision(index=0.001, level=0.01, point=0.005),
     )
     assert result.sigma[2] == pytest.approx(np.sqrt(0.002**2 + 0.0034**2 + 0.0067**2))
@@ -242,11 +261,11 @@ def test_an_oblique_lidar_beam_by_hand() -> None:
     # remaining 2 m of air range 1.5 m of water are left.
     start = np.array([0.0, 0.0, 1.0])
     echo = start + (np.sqrt(2) + 2.0) * np.array([1.0, 0.0, -1.0]) / np.sqrt(2)
-    beam = mm.correct_lidar_beams(start, echo, water_level=0.0, index=4 / 3)
+    beam = mm.correct_lidar_beams(start, echo, water_level=0.0, refractive_index=4 / 3)
     angle = np.arcsin(np.sin(np.pi / 4) * 0.75)
     expected = [1 + 1.5 * np.sin(angle), 0, -1.5 * np.cos(angle)]
     np.testing.assert_allclose(beam.xyz, expected, atol=1e-12)
-    dry = mm.correct_lidar_beams(start, [0.5, 0, 0.5], water_level=0.0, index=4 / 3)
+    dry = mm.correct_lidar_beams(start, [0.5, 0, 0.5], water_level=0.0, refractive_index=4 / 3)
     assert dry.xyz.tolist() == [0.5, 0.0, 0.5]
     assert dry.status == mm.BathymetryStatus.DRY
 
@@ -254,7 +273,7 @@ def test_an_oblique_lidar_beam_by_hand() -> None:
 def test_the_group_index_changes_the_range_only() -> None:
     beams = [
         mm.correct_lidar_beams(
-            [0, 0, 10.0], [3.0, 1, -4], water_level=0.0, index=1.337, group_index=group
+            [0, 0, 10.0], [3.0, 1, -4], water_level=0.0, refractive_index=1.337, group_index=group
         ).xyz
         for group in (1.337, 1.36)
     ]
@@ -269,7 +288,11 @@ def test_waves_turn_rays_by_their_slope_and_average_out() -> None:
     # h (1 - 1/n) 2 pi a / L at the steepest, divided by sqrt 2 for the root mean square.
     wave = mm.WaveSurface.sinusoid(0.0, amplitude=0.002, wavelength=2.0)
     effect = mm.wave_effect(
-        [[0, 0, -2.0]], [[-0.2, 0, 30], [0.2, 0, 30]], water_level=0.0, index=N, wave=wave
+        [[0, 0, -2.0]],
+        [[-0.2, 0, 30], [0.2, 0, 30]],
+        water_level=0.0,
+        refractive_index=N,
+        wave=wave,
     )
     expected = 2 * (1 - 1 / N) * 2 * np.pi * 0.002 / 2.0 / np.sqrt(2)
     assert effect.rms[0, 1] == pytest.approx(expected, rel=0.03)
@@ -278,7 +301,7 @@ def test_waves_turn_rays_by_their_slope_and_average_out() -> None:
         [[0, 0, -2.0]],
         [[-2, 0, 30], [2, 0, 30]],
         water_level=0.0,
-        index=N,
+        refractive_index=N,
         wave=mm.WaveSurface.sinusoid(0.0, amplitude=0.0, wavelength=2.0),
         phases=2,
     )
@@ -288,8 +311,8 @@ def test_waves_turn_rays_by_their_slope_and_average_out() -> None:
 @pytest.mark.parametrize(
     ("options", "kind", "message"),
     [
-        ({"index": 0.9}, InputError, "0.9 is no refractive index of water"),
-        ({"index": 133.4}, InputError, "133.4 is no refractive index"),
+        ({"refractive_index": 0.9}, InputError, "0.9 is no refractive index of water"),
+        ({"refractive_index": 133.4}, InputError, "133.4 is no refractive index"),
         ({"cameras": [[0, 0, -5.0]]}, GeometryError, "1 of 1 are not above the water surface"),
         ({"cameras": np.zeros((0, 3))}, InputError, "no camera is given"),
         ({"cameras": [[0, 0, 5.0]], "visible": [[True, True]]}, InputError, "expected shape"),
@@ -298,7 +321,7 @@ def test_waves_turn_rays_by_their_slope_and_average_out() -> None:
     ],
 )
 def test_impossible_corrections_are_refused(options, kind, message) -> None:
-    call = {"water_level": 0.0, "index": N} | options
+    call = {"water_level": 0.0, "refractive_index": N} | options
     with pytest.raises(kind, match=message):
         mm.correct_bathymetry([[0.0, 0.0, -1.0]], **call)
 
@@ -321,7 +344,7 @@ def test_cameras_culled_by_angle_are_those_of_a_table_of_all_pairs(monkeypatch):
     points, cameras = many_cameras()
     offset = cameras - points[:, None]
     seen = np.hypot(offset[..., 0], offset[..., 1]) <= np.tan(0.6) * offset[..., 2]
-    whole = {"water_level": 102.5, "index": N, "cameras": cameras}
+    whole = {"water_level": 102.5, "refractive_index": N, "cameras": cameras}
     whole["precision"] = mm.Precision(index=0.001, level=0.02, point=0.01)
     table = mm.correct_bathymetry(points, visible=seen, **whole)
     monkeypatch.setattr(visible_points, "POINTS", 64)
@@ -343,5 +366,5 @@ def test_an_angle_that_is_none_is_refused():
     for angle in (0.0, 1.6, np.nan):
         with pytest.raises(InputError, match="max_angle"):
             mm.correct_bathymetry(
-                points, water_level=102.5, index=N, cameras=cameras, max_angle=angle
+                points, water_level=102.5, refractive_index=N, cameras=cameras, max_angle=angle
             )

@@ -63,7 +63,7 @@ CENTRES = np.array([[0.0, 0, 160], [40, 0, 158], [0, 40, 162], [40, 40, 161], [2
 
 def apparent_of(true: np.ndarray, centres: np.ndarray) -> np.ndarray:
     """Return where straight rays in air meet best, equal precision in the images."""
-    water = mm.Interfaces.flat_water(LEVEL, index=N)
+    water = mm.Interfaces.flat_water(LEVEL, refractive_index=N)
     out = true.copy()
     wet = true[:, 2] < LEVEL
     u = mm.aim_rays(centres, true[wet, None], water).directions[..., 0, :]
@@ -345,7 +345,7 @@ def test_only_the_cameras_that_saw_a_point_are_used(tmp_path: Path, road: str) -
 
 def test_measured_rays_give_points_with_precision(tmp_path: Path) -> None:
     true = positions(40)[1:5]
-    water = mm.Interfaces.flat_water(LEVEL, index=N)
+    water = mm.Interfaces.flat_water(LEVEL, refractive_index=N)
     rows = ["id,X0,Y0,Z0,DX,DY,DZ"]
     for number, point in enumerate(true):
         centres = CENTRES[: 2 + number % 3]
@@ -382,7 +382,9 @@ def test_lidar_echoes_use_the_trajectory(tmp_path: Path) -> None:
     assert "10 dry, 40 rays" in out
     when = np.linspace(100, 110, 50)
     sensor = np.column_stack([(when - 99) / 12 * 40, np.full(50, 20.0), np.full(50, 400.0)])
-    expected = mm.correct_lidar_beams(sensor, xyz, water_level=LEVEL, index=N, group_index=1.36).xyz
+    expected = mm.correct_lidar_beams(
+        sensor, xyz, water_level=LEVEL, refractive_index=N, group_index=1.36
+    ).xyz
     after = laspy.read(tmp_path / "out.las")
     np.testing.assert_allclose(after.xyz, expected, atol=0.000_51)
 

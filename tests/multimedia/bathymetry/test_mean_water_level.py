@@ -56,7 +56,7 @@ def test_a_tilted_surface_is_fitted_with_its_slope() -> None:
     assert water.slope[0] == pytest.approx(0.003, abs=4 * water.slope_sigma[0])
     assert abs(water.slope[1]) < 4 * water.slope_sigma[1]
     at_corner = 1.8 + 0.003 * 2
-    corner = mm.correct_bathymetry([2.0, 0, 1.0], water_level=water.surface, index=1.34)
+    corner = mm.correct_bathymetry([2.0, 0, 1.0], water_level=water.surface, refractive_index=1.34)
     assert corner.depth == pytest.approx(1.34 * (at_corner - 1.0), abs=0.003)
 
 

@@ -193,7 +193,7 @@ def test_a_small_piece_of_a_huge_sphere_is_a_plane() -> None:
     sphere = mm.Sphere(centre=[0, 0, -radius], radius=radius)
     curved = mm.Interfaces(surfaces=(sphere,), indices=(1.0, WATER))
     point = [80.0, 30.0, -100.0]
-    flat = mm.aim_rays([0, 0, 300], point, mm.Interfaces.flat_water(0.0, index=WATER))
+    flat = mm.aim_rays([0, 0, 300], point, mm.Interfaces.flat_water(0.0, refractive_index=WATER))
     near = mm.aim_rays([0, 0, 300], point, curved)
     np.testing.assert_allclose(near.directions[0], flat.directions[0], atol=1e-6)
 
@@ -284,7 +284,7 @@ def test_shapes_broadcast_and_one_point_is_an_array_of_one() -> None:
 
 
 def test_a_camera_in_water_cannot_look_out_beyond_the_critical_angle() -> None:
-    outward = mm.Interfaces.flat_water(0.0, index=1.0, air=4 / 3)
+    outward = mm.Interfaces.flat_water(0.0, refractive_index=1.0, air=4 / 3)
     beyond = np.arcsin(0.75) + 1e-6
     inside = np.arcsin(0.75) - 1e-6
     rays = [[np.sin(a), 0, -np.cos(a)] for a in (beyond, inside)]
@@ -295,7 +295,7 @@ def test_a_camera_in_water_cannot_look_out_beyond_the_critical_angle() -> None:
 
 
 def test_points_on_the_wrong_side_are_named_not_guessed() -> None:
-    water = mm.Interfaces.flat_water(0.0, index=WATER)
+    water = mm.Interfaces.flat_water(0.0, refractive_index=WATER)
     path = mm.aim_rays([0, 0, 1.0], [[0.1, 0, 0.5], [0.1, 0, -0.5]], water)
     assert path.status.tolist() == [mm.RayStatus.WRONG_SIDE, mm.RayStatus.OK]
     under = mm.aim_rays([0, 0, -1.0], [0.1, 0, -0.5], water)
@@ -303,7 +303,9 @@ def test_points_on_the_wrong_side_are_named_not_guessed() -> None:
 
 
 def test_a_point_on_the_interface_is_seen_along_the_straight_line() -> None:
-    path = mm.aim_rays([0, 0, 1.0], [0.5, 0.2, 0.0], mm.Interfaces.flat_water(0.0, index=WATER))
+    path = mm.aim_rays(
+        [0, 0, 1.0], [0.5, 0.2, 0.0], mm.Interfaces.flat_water(0.0, refractive_index=WATER)
+    )
     straight = np.array([0.5, 0.2, -1.0]) / np.linalg.norm([0.5, 0.2, -1.0])
     np.testing.assert_allclose(path.directions[0], straight, atol=1e-14)
 
@@ -319,8 +321,14 @@ def test_rays_that_miss_a_surface_say_so() -> None:
     ("make", "message"),
     [
         (lambda: mm.Interfaces(surfaces=(wave(),), indices=(1.0,)), "1 surfaces lie between 2"),
-        (lambda: mm.Interfaces.flat_water(0, index=0.75), "medium 2 has refractive index 0.75"),
-        (lambda: mm.Interfaces.flat_water(0, index=133.5), "medium 2 has refractive index 133.5"),
+        (
+            lambda: mm.Interfaces.flat_water(0, refractive_index=0.75),
+            "medium 2 has refractive index 0.75",
+        ),
+        (
+            lambda: mm.Interfaces.flat_water(0, refractive_index=133.5),
+            "medium 2 has refractive index 133.5",
+        ),
         (
             lambda: mm.Interfaces(surfaces=(wave(),), indices=(1, 1.3), with_camera=(True,)),
             "WaveSurface stands still",

@@ -28,8 +28,8 @@ def test_one_limit_holds_for_layers_surfaces_and_bathymetry(index: float) -> Non
     possible = 1 <= index <= 4.1
     for make in (
         lambda: Layers(indices=(1.0, index)),
-        lambda: Interfaces.flat_water(0.0, index=index),
-        lambda: correct_bathymetry([0.0, 0.0, -1.0], water_level=0.0, index=index),
+        lambda: Interfaces.flat_water(0.0, refractive_index=index),
+        lambda: correct_bathymetry([0.0, 0.0, -1.0], water_level=0.0, refractive_index=index),
     ):
         if possible:
             make()
