@@ -153,15 +153,16 @@ class SurveyContent:
         return any(photo.lens is not None for photo in self.photos)
 
     @property
-    def point_columns(self) -> tuple[LiveColumn, ...]:
-        """The columns of `Points`."""
+    def corrected(self) -> list[int]:
+        """Images whose coordinates are corrected by cells of `Setup`."""
+        matrices = self.setup.adjusted if self.setup is not None else ()
+        return [image for image, matrix in enumerate(matrices, 1) if matrix is not None]
+
+    def point_columns(self, **there: bool) -> tuple[LiveColumn, ...]:
+        """Return the columns of `Points`; of an ideal pair those of the inputs that are there."""
         if self.is_pair:
             return pair_points(undistorted=self.undistorted, media=self.media_cells)
-        corrected = self.setup.adjusted if self.setup is not None else ()
-        return ideal_points(
-            adjusted=[image for image, matrix in enumerate(corrected, 1) if matrix is not None],
-            media=self.media_cells,
-        )
+        return ideal_points(**there, adjusted=self.corrected, media=self.media_cells)
 
     @property
     def placed(self) -> WorldPoints:

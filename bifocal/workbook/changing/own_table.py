@@ -20,7 +20,7 @@ from bifocal.workbook.changing.setup_update import (
 )
 from bifocal.workbook.changing.update import refuse_earlier, store_named_cells
 from bifocal.workbook.content import SurveyContent, point_cells, result_cells
-from bifocal.workbook.formulas.columns import FORMULAS, NEAR, ideal_points, pair_points
+from bifocal.workbook.formulas.columns import FORMULAS, NEAR
 from bifocal.workbook.formulas.georeference_values import precision_values
 from bifocal.workbook.formulas.placed_formulas import added_covariance
 from bifocal.workbook.formulas.setup_cells import TITLE_BLOCK, cells_of
@@ -100,14 +100,16 @@ def add_results(
     write_options(editor, content, given)
     write_corrections(editor, content)
     table = survey.table
-    make_numbers(editor, table, lambda key: _typed_factor(table, key))
+    # A unit typed into the cells goes with the text; one of a heading stays.
+    factors, typed = _factors(table), table.typed_units
+    make_numbers(editor, table, lambda key: factors[key] if key in typed else 1.0)
     grid = editor.grid(table.sheet).rows
     own = OwnTable(
         sheet=table.sheet,
         head=head_row(grid, table.columns, table.headings, table.rows[0]),
         rows=table.rows,
         columns=_inputs(table.columns, content),
-        factors=_factors(table),
+        factors={key: factor for key, factor in factors.items() if key not in typed},
     )
     put_result_columns(editor, own, _columns(own, content), mark=MARK)
     return editor.save(target, overwrite=overwrite)
@@ -130,19 +132,9 @@ def _links(editor: WorkbookEditor, survey: SurveyInput, given: Mapping[str, Any]
 
 
 def _factors(table: Table) -> dict[str, float]:
-    """Return what brings the cells of a column to mm or degrees; those with a unit are numbers."""
+    """Return what brings the numbers of a column that has a unit to mm or degrees."""
     scales = {key: TO_DEGREES if key == "theta" else TO_MM for key in table.units}
-    return {
-        key: scales[key].get(unit, 1.0)
-        for key, unit in table.units.items()
-        if key not in table.typed_units
-    }
-
-
-def _typed_factor(table: Table, key: str) -> float:
-    """Return what brings the cells of a column that say their unit themselves to mm or degrees."""
-    scale = TO_DEGREES if key == "theta" else TO_MM
-    return scale.get(table.units[key], 1.0) if key in table.typed_units else 1.0
+    return {key: scales[key].get(unit, 1.0) for key, unit in table.units.items()}
 
 
 def _inputs(columns: Mapping[str, int], content: SurveyContent) -> dict[str, int]:
@@ -156,19 +148,12 @@ def _inputs(columns: Mapping[str, int], content: SurveyContent) -> dict[str, int
 def _columns(table: OwnTable, content: SurveyContent) -> list[ResultColumn]:
     """Return the results: what the formulas need and the table lacks, then the formulas."""
     cells = point_cells(content)
-    corrected = [] if content.setup is None else content.setup.adjusted
-    images = [image for image, matrix in enumerate(corrected, start=1) if matrix is not None]
-    if content.is_pair:
-        described = pair_points(undistorted=content.undistorted, media=content.media_cells)
-    else:
-        described = ideal_points(
-            xy="x1" in table.columns or bool(images),
-            polar="s1" in table.columns,
-            theta="theta" in table.columns,
-            code="code" in table.columns,
-            adjusted=images,
-            media=content.media_cells,
-        )
+    described = content.point_columns(
+        xy="x1" in table.columns or bool(content.corrected),
+        polar="s1" in table.columns,
+        theta="theta" in table.columns,
+        code="code" in table.columns,
+    )
     results = []
     for column in described:
         if column.key in ("id", "use", "code", "note", *NEAR, "o_EN"):

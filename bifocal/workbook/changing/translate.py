@@ -18,19 +18,23 @@ from photocore.workbook.reading.grid import plain_title
 _ELSEWHERE = ("chart_plan", "chart_sigma", "chart_error", "page", "holds", "fails", "Points")
 
 
-def translate(editor: WorkbookEditor, content: SurveyContent, language: str) -> None:
+def translate(
+    editor: WorkbookEditor, built: BookBuilder, content: SurveyContent, language: str
+) -> None:
     """Replace the words of the program by those of another language, wherever they were moved to.
 
     Parameters
     ----------
     editor : WorkbookEditor
         The workbook.
+    built : BookBuilder
+        A new one of the same content.
     content : SurveyContent
         What it holds, with the language wanted.
     language : str
         The language it is in.
     """
-    built, old = build(content), build(replace(content, language=language)).book
+    old = build(replace(content, language=language)).book
     new = built.book
     for name, defined in new.defined_names.items():
         _reword(editor, built, old, name, defined.attr_text)
@@ -69,5 +73,4 @@ def _reword(
         return
     formula = built.book[sheet][cell].value
     if formula != old[sheet][cell].value:
-        value = built.results[sheet].get(cell)
-        editor.put(*own, "" if value is None else value, formula=formula[1:])
+        editor.put(*own, built.results[sheet].get(cell), formula=formula[1:])

@@ -34,7 +34,7 @@ from photocore.workbook.making.live_columns import TEXT_KEYS, row_formula
 from photocore.workbook.making.newbook import RowBlock
 from photocore.workbook.making.print_area import move_print_area
 from photocore.workbook.reading.grid import (
-    TableArea,
+    Value,
     column_letters,
     plain_title,
     split_area,
@@ -164,24 +164,22 @@ def update_book(
     if points is None:
         raise InputError(f"{source}: has lost its table tblPoints; write to a new workbook.")
     check_kind(source, survey, content)
-    other_words = content.language != survey.language
-    if other_words:
-        translate(editor, content, survey.language)
+    if other_words := content.language != survey.language:
+        translate(editor, built, content, survey.language)
     added = add_missing_sheets(editor, built)
     store_named_cells(editor, built, content)
     write_options(editor, content, given)
     write_corrections(editor, content)
-    first = points.area[0] + 1
-    rows = [row - first for row in survey.table.rows]
-    length = max([_length(points), *(row + 1 for row in rows)])
-    _table(editor, built, "tblPoints", rows, length, anew=_corrected(content))
+    rows = [row - points.first for row in survey.table.rows]
+    length = max([points.length, *(row + 1 for row in rows)])
+    anew = ("s1_used", "s2_used", "theta_used", "q") if content.corrected else ()
+    _table(editor, built, "tblPoints", rows, length, anew=anew)
     _table(editor, built, "tblResults", rows, length)
     _print_points(editor, max(rows, default=0) + 1, content.language)
     for name, sheet_rows in (("tblCheck", survey.known_rows), ("tblGeo", survey.control_rows)):
         own = editor.table(name)
         if own is not None:
-            rows_there = [row - own.area[0] - 1 for row in sheet_rows]
-            _table(editor, built, name, rows_there)
+            _table(editor, built, name, [row - own.first for row in sheet_rows])
     for name, key in (("tblPlan", "relief_cm"), ("tblFrame", "share")):
         _fixed_table(editor, built, name, key)
     _verdict(editor, built, content, rules="rules" in given, words=other_words)
@@ -205,17 +203,6 @@ def _print_points(editor: WorkbookEditor, count: int, language: str) -> None:
             editor.put(*place, "", formula=formula, style=stands.style if stands else "")
 
 
-def _corrected(content: SurveyContent) -> Sequence[str]:
-    """Return the columns whose formulas depend on whether coordinates are corrected."""
-    if content.setup is None or all(matrix is None for matrix in content.setup.adjusted):
-        return ()
-    return ("s1_used", "s2_used", "theta_used", "q")
-
-
-def _length(area: TableArea) -> int:
-    return area.area[2] - area.area[0]
-
-
 def store_named_cells(editor: WorkbookEditor, built: BookBuilder, content: SurveyContent) -> None:
     """Store the results of single formulas, found by their names; type what was found."""
     typed = {"g_auto"}
@@ -233,9 +220,11 @@ def store_named_cells(editor: WorkbookEditor, built: BookBuilder, content: Surve
             shown = built.book[sheet][cell].value
             type_value(editor, place, shown if value is None else value)
         elif built.book[sheet][cell].data_type == "f" or name in TYPED_FORMULAS:
-            editor.set_result(*place, _result(value))
+            editor.set_result(*place, value)
         if built.book[sheet][cell].data_type != "f" and name not in typed:
-            _make_number(editor, place, value)
+            is_text = isinstance(editor.value_at(*place), str)
+            if is_text and _is_number(value):
+                editor.set_value(*place, value)
 
 
 def _store_block(editor: WorkbookEditor, results: Mapping[str, CellValue], cells: str) -> None:
@@ -250,18 +239,11 @@ def _store_block(editor: WorkbookEditor, results: Mapping[str, CellValue], cells
         row, column = split_cell(cell)
         if top <= row <= bottom and left <= column <= right:
             at = (row - top + down, column - left + across)
-            editor.set_result(sheet, *at, _result(value))
+            editor.set_result(sheet, *at, value)
 
 
-def _make_number(editor: WorkbookEditor, place: tuple[str, int, int], value: CellValue) -> None:
-    """Turn a number that was typed as text into a number: formulas do not see it otherwise."""
-    is_number = isinstance(value, int | float) and value == value
-    if is_number and isinstance(editor.value_at(*place), str):
-        editor.set_value(*place, value)
-
-
-def _result(value: CellValue) -> CellValue:
-    return "" if value is None else value
+def _is_number(value: CellValue) -> bool:
+    return isinstance(value, int | float) and value == value
 
 
 def _table(
@@ -287,30 +269,32 @@ def _table(
     area, content = editor.table(name), built.tables[name]
     if area is None:
         return
-    headings, first = area.headings(), area.area[0] + 1
-    length = max([length, _length(area), *(row + 1 for row in rows)])
+    headings, first = area.headings(), area.first
+    length = max([length, area.length, *(row + 1 for row in rows)])
     editor.extend(name, area.area[0] + length)
     letters = {key: column_letters(number) for key, number in headings.items()}
-    styles = editor.styles_of(area.sheet, first)
+    styles, stands = editor.styles_of(area.sheet, first), editor.grid(area.sheet).rows
+    nothing: dict[int, Value] = {}
     filled, prepared = [], []
     for column in content.columns:
         if column.key not in headings:
             continue
-        given = content.cells.get(column.key, ())
-        number = headings[column.key]
-        style = styles.get(number, "")
-        if column.kind == "input" and column.key not in TEXT_KEYS:
-            stands = editor.grid(area.sheet).rows
+        given, number = content.cells.get(column.key, ()), headings[column.key]
+        style, is_input = styles.get(number, ""), column.kind == "input"
+        if is_input and column.key not in TEXT_KEYS:
+            # Points given by radial distances get the coordinates that are corrected.
+            completed = bool(anew) and column.key in ("x1", "y1", "x2", "y2")
             for row, value in zip(rows, given, strict=False):
-                if isinstance(stands.get(first + row, {}).get(number), str):
-                    _make_number(editor, (area.sheet, first + row, number), value)
-        if anew and column.kind == "input" and column.key in ("x1", "y1", "x2", "y2"):
-            _complete(editor, (area.sheet, first, number), rows, given)
+                there = stands.get(first + row, nothing).get(number)
+                is_text = isinstance(there, str) and _is_number(value)
+                if is_text or (completed and there is None and value is not None):
+                    editor.set_value(area.sheet, first + row, number, value)
         if column.kind != "formula":
-            prepared.append(NewColumn(number, [None] * (length - _length(area)), style))
-        if column.kind == "input":
+            prepared.append(NewColumn(number, [None] * (length - area.length), style))
+        if is_input:
             continue
-        values = _by_rows(given, rows, length, spare=_result(column.spare))
+        results = dict(zip(rows, given, strict=False))
+        values = [results.get(row, column.spare) for row in range(length)]
         if column.kind == "value":
             typed = [None if value == "" else value for value in values]
             type_column(editor, (area.sheet, first, number), typed)
@@ -320,29 +304,15 @@ def _table(
             for row, value in enumerate(values, start=first):
                 editor.put(area.sheet, row, number, value, formula=text, style=style)
             continue
-        formula: Callable[[int], str] | None = _constant(escape(text))
+        formula: str | Callable[[int], str] | None = escape(text)
         if _lacks(editor, text):
             formula = None
         elif length > STRUCTURED_ROWS:
-            formula = _escaped(short_formula(area.name, column.formula, letters, area.area[0]))
-        filled.append(NewColumn(number, values, style, formula))
+            formula = short_formula(area.name, escape(column.formula), letters, area.area[0])
+        shown = ["" if value is None else value for value in values]
+        filled.append(NewColumn(number, shown, style, formula))
     editor.fill_rows(area.sheet, first, filled)
-    editor.fill_rows(area.sheet, first + _length(area), prepared)
-
-
-def _by_rows(
-    given: Sequence[CellValue], rows: Sequence[int], length: int, *, spare: CellValue
-) -> list[CellValue]:
-    """Return the values of a column of a table, those of its blank rows too."""
-    values = [spare] * length
-    count = min(len(rows), len(given))
-    if count and rows[0] >= 0 and [*rows[:count]] == [*range(rows[0], rows[0] + count)]:
-        values[rows[0] : rows[0] + count] = ["" if v is None else v for v in given[:count]]
-        return values[:length]
-    for row, value in zip(rows, given, strict=False):
-        if 0 <= row < length:
-            values[row] = _result(value)
-    return values
+    editor.fill_rows(area.sheet, first + area.length, prepared)
 
 
 def _lacks(editor: WorkbookEditor, formula: str) -> bool:
@@ -354,41 +324,15 @@ def _lacks(editor: WorkbookEditor, formula: str) -> bool:
     return False
 
 
-def _complete(
-    editor: WorkbookEditor,
-    place: tuple[str, int, int],
-    rows: Sequence[int],
-    values: Sequence[CellValue],
-) -> None:
-    """Type coordinates where there are none, of points given by radial distances."""
-    sheet, first, column = place
-    grid = editor.grid(sheet).rows
-    for row, value in zip(rows, values, strict=False):
-        if grid.get(first + row, {}).get(column) is None and value is not None:
-            editor.set_value(sheet, first + row, column, value)
-
-
-def _constant(text: str) -> Callable[[int], str]:
-    """Return a function of the row that is the same formula in all."""
-    return lambda _: text
-
-
-def _escaped(formula: Callable[[int], str]) -> Callable[[int], str]:
-    return lambda row: escape(formula(row))
-
-
 def _fixed_table(editor: WorkbookEditor, built: BookBuilder, name: str, key: str) -> None:
     """Store the results of a table whose rows are given, where the user left them so."""
     area, content = editor.table(name), built.tables[name]
     if area is None:
         return
-    headings = area.headings()
-    given = content.cells[key]
-    grid = editor.grid(area.sheet).rows
-    if key not in headings or _length(area) != len(given):
+    headings, given, grid = area.headings(), content.cells[key], editor.grid(area.sheet).rows
+    if key not in headings or area.length != len(given):
         return
-    first = area.area[0] + 1
-    stand = [grid.get(first + i, {}).get(headings[key]) for i in range(len(given))]
+    stand = [grid.get(area.first + i, {}).get(headings[key]) for i in range(len(given))]
     if stand == [float(value or 0) for value in given]:
         _table(editor, built, name, range(len(given)))
 
@@ -406,28 +350,27 @@ def _verdict(
     area, wanted = editor.table("tblVerdict"), built.tables["tblVerdict"]
     if area is None or not {"tolerance", "verdict"} <= area.headings().keys():
         return
-    headings, first, grid = area.headings(), area.area[0] + 1, editor.grid(area.sheet).rows
+    headings, first, grid = area.headings(), area.first, editor.grid(area.sheet).rows
     accuracy = content.check.accuracy if content.check is not None else math.nan
     holds, fails = word("holds", content.language), word("fails", content.language)
     formula = row_formula(area.name, wanted.columns[-1].formula)[1:]
     count = len(wanted.cells["rule"]) if rules else 0
-    length = max(_length(area), count)
-    style = editor.styles_of(area.sheet, first)
+    length = max(area.length, count)
+    style = editor.styles_of(area.sheet, first).get(headings["verdict"], "")
     for i in range(length):
         row = first + i
         tolerance = grid.get(row, {}).get(headings["tolerance"])
         if rules:
             asked = {key: wanted.cells[key][i] if i < count else None for key in headings}
-            tolerance = asked.pop("tolerance")
-            asked.pop("verdict")
-            for key, value in (asked | {"tolerance": tolerance}).items():
-                type_value(editor, (area.sheet, row, headings[key]), value)
+            tolerance = asked["tolerance"]
+            for key in asked.keys() - {"verdict"}:
+                type_value(editor, (area.sheet, row, headings[key]), asked[key])
         result = ""
         if isinstance(tolerance, int | float) and not math.isnan(accuracy):
             result = holds if accuracy <= tolerance / 1000 else fails
         place = (area.sheet, row, headings["verdict"])
         if rules or words:
-            editor.put(*place, result, formula=formula, style=style.get(headings["verdict"], ""))
+            editor.put(*place, result, formula=formula, style=style)
         else:
             editor.set_result(*place, result)
     editor.extend(area.name, area.area[0] + length)
@@ -455,14 +398,12 @@ def _log(editor: WorkbookEditor, content: SurveyContent) -> None:
     if area is None or not content.log:
         return
     headings = area.headings()
-    entry: Mapping[str, str] = dict(
-        zip(("time", "program", "what", "file", "sha256"), content.log[-1], strict=True)
-    )
+    told = zip(("time", "program", "what", "file", "sha256"), content.log[-1], strict=True)
+    entry = {key: value for key, value in told if key in headings}
     cells = editor.grid(area.sheet).rows
     _, left, bottom, right = area.area
     if not any(column in cells.get(bottom, {}) for column in range(left, right + 1)):
         for key, value in entry.items():
-            if key in headings:
-                editor.set_value(area.sheet, bottom, headings[key], value)
+            editor.set_value(area.sheet, bottom, headings[key], value)
         return
-    editor.append_rows("tblLog", [{key: entry[key] for key in entry if key in headings}])
+    editor.append_rows("tblLog", [entry])

@@ -12,9 +12,8 @@ from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import KnownPoints
 from bifocal.survey.survey_input import SurveyInput, where_of, with_measured
-from bifocal.workbook.reading.setup_reader import LARGEST, is_general, read_setup
+from bifocal.workbook.reading.setup_reader import LARGEST, OpenSurvey, is_general, read_setup
 from bifocal.workbook.words import LANGUAGES, headings, word
-from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import (
     Column,
@@ -24,7 +23,6 @@ from photocore.tables import (
     read_named_values,
     read_table,
 )
-from photocore.tables.csvread import CsvFile
 from photocore.tables.headings import bare
 from photocore.tables.model import Kind
 from photocore.tables.numbers import Decimal
@@ -142,15 +140,15 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
         If the file or a sheet cannot be used at all.
     """
     options = options or ReadOptions()
-    book = open_tables(path)
-    errors: list[CellError] = []
-    table = _read_points(book, options, errors)
+    survey = OpenSurvey(open_tables(path), options.decimal, options.given)
+    book, errors = survey.book, survey.errors
+    table = _read_points(survey, options)
     _require_coordinates(table, book, path)
     points, unit = _observations(table, errors)
     sheets = book if isinstance(book, SheetFile) else None
-    setup = read_setup(book, options.decimal, errors, options.given)
-    check = _known(book, "Check", ("X_ref", "Y_ref", "Z_ref"), errors, options.decimal)
-    control = _known(book, "Georeference", ("E", "N", "H"), errors, options.decimal)
+    setup = read_setup(survey)
+    check = _known(survey, "Check", ("X_ref", "Y_ref", "Z_ref"))
+    control = _known(survey, "Georeference", ("E", "N", "H"))
     parts = (table, setup, check, control)
     model, language, is_ours = "auto", "en", False
     if sheets is not None:
@@ -182,14 +180,9 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
     )
 
 
-def _known(
-    book: SheetFile | CsvFile,
-    sheet: str,
-    keys: tuple[str, str, str],
-    errors: list[CellError],
-    decimal: Decimal | None,
-) -> _KnownTable:
+def _known(survey: OpenSurvey, sheet: str, keys: tuple[str, str, str]) -> _KnownTable:
     """Return check or control points of the sheet made for them; nothing where it is absent."""
+    book, errors = survey.book, survey.errors
     if not isinstance(book, SheetFile):
         return _KnownTable()
     names = {bare(sheet), bare(f"tbl{sheet}"), "tblgeo" if sheet == "Georeference" else ""}
@@ -202,7 +195,7 @@ def _known(
         [_understood(key, required=key == "id") for key in ("id", *keys, "use")],
         name="Geo" if sheet == "Georeference" and areas else sheet,
         sheet=areas[0].sheet if areas else titles[0],
-        decimal=decimal,
+        decimal=survey.decimal,
         errors=errors,
     )
     faulty = {(error.sheet, error.cell) for error in errors}
@@ -238,8 +231,9 @@ def _typed_as_text(cells: Sequence[str]) -> list[str]:
     ]
 
 
-def _read_points(book: SheetFile | CsvFile, options: ReadOptions, errors: list[CellError]) -> Table:
+def _read_points(survey: OpenSurvey, options: ReadOptions) -> Table:
     """Return the table of points; headings that both photos share are the last resort."""
+    book = survey.book
     # In the workbook of a general pair x1..y2 are formulas that follow from the raw pixels.
     general = isinstance(book, SheetFile) and is_general(book)
     followed = {*_XY, *_POLAR} if general else set()
@@ -252,7 +246,7 @@ def _read_points(book: SheetFile | CsvFile, options: ReadOptions, errors: list[C
                 [c for c in point_columns(shared=shared) if c.key not in followed],
                 name="Points",
                 sheet=options.sheet,
-                decimal=options.decimal,
+                decimal=survey.decimal,
                 column_map=options.columns or None,
                 visible_only=options.visible_only,
                 errors=complaints,
@@ -264,7 +258,7 @@ def _read_points(book: SheetFile | CsvFile, options: ReadOptions, errors: list[C
         given = table.present & {*_XY, *_PIXELS, "s1", "s2"}
         if last or (given and (not shared or table.present.issuperset(shared))):
             break
-    errors += complaints
+    survey.errors.extend(complaints)
     for key in followed:
         table.values[key] = np.full(len(table), np.nan)
     return table
@@ -312,7 +306,6 @@ def _observations(table: Table, errors: list[CellError]) -> tuple[PointObservati
     ids = table.texts("id")
     if "id" not in table.present:
         ids = [str(number) for number in range(1, len(table) + 1)]
-    ids = [name or "" for name in ids]
     said = bare(table.headings.get("theta", "")) in ("angle", "angolo", "winkel")
     if said and len(table) and "s1" in table.present and "x1" not in table.present:
         about = {"cell": table.cell(0, "theta"), "heading": table.headings["theta"]}
@@ -320,30 +313,15 @@ def _observations(table: Table, errors: list[CellError]) -> tuple[PointObservati
     errors += table.repeated("id")
     errors += table.too_large((*_XY, *_POLAR, *_PIXELS, "r_measured"), LARGEST)
     use = table.numbers("use")
-    used: BoolArray = np.isnan(use) | (use != 0)
     unit, factor = _unit_of_xy(table, errors)
     units = dict(zip(_POLAR, (TO_MM, TO_MM, TO_DEGREES), strict=True))
     units |= {key: {"px": 1.0} for key in _PIXELS} | {"r_measured": _TO_M}
     columns = {key: table.in_unit(key, factors, errors) for key, factors in units.items()}
     columns |= {key: table.numbers(key) * factor for key in _XY}
-    xy, polar, pixels = (
-        np.stack([columns[key] for key in keys], axis=-1) for keys in (_XY, _POLAR, _PIXELS)
-    )
-    _check_rows(table, ids, used, xy, polar, pixels, faulty, errors)
-    if errors:
-        ids = [name or f"row {row}" for name, row in zip(ids, table.rows, strict=True)]
-    points = PointObservations(
-        ids=tuple(ids),
-        xy1=xy[:, :2],
-        xy2=xy[:, 2:],
-        polar=polar,
-        pixels1=pixels[:, :2],
-        pixels2=pixels[:, 2:],
-        use=used,
-        code=tuple(table.texts("code")),
-        note=tuple(table.texts("note")),
-        r_measured=columns["r_measured"],
-    )
+    texts = {"id": ids, "code": table.texts("code"), "note": table.texts("note")}
+    used = np.isnan(use) | (use != 0)
+    points = PointObservations.from_columns({**texts, "use": used, **columns})
+    _check_rows(table, points, faulty, errors)
     return points, unit
 
 
@@ -384,18 +362,16 @@ def _unit_of_xy(table: Table, errors: list[CellError]) -> tuple[str, float]:
 
 def _check_rows(
     table: Table,
-    ids: Sequence[str],
-    used: BoolArray,
-    xy: FloatArray,
-    polar: FloatArray,
-    pixels: FloatArray,
+    points: PointObservations,
     faulty: set[tuple[str, str]],
     errors: list[CellError],
 ) -> None:
     """Complain about points without a name, measured on one photo only, or with s <= 0."""
+    ids, used, polar = points.ids, points.use, points.polar
     for row in range(len(table)):
         if used[row] and not ids[row] and (table.cell(row, "id"), "id") not in faulty:
             errors.append(table.error(row, "id", "the point has no name; give it one."))
+    xy, pixels = np.hstack([points.xy1, points.xy2]), np.hstack([points.pixels1, points.pixels2])
     groups = ((_XY, xy), (_PIXELS, pixels), (("s1", "s2"), polar[:, :2]))
     for keys, values in groups:
         given = ~np.isnan(values)
@@ -408,18 +384,14 @@ def _check_rows(
             if any((table.cell(row, key), key) in faulty for key in lacking):
                 continue  # its own complaint stands already
             errors.append(table.error(row, lacking[0], _incomplete(ids[row], keys, lacking)))
-    if "s1" in table.present or "s2" in table.present:
-        for i, key in enumerate(("s1", "s2")):
-            for row in np.flatnonzero(used & (polar[:, i] <= 0)).tolist():
-                errors.append(
-                    table.error(
-                        row,
-                        key,
-                        f"{polar[row, i]:g} mm at point {ids[row]}: a radial distance must be "
-                        "above zero; at the nadir itself there is no relief to measure. Set use = "
-                        "0 or measure it again.",
-                    )
-                )
+    for i, key in enumerate(("s1", "s2")):
+        for row in np.flatnonzero(used & (polar[:, i] <= 0)).tolist():
+            message = (
+                f"{polar[row, i]:g} mm at point {ids[row]}: a radial distance must be above zero; "
+                "at the nadir itself there is no relief to measure. Set use = 0 or measure it "
+                "again."
+            )
+            errors.append(table.error(row, key, message))
 
 
 def _incomplete(name: str, keys: Sequence[str], lacking: Sequence[str]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -52,25 +52,31 @@ LARGEST = 1e9
 _AGREE = 0.0015
 
 
-def read_setup(
-    book: SheetFile | CsvFile,
-    decimal: Decimal | None,
-    errors: list[CellError],
-    given: Collection[str],
-) -> SurveySetup:
-    """Return the values of `Setup`.
+@dataclass(frozen=True, slots=True)
+class OpenSurvey:
+    """A survey's file, open to be read.
 
-    Parameters
+    Attributes
     ----------
     book : SheetFile or CsvFile
-        The open workbook, or a text table, which has no set-up.
-    decimal : str or None
+        The workbook, or a text table, which has no other sheets and no set-up.
+    decimal : {"point", "comma"} or None
         Decimal separator of numbers typed as text.
-    errors : list
-        Takes the complaints.
     given : collection of str
         Cells that options replace, by their names; ``pair`` replaces them all.
+    errors : list of CellError
+        Takes the complaints.
     """
+
+    book: SheetFile | CsvFile
+    decimal: Decimal | None = None
+    given: Collection[str] = ()
+    errors: list[CellError] = field(default_factory=list)
+
+
+def read_setup(survey: OpenSurvey) -> SurveySetup:
+    """Return the values of `Setup`, complaining about what cannot be meant."""
+    book, decimal, given = survey.book, survey.decimal, survey.given
     if not isinstance(book, SheetFile):
         return SurveySetup(where=book.label)
     complaints: list[CellError] = []
@@ -98,7 +104,7 @@ def read_setup(
     unit = _unit(values, told)
     # What options replace may hold anything, as all beside another pair that is not our workbook.
     is_idle = "pair" in given and "d_1" not in book.names
-    errors += [] if is_idle else [error for error in told if error.column not in given]
+    survey.errors.extend(e for e in told if not is_idle and e.column not in given)
     matrices, nadirs = _general(values)
     return SurveySetup(
         taking=_stated(

@@ -229,14 +229,14 @@ class NewColumn(NamedTuple):
         One per row; None leaves the cell empty (or its formula without result).
     style : str
         Index of the cell format as text.
-    formula : callable, optional
-        Returns the formula of a row by its number, as `escape` leaves it.
+    formula : str or callable, optional
+        The formula of all rows, or what returns that of a row by its number, as `escape` leaves it.
     """
 
     column: int
     values: Sequence[CellValue]
     style: str = ""
-    formula: Callable[[int], str] | None = None
+    formula: str | Callable[[int], str] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -282,7 +282,7 @@ class NewRows:
         columns = []
         for column, values, style, formula in self.columns:
             names = [f"{column_letters(column)}{row}" for row in rows]
-            formulas = map(formula, rows) if formula else repeat("")
+            formulas = map(formula, rows) if callable(formula) else repeat(formula or "")
             others = repeat(prefix), repeat(style)
             columns.append(map(cell_xml, names, values[part], formulas, *others))
         return map("".join, zip(*columns, strict=True))

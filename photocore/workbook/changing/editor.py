@@ -129,9 +129,10 @@ class WorkbookEditor:
     def set_result(self, title: str, row: int, column: int, value: CellValue) -> None:
         """Store the result of a cell's formula; a cell without formula is left alone.
 
-        NaN is stored as the error value #N/A.
+        NaN is stored as the error value #N/A, None as an empty text.
         """
-        self._changes(title).cached.setdefault(row, {})[column] = value
+        shown = "" if value is None else value
+        self._changes(title).cached.setdefault(row, {})[column] = shown
 
     def set_results(
         self, title: str, first_row: int, columns: Mapping[int, ArrayLike | Sequence[CellValue]]
@@ -172,13 +173,14 @@ class WorkbookEditor:
         row, column : int
             Where.
         value : float, int, str, bool or None
-            The value, or the result of the formula.
+            The value, or the result of the formula: an empty text for None.
         formula : str
             English names, comma as separator, without the equals sign.
         style : str
             Index of the format for a cell that has none; an own format stays.
         """
-        cell = NewCell(value, escape(formula), style, "over")
+        shown = "" if formula and value is None else value
+        cell = NewCell(shown, escape(formula), style, "over")
         self._changes(title).placed.setdefault(row, {})[column] = cell
 
     def fill_rows(self, title: str, first: int, columns: Sequence[NewColumn]) -> None:

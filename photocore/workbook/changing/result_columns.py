@@ -140,8 +140,7 @@ def put_result_columns(
         pieces = _pieces(column.formula, table, places)
         for row, value in zip(table.rows, column.values, strict=True):
             text = str(row).join(pieces) if column.formula else ""
-            shown = "" if value is None and text else value
-            editor.put(table.sheet, row, number, shown, formula=text, style=style)
+            editor.put(table.sheet, row, number, value, formula=text, style=style)
     span = [places[column.key] for column in columns]
     area = ":".join(_absolute(head, number) for number in (min(span), max(span)))
     editor.define(mark, f"{quoted_title(table.sheet)}!{area}")

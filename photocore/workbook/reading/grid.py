@@ -102,6 +102,16 @@ class TableArea:
     part: str = ""
     columns: tuple[str, ...] = ()
 
+    @property
+    def first(self) -> int:
+        """The row below the headings."""
+        return self.area[0] + 1
+
+    @property
+    def length(self) -> int:
+        """Rows below the headings."""
+        return self.area[2] - self.area[0]
+
     def headings(self) -> dict[str, int]:
         """Return the column number of each heading."""
         return dict(zip(self.columns, range(self.area[1], self.area[3] + 1), strict=False))
