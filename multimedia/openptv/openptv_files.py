@@ -85,10 +85,10 @@ def read_control(path: Path) -> ControlParameters:
             "pixel width", "pixel height", "field flag", "index of air", "index of glass",
             "index of water", "glass thickness")  # fmt: skip
     values = [_number(path, lines, first + k, name) for k, name in enumerate(what)]
-    width, height, pitch = int(values[3]), int(values[4]), values[5:7]
-    if max(pitch) > 0.2:
+    width, height, side = int(values[3]), int(values[4]), values[5:7]
+    if max(side) > 0.2:
         raise InputError(
-            f"{path}, line {first + 6}: a pixel of {pitch[0]:g} x {pitch[1]:g} mm is no camera's; "
+            f"{path}, line {first + 6}: a pixel of {side[0]:g} x {side[1]:g} mm is no camera's; "
             "expected some 0.002 to 0.03 mm. Is it in micrometres?"
         )
     return ControlParameters(
@@ -97,7 +97,7 @@ def read_control(path: Path) -> ControlParameters:
         sensor=Sensor(
             width=width,
             height=height,
-            pixel_size=np.array(pitch),
+            pixel_size=np.array(side),
             origin=np.array([width, height]) / 2,
         ),
         field=int(values[7]),
