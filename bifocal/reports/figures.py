@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,14 @@ from bifocal.model.relief_map import Quality, ReliefMap
 from bifocal.reports.content import SIDE, PairContent, ReportedPhoto
 from photocore.arrays import FloatArray
 from photocore.reports.words import Words
+from photocore.textfile import packaged
 
 #: Place of the axes in a figure, with and without room for a colour bar; of the bar.
 _WIDE, _BESIDE, _BAR = (0.08, 0.1, 0.9, 0.87), (0.08, 0.1, 0.78, 0.87), (0.885, 0.16, 0.022, 0.72)
 #: Grey of what is unknown.
 _UNKNOWN = "0.8"
+
+_styles = cache(partial(packaged, __package__, "styles"))
 
 
 def ratio_of(bounds: Bounds) -> float:
@@ -54,11 +58,7 @@ def draw_plan(figure: Any, content: PairContent, say: Words) -> None:
         ends += [left, right, x]
         name = say("far") if number == 1 else say("near")
         axes.plot([x], [d], marker="^", color="black", ms=9)
-        axes.annotate(
-            f"{name}\nd{number} = {d:.3f} m", (x, d), (10, -4), textcoords="offset points",
-            fontsize=8, va="center",
-            bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none"},
-        )  # fmt: skip
+        axes.annotate(f"{name}\nd{number} = {d:.3f} m", (x, d), **_styles()["station"])
     first = (float(pair.image1.nadir[0]), pair.image1.distance)
     zoom = float(pair.zoom_centre[0])
     low, high = min(ends), max(ends)
@@ -153,65 +153,45 @@ def _label(axes: Any, text: str, at: tuple[float, float], *, at_right: bool) -> 
     """Write a name beside a point; to the left of one at the right edge."""
     from matplotlib.patheffects import withStroke
 
-    axes.annotate(
-        text, at, (-5 if at_right else 5, 5), textcoords="offset points", fontsize=7,
-        ha="right" if at_right else "left", color="yellow",
-        path_effects=[withStroke(linewidth=1.6, foreground="black")],
-    )  # fmt: skip
+    side, away = ("right", -5) if at_right else ("left", 5)
+    rim = [withStroke(linewidth=1.6, foreground="black")]
+    axes.annotate(text, at, (away, 5), ha=side, path_effects=rim, **_styles()["point_name"])
 
 
 def draw_relief(figure: Any, content: PairContent, say: Words) -> None:
     """Draw the relief in diverging colours about the wall, interpolated parts lightly hatched."""
-    relief = content.relief
-    assert relief is not None
-    part = _reduced(relief)
+    axes, part, bounds = _map_axes(figure, content)
+    extent = _extent(bounds)
     reach = max(float(np.nanpercentile(np.abs(part.r), 98)), 1e-3)
-    axes = _plane_axes(figure, relief.bounds, _BESIDE)
-    axes.set_facecolor(_UNKNOWN)
-    image = axes.imshow(
-        part.r, extent=_extent(relief.bounds), cmap="RdBu_r", vmin=-reach, vmax=reach,
-        interpolation="nearest",
-    )  # fmt: skip
+    image = axes.imshow(part.r, extent=extent, vmin=-reach, vmax=reach, **_styles()["relief"])
     guessed = (part.quality > Quality.MEASURED) & np.isfinite(part.r)
     if guessed.any() and not guessed.all():
-        # Dots let the colours through; a filled contour keeps them vector.
-        axes.contourf(
-            guessed.astype(float), levels=[0.5, 1.5], hatches=["...."], colors="none",
-            extent=_extent(relief.bounds), origin="upper", alpha=0.0,
-        )  # fmt: skip
+        axes.contourf(guessed.astype(float), extent=extent, **_styles()["guessed"])
     bar = _colour_bar(figure, image, say("relief_axis"), extend="both")
     bar.axhline(0, color="black", lw=1)
-    _scale_bar(axes, relief.bounds)
+    _scale_bar(axes, bounds)
 
 
 def draw_sigma(figure: Any, content: PairContent, say: Words, limit: float) -> None:
     """Draw the standard deviation of the relief and the border of the area of uncertainty."""
     from matplotlib.colors import LogNorm
 
-    relief = content.relief
-    assert relief is not None
-    part = _reduced(relief)
+    axes, part, bounds = _map_axes(figure, content)
+    extent = _extent(bounds)
     sigma = 1000.0 * np.where(part.quality == Quality.MEASURED, part.sigma, np.nan)
     good = np.isfinite(sigma) & (sigma > 0)
-    axes = _plane_axes(figure, relief.bounds, _BESIDE)
-    axes.set_facecolor(_UNKNOWN)
     if good.any():
         low, high = np.percentile(sigma[good], [2, 98])
-        image = axes.imshow(
-            sigma, extent=_extent(relief.bounds), cmap="cividis",
-            norm=LogNorm(max(low, 0.01), max(high, 1.5 * low, 0.02)), interpolation="nearest",
-        )  # fmt: skip
+        norm = LogNorm(max(low, 0.01), max(high, 1.5 * low, 0.02))
+        image = axes.imshow(sigma, extent=extent, norm=norm, **_styles()["sigma"])
         _colour_bar(figure, image, say("sigma_axis"), extend="both")
         if (sigma[good] > 1000 * limit).any() and (sigma[good] < 1000 * limit).any():
-            axes.contour(
-                np.where(good, sigma, np.nan), levels=[1000 * limit], colors="red", linewidths=1.2,
-                extent=_extent(relief.bounds), origin="upper",
-            )  # fmt: skip
+            known = np.where(good, sigma, np.nan)
+            axes.contour(known, levels=[1000 * limit], extent=extent, **_styles()["limit"])
     x, y = content.pair.zoom_centre
-    x_min, y_min, x_max, y_max = relief.bounds
-    if x_min <= x <= x_max and y_min <= y <= y_max:
+    if len(_inside(np.array([[x, y]]), bounds)):
         axes.plot([x], [y], "x", color="red", ms=10, mew=2)
-    _scale_bar(axes, relief.bounds)
+    _scale_bar(axes, bounds)
 
 
 def draw_errors(figure: Any, content: PairContent, say: Words) -> None:
@@ -228,15 +208,10 @@ def draw_errors(figure: Any, content: PairContent, say: Words) -> None:
         axes.set(xlim=bounds[::2], ylim=bounds[1::2])
     zoom = error_zoom(content)
     reach = max(float(np.abs(errors[:, 2]).max(initial=0.0)), 1e-4) * 1000
-    dots = axes.scatter(
-        places[:, 0], places[:, 1], c=errors[:, 2] * 1000, cmap="RdBu_r", vmin=-reach, vmax=reach,
-        s=34, edgecolors="black", linewidths=0.8, zorder=3,
-    )  # fmt: skip
+    colours = {"c": errors[:, 2] * 1000, "vmin": -reach, "vmax": reach}
+    dots = axes.scatter(*places[:, :2].T, **colours, **_styles()["error"])
     if {"X", "Y"} & {*compared_axes(content)}:
-        axes.quiver(
-            places[:, 0], places[:, 1], errors[:, 0] * zoom, errors[:, 1] * zoom, angles="xy",
-            scale_units="xy", scale=1, width=0.004, color="black", zorder=4,
-        )  # fmt: skip
+        axes.quiver(*places[:, :2].T, *zoom * errors[:, :2].T, **_styles()["error_arrow"])
     _colour_bar(figure, dots, say("error_of"))
     _scale_bar(axes, bounds)
 
@@ -266,10 +241,8 @@ def error_bounds(content: PairContent) -> Bounds:
     places = places[np.isfinite(places).all(axis=1)]
     low, high = places.min(axis=0), places.max(axis=0)
     margin = 0.12 * max(float((high - low).max()), 0.1)
-    return (
-        float(low[0] - margin), float(low[1] - margin),
-        float(high[0] + margin), float(high[1] + margin),
-    )  # fmt: skip
+    left, bottom, right, top = np.r_[low - margin, high + margin].tolist()
+    return left, bottom, right, top
 
 
 def draw_histogram(figure: Any, content: PairContent, say: Words) -> None:
@@ -296,10 +269,17 @@ def _reduced(relief: ReliefMap) -> ReliefMap:
     step = max(1, -(-max(relief.shape) // SIDE))
     cut = np.s_[::step, ::step]
     matrix = relief.plane_from_pixel @ np.diag([step, step, 1.0])
-    return ReliefMap(
-        r=relief.r[cut], sigma=relief.sigma[cut], quality=relief.quality[cut],
-        plane_from_pixel=matrix,
-    )  # fmt: skip
+    r, sigma, quality = relief.r[cut], relief.sigma[cut], relief.quality[cut]
+    return ReliefMap(r=r, sigma=sigma, quality=quality, plane_from_pixel=matrix)
+
+
+def _map_axes(figure: Any, content: PairContent) -> tuple[Any, ReliefMap, Bounds]:
+    """Return axes for the relief map with room for a colour bar, the map reduced, its bounds."""
+    relief = content.relief
+    assert relief is not None
+    axes = _plane_axes(figure, relief.bounds, _BESIDE)
+    axes.set_facecolor(_UNKNOWN)
+    return axes, _reduced(relief), relief.bounds
 
 
 def _plane_axes(figure: Any, bounds: Bounds, place: tuple[float, float, float, float]) -> Any:
@@ -337,10 +317,7 @@ def _scale_bar(axes: Any, bounds: Bounds) -> None:
     x, y = x_min + 0.03 * (x_max - x_min), y_min + 0.035 * (y_max - y_min)
     for colour, width in (("white", 6.0), ("black", 3.0)):
         axes.plot([x, x + length], [y, y], color=colour, lw=width, solid_capstyle="butt", zorder=5)
-    axes.annotate(
-        f"{length:g} m", (x + length / 2, y), (0, 4), textcoords="offset points", ha="center",
-        fontsize=8, zorder=6, bbox={"boxstyle": "round,pad=0.1", "fc": "white", "ec": "none"},
-    )  # fmt: skip
+    axes.annotate(f"{length:g} m", (x + length / 2, y), **_styles()["bar_length"])
 
 
 def tilt_of(photo: Photo, seen: ReportedPhoto) -> float:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from xml.etree import ElementTree
+from xml.etree.ElementTree import SubElement
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from multimedia.exchange.opencv_camera import OpencvCamera, camera_of, digits, l
 from multimedia.media.camera import Camera
 from multimedia.projects.model import Project
 from photocore.arrays import FloatArray
+from photocore.camera.fisheye import TERMS
 from photocore.camera.lensformats import LensData, metashape_lens, xml_root
 from photocore.camera.rotation import checked_rotation, nearest_rotation
 from photocore.errors import LARGEST, InputError
@@ -23,6 +25,8 @@ from photocore.output import atomic_path
 from photocore.textfile import read_text
 
 _KIND = "Metashape file"
+#: The chunk's transform where it has none: its frame is the world's.
+_FRAME = dict[str, FloatArray](rotation=np.eye(3), translation=np.zeros(3), scale=np.ones(1))
 #: Printed matrices have at least so many digits.
 _PRINTED = 1e-5
 
@@ -39,9 +43,8 @@ def read_metashape(path: Path, *, pitch: float, unit: str) -> Project:
     chunk = root if root.tag == "chunk" else root.find(".//chunk")
     if chunk is None:
         raise InputError(f"{path}: holds no chunk; export the cameras as Agisoft XML.")
-    lenses: dict[str, LensData | str] = {}
-    for sensor in chunk.findall("./sensors/sensor"):
-        lenses[sensor.get("id", "")] = _lens(sensor, path)
+    sensors = chunk.findall("./sensors/sensor")
+    lenses = {sensor.get("id", ""): _lens(sensor, path) for sensor in sensors}
     rotation, translation, scale = _world_from_chunk(chunk, path)
     cameras: list[Camera] = []
     remarks: list[str] = []
@@ -73,22 +76,18 @@ def write_metashape(path: Path, project: Project, *, overwrite: bool = False) ->
     """Write the cameras of a project; return what is not exactly as in the project."""
     views = {camera.name: opencv_of(camera) for camera in project.cameras}
     document = ElementTree.Element("document", version="2.0.0")
-    chunk = ElementTree.SubElement(document, "chunk", label=project.name or "multimedia")
-    sensors = ElementTree.SubElement(chunk, "sensors")
-    cameras = ElementTree.SubElement(chunk, "cameras")
+    chunk = SubElement(document, "chunk", label=project.name or "multimedia")
+    sensors, cameras = SubElement(chunk, "sensors"), SubElement(chunk, "cameras")
     for number, (name, view) in enumerate(views.items()):
         _add_sensor(sensors, number, name, view)
-        camera = ElementTree.SubElement(
-            cameras, "camera", id=str(number), sensor_id=str(number), label=name
-        )
+        camera = SubElement(cameras, "camera", id=str(number), sensor_id=str(number), label=name)
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = view.rotation.T, -view.rotation.T @ view.translation
-        ElementTree.SubElement(camera, "transform").text = digits(matrix.ravel())
+        SubElement(camera, "transform").text = digits(matrix.ravel())
     # The chunk's frame is the project's.
-    transform = ElementTree.SubElement(chunk, "transform")
-    ElementTree.SubElement(transform, "rotation").text = digits(np.eye(3).ravel())
-    ElementTree.SubElement(transform, "translation").text = digits(np.zeros(3))
-    ElementTree.SubElement(transform, "scale").text = "1"
+    transform = SubElement(chunk, "transform")
+    for key, default in _FRAME.items():
+        SubElement(transform, key).text = digits(default.ravel())
     ElementTree.indent(document)
     with atomic_path(path, overwrite=overwrite) as temporary:
         content = ElementTree.tostring(document, encoding="unicode")
@@ -101,24 +100,19 @@ def _add_sensor(parent: ElementTree.Element, number: int, name: str, view: Openc
     """Add the sensor of a camera with its calibration."""
     (width, height), d = view.size, view.coefficients
     kind = "fisheye" if view.fisheye else "frame"
-    sensor = ElementTree.SubElement(parent, "sensor", id=str(number), label=name, type=kind)
+    sensor = SubElement(parent, "sensor", id=str(number), label=name, type=kind)
     size = {"width": str(width), "height": str(height)}
-    ElementTree.SubElement(sensor, "resolution", size)
-    node = ElementTree.SubElement(sensor, "calibration", {"type": kind, "class": "adjusted"})
-    ElementTree.SubElement(node, "resolution", size)
+    SubElement(sensor, "resolution", size)
+    node = SubElement(sensor, "calibration", {"type": kind, "class": "adjusted"})
+    SubElement(node, "resolution", size)
     fx, fy = view.matrix[0, 0], view.matrix[1, 1]
     cx, cy = view.matrix[:2, 2] + 0.5 - np.array(view.size) / 2
     # p1 and p2 are exchanged against OpenCV's, see `photocore.camera.lensformats`.
-    values = {"f": fy, "cx": cx, "cy": cy, "b1": fx - fy}
-    keys, terms = ["k1", "k2", "k3", "p1", "p2"], d
-    if view.fisheye:
-        keys = ["k1", "k2", "k3", "k4"]
-    else:
-        terms = d[[0, 1, 4, 3, 2]]
-    values |= dict(zip(keys, terms.tolist(), strict=True))
-    for key, value in values.items():
+    keys, terms = ("k1", "k2", "k3", "p1", "p2"), d if view.fisheye else d[[0, 1, 4, 3, 2]]
+    named = zip(TERMS if view.fisheye else keys, terms.tolist(), strict=True)
+    for key, value in {"f": fy, "cx": cx, "cy": cy, "b1": fx - fy, **dict(named)}.items():
         if value or key in ("f", "cx", "cy"):
-            ElementTree.SubElement(node, key).text = f"{value:.17g}"
+            SubElement(node, key).text = f"{value:.17g}"
 
 
 def _lens(sensor: ElementTree.Element, path: Path) -> LensData | str:
@@ -128,9 +122,9 @@ def _lens(sensor: ElementTree.Element, path: Path) -> LensData | str:
         return f"is of the type {kind}; projects hold frame cameras and fisheyes"
     nodes = sensor.findall("calibration")
     best = [node for node in nodes if node.get("class") == "adjusted"] or nodes
-    return (
-        metashape_lens(best[0], path, fisheye=kind == "fisheye") if best else "has no calibration"
-    )
+    if not best:
+        return "has no calibration"
+    return metashape_lens(best[0], path, fisheye=kind == "fisheye")
 
 
 def _world_from_chunk(
@@ -143,12 +137,10 @@ def _world_from_chunk(
         node = found[0] if len(found) == 1 else None
     if node is None:
         return np.eye(3), np.zeros(3), 1.0
-    parts = {}
-    for key, count, default in (("rotation", 9, np.eye(3)), ("translation", 3, np.zeros(3)),
-                                ("scale", 1, np.ones(1))):  # fmt: skip
-        text = node.findtext(key)
-        where = f"{key} of the chunk"
-        parts[key] = default if text is None else _numbers(text, count, path, where)
+    parts = dict(_FRAME)
+    for key, default in _FRAME.items():
+        if (text := node.findtext(key)) is not None:
+            parts[key] = _numbers(text, default.size, path, f"{key} of the chunk")
     matrix = parts["rotation"].reshape(3, 3)
     turn = checked_rotation(matrix, f"{path}: rotation of the chunk", tolerance=_PRINTED)
     return nearest_rotation(turn), parts["translation"], float(parts["scale"][0])

@@ -9,8 +9,9 @@ the world's.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -30,10 +31,8 @@ _TERMS = ("distortion_coefficients", "dist_coeffs", "distCoeffs", "Distortion_Co
           "dist", "distortion")  # fmt: skip
 _TURN = ("R", "rotation", "rotation_matrix", "rvec", "rotation_vector")
 _SHIFT = ("T", "t", "translation", "tvec", "translation_vector")
-_WIDTH, _HEIGHT = (
-    ("image_width", "image_Width", "width"),
-    ("image_height", "image_Height", "height"),
-)
+_WIDTH = ("image_width", "image_Width", "width")
+_HEIGHT = ("image_height", "image_Height", "height")
 _SIZE = ("image_size", "imageSize", "size", "resolution")
 
 #: Returns the value of a key as numbers, None where there is none.
@@ -92,34 +91,25 @@ def write_opencv(path: Path, project: Project, *, overwrite: bool = False) -> tu
 
 def _calibration_text(path: Path, view: OpencvCamera) -> str:
     """Return the calibration of a camera; JSON if the file's name says so, else YAML."""
-    content = {
-        "camera_matrix": view.matrix, "distortion_coefficients": view.coefficients[None],
-        "R": view.rotation, "T": view.translation[:, None],
-    }  # fmt: skip
-    if view.fisheye:
-        content[FISHEYE_KEY] = np.ones(1)
-    return _storage_text(path, view.size, content)
-
-
-def _storage_text(path: Path, size: tuple[int, int], content: Mapping[str, FloatArray]) -> str:
-    """Return a FileStorage by OpenCV itself, as JSON or YAML."""
     import cv2
 
-    form = cv2.FILE_STORAGE_FORMAT_YAML
-    if path.suffix.lower() == ".json":
-        form = cv2.FILE_STORAGE_FORMAT_JSON
-    storage = cv2.FileStorage("", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY | form)
-    storage.write("image_width", size[0])
-    storage.write("image_height", size[1])
-    for key, value in content.items():
-        plain = key == FISHEYE_KEY
-        storage.write(key, 1 if plain else np.ascontiguousarray(value))
+    form = "JSON" if path.suffix.lower() == ".json" else "YAML"
+    flags = cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY
+    storage = cv2.FileStorage("", flags | getattr(cv2, f"FILE_STORAGE_FORMAT_{form}"))
+    storage.write("image_width", view.size[0])
+    storage.write("image_height", view.size[1])
+    storage.write("camera_matrix", view.matrix)
+    storage.write("distortion_coefficients", view.coefficients[None])
+    storage.write("R", np.ascontiguousarray(view.rotation))
+    storage.write("T", view.translation[:, None])
+    if view.fisheye:
+        storage.write(FISHEYE_KEY, 1)
     return str(storage.releaseAndGetString())
 
 
 def _cameras(path: Path, get: _Get, pitch: float) -> tuple[list[Camera], list[str]]:
     """Return the camera of a file, or the two of a stereo file, and remarks."""
-    size = _first(get, *_SIZE)
+    size: Any = _first(get, *_SIZE)
     width, height = _first(get, *_WIDTH), _first(get, *_HEIGHT)
     if size is None and width is not None and height is not None:
         size = np.array([width.item(), height.item()])
@@ -135,11 +125,9 @@ def _cameras(path: Path, get: _Get, pitch: float) -> tuple[list[Camera], list[st
         terms = _first(get, *(key + number for key in _TERMS))
         if matrix is None or matrix.shape != (3, 3):
             raise InputError(f"{path}: lacks camera_matrix{number} (3 x 3).")
-        lens = LensData(
-            matrix, np.ravel(terms) if terms is not None else np.zeros(4 if fisheye else 5),
-            "fisheye" if fisheye else "opencv",
-            (float(size.flat[0]), float(size.flat[1])), f"OpenCV, {path.name}",
-        )  # fmt: skip
+        model, count = ("fisheye", 4) if fisheye else ("opencv", 5)
+        terms = np.zeros(count) if terms is None else np.ravel(terms)
+        lens = LensData(matrix, terms, model, tuple(size.ravel().tolist()), f"OpenCV, {path.name}")
         here = number != "1" and turn is not None and shift is not None
         rotation, translation = _pose(path, turn, shift) if here else (np.eye(3), np.zeros(3))
         name = f"{path.stem}{number}"

@@ -79,11 +79,9 @@ def correspondences(
             own = (found[-1][:, a] == one) & (found[-1][:, b] == two)
             found[-1] = found[-1][own & ((found[-1] >= 0).sum(axis=1) >= fewest)]
     numbers = np.unique(np.concatenate(found), axis=0)
-    grid = np.stack([
-        np.where((numbers[:, k] >= 0)[:, None], image[k][numbers[:, k]] if len(image[k]) else 0.0,
-                 np.nan)
-        for k in range(len(cameras))
-    ])  # fmt: skip
+    # The row behind the last, -1, is that of no target.
+    padded = [np.vstack([i, [np.nan, np.nan]]) for i in image]
+    grid = np.stack([i[n] for i, n in zip(padded, numbers.T, strict=True)])
     xyz = intersect_rays(cameras, grid, list(media)) if len(numbers) else np.empty((0, 3))
     misfit = _misfits(cameras, media, sensors, xyz, grid)
     good = misfit <= tolerance
@@ -118,8 +116,8 @@ def expected_by_chance(
         # Golden angles: no shift or turn of the object moves the images like this, and for two
         # cameras, whose one condition a displacement may keep, the other frame breaks it.
         angles = 2.4 * np.arange(len(cameras)) + turn * np.pi / 2
-        moved = [t.reshape(-1, 2) + away * np.array([np.cos(a), np.sin(a)])
-                 for t, a in zip(targets, angles, strict=True)]  # fmt: skip
+        shifts = away * np.column_stack([np.cos(angles), np.sin(angles)])
+        moved = [t.reshape(-1, 2) + shift for t, shift in zip(targets, shifts, strict=True)]
         _, numbers, _ = correspondences(cameras, moved, media, tolerance=tolerance, fewest=fewest)
         counts += np.bincount((numbers >= 0).sum(axis=1), minlength=len(counts))
     return counts / DECOYS
@@ -174,22 +172,19 @@ def _misfits(
     """Return the root mean square distance of targets from where their particles are seen. [px]"""
     if not len(xyz):
         return np.empty(0)
-    squares = np.stack([
-        (((project(c, xyz, m) - i) / s.pitch) ** 2).sum(axis=-1)
-        for c, m, s, i in zip(cameras, media, sensors, image, strict=True)
-    ])  # fmt: skip
+    seen = np.stack([project(c, xyz, m) for c, m in zip(cameras, media, strict=True)])
+    pitch = np.array([sensor.pitch for sensor in sensors])[:, None]
+    squares = (((seen - image) / pitch) ** 2).sum(axis=-1)
     with np.errstate(invalid="ignore"):  # a proposal that no camera sees has no misfit
         return np.sqrt(np.nansum(squares, axis=0) / np.isfinite(squares).sum(axis=0))
 
 
 def _each_once(numbers: IntArray, order: IntArray) -> IntArray:
     """Return the rows, in this order, whose targets no row before has used."""
-    used = [set[int]() for _ in range(numbers.shape[1])]
-    kept = []
+    used, kept = set[tuple[int, int]](), []
     for row in order.tolist():
         mine = [(k, n) for k, n in enumerate(numbers[row].tolist()) if n >= 0]
-        if not any(n in used[k] for k, n in mine):
+        if used.isdisjoint(mine):
             kept.append(row)
-            for k, n in mine:
-                used[k].add(n)
+            used.update(mine)
     return np.array(kept, dtype=np.int64)

@@ -118,14 +118,10 @@ def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experi
     remarks += [*odd, *odd_cameras]
     if not source:
         remarks.append("no calibration body (cal_ori.par names it) was found: no object points.")
-    targets = tuple(
-        _targets(roots, [f"{name}_targets"], control.field) for name in control.calibration_images
-    )
-    remarks += [
-        NO_TARGETS.format(camera.name)
-        for camera, detected in zip(cameras, targets, strict=True)
-        if detected is None
-    ]
+    shown = control.calibration_images
+    targets = tuple(_targets(roots, [f"{name}_targets"], control.field) for name in shown)
+    unseen = [c.name for c, detected in zip(cameras, targets, strict=True) if detected is None]
+    remarks += map(NO_TARGETS.format, unseen)
     particles, numbers, frame, odd_frame = _particles(roots, control)
     manual, odd_manual = _manual(roots, len(cameras))
     listed = _find(roots, "multi_planes.par")
@@ -242,11 +238,12 @@ def _cost(
     if len(views) < 2 or not ids:
         return []
     image, _ = project.image_points.grid(project.camera_names, ids)
-    there = np.stack([
-        sensor.image_from_pixel(camera.sensor.pixel_from_image(seen)) / ours.scale
-        for camera, seen, (ours, _) in zip(project.cameras, image, views, strict=True)
-        if camera.sensor is not None
-    ])  # fmt: skip
+    pixels = [
+        camera.described_sensor().pixel_from_image(seen)
+        for camera, seen in zip(project.cameras, image, strict=True)
+    ]
+    scales = np.array([ours.scale for ours, _ in views])
+    there = sensor.image_from_pixel(pixels) / scales[:, None, None]
     own = intersect(project.cameras, image, project.interfaces).xyz
     media = [None if len(set(wall.indices)) == 1 else wall for _, wall in views]
     moved = intersect([ours.camera for ours, _ in views], there, media).xyz
@@ -266,10 +263,11 @@ def _targets_text(project: Project, camera: Camera, rows: Sequence[int]) -> str:
     assert camera.sensor is not None  # common_sensor has looked
     pixels = camera.sensor.pixel_from_image(project.image_points.image[list(rows)])
     place = project.object_points.rows([project.image_points.ids[row] for row in rows])
-    lines = [f"{len(rows)}\n"]
-    for k, ((x, y), number) in enumerate(zip(pixels, place, strict=True)):
-        lines.append(f"{k:4d} {x:.9f} {y:.9f} 20 5 5 1000 {number}\n")
-    return "".join(lines)
+    lines = (
+        f"{k:4d} {x:.9f} {y:.9f} 20 5 5 1000 {number}\n"
+        for k, ((x, y), number) in enumerate(zip(pixels, place, strict=True))
+    )
+    return f"{len(rows)}\n" + "".join(lines)
 
 
 def _control_path(folder: Path) -> Path:
@@ -329,7 +327,7 @@ def _checked_indices(
         )
     if control.thickness == 0:
         remarks.append(f"{file}: the glass has no thickness.")
-    if control.thickness > 0 and control.thickness < 0.1:
+    if 0 < control.thickness < 0.1:
         remarks.append(
             f"{file}: glass of {control.thickness:g} mm; OpenPTV's lengths are in mm, is this in m?"
         )
@@ -426,11 +424,10 @@ def _particles(
 ) -> tuple[FloatArray, IntArray, tuple[DetectedTargets | None, ...], tuple[str, ...]]:
     """Return the first stored frame: positions, target numbers, the targets; and remarks."""
     nothing = np.empty((0, 3)), np.empty((0, len(control.images)), dtype=np.int64), ()
-    stored = [path for root in roots for path in sorted((root / "res").glob("rt_is.*"))]
-    stored += [path for root in roots for path in sorted(root.glob("rt_is.*"))]
-    if not stored:
+    folders = (*(root / "res" for root in roots), *roots)
+    path = next((path for place in folders for path in sorted(place.glob("rt_is.*"))), None)
+    if path is None:
         return *nothing, ()
-    path = stored[0]
     frame = path.suffix.lstrip(".")
     positions, numbers = read_correspondences(path)
     if not len(positions):
@@ -458,8 +455,7 @@ def particle_points(experiment: Experiment) -> tuple[ObjectPoints, ImagePoints]:
         If a particle refers to a target that does not exist.
     """
     ids = tuple(f"p{k}" for k in range(1, len(experiment.particles) + 1))
-    seen_by: list[tuple[str, str]] = []
-    pixels: list[FloatArray] = []
+    cameras, names, image = list[str](), list[str](), list[FloatArray]([np.empty((0, 2))])
     for k, targets in enumerate(experiment.frame_targets):
         camera = experiment.project.cameras[k]
         if targets is None or camera.sensor is None:
@@ -471,10 +467,8 @@ def particle_points(experiment: Experiment) -> tuple[ObjectPoints, ImagePoints]:
                 f"file holds {len(targets.pixels)}. Positions and targets are of other frames."
             )
         seen = np.flatnonzero(number >= 0)
-        seen_by += [(camera.name, ids[row]) for row in seen]
-        pixels.append(camera.sensor.image_from_pixel(targets.pixels[number[seen]]))
-    if not pixels:
-        return ObjectPoints(), ImagePoints()
-    cameras, names = zip(*seen_by, strict=True) if seen_by else ((), ())
-    images = ImagePoints(cameras=cameras, ids=names, image=np.concatenate(pixels))
+        cameras += [camera.name] * len(seen)
+        names += [ids[row] for row in seen]
+        image.append(camera.sensor.image_from_pixel(targets.pixels[number[seen]]))
+    images = ImagePoints(cameras=tuple(cameras), ids=tuple(names), image=np.concatenate(image))
     return ObjectPoints(ids=ids, xyz=experiment.particles), images

@@ -121,10 +121,8 @@ def read_camera(path: Path, *, sensor: Sensor, name: str) -> tuple[Camera, Float
         If numbers are missing or angles and matrix contradict each other.
     """
     values = _numbers(path, 3 + 3 + 9 + 2 + 1, "X0 Y0 Z0, angles, matrix, xh yh, c")
-    remarks: list[str] = []
-    matrix = values[6:15].reshape(3, 3)
-    rotation, said = _rotation(path, values[3:6], matrix)
-    remarks += said
+    rotation, said = _rotation(path, values[3:6], values[6:15].reshape(3, 3))
+    remarks = [*said]
     glass = values[18:21] if len(values) >= 21 else np.zeros(3)
     if not np.any(glass):
         remarks.append(f"{path.name}: no glass vector; the camera looks through no interface.")
@@ -263,11 +261,11 @@ def read_correspondences(path: Path) -> tuple[FloatArray, IntArray]:
 def rt_is_text(xyz: FloatArray, numbers: IntArray) -> str:
     """Return the content of an rt_is file: number from 1, X, Y, Z [mm], targets of four cameras."""
     blank = np.full((len(numbers), max(0, 4 - numbers.shape[1])), -1, dtype=np.int64)
-    lines = [str(len(xyz))]
+    text = f"{len(xyz)}\n"
     for k, (place, row) in enumerate(zip(xyz, np.hstack([numbers, blank]), strict=True), start=1):
         words = [f"{k:4d}", *(f"{v:9.3f}" for v in place), *(f"{n:4d}" for n in row)]
-        lines.append(" ".join(words))
-    return "\n".join(lines) + "\n"
+        text += " ".join(words) + "\n"
+    return text
 
 
 def ori_text(camera: Camera, glass: FloatArray) -> str:

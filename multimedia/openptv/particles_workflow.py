@@ -24,7 +24,7 @@ from photocore.errors import InputError
 from photocore.output import atomic_path, check_all_writable, check_not_input
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class Particles:
     """Particles of one frame.
 
@@ -111,10 +111,8 @@ def find_particles(
             "(`multimedia adjust`)? Fewer come by chance with a smaller --tolerance"
             + (f" or --fewest {len(names)}." if fewest < len(names) else ".")
         )
-    found = Particles(
-        project=content, xyz=xyz, numbers=numbers, misfit=misfit,
-        targets=tuple(len(place) for place in places), seen_by=seen_by, chance=chance,
-    )  # fmt: skip
+    counts = tuple(map(len, places))
+    found = Particles(content, xyz, numbers, misfit, counts, seen_by, chance)
     if out is not None:
         _write(out, found, overwrite=overwrite)
     return found

@@ -29,7 +29,7 @@ _INTERIOR = ("c", "xh", "yh", "k1", "k2", "p1", "p2")
 _LEAN = ("c", "k1")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class PlaneMatch:
     """The points of one camera that a multi-plane calibration is made of.
 
@@ -82,8 +82,7 @@ def choose_sets(camera: Camera, candidates: PlaneCandidates, media: Media) -> Pl
         chosen = [best]
     chosen = list(_agreeing(camera, chosen, media, remarks))
     if not chosen:
-        nothing = np.empty((0, 2)), np.empty((0, 3))
-        return PlaneMatch(labels=(), image=nothing[0], xyz=nothing[1], remarks=tuple(remarks))
+        return PlaneMatch((), np.empty((0, 2)), np.empty((0, 3)), tuple(remarks))
     return _matched(camera, chosen, media, remarks)
 
 
@@ -112,10 +111,7 @@ def _matched(
             "all these points lie in one plane, which cannot tell the principal distance from the "
             "distance of the camera."
         )
-    return PlaneMatch(
-        labels=tuple(labels[good].tolist()), image=image[good], xyz=xyz[good],
-        remarks=tuple(remarks),
-    )  # fmt: skip
+    return PlaneMatch(tuple(labels[good].tolist()), image[good], xyz[good], tuple(remarks))
 
 
 def _agreeing(
@@ -149,7 +145,7 @@ def _agreeing(
 def _fits_alone(camera: Camera, one: PlaneSet, media: Media) -> bool:
     """Whether some pose of the camera shows these points where they were measured."""
     few = _sample(one)
-    found = _resected(camera, one.xyz[few], one.image[few], media, estimate=None)
+    found = _resected(camera, one.xyz[few], one.image[few], media, estimate=())
     return found is not None and _is_match(camera, one, found.residuals)
 
 
@@ -212,10 +208,10 @@ def _resected(
     image: FloatArray,
     media: Media,
     *,
-    estimate: tuple[str, ...] | None = _INTERIOR,
+    estimate: tuple[str, ...] = _INTERIOR,
 ) -> Resection | None:
     """Return a resection with the interior free as far as points of some depth carry it."""
-    free = () if estimate is None or _is_flat(xyz) or len(xyz) < 2 * len(_INTERIOR) else estimate
+    free = () if _is_flat(xyz) or len(xyz) < 2 * len(_INTERIOR) else estimate
     for names in dict.fromkeys((free, ("c",) if free else (), ())):
         try:
             return resect(camera, xyz, image, media, estimate=names)

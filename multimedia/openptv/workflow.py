@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -117,16 +117,16 @@ def export_openptv(
 class _CameraControl:
     """Control points of one camera: ids, image coordinates, where from, and remarks."""
 
-    ids: list[str]
-    image: FloatArray
-    remarks: list[str]
+    ids: Sequence[str] = ()
+    image: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
+    remarks: Sequence[str] = ()
     planes: PlaneMatch | None = None
 
 
 def _control(experiment: Experiment, k: int, least_pixels: int, radius: float) -> _CameraControl:
     """Return the control points of a camera: of the planes if listed, else found among targets."""
     listed = any(experiment.planes[k].positions)
-    targets = _nothing() if listed else _from_targets(experiment, k, least_pixels, radius)
+    targets = _CameraControl() if listed else _from_targets(experiment, k, least_pixels, radius)
     if targets.ids or not (listed or experiment.planes[k].together):
         return targets
     project = experiment.project
@@ -135,7 +135,7 @@ def _control(experiment: Experiment, k: int, least_pixels: int, radius: float) -
     said = [*targets.remarks, *(f"{camera.name}: {text}" for text in planes.remarks)]
     if not planes.labels and listed:
         targets = _from_targets(experiment, k, least_pixels, radius)
-        return replace(targets, remarks=said + targets.remarks)
+        return replace(targets, remarks=(*said, *targets.remarks))
     ids = [name_of(place) for place in planes.xyz]
     return _CameraControl(ids=ids, image=planes.image, remarks=said, planes=planes)
 
@@ -155,25 +155,17 @@ def name_of(place: FloatArray) -> str:
 def _with_planes(experiment: Experiment, control: Sequence[_CameraControl]) -> ObjectPoints:
     """Return the points of all planes, and those of the body where a camera was matched to it."""
     body = experiment.project.object_points
-    found = [one for one in control if one.planes is not None]
-    if not found:
+    planes = [(one.ids, one.planes) for one in control if one.planes is not None]
+    if not planes:
         return body
     points: dict[str, tuple[str, FloatArray]] = {}
-    if len(found) < len(control):
+    if len(planes) < len(control):
         points |= {name: ("", place) for name, place in zip(body.ids, body.xyz, strict=True)}
-    for one in found:
-        if one.planes is not None:
-            for name, label, place in zip(one.ids, one.planes.labels, one.planes.xyz, strict=True):
-                points.setdefault(name, (label, place))
-    return ObjectPoints(
-        ids=tuple(points),
-        xyz=np.array([place for _, place in points.values()]),
-        groups=tuple(label for label, _ in points.values()),
-    )
-
-
-def _nothing(remarks: Sequence[str] = ()) -> _CameraControl:
-    return _CameraControl(ids=[], image=np.empty((0, 2)), remarks=list(remarks))
+    for ids, plane in planes:
+        for name, label, place in zip(ids, plane.labels, plane.xyz, strict=True):
+            points.setdefault(name, (label, place))
+    labels, xyz = zip(*points.values(), strict=True)
+    return ObjectPoints(ids=tuple(points), xyz=np.array(xyz), groups=labels)
 
 
 def _from_targets(
@@ -183,9 +175,17 @@ def _from_targets(
     project, targets = experiment.project, experiment.targets[k]
     camera, body = project.cameras[k], project.object_points
     if targets is None or not body.ids or camera.sensor is None:
-        return _nothing()
+        return _CameraControl()
     remarks = []
-    best = _matched(project, camera, k, targets, least_pixels, radius)
+
+    def matched(start: Camera, least_pixels: int) -> IntArray:
+        """Return the target of each control point in the file's numbering, -1 for none."""
+        large = np.flatnonzero(targets.counts >= least_pixels)
+        medium = project.interface_of(k)
+        partner = match_targets(start, body.xyz, targets.pixels[large], medium, radius=radius)
+        return np.where(partner >= 0, large[partner], -1) if len(large) else partner
+
+    best = matched(camera, least_pixels)
     others = [(camera, 1, f"targets below {least_pixels} px were needed too.")]
     if (best >= 0).sum() < 0.5 * len(body.ids):
         clicked = _from_clicks(experiment, k)
@@ -193,22 +193,20 @@ def _from_targets(
             said = "started from the points clicked by hand (man_ori)."
             others += [(clicked, size, said) for size in (least_pixels, 1)]
     for start, size, said in others:
-        again = _matched(project, start, k, targets, size, radius)
+        again = matched(start, size)
         # A few more may be noise that happens to lie near; a better start finds many.
         if (again >= 0).sum() > 1.1 * (best >= 0).sum():
             best = again
             remarks.append(f"{camera.name}: {said}")
     seen = np.flatnonzero(best >= 0)
     if len(seen) < _FEWEST or _by_chance(project, k, targets, best):
-        return _nothing(
-            [
-                *remarks,
-                f"{camera.name}: its control points were not found: only {len(seen)} of "
-                f"{len(body.ids)} lie near one of the {len(targets.pixels)} targets, no more than "
-                "by chance; none was taken. The stored orientation may be far off (--radius), or "
-                "belong to another image.",
-            ]
+        remarks.append(
+            f"{camera.name}: its control points were not found: only {len(seen)} of "
+            f"{len(body.ids)} lie near one of the {len(targets.pixels)} targets, no more than by "
+            "chance; none was taken. The stored orientation may be far off (--radius), or belong "
+            "to another image."
         )
+        return _CameraControl(remarks=remarks)
     if len(seen) < len(body.ids):
         missing = [body.ids[row] for row in np.flatnonzero(best < 0)]
         more = f" and {len(missing) - 10} more" if len(missing) > 10 else ""
@@ -243,18 +241,3 @@ def _from_clicks(experiment: Experiment, k: int) -> Camera | None:
     except PhotogrammetryError:
         # Clicks of another image, or too few: the stored orientation remains.
         return None
-
-
-def _matched(
-    project: Project,
-    camera: Camera,
-    k: int,
-    targets: DetectedTargets,
-    least_pixels: int,
-    radius: float,
-) -> IntArray:  # fmt: skip
-    """Return the target of each control point in the file's numbering, -1 for none."""
-    large = np.flatnonzero(targets.counts >= least_pixels)
-    control, medium = project.object_points.xyz, project.interface_of(k)
-    partner = match_targets(camera, control, targets.pixels[large], medium, radius=radius)
-    return np.where(partner >= 0, large[partner], -1) if len(large) else partner

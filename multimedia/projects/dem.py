@@ -48,10 +48,9 @@ class Dem(RasterFile):
             )
         self._unmarked = self.nodata is None and not self.masked
         name = self.path.name
+        lost = not self.has_position
         told = {
-            f"{name} has no position (no geotransform); X and Y are unknown.": (
-                not self.has_position
-            ),
+            f"{name} has no position (no geotransform); X and Y are unknown.": lost,
             f"{name} has no coordinate reference system; its coordinates are taken as metres, "
             "like those of the cameras.": self.crs is None,
             f"{name} declares no no-data value; every number in it is taken as a height. If it "

@@ -19,10 +19,8 @@ METRES: Mapping[str, float] = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µ
 
 _ID = Column("id", ("point", "name", "no", "nr", "number", "punkt", "punto", "pnt"), kind="text")
 _GROUP = Column("group", ("set", "plate", "frame", "gruppe", "gruppo", "code"), kind="text")
-_CAMERA = Column(
-    "camera", ("cam", "image", "photo", "kamera", "bild", "foto", "fotocamera"), kind="text",
-    required=True,
-)  # fmt: skip
+_PHOTO = ("cam", "image", "photo", "kamera", "bild", "foto", "fotocamera")
+_CAMERA = Column("camera", _PHOTO, kind="text", required=True)
 _OBJECT = (
     _ID,
     Column("X", ("E", "easting", "Rechtswert"), required=True),
@@ -143,13 +141,12 @@ def read_image_points(path: Path, cameras: Sequence[Camera]) -> tuple[ImagePoint
         values = values * [_factor(table, key, "mm") for key in keys]
     else:
         for name in dict.fromkeys(names):
-            rows = [row for row, other in enumerate(names) if other == name]
+            rows = np.array(names) == name
             values[rows] = by_name[name].described_sensor(_IN_PIXELS).image_from_pixel(values[rows])
+    sigma, groups = _sigmas(table, keys, [by_name[n] for n in names]), table.texts("group")
     points = ImagePoints(
-        cameras=tuple(names), ids=_ids(table), image=values,
-        sigma=_sigmas(table, keys, [by_name[name] for name in names]),
-        groups=tuple(table.texts("group")),
-    )  # fmt: skip
+        cameras=tuple(names), ids=_ids(table), image=values, sigma=sigma, groups=tuple(groups)
+    )
     return points, list(table.remarks)
 
 
@@ -157,11 +154,7 @@ def object_columns(points: ObjectPoints, unit: str) -> dict[str, FloatArray | tu
     """Return the columns of a table of object points."""
     columns: dict[str, FloatArray | tuple[str, ...]] = {"id": points.ids}
     columns |= {f"{axis} [{unit}]": points.xyz[:, k] for k, axis in enumerate("XYZ")}
-    if np.isfinite(points.sigma).any():
-        columns |= {f"sigma_{axis} [{unit}]": points.sigma[:, k] for k, axis in enumerate("XYZ")}
-    if any(points.groups):
-        columns["group"] = points.groups
-    return columns
+    return columns | _sigma_and_group(points, "XYZ", unit)
 
 
 def image_columns(
@@ -169,21 +162,24 @@ def image_columns(
 ) -> dict[str, FloatArray | tuple[str, ...]]:
     """Return the columns of a table of image points, in pixels where every sensor is known."""
     columns: dict[str, FloatArray | tuple[str, ...]] = {"camera": points.cameras, "id": points.ids}
-    sensors = {camera.name: camera.sensor for camera in cameras}
-    if all(sensors.get(name) is not None for name in points.cameras):
+    sensors = {camera.name: camera.sensor for camera in cameras if camera.sensor is not None}
+    if sensors.keys() >= set(points.cameras):
         pixels = np.array(points.image)
         for name in dict.fromkeys(points.cameras):
-            rows, sensor = points.of_camera(name), sensors[name]
-            if sensor is not None:
-                pixels[rows] = sensor.pixel_from_image(points.image[rows])
+            rows = points.of_camera(name)
+            pixels[rows] = sensors[name].pixel_from_image(points.image[rows])
         columns |= {"col [px]": pixels[:, 0], "row [px]": pixels[:, 1]}
     else:
         columns |= {"x [mm]": points.image[:, 0], "y [mm]": points.image[:, 1]}
+    return columns | _sigma_and_group(points, "xy", "mm")
+
+
+def _sigma_and_group(points: ObjectPoints | ImagePoints, axes: str, unit: str) -> dict[str, Any]:
+    """Return the columns that are written only where points have them."""
+    columns: dict[str, Any] = {}
     if np.isfinite(points.sigma).any():
-        columns |= {"sigma_x [mm]": points.sigma[:, 0], "sigma_y [mm]": points.sigma[:, 1]}
-    if any(points.groups):
-        columns["group"] = points.groups
-    return columns
+        columns |= {f"sigma_{axis} [{unit}]": points.sigma[:, k] for k, axis in enumerate(axes)}
+    return columns | ({"group": points.groups} if any(points.groups) else {})
 
 
 def write_columns(
@@ -261,9 +257,7 @@ def _sigmas(table: Table, coordinates: Sequence[str], cameras: Sequence[Camera])
         factor = METRES.get(unit, METRES["mm"]) / METRES["mm"]
         sigma[:, axis] = table.numbers(key) * factor
         if unit == "px" and key in table.present:
-            sigma[:, axis] *= [
-                camera.described_sensor(_IN_PIXELS).pitch[axis] for camera in cameras
-            ]
+            sigma[:, axis] *= [c.described_sensor(_IN_PIXELS).pitch[axis] for c in cameras]
     return sigma
 
 
@@ -275,12 +269,9 @@ _IN_PIXELS = (
 
 def _read_wide(book: object, cameras: Sequence[Camera]) -> tuple[ImagePoints, list[str]] | None:
     """Read one row per point with a pair of columns per camera; None if there are none."""
-    columns = [_ID, _GROUP]
-    for camera in cameras:
-        columns += [
-            Column(f"{camera.name} {key}", unit="px" if key in ("col", "row") else "mm")
-            for key in ("col", "row", "x", "y")
-        ]
+    units = {"col": "px", "row": "px", "x": "mm", "y": "mm"}
+    of_cameras = (Column(f"{c.name} {key}", unit=units[key]) for c in cameras for key in units)
+    columns = [_ID, _GROUP, *of_cameras]
     try:
         table = read_table(book, columns, name="ImagePoints")  # type: ignore[arg-type]
     except WorkbookError:
@@ -306,9 +297,7 @@ def _read_wide(book: object, cameras: Sequence[Camera]) -> tuple[ImagePoints, li
             break
     if not images:
         return None
-    ids, groups = _ids(table), table.texts("group")
-    points = ImagePoints(
-        cameras=tuple(names), ids=tuple(ids[row] for row in rows), image=np.concatenate(images),
-        groups=tuple(groups[row] for row in rows),
-    )  # fmt: skip
+    ids, groups = (tuple(np.array(t, object)[rows]) for t in (_ids(table), table.texts("group")))
+    image = np.concatenate(images)
+    points = ImagePoints(cameras=tuple(names), ids=ids, image=image, groups=groups)
     return points, list(table.remarks)

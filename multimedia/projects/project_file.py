@@ -32,12 +32,7 @@ from multimedia.projects.point_tables import (
     read_object_points,
     write_columns,
 )
-from multimedia.projects.surface_files import (
-    read_mesh,
-    read_raster,
-    wave_rows,
-    waves_of,
-)
+from multimedia.projects.surface_files import read_mesh, read_raster, wave_rows, waves_of
 from multimedia.refraction.layers import Layers
 from photocore.arrays import is_finite_number, positive
 from photocore.camera.distortion import NAMES, Brown, Convention
@@ -53,13 +48,13 @@ _KINDS: Mapping[str, tuple[Callable[..., RefractingSurface], tuple[str, ...]]] =
     "plane": (Plane, ("point", "normal")),
     "sphere": (Sphere, ("centre", "radius")),
     "cylinder": (Cylinder, ("point", "axis", "radius")),
+    "raster": (RasterSurface, ("file",)),
+    "mesh": (MeshSurface, ("file",)),
+    "waves": (WaveSurface, ("level", "waves")),
 }
-#: Surfaces whose form lies in a file beside the project: what they are and what reads them.
-_FILED: Mapping[str, tuple[type[RasterSurface | MeshSurface], Callable[[Path], Any]]] = {
-    "raster": (RasterSurface, read_raster),
-    "mesh": (MeshSurface, read_mesh),
-}
-_WAVES = "waves"
+#: Surfaces whose form lies in a file beside the project.
+_FILED: Mapping[str, Callable[[Path], Any]] = {"raster": read_raster, "mesh": read_mesh}
+_SENSOR_KEYS = ("width", "height", "pitch", "origin")
 _HEAD = """\
 # Project of the `multimedia` commands; object lengths in `unit`, image lengths in mm, angles in
 # degrees. Tables of points: paths relative to this file.
@@ -263,10 +258,9 @@ def _media(value: Any, where: str, folder: Path) -> FlatInterface | Interfaces:
     point = section.numbers("point", (3,), default=(0, 0, 0))
     normal = section.numbers("normal", (3,), default=(0, 0, 1))
     moves = section.flag("moves_with_camera")
-    if any(key in value for key in _GRADED):
+    if graded := _graded(section):
         traced = Interfaces.parallel(layers, point=point, normal=normal, with_camera=moves)
-        gradient, level = _graded(section)
-        return replace(traced, gradient=gradient, level=level)
+        return replace(traced, **graded)
     return FlatInterface(layers=layers, point=point, normal=normal, moves_with_camera=moves)
 
 
@@ -274,10 +268,9 @@ def _media(value: Any, where: str, folder: Path) -> FlatInterface | Interfaces:
 _GRADED = {"gradient": "gradient", "gradient_level": "level"}
 
 
-def _graded(section: FileSection) -> tuple[float, float]:
+def _graded(section: FileSection) -> dict[str, Any]:
     """Return by how much the index of the last medium grows with depth, and from which level."""
-    gradient, level = (section.number(k) if k in section else 0.0 for k in _GRADED)
-    return gradient, level
+    return {name: section.number(key) for key, name in _GRADED.items() if key in section}
 
 
 def _surfaces(value: Mapping[str, Any], where: str, folder: Path) -> Interfaces:
@@ -286,49 +279,36 @@ def _surfaces(value: Mapping[str, Any], where: str, folder: Path) -> Interfaces:
     listed = section["surfaces"]
     if not isinstance(listed, list) or not listed:
         raise InputError(f"{where}: surfaces must be a list of sections, camera side first.")
-    surfaces: list[RefractingSurface] = []
-    moving: list[bool] = []
-    for number, item in enumerate(listed, start=1):
-        place = f"{where}, surface {number}"
-        surfaces.append(_surface(item, place, folder))
-        moving.append(FileSection(item, place).flag("moves_with_camera"))
+    pairs = [_surface(item, f"{where}, surface {k}", folder) for k, item in enumerate(listed, 1)]
+    surfaces, moving = zip(*pairs, strict=True)
     indices = section.get("indices")
     if not isinstance(indices, list):
         raise InputError(f"{where}: indices must be a list of numbers, camera side first.")
-    gradient, level = _graded(section)
+    graded = _graded(section)
     with located(where):
-        return Interfaces(
-            surfaces=tuple(surfaces), indices=tuple(indices), with_camera=tuple(moving),
-            gradient=gradient, level=level,
-        )  # fmt: skip
+        return Interfaces(surfaces=surfaces, indices=tuple(indices), with_camera=moving, **graded)
 
 
-def _surface(item: Any, place: str, folder: Path) -> RefractingSurface:
-    """Return one ray-traced surface."""
+def _surface(item: Any, place: str, folder: Path) -> tuple[RefractingSurface, bool]:
+    """Return one ray-traced surface, and whether it moves with the camera."""
     kind = str(item.get("kind", "")) if isinstance(item, Mapping) else ""
-    if kind in _FILED:
-        section = FileSection(item, place, ("kind", "moves_with_camera", "file"))
-        name = _file_name(section["file"], f"{place}, file")
-        surface: RefractingSurface = _FILED[kind][1](folder / name)
-        return surface
-    if kind == _WAVES:
-        section = FileSection(item, place, ("kind", "moves_with_camera", "level", "waves"))
-        rows = section["waves"]
-        if not isinstance(rows, list) or not all(
-            isinstance(row, list) and all(is_finite_number(v) for v in row) for row in rows
-        ):
-            raise InputError(
-                f"{place}: waves must be a list of [amplitude, length, direction, phase], found "
-                f"{rows!r:.60}."
-            )
-        return waves_of(section.number("level"), rows, place)
     if kind not in _KINDS:
-        known = ", ".join((*_KINDS, *_FILED, _WAVES))
-        raise InputError(f"{place}: kind must be one of {known}, found {kind!r}.")
+        raise InputError(f"{place}: kind must be one of {', '.join(_KINDS)}, found {kind!r}.")
     form, keys = _KINDS[kind]
     section = FileSection(item, place, ("kind", "moves_with_camera", *keys))
-    values = {k: section.number(k) if k == "radius" else section.numbers(k, (3,)) for k in keys}
-    return form(**values)
+    surface: RefractingSurface
+    if kind in _FILED:
+        surface = _FILED[kind](folder / _file_name(section["file"], f"{place}, file"))
+    elif kind == "waves":
+        rows = section["waves"]
+        good = isinstance(rows, list) and all(isinstance(row, list) for row in rows)
+        if not good or not all(is_finite_number(v) for row in rows for v in row):
+            raise section.wrong("waves", "a list of [amplitude, length, direction, phase]")
+        surface = waves_of(section.number("level"), rows, place)
+    else:
+        read = (section.number(k) if k == "radius" else section.numbers(k, (3,)) for k in keys)
+        surface = form(**dict(zip(keys, read, strict=True)))
+    return surface, section.flag("moves_with_camera")
 
 
 def _media_data(media: FlatInterface | Interfaces, folder: Path) -> dict[str, Any]:
@@ -342,26 +322,28 @@ def _media_data(media: FlatInterface | Interfaces, folder: Path) -> dict[str, An
                 for surface, moves in zip(media.surfaces, media.with_camera, strict=True)
             ],
         }
-    data: dict[str, Any] = dict(media.layers.as_dict())
-    data |= {"point": media.point.tolist(), "normal": media.normal.tolist()}
-    if media.moves_with_camera:
-        data["moves_with_camera"] = True
-    return data
+    moves = {"moves_with_camera": True} if media.moves_with_camera else {}
+    return {**media.layers.as_dict(), **_plain(media, "point", "normal"), **moves}
 
 
 def _surface_data(surface: RefractingSurface, folder: Path) -> dict[str, Any]:
+    kind = next((kind for kind, (form, _) in _KINDS.items() if type(surface) is form), "")
     if isinstance(surface, WaveSurface):
-        return {"kind": _WAVES, "level": float(surface.level), "waves": wave_rows(surface)}
-    for kind, (filed, _) in _FILED.items():
-        if isinstance(surface, filed) and surface.source:
-            return {"kind": kind, "file": relative_name(surface.source, folder)}
-    for kind, (form, keys) in _KINDS.items():
-        if type(surface) is form:
-            return {"kind": kind} | {k: np.asarray(getattr(surface, k)).tolist() for k in keys}
+        return {"kind": kind, "level": float(surface.level), "waves": wave_rows(surface)}
+    if isinstance(surface, RasterSurface | MeshSurface) and surface.source:
+        return {"kind": kind, "file": relative_name(surface.source, folder)}
+    if kind and kind not in _FILED:
+        return {"kind": kind} | _plain(surface, *_KINDS[kind][1])
     raise InputError(
         f"a {type(surface).__name__} cannot be written into a project file; it holds "
-        f"{', '.join((*_KINDS, _WAVES))}, and {' and '.join(_FILED)} read from a file."
+        f"{', '.join(k for k in _KINDS if k not in _FILED)}, and {' and '.join(_FILED)} read from "
+        "a file."
     )
+
+
+def _plain(value: object, *keys: str) -> dict[str, Any]:
+    """Return attributes as a file holds them."""
+    return {key: np.asarray(getattr(value, key)).tolist() for key in keys}
 
 
 #: What a fisheye lens has in place of a convention of Brown's formula.
@@ -406,18 +388,13 @@ def _camera_data(camera: Camera, media: str) -> dict[str, Any]:
         terms = {name: float(getattr(lens, name)) for name in lens.names}
         data["distortion"] = {"convention": convention} | terms
     if camera.sensor is not None:
-        data["sensor"] = {
-            "width": camera.sensor.width,
-            "height": camera.sensor.height,
-            "pitch": camera.sensor.pitch.tolist(),
-            "origin": camera.sensor.origin.tolist(),
-        }
+        data["sensor"] = _plain(camera.sensor, *_SENSOR_KEYS)
     return data
 
 
 def _sensor(value: Any, where: str) -> Sensor:
     where = f"{where}, sensor"
-    section = FileSection(value, where, ("width", "height", "pitch", "origin"))
+    section = FileSection(value, where, _SENSOR_KEYS)
     if isinstance(pitch := section.get("pitch"), int | float):
         section = FileSection({**value, "pitch": [pitch, pitch]}, where)
     size = section.numbers("pitch", (2,))

@@ -164,11 +164,10 @@ def waves_of(level: float, rows: Sequence[Sequence[float]], where: str) -> WaveS
 
 def wave_rows(surface: WaveSurface) -> list[list[float]]:
     """Return the rows of `waves_of`."""
-    number = np.hypot(*surface.wave_vector.T)
-    turn = np.degrees(np.arctan2(*surface.wave_vector.T))
-    rows: list[list[float]] = np.column_stack(
-        [surface.amplitude, 2 * np.pi / number, turn, np.degrees(surface.phase)]
-    ).tolist()
+    length = 2 * np.pi / np.hypot(*surface.wave_vector.T)
+    turn = np.arctan2(*surface.wave_vector.T)
+    angles = np.degrees([turn, surface.phase])
+    rows: list[list[float]] = np.column_stack([surface.amplitude, length, *angles]).tolist()
     return rows
 
 

@@ -29,6 +29,10 @@ INNER = PAGE[0] - 2 * MARGIN
 _MM, _LINE, _WIDE, _MONO = 0.3528, 1.35, 0.55, 0.61
 #: Widths of letters where none may touch the next column or the frame: figures and bold type.
 _WIDEST = 0.66
+#: Type of the cells of tables. [points]
+_CELL = 8.0
+#: A grid over the whole page, without gaps.
+_WHOLE: dict[str, Any] = {"left": 0, "right": 1, "bottom": 0, "top": 1, "wspace": 0, "hspace": 0}
 
 
 def write_pdf(
@@ -38,10 +42,9 @@ def write_pdf(
     from matplotlib.backends.backend_pdf import PdfPages
 
     made = datetime.fromisoformat(today()).replace(tzinfo=UTC)
-    info = {
-        "Title": document.title, "Creator": document.subject, "Producer": "bifocal",
-        "CreationDate": made, "ModDate": made, "Subject": "; ".join(provenance().lines()),
-    }  # fmt: skip
+    info: dict[str, Any] = {"Title": document.title, "Creator": document.subject}
+    info |= {"Producer": "bifocal", "CreationDate": made, "ModDate": made}
+    info["Subject"] = "; ".join(provenance().lines())
     with atomic_path(path, overwrite=overwrite) as temporary:
         # Where the disk is full, matplotlib tries again as it closes the file, and zlib fails.
         written = BytesIO()
@@ -90,13 +93,14 @@ class _Pages:
             self.y -= size * _MM * 0.7
             self._text(block.text, size=size, weight="bold")
             if block.level <= 2:
-                self._rule()
+                self._line(PAGE[0] - MARGIN, y=self.y - 1.4)
+                self.y -= 2.6
         elif isinstance(block, Banner):
             self._banner(block)
         elif isinstance(block, Paragraph):
             self._text(block.text, size=7.5 if block.small else 9)
             for line in block.lines:
-                self._text(line, size=7, mono=True, indent=4)
+                self._text(line, size=7, mono=True)
             self.y -= 1.0
         elif isinstance(block, TextTable):
             self._table(block)
@@ -115,11 +119,8 @@ class _Pages:
             x / PAGE[0], y / PAGE[1], text.replace("$", r"\$"), fontsize=size, va="baseline", **more
         )
 
-    def _text(
-        self, text: str, *, size: float, weight: str = "normal", mono: bool = False,
-        indent: float = 0.0,
-    ) -> None:  # fmt: skip
-        letter = size * _MM * (_MONO if mono else _WIDE)
+    def _text(self, text: str, *, size: float, weight: str = "normal", mono: bool = False) -> None:
+        letter, indent = size * _MM * (_MONO if mono else _WIDE), 4.0 if mono else 0.0
         width = int((INNER - indent) / letter)
         family = {"family": "monospace"} if mono else {}
         lines = textwrap.wrap(text, width, drop_whitespace=not mono) or [""]
@@ -128,37 +129,30 @@ class _Pages:
             self.y -= size * _MM * _LINE
             self._put(line, x=MARGIN + indent, y=self.y, size=size, weight=weight, **family)
 
-    def _rule(self) -> None:
+    def _line(self, right: float, *, y: float, color: str = "black", lw: float = 0.8) -> None:
         from matplotlib.lines import Line2D
 
-        self.y -= 1.4
-        y = self.y / PAGE[1]
-        ends = (MARGIN / PAGE[0], 1 - MARGIN / PAGE[0])
-        self.figure.add_artist(Line2D(ends, (y, y), color="black", lw=0.8))
-        self.y -= 1.2
+        ends = MARGIN / PAGE[0], right / PAGE[0]
+        self.figure.add_artist(Line2D(ends, [y / PAGE[1]] * 2, color=color, lw=lw))
 
     def _banner(self, block: Banner) -> None:
         from matplotlib.patches import Rectangle
 
-        lines = textwrap.wrap(block.text, int((INNER - 8) / (12 * _MM * _WIDEST)))
-        details = [
-            line for text in block.details
-            for line in textwrap.wrap(text, int((INNER - 8) / (10 * _MM * _WIDE)))
-        ]  # fmt: skip
-        height = (12 * len(lines) + 10 * len(details)) * _MM * _LINE + 5
+        width = int((INNER - 8) / (12 * _MM * _WIDEST))
+        lines = [(line, 12, "bold") for line in textwrap.wrap(block.text, width)]
+        for text in block.details:
+            width = int((INNER - 8) / (10 * _MM * _WIDE))
+            lines += [(line, 10, "normal") for line in textwrap.wrap(text, width)]
+        height = sum(size for _, size, _ in lines) * _MM * _LINE + 5
         self._room(height + 4)
         colour = {True: "#1a6e2e", False: "#b00020", None: "black"}[block.good]
         for wide, fill in ((INNER, False), (4.0, True)):
-            self.figure.add_artist(
-                Rectangle(
-                    (MARGIN / PAGE[0], (self.y - height) / PAGE[1]), wide / PAGE[0],
-                    height / PAGE[1], fill=fill, facecolor=colour, edgecolor=colour, lw=1.5,
-                )
-            )  # fmt: skip
+            corner = MARGIN / PAGE[0], (self.y - height) / PAGE[1]
+            sides = wide / PAGE[0], height / PAGE[1]
+            box = Rectangle(corner, *sides, fill=fill, lw=1.5, fc=colour, ec=colour)
+            self.figure.add_artist(box)
         y = self.y - 1.5
-        for text, size, weight in (
-            *((line, 12, "bold") for line in lines), *((line, 10, "normal") for line in details),
-        ):  # fmt: skip
+        for text, size, weight in lines:
             y -= size * _MM * _LINE
             self._put(text, x=MARGIN + 7, y=y, size=size, weight=weight)
         self.y -= height + 3
@@ -168,57 +162,42 @@ class _Pages:
             self._room(24)
             self.y -= 1.5
             self._text(block.caption, size=8.5, weight="bold")
-        columns = list(zip(block.headings, *block.rows, strict=True))
-        lengths = [max(4, *(len(cell) for cell in column)) for column in columns]
-        size = 8.0
+        columns = zip(block.headings, *block.rows, strict=True)
+        lengths = [max(4, *map(len, column)) for column in columns]
         # Columns of a table that is too wide share what there is, and their cells are folded.
-        letters = INNER / (size * _MM * _WIDEST) - 2.0 * len(lengths)
+        letters = INNER / (_CELL * _MM * _WIDEST) - 2.0 * len(lengths)
         while sum(lengths) > letters and max(lengths) > 12:
             lengths[lengths.index(max(lengths))] -= 1
-        widths = [(length + 2.0) * size * _MM * _WIDEST for length in lengths]
+        widths = [(length + 2.0) * _CELL * _MM * _WIDEST for length in lengths]
         for index, row in enumerate([block.headings, *block.rows]):
-            cells = [
-                textwrap.wrap(cell, length) or [""]
-                for cell, length in zip(row, lengths, strict=True)
-            ]
-            self._row(cells, widths, size, left_columns=block.to_the_left, heading=index == 0)
+            cells = (textwrap.wrap(*cell) or [""] for cell in zip(row, lengths, strict=True))
+            columns = zip(cells, widths, block.to_the_left, strict=True)
+            self._row(list(columns), heading=index == 0)
         self.y -= 2.5
 
-    def _row(
-        self, cells: list[list[str]], widths: list[float], size: float, *,
-        left_columns: Sequence[bool], heading: bool,
-    ) -> None:  # fmt: skip
-        from matplotlib.lines import Line2D
-
-        deep = max(map(len, cells)) * size * _MM * _LINE
+    def _row(self, columns: Sequence[tuple[list[str], float, bool]], *, heading: bool) -> None:
+        """Set the lines of the cells of a row, in columns of a width, to the left or the right."""
+        weight, color, lw = ("bold", "black", 0.8) if heading else ("normal", "0.75", 0.4)
+        step = _CELL * _MM * _LINE
+        deep = max(len(lines) for lines, *_ in columns) * step
         self._room(deep)
         left = MARGIN
-        for column, (lines, width) in enumerate(zip(cells, widths, strict=True)):
+        for lines, width, to_the_left in columns:
+            x, ha = (left, "left") if to_the_left else (left + width - 1.0, "right")
             for number, line in enumerate(lines, start=1):
-                words = left_columns[column]
-                self._put(
-                    line, x=left if words else left + width - 1.0,
-                    y=self.y - number * size * _MM * _LINE + 0.6, size=size,
-                    ha="left" if words else "right", weight="bold" if heading else "normal",
-                )  # fmt: skip
+                y = self.y - number * step + 0.6
+                self._put(line, x=x, y=y, size=_CELL, ha=ha, weight=weight)
             left += width
         self.y -= deep
-        self.figure.add_artist(
-            Line2D(
-                (MARGIN / PAGE[0], left / PAGE[0]), [(self.y - 0.2) / PAGE[1]] * 2,
-                color="black" if heading else "0.75", lw=0.8 if heading else 0.4,
-            )
-        )  # fmt: skip
+        self._line(left, y=self.y - 0.2, color=color, lw=lw)
 
     def _picture(self, block: Picture) -> None:
         height = _height(block)
         wide = height / block.ratio
         self._room(height + 12)
-        grid = self.figure.add_gridspec(
-            3, 3, left=0, right=1, bottom=0, top=1, wspace=0, hspace=0,
-            height_ratios=(PAGE[1] - self.y, height, self.y - height),
-            width_ratios=((PAGE[0] - wide) / 2, wide, (PAGE[0] - wide) / 2),
-        )  # fmt: skip
+        rows, beside = (PAGE[1] - self.y, height, self.y - height), (PAGE[0] - wide) / 2
+        ratios = {"height_ratios": rows, "width_ratios": (beside, wide, beside)}
+        grid = self.figure.add_gridspec(3, 3, **_WHOLE, **ratios)
         block.draw(self.figure.add_subfigure(grid[1, 1]))
         self.y -= height + 1
         self._text(block.caption, size=7.5)
