@@ -71,10 +71,8 @@ def _banner(content: PairContent, check: CheckResult, say: Words) -> Banner:
         good = limit is not None and check.accuracy <= limit
         details.append(say("wanted_yes" if good else "wanted_no", scale=f"{scale:g}"))
     details += _foundation(content, check, say)
-    return Banner(
-        text=say(key, accuracy=millimetres(check.accuracy), n=count), details=tuple(details),
-        good=good,
-    )  # fmt: skip
+    text = say(key, accuracy=millimetres(check.accuracy), n=count)
+    return Banner(text=text, details=tuple(details), good=good)
 
 
 def _foundation(content: PairContent, check: CheckResult, say: Words) -> Iterator[str]:
@@ -117,10 +115,8 @@ def _verdict_table(verdicts: tuple[Verdict, ...], say: Words) -> TextTable:
             word = "" if verdict is None else say("holds" if verdict.holds else "fails")
             cells.append("-" if verdict is None else f"{verdict.tolerance * 1000:.3g} mm: {word}")
         rows.append([f"1:{scale}", *cells])
-    return TextTable(
-        headings=[say("scale"), *(names[rule] for rule in rules)], rows=rows,
-        caption=say("rule_table"),
-    )  # fmt: skip
+    headings = [say("scale"), *(names[rule] for rule in rules)]
+    return TextTable(headings=headings, rows=rows, caption=say("rule_table"))
 
 
 def _point_table(content: PairContent, check: CheckResult, say: Words) -> TextTable:
@@ -128,21 +124,18 @@ def _point_table(content: PairContent, check: CheckResult, say: Words) -> TextTa
     assert solution is not None
     table, control = solution.table, content.control_ids
     place = {name: row for row, name in enumerate(table.ids)}
-    headings = [
-        say("point"), say("kind"), "X [m]", "Y [m]", "r [m]", "dX [mm]", "dY [mm]", "dr [mm]",
-        "σr [mm]", say("flag"),
-    ]  # fmt: skip
+    columns = ("X [m]", "Y [m]", "r [m]", "dX [mm]", "dY [mm]", "dr [mm]", "σr [mm]")
+    headings = [say("point"), say("kind"), *columns, say("flag")]
     rows = []
     compared = np.isfinite(check.errors).any(axis=1)
     for index in np.flatnonzero(compared)[:MOST_POINTS].tolist():
         name = check.ids[index]
         row = place[name]
-        rows.append([
-            name, say("kind_control" if name in control else "kind_check"),
-            *(_number(v, 3) for v in check.solved[index]),
-            *(_number(1000 * v, 1) for v in check.errors[index]),
-            _number(1000 * table["sigma_r"][row], 1), table.flags[row],
-        ])  # fmt: skip
+        kind = say("kind_control" if name in control else "kind_check")
+        place_m = (_number(v, 3) for v in check.solved[index])
+        sizes = (*check.errors[index], table["sigma_r"][row])
+        errors = (_number(1000 * v, 1) for v in sizes)
+        rows.append([name, kind, *place_m, *errors, table.flags[row]])
     for key, name in (("rmse", "rmse"), ("mean", "mean"), ("max_abs", "max")):
         values = [1000 * getattr(check.axes[axis], key) for axis in "XYZ"]
         rows.append([say(name), "", "", "", "", *(_number(v, 1) for v in values), "", ""])

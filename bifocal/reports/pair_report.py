@@ -47,11 +47,10 @@ def pair_blocks(content: PairContent, say: Words) -> Iterator[Block]:
     yield from accuracy_blocks(content, say)
     if content.ortho is not None:
         yield Heading(text=say("overview"))
-        yield Picture(
-            draw=partial(figures.draw_ortho, content=content),
-            ratio=figures.ratio_of(content.ortho[1]),
-            caption=say("overview_caption", gsd=millimetres(content.ortho_gsd)),
-        )
+        draw = partial(figures.draw_ortho, content=content)
+        ratio = figures.ratio_of(content.ortho[1])
+        caption = say("overview_caption", gsd=millimetres(content.ortho_gsd))
+        yield Picture(draw=draw, ratio=ratio, caption=caption)
     yield from _geometry(content, say)
     yield from _photos(content, say)
     yield from _relief(content, say)
@@ -72,16 +71,13 @@ def _geometry(content: PairContent, say: Words) -> Iterator[Block]:
         rows.append([say(key), *cells])
 
     add("file", *(Path(photo.file).name or "-" for photo in photos))
-    add("distance", *(
-        f"{photo.distance:.3f}{_spread(deviations.get(f'distance{k}'), 3)} m"
-        for k, photo in enumerate(photos, start=1)
-    ))  # fmt: skip
+    spreads = [_spread(deviations.get(f"distance{k}"), 3) for k in (1, 2)]
+    add("distance", *(f"{p.distance:.3f}{s} m" for p, s in zip(photos, spreads, strict=True)))
     add("nadir", *(f"{photo.nadir[0]:.3f}, {photo.nadir[1]:.3f} m" for photo in photos))
     if focal := content.setup.get("focal_px"):
-        add("focal_found", *(
-            _focal(float(focal[k - 1]), photo.pixel_size, deviations.get(f"focal{k}"))
-            for k, photo in enumerate(photos, start=1)
-        ))  # fmt: skip
+        pitches = [photo.pixel_size for photo in photos]
+        sigmas = [deviations.get(f"focal{k}") for k in (1, 2)]
+        add("focal_found", *map(_focal, map(float, focal), pitches, sigmas))
         sources = content.setup.get("interior", ("-", "-"))
         add("focal_given", *(in_language(str(source), language) for source in sources))
     if content.photos:
@@ -95,11 +91,8 @@ def _geometry(content: PairContent, say: Words) -> Iterator[Block]:
     yield from refraction_blocks(content, say)
     for sentence in content.setup.get("words", ()):
         yield Paragraph(text=in_language(str(sentence), language), small=True)
-    yield Picture(
-        draw=partial(figures.draw_plan, content=content, say=say),
-        ratio=figures.plan_ratio(content),
-        caption=say("plan_caption"),
-    )
+    draw = partial(figures.draw_plan, content=content, say=say)
+    yield Picture(draw=draw, ratio=figures.plan_ratio(content), caption=say("plan_caption"))
 
 
 def _spread(sigma: float | None, digits: int) -> str:
@@ -130,25 +123,19 @@ def _relief(content: PairContent, say: Words) -> Iterator[Block]:
     if content.relief is None:
         return
     relief = content.relief
-    shares = {q: f"{float((relief.quality == q).mean()):.0%}" for q in Quality}
+    shares = {q.name.lower(): f"{float((relief.quality == q).mean()):.0%}" for q in Quality}
     yield Heading(text=say("relief_map"))
     ratio = figures.ratio_of(relief.bounds)
-    yield Picture(
-        draw=partial(figures.draw_relief, content=content, say=say), ratio=ratio,
-        caption=say(
-            "relief_caption", measured=shares[Quality.MEASURED],
-            guessed=shares[Quality.INTERPOLATED], hidden=shares[Quality.HIDDEN],
-        ),
-    )  # fmt: skip
+    draw = partial(figures.draw_relief, content=content, say=say)
+    yield Picture(draw=draw, ratio=ratio, caption=say("relief_caption", **shares))
     if content.task.view is not None:
         view = content.task.view
         yield Paragraph(text=say("view_link", file=view.name), link=view)
     scale = content.task.scale
     limit = (RULES[0].tolerance(round(scale)) if scale else None) or _UNCERTAIN
-    yield Picture(
-        draw=partial(figures.draw_sigma, content=content, say=say, limit=limit), ratio=ratio,
-        caption=say("sigma_caption", limit=millimetres(limit)),
-    )  # fmt: skip
+    draw = partial(figures.draw_sigma, content=content, say=say, limit=limit)
+    caption = say("sigma_caption", limit=millimetres(limit))
+    yield Picture(draw=draw, ratio=ratio, caption=caption)
 
 
 def _residuals(content: PairContent, say: Words) -> Iterator[Block]:
@@ -159,21 +146,17 @@ def _residuals(content: PairContent, say: Words) -> Iterator[Block]:
     if compared:
         axes = figures.compared_axes(content)
         key = "vector_caption" if {"X", "Y"} & {*axes} else "relief_errors_caption"
-        yield Picture(
-            draw=partial(figures.draw_errors, content=content, say=say),
-            ratio=figures.ratio_of(figures.error_bounds(content)),
-            caption=say(key, zoom=f"{figures.error_zoom(content):g}"),
-        )
-        yield Picture(
-            draw=partial(figures.draw_histogram, content=content, say=say), ratio=0.3,
-            caption=say("histogram_caption", axes=", ".join(axes)),
-        )  # fmt: skip
+        draw = partial(figures.draw_errors, content=content, say=say)
+        ratio = figures.ratio_of(figures.error_bounds(content))
+        caption = say(key, zoom=f"{figures.error_zoom(content):g}")
+        yield Picture(draw=draw, ratio=ratio, caption=caption)
+        draw = partial(figures.draw_histogram, content=content, say=say)
+        caption = say("histogram_caption", axes=", ".join(axes))
+        yield Picture(draw=draw, ratio=0.3, caption=caption)
     if control:
         headings = [say("point"), "Δcol1", "Δrow1", "Δcol2", "Δrow2", "test", say("used")]
-        yield TextTable(
-            headings=headings, rows=[_control_row(row, say) for row in control],
-            caption=say("control_table"),
-        )  # fmt: skip
+        rows = [_control_row(row, say) for row in control]
+        yield TextTable(headings=headings, rows=rows, caption=say("control_table"))
 
 
 def _control_row(row: Mapping[str, Any], say: Words) -> list[str]:
@@ -191,25 +174,18 @@ def _foundations(content: PairContent, say: Words) -> Iterator[Block]:
     else:
         ties = setup.get("common_points", {})
         sigma = ties.get("sigma_px")
-        yield Paragraph(
-            text=say(
-                "rest_measured", control=len(content.control_ids), ties=ties.get("count", 0),
-                sigma="-" if sigma is None else f"{sigma:.2f} px",
-            )
-        )  # fmt: skip
+        shown = "-" if sigma is None else f"{sigma:.2f} px"
+        counts = {"control": len(content.control_ids), "ties": ties.get("count", 0)}
+        yield Paragraph(text=say("rest_measured", sigma=shown, **counts))
         found = setup.get("standard_deviations", {})
 
         def share(key: str) -> str:
             value = found.get(key)
             return "-" if value is None else f"{100 * value:.2g} %"
 
-        yield Paragraph(
-            text=say(
-                "rest_sigma", d1=millimetres(found.get("distance1")),
-                d2=millimetres(found.get("distance2")), scale=share("scale"),
-                relief=share("relief_scale"),
-            )
-        )  # fmt: skip
+        d1, d2 = (millimetres(found.get(key)) for key in ("distance1", "distance2"))
+        scale, relief = share("scale"), share("relief_scale")
+        yield Paragraph(text=say("rest_sigma", d1=d1, d2=d2, scale=scale, relief=relief))
         assumed = [str(text) for text in setup.get("assumed", ())]
         for text in assumed:
             what = in_language(text, content.task.language)

@@ -116,13 +116,9 @@ def _solved(
             f"{1000 * np.hypot(*parts) / np.sqrt(square):.2f} mm",
         ),
     )
-    x, y, relief = table.xyz[row]
-    yield Paragraph(
-        text=say(
-            "step_program", r=f"{relief:.4f} m", x=f"{x:.4f} m", y=f"{y:.4f} m",
-            sigma=millimetres(float(table["sigma_r"][row])),
-        )
-    )  # fmt: skip
+    x, y, relief = (f"{value:.4f} m" for value in table.xyz[row])
+    sigma = millimetres(float(table["sigma_r"][row]))
+    yield Paragraph(text=say("step_program", r=relief, x=x, y=y, sigma=sigma))
     yield Paragraph(text=say("method_source_bent" if bent else "method_source"), small=True)
 
 

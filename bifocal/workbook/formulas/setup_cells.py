@@ -9,6 +9,8 @@ from bifocal.survey.setup import SCALE_TOLERANCE, SIGMA_PRINT, SIGMA_RADIAL
 from bifocal.survey.survey_media import HEIGHTS, index_names, media_names, thickness_names
 from bifocal.workbook.formulas.columns import FORMULAS
 from bifocal.workbook.formulas.media_formulas import calculated_names
+from photocore.option_types import Number
+from photocore.options import options_of
 from photocore.workbook.changing.cells import CellValue
 
 Groups = tuple[tuple[str, ...], ...]
@@ -180,9 +182,21 @@ def number_format(name: str) -> str:
     return next((form for form, names in forms.items() if name in names.split()), "General")
 
 
-def is_one_of(kind: str, name: str) -> bool:
-    """Tell whether a cell holds one of the ``texts``, or must be ``positive``."""
-    return name in FORMULAS.content["setup"][kind].split()
+def numbers() -> tuple[str, ...]:
+    """Return the cells that hold the numbers of an ideal pair and of how points were measured."""
+    return tuple(FORMULAS.content["setup"]["numbers"].split())
+
+
+def is_text(name: str) -> bool:
+    """Tell whether a cell holds a text."""
+    return name in FORMULAS.content["setup"]["texts"].split()
+
+
+def is_above_zero(name: str) -> bool:
+    """Tell whether a cell must hold a number above zero, as the option in its place must."""
+    options = options_of("bifocal", "solve").values()
+    stated = (o.name for o in options if isinstance(o.attributes.get("type"), Number))
+    return name in cells_of(stated)
 
 
 def may_be_zero(name: str) -> bool:

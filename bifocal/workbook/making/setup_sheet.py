@@ -13,7 +13,8 @@ from bifocal.workbook.formulas.setup_cells import (
     STATES,
     formulas,
     groups,
-    is_one_of,
+    is_above_zero,
+    is_text,
     may_be_zero,
     number_format,
     state,
@@ -101,13 +102,11 @@ def _validate(sheet: SheetBuilder, cell: str, name: str, prompt: str) -> None:
     """Tell what a cell of `Setup` is for, and refuse what cannot be meant."""
     if name == "input_unit":
         sheet.validate(cell, title=name, prompt=prompt, choices="mm,px")
-    elif is_one_of("texts", name):
+    elif is_text(name):
         sheet.validate(cell, title=name, prompt=prompt)
     else:
-        above = is_one_of("positive", name)
-        limits = None if above else _NUMBERS
-        if name.startswith("index_"):
-            limits = INDEX_LIMITS
-        elif may_be_zero(name):
+        limits = INDEX_LIMITS if name.startswith("index_") else _NUMBERS
+        if may_be_zero(name):
             limits = (0.0, _NUMBERS[1])
-        sheet.validate(cell, title=name, prompt=prompt, above_zero=above, limits=limits)
+        above_zero = is_above_zero(name)
+        sheet.validate(cell, title=name, prompt=prompt, above_zero=above_zero, limits=limits)

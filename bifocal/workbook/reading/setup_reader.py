@@ -25,11 +25,11 @@ from bifocal.workbook.formulas.setup_cells import (
     MATRICES,
     NADIRS,
     PHOTOS,
-    PRINTS,
     TITLE_BLOCK,
     TYPED_FORMULAS,
     cells_of,
     formulas,
+    numbers,
 )
 from bifocal.workbook.words import headings, term
 from photocore.arrays import FloatArray
@@ -40,11 +40,6 @@ from photocore.tables.model import Kind
 from photocore.tables.numbers import Decimal
 from photocore.workbook.reading.grid import SheetFile
 
-_NUMBERS = (
-    *("c_1", "c_2", *PRINTS, "d_1", "d_2", "delta_d", "pitch"),
-    *("sigma_s", "sigma_px", "sigma_r_max", "k_off", "k_plane"),
-    *("nadir_1_col", "nadir_1_row", "nadir_2_col", "nadir_2_row", "sensor_w", "sensor_h"),
-)
 _TEXTS = ("input_unit", "pair_file", *PHOTOS)
 #: No coordinate of a photo or a map is larger.
 LARGEST = 1e9
@@ -97,10 +92,10 @@ def read_setup(survey: OpenSurvey) -> SurveySetup:
     defaults = {key for key in ("sigma_s", "sigma_r_max") if key in live}
     # Cells with the template's own formula are defaults, calculated or not.
     told = [e for e in complaints if e.column not in live]
-    number = {key: values.given(key) for key in _NUMBERS if key not in defaults}
+    number = {key: values.given(key) for key in numbers() if key not in defaults}
     _check_positive(values, number, told)
     media = _media(book, values, told)
-    d1 = _distance(values, number, "d_1" in live, told)
+    d1, d2 = _distances(values, number, "d_1" in live, told)
     unit = _unit(values, told)
     # What options replace may hold anything, as all beside another pair that is not our workbook.
     is_idle = "pair" in given and "d_1" not in book.names
@@ -111,7 +106,7 @@ def read_setup(survey: OpenSurvey) -> SurveySetup:
             Taking,
             number,
             d1=d1,
-            d2=_near(number, d1),
+            d2=d2,
             nadir1=_place(number["nadir_1_col"], number["nadir_1_row"]),
             nadir2=_place(number["nadir_2_col"], number["nadir_2_row"]),
         ),
@@ -212,7 +207,7 @@ def is_general(book: SheetFile) -> bool:
 
 def _columns() -> list[Column]:
     columns = []
-    for key in (*_NUMBERS, *media_names(MOST), *_general_names(), *_TEXTS):
+    for key in (*numbers(), *media_names(MOST), *_general_names(), *_TEXTS):
         known = term("setup", key)
         unit = known.unit if known is not None and key not in _TEXTS else ""
         kind: Kind = "text" if key in _TEXTS else "number"
@@ -258,10 +253,10 @@ def _check_positive(
             errors.append(values.error(key, f"found {value:g}, which cannot be meant; correct it."))
 
 
-def _distance(
+def _distances(
     values: NamedValues, number: dict[str, float | None], is_formula: bool, errors: list[CellError]
-) -> float | None:
-    """Return d_1: typed, or d_2 + delta_d; complain if both are given and differ."""
+) -> tuple[float | None, float | None]:
+    """Return d_1 and d_2, the one not typed by delta_d; complain if all are given and differ."""
     near, step = number["d_2"], number["delta_d"]
     typed = None if is_formula else number["d_1"]
     total = near + step if near is not None and step is not None else None
@@ -273,29 +268,23 @@ def _distance(
                 "Correct one of the three, or clear delta_d.",
             )
         )
-    return typed if typed is not None else total
+    far = typed if typed is not None else total
+    if near is None and far is not None and step is not None and far > step:
+        near = far - step
+    return far, near
 
 
 def _place(column: float | None, row: float | None) -> tuple[float, float] | None:
     return None if column is None or row is None else (column, row)
 
 
-def _near(number: dict[str, float | None], d1: float | None) -> float | None:
-    """Return d_2: typed, or d_1 - delta_d."""
-    step = number["delta_d"]
-    if number["d_2"] is None and d1 is not None and step is not None and d1 > step:
-        return d1 - step
-    return number["d_2"]
-
-
 def _unit(values: NamedValues, errors: list[CellError]) -> str:
     """Return the input unit, millimetres where the cell is blank."""
     text = _text(values, "input_unit").strip().casefold()
-    if text in ("", "mm"):
-        return "mm"
     if text in ("px", "pixel", "pixels", "pix"):
         return "px"
-    errors.append(values.error("input_unit", f'found "{text}", expected mm or px.'))
+    if text not in ("", "mm"):
+        errors.append(values.error("input_unit", f'found "{text}", expected mm or px.'))
     return "mm"
 
 
