@@ -131,8 +131,7 @@ class WorkbookEditor:
 
         NaN is stored as the error value #N/A, None as an empty text.
         """
-        shown = "" if value is None else value
-        self._changes(title).cached.setdefault(row, {})[column] = shown
+        self._changes(title).cached.setdefault(row, {})[column] = "" if value is None else value
 
     def set_results(
         self, title: str, first_row: int, columns: Mapping[int, ArrayLike | Sequence[CellValue]]
