@@ -64,7 +64,8 @@ def read_named_values(
     complaints = errors if errors is not None else []
     titles = sorted(book.titles, key=lambda title: bare(title) != bare(sheet or ""))
     labels: dict[str, dict[str, str]] = {}
-    if several:
+    # Labels are sought on every sheet, at some cost, only if a value has no cell by its name.
+    if several and any(_by_defined_name(book, name) is None for name in names):
         labels = {title: _found(book, title, names) for title in titles}
         weights = {title: _weight(book, title, labels[title].values()) for title in titles}
         weights[titles[0]] += _BELIEVED * (len(titles) == 1 or bare(titles[0]) == bare(sheet or ""))
