@@ -1,4 +1,4 @@
-"""The planted faults of `tests/planted_faults.py` still fit the code they are to be planted in."""
+"""The faults of `tests/planted_faults.toml` still fit the code they are to be planted in."""
 
 from __future__ import annotations
 
