@@ -220,6 +220,7 @@ WORDS: list[tuple[str, str]] = [
     ("bifocal view relief.tif --out o.html --ortho relief.tif", "relief.tif"),
     ("bifocal export result.csv", "--out"),
     ("bifocal export result.csv --out o.shp", "o.shp"),
+    ("bifocal export result.csv --out o.points", "result.csv"),
     ("bifocal export result.csv --out o", "o: "),
     ("bifocal export result.csv --out o.csv --order XYZ", "--order"),
     ("bifocal export result.csv --out o.csv --csv-flavour excel-fr", "--csv-flavour"),
