@@ -250,11 +250,11 @@ class PhotoSet:
     def _places(self) -> FloatArray:
         """Return places of the wall all over the photos, shape (n, 3). [m]"""
         steps = (np.arange(_PLACES) + 0.5) / _PLACES
-        places = []
+        places: list[FloatArray] = []
         for photo in self.photos:
             grid = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
             if photo.image_size is None:  # as wide as a usual lens sees
-                places.append(np.asarray(photo.nadir + (grid - 0.5) * photo.distance))
+                places.append(photo.nadir + (grid - 0.5) * photo.distance)
             else:
                 seen = photo.plane_from_pixels(grid * photo.image_size - 0.5)
                 ahead = photo.sees_ahead(seen, photo.image_size[::-1])
