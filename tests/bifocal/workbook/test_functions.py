@@ -120,7 +120,9 @@ def test_names_hold_what_the_file_format_wants(book):
         assert len(text) < 8192
         own = set(re.findall(r"_xlpm\.(\w+)", text))
         assert not own & others, "some programs take the workbook's own cell of that name"
-        assert not [word for word in own if re.fullmatch(r"[a-z]{1,3}\d+|[rc]", word, re.IGNORECASE)]
+        assert not [
+            word for word in own if re.fullmatch(r"[a-z]{1,3}\d+|[rc]", word, re.IGNORECASE)
+        ]
         bare = re.sub(r"_xl(pm|fn)\.\w+", "", text)
         assert set(re.findall(r"[A-Za-z_]\w*", bare)) <= {
             *("IF", "NA", "MIN", "SQRT", "ABS", "SIN", "COS", "RADIANS", "E")
