@@ -25,7 +25,7 @@ _LINE = 78
 
 
 def functions_sheet(builder: BookBuilder) -> None:
-    """Write the functions: names, what each takes and gives, an example, a text for Google Sheets."""
+    """Write the functions: what each takes and gives, an example, a text for Google Sheets."""
     sheet = builder.sheet("Functions", "functions_how")
     sheet.headings(4, ("name", "description", "value", "unit"), (23, 82, 18, 9))
     row, calls = 6, []

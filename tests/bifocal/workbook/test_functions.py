@@ -71,12 +71,17 @@ OTHERS = {
     "PLANE_X": [(7.1, -0.3, -135), (3, 0, 0)],
     "PLANE_Y": [(7.1, -0.3, -135), (3, 0, 0)],
     "NINDEX": [(640, 4, 3.5, 20)],
-    "RADIALSHIFT": [(0, 1, 0, 1, 1, 1, 1.33), (2, 0.8, 0.05, 1.5, 1, 1.5, 1.34), (2, 1, 0, 3, 1.33, 1.5, 1)],
-}  # fmt: skip
+    "RADIALSHIFT": [
+        (0, 1, 0, 1, 1, 1, 1.33),
+        (2, 0.8, 0.05, 1.5, 1, 1.5, 1.34),
+        (2, 1, 0, 3, 1.33, 1.5, 1),
+    ],
+}
 
 
 def test_cells_equal_the_library_recalculated(book, tmp_path):
-    sheet, stored = recalculated(book, tmp_path)["Functions"], openpyxl.load_workbook(book, data_only=True)["Functions"]  # fmt: skip
+    sheet = recalculated(book, tmp_path)["Functions"]
+    stored = openpyxl.load_workbook(book, data_only=True)["Functions"]
     found = places(book)
     assert tuple(found) == NAMES
     for name, (given, cells, call) in found.items():
