@@ -40,7 +40,9 @@ from .model.lens import Lens
 from .model.pair import Pair
 from .model.pair_media import PairMedia
 from .model.photo import Photo
+from .model.photo_set import PhotoSet, RankedPair
 from .model.relief_map import Quality, ReliefMap
+from .model.set_intersection import SetIntersection
 from .model.surface import FlatSurface, MapSurface, Surface
 from .orientation.alignment import Alignment
 from .orientation.control_points import Control, SiteMeasures, read_control
@@ -107,6 +109,7 @@ __all__ = [
     "Pair",
     "PairMedia",
     "Photo",
+    "PhotoSet",
     "PhotogrammetryError",
     "Pinhole",
     "PlanePicks",
@@ -116,12 +119,14 @@ __all__ = [
     "Quality",
     "RadialDivision",
     "ReadOptions",
+    "RankedPair",
     "Registration",
     "Rectification",
     "ReliefMap",
     "ReliefTable",
     "SAMPLE",
     "Session",
+    "SetIntersection",
     "Similarity",
     "SiteMeasures",
     "SolvedSurvey",
