@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.image import as_grey
 from bifocal.model.interior_orientation import Interior
-from bifocal.model.photo import Photo
+from bifocal.model.photo_alone import PhotoAlone
 from bifocal.model.surface import FlatSurface
 from bifocal.orientation import one_photo
 from bifocal.orientation.align_workflow import KnownLens, check_inside, interior_of_photo
@@ -195,20 +195,22 @@ def rectify_photo(
     pair = photo.as_pair(str(path.resolve()))
     keys = ("gsd", "bounds", "interpolation", "overviews", "any_size", "scale")
     task = OrthoTask.from_given({key: given[key] for key in keys})
-    relief, scale = given["stands_out"], given["scale"]
+    relief, scale, done = given["stands_out"], given["scale"], None
+    # What can be refused is, before the work.
+    words = photo.bound_in_words(relief, _places(pair, planned_grid(pair, FlatSurface(0.0), task)))
     if folder is None:
         ortho = make_ortho(
             pair, out or Path("ortho.tif"), task, overwrite=overwrite, world_file=world_file,
             progress=progress,
         )  # fmt: skip
-        return _told(photo, ortho, relief, scale)
-    places = _places(pair.image1, planned_grid(pair, FlatSurface(0.0), task))
-    wish = DeliverTask(
-        title=given["title"] or path.stem, camera=photo.bound_in_words(relief, places),
-        **{key: given[key] for key in ("scale", "dpi", "paper", "mark", "language")},
-    )  # fmt: skip
-    done = deliver(pair, folder, task, wish, out=out, overwrite=overwrite, progress=progress)
-    return replace(_told(photo, done.ortho, relief, scale), delivery=done)
+    else:
+        wish = DeliverTask(
+            title=given["title"] or path.stem, camera=words,
+            **{key: given[key] for key in ("scale", "dpi", "paper", "mark", "language")},
+        )  # fmt: skip
+        done = deliver(pair, folder, task, wish, out=out, overwrite=overwrite, progress=progress)
+        ortho = done.ortho
+    return replace(_told(photo, ortho, relief, scale), delivery=done)
 
 
 def _oriented(
@@ -235,7 +237,8 @@ def _told(
     scale: float | None = None,
 ) -> Rectification:  # fmt: skip
     """Return the picture with what is to be known of it, what relief does to it first."""
-    places, centre = _places(photo.as_pair().image1, ortho.grid), photo.camera.centre
+    places = _places(photo.as_pair(), ortho.grid)
+    centre = np.round(photo.camera.centre, 2) + 0.0  # no -0.00
     value, sigma = photo.displacement(relief, places)
     words, sigmas = [photo.bound_in_words(relief, places)], 1000 * photo.sigma_at(places)
     if scale is not None:
@@ -270,7 +273,7 @@ def _told(
     )
 
 
-def _places(photo: Photo, grid: Grid) -> FloatArray:
+def _places(pair: PhotoAlone, grid: Grid) -> FloatArray:
     """Return places all over an orthophoto that the photo shows, shape (n, 2). [m]
 
     Raises
@@ -278,7 +281,7 @@ def _places(photo: Photo, grid: Grid) -> FloatArray:
     InputError
         If there are none.
     """
-    xmin, ymin, xmax, ymax = grid.bounds
+    photo, (xmin, ymin, xmax, ymax) = pair.image1, grid.bounds
     mesh = np.meshgrid(np.linspace(xmin, xmax, 41), np.linspace(ymin, ymax, 41))
     places, size = np.stack(mesh, axis=-1).reshape(-1, 2), np.array(photo.image_size)
     pixels = photo.pixels_from_plane(places)

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from photocore.cli import print_result, progress_bar
+from photocore.cli import print_result, progress_bar, remark
 from photocore.options import declared
 
 
@@ -48,4 +48,6 @@ def command(
         made = done.delivery
         data |= {"folder": str(folder), "files": list(made.files), "sheet": made.sheet}
         told.append(f"{folder}: {', '.join(made.files)} (sheet {made.sheet})")
-    print_result(data, told, as_json=as_json, remarks=done.remarks)
+    print_result(data, told, as_json=as_json)
+    for note in done.remarks:  # what relief does comes before all else
+        remark(note)

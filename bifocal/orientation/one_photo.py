@@ -14,12 +14,12 @@ from bifocal.orientation.adjustment.pair_adjustment import ROUNDING, as_one
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.facade_lines import facing_wall
 from bifocal.orientation.slips import Fitted, Typed, slip_of
-from bifocal.orientation.starts.space_resection import resect
+from bifocal.orientation.starts.space_resection import refuse_line, resect
 from bifocal.orientation.tuning import SLIPS
 from bifocal.remarks import remark
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.adjustment.network import Network, NetworkState, Rows
-from photocore.arrays import ByteArray, FloatArray
+from photocore.arrays import ByteArray, FloatArray, positive
 from photocore.camera import pinhole
 from photocore.camera.pinhole import PARAMETERS, Pinhole, ray_on_plane
 from photocore.errors import ConvergenceError, GeometryError, InputError
@@ -96,6 +96,9 @@ class OrientedPhoto:
         -----
         ``e = r R / (d - r)`` at the distance R from the nadir, Midulla Eq. (1) on the plane.
         """
+        if not relief < self.camera.centre[2]:
+            distance = float(self.camera.centre[2])
+            raise InputError(remark("rectify.before_camera", relief=relief, distance=distance))
 
         def moved(camera: Pinhole) -> FloatArray:
             away = np.linalg.norm(positions - camera.centre[:2], axis=1)
@@ -142,7 +145,7 @@ def by_rectangle(
         except (GeometryError, ConvergenceError):
             return SLIPS.most
 
-    width, height = sides
+    width, height = (positive(side, "--rectangle", unit="m") for side in sides)
     if misfit(height, width) < min(SLIPS.fits, misfit(width, height) / SLIPS.better):
         raise GeometryError(remark("rectify.sides", width=width, height=height))
     return fitted(width, height)
@@ -199,6 +202,7 @@ def _by_points(control: Control, interior: Interior, sigma_pick: float) -> Orien
     With a point's misfit w, its Jacobian A, both in standard deviations, and the cofactor Q of the
     camera, ``(I - A Q Aᵀ)⁻¹ w`` is its misfit had it been left out, and the inverse its covariance.
     """
+    refuse_line(control.pixels1)
     start, _ = resect(control.xyz, control.pixels1, interior)
     spread = pinhole.project_with_jacobian(start, control.xyz).by_point * control.sigma[:, None, :]
     root = np.linalg.cholesky(
@@ -250,6 +254,7 @@ def by_lines(
     GeometryError
         If the photo shows too few lines.
     """
+    length = positive(length, "--length", unit="m")
     turn, lines = facing_wall(image, interior)
     picks, camera = interior.ideal(ends), Pinhole(interior.matrix, turn, np.array([0.0, 0.0, 1.0]))
     first, second = ray_on_plane(camera, picks)
