@@ -113,7 +113,7 @@ def _points(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
         freeze=f"B{HEAD + 1}",
         repeat=f"{HEAD - 1}:{HEAD}",
         scale=_SCALE,
-        breaks=(len(columns), (first_result,)),
+        breaks=(len(columns), (first_result, keys.index("x_c") + 1)),
     )
 
 
