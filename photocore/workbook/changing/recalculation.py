@@ -41,9 +41,9 @@ def examine(path: Path, program: str | None) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``faults`` of the package, ``formulas`` (their number), ``differ`` (cells that show
-        something else when calculated anew: what is stored and what comes out) and ``unknown``
-        (cells with functions that LibreOffice does not know).
+        ``faults`` of the package, ``formulas`` and how many of them were ``not_calculated`` yet,
+        ``differ`` (cells that show something else when calculated anew: what is stored and what
+        comes out) and ``unknown`` (cells with functions that LibreOffice does not know).
 
     Raises
     ------
@@ -54,6 +54,7 @@ def examine(path: Path, program: str | None) -> dict[str, Any]:
     cells = [(t, *found) for t in stored.titles for found in _FORMULA.findall(stored.text(t))]
     differ: dict[str, tuple[str, str]] = {}
     unknown: list[str] = []
+    blank = 0
     with open_package(path) as package:
         names = read_directory(path, package).names
     lambdas = "|".join(re.escape(n) for n, text in names.items() if "_xlfn.LAMBDA" in text)
@@ -69,14 +70,18 @@ def examine(path: Path, program: str | None) -> dict[str, Any]:
             )
             if called.search(text) or (new == CellFault("#NAME?") and old != new):
                 unknown.append(f"{title}!{cell}")
+            elif isinstance(old, NotCalculated):
+                blank += 1
             elif not _alike(old, new):
                 differ[f"{title}!{cell}"] = _shown(old), _shown(new)
-    return {"faults": faults, "formulas": len(cells), "differ": differ, "unknown": unknown}
+    counted = {"formulas": len(cells), "not_calculated": blank}
+    return {"faults": faults, **counted, "differ": differ, "unknown": unknown}
 
 
 def examination_lines(found: Mapping[str, Any], program: str | None) -> list[str]:
     """Return what `examine` found for people."""
-    lines = [*found["faults"], f"{found['formulas']} formulas"]
+    blank = f", {found['not_calculated']} without a result yet" if found["not_calculated"] else ""
+    lines = [*found["faults"], f"{found['formulas']} formulas{blank}"]
     if program is None:
         return [*lines, "LibreOffice is not installed: nothing was calculated anew"]
     lines += [
@@ -117,6 +122,4 @@ def _alike(old: Value, new: Value) -> bool:
 
 def _shown(value: Value) -> str:
     """Return what a cell holds, for people."""
-    if isinstance(value, NotCalculated):
-        return "not calculated"
     return value.text if isinstance(value, CellFault) else str(value) or "blank"
