@@ -59,9 +59,7 @@ def read_metashape_project(path: Path) -> ForeignProject:
     if not views:
         raise InputError(f"{path}: holds no aligned camera.")
     scaled = "the chunk's transform" if chunk.find("./transform/scale") is not None else ""
-    return ForeignProject(
-        "Metashape", tuple(views), metres=scaled, upright=bool(scaled), remarks=tuple(remarks)
-    )
+    return ForeignProject("Metashape", tuple(views), metres=scaled, remarks=tuple(remarks))
 
 
 def _lens(sensor: ElementTree.Element, path: Path) -> LensData | str:

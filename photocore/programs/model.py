@@ -41,9 +41,7 @@ class ForeignProject(NamedTuple):
     points : ndarray, shape (n, 3)
         None where the file holds no points.
     metres : str
-        What makes its lengths metres; empty where nothing does.
-    upright : bool
-        Whether Z is meant to point up.
+        What makes its lengths metres, and its Z upright; empty where nothing does.
     remarks : tuple of str
         What was left out.
     """
@@ -52,5 +50,4 @@ class ForeignProject(NamedTuple):
     views: tuple[ForeignView, ...]
     points: FloatArray = np.empty((0, 3))
     metres: str = ""
-    upright: bool = False
     remarks: tuple[str, ...] = ()

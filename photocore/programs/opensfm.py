@@ -56,7 +56,7 @@ def read_opensfm(path: Path, value: JsonValue) -> ForeignProject:
     left = sum(len(dict(part["shots"].items())) for part in others)
     return ForeignProject(
         "OpenSfM", tuple(views), np.array(points).reshape(-1, 3),
-        metres="the positions of the photos or ground control" if known else "", upright=True,
+        metres="the positions of the photos or ground control" if known else "",
         remarks=(f"{left} photos of smaller reconstructions left out.",) if left else (),
     )  # fmt: skip
 
