@@ -30,7 +30,7 @@ def command(
     from bifocal.projects.colmap_workflow import export_photos
     from bifocal.projects.photos_workflow import ProjectOptions, photos_from_project
 
-    options = ProjectOptions(**given)
+    options = ProjectOptions(**{key: said for key, said in given.items() if said is not None})
     if to is not None:
         if options != ProjectOptions():
             raise click.UsageError("--to: takes a set of photos as it is; leave out other options.")

@@ -11,6 +11,7 @@ from bifocal.model.photo import Photo
 from bifocal.model.photo_set import PhotoSet
 from photocore.arrays import FloatArray
 from photocore.errors import InputError, located
+from photocore.images import image_info
 from photocore.output import check_not_input
 from photocore.programs.colmap import camera_words, image_words, write_colmap_model
 
@@ -65,12 +66,11 @@ def export_photos(source: Path, folder: Path, *, overwrite: bool = False) -> Non
 
 def _in_words(photo: Photo) -> tuple[str, FloatArray, FloatArray]:
     """Return what COLMAP says of a photo's lens, and the photo's rotation and centre."""
-    if photo.image_size is None:
-        raise InputError("its size is not known; add image_size to the file of the set.")
+    size = photo.image_size or image_info(photo.path).size
     camera, lens = pinhole(photo), photo.lens
     matrix = camera.matrix
     terms: FloatArray = np.zeros(0)
-    if abs(matrix[0, 1]) / matrix[1, 1] * photo.image_size[1] > SKEWED:
+    if abs(matrix[0, 1]) / matrix[1, 1] * size[1] > SKEWED:
         raise InputError(
             "its homography is no camera's with square axes; COLMAP has no model for that."
         )
@@ -82,5 +82,5 @@ def _in_words(photo: Photo) -> tuple[str, FloatArray, FloatArray]:
             )
         matrix, terms = lens.camera_matrix, lens.coefficients
     fisheye = lens is not None and lens.model == "fisheye"
-    words = camera_words(matrix, terms, photo.image_size, fisheye=fisheye)
+    words = camera_words(matrix, terms, size, fisheye=fisheye)
     return words, camera.rotation, camera.centre

@@ -9,6 +9,7 @@ from pathlib import Path, PurePath
 import numpy as np
 
 from bifocal.model.lens import Lens
+from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.model.photo_set import PhotoSet
 from bifocal.projects.project_points import chosen, read_points, sparse_points
@@ -122,11 +123,17 @@ def photos_from_project(
         File or folder of COLMAP, Metashape, OpenSfM or OpenDroneMap, AliceVision or Meshroom,
         OpenMVG, Bundler.
     out : path
-        File of the set; lens files are written beside it.
+        File of the set, or ``*.pair.json`` for the two photos that promise the best relief; lens
+        files are written beside it.
     options : ProjectOptions, optional
         What is known beside the project.
     overwrite : bool
         Whether files that exist may be replaced.
+
+    Returns
+    -------
+    ProjectPhotos
+        The set, what gave its scale, and what to say of it.
 
     Raises
     ------
@@ -171,7 +178,12 @@ def photos_from_project(
             photos=tuple(photos), folder=out.parent, extra={"setup": setup},
             orientation=of_cameras(centres, covariance) if covariance.any() else None,
         )  # fmt: skip
-        made.write(out, overwrite=overwrite)
+        written: PhotoSet | Pair = made
+        if out.name.endswith(".pair.json"):
+            if not (ranked := made.pairs()):
+                raise InputError(f"{out}: no two photos of the wall tell its relief; write a set.")
+            written = made.pair(ranked[0].far, ranked[0].near)
+        written.write(out, overwrite=overwrite)
     return ProjectPhotos(
         photos=made, program=read.program, scale=scale, remarks=(*read.remarks, *said, *doubts)
     )
@@ -254,7 +266,7 @@ def _photos(
     overwrite: bool,
 ) -> list[Photo]:  # fmt: skip
     """Return the photos in the wall's frame; write their lenses beside the set."""
-    stem = out.name.removesuffix(".json").removesuffix(".photos")
+    stem = out.name.split(".")[0]
     written: dict[tuple[object, ...], tuple[Lens, str]] = {}
     photos = []
     for view in views:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePath
 
 import numpy as np
@@ -73,20 +73,19 @@ def read_points(path: Path, views: tuple[ForeignView, ...]) -> dict[str, FloatAr
 
 
 def _intersected(table: Table, views: tuple[ForeignView, ...]) -> dict[str, FloatArray]:
-    called: dict[str, ForeignView] = {}
-    for one in views:
-        own = PurePath(one.name)
-        called |= {own.stem.lower(): one, own.name.lower(): one, one.name.lower(): one}
     pixels = np.column_stack([table.numbers("col"), table.numbers("row")])
     rays: dict[str, list[tuple[Pinhole, FloatArray]]] = {}
     errors = []
     for row, (name, photo) in enumerate(zip(table.texts("id"), table.texts("photo"), strict=True)):
-        if photo.lower() not in called:
-            errors.append(table.error(row, "photo", f'"{photo}" is no photo of the project.'))
+        shown = _called(photo, views)
+        if len(shown) != 1:
+            what = "several photos" if shown else "no photo"
+            message = f'"{photo}" is {what} of the project; name one as the project does.'
+            errors.append(table.error(row, "photo", message))
         elif not np.isfinite(pixels[row]).all():
             errors.append(table.error(row, "col", "column and row must both be given."))
         else:
-            view = called[photo.lower()]
+            view = shown[0]
             lens = Lens(**view.lens._asdict())
             camera = Pinhole(lens.camera_matrix, view.rotation, view.centre)
             rays.setdefault(name, []).append((camera, lens.undistort(pixels[row])[None]))
@@ -102,6 +101,16 @@ def _intersected(table: Table, views: tuple[ForeignView, ...]) -> dict[str, Floa
             )
         points[name] = place
     return points
+
+
+def _called(photo: str, views: Sequence[ForeignView]) -> list[ForeignView]:
+    """Return the photos of a name: the whole one, else without folders, else without ending."""
+    for part in (PurePath.as_posix, lambda path: path.name, lambda path: path.stem):
+        found = [view for view in views if part(PurePath(view.name)).lower()
+                 == part(PurePath(photo)).lower()]  # fmt: skip
+        if found:
+            return found
+    return []
 
 
 def chosen(points: Mapping[str, FloatArray], names: tuple[str, ...], option: str) -> FloatArray:

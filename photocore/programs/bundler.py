@@ -78,7 +78,10 @@ def _names(path: Path, cameras: int) -> list[str]:
     lines = [line.split() for line in read_text(place, "list of photos").splitlines()]
     names = [words[0] for words in lines if words]
     if len(names) != cameras:
-        raise InputError(f"{place}: lists {len(names)} photos, {path.name} has {cameras} cameras.")
+        raise InputError(
+            f"{place}: lists {len(names)} photos, {path.name} has {cameras} cameras; give "
+            "one line to each."
+        )
     return names
 
 

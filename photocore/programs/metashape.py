@@ -66,7 +66,7 @@ def _lens(sensor: ElementTree.Element, path: Path) -> LensData | str:
     """Return the lens of a sensor, or what is wrong with it."""
     kind = sensor.get("type", "frame")
     if kind not in ("frame", "fisheye"):
-        return f"is of the type {kind}; projects hold frame cameras and fisheyes"
+        return f"is of the type {kind}; frame cameras and fisheyes alone are read; leave it out"
     nodes = sensor.findall("calibration")
     best = [node for node in nodes if node.get("class") == "adjusted"] or nodes
     if not best:
