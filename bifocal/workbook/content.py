@@ -84,6 +84,8 @@ class SurveyContent:
         Rows of `Points` in an empty template.
     functions : bool
         Whether the workbook has functions with names.
+    plain : bool
+        Whether a new workbook's formulas are plain: A1 references, no tables or cells by name.
     media : SurveyMedia or None
         Cells of media in an empty template, and of a general pair; None for those that follow from
         the pair. An ideal pair's stand in its set-up.
@@ -110,6 +112,7 @@ class SurveyContent:
     log: Sequence[tuple[str, str, str, str, str]] = ()
     rows: int = POINT_ROWS
     functions: bool = False
+    plain: bool = False
     media: SurveyMedia | None = None
 
     @classmethod
