@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from openpyxl.worksheet.worksheet import Worksheet
 from PIL import Image
 
-from bifocal import SAMPLE, WATER_SAMPLE, Pair
+from bifocal import SAMPLE, WATER_SAMPLE, Pair, PhotoSet
 from tests.bifocal.campaigns import sample_tables
 from tests.builders.commands import bifocal_command as main
 from tests.builders.foreign_projects import (
@@ -85,7 +85,7 @@ def make_desk(folder: Path) -> None:
 def _projects(folder: Path, rows: list[list[float | str]]) -> None:
     """Write projects of other programs that hold the pair's photos, and picks in them."""
     shots = []
-    for photo in Pair.read(folder / "wall.pair.json").photos:
+    for photo in PhotoSet.read(folder / "wall.pair.json").photos:
         inverse = np.linalg.inv(photo.plane_from_pixel)  # square to the wall: scale and middle
         focal = float(photo.distance * inverse[0, 0] / inverse[2, 2])
         middle = inverse[:2] @ [*photo.nadir, 1] / inverse[2, 2]

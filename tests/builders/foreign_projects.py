@@ -154,7 +154,7 @@ def write_metashape(path: Path, shots: Sequence[Shot], *, scale: float | None = 
         cx, cy = (c + 0.5 - side / 2 for c, side in zip(shot.centre, shot.size, strict=True))
         values = {"f": shot.focal[1], "cx": cx, "cy": cy, "b1": shot.focal[0] - shot.focal[1],
                   "k1": k1, "k2": k2, "k3": k3, "p1": p2, "p2": p1}  # fmt: skip
-        inside = "".join(f"<{key}>{value!r}</{key}>" for key, value in values.items())
+        inside = "".join(f"<{key}>{float(value)!r}</{key}>" for key, value in values.items())
         sensors.append(
             f'<sensor id="{k}" type="frame"><resolution width="{width}" height="{height}"/>'
             f'<calibration type="frame" class="adjusted"><resolution width="{width}" '
