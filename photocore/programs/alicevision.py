@@ -49,7 +49,7 @@ def read_alicevision(path: Path, value: JsonValue) -> ForeignProject:
         if pose is None or "rigId" in view:
             unposed += 1
             continue
-        name, number = view["path"].text(), view.get("intrinsicId", "").text()
+        name, number = view["path"].text().replace("\\", "/"), view.get("intrinsicId", "").text()
         if number not in lenses:
             raise InputError(f"{path}: intrinsic {number!r} of photo {name} is not in the file.")
         rotation = pose["rotation"].numbers(9).reshape(3, 3).T

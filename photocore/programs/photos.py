@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path, PurePath, PureWindowsPath
+from pathlib import Path, PurePath
 
 from photocore.errors import InputError
 from photocore.images import image_info
@@ -37,7 +37,7 @@ class PhotoFinder:
         return next((path for path in self._candidates(name) if path.is_file()), None)
 
     def _candidates(self, name: str) -> Iterator[Path]:
-        own = PureWindowsPath(name) if "\\" in name else PurePath(name)
+        own = PurePath(name)
         if self.images is None and own.is_absolute():
             yield Path(name)
         for folder in self.folders:
