@@ -29,8 +29,10 @@ from photocore.programs.projects import read_foreign_project
 
 #: Length of a unit that a project may be in. [m]
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-#: Of the wall's points that a photo must show to belong to the set, a share and a number.
-LEAST_SHARE, LEAST_POINTS = 0.02, 3
+#: Points of a wall whose spread across their line is a smaller share say nothing of its plane.
+NARROWEST = 0.05
+#: Of the wall's points, what a photo must show to belong to the set.
+LEAST_SHARE = 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -205,11 +207,11 @@ def _frame(
         points = chosen(named, options.wall, "--wall")
         middle = points.mean(axis=0)
         _, spread, axes = np.linalg.svd(points - middle, full_matrices=False)
-        if spread[1] < 1e-3 * spread[0]:
-            raise InputError("--wall: its points lie on one line; add one beside it.")
+        if spread[1] < NARROWEST * spread[0]:
+            raise InputError("--wall: its points lie nearly on one line; add one well beside it.")
         frame = framed(project, axes[2], points, level)
     else:
-        frame, said = found_frame(project, points, level)
+        frame, points, said = found_frame(project, points, level)
     covariance, scale = np.zeros((7, 7)), ""
     if options.length:
         *ends, metres = options.length
@@ -240,7 +242,6 @@ def _of_the_wall(
 ) -> tuple[list[ForeignView], list[str]]:
     """Return the photos that show the wall from its front, and the names of the others."""
     placed, left, places = [], [], frame(wall)
-    places = places[np.abs(places[:, 2]) <= np.median(np.abs(places[:, 2])) + 1e-9]
     for view in views:
         camera = _camera(view, frame)
         size = np.array(view.lens.image_size)
@@ -250,7 +251,7 @@ def _of_the_wall(
             ahead = away[away[:, 2] > 0]
             pixels = ahead[:, :2] / ahead[:, 2:]
             inside = int(((pixels > -0.5) & (pixels < size - 0.5)).all(axis=1).sum())
-        if inside >= min(LEAST_POINTS, max(1.0, LEAST_SHARE * len(places))):
+        if inside >= max(1.0, LEAST_SHARE * len(places)):
             placed.append(view)
         else:
             left.append(PurePath(view.name).name)

@@ -38,8 +38,8 @@ RIVAL = 0.6
 
 def found_frame(
     project: ForeignProject, points: FloatArray, level: FloatArray | None = None
-) -> tuple[Similarity, list[str]]:
-    """Return the frame of the largest façade among points, and what to say of it.
+) -> tuple[Similarity, FloatArray, list[str]]:
+    """Return the frame of the largest façade among points, its points, and what to say of it.
 
     ``level`` as for `framed`.
 
@@ -81,7 +81,7 @@ def found_frame(
     normal = frame.rotation.T @ [-plane[1], -plane[2], 1.0]
     raised = wall @ [-plane[1], -plane[2], 1.0] - plane[0]
     members = np.abs(raised) < WALLS.face_band * distance
-    return framed(project, normal, near[members], level), said
+    return framed(project, normal, near[members], level), near[members], said
 
 
 def framed(
