@@ -13,7 +13,7 @@ By hand, the equations
 The pair
     Pair, Photo               both cameras; read and write pair files, intersect and project points
     PhotoSet                  two or more photos of one wall; a pair is the set of two
-    Intersection              what `Pair.intersect` returns: X, Y, r, covariance, flags
+    Intersection, SetIntersection   what their `intersect` returns: X, Y, r, covariance, flags
     read_image, write_image   photos as arrays, upright as seen
     Lens                      principal distance, principal point and distortion of a lens
     calibrate, Calibration    a lens from photos of a board

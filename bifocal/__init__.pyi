@@ -41,6 +41,7 @@ from .model.pair_media import PairMedia
 from .model.photo import Photo
 from .model.photo_set import PhotoSet, RankedPair
 from .model.relief_map import Quality, ReliefMap
+from .model.set_intersection import SetIntersection
 from .model.surface import FlatSurface, MapSurface, Surface
 from .orientation.alignment import Alignment
 from .orientation.control_points import Control, SiteMeasures, read_control
@@ -123,6 +124,7 @@ __all__ = [
     "ReliefTable",
     "SAMPLE",
     "Session",
+    "SetIntersection",
     "Similarity",
     "SiteMeasures",
     "SolvedSurvey",
