@@ -76,7 +76,7 @@ class DenseRelief(ReliefMap):
         }
 
 
-def relief_of_pair(
+def pair_relief(
     pair: Pair,
     image1: NDArray[np.generic],
     image2: NDArray[np.generic],

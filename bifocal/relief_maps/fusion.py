@@ -108,7 +108,8 @@ def _decide(
     row, column = np.nonzero(apart)
     at = (slice(None), row, column)
     relief, sigma = (
-        np.stack([getattr(one.bands, name)[row, column] for one in found]) for name in ("r", "sigma")
+        np.stack([getattr(one.bands, name)[row, column] for one in found])
+        for name in ("r", "sigma")
     )
     cost = np.where(measured[at], misfits[at], np.float32(np.inf))
     best = cost.argmin(axis=0)[None]

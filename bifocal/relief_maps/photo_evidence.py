@@ -51,8 +51,8 @@ class Witness:
         pixels = self.photo.project(xyz)
         factors = np.array([self.grey.shape[1], self.grey.shape[0]]) / self.size
         with np.errstate(invalid="ignore"):
-            inside = ((pixels >= 0) & (pixels <= np.subtract(self.size, 1))).all(axis=-1)
-        places = np.where(inside[:, None], (pixels + 0.5) * factors - 0.5, -10.0)
+            inside = np.all((pixels >= 0) & (pixels <= np.subtract(self.size, 1)), axis=-1)
+        places = np.where(np.asarray(inside)[:, None], (pixels + 0.5) * factors - 0.5, -10.0)
         values = values_at(self.grey, places.astype(np.float32), cv2.INTER_LINEAR)
         return np.where(inside, values, np.float32(np.nan))
 
@@ -110,9 +110,7 @@ def misfit(
     return np.asarray(cv2.blur(result, (side, side)))
 
 
-def exposed_alike(
-    witnesses: Sequence[Witness], relief: Float32Array, grid: Grid
-) -> list[Witness]:
+def exposed_alike(witnesses: Sequence[Witness], relief: Float32Array, grid: Grid) -> list[Witness]:
     """Return the photos exposed like the first that they share a part of the wall with.
 
     ``I1 = a + b I2 + c x + d y``, robustly, over a few thousand places of the map.

@@ -11,12 +11,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.model.grid import Bounds, Grid, bounds_of, bounds_of
+from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.model.image import as_grey
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.model.photo_set import PhotoSet
-from bifocal.relief_maps.dense_matching import DenseRelief, relief_of_pair
+from bifocal.relief_maps.dense_matching import DenseRelief, pair_relief
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import common_bounds
 from bifocal.relief_maps.fusion import PairRelief, fused
@@ -26,7 +26,7 @@ from bifocal.relief_maps.seed import usual_range
 from bifocal.relief_maps.tuning import FUSION
 from bifocal.relief_maps.turned_plane import TurnedPlane
 from bifocal.remarks import remark
-from photocore.arrays import Float32Array, FloatArray
+from photocore.arrays import ByteArray, Float32Array, FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import GeometryError, InputError
 
@@ -53,7 +53,7 @@ def dense_relief(
     image1, image2 : ndarray of uint8 or uint16, shape (height, width[, 3])
         Far and near photo as taken; lens distortion is removed on the way if the pair has lenses.
         Of a set all its photos, in its order.
-    *others : ndarray
+    others : ndarray
         The third photo of a set and on.
     gsd : float, optional
         Pixel of the map; by default that of the far photo on the plane. [m] The photos are
@@ -129,7 +129,7 @@ class _Wishes(NamedTuple):
         self, pair: Pair, image1: Image, image2: Image, progress: Progress
     ) -> DenseRelief:
         """Return the relief of a pair."""
-        return relief_of_pair(pair, image1, image2, progress=progress, **self._asdict())
+        return pair_relief(pair, image1, image2, progress=progress, **self._asdict())
 
 
 class _Part(NamedTuple):
@@ -201,9 +201,10 @@ def _of_set(
 
 def _within(progress: Progress, done: int, jobs: int) -> Progress:
     """Return the progress of one job among others."""
+    start = done
 
-    def tell(part: float, whole: float, what: str = "") -> None:
-        progress((done + part / whole) / jobs, 1.0, what)
+    def tell(done: float, total: float, what: str = "") -> None:
+        progress((start + done / total) / jobs, 1.0, what)
 
     return tell
 
@@ -269,7 +270,7 @@ def _best_pairs(
 
 
 def _pixel(photo: Photo, grey: ByteArray, xy: FloatArray) -> FloatArray:
-    """Return the side of a photo's pixel at places of the wall, infinite where it shows none. [m]"""
+    """Return the side of a photo's pixel at places, infinite where it shows nothing. [m]"""
     pixels = photo.pixels_from_plane(xy)
     size = np.array(grey.shape[::-1])
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -309,12 +310,10 @@ def _measured(
         relief = wishes.fulfilled(turned, images[far], images[near], progress)
         bands = turn.brought_back(relief, part)
         bands = bands._replace(sigma=np.hypot(bands.sigma, orientation_sigma(pair, bands.r, part)))
-    return relief, PairRelief(bands, _weight(photos, images, numbers, part, turn is not None))
+    return relief, PairRelief(bands, _weight(photos, numbers, part, turn is not None))
 
 
-def _weight(
-    photos: PhotoSet, images: Sequence[Image], numbers: tuple[int, int], part: Grid, turned: bool
-) -> Float32Array:
+def _weight(photos: PhotoSet, numbers: tuple[int, int], part: Grid, turned: bool) -> Float32Array:
     """Return one over the square of the relief that a pixel of parallax is worth. [1/m²]"""
     x, y = (np.linspace(0, side - 1, FUSION.places) for side in part.shape[::-1])
     coarse = np.stack(np.meshgrid(part.x0 + x * part.gsd, part.y0 - y * part.gsd), axis=-1)
