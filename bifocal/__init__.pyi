@@ -53,8 +53,9 @@ from .orthophotos.ortho_image import OrthoOptions, Orthophoto, Source
 from .projects.colmap_workflow import write_colmap
 from .projects.photos_workflow import ProjectOptions, ProjectPhotos, photos_from_project
 from .rays import Foot
-from .relief_maps.dense_matching import DenseRelief, dense_relief
+from .relief_maps.dense_matching import DenseRelief
 from .relief_maps.registration import Registration
+from .relief_maps.set_relief import dense_relief
 from .reports.relief_view import relief_view
 from .survey.georeferencing import georeference
 from .survey.observations import PointObservations
