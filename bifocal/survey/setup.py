@@ -293,7 +293,7 @@ class SurveySetup:
         """Return the points as image coordinates of `pair`, without raw pixels."""
         first, second = self.adjusted
         lenses = self.lens(1), self.lens(2)
-        is_plain = (first, second, *lenses) == (None,) * 4
+        is_plain = all(part is None for part in (first, second, *lenses))
         if self.unit == "mm" and is_plain and not points.has_pixels.any():
             return points
         typed = (points.xy1, points.xy2)
