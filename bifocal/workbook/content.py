@@ -11,10 +11,11 @@ from bifocal.model.flags import DOUBTFUL_SHARE, FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.survey.georeferencing import residuals
+from bifocal.survey.image_shift import foot_tangents, image_shift
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable, entries
-from bifocal.survey.setup import SurveySetup
+from bifocal.survey.setup import SIGMA_RADIAL, SurveySetup
 from bifocal.survey.solved_survey import SolvedSurvey, WorldPoints
 from bifocal.survey.survey_media import SurveyMedia
 from bifocal.survey.tolerances import RULES, ToleranceRule
@@ -236,6 +237,10 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
         if key in ("q", "theta_used"):
             blank = np.isnan(values)
         cells[key] = _unless(blank, values)
+    undirected = incomplete | np.isnan(table["theta_used"])
+    first = content.photos[0]
+    shifts = image_shift(first, content.setup, points, table) | foot_tangents(first, table)
+    cells |= {key: _unless(undirected, values) for key, values in shifts.items()}
     cells |= {key: inputs(values) for key, values in table.formula_cells.items()}
     for key in {"g1", "g2"} & table.formula_cells.keys():
         cells[key] = _unless(incomplete, table.formula_cells[key])
@@ -381,7 +386,7 @@ def _setup_cells(content: SurveyContent) -> dict[str, CellValue]:
         **{f"off_{axis}{image}": 0 for axis in "xy" for image in "12"},
     }  # fmt: skip
     if content.pair is None:
-        return cells
+        return cells | {"sigma_s": SIGMA_RADIAL}
     for image, photo in enumerate(content.photos, start=1):
         cells |= {
             f"d_{image}": photo.distance,
