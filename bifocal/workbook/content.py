@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations_with_replacement
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from bifocal.model.flags import DOUBTFUL_SHARE, FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.survey.georeferencing import residuals
+from bifocal.survey.leave_one_out import leave_one_out
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable, entries
@@ -332,7 +334,21 @@ def control_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
         cells[f"c{world}"] = inputs(np.where(used, near[:, i], 0.0))
         cells[f"v{world}"] = inputs(left[:, i])
     cells["w"] = [int(value) for value in used]
-    return cells | _weight_cells(geo)
+    return cells | _weight_cells(geo) | _left_out_cells(geo)
+
+
+def _left_out_cells(geo: Georeference) -> dict[str, list[CellValue]]:
+    """Return what each control point costs the fit."""
+    found = leave_one_out(geo)
+    cells = {key: inputs(getattr(found, key)) for key in ("own", "gain")}
+    cells |= {"v": inputs(found.size), "s0": inputs(found.sigma0)}
+    for (i, a), (j, b) in combinations_with_replacement(enumerate("ENH"), 2):
+        cells[f"d_{a}{b}"] = inputs(found.covariance[:, i, j])
+    fits = [
+        None if gain != gain else "CHECK" if row == found.worst else "OK"
+        for row, gain in enumerate(found.gain)
+    ]
+    return cells | {"fit": fits}
 
 
 def _weight_cells(geo: Georeference) -> dict[str, list[CellValue]]:

@@ -63,7 +63,8 @@ def is_earlier(survey: SurveyInput) -> bool:
     """Tell by its names whether a workbook's sheets were made by an earlier version."""
     names = () if survey.book is None else survey.book.names
     newest = "setup_missing" if "sigma_px" in names else "enlargement_1"
-    came = {"b_lever": newest, "g_k": "g_space"}  # what stands beside what from the start
+    # What stands beside what from the start.
+    came = {"b_lever": newest, "g_k": "g_space", "g_space": "g_alarm"}
     return any(old in names and new not in names for old, new in came.items())
 
 

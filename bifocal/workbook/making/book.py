@@ -15,6 +15,7 @@ from bifocal.workbook.content import (
     setup_cells,
 )
 from bifocal.workbook.formulas.columns import FORMULAS, results_columns
+from bifocal.workbook.formulas.world_state import STATE, STATES, world_state
 from bifocal.workbook.making.cameras_sketch import cameras_sketch
 from bifocal.workbook.making.charts import charts
 from bifocal.workbook.making.georeference_sheet import georeference
@@ -28,8 +29,10 @@ from photocore.workbook.making.look import (
     BODY_FONT,
     DOUBT,
     GOOD,
+    HEAD_FONT,
     WARN_FONT,
     WRONG,
+    colour_where,
     colour_words,
     strike_out,
 )
@@ -210,6 +213,14 @@ def _title_block(sheet: SheetBuilder, content: SurveyContent, results: Cells) ->
         sheet.worksheet.merge_cells(area)
         sheet.worksheet[left].alignment = _BLOCK_PLACE
     sheet.worksheet.row_dimensions[2].height = 42
+    words = {key: book.word(key) for key in STATES}
+    said, _ = world_state(words, content.georeference)
+    sheet.formula("H1", STATE, said, font=HEAD_FONT)
+    colour_where(sheet.worksheet, "H1", "g_alarm=1", WRONG)
+    for area in ("E1:G1", "H1:O1"):
+        sheet.worksheet.merge_cells(area)
+        sheet.worksheet[area[:2]].alignment = _BLOCK_PLACE
+    sheet.worksheet.row_dimensions[1].height = 40
 
 
 def _log(builder: BookBuilder, content: SurveyContent) -> None:

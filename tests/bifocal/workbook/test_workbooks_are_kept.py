@@ -568,7 +568,7 @@ def test_a_coordinate_survey_becomes_one_for_pixels_in_a_new_workbook_only(tmp_p
 
 
 @pytest.mark.parametrize(
-    "names", [("g_space", "g_space_block"), ("enlargement_1", "enlargement_2", "setup_missing")]
+    "names", [("g_alarm",), ("g_space", "g_space_block"), ("enlargement_1", "enlargement_2", "setup_missing")]
 )
 def test_a_workbook_of_an_earlier_version_goes_into_a_new_one(tmp_path, names):
     path, out = tmp_path / "s.xlsx", tmp_path / "s-result.xlsx"
