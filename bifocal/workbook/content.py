@@ -304,15 +304,25 @@ def result_cells(
     }
 
 
-def check_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
-    """Return every column of `Check` by key."""
-    known, check = content.known, content.check
+def check_cells(
+    content: SurveyContent, points: Mapping[str, Sequence[CellValue]]
+) -> dict[str, list[CellValue]]:
+    """Return every column of `Check` by key, from those of `Points`."""
+    known, check, table = content.known, content.check, content.table
     cells = _named(known.ids, known.used)
     for i, axis in enumerate("XYZ"):
         cells[f"{axis}_ref"] = inputs(known.xyz[:, i])
         if check is not None:
             cells[axis] = inputs(check.solved[:, i])
             cells[f"d{axis}"] = inputs(check.errors[:, i])
+            cells[f"t{axis}"] = inputs(check.standardised[:, i])
+    if check is not None and table is not None:
+        sizes = np.abs(np.nan_to_num(check.standardised)).max(axis=1)
+        tested = ~np.isnan(check.standardised).all(axis=1)
+        cells["sigmas"] = inputs(np.where(tested, sizes, np.nan))
+        cells["out"] = [int(name in check.flagged) for name in known.ids]
+        flags = [*points["flag"], None]
+        cells["flag"] = [flags[row] for row in known.rows_in(table)]
     return cells
 
 

@@ -42,6 +42,12 @@ from photocore.workbook.reading.grid import (
 )
 from photocore.workbook.reading.package import uncollected
 
+#: Tables whose rows are given, and the columns that tell whether they still are those.
+_FIXED = (
+    ("tblPlan", "relief_cm"), ("tblFrame", "share"), ("tblBins", "sigmas_to"),
+    ("tblVectors", "check_row"),
+)  # fmt: skip
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BookUpdate:
@@ -181,7 +187,7 @@ def update_book(
         own = editor.table(name)
         if own is not None:
             _table(editor, built, name, [row - own.first for row in sheet_rows])
-    for name, key in (("tblPlan", "relief_cm"), ("tblFrame", "share")):
+    for name, key in _FIXED:
         _fixed_table(editor, built, name, key)
     _verdict(editor, built, content, rules="rules" in given, words=other_words)
     _charts(editor, built, rows)

@@ -87,7 +87,7 @@ def build(content: SurveyContent) -> BookBuilder:
     cells = point_cells(content)
     _points(builder, content, cells)
     _results(builder, content, cells)
-    check(builder, content)
+    check(builder, content, cells)
     georeference(builder, content)
     planning(builder, content)
     charts(builder, content, cells)

@@ -30,13 +30,15 @@ def placed(model, *, off=0.0, rows=COUNT, seed=3):
     world[4, 0] += off
     if model == "2D":
         world[:, 2] = np.nan
-    noisy = xyz + np.einsum("nij,nj->ni", np.linalg.cholesky(covariance), rng.normal(size=xyz.shape))
+    noisy = xyz + np.einsum(
+        "nij,nj->ni", np.linalg.cholesky(covariance), rng.normal(size=xyz.shape)
+    )
     ids = tuple(f"P{i}" for i in range(rows))
     return KnownPoints(ids=ids, xyz=noisy), KnownPoints(ids=ids, xyz=world), covariance
 
 
-@pytest.fixture
-def unjudged(monkeypatch):
+@pytest.fixture(autouse=True)
+def _unjudged(monkeypatch):
     """Let the fit keep every point, as a workbook's formulas do by themselves."""
     monkeypatch.setattr(georeferencing, "ALPHA_POINT", 1e-300)
 
@@ -49,7 +51,7 @@ def refitted(model, points, control, covariance, row):
 
 
 @pytest.mark.parametrize(("model", "worth"), [("2D", 1e-6), ("levelled", 0.01), ("3D", 0.01)])
-def test_squares_without_a_point_are_those_of_a_fit_without_it(model, worth, unjudged):
+def test_squares_without_a_point_are_those_of_a_fit_without_it(model, worth):
     points, control, covariance = placed(model)
     found = leave_one_out(georeference(points, control, model=model, covariance=covariance))
     squares = np.nansum(found.own)
@@ -61,7 +63,7 @@ def test_squares_without_a_point_are_those_of_a_fit_without_it(model, worth, unj
 
 
 @pytest.mark.parametrize("model", ["2D", "levelled", "3D"])
-def test_the_point_that_is_a_metre_off_is_found(model, unjudged):
+def test_the_point_that_is_a_metre_off_is_found(model):
     points, control, covariance = placed(model, off=1.0)
     world = georeference(points, control, model=model, covariance=covariance)
     found = leave_one_out(world)
@@ -72,7 +74,7 @@ def test_the_point_that_is_a_metre_off_is_found(model, unjudged):
     assert found.sigma0[4] < world.sigma0 / 3
 
 
-def test_four_coordinates_to_spare_are_needed_to_tell_which_point_is_wrong(unjudged):
+def test_four_coordinates_to_spare_are_needed_to_tell_which_point_is_wrong():
     points, control, covariance = placed("levelled", off=1.0, rows=5)
     kept = replace(control, use=np.array([True, False, False, False, True]))
     found = leave_one_out(georeference(points, kept, model="levelled", covariance=covariance))
@@ -82,7 +84,7 @@ def test_four_coordinates_to_spare_are_needed_to_tell_which_point_is_wrong(unjud
     assert np.isfinite(found.size[[0, 4]]).all()
 
 
-def test_exact_coordinates_contradict_nothing(unjudged):
+def test_exact_coordinates_contradict_nothing():
     points, control, covariance = placed("levelled")
     exact = KnownPoints(ids=points.ids, xyz=control.xyz - [351234.0, 4123456.0, 33.0])
     world = KnownPoints(ids=control.ids, xyz=exact.xyz[:, [0, 2, 1]] * [1, -1, 1] + 4e6)
