@@ -18,8 +18,8 @@ from bifocal.workbook.making.reference_sheets import CHECK_HEAD
 from bifocal.workbook.words import word
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
-from photocore.workbook.making.live_charts import COLOURS, scatter, titled
-from photocore.workbook.making.look import FACE, HEAD_FONT, LABEL, LABEL_FONT
+from photocore.workbook.making.live_charts import COLOURS, linked_title, scatter, titled
+from photocore.workbook.making.look import FACE, LABEL, LABEL_FONT
 from photocore.workbook.making.newbook import RowBlock
 from photocore.workbook.reading.grid import column_letters
 
@@ -93,7 +93,8 @@ def _checked(sheet: SheetBuilder, content: SurveyContent, cells: Cells, head: in
     place = f"{column_letters(LEFT + 6)}{head - 2}"
     sheet.formula(place, line.formula, scale, form=line.number_format, name=line.key)
     live = f'"{told[0]}"&{line.key}&"{told[1]}"'
-    sheet.formula("A87", live, f"{scale:g}".join(told), name="chart_vectors", font=HEAD_FONT)
+    said, at = f"{scale:g}".join(told), f"{column_letters(LEFT + 7)}{head - 2}"
+    sheet.formula(at, live, said, name="chart_vectors", font=LABEL_FONT)
     rows = len(counts["sigmas_from"])
     sheet.table("tblBins", bins, at=(head, LEFT + 6), rows=rows, cells=counts)
     left, count = LEFT + 12, content.check_rows
@@ -126,9 +127,9 @@ def _checked(sheet: SheetBuilder, content: SurveyContent, cells: Cells, head: in
         arrow.graphicalProperties.line.width = 15000
         arrow.graphicalProperties.line.tailEnd = LineEndProperties(type="triangle")
         plan.series.append(arrow)
-    plan.title = None
+    plan.title = linked_title("Charts", at, said)
     _equal_scales(plan, cells)
-    sheet.worksheet.add_chart(plan, "A88")
+    sheet.worksheet.add_chart(plan, "A87")
 
 
 def _bin_cells(content: SurveyContent) -> Cells:
