@@ -222,7 +222,8 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
         cells |= {key: inputs(array[:, i]) for i, key in enumerate(keys)}
     if table is None:
         return cells
-    # A formula shows nothing where a measurement is missing, #N/A where relief is undefined.
+    # A formula shows nothing where a measurement is missing or relief is undefined: an error value
+    # would be that of every sum.
     incomplete = np.isnan(table["s1_used"])
     placeless = incomplete | np.isnan(table["theta_used"])
     if not content.is_pair and table.image_scale is None:
@@ -282,8 +283,10 @@ def _radial_variances(content: SurveyContent, blank: BoolArray) -> dict[str, lis
 
 
 def _unless(blank: BoolArray, values: FloatArray) -> list[CellValue]:
-    """Return a column of numbers, blank where a condition holds."""
-    return [None if no else v for no, v in zip(blank.tolist(), values.tolist(), strict=True)]
+    """Return a column of numbers, blank where a condition holds and where they are undefined."""
+    return [
+        None if no or v != v else v for no, v in zip(blank.tolist(), values.tolist(), strict=True)
+    ]
 
 
 def result_cells(

@@ -206,7 +206,7 @@ def _print_points(editor: WorkbookEditor, count: int, language: str) -> None:
         found = re.search(r">(\d+),", stands.formula if stands else "")
         head = area.area[0]
         if found and move_print_area(editor, area.sheet, head + int(found[1]), head + count):
-            formula = unprinted_formula(word("unprinted", language), count)
+            formula = unprinted_formula(language, count)
             editor.put(*place, "", formula=formula, style=stands.style if stands else "")
 
 

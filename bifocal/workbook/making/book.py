@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from openpyxl.styles import Alignment
+from openpyxl.styles import Alignment, Protection
 
 from bifocal.workbook.content import (
     STRUCTURED_ROWS,
@@ -21,7 +21,7 @@ from bifocal.workbook.making.charts import charts
 from bifocal.workbook.making.georeference_sheet import georeference
 from bifocal.workbook.making.reference_sheets import check, planning
 from bifocal.workbook.making.setup_sheet import setup_sheet
-from bifocal.workbook.words import WORDS, readme
+from bifocal.workbook.words import WORDS, readme, word
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
 from photocore.workbook.making.live_columns import LiveColumn
@@ -56,8 +56,12 @@ FLAG_COLOURS = {
 _SCALE = 92
 #: Name of the column `use` of `Points`, for rules of other sheets, which may not name a table.
 USED = "points_use"
+#: Name of all cells below the heading of the names of `Points`, in the table or not.
+TYPED = "points_names"
 #: Printed rows of the sheet `Readme`.
 _README_ROWS = 34
+#: The last row of a sheet in Excel.
+_LAST_ROW = 1048576
 
 
 def write_book(path: Path | str, content: SurveyContent, *, overwrite: bool = False) -> None:
@@ -141,6 +145,8 @@ def _long_sheet(
     flag, last = column_letters(keys.index("flag") + 1), HEAD + rows
     if "use" in keys:
         used = column_letters(keys.index("use") + 1)
+        builder.define(TYPED, f"'{name}'!$A${HEAD + 1}:$A${_LAST_ROW}")
+        _unlock_below(sheet, columns)
         builder.define(USED, f"'{name}'!${used}${HEAD + 1}:${used}${last}")
         unused = f"AND(ISNUMBER(${used}{HEAD + 1}),${used}{HEAD + 1}=0)"
     else:
@@ -156,6 +162,14 @@ def _long_sheet(
     return sheet
 
 
+def _unlock_below(sheet: SheetBuilder, columns: Sequence[LiveColumn]) -> None:
+    """Let points be typed below the table of a protected sheet, names staying as they are typed."""
+    for number, column in enumerate(columns, start=1):
+        if column.kind == "input":
+            whole = sheet.worksheet.column_dimensions[column_letters(number)]
+            whole.protection, whole.number_format = Protection(locked=False), column.number_format
+
+
 def printed_rows(content: SurveyContent) -> int:
     """Return how many points are printed: all there are, or one page of an empty form."""
     if content.points is None:
@@ -168,16 +182,19 @@ def print_area(sheet: str, columns: int, rows: int) -> str:
     return f"A{1 if sheet == 'Results' else HEAD - 1}:{column_letters(columns)}{HEAD + rows}"
 
 
-def unprinted_formula(words: str, rows: int) -> str:
-    """Return the formula of the warning that points stand below the printed rows."""
-    return f'IF(COUNTA(tblPoints[id])>{rows},"{words}","")'
+def unprinted_formula(language: str, rows: int) -> str:
+    """Return the formula of the warning that points stand below the printed rows, or the table."""
+    below = f"(COUNTA({TYPED})-COUNTA(tblPoints[id]))"
+    waiting = f'IF({below}>0," "&{below}&" {word("waiting", language)}","")'
+    unprinted = f'IF(COUNTA(tblPoints[id])>{rows},"{word("unprinted", language)}","")'
+    return f"TRIM({unprinted}&{waiting})"
 
 
 def _printed(sheet: SheetBuilder, area: str, content: SurveyContent) -> None:
     """Print only the rows that hold points, and say so where points stand below them."""
     name = sheet.worksheet.title
     sheet.worksheet.print_area = area
-    formula = unprinted_formula(sheet.book.word("unprinted"), printed_rows(content))
+    formula = unprinted_formula(sheet.book.language, printed_rows(content))
     sheet.formula("E1", formula, None, name=f"unprinted_{name}", font=WARN_FONT)
 
 
