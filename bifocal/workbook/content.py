@@ -353,11 +353,12 @@ def control_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
 def _left_out_cells(geo: Georeference) -> dict[str, list[CellValue]]:
     """Return what each control point costs the fit."""
     found = leave_one_out(geo)
-    cells = {key: inputs(getattr(found, key)) for key in ("own", "gain")}
+    cells: dict[str, list[CellValue]] = {}
+    cells |= {key: inputs(getattr(found, key)) for key in ("own", "gain")}
     cells |= {"v": inputs(found.size), "s0": inputs(found.sigma0)}
     for (i, a), (j, b) in combinations_with_replacement(enumerate("ENH"), 2):
         cells[f"d_{a}{b}"] = inputs(found.covariance[:, i, j])
-    fits = [
+    fits: list[CellValue] = [
         None if gain != gain else "CHECK" if row == found.worst else "OK"
         for row, gain in enumerate(found.gain)
     ]
