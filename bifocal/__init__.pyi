@@ -39,7 +39,9 @@ from .model.lens import Lens
 from .model.pair import Pair
 from .model.pair_media import PairMedia
 from .model.photo import Photo
+from .model.photo_set import PhotoSet, RankedPair
 from .model.relief_map import Quality, ReliefMap
+from .model.set_intersection import SetIntersection
 from .model.surface import FlatSurface, MapSurface, Surface
 from .orientation.alignment import Alignment
 from .orientation.control_points import Control, SiteMeasures, read_control
@@ -106,6 +108,7 @@ __all__ = [
     "Pair",
     "PairMedia",
     "Photo",
+    "PhotoSet",
     "PhotogrammetryError",
     "Pinhole",
     "PlanePicks",
@@ -115,11 +118,13 @@ __all__ = [
     "Quality",
     "RadialDivision",
     "ReadOptions",
+    "RankedPair",
     "Registration",
     "ReliefMap",
     "ReliefTable",
     "SAMPLE",
     "Session",
+    "SetIntersection",
     "Similarity",
     "SiteMeasures",
     "SolvedSurvey",

@@ -84,6 +84,10 @@ class SurveyContent:
         Rows of the sheet `Log`: date, program, what, file, SHA-256.
     rows : int
         Rows of `Points` in an empty template.
+    functions : bool
+        Whether the workbook has functions with names.
+    plain : bool
+        Whether a new workbook's formulas are plain: A1 references, no tables or cells by name.
     media : SurveyMedia or None
         Cells of media in an empty template, and of a general pair; None for those that follow from
         the pair. An ideal pair's stand in its set-up.
@@ -109,6 +113,8 @@ class SurveyContent:
     links: Mapping[str, str] = field(default_factory=dict)
     log: Sequence[tuple[str, str, str, str, str]] = ()
     rows: int = POINT_ROWS
+    functions: bool = False
+    plain: bool = False
     media: SurveyMedia | None = None
 
     @classmethod

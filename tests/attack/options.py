@@ -25,6 +25,8 @@ WORDS: list[tuple[str, str]] = [
     ("bifocal demo --out far.jpg", "far.jpg"),
     ("bifocal demo --out lens.json/d", "lens.json"),
     ("bifocal template o.ods", "o.ods"),
+    ("bifocal template o.ods --plain", "o.ods"),
+    ("bifocal template far.jpg --functions", "far.jpg"),
     ("bifocal template o", "o: "),
     ("bifocal template o.xlsx --lang fr", "--lang.*fr"),
     ("bifocal template o.xlsx --rows 0", "rows"),

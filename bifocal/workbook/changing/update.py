@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ from photocore.output import free_path
 from photocore.workbook.changing.cells import CellValue, NewColumn, escape
 from photocore.workbook.changing.editor import WorkbookEditor
 from photocore.workbook.changing.named_cells import place_of, type_column, type_value
+from photocore.workbook.changing.plain import MARK, PlainEditor
 from photocore.workbook.making.live_book import BookBuilder, short_formula
 from photocore.workbook.making.live_columns import TEXT_KEYS, row_formula
 from photocore.workbook.making.newbook import RowBlock
@@ -166,7 +167,10 @@ def update_book(
         If the workbook's formulas are made for another kind of measurement, or it cannot be
         changed.
     """
-    editor, built = WorkbookEditor(source, survey.book), build(content)
+    names = () if survey.book is None else survey.book.names
+    editor = (PlainEditor if MARK in names else WorkbookEditor)(source, survey.book)
+    content = replace(content, functions="RELIEF_SIGMA" in editor.book.names)
+    built = build(content)
     points = editor.table("tblPoints")
     if points is None:
         raise InputError(f"{source}: has lost its table tblPoints; write to a new workbook.")

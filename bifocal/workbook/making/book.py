@@ -18,6 +18,7 @@ from bifocal.workbook.formulas.columns import FORMULAS, results_columns
 from bifocal.workbook.formulas.world_state import STATE, STATES, world_state
 from bifocal.workbook.making.cameras_sketch import cameras_sketch
 from bifocal.workbook.making.charts import charts
+from bifocal.workbook.making.functions_sheet import functions_sheet
 from bifocal.workbook.making.georeference_sheet import georeference
 from bifocal.workbook.making.reference_sheets import check, planning
 from bifocal.workbook.making.setup_sheet import setup_sheet
@@ -96,6 +97,10 @@ def build(content: SurveyContent) -> BookBuilder:
     planning(builder, content)
     charts(builder, content, cells)
     _log(builder, content)
+    if content.functions:
+        functions_sheet(builder, named=not content.plain)
+    if content.plain:
+        builder.make_plain("'Setup'!$A$1")
     builder.open_at("Points" if content.points else "Readme")
     return builder
 
@@ -137,7 +142,7 @@ def _long_sheet(
 ) -> SheetBuilder:
     """Write a sheet that is one table with a row per point, its flags coloured."""
     sheet, rows = builder.sheet(name, note), content.point_rows
-    short = rows > STRUCTURED_ROWS
+    short = rows > STRUCTURED_ROWS and not content.plain
     sheet.table(
         f"tbl{name}", columns, at=(HEAD, 1), rows=rows, cells=cells, repeat=True, short=short
     )
