@@ -16,13 +16,13 @@ from bifocal.workbook.content import (
 )
 from bifocal.workbook.formulas.columns import FORMULAS, results_columns
 from bifocal.workbook.formulas.world_state import STATE, STATES, world_state
-from bifocal.workbook.making.cameras_sketch import cameras_sketch
 from bifocal.workbook.making.charts import charts
 from bifocal.workbook.making.functions_sheet import functions_sheet
 from bifocal.workbook.making.georeference_sheet import georeference
+from bifocal.workbook.making.readme_sheet import readme_sheet
 from bifocal.workbook.making.reference_sheets import check, planning
 from bifocal.workbook.making.setup_sheet import setup_sheet
-from bifocal.workbook.words import WORDS, readme, word
+from bifocal.workbook.words import WORDS, word
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
 from photocore.workbook.making.live_columns import LiveColumn
@@ -59,8 +59,6 @@ _SCALE = 92
 USED = "points_use"
 #: Name of all cells below the heading of the names of `Points`, in the table or not.
 TYPED = "points_names"
-#: Printed rows of the sheet `Readme`.
-_README_ROWS = 34
 #: The last row of a sheet in Excel.
 _LAST_ROW = 1048576
 
@@ -85,11 +83,9 @@ def build(content: SurveyContent) -> BookBuilder:
     builder = BookBuilder(language=content.language, words=WORDS)
     builder.book.properties.creator = "bifocal"
     builder.book.properties.title = "bifocal survey"
-    lines = readme(builder.language, media=bool(content.media_cells))
-    sketch = cameras_sketch(builder.word("nadir"), builder.word("sketch"))
-    builder.readme(lines, sketch, rows=_README_ROWS)
-    setup_sheet(builder, content)
     cells = point_cells(content)
+    readme_sheet(builder, content, cells)
+    setup_sheet(builder, content)
     _points(builder, content, cells)
     _results(builder, content, cells)
     check(builder, content, cells)
@@ -192,7 +188,7 @@ def unprinted_formula(language: str, rows: int) -> str:
     below = f"(COUNTA({TYPED})-COUNTA(tblPoints[id]))"
     waiting = f'IF({below}>0," "&{below}&" {word("waiting", language)}","")'
     unprinted = f'IF(COUNTA(tblPoints[id])>{rows},"{word("unprinted", language)}","")'
-    return f"TRIM({unprinted}&{waiting})"
+    return f"{unprinted}&{waiting}"
 
 
 def _printed(sheet: SheetBuilder, area: str, content: SurveyContent) -> None:

@@ -66,7 +66,7 @@ def check(builder: BookBuilder, content: SurveyContent, points: Cells) -> None:
     columns = check_columns()
     cells = check_cells(content, points)
     sheet.table("tblCheck", columns, at=(CHECK_HEAD, 1), rows=rows, cells=cells)
-    sheet.worksheet.column_dimensions["A"].width = 22
+    sheet.worksheet.column_dimensions["A"].width = 18
     for letter in ("R", "S"):
         sheet.worksheet.column_dimensions[letter].width = 1.5
     keys = [column.key for column in columns]
