@@ -12,6 +12,7 @@ from bifocal.model.flags import DOUBTFUL_SHARE, FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.survey.georeferencing import residuals
+from bifocal.survey.image_shift import foot_tangents, image_shift
 from bifocal.survey.leave_one_out import leave_one_out
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
@@ -239,6 +240,10 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
         if key in ("q", "theta_used"):
             blank = np.isnan(values)
         cells[key] = _unless(blank, values)
+    undirected = incomplete | np.isnan(table["theta_used"])
+    first = content.photos[0]
+    shifts = image_shift(first, content.setup, points, table) | foot_tangents(first, table)
+    cells |= {key: _unless(undirected, values) for key, values in shifts.items()}
     cells |= {key: inputs(values) for key, values in table.formula_cells.items()}
     for key in {"g1", "g2"} & table.formula_cells.keys():
         cells[key] = _unless(incomplete, table.formula_cells[key])
