@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from openpyxl.worksheet.worksheet import Worksheet
 from PIL import Image
 
-from bifocal import SAMPLE, WATER_SAMPLE, Pair
+from bifocal import SAMPLE, WATER_SAMPLE, Pair, PhotoSet
 from tests.bifocal.campaigns import sample_tables
 from tests.builders.commands import bifocal_command as main
 from tests.scenes import demo_scene
@@ -56,6 +56,9 @@ def make_desk(folder: Path) -> None:
     for name, part in PARTS.items():
         _pair(folder, name, part, (f"{name}_far.jpg", f"{name}_near.jpg"))
         _table(folder / f"{name}.csv", _inside(rows, part))
+    wall = Pair.read(folder / "wall.pair.json")
+    three = (wall.image1, wall.image2, replace(wall.image2, name="again"))
+    PhotoSet(photos=three).write(folder / "porch.photos.json")
     _workbook(folder, rows)
     _pick_tables(folder, rows)
     _reef(folder)

@@ -111,6 +111,9 @@ def _photos_and_pair(folder: Path, rng: np.random.Generator) -> None:
         "image1": {"file": "far.jpg", **photo, "distance": 17.5, "principal_distance": 35},
         "image2": {"file": "near.jpg", **photo, "distance": 9.5, "principal_distance": 19},
     }
+    three = [dict(pair[key], name=key) for key in ("image1", "image2")]
+    three.append({**three[1], "name": "beside", "distance": 10.0, "nadir": [0.1, 0]})
+    photos = {"format": "bifocal-photos/1", "photos": three}
     lens = {
         "format": "bifocal-lens/1", "model": "opencv", "image_size": [WIDTH, HEIGHT],
         "camera_matrix": [[350, 0, 120], [0, 350, 80], [0, 0, 1]],
@@ -121,7 +124,8 @@ def _photos_and_pair(folder: Path, rng: np.random.Generator) -> None:
     (folder / "street.toml").write_text(STREET)
     (folder / "aquacal.json").write_text(json.dumps(AQUACAL))
     (folder / "lens.xml").write_text(XML)
-    for name, content in (("wall.pair.json", pair), ("lens.json", lens)):
+    files = {"wall.pair.json": pair, "wall.photos.json": photos, "lens.json": lens}
+    for name, content in files.items():
         (folder / name).write_text(json.dumps(content, indent=1), encoding="utf-8")
 
 
