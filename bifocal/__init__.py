@@ -32,6 +32,7 @@ The whole wall
     orthophoto, Orthophoto, OrthoOptions, Source   the photo to scale, moved by its relief
     rectify                   one photo alone to scale on the plane of its wall
     mosaic, Mosaic, MosaicOptions   several orthophotos or relief maps made one
+    compare, Comparison, ChangedRegion   two relief maps of one wall: what has changed
     relief_view               the relief in three dimensions, as a page of HTML
 The page
     pick                      orient, pick and draw in the browser, as the command `bifocal pick`

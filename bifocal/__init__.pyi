@@ -19,6 +19,7 @@ from .calibration.board_photos import calibrate
 from .campaigns.rectification import Rectification, rectify
 from .collimation.session import Session
 from .collimation.workflow import PageServer, page_server, pick
+from .comparison.change import ChangedRegion, Comparison, compare
 from .demo import SAMPLE, WATER_SAMPLE
 from .equations import (
     plane_coordinates,
@@ -80,7 +81,9 @@ __all__ = [
     "Bounds",
     "Calibration",
     "CellError",
+    "ChangedRegion",
     "CheckResult",
+    "Comparison",
     "Control",
     "ConvergenceError",
     "DenseRelief",
@@ -151,6 +154,7 @@ __all__ = [
     "WorldPoints",
     "align",
     "calibrate",
+    "compare",
     "dense_relief",
     "georeference",
     "match",

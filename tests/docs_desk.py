@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from openpyxl.worksheet.worksheet import Worksheet
 from PIL import Image
 
-from bifocal import SAMPLE, WATER_SAMPLE, Pair, PhotoSet
+from bifocal import SAMPLE, WATER_SAMPLE, Pair, PhotoSet, ReliefMap
 from tests.bifocal.campaigns import sample_tables
 from tests.builders.commands import bifocal_command as main
 from tests.builders.foreign_projects import (
@@ -130,6 +130,18 @@ def _products(folder: Path) -> None:
     for line in lines:
         done = CliRunner().invoke(main, line.split())
         assert done.exit_code == 0, done.output
+    _two_dates(folder)
+
+
+def _two_dates(folder: Path) -> None:
+    """Write the relief map of two dates, and where the wall stood still."""
+    relief = ReliefMap.read(folder / "relief.tif")
+    for year in (2019, 2024):
+        noise = np.random.default_rng(year).normal(0, 0.001, relief.shape)
+        replace(relief, r=relief.r + noise).write(folder / f"relief{year}.tif")
+    ring = [[-5, -3], [5, -3], [5, 3], [-5, 3], [-5, -3]]
+    still = {"type": "Polygon", "coordinates": [ring]}
+    (folder / "still.geojson").write_text(json.dumps(still))
 
 
 def _points() -> list[list[float | str]]:

@@ -16,7 +16,7 @@ from photocore.reports.words import Words
 from photocore.textfile import packaged
 
 #: Place of the axes in a figure, with and without room for a colour bar; of the bar.
-_WIDE, _BESIDE, _BAR = (0.08, 0.1, 0.9, 0.87), (0.08, 0.1, 0.78, 0.87), (0.885, 0.16, 0.022, 0.72)
+_WIDE, BESIDE, _BAR = (0.08, 0.1, 0.9, 0.87), (0.08, 0.1, 0.78, 0.87), (0.885, 0.16, 0.022, 0.72)
 #: Grey of what is unknown.
 _UNKNOWN = "0.8"
 
@@ -33,13 +33,13 @@ def draw_ortho(figure: Any, content: PairContent) -> None:
     """Draw the orthophoto with the compared points."""
     assert content.ortho is not None
     picture, bounds = content.ortho
-    axes = _plane_axes(figure, bounds, _WIDE)
-    axes.imshow(picture, extent=_extent(bounds), interpolation="antialiased")
+    axes = plane_axes(figure, bounds, _WIDE)
+    axes.imshow(picture, extent=extent_of(bounds), interpolation="antialiased")
     if content.solution is not None:
         x, y = _inside(content.solution.table.xyz[:, :2], bounds).T
         axes.plot(x, y, "+", color="black", ms=8, mew=2.2)
         axes.plot(x, y, "+", color="yellow", ms=7, mew=0.9)
-    _scale_bar(axes, bounds)
+    scale_bar(axes, bounds)
 
 
 def draw_plan(figure: Any, content: PairContent, say: Words) -> None:
@@ -161,15 +161,15 @@ def _label(axes: Any, text: str, at: tuple[float, float], *, at_right: bool) -> 
 def draw_relief(figure: Any, content: PairContent, say: Words) -> None:
     """Draw the relief in diverging colours about the wall, interpolated parts lightly hatched."""
     axes, part, bounds = _map_axes(figure, content)
-    extent = _extent(bounds)
+    extent = extent_of(bounds)
     reach = max(float(np.nanpercentile(np.abs(part.r), 98)), 1e-3)
     image = axes.imshow(part.r, extent=extent, vmin=-reach, vmax=reach, **_styles()["relief"])
     guessed = (part.quality > Quality.MEASURED) & np.isfinite(part.r)
     if guessed.any() and not guessed.all():
         axes.contourf(guessed.astype(float), extent=extent, **_styles()["guessed"])
-    bar = _colour_bar(figure, image, say("relief_axis"), extend="both")
+    bar = colour_bar(figure, image, say("relief_axis"), extend="both")
     bar.axhline(0, color="black", lw=1)
-    _scale_bar(axes, bounds)
+    scale_bar(axes, bounds)
 
 
 def draw_sigma(figure: Any, content: PairContent, say: Words, limit: float) -> None:
@@ -177,21 +177,21 @@ def draw_sigma(figure: Any, content: PairContent, say: Words, limit: float) -> N
     from matplotlib.colors import LogNorm
 
     axes, part, bounds = _map_axes(figure, content)
-    extent = _extent(bounds)
+    extent = extent_of(bounds)
     sigma = 1000.0 * np.where(part.quality == Quality.MEASURED, part.sigma, np.nan)
     good = np.isfinite(sigma) & (sigma > 0)
     if good.any():
         low, high = np.percentile(sigma[good], [2, 98])
         norm = LogNorm(max(low, 0.01), max(high, 1.5 * low, 0.02))
         image = axes.imshow(sigma, extent=extent, norm=norm, **_styles()["sigma"])
-        _colour_bar(figure, image, say("sigma_axis"), extend="both")
+        colour_bar(figure, image, say("sigma_axis"), extend="both")
         if (sigma[good] > 1000 * limit).any() and (sigma[good] < 1000 * limit).any():
             known = np.where(good, sigma, np.nan)
             axes.contour(known, levels=[1000 * limit], extent=extent, **_styles()["limit"])
     x, y = content.pair.zoom_centre
     if len(_inside(np.array([[x, y]]), bounds)):
         axes.plot([x], [y], "x", color="red", ms=10, mew=2)
-    _scale_bar(axes, bounds)
+    scale_bar(axes, bounds)
 
 
 def draw_errors(figure: Any, content: PairContent, say: Words) -> None:
@@ -201,10 +201,10 @@ def draw_errors(figure: Any, content: PairContent, say: Words) -> None:
     known = np.isfinite(check.errors).any(axis=1) & np.isfinite(check.solved[:, :2]).all(axis=1)
     places, errors = check.solved[known], np.nan_to_num(check.errors[known])
     bounds = error_bounds(content)
-    axes = _plane_axes(figure, bounds, _BESIDE)
+    axes = plane_axes(figure, bounds, BESIDE)
     if content.ortho is not None:
         picture, extent = content.ortho
-        axes.imshow(picture, extent=_extent(extent), alpha=0.35, interpolation="antialiased")
+        axes.imshow(picture, extent=extent_of(extent), alpha=0.35, interpolation="antialiased")
         axes.set(xlim=bounds[::2], ylim=bounds[1::2])
     zoom = error_zoom(content)
     reach = max(float(np.abs(errors[:, 2]).max(initial=0.0)), 1e-4) * 1000
@@ -212,8 +212,8 @@ def draw_errors(figure: Any, content: PairContent, say: Words) -> None:
     dots = axes.scatter(*places[:, :2].T, **colours, **_styles()["error"])
     if {"X", "Y"} & {*compared_axes(content)}:
         axes.quiver(*places[:, :2].T, *zoom * errors[:, :2].T, **_styles()["error_arrow"])
-    _colour_bar(figure, dots, say("error_of"))
-    _scale_bar(axes, bounds)
+    colour_bar(figure, dots, say("error_of"))
+    scale_bar(axes, bounds)
 
 
 def compared_axes(content: PairContent) -> list[str]:
@@ -277,12 +277,13 @@ def _map_axes(figure: Any, content: PairContent) -> tuple[Any, ReliefMap, Bounds
     """Return axes for the relief map with room for a colour bar, the map reduced, its bounds."""
     relief = content.relief
     assert relief is not None
-    axes = _plane_axes(figure, relief.bounds, _BESIDE)
+    axes = plane_axes(figure, relief.bounds, BESIDE)
     axes.set_facecolor(_UNKNOWN)
     return axes, _reduced(relief), relief.bounds
 
 
-def _plane_axes(figure: Any, bounds: Bounds, place: tuple[float, float, float, float]) -> Any:
+def plane_axes(figure: Any, bounds: Bounds, place: tuple[float, float, float, float]) -> Any:
+    """Return axes of a part of the wall, to scale. [m]"""
     axes = figure.add_axes(place)
     axes.set(aspect="equal", xlim=bounds[::2], ylim=bounds[1::2])
     axes.set_xlabel("X [m]", fontsize=8)
@@ -291,7 +292,7 @@ def _plane_axes(figure: Any, bounds: Bounds, place: tuple[float, float, float, f
     return axes
 
 
-def _colour_bar(figure: Any, image: Any, label: str, **more: Any) -> Any:
+def colour_bar(figure: Any, image: Any, label: str, **more: Any) -> Any:
     """Draw the bar of what has colours; return its axes."""
     bar = figure.colorbar(image, cax=figure.add_axes(_BAR), **more)
     bar.set_label(label, fontsize=8)
@@ -299,7 +300,8 @@ def _colour_bar(figure: Any, image: Any, label: str, **more: Any) -> Any:
     return bar.ax
 
 
-def _extent(bounds: Bounds) -> tuple[float, float, float, float]:
+def extent_of(bounds: Bounds) -> tuple[float, float, float, float]:
+    """Return bounds in the order that matplotlib takes. [m]"""
     x_min, y_min, x_max, y_max = bounds
     return x_min, x_max, y_min, y_max
 
@@ -310,7 +312,7 @@ def _inside(positions: FloatArray, bounds: Bounds) -> FloatArray:
     return positions[(x >= x_min) & (x <= x_max) & (y >= y_min) & (y <= y_max)]
 
 
-def _scale_bar(axes: Any, bounds: Bounds) -> None:
+def scale_bar(axes: Any, bounds: Bounds) -> None:
     """Draw a bar of a round length in the lower left corner."""
     x_min, y_min, x_max, y_max = bounds
     length = 10 ** np.floor(np.log10(0.3 * (x_max - x_min)))

@@ -17,6 +17,10 @@ LINES = "bifocal calibrate far.jpg --lines lines.csv --out o.json"
 
 #: Options that cannot be meant, one by one or together, and what the refusal must name.
 WORDS: list[tuple[str, str]] = [
+    ("bifocal compare relief.tif relief.tif --out d", "itself"),
+    ("bifocal compare wall.photos.json relief.tif --out d", "bifocal relief"),
+    ("bifocal compare relief.tif relief2.tif --out d --smallest 0", "--smallest"),
+    ("bifocal compare relief.tif relief2.tif --out far.jpg", "far.jpg"),
     (RECTIFY, "one of --control, --rectangle and --lines"),
     ("bifocal rectify far.jpg --control control.csv", "--out"),
     (f"{RECTIFY} --control control.csv --lines --length 1,2,3,4,5", "one of --control"),

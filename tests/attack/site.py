@@ -195,6 +195,10 @@ def _rasters_and_clouds(folder: Path, rng: np.random.Generator) -> None:
     with rasterio.open(folder / "relief.tif", "w", count=3, dtype="float32", **form) as file:
         layers = (0.2 * smooth, 0.01 + 0 * smooth, 1 + 0 * smooth)
         file.write(np.stack(layers).astype("f4"))
+    shutil.copy(folder / "relief.tif", folder / "relief2.tif")
+    ring = [[-9, -9], [9, -9], [9, 9], [-9, 9], [-9, -9]]
+    still = {"type": "Polygon", "coordinates": [ring]}
+    (folder / "still.geojson").write_text(json.dumps(still), encoding="utf-8")
     wall = rng.integers(1, 250, (4, HEIGHT, WIDTH), dtype=np.uint8)  # seen by both
     for name in ("ortho1.tif", "ortho2.tif"):
         with rasterio.open(folder / name, "w", count=4, dtype="uint8", **form) as file:

@@ -1,0 +1,136 @@
+"""What has changed on a wall: found where it has, not where it has not, with honest numbers."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import ezdxf
+import numpy as np
+import pytest
+import rasterio
+from click.testing import CliRunner
+from openpyxl import load_workbook
+
+from bifocal import Grid, InputError, Quality, ReliefMap, compare
+from tests.builders.commands import bifocal_command as bifocal
+
+GRID = Grid.from_bounds((0.0, 0.0, 4.0, 3.0), gsd=0.04)
+SIGMA = 0.003
+#: 0.2 m2 of the wall.
+PART = np.s_[25:36, 30:41]
+
+
+def noise(rng: np.random.Generator) -> np.ndarray:
+    """Return errors of variance 1 as dense relief has them: most hang together over 0.08 m."""
+    wide = rng.standard_normal((2, GRID.height + 80, GRID.width + 80))
+    parts = [cv2.GaussianBlur(field, (0, 0), radius)[40:-40, 40:-40]
+             for field, radius in zip(wide, (1.0, 4.0), strict=True)]  # fmt: skip
+    gains = [2 * np.sqrt(np.pi) * radius for radius in (1.0, 4.0)]
+    own = rng.standard_normal(GRID.shape)
+    return 0.95 * gains[0] * parts[0] + 0.2 * gains[1] * parts[1] + 0.25 * own
+
+
+def measured(rng: np.random.Generator, *, moved: float = 0.0, offset: float = 0.0) -> ReliefMap:
+    r = SIGMA * noise(rng) + offset
+    r[PART] += moved
+    flat = ReliefMap.from_relief(r, plane_from_pixel=GRID.plane_from_pixel)
+    return replace(flat, sigma=np.full(GRID.shape, SIGMA))
+
+
+def test_nothing_is_told_where_nothing_changed_and_a_bulge_of_three_sigma_is_found():
+    moved, ratios = 3 * SIGMA * np.sqrt(2), []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        before = measured(rng)
+        still = compare(before, measured(rng))
+        assert still.regions == (), seed
+        assert 0.04 < still.correlation_length < 0.2
+        (bulge,) = compare(before, measured(rng, moved=moved)).regions
+        assert pytest.approx((1.4, 1.8), abs=0.15) == (bulge.X, bulge.Y)
+        assert bulge.area == pytest.approx(0.1936, abs=3.5 * bulge.sigma_area)
+        ratios.append((bulge.volume - 0.1936 * moved) / bulge.sigma_volume)
+    assert len(ratios) >= 19
+    assert np.abs(np.mean(ratios)) < 1.2
+    assert 0.4 < np.sqrt(np.mean(np.square(ratios))) < 2
+
+
+def test_offset_and_tilt_come_off_by_stable_parts_and_are_told_without_them():
+    rng = np.random.default_rng(5)
+    x, y = np.meshgrid(GRID.columns_x, GRID.rows_y)
+    before, after = measured(rng), measured(rng, moved=0.02, offset=0.015)
+    after = replace(after, r=after.r + 0.002 * (x - 2.0) - 0.001 * (y - 1.5))
+    (remark,) = compare(before, after).remarks
+    assert "+15." in remark or "+14." in remark
+    still = [[(0, 0), (4, 0), (4, 1), (0, 1)], [(2.2, 1), (4, 1), (4, 3), (2.2, 3)]]
+    for done in (compare(before, after, fit=True), compare(before, after, stable=still)):
+        (bulge,) = done.regions
+        assert bulge.mean == pytest.approx(0.02, abs=3 * bulge.sigma_mean)
+        errors = np.subtract(done.trend, (0.015, 0.002, -0.001))
+        assert (np.abs(errors) < 4 * np.array(done.sigma_trend)).all()
+        assert done.remarks == ()
+    with pytest.raises(InputError, match="too little"):
+        compare(before, after, stable=[[(0, 0), (0.2, 0), (0.2, 0.2)]])
+
+
+def test_only_what_both_dates_measured_is_compared_on_the_coarser_grid():
+    rng = np.random.default_rng(9)
+    before, after = measured(rng), measured(rng, moved=0.03)
+    quality = np.array(after.quality)
+    quality[PART] = Quality.INTERPOLATED
+    done = compare(before, replace(after, quality=quality))
+    assert done.regions == ()
+    assert np.isnan(done.difference.r[PART]).all()
+    finer = Grid.from_bounds(GRID.bounds, gsd=0.02)
+    r, sigma = (np.repeat(np.repeat(part, 2, 0), 2, 1) for part in (after.r, after.sigma))
+    fine = ReliefMap.from_relief(r, plane_from_pixel=finer.plane_from_pixel)
+    fine = replace(fine, sigma=sigma)
+    for pair, sign in (((before, fine), 1), ((fine, before), -1)):
+        done = compare(*pair)
+        assert done.difference.gsd == 0.04
+        assert [round(sign * one.mean, 2) for one in done.regions] == [0.03]
+    away = ReliefMap.from_relief(r, plane_from_pixel=finer.window(900, 0, 9, 9).plane_from_pixel)
+    with pytest.raises(InputError, match="in common"):
+        compare(before, away)
+
+
+def test_maps_without_sigma_take_it_from_their_differences():
+    rng = np.random.default_rng(3)
+    before, after = (replace(measured(rng, moved=m), sigma=np.zeros(GRID.shape)) for m in (0, 0.02))
+    done = compare(before, after)
+    assert [round(one.mean, 2) for one in done.regions] == [0.02]
+    assert "without standard deviations" in done.remarks[0]
+
+
+@pytest.mark.parametrize("language", ["en", "it", "de"])
+def test_the_folder_tells_the_same_in_every_file(tmp_path: Path, language: str):
+    rng = np.random.default_rng(2)
+    measured(rng).write(tmp_path / "relief2019.tif")
+    measured(rng, moved=-0.02).write(tmp_path / "relief2024.tif")
+    names = [str(tmp_path / f"relief{year}.tif") for year in (2019, 2024)]
+    out = tmp_path / "changed"
+    line = ["compare", *names, "--out", str(out), "--language", language, "--json"]
+    told = CliRunner().invoke(bifocal, line)
+    assert told.exit_code == 0, told.stderr
+    (region,) = json.loads(told.stdout)["regions"]
+    assert region["mean"] == pytest.approx(-0.02, abs=3 * region["sigma_mean"])
+    with rasterio.open(out / "difference.tif") as file:
+        bands, cell = file.read(), file.res[0] ** 2
+        assert file.descriptions[0] == "difference [m]"
+    inside = bands[2] == 1
+    assert inside.sum() * cell == pytest.approx(region["area"])
+    assert np.nansum(bands[0][inside]) * cell == pytest.approx(region["volume"], rel=1e-3)
+    (row,) = csv.DictReader((out / "regions.csv").read_text().splitlines())
+    assert float(row["volume [m3]"]) == pytest.approx(region["volume"])
+    sheet = load_workbook(out / "regions.xlsx")["Regions"]
+    assert sheet.cell(2, 6).value == pytest.approx(region["volume"])
+    lines = ezdxf.readfile(out / "regions.dxf").modelspace().query("LWPOLYLINE")
+    layers = {line.dxf.layer for line in lines}
+    assert layers == {"BIFOCAL_BACK", "BIFOCAL_CONTOURS_10MM"}
+    page = (out / "report.html").read_text()
+    words = {"en": "Changed regions: 1", "it": "Regioni cambiate: 1", "de": "Bereiche: 1"}
+    assert words[language] in page
+    assert (out / "report.pdf").read_bytes().startswith(b"%PDF")
