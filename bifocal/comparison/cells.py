@@ -90,11 +90,11 @@ class Cells:
         """Return averages of cells of so many pixels a side; known where half of them are."""
         grid = difference.grid
         rows, columns = (-(-length // side) for length in grid.shape)
-        margin = (0, rows * side - grid.height, 0, columns * side - grid.width)
+        below, right = rows * side - grid.height, columns * side - grid.width
 
         def averaged(field: Any) -> FloatArray:
             filled = cv2.copyMakeBorder(
-                np.where(measured, field, 0.0), *margin, cv2.BORDER_CONSTANT, value=0.0
+                np.where(measured, field, 0.0), 0, below, 0, right, cv2.BORDER_CONSTANT, value=0.0
             )
             small = cv2.resize(filled, (columns, rows), interpolation=cv2.INTER_AREA)
             return np.asarray(small, np.float64)
@@ -178,4 +178,5 @@ def without_trend(
     terms = trend_terms(difference.grid, bounds)
     variance = np.einsum("...i,ij,...j", terms, covariance, terms)
     sigma = np.sqrt(difference.sigma.astype(np.float64) ** 2 + variance)
-    return replace(difference, r=difference.r - terms @ trend, sigma=sigma)
+    r = np.asarray(difference.r - terms @ trend, np.float32)
+    return replace(difference, r=r, sigma=np.asarray(sigma, np.float32))

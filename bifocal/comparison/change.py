@@ -51,7 +51,7 @@ class Comparison:
     ----------
     difference : ReliefMap
         After minus before: positive where the wall came forward. [m]
-    region : ndarray of int32, shape as the difference's
+    region : ndarray of int64, shape as the difference's
         Number of the changed region of each pixel; 0 where no change is proven.
     smooth : ndarray, shape as the difference's
         Difference averaged over the smallest patches, bilinear between cells; 0 where unknown. [m]
@@ -155,7 +155,9 @@ def compare(
     if int(cells.known.sum()) < CHANGE.least:
         raise InputError(remark("compare.nothing_in_common"))
     radii = [max(radius * 2**k / cells.grid.gsd, 0.5) for k in range(4)]
-    rng, trend, covariance = np.random.default_rng(seed), np.zeros(3), np.zeros((3, 3))
+    rng = np.random.default_rng(seed)
+    trend: FloatArray = np.zeros(3)
+    covariance: FloatArray = np.zeros((3, 3))
     patches, bounds = Patches(cells.known, radii), cells.grid.bounds
     if stable or fit:
         still = cells.known & inside(stable, cells.grid) if stable else cells.known
@@ -191,8 +193,8 @@ def compare(
         ],
         regions=regions,
         level=level,
-        trend=tuple(trend.tolist()),
-        sigma_trend=tuple(np.sqrt(np.diag(covariance)).tolist()),
+        trend=_three(trend),
+        sigma_trend=_three(np.sqrt(np.diag(covariance))),
         patches=tuple(
             (float(4 * np.pi * (radius * cells.grid.gsd) ** 2), limit * float(sigma) * usual)
             for radius, sigma in zip(radii, sigmas, strict=True)
@@ -201,6 +203,11 @@ def compare(
         compared=float(cells.known.sum() * cells.grid.gsd**2),
         remarks=tuple(remarks),
     )
+
+
+def _three(values: FloatArray) -> tuple[float, float, float]:
+    one, two, three = values.tolist()
+    return one, two, three
 
 
 def _wider(cells: BoolArray) -> BoolArray:
@@ -246,18 +253,18 @@ def _regions(
     """Return the regions and their cells, outlined by the change over the smallest patches.
 
     A region is what hangs together with a significant part and has changed by a quarter of its
-    largest change at least, and by a standard deviation.
+    largest change at least, and by two standard deviations.
     """
     from scipy.ndimage import binary_fill_holes, label
 
     smooth = np.nan_to_num(patches.averages(cells.difference)[0])
     terms, cell = trend_terms(cells.grid, cells.grid.bounds), cells.grid.gsd**2
-    numbered, made = np.zeros_like(labels), []
+    numbered, made = np.zeros_like(labels), list[ChangedRegion]()
     parts = [labels == number for number in range(1, int(labels.max()) + 1)]
     for part in sorted(parts, key=lambda one: -np.abs(smooth[one]).max()):
         change = smooth * np.sign(test[part][0])
         peak, own = float(change[part].max()), sigma * float(np.median(cells.sigma[part]))
-        edge = max(CHANGE.outline * peak, own)
+        edge = max(CHANGE.outline * peak, 2 * own)
         spread_out, _ = label((change >= edge) & cells.known & (numbered == 0))
         inner = np.isin(spread_out, np.setdiff1d(spread_out[part], [0]))
         inner = binary_fill_holes(inner) & cells.known & (numbered == 0)
@@ -282,7 +289,7 @@ def _regions(
             probability=by_chance.probability(float(np.abs(test[part]).max())),
         ))  # fmt: skip
     order = sorted(made, key=lambda one: -abs(one.volume))
-    ranks = np.zeros(len(made) + 1, np.int32)
+    ranks = np.zeros(len(made) + 1, np.int64)
     for rank, one in enumerate(order, start=1):
         ranks[one.number] = rank
     return tuple(replace(one, number=int(ranks[one.number])) for one in order), ranks[numbered]

@@ -34,9 +34,9 @@ def change_document(done: Comparison, names: tuple[str, str], language: str) -> 
     say = words_of("bifocal.comparison", language)
     title = say("title", before=names[0], after=names[1])
     made = say("made", program=program(), date=today())
-    head = [Heading(text=title, level=1), Paragraph(text=made, small=True)]
-    blocks = (*head, *_blocks(done, say, language))
-    return Document(title=title, language=language, subject=made, blocks=blocks)
+    blocks: list[Block] = [Heading(text=title, level=1), Paragraph(text=made, small=True)]
+    blocks += _blocks(done, say, language)
+    return Document(title=title, language=language, subject=made, blocks=tuple(blocks))
 
 
 def _blocks(done: Comparison, say: Words, language: str) -> Iterator[Block]:

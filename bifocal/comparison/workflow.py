@@ -146,10 +146,10 @@ def _polygons(path: Path) -> list[FloatArray]:
     rings = []
     for number, item in enumerate(items if isinstance(items, list) else [], start=1):
         shape = item.get("geometry", item) if isinstance(item, dict) else {}
-        kind, parts = (shape or {}).get("type"), (shape or {}).get("coordinates")
+        kind, parts = ((shape or {}).get(key) for key in ("type", "coordinates"))
         try:
-            parts = {"Polygon": [parts], "MultiPolygon": parts}[kind]
-            rings += [as_floats(part[0], "ring")[:, :2] for part in parts]
+            outer = {"Polygon": lambda: [parts], "MultiPolygon": lambda: parts}[str(kind)]()
+            rings += [as_floats(part[0], "ring")[:, :2] for part in outer]
         except (KeyError, TypeError, IndexError, InputError):
             raise InputError(remark("compare.no_polygon", path=path, number=number)) from None
     if not rings or any(len(ring) < 3 or not np.isfinite(ring).all() for ring in rings):
