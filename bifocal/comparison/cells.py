@@ -40,14 +40,15 @@ def difference_of(before: ReliefMap, after: ReliefMap) -> tuple[ReliefMap, list[
     known &= np.isfinite(r) & np.isfinite(variance)
     if not known.any():
         raise InputError(remark("compare.nothing_in_common"))
-    remarks = []
+    remarks: list[str] = []
     if not (np.nan_to_num(base.sigma[known]).any() and np.nan_to_num(other.sigma[known]).any()):
         spread = max(1.4826 * float(np.median(np.abs(r[known]))), 1e-6)
         variance += spread**2
         remarks.append(remark("compare.no_sigma", sigma=1000 * spread))
     unknown = np.where(known, 0.0, np.nan)
     difference = ReliefMap(
-        r=r + unknown, sigma=np.sqrt(variance) + unknown,
+        r=np.asarray(r + unknown, np.float32),
+        sigma=np.asarray(np.sqrt(variance) + unknown, np.float32),
         quality=known * np.uint8(Quality.MEASURED), plane_from_pixel=base.plane_from_pixel,
     )  # fmt: skip
     return difference, remarks

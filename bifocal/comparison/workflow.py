@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -102,7 +103,7 @@ def compare_files(
         If a file is unusable, the maps have nothing in common, or the folder cannot be written.
     """
     paths = [_relief_of(path) for path in (before, after)]
-    if paths[0].resolve() == paths[1].resolve():
+    if os.path.realpath(paths[0]) == os.path.realpath(paths[1]):
         raise InputError(f"{before}: is compared with itself; name two dates.")
     polygons = [] if stable is None else _polygons(stable)
     with atomic_folder(out, overwrite=overwrite) as folder:
@@ -116,7 +117,7 @@ def compare_files(
         _write_drawing(folder / "regions.dxf", done)
         names = tuple(path.name for path in (before, after))
         if names[0] == names[1]:
-            names = tuple(f"{path.resolve().parent.name}/{path.name}" for path in (before, after))
+            names = tuple(f"{path.absolute().parent.name}/{path.name}" for path in (before, after))
         document = change_document(done, (names[0], names[1]), language)
         for name in ("report.html", "report.pdf"):
             write_document(folder / name, document)
@@ -146,9 +147,9 @@ def _polygons(path: Path) -> list[FloatArray]:
     rings = []
     for number, item in enumerate(items if isinstance(items, list) else [], start=1):
         shape = item.get("geometry", item) if isinstance(item, dict) else {}
-        kind, parts = ((shape or {}).get(key) for key in ("type", "coordinates"))
         try:
-            outer = {"Polygon": lambda: [parts], "MultiPolygon": lambda: parts}[str(kind)]()
+            parts: Any = shape["coordinates"]
+            outer = {"Polygon": [parts], "MultiPolygon": parts}[shape["type"]]
             rings += [as_floats(part[0], "ring")[:, :2] for part in outer]
         except (KeyError, TypeError, IndexError, InputError):
             raise InputError(remark("compare.no_polygon", path=path, number=number)) from None

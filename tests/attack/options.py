@@ -18,7 +18,6 @@ LINES = "bifocal calibrate far.jpg --lines lines.csv --out o.json"
 #: Options that cannot be meant, one by one or together, and what the refusal must name.
 WORDS: list[tuple[str, str]] = [
     ("bifocal compare relief.tif relief.tif --out d", "itself"),
-    ("bifocal compare wall.photos.json relief.tif --out d", "bifocal relief"),
     ("bifocal compare relief.tif relief2.tif --out d --smallest 0", "--smallest"),
     ("bifocal compare relief.tif relief2.tif --out far.jpg", "far.jpg"),
     (RECTIFY, "one of --control, --rectangle and --lines"),
