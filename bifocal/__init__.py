@@ -22,17 +22,15 @@ The pair
     Control, Interior, SiteMeasures, PairMedia, read_control   what `align` is told
 Points
     solve, SolvedSurvey       relief, coordinates, precision, check of measured points
-    Taking, Measuring         distances and lenses, unit and precision that `solve` is told
-    ReadOptions               which column of a table is which
+    Taking, Measuring, ReadOptions   lenses, distances, precision, columns that `solve` is told
     georeference, Georeference   wall coordinates to world coordinates by control points
     match, Matches, MatchSettings   homologous points found automatically, with their precision
 The whole wall
     dense_relief, DenseRelief measured relief with its precision, pixel by pixel
     ReliefMap, Quality        relief on a grid, its GeoTIFF, and where each pixel's comes from
     orthophoto, Orthophoto, OrthoOptions, Source   the photo to scale, moved by its relief
-    rectify                   one photo alone to scale on the plane of its wall
+    rectify, compare          one photo alone to scale on its wall; what has changed between two dates
     mosaic, Mosaic, MosaicOptions   several orthophotos or relief maps made one
-    compare, Comparison, ChangedRegion   two relief maps of one wall: what has changed
     relief_view               the relief in three dimensions, as a page of HTML
 The page
     pick                      orient, pick and draw in the browser, as the command `bifocal pick`
@@ -40,11 +38,12 @@ The page
     recording                 what the outputs written within it say made them
 Sample pairs                  SAMPLE, WATER_SAMPLE: folders of photos with exact truth
 
-What they take and give: Bounds, CheckResult, FlagLimits, FlatSurface, Foot, Grid, KnownPoints,
-Layers, MapSurface, MediaPath, NamedPoints, OrientationCheck, Pinhole, PlanePicks,
-PointObservations, Progress, ProjectOptions, ProjectPhotos, ProjectedPoints, RadialDivision,
-RankedPair, Rectification, Registration, ReliefTable, Similarity, SpaceSums, Surface, SurveyInput,
-SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision, WeightedSums, Window, WorldPoints.
+What they take and give: Bounds, ChangedRegion, CheckResult, Comparison, FlagLimits, FlatSurface,
+Foot, Grid, KnownPoints, Layers, MapSurface, MediaPath, NamedPoints, OrientationCheck, Pinhole,
+PlanePicks, PointObservations, Progress, ProjectOptions, ProjectPhotos, ProjectedPoints,
+RadialDivision, RankedPair, Rectification, Registration, ReliefTable, Similarity, SpaceSums,
+Surface, SurveyInput, SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision,
+WeightedSums, Window, WorldPoints.
 
 Errors are one family with one message each that says what is wrong, where, and how to mend it:
 PhotogrammetryError > InputError (a ValueError) > CellError, WorkbookError, MissingExtraError;

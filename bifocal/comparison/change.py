@@ -27,7 +27,22 @@ from photocore.errors import InputError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChangedRegion:
-    """A part of a wall whose relief has changed; lengths in metres, each with its sigma."""
+    """A part of a wall whose relief has changed.
+
+    Attributes
+    ----------
+    number : int
+        The largest volume is 1.
+    X, Y : float
+        Its middle. [m]
+    area, volume, mean, largest : float
+        Positive where the wall came forward; the mean over the outline, the largest as an average
+        over the smallest patch. [m², m³, m, m]
+    sigma_area, sigma_volume, sigma_mean, sigma_largest : float
+        Their standard deviations.
+    probability : float
+        That chance alone makes so large an average anywhere on the wall; never below 0.0001.
+    """
 
     number: int
     X: float
@@ -114,6 +129,10 @@ def compare(
         times as much are. [m²]
     seed : int
         Of the walls drawn to learn what chance does.
+
+    Returns
+    -------
+    Comparison
 
     Raises
     ------
