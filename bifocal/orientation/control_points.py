@@ -54,6 +54,8 @@ class Control:
     sigma_lengths : tuple of float
         Standard deviations of these; where they are left out or NaN, that of the best coordinate,
         3 mm at most. [m]
+    more : tuple of ndarray, each of shape (n, 2)
+        Picks in the third photo of a set and those that follow. [px]
     """
 
     ids: tuple[str, ...] = ()
@@ -63,11 +65,12 @@ class Control:
     pixels2: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     lengths: tuple[tuple[int, int, float], ...] = ()
     sigma_lengths: tuple[float, ...] = ()
+    more: tuple[FloatArray, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.ids)
-        shapes = [self.xyz.shape, self.sigma.shape, self.pixels1.shape, self.pixels2.shape]
-        if shapes != [(count, 3), (count, 3), (count, 2), (count, 2)]:
+        shapes = [self.xyz.shape, self.sigma.shape, *(picks.shape for picks in self.picks)]
+        if shapes != [(count, 3)] * 2 + [(count, 2)] * len(self.picks):
             raise InputError(f"control: {count} ids but arrays of shape {shapes}.")
         if len(self.sigma_lengths) not in (0, len(self.lengths)):
             raise InputError("control: sigma_lengths and lengths are not equally many.")
@@ -75,6 +78,16 @@ class Control:
     def exchanged(self) -> Control:
         """Return the same points with far and near photo exchanged."""
         return replace(self, pixels1=self.pixels2, pixels2=self.pixels1)
+
+    @property
+    def picks(self) -> tuple[FloatArray, ...]:
+        """Picks in every photo, as they were given."""
+        return (self.pixels1, self.pixels2, *self.more)
+
+    def of(self, far: int, near: int) -> Control:
+        """Return the points of two photos of a set, by their numbers from 0."""
+        picks = self.picks if self.ids else [np.zeros((0, 2))] * (max(far, near) + 1)
+        return replace(self, pixels1=picks[far], pixels2=picks[near], more=())
 
     @property
     def positioned(self) -> BoolArray:
@@ -137,6 +150,7 @@ def read_control(
     unit: str = "",
     columns: str | None = None,
     unnamed: str = "",
+    photos: int = 2,
 ) -> Control:
     """Read control points: id, X, Y, r and their pixels col1, row1, col2, row2.
 
@@ -154,6 +168,8 @@ def read_control(
         Which column is which, ``"id=A,X=East"``; by default as the headings say.
     unnamed : str
         Goes before the row's number in the name of a row that has none.
+    photos : int
+        Of the set; with more than two their pixels are col3, row3 and so on.
 
     Returns
     -------
@@ -166,14 +182,18 @@ def read_control(
     WorkbookError, InputError
         Naming every bad cell; if there are no pixels.
     """
-    places = parse_column_map(columns, [column.key for column in COLUMNS]) if columns else None
-    table = read_table(path, COLUMNS, column_map=places)
-    keys = ("col1", "row1", "col2", "row2")
+    keys = tuple(f"{axis}{k}" for k in range(1, photos + 1) for axis in ("col", "row"))
+    wanted = (*COLUMNS, *(Column(key, unit="px") for key in keys[4:]))
+    places = parse_column_map(columns, [column.key for column in wanted]) if columns else None
+    table = read_table(path, wanted, column_map=places)
     missing = [key for key in keys if key not in table.present]
     if missing:
+        each = "both photos (col1, row1, col2, row2)."
+        if photos > 2:
+            each = f"every photo that shows it (col1, row1 to {', '.join(keys[-2:])}), else blank."
         raise InputError(
             f"{path}: the columns {', '.join(missing)} are missing: where the points are seen. "
-            "Each control point needs its pixel in both photos (col1, row1, col2, row2)."
+            f"Each control point needs its pixel in {each}"
         )
     if not len(table):
         raise InputError(f"{path}: no control points in the table.")
@@ -190,13 +210,14 @@ def read_control(
         on_wall = np.isfinite(xyz[:, :2]).all(axis=1) & np.isnan(xyz[:, 2])
         xyz[on_wall, 2] = 0.0
         spread[on_wall, 2] = sigma_plane
-    return Control(
-        ids=tuple(names),
-        xyz=xyz,
-        sigma=spread,
-        pixels1=np.column_stack([table.numbers("col1"), table.numbers("row1")]),
-        pixels2=np.column_stack([table.numbers("col2"), table.numbers("row2")]),
+    picks = tuple(
+        np.column_stack([table.numbers(column), table.numbers(row)])
+        for column, row in zip(keys[::2], keys[1::2], strict=True)
     )
+    return Control(
+        ids=tuple(names), xyz=xyz, sigma=spread,
+        pixels1=picks[0], pixels2=picks[1], more=picks[2:],
+    )  # fmt: skip
 
 
 def _names(texts: Sequence[str], before: str) -> list[str]:
@@ -252,7 +273,7 @@ def _metres(table: Table, key: str, unit: str) -> FloatArray:
 def _halves(table: Table, keys: tuple[str, ...]) -> list[CellError]:
     """Return complaints about pixels of which only one coordinate is given."""
     errors = []
-    for first, second in (keys[:2], keys[2:]):
+    for first, second in zip(keys[::2], keys[1::2], strict=True):
         a, b = table.numbers(first), table.numbers(second)
         for row in np.flatnonzero(np.isnan(a) != np.isnan(b)):
             key = first if np.isnan(a[row]) else second
