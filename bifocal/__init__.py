@@ -12,6 +12,7 @@ By hand, the equations
     plane_coordinates         x, y from radial distance and angle, Eq. (7)
 The pair
     Pair, Photo               both cameras; read and write pair files, intersect and project points
+    PhotoSet                  two or more photos of one wall; a pair is the set of two
     Intersection              what `Pair.intersect` returns: X, Y, r, covariance, flags
     read_image, write_image   photos as arrays, upright as seen
     Lens                      principal distance, principal point and distortion of a lens
@@ -38,7 +39,7 @@ Sample pairs                  SAMPLE, WATER_SAMPLE: folders of photos with exact
 
 What they take and give: Bounds, CheckResult, FlagLimits, FlatSurface, Foot, Grid, KnownPoints,
 Layers, MapSurface, MediaPath, NamedPoints, OrientationCheck, Pinhole, PlanePicks,
-PointObservations, Progress, ProjectedPoints, RadialDivision, Registration, ReliefTable,
+PointObservations, Progress, ProjectedPoints, RadialDivision, RankedPair, Registration, ReliefTable,
 Similarity, SpaceSums,
 Surface, SurveyInput, SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision,
 WeightedSums, Window, WorldPoints.

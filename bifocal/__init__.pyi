@@ -39,6 +39,7 @@ from .model.lens import Lens
 from .model.pair import Pair
 from .model.pair_media import PairMedia
 from .model.photo import Photo
+from .model.photo_set import PhotoSet, RankedPair
 from .model.relief_map import Quality, ReliefMap
 from .model.surface import FlatSurface, MapSurface, Surface
 from .orientation.alignment import Alignment
@@ -106,6 +107,7 @@ __all__ = [
     "Pair",
     "PairMedia",
     "Photo",
+    "PhotoSet",
     "PhotogrammetryError",
     "Pinhole",
     "PlanePicks",
@@ -115,6 +117,7 @@ __all__ = [
     "Quality",
     "RadialDivision",
     "ReadOptions",
+    "RankedPair",
     "Registration",
     "ReliefMap",
     "ReliefTable",

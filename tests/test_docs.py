@@ -99,7 +99,8 @@ def test_python_examples_run(page, tmp_path, monkeypatch):
     """Examples of a page run in order in an empty folder, its JSON examples written as files."""
     text = page.read_text(encoding="utf-8")
     for number, block in enumerate(re.findall(r"```json\n(.*?)```", text, re.S)):
-        name = "wall.pair.json" if "bifocal-pair" in block else f"example{number}.json"
+        kind = re.search(r'"bifocal-(pair|photos)/', block)
+        name = f"wall.{kind[1]}.json" if kind else f"example{number}.json"
         (tmp_path / name).write_text(block, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     names = {"__name__": "example"}

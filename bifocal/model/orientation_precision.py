@@ -6,7 +6,7 @@ map and report states what the whole measurement is worth, not the pick alone.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -64,11 +64,18 @@ def common_names(layers: Layers | None) -> tuple[str, ...]:
     )
 
 
-def names_of(layers: Layers | None) -> tuple[str, ...]:
-    """Return what the covariance of a pair counts: `NAMES`, and through media those of them."""
-    if not (common := common_names(layers)):
-        return NAMES
-    return (*NAMES, *common, *(f"{name} {number}" for number in (1, 2) for name in PLACING))
+def names_of(layers: Layers | None, count: int = 2) -> tuple[str, ...]:
+    """Return what the covariance of so many photos counts: cameras, through media also of them.
+
+    Examples
+    --------
+    >>> names_of(None) == NAMES, names_of(None, 3)[-1]
+    (True, 'k2 3')
+    """
+    common, numbers = common_names(layers), range(1, count + 1)
+    cameras = tuple(f"{name} {number}" for number in numbers for name in CAMERA)
+    placing = (f"{name} {number}" for number in numbers for name in PLACING)
+    return (*cameras, *common, *placing) if common else cameras
 
 
 def pinhole(photo: PlanePhoto) -> Pinhole:
@@ -96,15 +103,15 @@ def pinhole(photo: PlanePhoto) -> Pinhole:
 
 
 def orientation_covariance(
-    photos: tuple[PlanePhoto, PlanePhoto], covariance: FloatArray, xyz: FloatArray
+    photos: Sequence[PlanePhoto], covariance: FloatArray, xyz: FloatArray
 ) -> FloatArray:
     """Return the covariance of points at fixed pixels from that of the orientation. [m²]
 
     Parameters
     ----------
-    photos : pair of photos
+    photos : sequence of photos
     covariance : ndarray, shape (k, k)
-        Of `NAMES`, through media of `names_of`.
+        Of `NAMES`, through media and of more photos of `names_of`.
     xyz : ndarray, shape (n, 3)
         Points. [m]
 
@@ -118,7 +125,7 @@ def orientation_covariance(
 
 
 def orientation_effect(
-    photos: tuple[PlanePhoto, PlanePhoto], covariance: FloatArray, xyz: FloatArray
+    photos: Sequence[PlanePhoto], covariance: FloatArray, xyz: FloatArray
 ) -> FloatArray:
     """Return what independent errors of the orientation, of sigma 1, move each point by. [m]
 
@@ -140,13 +147,29 @@ def orientation_effect(
     return np.asarray(_by_orientation(photos, xyz) @ factor)
 
 
-def _by_orientation(photos: tuple[PlanePhoto, PlanePhoto], xyz: FloatArray) -> FloatArray:
+def _by_orientation(photos: Sequence[PlanePhoto], xyz: FloatArray) -> FloatArray:
     """Return the derivative of points at fixed pixels by the orientation, shape (n, 3, k).
 
     Notes
     -----
-    The four pixels p of a point P in cameras c stay: ``A dP = -dp/dc dc`` by least squares with
+    The pixels p of a point P in cameras c stay: ``A dP = -dp/dc dc`` by least squares with
     ``A = dp/dP``, so ``J = -(AᵀA)⁻¹Aᵀ dp/dc``.
+    """
+    design, by_camera = pixel_rates(photos, xyz)
+    known = np.isfinite(design).all(axis=(1, 2))
+    out = np.full((len(xyz), 3, by_camera.shape[2]), np.nan)
+    out[known] = -np.linalg.pinv(design[known]) @ by_camera[known]
+    return out
+
+
+def pixel_rates(photos: Sequence[PlanePhoto], xyz: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return how the pixels of points in m photos move with the points and with the orientation.
+
+    Returns
+    -------
+    by_point : ndarray, shape (n, 2 m, 3)
+    by_orientation : ndarray, shape (n, 2 m, k)
+        By what `names_of` counts. NaN where a photo does not see the point.
     """
     by_point, by_orientation = [], []
     for number, photo in enumerate(photos):
@@ -157,16 +180,12 @@ def _by_orientation(photos: tuple[PlanePhoto, PlanePhoto], xyz: FloatArray) -> F
         square = (away**2).sum(axis=1, keepdims=True) / camera.matrix[0, 0] ** 2
         radial = np.stack([away * square, away * square**2], axis=2)
         by_point.append(seen.by_point)
-        by_orientation.append(rates_of(seen, radial, number))
-    design, by_camera = np.concatenate(by_point, axis=1), np.concatenate(by_orientation, axis=1)
-    known = np.isfinite(design).all(axis=(1, 2))
-    out = np.full((len(xyz), 3, by_camera.shape[2]), np.nan)
-    out[known] = -np.linalg.pinv(design[known]) @ by_camera[known]
-    return out
+        by_orientation.append(rates_of(seen, radial, number, len(photos)))
+    return np.concatenate(by_point, axis=1), np.concatenate(by_orientation, axis=1)
 
 
-def rates_of(seen: PointViews, radial: FloatArray, number: int) -> FloatArray:
-    """Return how the pixels of camera 0 or 1 move with all that `names_of` counts, (n, 2, k).
+def rates_of(seen: PointViews, radial: FloatArray, number: int, photos: int = 2) -> FloatArray:
+    """Return how the pixels of one camera move with all that `names_of` counts, (n, 2, k).
 
     Parameters
     ----------
@@ -174,16 +193,17 @@ def rates_of(seen: PointViews, radial: FloatArray, number: int) -> FloatArray:
         Of that camera.
     radial : ndarray, shape (n, 2, 2)
         By its two terms of radial distortion.
-    number : int
+    number, photos : int
+        Of the camera, from 0, and how many there are.
     """
-    own = len(PLACING)
+    own, cameras = len(PLACING), photos * len(CAMERA)
     common = max(seen.by_media.shape[2] - own, 0)
-    count = len(NAMES) + seen.by_media.shape[2] + (own if common else 0)
+    count = cameras + common + (photos * own if common else 0)
     rates = np.zeros((*seen.pixels.shape, count))
-    first, last = number * len(CAMERA), len(NAMES) + common + number * own
+    first, last = number * len(CAMERA), cameras + common + number * own
     rates[..., first : first + len(PARAMETERS)] = seen.by_camera
     rates[..., first + len(PARAMETERS) : first + len(CAMERA)] = radial
-    rates[..., len(NAMES) : len(NAMES) + common] = seen.by_media[..., :common]
+    rates[..., cameras : cameras + common] = seen.by_media[..., :common]
     rates[..., last : last + own] = seen.by_media[..., common:]
     return rates
 
@@ -218,14 +238,19 @@ def of_distances(d1: float, d2: float, sigma: float) -> FloatArray:
 
 
 def exchanged(covariance: FloatArray) -> FloatArray:
-    """Return the covariance with both cameras exchanged."""
-    order = np.roll(np.arange(len(NAMES)), len(CAMERA))
-    rest = np.arange(len(NAMES), len(covariance))
+    """Return the covariance of a pair with both cameras exchanged."""
+    return of_photos(covariance, (1, 0), 2)
+
+
+def of_photos(covariance: FloatArray, numbers: Sequence[int], count: int) -> FloatArray:
+    """Return the covariance of some of ``count`` photos, counted from 0, in their order."""
+    own, rest = len(CAMERA), np.arange(count * len(CAMERA), len(covariance))
+    order = [np.arange(own) + number * own for number in numbers]
     if len(rest):  # what the media have in common stays, what places them goes with its camera
-        own = 2 * len(PLACING)
-        rest = np.concatenate([rest[:-own], np.roll(rest[-own:], len(PLACING))])
-    order = np.concatenate([order, rest])
-    return covariance[np.ix_(order, order)]
+        common, placing = np.split(rest, [-count * len(PLACING)])
+        order += [common, *(placing.reshape(count, -1)[number] for number in numbers)]
+    chosen = np.concatenate(order)
+    return covariance[np.ix_(chosen, chosen)]
 
 
 def moved(covariance: FloatArray, axes: FloatArray) -> FloatArray:
@@ -241,31 +266,39 @@ def moved(covariance: FloatArray, axes: FloatArray) -> FloatArray:
     return turn @ covariance @ turn.T
 
 
-def as_dict(covariance: FloatArray, layers: Layers | None = None) -> dict[str, Any]:
-    """Return what the pair file holds under ``orientation``."""
-    names = names_of(layers if len(covariance) > len(NAMES) else None)
-    units = "ln, ln, px, px, rad, rad, rad, m, m, m, 1, 1 for either camera"
-    if len(names) > len(NAMES):
-        units += "; then 1 for indices, m for thicknesses; m, rad, rad, rad for either camera"
+def as_dict(covariance: FloatArray, layers: Layers | None = None, count: int = 2) -> dict[str, Any]:
+    """Return what the file of a pair, or of ``count`` photos, holds under ``orientation``."""
+    cameras, each = count * len(CAMERA), "either" if count == 2 else "each"
+    names = names_of(layers if len(covariance) > cameras else None, count)
+    units = f"ln, ln, px, px, rad, rad, rad, m, m, m, 1, 1 for {each} camera"
+    if len(names) > cameras:
+        units += f"; then 1 for indices, m for thicknesses; m, rad, rad, rad for {each} camera"
     return {"parameters": list(names), "units": units, "covariance": covariance}
 
 
-def from_dict(data: Any, layers: Layers | None = None) -> FloatArray:
-    """Return the covariance that a pair file holds under ``orientation``.
+def from_dict(data: Any, layers: Layers | None = None, count: int = 2) -> FloatArray:
+    """Return the covariance that a file holds under ``orientation``, of ``count`` photos.
 
     Raises
     ------
     InputError
-        If it is not one of `names_of` the pair's media or of `NAMES`, or no covariance.
+        If it is not one of `names_of` the photos, with or without their media, or no covariance.
     """
     stated = data.get("parameters") if isinstance(data, Mapping) else None
-    if not isinstance(stated, list) or stated not in (list(NAMES), list(names_of(layers))):
+    possible = [list(names_of(media, count)) for media in (None, layers)]
+    if not isinstance(stated, list) or stated not in possible:
         raise InputError(
             '"orientation": expected {"parameters": [...], "covariance": [[...]]} with the '
-            f"{len(names_of(layers))} parameters that `bifocal align` writes; leave the key out if "
+            f"{len(possible[1])} parameters that `bifocal align` writes; leave the key out if "
             "the orientation's precision is not known."
         )
     return checked(as_floats(data.get("covariance", ()), "orientation.covariance"), len(stated))
+
+
+def checked_of(covariance: FloatArray, layers: Layers | None, count: int = 2) -> FloatArray:
+    """Return a read-only covariance of so many photos, with or without their media's."""
+    whole, size = len(names_of(layers, count)), len(names_of(None, count))
+    return checked(covariance, whole if np.shape(covariance) == (whole, whole) else size)
 
 
 def checked(covariance: FloatArray, size: int = len(NAMES)) -> FloatArray:

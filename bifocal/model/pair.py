@@ -16,6 +16,7 @@ from bifocal.model.doubts import covariance_of_doubts, doubts_in_words
 from bifocal.model.flags import FlagLimits
 from bifocal.model.intersection import Intersection, intersect
 from bifocal.model.photo import Photo
+from bifocal.model.photo_entries import PAIR_FORMAT, SET_FORMAT, file_content, photo_entries
 from bifocal.precision import base_factor
 from bifocal.remarks import remark
 from multimedia import Layers
@@ -24,7 +25,6 @@ from photocore.errors import GeometryError, InputError, located
 from photocore.jsonfile import read_object, write_object
 from photocore.series import check_index
 
-FORMAT = "bifocal-pair/1"
 #: Parameters of two cameras in air.
 _IN_AIR = len(orientation_precision.NAMES)
 
@@ -64,9 +64,7 @@ class Pair:
         if self.image1.layers != self.image2.layers:
             raise InputError(remark("pair.two_layers"))
         if self.orientation is not None:
-            whole = len(orientation_precision.names_of(self.layers))
-            size = whole if np.shape(self.orientation) == (whole, whole) else _IN_AIR
-            matrix = orientation_precision.checked(self.orientation, size)
+            matrix = orientation_precision.checked_of(self.orientation, self.layers)
             object.__setattr__(self, "orientation", matrix)
         for name in ("image1", "image2"):
             photo = getattr(self, name)
@@ -202,33 +200,19 @@ class Pair:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], *, folder: Path = Path()) -> Pair:
-        """Return the pair described by a pair file's content."""
-        data = dict(data)
-        stated = data.pop("format", None)
-        if stated != FORMAT:
-            raise InputError(f'"format" must be "{FORMAT}", found {stated!r}.')
-        media = data.pop("layers", None)
-        layers = None if media is None else Layers.from_dict(media, where='"layers"')
-        far, near = (
-            Photo.from_dict(data.pop(key, None), key, folder, layers)
-            for key in ("image1", "image2")
-        )
-        stated = data.pop("orientation", None)
-        precision = None if stated is None else orientation_precision.from_dict(stated, layers)
-        return cls(image1=far, image2=near, folder=folder, extra=data, orientation=precision)
+        """Return the pair described by the content of a pair file, or of a set of two photos."""
+        photos, precision, extra = photo_entries(data, folder, PAIR_FORMAT, SET_FORMAT)
+        if len(photos) > 2:
+            names = ", ".join(photo.name or Path(photo.file).name for photo in photos)
+            raise InputError(remark("pair.set_of_more", count=len(photos), names=names))
+        far, near = photos
+        return cls(image1=far, image2=near, folder=folder, extra=extra, orientation=precision)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of a pair file."""
-        data = {
-            "format": FORMAT,
-            "image1": self.image1.to_dict(),
-            "image2": self.image2.to_dict(),
-            **({"layers": self.layers.as_dict()} if self.layers else {}),
-            **self.extra,
-        }
-        if self.orientation is not None:
-            data["orientation"] = orientation_precision.as_dict(self.orientation, self.layers)
-        return data
+        photos = (self.image1, self.image2)
+        head = {"image1": self.image1.to_dict(), "image2": self.image2.to_dict()}
+        return file_content({"format": PAIR_FORMAT, **head}, photos, self.extra, self.orientation)
 
     def write(self, path: Path | str, *, overwrite: bool = False) -> None:
         """Write a pair file, whole or not at all."""

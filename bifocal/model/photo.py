@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -56,6 +56,8 @@ class Photo:
         Distance of the projection centre to the reference plane. [m]
     file : str
         Image file, relative to the pair file; empty where no image is needed.
+    name : str
+        What it is called in a set of photos.
     lens : Lens or None
         Distortion of the pixels; None if they are free of it.
     sigma_pixel : float or None
@@ -82,6 +84,7 @@ class Photo:
     nadir: FloatArray
     distance: float
     file: str = ""
+    name: str = ""
     lens: Lens | None = None
     sigma_pixel: float | None = None
     image_size: tuple[int, int] | None = None
@@ -338,19 +341,29 @@ class Photo:
         return float(np.sqrt(area))
 
     @classmethod
-    def from_dict(cls, data: Any, key: str, folder: Path, layers: Layers | None = None) -> Photo:
-        """Return a photo from its part of the pair file.
+    def from_dict(
+        cls,
+        data: Any,
+        key: str,
+        folder: Path,
+        layers: Layers | None = None,
+        *,
+        lens_of: Callable[[Path], Lens] = Lens.read,
+    ) -> Photo:
+        """Return a photo from its part of the file of a pair or set.
 
         Parameters
         ----------
         data : mapping
             What stands in the pair file under ``key``.
         key : str
-            ``"image1"`` or ``"image2"``, for messages.
+            ``"image1"``, ``"photos[0]"`` ..., for messages.
         folder : Path
             Where the pair file lies; its lens file is looked for from there.
         layers : Layers, optional
-            The media that the pair file states for both photos.
+            The media that the file states for all photos.
+        lens_of : callable
+            What reads a lens file.
 
         Raises
         ------
@@ -363,9 +376,10 @@ class Photo:
         missing = [name for name in ("plane_from_pixel", "nadir", "distance") if name not in data]
         if missing:
             raise InputError(f'"{key}" lacks {", ".join(missing)}.')
-        file = data.pop("file", "")
-        if not isinstance(file, str):
-            raise InputError(f'"{key}.file" must be text, found {file!r}.')
+        file, called = (data.pop(part, "") for part in ("file", "name"))
+        for part, text in (("file", file), ("name", called)):
+            if not isinstance(text, str):
+                raise InputError(f'"{key}.{part}" must be text, found {text!r}.')
         lens = data.get("lens")
         if lens is not None and not isinstance(lens, str):
             raise InputError(f'"{key}.lens" must name a lens file, found {lens!r}.')
@@ -377,7 +391,8 @@ class Photo:
                 data["interface_normal"] = _towards_camera(data)
             return cls(
                 file=file,
-                lens=Lens.read(folder / lens) if lens else None,
+                name=called,
+                lens=lens_of(folder / lens) if lens else None,
                 plane_from_pixel=data.pop("plane_from_pixel"),
                 nadir=data.pop("nadir"),
                 distance=data.pop("distance"),
@@ -389,7 +404,8 @@ class Photo:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the photo's part of the pair file."""
-        data: dict[str, Any] = {"file": self.file} if self.file else {}
+        stated = {"name": self.name, "file": self.file}
+        data: dict[str, Any] = {key: text for key, text in stated.items() if text}
         data |= {
             "plane_from_pixel": self.plane_from_pixel,
             "nadir": self.nadir,

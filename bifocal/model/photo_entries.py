@@ -1,0 +1,84 @@
+"""What the files of pairs and of sets of photos hold: photo entries, media and their covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from bifocal.model import orientation_precision
+from bifocal.model.lens import Lens
+from bifocal.model.photo import Photo
+from multimedia import Layers
+from photocore.arrays import FloatArray
+from photocore.errors import InputError
+
+#: Format of a pair file and of a file of two photos or more.
+PAIR_FORMAT, SET_FORMAT = "bifocal-pair/1", "bifocal-photos/1"
+
+
+class PhotoEntries(NamedTuple):
+    """Photos in the order of their file, the covariance of all, and the keys not known.
+
+    A lens file that several photos name is one `Lens`.
+    """
+
+    photos: tuple[Photo, ...]
+    orientation: FloatArray | None
+    extra: dict[str, Any]
+
+
+def photo_entries(data: Mapping[str, Any], folder: Path, *formats: str) -> PhotoEntries:
+    """Return what the file of a pair or of a set holds.
+
+    Parameters
+    ----------
+    data : mapping
+        Its content.
+    folder : Path
+        Where it lies; lens files are looked for from there.
+    *formats : str
+        Those that are taken, the one to name first.
+
+    Raises
+    ------
+    InputError, GeometryError
+        Naming the key that is wrong.
+    """
+    data = dict(data)
+    stated = data.pop("format", None)
+    if stated not in formats:
+        raise InputError(f'"format" must be "{formats[0]}", found {stated!r}.')
+    media = data.pop("layers", None)
+    layers = None if media is None else Layers.from_dict(media, where='"layers"')
+    if stated == PAIR_FORMAT:
+        entries = {key: data.pop(key, None) for key in ("image1", "image2")}
+    else:
+        listed = data.pop("photos", None)
+        if not isinstance(listed, list) or len(listed) < 2:
+            raise InputError('"photos" must list two photos or more.')
+        entries = {f"photos[{number}]": entry for number, entry in enumerate(listed)}
+    lens_of = cache(Lens.read)
+    photos = [
+        Photo.from_dict(entry, key, folder, layers, lens_of=lens_of)
+        for key, entry in entries.items()
+    ]
+    stated = data.pop("orientation", None)
+    if stated is not None:
+        stated = orientation_precision.from_dict(stated, layers, len(photos))
+    return PhotoEntries(tuple(photos), stated, data)
+
+
+def file_content(
+    head: Mapping[str, Any],
+    photos: Sequence[Photo],
+    extra: Mapping[str, Any],
+    orientation: FloatArray | None,
+) -> dict[str, Any]:
+    """Return the content of a file: format and photos, media, other keys, covariance."""
+    layers = photos[0].layers
+    data = {**head, **({"layers": layers.as_dict()} if layers else {}), **extra}
+    if orientation is not None:
+        data["orientation"] = orientation_precision.as_dict(orientation, layers, len(photos))
+    return data

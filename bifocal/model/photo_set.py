@@ -1,0 +1,294 @@
+"""A set of photos of one wall: two or more, each with its homography, nadir and distance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bifocal.model import orientation_precision
+from bifocal.model.doubts import doubts_in_words
+from bifocal.model.flags import UNCERTAIN_SHARE, FlagLimits
+from bifocal.model.intersection import intersect
+from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
+from bifocal.model.photo_entries import PAIR_FORMAT, SET_FORMAT, file_content, photo_entries
+from bifocal.rays import plane_position
+from bifocal.remarks import remark
+from multimedia import Layers
+from photocore.arrays import BoolArray, FloatArray, as_points
+from photocore.errors import InputError, located
+from photocore.jsonfile import read_object, write_object
+
+#: Places a side at which pairs of a set are judged, over each photo.
+_PLACES = 12
+#: What a lens shows as far from where it is has been folded over; a share of the distance.
+_FOLDED = 1e-3
+
+
+class RankedPair(NamedTuple):
+    """Two photos of a set, by their numbers, the far one first, and what relief they promise.
+
+    Attributes
+    ----------
+    far, near : int
+        Numbers of the photos in the set, from 0.
+    share : float
+        Of the wall that any photo shows, how much both do.
+    sigma_r : float
+        Median precision of relief there, from the picks alone. [m]
+    """
+
+    far: int
+    near: int
+    share: float
+    sigma_r: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PhotoSet:
+    """Two or more photos of one wall; a pair is the set of two.
+
+    Attributes
+    ----------
+    photos : tuple of Photo
+        In the order given, which nothing changes: picks and covariance follow it. Each has a name
+        of its own; one without is called as its file is.
+    folder : Path
+        Folder of the set's file, to which the photos' names are relative.
+    extra : mapping
+        Other keys of the file; kept.
+    orientation : ndarray, shape (k, k), or None
+        Covariance of all photos, and of their media where it counts them
+        (`bifocal.model.orientation_precision.names_of`), common to all points; None where it is
+        not known.
+    """
+
+    photos: tuple[Photo, ...]
+    folder: Path = Path()
+    extra: Mapping[str, Any] = field(default_factory=dict)
+    orientation: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        photos = tuple(self.photos)
+        if len(photos) < 2:
+            raise InputError(remark("photo_set.too_few", count=len(photos)))
+        if any(photo.layers != photos[0].layers for photo in photos):
+            raise InputError(remark("pair.two_layers"))
+        names = _names(photos)
+        photos = tuple(
+            photo
+            if (photo.name, photo.folder) == (name, self.folder)
+            else replace(photo, name=name, folder=self.folder)
+            for photo, name in zip(photos, names, strict=True)
+        )
+        object.__setattr__(self, "photos", photos)
+        if self.orientation is not None:
+            layers = photos[0].layers
+            matrix = orientation_precision.checked_of(self.orientation, layers, len(photos))
+            object.__setattr__(self, "orientation", matrix)
+
+    def __len__(self) -> int:
+        return len(self.photos)
+
+    @classmethod
+    def read(cls, path: Path | str) -> PhotoSet:
+        """Read the file of a set, or of a pair as a set of two in the order of its file.
+
+        Raises
+        ------
+        InputError
+            If the file or one of its values is unusable; the message names the key.
+        GeometryError
+            If a homography is singular.
+        """
+        data = read_object(path, what="file of photos")
+        with located(path):
+            return cls.from_dict(data, folder=Path(path).parent)
+
+    @classmethod
+    def of(cls, source: PhotoSet | Pair | Path | str) -> PhotoSet:
+        """Return a set as it is, a pair as a set of two, or read the file of either."""
+        if isinstance(source, PhotoSet):
+            return source
+        return cls.from_pair(source) if isinstance(source, Pair) else cls.read(source)
+
+    @classmethod
+    def from_pair(cls, pair: Pair) -> PhotoSet:
+        """Return a pair as a set of two, the far photo first."""
+        return cls(
+            photos=(pair.image1, pair.image2), folder=pair.folder, extra=pair.extra,
+            orientation=pair.orientation,
+        )  # fmt: skip
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], *, folder: Path = Path()) -> PhotoSet:
+        """Return the set described by the content of its file, or of a pair file."""
+        photos, orientation, extra = photo_entries(data, folder, SET_FORMAT, PAIR_FORMAT)
+        return cls(photos=photos, folder=folder, extra=extra, orientation=orientation)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of the set's file."""
+        head = {"format": SET_FORMAT, "photos": [photo.to_dict() for photo in self.photos]}
+        return file_content(head, self.photos, self.extra, self.orientation)
+
+    def write(self, path: Path | str, *, overwrite: bool = False) -> None:
+        """Write the set's file, whole or not at all."""
+        write_object(path, self.to_dict(), overwrite=overwrite)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the photos are called."""
+        return tuple(photo.name for photo in self.photos)
+
+    @property
+    def layers(self) -> Layers | None:
+        """The media between cameras and object; None in air."""
+        return self.photos[0].layers
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the file says is wrong with the set."""
+        return doubts_in_words(self.extra.get("setup"))
+
+    def number(self, photo: int | str) -> int:
+        """Return the number of a photo, from 0, by that or by its name.
+
+        Raises
+        ------
+        InputError
+            If the set has none of that name or number.
+        """
+        if photo in self.names:
+            return self.names.index(str(photo))
+        if isinstance(photo, str) or not 0 <= photo < len(self):
+            raise InputError(remark("photo_set.no_photo", name=photo, names=", ".join(self.names)))
+        return int(photo)
+
+    def pair(self, first: int | str = 0, second: int | str = 1) -> Pair:
+        """Return two of the photos as a pair, the far one first, with their part of the covariance.
+
+        Parameters
+        ----------
+        first, second : int or str
+            Numbers from 0, or names.
+
+        Raises
+        ------
+        InputError
+            If the set has none of that name or number, or both are one.
+        GeometryError
+            If both cameras stand equally far from the wall.
+        """
+        chosen = [self.number(first), self.number(second)]
+        if chosen[0] == chosen[1]:
+            raise InputError(remark("photo_set.same_photo", name=self.names[chosen[0]]))
+        far, near = sorted(chosen, key=lambda number: -self.photos[number].distance)
+        part = self.orientation
+        if part is not None:
+            part = orientation_precision.of_photos(part, (far, near), len(self))
+        extra = dict(self.extra)
+        if len(self) > 2 and "setup" in extra:  # diagnostics of all photos are not those of two
+            extra["setup"] = {"doubts": list(self.remarks)}
+        return Pair(
+            image1=self.photos[far], image2=self.photos[near], folder=self.folder, extra=extra,
+            orientation=part,
+        )  # fmt: skip
+
+    def pairs(self) -> tuple[RankedPair, ...]:
+        """Return the pairs that promise relief, the best first.
+
+        Those that stand equally far from the wall are left out, and those whose relief, where both
+        photos see, is less precise than the share of the distance that makes points UNCERTAIN.
+
+        Returns
+        -------
+        tuple of RankedPair
+            By what they tell: the sum of ``1 / sigma_r**2`` over the wall that any photo shows.
+        """
+        xyz = self._places()
+        picked = [
+            photo.picks(np.where(seen[:, None], pixels, np.nan))
+            for photo, pixels, seen in zip(
+                self.photos, self.project(xyz), self.sees(xyz), strict=True
+            )
+        ]
+        ranked = []
+        for one, other in combinations(range(len(self)), 2):
+            far, near = sorted((one, other), key=lambda number: -self.photos[number].distance)
+            if self.photos[far].distance == self.photos[near].distance:
+                continue
+            sigma = intersect(picked[far], picked[near], limits=FlagLimits()).sigma[:, 2]
+            both = np.isfinite(sigma)
+            told = float(np.sum(1.0 / sigma[both] ** 2))
+            if both.any() and (middle := float(np.median(sigma[both]))) <= (
+                UNCERTAIN_SHARE * self.photos[near].distance
+            ):
+                ranked.append((told, RankedPair(far, near, float(both.mean()), middle)))
+        return tuple(pair for _, pair in sorted(ranked, key=lambda item: -item[0]))
+
+    def project(self, xyz: ArrayLike) -> tuple[FloatArray, ...]:
+        """Return the pixels of points (X, Y, r) in every photo, each of shape (..., 2)."""
+        return tuple(photo.project(xyz) for photo in self.photos)
+
+    def sees(self, xyz: ArrayLike) -> BoolArray:
+        """Tell which photos have points (X, Y, r) in their frame, hidden or not.
+
+        Returns
+        -------
+        ndarray of bool, shape (photos, ...)
+            Of a photo whose size is not known, all that lies before its camera.
+        """
+        points = as_points(xyz, "xyz", dimension=3)
+        return np.stack([_in_frame(photo, points) for photo in self.photos])
+
+    def _places(self) -> FloatArray:
+        """Return places of the wall all over the photos, shape (n, 3). [m]"""
+        steps = (np.arange(_PLACES) + 0.5) / _PLACES
+        places: list[FloatArray] = []
+        for photo in self.photos:
+            grid = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+            if photo.image_size is None:  # as wide as a usual lens sees
+                places.append(photo.nadir + (grid - 0.5) * photo.distance)
+            else:
+                seen = photo.plane_from_pixels(grid * photo.image_size - 0.5)
+                ahead = photo.sees_ahead(seen, photo.image_size[::-1])
+                places.append(seen[ahead & np.isfinite(seen).all(axis=1)])
+        plane = np.concatenate(places)
+        return np.column_stack([plane, np.zeros(len(plane))])
+
+
+def _names(photos: tuple[Photo, ...]) -> tuple[str, ...]:
+    """Return a name for each photo: its own, else that of its file.
+
+    Raises
+    ------
+    InputError
+        If two photos are called alike.
+    """
+    stems = [Path(photo.file).stem or f"photo {k}" for k, photo in enumerate(photos, start=1)]
+    if len(set(stems)) < len(stems):  # as cameras count them, in one folder for each
+        stems = [photo.file or stem for photo, stem in zip(photos, stems, strict=True)]
+    names = [photo.name or stem for photo, stem in zip(photos, stems, strict=True)]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise InputError(remark("photo_set.name_twice", name=twice[0]))
+    return tuple(names)
+
+
+def _in_frame(photo: Photo, xyz: FloatArray) -> BoolArray:
+    """Tell which points a photo has in its frame."""
+    pixels = photo.project(xyz)
+    inside = np.isfinite(pixels).all(axis=-1)
+    if photo.image_size is not None:
+        edge = np.array(photo.image_size) - 0.5
+        inside &= ((pixels >= -0.5) & (pixels <= edge)).all(axis=-1)
+    if photo.lens is not None:  # beyond its photo a lens may fold what it shows back into it
+        away = photo.apparent_from_pixels(pixels) - plane_position(xyz, photo.foot)
+        inside &= np.hypot(away[..., 0], away[..., 1]) < _FOLDED * photo.distance
+    return np.asarray(inside)
