@@ -82,10 +82,12 @@ class CameraKnowledge:
         """Add all of it to the rows of a network, ``column`` (m, 12) being that of each unknown."""
         cameras, lenses = state.blocks["camera"], sorted(set(self.lens))
         for k in lenses:
-            off, sigma = self.off(k, cameras[k], state.blocks["radial"][k])
+            off, sigmas = self.off(k, cameras[k], state.blocks["radial"][k])
             own = column[k, INTERIOR]
-            rows.known(own[own >= 0], off[own >= 0], sigma[own >= 0])
-        for one, other in pairwise(lenses) if self.sigma_body else ():
+            rows.known(own[own >= 0], off[own >= 0], sigmas[own >= 0])
+        for one, other in pairwise(lenses):
+            if self.sigma_body is None:
+                break
             apart = cameras[one].matrix[:2, 2] - cameras[other].matrix[:2, 2]
             line = rows.add(apart / self.sigma_body)
             for k, sign in ((one, 1.0), (other, -1.0)):

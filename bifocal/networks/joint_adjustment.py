@@ -205,7 +205,7 @@ def _unknowns(state: NetworkState) -> JointUnknowns:
 
 def _stepped(block: Any, at: list[int], step: FloatArray) -> Any:
     """Return a camera or a radial distortion after a step of some of `CAMERA`."""
-    whole = np.bincount(at, step, len(CAMERA))
+    whole = np.bincount(at, step, len(CAMERA)).astype(np.float64)
     if isinstance(block, Pinhole):
         return block.stepped(whole[: len(PARAMETERS)])
     return block + whole[len(PARAMETERS) :]

@@ -24,13 +24,17 @@ from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.tie_points import refine_ties
 from bifocal.orientation.tuning import TIES, WALLS
 from bifocal.orientation.walls.reference_plane import narrow_face
+from photocore.adjustment import OUTLIER_LIMIT
 from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import BoolArray, FloatArray
+from photocore.camera.pinhole import project_with_jacobian
 from photocore.cli import Progress, no_progress
 from photocore.errors import GeometryError
 
 #: Features of a photo, and pixels in which they are looked for.
 FEATURES, PIXELS = 8000, 6e6
+#: Common points of two photos that are kept.
+MATCHES = 600
 #: Precision of features as found, of the searched photo, and of patches before they tell it. [px]
 FOUND, REFINED = 0.5, 0.2
 #: Chance from which a point tells of the wall's plane.
@@ -100,19 +104,40 @@ def orient_set(
     observed = _observed(photos, seen, control, site, first)
     is_tie = observed.point >= len(control.ids)
     reduction = np.array([part.reduction for part in features])
-    coarse = replace(
+    observed = replace(
         observed, sigma=np.where(is_tie, FOUND * reduction[observed.camera], site.sigma_pick)
     )
     start = JointUnknowns(cameras=first.cameras, xyz=first.xyz, radial=first.radial)
-    state: JointUnknowns = adjust_jointly(coarse, start)
+    state = adjust_jointly(observed, start)
     for _ in range(2):  # the second pass searches around better places
-        observed, state = _refined(photos, observed, state, first, len(control.ids))
-    assert isinstance(state, JointAdjustment)
-    used = state.observations.point >= len(control.ids)
-    rays = state.residuals[used]
-    share = max(state.redundancy / (2 * len(state.residuals)), 0.05)
-    sigma = max(robust_sigma(rays.ravel()) / float(np.sqrt(share)), TIES.best)
+        observed = _refined(photos, observed, state, first, len(control.ids))
+        state = _readjusted(observed, state, first)
+    for _ in range(2):  # a few wrong patches hide each other
+        observed, sigma = _without_gross(state, len(control.ids))
+        state = _readjusted(observed, state, first)
     return _adjusted(observed, state, first, control, site, sigma)
+
+
+def _readjusted(
+    observed: JointObservations, state: JointAdjustment, first: FirstCameras
+) -> JointAdjustment:
+    """Return everything adjusted from where it was."""
+    start = JointUnknowns(
+        cameras=state.cameras, radial=state.radial,
+        xyz=np.where(np.isfinite(state.xyz), state.xyz, first.xyz),
+    )  # fmt: skip
+    return adjust_jointly(observed, start)
+
+
+def _without_gross(state: JointAdjustment, control: int) -> tuple[JointObservations, float]:
+    """Return the rays without those that most ties contradict, and the precision of these. [px]"""
+    seen = state.observations
+    ties = seen.point >= control
+    free = max(state.redundancy / (2 * len(seen.point)), 0.05)
+    sigma = max(robust_sigma(state.residuals[ties].ravel()) / float(np.sqrt(free)), TIES.best)
+    off = np.abs(state.residuals).max(axis=1)
+    kept = ~ties | (off < OUTLIER_LIMIT * sigma)
+    return with_rays(replace(seen, sigma=np.where(ties, sigma, seen.sigma)), kept), sigma
 
 
 def _seen(
@@ -120,7 +145,7 @@ def _seen(
 ) -> SharedPoints:
     """Return where control points and then ties are seen, free of the lens files' distortion."""
     shapes = [photo.interior.image_size[::-1] for photo in photos]
-    ties = common_features(features, shapes, ~np.eye(len(photos), dtype=bool))
+    ties = common_features(features, shapes, ~np.eye(len(photos), dtype=bool), most=MATCHES)
     count, picks = len(control.ids), control.picks if control.ids else ()
     picked = [np.flatnonzero(np.isfinite(own).all(axis=1)) for own in picks]
     parts = [photos[k].interior.ideal(picks[k][rows]) for k, rows in enumerate(picked)]
@@ -140,8 +165,9 @@ def _observed(
     """Return all rays, in the frame of control, or without enough of it of the first pair."""
     known, sigma = np.full((seen.count, 3), np.nan), np.ones((seen.count, 3))
     held: dict[int, tuple[str, ...]] = {}
-    sizes = {(i.image_size, i.is_calibrated) for i in first.interiors}
-    one_body = len(sizes) == 1 and not first.interiors[0].is_calibrated
+    one_body = len({(i.image_size, i.is_calibrated) for i in first.interiors}) == 1
+    one_body &= not first.interiors[0].is_calibrated
+    centres = 0.002 * float(np.hypot(*first.interiors[0].image_size))
     if _holds_frame(control):
         known[: len(control.ids)], sigma[: len(control.ids)] = control.xyz, control.sigma
     else:
@@ -154,7 +180,7 @@ def _observed(
         known=known, sigma_known=sigma, sigma_focal=np.zeros(len(photos)),
         cameras=CameraKnowledge(
             interiors=first.interiors, lens=first.lens, held=held, by_wall=bool(held),
-            sigma_body=0.002 * float(np.hypot(*photos[0].interior.image_size)) if one_body else None,
+            sigma_body=centres if one_body else None,
         ),
     )  # fmt: skip
 
@@ -170,8 +196,8 @@ def _holds_frame(control: Control) -> bool:
 def _refined(
     photos: Sequence[PhotoInput], observed: JointObservations, state: JointUnknowns,
     first: FirstCameras, fewest: int,
-) -> tuple[JointObservations, JointAdjustment]:  # fmt: skip
-    """Return ties matched by patches to a tenth of a pixel, and all cameras adjusted to them.
+) -> JointObservations:  # fmt: skip
+    """Return ties matched by patches to a tenth of a pixel.
 
     A tie stays where its first photo shows it; the other photos show it where patches agree.
     """
@@ -182,9 +208,10 @@ def _refined(
     at_home = is_tie & (observed.camera == home[observed.point])
     place[observed.point[at_home]] = observed.pixels[at_home]
     pixels, good = observed.pixels.copy(), ~is_tie | at_home
-    for one in range(len(photos)):
-        for other in range(one + 1, len(photos)):
-            rays = is_tie & (observed.camera == other) & (home[observed.point] == one)
+    greys = [photo.grey for photo in photos if photo.grey is not None]
+    for one, first_grey in enumerate(greys):
+        for other, grey in enumerate(greys):
+            rays = is_tie & (observed.camera == other) & (home[observed.point] == one) & ~at_home
             if rays.any():
                 pixels[rays], good[rays] = refine_ties(
                     PairObservations(
@@ -196,15 +223,10 @@ def _refined(
                         cameras=(state.cameras[one], state.cameras[other]),
                         radial=state.radial[[one, other]],
                     ),
-                    (photos[one].grey, photos[other].grey),
+                    (first_grey, grey),
                 )  # fmt: skip
     sigma = np.where(is_tie, REFINED, observed.sigma)
-    observed = with_rays(replace(observed, pixels=pixels, sigma=sigma), good)
-    start = JointUnknowns(
-        cameras=state.cameras, radial=state.radial,
-        xyz=np.where(np.isfinite(state.xyz), state.xyz, first.xyz),
-    )  # fmt: skip
-    return observed, adjust_jointly(observed, start)
+    return with_rays(replace(observed, pixels=pixels, sigma=sigma), good)
 
 
 def _adjusted(
@@ -228,7 +250,7 @@ def _adjusted(
     if knowledge.by_wall:
         count = len(control.ids)
         known[:count], spread[:count] = control.xyz, control.sigma
-        on_wall, rough = _wall(state, count, len(first.cameras))
+        on_wall, rough = _wall(state, count, sigma_tie)
         known[on_wall, 2], spread[on_wall, 2] = 0.0, rough[on_wall]
         held = {first.far: ("turn Z", "X", "Y")} if free_frame else {}
         cameras = {1: first.far, 2: first.near}
@@ -252,18 +274,13 @@ def _adjusted(
         ),
     )  # fmt: skip
     observed = replace(observed, sigma=sigma, known=known, sigma_known=spread, cameras=knowledge)
-    start = replace(
-        JointUnknowns(cameras=state.cameras, xyz=state.xyz, radial=state.radial),
-        xyz=np.where(np.isfinite(state.xyz), state.xyz, first.xyz),
-    )
-    adjusted = adjust_jointly(observed, start)
     return OrientedSet(
-        first=first, adjusted=adjusted, control=control, sigma_tie=sigma_tie,
+        first=first, adjusted=_readjusted(observed, state, first), control=control, sigma_tie=sigma_tie,
         on_wall=int(on_wall.sum()), free_frame=bool(free_frame),
     )  # fmt: skip
 
 
-def _wall(state: JointAdjustment, control: int, photos: int) -> tuple[BoolArray, FloatArray]:
+def _wall(state: JointAdjustment, control: int, sigma_tie: float) -> tuple[BoolArray, FloatArray]:
     """Return which ties tell of the wall's plane, and by what sigma they lie on it, (p,). [m]
 
     Roughness is common to stretches of the wall, as in `bifocal.orientation.tie_points.with_wall`.
@@ -273,10 +290,17 @@ def _wall(state: JointAdjustment, control: int, photos: int) -> tuple[BoolArray,
     GeometryError
         If there is no wall.
     """
+    seen, xyz = state.observations, state.xyz
     camera = max(state.cameras, key=lambda one: float(one.centre[2]))
-    xyz, sigma = state.xyz, np.sqrt(state.covariance[:, 2, 2])
-    there = np.isfinite(xyz).all(axis=1) & np.isfinite(sigma)
+    normal = np.zeros((len(xyz), 3, 3))
+    for k, own in enumerate(state.cameras):
+        points = seen.point[seen.camera == k]
+        by = project_with_jacobian(own, xyz[points]).by_point / sigma_tie
+        np.add.at(normal, points, by.transpose(0, 2, 1) @ by)
+    there = np.isfinite(xyz).all(axis=1) & (np.linalg.eigvalsh(normal)[:, 0] > 1.0)
     there[:control] = False
+    sigma = np.full(len(xyz), np.nan)
+    sigma[there] = np.sqrt(np.linalg.inv(normal[there])[:, 2, 2])
     face = narrow_face(xyz[there], sigma[there], band=WALLS.rough_band * float(camera.centre[2]))
     chance = np.zeros(len(xyz))
     chance[there] = face.chance
@@ -284,7 +308,7 @@ def _wall(state: JointAdjustment, control: int, photos: int) -> tuple[BoolArray,
     cells = len(np.unique(np.floor(xyz[chance > LEAST_CHANCE, :2] / width), axis=0))
     if chance.sum() < TIES.fewest_on_wall or cells < TIES.fewest_cells:
         raise GeometryError(
-            f"no plane: too few of the details that the {photos} photos share lie on one. Frame "
+            f"no plane: too few details that {len(state.cameras)} photos share lie on one. Frame "
             "them so that the wall fills them, or give control points on the wall (--control)."
         )
     common = max(float(chance.sum()) / max(cells / 4.0, 3.0), 1.0)

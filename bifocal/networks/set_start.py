@@ -94,7 +94,7 @@ def first_cameras_of(
     known[: len(control.ids)] = control.xyz
     while len(cameras) < len(photos):
         xyz = np.where(np.isfinite(known), known, _meeting(cameras, seen, pixels))
-        there = np.isfinite(xyz).all(axis=1)[seen.point]
+        there = np.asarray(np.isfinite(xyz).all(axis=1))[seen.point]
         count = [-1 if k in cameras else int((there & (seen.photo == k)).sum())
                  for k in range(len(photos))]  # fmt: skip
         k = int(np.argmax(count))
@@ -111,14 +111,14 @@ def first_cameras_of(
             )
         cameras[k] = camera
     xyz = _meeting(cameras, seen, pixels)
-    middle = np.nanmedian(xyz, axis=0)
+    middle, unknown = np.nanmedian(xyz, axis=0), np.asarray(np.isnan(xyz).any(axis=1))
     for k, camera in cameras.items():  # what is seen under too small an angle stands on the wall
-        rays = np.flatnonzero((seen.photo == k) & ~np.isfinite(xyz).all(axis=1)[seen.point])
+        rays = np.flatnonzero((seen.photo == k) & unknown[seen.point])
         xyz[seen.point[rays]] = ray_on_plane(camera, pixels[rays])
     return FirstCameras(
         far=far, near=near, pair=pair, cameras=tuple(cameras[k] for k in range(len(photos))),
         interiors=tuple(interiors), lens=lens, radial=radial,
-        xyz=np.where(np.isfinite(xyz).all(axis=1)[:, None], xyz, middle),
+        xyz=np.where(np.isfinite(xyz), xyz, middle),
     )  # fmt: skip
 
 
@@ -161,7 +161,10 @@ def _measures(site: SiteMeasures, far: int, near: int) -> SiteMeasures:
 def _promising(
     photos: Sequence[PhotoInput], seen: SharedPoints, control: Control, site: SiteMeasures
 ) -> list[tuple[int, int]]:
-    """Return the pairs that may be oriented, those whose rays meet best first."""
+    """Return the pairs that may be oriented, those whose rays meet best first.
+
+    Of each, the photo first that seems to be taken from farther away.
+    """
     found = []
     for pair, ties in _common(seen, len(photos), len(control.ids)):
         one, other = pair
@@ -173,8 +176,8 @@ def _promising(
         own = _measures(site, one, other)
         scaled = own.distance1 or own.distance2 or own.delta_d or (control.lengths and one == 0)
         if enough or ((scaled or picked.positioned.sum() >= 2) and (site.wall is None or not one)):
-            told = _meeting_angles(photos[one].interior, photos[other].interior, *ties)
-            found.append((enough, float((np.minimum(told, WIDE) ** 2).sum()), pair))
+            told = _promise(photos[one].interior, photos[other].interior, *ties)
+            found.append((enough, abs(told), pair if told >= 0 or site.wall else pair[::-1]))
     return [pair for *_, pair in sorted(found, reverse=True)]
 
 
@@ -191,22 +194,32 @@ def _common(
             yield (one, other), (pixels[one, both], pixels[other, both])
 
 
-def _meeting_angles(
-    first: Interior, second: Interior, x1: FloatArray, x2: FloatArray
-) -> FloatArray:
-    """Return the angles at which rays of common points meet, shape (n,). [rad]"""
+def _promise(first: Interior, second: Interior, x1: FloatArray, x2: FloatArray) -> float:
+    """Return how well rays of common points meet: their angles' square sum, up to `WIDE`.
+
+    Negative where the second camera stands farther from them.
+    """
     y1, y2 = (homogeneous(x) @ np.linalg.inv(i.matrix).T for i, x in ((first, x1), (second, x2)))
     cv2.setRNGSeed(7)
     limit = 3.0 / min(first.focal, second.focal)
     a, b = np.ascontiguousarray(y1[:, :2]), np.ascontiguousarray(y2[:, :2])
     matrix, inside = cv2.findEssentialMat(a, b, np.eye(3), cv2.RANSAC, 0.999, limit)
     if matrix is None or matrix.shape != (3, 3):
-        return np.zeros(0)
-    _, turn, _, inside = cv2.recoverPose(matrix, a, b, np.eye(3), mask=inside)
+        return 0.0
+    _, turn, shift, inside, xyz = cv2.recoverPose(
+        matrix, a, b, np.eye(3), distanceThresh=1e3, mask=inside
+    )
     good = inside.ravel() > 0
+    if not good.any():
+        return 0.0
+    there = (xyz[:3] / xyz[3]).T[good]
+    depth2 = (there @ turn.T + shift.T)[:, 2]
+    farther = np.median(there[:, 2]) >= np.median(depth2)
     d1, d2 = y1[good], y2[good] @ turn
-    cosine = (d1 * d2).sum(1) / np.linalg.norm(d1, axis=1) / np.linalg.norm(d2, axis=1)
-    return np.arccos(np.clip(cosine, -1.0, 1.0))
+    sine = np.linalg.norm(np.cross(d1, d2), axis=1)
+    sine /= np.linalg.norm(d1, axis=1) * np.linalg.norm(d2, axis=1)
+    told = float((np.minimum(sine, WIDE) ** 2).sum())
+    return told if farther else -told
 
 
 def _lenses(interiors: Sequence[Interior]) -> tuple[int, ...]:
