@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import zipfile
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -72,7 +72,7 @@ def lint(path: Path | str) -> list[str]:
             facts = _read(path, package, sheet, shared)
             found = [
                 *_order_faults(facts, formats),
-                *_formula_faults(facts),
+                *_formula_faults(facts, book.names),
                 *_rule_faults(facts),
                 *_table_faults(path, package, tables[sheet.title], facts),
             ]
@@ -156,10 +156,12 @@ def _order_faults(facts: _SheetFacts, formats: int) -> Iterator[str]:
                 yield f"merged ranges overlap at {cell_name(*second[:2])}"
 
 
-def _formula_faults(facts: _SheetFacts) -> Iterator[str]:
-    """Yield formulas that Excel or LibreOffice will not read."""
+def _formula_faults(facts: _SheetFacts, names: Mapping[str, str]) -> Iterator[str]:
+    """Yield formulas that Excel or LibreOffice will not read; functions with names are known."""
+    own = [name for name, text in names.items() if text.startswith("_xlfn.LAMBDA(")]
+    called = re.compile(rf"\b({'|'.join(own)})\(" if own else r"(?!)")
     for cell, formula in facts.formulas.items():
-        for fault in formula_faults(formula):
+        for fault in formula_faults(called.sub("(", formula)):
             yield f"{cell}: {fault}: {formula:.80}"
 
 

@@ -82,6 +82,8 @@ class SurveyContent:
         Rows of the sheet `Log`: date, program, what, file, SHA-256.
     rows : int
         Rows of `Points` in an empty template.
+    functions : bool
+        Whether the workbook has functions with names.
     media : SurveyMedia or None
         Cells of media in an empty template, and of a general pair; None for those that follow from
         the pair. An ideal pair's stand in its set-up.
@@ -107,6 +109,7 @@ class SurveyContent:
     links: Mapping[str, str] = field(default_factory=dict)
     log: Sequence[tuple[str, str, str, str, str]] = ()
     rows: int = POINT_ROWS
+    functions: bool = False
     media: SurveyMedia | None = None
 
     @classmethod

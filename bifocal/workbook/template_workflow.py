@@ -28,6 +28,7 @@ def write_template(
     language: str = "en",
     rows: int = POINT_ROWS,
     media: int | None = None,
+    functions: bool = False,
     overwrite: bool = False,
 ) -> None:
     """Write an empty survey workbook with live formulas.
@@ -43,6 +44,8 @@ def write_template(
     media : int, optional
         How many media `Setup` gets cells for: 2 for a water surface, 3 for air, glass and water;
         none by default, for photos in air.
+    functions : bool
+        Add the formulas of the method as functions with names, and a sheet that explains them.
     overwrite : bool
         Replace an existing file.
 
@@ -59,7 +62,7 @@ def write_template(
     cells = None if media is None else SurveyMedia.blank(media)
     check_book_path(path)
     check_new_workbook(path, overwrite=overwrite, other="")
-    content = SurveyContent(language=language, rows=rows, media=cells)
+    content = SurveyContent(language=language, rows=rows, media=cells, functions=functions)
     write_book(path, content, overwrite=overwrite)
 
 

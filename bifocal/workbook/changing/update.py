@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -159,7 +159,9 @@ def update_book(
         If the workbook's formulas are made for another kind of measurement, or it cannot be
         changed.
     """
-    editor, built = WorkbookEditor(source, survey.book), build(content)
+    editor = WorkbookEditor(source, survey.book)
+    content = replace(content, functions="RELIEF_SIGMA" in editor.book.names)
+    built = build(content)
     points = editor.table("tblPoints")
     if points is None:
         raise InputError(f"{source}: has lost its table tblPoints; write to a new workbook.")

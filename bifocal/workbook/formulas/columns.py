@@ -13,6 +13,8 @@ from bifocal.workbook.formulas.placed_formulas import placed_parts
 from photocore.workbook.making.live_columns import FormulaBook, LiveColumn
 
 FORMULAS = FormulaBook(__package__)
+#: The functions with names of `bifocal template --functions`, a table each.
+FUNCTIONS = FormulaBook(__package__, "functions")
 #: E, N, H from a whole-metre origin: columns that refer to the sheet `Georeference`.
 NEAR = ("n_E", "n_N", "n_H", "cov_EN")
 #: Relief whose area of uncertainty the sheet `Planning` shows. [cm]

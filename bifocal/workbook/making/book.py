@@ -17,6 +17,7 @@ from bifocal.workbook.content import (
 from bifocal.workbook.formulas.columns import FORMULAS, results_columns
 from bifocal.workbook.making.cameras_sketch import cameras_sketch
 from bifocal.workbook.making.charts import charts
+from bifocal.workbook.making.functions_sheet import functions_sheet
 from bifocal.workbook.making.georeference_sheet import georeference
 from bifocal.workbook.making.reference_sheets import check, planning
 from bifocal.workbook.making.setup_sheet import setup_sheet
@@ -89,6 +90,8 @@ def build(content: SurveyContent) -> BookBuilder:
     planning(builder, content)
     charts(builder, content, cells)
     _log(builder, content)
+    if content.functions:
+        functions_sheet(builder)
     builder.open_at("Points" if content.points else "Readme")
     return builder
 

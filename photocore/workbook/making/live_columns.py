@@ -91,15 +91,17 @@ class FormulaBook:
     ----------
     package : str
         Where the file lies.
+    name : str
+        What it is called.
     """
 
-    def __init__(self, package: str) -> None:
-        self.package = package
+    def __init__(self, package: str, name: str = "formulas") -> None:
+        self.package, self.name = package, name
 
     @cached_property
     def content(self) -> dict[str, dict[str, Any]]:
         """The file."""
-        text = files(self.package).joinpath("formulas.toml").read_text(encoding="utf-8")
+        text = files(self.package).joinpath(f"{self.name}.toml").read_text(encoding="utf-8")
         return tomllib.loads(text)
 
     def columns(
