@@ -17,6 +17,7 @@ The pair
     read_image, write_image   photos as arrays, upright as seen
     Lens                      principal distance, principal point and distortion of a lens
     calibrate, Calibration    a lens from photos of a board
+    align_set, SetAlignment   a set of photos oriented together
     align, Alignment          a pair from two photos and what was measured on site
     Control, Interior, SiteMeasures, PairMedia, read_control   what `align` is told
 Points

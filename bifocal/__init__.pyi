@@ -42,6 +42,7 @@ from .model.photo import Photo
 from .model.photo_set import PhotoSet, RankedPair
 from .model.relief_map import Quality, ReliefMap
 from .model.surface import FlatSurface, MapSurface, Surface
+from .networks.set_alignment import SetAlignment, align_set
 from .orientation.alignment import Alignment
 from .orientation.control_points import Control, SiteMeasures, read_control
 from .orientation.photo_alignment import align
@@ -123,6 +124,7 @@ __all__ = [
     "ReliefTable",
     "SAMPLE",
     "Session",
+    "SetAlignment",
     "Similarity",
     "SiteMeasures",
     "SolvedSurvey",
@@ -141,6 +143,7 @@ __all__ = [
     "WorkbookError",
     "WorldPoints",
     "align",
+    "align_set",
     "calibrate",
     "dense_relief",
     "georeference",

@@ -253,15 +253,15 @@ def of_photos(covariance: FloatArray, numbers: Sequence[int], count: int) -> Flo
     return covariance[np.ix_(chosen, chosen)]
 
 
-def moved(covariance: FloatArray, axes: FloatArray) -> FloatArray:
-    """Return the covariance in a frame whose axes are the rows of ``axes``."""
+def moved(covariance: FloatArray, axes: FloatArray, count: int = 2) -> FloatArray:
+    """Return the covariance of so many photos in a frame whose axes are the rows of ``axes``."""
     turn = np.eye(len(covariance))
-    for number in (0, 1):
+    for number in range(count):
         for name in ("turn X", "X"):
             first = number * len(CAMERA) + CAMERA.index(name)
             turn[first : first + 3, first : first + 3] = axes
-        if len(covariance) > len(NAMES):  # the interfaces lean about the same axes
-            first = len(covariance) - (1 - number) * len(PLACING) - 3
+        if len(covariance) > count * len(CAMERA):  # the interfaces lean about the same axes
+            first = len(covariance) - (count - 1 - number) * len(PLACING) - 3
             turn[first : first + 3, first : first + 3] = axes
     return turn @ covariance @ turn.T
 

@@ -57,6 +57,8 @@ class OrientedSet:
         Ties that tell of the wall's plane.
     free_frame : bool
         Whether origin and turn of the frame are free.
+    way : str
+        ``control``, ``site`` or ``auto``.
     """
 
     first: FirstCameras
@@ -65,6 +67,7 @@ class OrientedSet:
     sigma_tie: float
     on_wall: int
     free_frame: bool
+    way: str
 
 
 def orient_set(
@@ -108,6 +111,11 @@ def orient_set(
         observed, sigma=np.where(is_tie, FOUND * reduction[observed.camera], site.sigma_pick)
     )
     start = JointUnknowns(cameras=first.cameras, xyz=first.xyz, radial=first.radial)
+    before = [
+        (first.xyz[observed.point] - camera.centre) @ camera.rotation[2] > 0
+        for camera in first.cameras
+    ]
+    observed = with_rays(observed, np.array(before)[observed.camera, np.arange(len(is_tie))])
     state = adjust_jointly(observed, start)
     for _ in range(2):  # the second pass searches around better places
         observed = _refined(photos, observed, state, first, len(control.ids))
@@ -275,8 +283,9 @@ def _adjusted(
     )  # fmt: skip
     observed = replace(observed, sigma=sigma, known=known, sigma_known=spread, cameras=knowledge)
     return OrientedSet(
-        first=first, adjusted=_readjusted(observed, state, first), control=control, sigma_tie=sigma_tie,
-        on_wall=int(on_wall.sum()), free_frame=bool(free_frame),
+        first=first, adjusted=_readjusted(observed, state, first), control=control,
+        sigma_tie=sigma_tie, on_wall=int(on_wall.sum()), free_frame=bool(free_frame),
+        way="auto" if knowledge.by_wall else "control",
     )  # fmt: skip
 
 

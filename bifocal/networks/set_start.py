@@ -250,4 +250,7 @@ def _meeting(cameras: Mapping[int, Pinhole], seen: SharedPoints, pixels: FloatAr
     xyz = np.full((seen.count, 3), np.nan)
     good = np.linalg.eigvalsh(normal)[:, 0] > NARROW
     xyz[good] = np.linalg.solve(normal[good], right[good][..., None])[..., 0]
+    for k, camera in cameras.items():  # wrong matches meet behind a camera
+        points = seen.point[seen.photo == k]
+        xyz[points[(xyz[points] - camera.centre) @ camera.rotation[2] <= 0]] = np.nan
     return xyz
