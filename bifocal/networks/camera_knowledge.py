@@ -16,8 +16,9 @@ from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.camera.pinhole import Pinhole
 from photocore.camera.rotation import skew
 
-#: What belongs to a lens, and is one unknown for all photos that it took, by its place in `CAMERA`.
-INTERIOR = (0, 1, 2, 3, 10, 11)
+#: What is interior, by its place in `CAMERA`; what of it is one unknown for all photos of a lens.
+#: Focus, stabiliser and crop move the principal point from photo to photo.
+INTERIOR, SHARED = (0, 1, 2, 3, 10, 11), (0, 1, 10, 11)
 _TURN, _Z, _CENTRE = CAMERA.index("turn X"), CAMERA.index("Z"), [2, 3]
 
 
@@ -30,11 +31,11 @@ class CameraKnowledge:
     interiors : tuple of Interior
         Of each camera.
     lens : tuple of int
-        Of each camera, the first that has the same lens: they share all of its unknowns.
+        Of each camera, the first that has the same lens: they share `SHARED`.
     held : mapping of int to tuple of str
         By camera, which of `CAMERA` are held.
     sigma_body : float or None
-        How closely the principal points of different lenses agree, on one body. [px]
+        How closely principal points agree where one body took all photos. [px]
     distances : tuple of (mapping of int to float, float, float)
         Taped: how often each camera's distance counts, the sum of these, its sigma. [m]
     lengths : tuple of (int, int, float, float)
@@ -80,12 +81,14 @@ class CameraKnowledge:
 
     def observe(self, state: NetworkState, rows: Rows, column: IntArray) -> None:
         """Add all of it to the rows of a network, ``column`` (m, 12) being that of each unknown."""
-        cameras, lenses = state.blocks["camera"], sorted(set(self.lens))
-        for k in lenses:
-            off, sigmas = self.off(k, cameras[k], state.blocks["radial"][k])
-            own = column[k, INTERIOR]
-            rows.known(own[own >= 0], off[own >= 0], sigmas[own >= 0])
-        for one, other in pairwise(lenses):
+        cameras = state.blocks["camera"]
+        for k, camera in cameras.items():
+            off, sigmas = self.off(k, camera, state.blocks["radial"][k])
+            told = column[k, INTERIOR] >= 0
+            if self.lens[k] != k:  # what it shares is told once
+                told &= ~np.isin(INTERIOR, SHARED)
+            rows.known(column[k, INTERIOR][told], off[told], sigmas[told])
+        for one, other in pairwise(cameras):
             if self.sigma_body is None:
                 break
             apart = cameras[one].matrix[:2, 2] - cameras[other].matrix[:2, 2]

@@ -15,7 +15,7 @@ from scipy.sparse import csr_matrix
 
 from bifocal.model.orientation_precision import CAMERA
 from bifocal.model.pair_media import PairMedia
-from bifocal.networks.camera_knowledge import INTERIOR
+from bifocal.networks.camera_knowledge import SHARED
 from bifocal.networks.joint_observations import JointObservations, with_enough_rays, with_rays
 from photocore.adjustment import OUTLIER_LIMIT, Fit, huber_weights, standardised
 from photocore.adjustment.blocks import BlockEquations
@@ -268,7 +268,7 @@ class _System:
         owner = np.repeat(np.arange(count)[:, None], len(CAMERA), axis=1)
         if known is not None:
             free = known.free
-            owner[:, INTERIOR] = np.array(known.lens)[:, None]
+            owner[:, SHARED] = np.array(known.lens)[:, None]
         elif not seen.frame_is_known:
             # Seven are free: the far camera, and for the scale the near one's distance.
             free[0], free[1, CAMERA.index("Z")] = False, False

@@ -16,7 +16,7 @@ from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
 from bifocal.orientation.starts.space_resection import resect
 from photocore.arrays import FloatArray, IntArray
-from photocore.camera.pinhole import Pinhole, homogeneous, ray_on_plane
+from photocore.camera.pinhole import Pinhole, camera_matrix, homogeneous, ray_on_plane
 from photocore.errors import ConvergenceError, GeometryError
 
 #: So many pairs are tried, the most promising first.
@@ -39,7 +39,7 @@ class FirstCameras:
     cameras, interiors : tuple
         Of all photos, in the frame of the first pair.
     lens : tuple of int
-        Of each photo, the first that has the same lens.
+        Of each photo, the first of the same unknown lens.
     radial : ndarray, shape (m, 2)
     xyz : ndarray, shape (p, 3)
     """
@@ -80,9 +80,9 @@ def first_cameras_of(
     radial = np.zeros((len(photos), 2))
     radial[[far, near]] = pair.adjusted.radial
     for k, first in enumerate(lens):
-        own = next((j for j in (far, near) if lens[j] == first), None)
-        if own is not None:
-            interiors[k], radial[k] = interiors[own], radial[own]
+        its = next((j for j in (far, near) if lens[j] == first), None)
+        if its is not None:
+            interiors[k], radial[k] = interiors[its], radial[its]
         elif radial.any() and not interiors[k].is_calibrated:
             interiors[k] = replace(interiors[k], sigma_radial=SIGMA_RADIAL)
     cameras = {far: pair.adjusted.cameras[0], near: pair.adjusted.cameras[1]}
@@ -110,6 +110,11 @@ def first_cameras_of(
                 "taken from not too different directions: leave it out, or pick control points."
             )
         cameras[k] = camera
+    for k, leader in enumerate(lens):  # what is one unknown begins with one value
+        if leader != k:
+            whole, centre = cameras[leader].matrix, cameras[k].matrix[:2, 2]
+            matrix = camera_matrix(whole[0, 0], whole[1, 1] / whole[0, 0], *centre)
+            cameras[k], radial[k] = cameras[k]._replace(matrix=matrix), radial[leader]
     xyz = _meeting(cameras, seen, pixels)
     middle, unknown = np.nanmedian(xyz, axis=0), np.asarray(np.isnan(xyz).any(axis=1))
     for k, camera in cameras.items():  # what is seen under too small an angle stands on the wall
@@ -223,13 +228,13 @@ def _promise(first: Interior, second: Interior, x1: FloatArray, x2: FloatArray) 
 
 
 def _lenses(interiors: Sequence[Interior]) -> tuple[int, ...]:
-    """Return, of each photo, the first that was taken with the same lens as far as is known."""
+    """Return, of each photo, the first of the same lens, of which no file tells more."""
 
     def same(one: Interior, other: Interior) -> bool:
-        if one.is_assumed or one.image_size != other.image_size:
+        if one.is_assumed or one.is_calibrated or other.is_calibrated:
             return False
-        if one.is_calibrated or other.is_calibrated:
-            return one.source == other.source and one.focal == other.focal
+        if one.image_size != other.image_size:
+            return False
         return bool(abs(np.log(one.focal / other.focal)) < SAME_FOCAL)
 
     return tuple(
