@@ -19,6 +19,7 @@ from photocore.camera.rotation import skew
 #: What is interior, by its place in `CAMERA`; what of it is one unknown for all photos of a lens.
 #: Focus, stabiliser and crop move the principal point from photo to photo.
 INTERIOR, SHARED = (0, 1, 2, 3, 10, 11), (0, 1, 10, 11)
+Taped = tuple[int, int, float, float]
 _TURN, _Z, _CENTRE = CAMERA.index("turn X"), CAMERA.index("Z"), [2, 3]
 
 
@@ -53,7 +54,7 @@ class CameraKnowledge:
     held: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
     sigma_body: float | None = None
     distances: tuple[tuple[Mapping[int, float], float, float], ...] = ()
-    lengths: tuple[tuple[int, int, float, float], ...] = ()
+    lengths: tuple[Taped, ...] = ()
     lines: tuple[tuple[int, FacadeDirection], ...] = ()
     sigma_tilts: Mapping[int, float] = field(default_factory=dict)
     by_wall: bool = False
@@ -79,8 +80,13 @@ class CameraKnowledge:
         sigmas = known.sigma_focal, known.sigma_aspect, known.sigma_centre, known.sigma_centre
         return off, np.array([*sigmas, known.sigma_radial, known.sigma_radial])
 
-    def observe(self, state: NetworkState, rows: Rows, column: IntArray) -> None:
-        """Add all of it to the rows of a network, ``column`` (m, 12) being that of each unknown."""
+    def observe(
+        self, state: NetworkState, rows: Rows, column: IntArray, lengths: tuple[Taped, ...]
+    ) -> None:
+        """Add all of it to the rows of a network, of the lengths those given.
+
+        ``column`` is that of each camera's unknowns, shape (m, 12).
+        """
         cameras = state.blocks["camera"]
         for k, camera in cameras.items():
             off, sigmas = self.off(k, camera, state.blocks["radial"][k])
@@ -100,7 +106,7 @@ class CameraKnowledge:
             line = rows.add(np.array([(total - metres) / sigma]))
             for k, share in shares.items():
                 rows.by_label(line, column[k, _Z], share / sigma)
-        for a, b, metres, sigma in self.lengths:
+        for a, b, metres, sigma in lengths:
             between = (state.points[a] - state.points[b])[None]
             length = float(np.linalg.norm(between))
             line = rows.add(np.array([(length - metres) / sigma]))

@@ -286,7 +286,9 @@ class _System:
         self.first_focal = np.log(focal)
         labels = [f"{seen.names[i]}: {CAMERA[k]}" for i, k in np.argwhere(self.own_free).tolist()]
         # The ends of a taped length meet in one row and are not eliminated.
-        ends = sorted({k for length in known.lengths for k in length[:2]}) if known else []
+        taped = known.lengths if known else ()
+        self.lengths = tuple(one for one in taped if self.used[[*one[:2]]].all())
+        ends = sorted({k for one in self.lengths for k in one[:2]})
         shape = (len(self.used), 3)
         self.kept = np.full(shape, -1)
         self.kept[ends] = len(labels) + np.arange(3 * len(ends)).reshape(-1, 3)
@@ -354,7 +356,7 @@ class _System:
 
     def _cameras(self, state: NetworkState, rows: Rows) -> bool:
         assert self.seen.cameras is not None
-        self.seen.cameras.observe(state, rows, self.column)
+        self.seen.cameras.observe(state, rows, self.column, self.lengths)
         return True
 
 

@@ -115,7 +115,9 @@ def orient_set(
         (first.xyz[observed.point] - camera.centre) @ camera.rotation[2] > 0
         for camera in first.cameras
     ]
-    observed = with_rays(observed, np.array(before)[observed.camera, np.arange(len(is_tie))])
+    there = np.array(before)[observed.camera, np.arange(len(is_tie))]
+    # A tie whose rays run along each other would wander on them.
+    observed = with_rays(observed, there & (~is_tie | first.met[observed.point]))
     state = adjust_jointly(observed, start)
     for _ in range(2):  # the second pass searches around better places
         observed = _refined(photos, observed, state, first, len(control.ids))

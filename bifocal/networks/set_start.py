@@ -15,7 +15,7 @@ from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
 from bifocal.orientation.starts.space_resection import resect
-from photocore.arrays import FloatArray, IntArray
+from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.camera.pinhole import Pinhole, camera_matrix, homogeneous, ray_on_plane
 from photocore.errors import ConvergenceError, GeometryError
 
@@ -42,6 +42,9 @@ class FirstCameras:
         Of each photo, the first of the same unknown lens.
     radial : ndarray, shape (m, 2)
     xyz : ndarray, shape (p, 3)
+        Of points whose rays do not meet, roughly on the wall.
+    met : ndarray of bool, shape (p,)
+        Which points' rays do, at a fair angle.
     """
 
     far: int
@@ -52,6 +55,7 @@ class FirstCameras:
     lens: tuple[int, ...]
     radial: FloatArray
     xyz: FloatArray
+    met: BoolArray
 
 
 def first_cameras_of(
@@ -123,7 +127,7 @@ def first_cameras_of(
     return FirstCameras(
         far=far, near=near, pair=pair, cameras=tuple(cameras[k] for k in range(len(photos))),
         interiors=tuple(interiors), lens=lens, radial=radial,
-        xyz=np.where(np.isfinite(xyz), xyz, middle),
+        xyz=np.where(np.isfinite(xyz), xyz, middle), met=~unknown,
     )  # fmt: skip
 
 
