@@ -16,6 +16,7 @@ from photocore.images import read_image, write_image
 
 from .calibration.board_calibration import Calibration
 from .calibration.board_photos import calibrate
+from .campaigns.rectification import Rectification, rectify
 from .collimation.session import Session
 from .collimation.workflow import PageServer, page_server, pick
 from .demo import SAMPLE, WATER_SAMPLE
@@ -41,6 +42,7 @@ from .model.pair_media import PairMedia
 from .model.photo import Photo
 from .model.photo_set import PhotoSet, RankedPair
 from .model.relief_map import Quality, ReliefMap
+from .model.set_intersection import SetIntersection
 from .model.surface import FlatSurface, MapSurface, Surface
 from .networks.set_alignment import SetAlignment, align_set
 from .orientation.alignment import Alignment
@@ -120,11 +122,16 @@ __all__ = [
     "ReadOptions",
     "RankedPair",
     "Registration",
+    "Rectification",
     "ReliefMap",
     "ReliefTable",
     "SAMPLE",
     "Session",
+<<<<<<< HEAD
     "SetAlignment",
+=======
+    "SetIntersection",
+>>>>>>> main
     "Similarity",
     "SiteMeasures",
     "SolvedSurvey",
@@ -156,6 +163,7 @@ __all__ = [
     "read_control",
     "read_image",
     "recording",
+    "rectify",
     "relief",
     "relief_displacement",
     "relief_displacements",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +28,10 @@ class FlagLimits:
     ----------
     off_radial : float
         A misfit across the radius beyond this many sigma is a blunder: one honest pick in 2000.
+    redundant : float
+        The same of three rays and more, of all their misfits together, as for a normal deviate: one
+        honest pick in 100. Of 35/28/19 mm at 17.5/14/9.5 m and 0.5 px it notices a slip of 3 px
+        along the radius in 61, 95 and 7 % of cases, where a pair notices none.
     on_plane : float
         Relief below this many sigma cannot be told from zero.
     sigma_r_max : float or None
@@ -34,10 +39,11 @@ class FlagLimits:
     """
 
     off_radial: float = 3.5
+    redundant: float = 2.576
     on_plane: float = 2.0
     sigma_r_max: float | None = None
 
-    def relief_limit(self, near_distance: float) -> float:
+    def relief_limit(self, near_distance: Any) -> Any:
         """Return the standard deviation of r beyond which a point is UNCERTAIN. [m]"""
         return self.sigma_r_max or UNCERTAIN_SHARE * near_distance
 
@@ -49,8 +55,9 @@ def point_flags(
     incomplete: BoolArray,
     relief: FloatArray,
     sigma_r: FloatArray,
-    near_distance: float,
+    near_distance: float | FloatArray,
     limits: FlagLimits,
+    redundant: BoolArray | None = None,
 ) -> tuple[str, ...]:
     """Return the first flag of `FLAGS` that applies to each point.
 
@@ -62,16 +69,20 @@ def point_flags(
         Misfit across the radius over its standard deviation; NaN where it cannot be tested.
     relief, sigma_r : ndarray, shape (n,)
         Relief and its standard deviation; NaN where the rays do not meet. [m]
-    near_distance : float
+    near_distance : float or ndarray
         Of the near camera. [m]
     limits : FlagLimits
         Where the flags begin.
+    redundant : ndarray of bool, optional
+        Points of three rays or more; by default none.
     """
     limit = limits.relief_limit(near_distance)
+    several = np.zeros_like(at_nadir) if redundant is None else redundant
+    most = np.where(several, limits.redundant, limits.off_radial)
     with np.errstate(invalid="ignore"):
         conditions = [
             at_nadir,
-            np.abs(standardised) > limits.off_radial,
+            np.abs(standardised) > most,
             incomplete,
             ~(sigma_r <= limit) | np.isnan(relief),
             sigma_r > limit / 2,

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bifocal import rays
 from bifocal.model.flags import FlagLimits, point_flags
@@ -42,7 +44,59 @@ class PlanePicks:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Intersection:
+class IntersectedPoints:
+    """Points in the plane frame with their precision, however many rays met in them.
+
+    Attributes
+    ----------
+    xyz : ndarray, shape (n, 3)
+        X, Y on the reference plane and relief r; NaN where the rays do not meet. [m]
+    covariance : ndarray, shape (n, 3, 3)
+        Covariance of xyz; NaN where xyz is. [m²]
+    standardised : ndarray, shape (n,)
+        Misfit of the rays over its standard deviation.
+    flags : tuple of str, length n
+        One of `bifocal.model.flags.FLAGS` per point.
+    sigma_px : float
+        Measuring precision per coordinate that the covariance rests on. [px]
+    """
+
+    xyz: FloatArray
+    covariance: FloatArray
+    standardised: FloatArray
+    flags: tuple[str, ...]
+    sigma_px: float
+
+    def __post_init__(self) -> None:
+        for array in self._arrays().values():
+            array.setflags(write=False)
+
+    def __len__(self) -> int:
+        return len(self.flags)
+
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the arrays by name."""
+        values = {part.name: getattr(self, part.name) for part in fields(self)}
+        return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
+
+    def reshaped(self, shape: tuple[int, ...]) -> Self:
+        """Return the same points in arrays that begin with another shape."""
+        if shape == (len(self),):
+            return self
+        arrays = {
+            name: array.reshape((*shape, *array.shape[1:]))
+            for name, array in self._arrays().items()
+        }
+        return replace(self, **arrays)  # type: ignore[arg-type]
+
+    @property
+    def sigma(self) -> FloatArray:
+        """Standard deviations of X, Y and r, shape (n, 3). [m]"""
+        return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Intersection(IntersectedPoints):
     """Points in the plane frame with their precision.
 
     Attributes
@@ -68,41 +122,12 @@ class Intersection:
         Measuring precision per coordinate that the covariance rests on. [px]
     """
 
-    xyz: FloatArray
-    covariance: FloatArray
     residuals: FloatArray
     misfit: FloatArray
-    standardised: FloatArray
     e1: FloatArray
     e2: FloatArray
     adjusted1: FloatArray
     adjusted2: FloatArray
-    flags: tuple[str, ...]
-    sigma_px: float
-
-    def __post_init__(self) -> None:
-        for name in self.__slots__:
-            if isinstance(array := getattr(self, name), np.ndarray):
-                array.setflags(write=False)
-
-    def __len__(self) -> int:
-        return len(self.flags)
-
-    def reshaped(self, shape: tuple[int, ...]) -> Intersection:
-        """Return the same points in arrays that begin with another shape."""
-        if shape == (len(self),):
-            return self
-        arrays = {
-            name: array.reshape((*shape, *array.shape[1:]))
-            for name in self.__slots__
-            if isinstance(array := getattr(self, name), np.ndarray)
-        }
-        return replace(self, **arrays)  # type: ignore[arg-type]
-
-    @property
-    def sigma(self) -> FloatArray:
-        """Standard deviations of X, Y and r, shape (n, 3). [m]"""
-        return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
 
 
 def intersect(
@@ -174,7 +199,7 @@ def _square(jacobian: FloatArray) -> FloatArray:
     return product
 
 
-def _inverse3(matrix: FloatArray) -> FloatArray:
+def inverse_3x3(matrix: FloatArray) -> FloatArray:
     """Return the inverses of symmetric 3x3 matrices by cofactors; NaN where singular."""
     cofactor = np.cross(matrix[:, [1, 2, 0]], matrix[:, [2, 0, 1]])
     determinant = (matrix[:, 0] * cofactor[:, 0]).sum(axis=1)
@@ -199,7 +224,7 @@ def _covariance(
         product = rows.transpose(0, 2, 1) @ inverse_2x2(cov)
         weighted.append(product)
         normal += product @ rows
-    covariance = _inverse3(normal)
+    covariance = inverse_3x3(normal)
     sigma_d1, sigma_d2, sigma_scale, sigma_nadir = sigma_orientation
     if not any(sigma_orientation):
         return covariance

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
@@ -18,17 +18,21 @@ from bifocal.model.intersection import intersect
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.model.photo_entries import PAIR_FORMAT, SET_FORMAT, file_content, photo_entries
+from bifocal.model.set_intersection import SetIntersection, intersect_rays
 from bifocal.rays import plane_position
 from bifocal.remarks import remark
 from multimedia import Layers
-from photocore.arrays import BoolArray, FloatArray, as_points
+from photocore.arrays import BoolArray, FloatArray, IntArray, as_points, positive
 from photocore.errors import InputError, located
 from photocore.jsonfile import read_object, write_object
+from photocore.series import check_index
 
 #: Places a side at which pairs of a set are judged, over each photo.
 _PLACES = 12
 #: What a lens shows as far from where it is has been folded over; a share of the distance.
 _FOLDED = 1e-3
+#: Cameras whose distances differ by less of them have their zoom centre too far off for a pair.
+_ALIKE = 1e-6
 
 
 class RankedPair(NamedTuple):
@@ -246,6 +250,102 @@ class PhotoSet:
         """
         points = as_points(xyz, "xyz", dimension=3)
         return np.stack([_in_frame(photo, points) for photo in self.photos])
+
+    def intersect(
+        self,
+        pixels: Sequence[ArrayLike],
+        *,
+        sigma_px: float | None = None,
+        sigma_r_max: float | None = None,
+    ) -> SetIntersection:
+        """Intersect all rays of every point by least squares.
+
+        Parameters
+        ----------
+        pixels : sequence of array_like, shape (..., 2)
+            (column, row) of the same points in each photo of the set, in its order; NaN where a
+            point was not measured.
+        sigma_px : float, optional
+            Measuring precision per coordinate; by default each photo's own, else 0.5. [px]
+        sigma_r_max : float, optional
+            Points of less precise relief are UNCERTAIN; default 2 % of the distance of the nearest
+            camera that measured them. [m]
+
+        Returns
+        -------
+        SetIntersection
+            Its arrays begin with the shape of the points; ``flags`` is one row after the other.
+            Points of two rays are those of `Pair.intersect`, digit for digit.
+
+        Raises
+        ------
+        InputError
+            If there is not one array for each photo, or they differ in shape.
+
+        Notes
+        -----
+        Weighted least squares over all rays, with the covariance of the orientation, which all
+        points have in common (`bifocal.model.set_intersection.intersect_rays`).
+
+        Examples
+        --------
+        Three photos of one camera, 4 mm of wall a pixel; the last pick is 8 px across the radius:
+
+        >>> metres = [[0.004, 0, -6], [0, -0.004, 4], [0, 0, 1]]
+        >>> stations = {"far": 17.5, "mid": 14.0, "near": 9.5}
+        >>> photos = PhotoSet(photos=tuple(
+        ...     Photo(name=name, plane_from_pixel=metres, nadir=[0, 0], distance=d)
+        ...     for name, d in stations.items()
+        ... ))
+        >>> picks = photos.project([[2.0, 0.0, 0.5]])
+        >>> photos.intersect(picks).xyz.round(9).tolist()
+        [[2.0, 0.0, 0.5]]
+        >>> wrong = photos.intersect([*picks[:2], picks[2] + [0, 8]])
+        >>> wrong.flags, wrong.suspects.tolist(), wrong.slips.round(3).tolist()
+        (('OFF-RADIAL',), [[False, False, True]], [[3.97, 4.028, 8.0]])
+        """
+        check_index("intersect", *pixels)
+        if len(pixels) != len(self):
+            raise InputError(remark("photo_set.picks", count=len(self), found=len(pixels)))
+        given = [
+            as_points(own, f"pixels of {photo.name}", dimension=2)
+            for photo, own in zip(self.photos, pixels, strict=True)
+        ]
+        shape = given[0].shape[:-1]
+        if any(own.shape[:-1] != shape for own in given):
+            shapes = ", ".join(str(own.shape) for own in given)
+            raise InputError(remark("photo_set.shapes", shapes=shapes))
+        if sigma_r_max is not None:
+            positive(sigma_r_max, "sigma_r_max", unit="m")
+        rows = [own.reshape(-1, 2) for own in given]
+        whole = intersect_rays(
+            self.photos, rows, sigma_px=sigma_px, limits=FlagLimits(sigma_r_max=sigma_r_max),
+            orientation=self._whole_orientation,
+        )  # fmt: skip
+        picked = np.stack([~np.isnan(own).any(axis=1) for own in rows], axis=1)
+        for places, (far, near) in self._seen_by_two(picked):
+            own = self.pair(far, near).intersect(
+                rows[far][places], rows[near][places], sigma_px=sigma_px, sigma_r_max=sigma_r_max
+            )
+            whole = whole.with_pair(places, (far, near), own)
+        return whole.reshaped(shape)
+
+    @property
+    def _whole_orientation(self) -> FloatArray | None:
+        """``orientation`` where it counts all that places and bends the rays, else None."""
+        size = len(orientation_precision.names_of(self.layers, len(self)))
+        known = self.orientation is not None and len(self.orientation) == size
+        return self.orientation if known else None
+
+    def _seen_by_two(self, picked: BoolArray) -> Iterator[tuple[IntArray, tuple[int, int]]]:
+        """Yield points measured in two photos alone that are a pair, with its far and near one."""
+        alone = picked.sum(axis=1) == 2
+        for one, other in combinations(range(len(self)), 2):
+            d1, d2 = self.photos[one].distance, self.photos[other].distance
+            both = alone & picked[:, one] & picked[:, other]
+            places = np.flatnonzero(both | (len(self) == 2))
+            if len(places) and abs(d1 - d2) > _ALIKE * d1:
+                yield places, (one, other) if d1 > d2 else (other, one)
 
     def _places(self) -> FloatArray:
         """Return places of the wall all over the photos, shape (n, 3). [m]"""

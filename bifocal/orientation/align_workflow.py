@@ -294,7 +294,7 @@ def check_metres(options: AlignOptions) -> None:
             raise InputError(remark("refused.length_in_mm", **about))
 
 
-def interior_of_photo(info: ImageInfo, data: KnownLens, number: int) -> Interior:
+def interior_of_photo(info: ImageInfo, data: KnownLens, number: int | str = "") -> Interior:
     """Return the best that is known of a photo's interior orientation."""
     if data.lens is not None:
         lens = lens_of_photo(Lens.read(data.lens), info.size, orientation=info.orientation)
@@ -345,9 +345,15 @@ def control_of(options: AlignOptions, sizes: Sequence[tuple[int, int]]) -> Contr
         control = read_lengths(options.lengths, control)
     if options.length is not None:
         control = _with_length(control, options.length, options.site.sigma_control)
+<<<<<<< HEAD
     names = ("far", "near") if len(sizes) == 2 else [f"{k}." for k in range(1, len(sizes) + 1)]
     for pixels, size, photo in zip(control.picks, sizes, names, strict=False):
         _check_inside(control, pixels, size, photo)
+=======
+    picks = (control.pixels1, control.pixels2)
+    for pixels, size, photo in zip(picks, sizes, ("far", "near"), strict=True):
+        check_inside(control, pixels, size, photo)
+>>>>>>> main
     return control
 
 
@@ -370,7 +376,7 @@ def _with_length(
     )
 
 
-def _check_inside(control: Control, pixels: FloatArray, size: tuple[int, int], photo: str) -> None:
+def check_inside(control: Control, pixels: FloatArray, size: tuple[int, int], photo: str) -> None:
     """Refuse picks outside the photo: they belong to another photo or another size."""
     width, height = size
     outside = (pixels < -0.5).any(axis=1) | (pixels > [width, height]).any(axis=1)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, Table, parse_column_map, read_table
@@ -15,6 +16,7 @@ from photocore.tables import Column, Table, parse_column_map, read_table
 #: Length units a heading may say, in metres.
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0}
 
+_ALONE = {"col1": ("col", "column", "colonna", "spalte"), "row1": ("row", "riga", "zeile")}
 COLUMNS = (
     Column("id", ("point", "name", "punto", "punkt", "nr", "no", "number"), kind="text"),
     Column("X", ("X_ref", "X wall", "east", "E", "X control"), unit="m"),
@@ -27,6 +29,10 @@ COLUMNS = (
     Column("row2", ("row near", "y near", "riga2", "zeile2"), unit="px"),
     Column("sigma", ("sigma control", "std"), unit="m"),
 )  # fmt: skip
+#: The same of one photo alone.
+ALONE = tuple(
+    replace(column, aliases=(*column.aliases, *_ALONE.get(column.key, ()))) for column in COLUMNS
+)
 LENGTHS = (
     Column("from", ("point 1", "da", "von", "a"), kind="text", required=True),
     Column("to", ("point 2", "nach", "b"), kind="text", required=True),
@@ -169,7 +175,8 @@ def read_control(
     unnamed : str
         Goes before the row's number in the name of a row that has none.
     photos : int
-        Of the set; with more than two their pixels are col3, row3 and so on.
+        How many there are; of more than two the pixels are col3, row3 and so on, of one alone col1,
+        row1, which may be called col, row.
 
     Returns
     -------
@@ -182,11 +189,14 @@ def read_control(
     WorkbookError, InputError
         Naming every bad cell; if there are no pixels.
     """
+    alone = photos == 1
     keys = tuple(f"{axis}{k}" for k in range(1, photos + 1) for axis in ("col", "row"))
-    wanted = (*COLUMNS, *(Column(key, unit="px") for key in keys[4:]))
+    wanted = ALONE if alone else (*COLUMNS, *(Column(key, unit="px") for key in keys[4:]))
     places = parse_column_map(columns, [column.key for column in wanted]) if columns else None
     table = read_table(path, wanted, column_map=places)
     missing = [key for key in keys if key not in table.present]
+    if missing and alone:
+        raise InputError(remark("rectify.no_picks", path=path))
     if missing:
         each = "both photos (col1, row1, col2, row2)."
         if photos > 2:
@@ -210,13 +220,14 @@ def read_control(
         on_wall = np.isfinite(xyz[:, :2]).all(axis=1) & np.isnan(xyz[:, 2])
         xyz[on_wall, 2] = 0.0
         spread[on_wall, 2] = sigma_plane
-    picks = tuple(
+    picks = [
         np.column_stack([table.numbers(column), table.numbers(row)])
         for column, row in zip(keys[::2], keys[1::2], strict=True)
-    )
+    ]
+    picks += [np.full((len(table), 2), np.nan)] * alone
     return Control(
         ids=tuple(names), xyz=xyz, sigma=spread,
-        pixels1=picks[0], pixels2=picks[1], more=picks[2:],
+        pixels1=picks[0], pixels2=picks[1], more=tuple(picks[2:]),
     )  # fmt: skip
 
 
