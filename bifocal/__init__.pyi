@@ -127,11 +127,8 @@ __all__ = [
     "ReliefTable",
     "SAMPLE",
     "Session",
-<<<<<<< HEAD
     "SetAlignment",
-=======
     "SetIntersection",
->>>>>>> main
     "Similarity",
     "SiteMeasures",
     "SolvedSurvey",

@@ -345,15 +345,9 @@ def control_of(options: AlignOptions, sizes: Sequence[tuple[int, int]]) -> Contr
         control = read_lengths(options.lengths, control)
     if options.length is not None:
         control = _with_length(control, options.length, options.site.sigma_control)
-<<<<<<< HEAD
     names = ("far", "near") if len(sizes) == 2 else [f"{k}." for k in range(1, len(sizes) + 1)]
     for pixels, size, photo in zip(control.picks, sizes, names, strict=False):
-        _check_inside(control, pixels, size, photo)
-=======
-    picks = (control.pixels1, control.pixels2)
-    for pixels, size, photo in zip(picks, sizes, ("far", "near"), strict=True):
         check_inside(control, pixels, size, photo)
->>>>>>> main
     return control
 
 
