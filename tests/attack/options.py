@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tests.attack.lines import ALIGN, CANON, CURVE, RING, SITE, SOLVE, WATER
 
+THREE = "bifocal align far.jpg near.jpg cam1_1.png --out"
 DELIVER = "bifocal ortho wall.pair.json --relief relief.tif --deliver d --any-size"
 ORTHO = "bifocal ortho wall.pair.json --out o.tif"
 RECTIFY = "bifocal rectify far.jpg --out o.tif"
@@ -116,6 +117,14 @@ WORDS: list[tuple[str, str]] = [
     (f"{ALIGN} {SITE} --sensor-width1 0", "--sensor-width1"),
     (f"{ALIGN} {SITE} --pixel-size -1", "--pixel-size"),
     (f"{ALIGN} {SITE} --sigma-distance -1", "--sigma-distance"),
+    (f"{THREE} o.pair.json --auto --distance1 17.5", "photos.json"),
+    (f"{THREE} o.photos.json", "--control|--auto"),
+    (f"{THREE} o.photos.json --control control.csv", "col3, row3"),
+    (f"{THREE} o.photos.json --control control.csv --picture p.png", "--picture"),
+    (f"{THREE} o.photos.json --as-set-up --distance1 17.5 --distance2 9.5", "--as-set-up"),
+    (f"{THREE} o.photos.json --control control.csv --indices 1,1.337 --port 0", "--indices"),
+    (f"{THREE} o.photos.json --auto --distance1 17500", "17500"),
+    (f"{THREE.replace('cam1_1.png', 'far.jpg')} o.photos.json --auto --distance1 17.5", "far.jpg"),
     (f"{ALIGN} --control control.csv --unit ft", "--unit"),
     (f"{ALIGN} --control control.csv --sigma-pick 0", "--sigma-pick"),
     (f"{ALIGN} --control control.csv --sigma-control 0", "--sigma-control"),
