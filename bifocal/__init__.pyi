@@ -44,16 +44,18 @@ from .model.photo_set import PhotoSet, RankedPair
 from .model.relief_map import Quality, ReliefMap
 from .model.set_intersection import SetIntersection
 from .model.surface import FlatSurface, MapSurface, Surface
-from .networks.set_alignment import SetAlignment, align_set
 from .orientation.alignment import Alignment
 from .orientation.control_points import Control, SiteMeasures, read_control
 from .orientation.photo_alignment import align
 from .orthophotos.compose import orthophoto
 from .orthophotos.mosaic_in_memory import Mosaic, MosaicOptions, mosaic
 from .orthophotos.ortho_image import OrthoOptions, Orthophoto, Source
+from .projects.colmap_workflow import write_colmap
+from .projects.photos_workflow import ProjectOptions, ProjectPhotos, photos_from_project
 from .rays import Foot
-from .relief_maps.dense_matching import DenseRelief, dense_relief
+from .relief_maps.dense_matching import DenseRelief
 from .relief_maps.registration import Registration
+from .relief_maps.set_relief import dense_relief
 from .reports.relief_view import relief_view
 from .survey.georeferencing import georeference
 from .survey.observations import PointObservations
@@ -116,6 +118,8 @@ __all__ = [
     "PlanePicks",
     "PointObservations",
     "Progress",
+    "ProjectOptions",
+    "ProjectPhotos",
     "ProjectedPoints",
     "Quality",
     "RadialDivision",
@@ -127,7 +131,6 @@ __all__ = [
     "ReliefTable",
     "SAMPLE",
     "Session",
-    "SetAlignment",
     "SetIntersection",
     "Similarity",
     "SiteMeasures",
@@ -147,7 +150,6 @@ __all__ = [
     "WorkbookError",
     "WorldPoints",
     "align",
-    "align_set",
     "calibrate",
     "dense_relief",
     "georeference",
@@ -155,6 +157,7 @@ __all__ = [
     "mosaic",
     "orthophoto",
     "page_server",
+    "photos_from_project",
     "pick",
     "plane_coordinates",
     "read_control",
@@ -167,5 +170,6 @@ __all__ = [
     "relief_from_displacement",
     "relief_view",
     "solve",
+    "write_colmap",
     "write_image",
 ]

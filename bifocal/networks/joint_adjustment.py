@@ -36,6 +36,9 @@ COARSE, FAR_OFF = 3, 10.0
 #: 2 mm of which one coordinate is wrong by 0.3 to 1 m, 8 to 22 rays are lost with 1, at most one
 #: with 10, 30 or 100, and the point is named.
 LOOSE = 100.0
+#: In a set points lie off the wall by so much of the nearest camera's distance: with all of it
+#: those seen at a small angle wander towards the cameras, and nothing settles.
+SHALLOW = 0.1
 #: Rounding error of pixels and metres, as a share of their standard deviations.
 ROUNDING = 1e-9
 #: Redundancy from which rays of one stated precision tell how good they truly are.
@@ -282,6 +285,7 @@ class _System:
         self.used = np.bincount(seen.point, minlength=len(seen.ids)) > 0
         self.loose = np.flatnonzero(self.used & ~np.isfinite(seen.known[:, 2]))
         self.reach = float(min(camera.centre[2] for camera in start.cameras))
+        self.reach *= 1.0 if known is None else SHALLOW
         self.focal = np.flatnonzero(free[:, 0]) if known is None else np.zeros(0, np.int64)
         self.first_focal = np.log(focal)
         labels = [f"{seen.names[i]}: {CAMERA[k]}" for i, k in np.argwhere(self.own_free).tolist()]

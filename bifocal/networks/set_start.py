@@ -24,7 +24,7 @@ TRIED = 5
 #: Rays that meet at a larger angle tell no more: their photos match less well. [rad]
 WIDE = 0.3
 #: Rays that meet at a smaller one give no place to resect by: 1 less the angle's cosine.
-NARROW = 2e-5
+NARROW = 2e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

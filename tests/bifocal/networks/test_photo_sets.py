@@ -3,32 +3,27 @@
 from __future__ import annotations
 
 import csv
-import json
 from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from bifocal import (
     SAMPLE,
     Control,
     InputError,
     Interior,
-    PhotoSet,
     Pinhole,
-    SiteMeasures,
-    align_set,
     read_control,
     read_image,
 )
-from bifocal.model.orientation_precision import CAMERA, pinhole
+from bifocal.model.orientation_precision import CAMERA
 from bifocal.networks.camera_knowledge import CameraKnowledge
 from bifocal.networks.joint_adjustment import JointUnknowns, adjust_jointly
 from bifocal.networks.joint_observations import JointObservations
+from bifocal.networks.set_alignment import align_set
 from tests.bifocal.campaigns.sample_tables import write_tables
-from tests.builders.commands import bifocal_command as main
 from tests.builders.pinholes import camera_matrix, project, rotation_from_vector
 from tests.scenes.make_sample import PIXEL
 
@@ -135,58 +130,26 @@ def three(tmp_path_factory):
             place = (row[name] for name in ("id", "X [m]", "Y [m]", "r [m]"))
             near_far = (*map(str, picks[:2]), "", "", *map(str, picks[2:]))
             file.write(",".join((*place, *near_far)) + "\n")
-    return folder, half[::-1], turn
+    return folder, half[::-1]
 
 
-def test_three_photos_in_any_order_become_a_set_by_control(three, monkeypatch):
-    folder, _, turn = three
-    monkeypatch.chdir(folder)
-    line = ["align", "near.png", "turned.png", "far.png", "--control", "set.csv",
-            "--out", "wall.photos.json"]  # fmt: skip
-    result = CliRunner().invoke(main, [*line, "--json"])
-    assert result.exit_code == 0, result.output
-    told = json.loads(result.stdout)
-    assert [photo["name"] for photo in told["photos"]] == ["near", "turned", "far"]
-    made = PhotoSet.read("wall.photos.json")
-    near, turned, far = (pinhole(photo) for photo in made.photos)
-    assert far.centre[2] == pytest.approx(17.5, abs=0.25)
-    assert near.centre[2] == pytest.approx(9.5, abs=0.15)
-    # The turned photo stands where the far one does, turned as it was.
-    apart = np.eye(24)[[7, 8, 9]] - np.eye(24)[[19, 20, 21]]
-    part = made.orientation[12:, 12:]
-    spread = np.sqrt(np.diag(apart @ part @ apart.T))
-    assert (np.abs(turned.centre - far.centre) < 4 * spread + 0.002).all()
-    between = turned.rotation @ far.rotation.T
-    assert np.rad2deg(np.arccos((np.trace(between @ turn.T) - 1) / 2)) < 0.15
-    pair = made.pair("far", "near")
-    control = read_control("set.csv", sigma=0.003, sigma_plane=None, photos=3)
-    found = pair.intersect(control.more[0], control.pixels1, sigma_px=0.3)
-    away = (found.xyz - control.xyz) / np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2))
-    assert np.nanmean(np.abs(away) < 2) > 0.9
-    again = CliRunner().invoke(main, line)
-    assert again.exit_code == 1
-    assert "--overwrite" in again.output
-
-
-def test_three_photos_and_one_distance_become_a_set(three):
-    _, images, _ = three
+@pytest.mark.acceptance
+def test_three_photos_in_any_order_become_a_set_by_control(three):
+    folder, images = three
     size = (images[0].shape[1], images[0].shape[0])
+    control = read_control(folder / "set.csv", sigma=0.003, sigma_plane=0.005, photos=3)
     lenses = [
         Interior.from_focal(distance / (2 * PIXEL), image_size=size, sigma=0.002, source="known")
         for distance in (9.5, 17.5, 17.5)
     ]
-    made = align_set(images, interiors=lenses, site=SiteMeasures(distance1=9.5, sigma=0.01))
-    assert made.way == "auto"
-    near, turned, far = made.photos.photos
-    sigma = [one["distance"] for one in made.setup["standard_deviations"]]
-    assert near.distance == pytest.approx(9.5, abs=4 * sigma[0])
-    assert far.distance == pytest.approx(17.5, abs=4 * sigma[2])
-    assert turned.distance == pytest.approx(far.distance, abs=0.02)
-    assert sigma[2] < 0.3
+    near, turned, far = align_set(images, interiors=lenses, control=control).photos.photos
+    assert far.distance == pytest.approx(17.5, abs=0.1)
+    assert near.distance == pytest.approx(9.5, abs=0.06)
+    assert turned.distance == pytest.approx(far.distance, abs=0.01)
 
 
 def test_a_set_is_refused_with_the_reason(three):
-    folder, images, _ = three
+    folder, images = three
     with pytest.raises(InputError, match="one for each"):
         align_set(images, interiors=[])
     with pytest.raises(InputError, match="col4, row4 are missing"):
