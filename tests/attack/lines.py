@@ -35,6 +35,8 @@ INPUTS: list[tuple[str, ...]] = [
     ("bifocal solve {} --json " + SOLVE, "survey.ods"),
     ("bifocal solve {} --json " + SOLVE, "survey.csv", "half"),
     ("bifocal solve picks.csv --json --pair {}", "wall.pair.json"),
+    ("bifocal solve picks.csv --json --pair {}", "wall.photos.json"),
+    ("bifocal solve {} --json --pair wall.photos.json", "picks3.csv", "half"),
     ("bifocal relief {} --out o.tif", "wall.pair.json"),
     ("bifocal adjust {} wall.pair.json --out d", "wall.pair.json"),
     ("bifocal ortho {} --plane --out o.tif", "wall.pair.json"),
