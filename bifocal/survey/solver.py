@@ -119,7 +119,8 @@ def solve_survey_of_set(
     """
     points, measuring, pair = survey.points, survey.setup.measuring, best_pair(photos)
     if not points.has_pixels.any():
-        raise InputError(f"{survey.where}: {remark('survey.set_pixels', count=len(photos))}")
+        needed = remark("survey.set_pixels", count=len(photos))
+        raise InputError(f"{survey.where}: {needed}")
     sigma, said = measuring.sigma_px, tuple[str, ...]()
     if sigma is None and not any(photo.sigma_pixel for photo in photos.photos):
         far, near = (points.pixels[photos.number(p.name)] for p in (pair.image1, pair.image2))
