@@ -29,6 +29,7 @@ The whole wall
     dense_relief, DenseRelief measured relief with its precision, pixel by pixel
     ReliefMap, Quality        relief on a grid, its GeoTIFF, and where each pixel's comes from
     orthophoto, Orthophoto, OrthoOptions, Source   the photo to scale, moved by its relief
+    rectify                   one photo alone to scale on the plane of its wall
     mosaic, Mosaic, MosaicOptions   several orthophotos or relief maps made one
     relief_view               the relief in three dimensions, as a page of HTML
 The page
@@ -39,8 +40,8 @@ Sample pairs                  SAMPLE, WATER_SAMPLE: folders of photos with exact
 
 What they take and give: Bounds, CheckResult, FlagLimits, FlatSurface, Foot, Grid, KnownPoints,
 Layers, MapSurface, MediaPath, NamedPoints, OrientationCheck, Pinhole, PlanePicks,
-PointObservations, Progress, ProjectedPoints, RadialDivision, RankedPair, Registration, ReliefTable,
-Similarity, SpaceSums,
+PointObservations, Progress, ProjectedPoints, RadialDivision, RankedPair, Rectification,
+Registration, ReliefTable, Similarity, SpaceSums,
 Surface, SurveyInput, SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision,
 WeightedSums, Window, WorldPoints.
 

@@ -16,6 +16,7 @@ from photocore.images import read_image, write_image
 
 from .calibration.board_calibration import Calibration
 from .calibration.board_photos import calibrate
+from .campaigns.rectification import Rectification, rectify
 from .collimation.session import Session
 from .collimation.workflow import PageServer, page_server, pick
 from .demo import SAMPLE, WATER_SAMPLE
@@ -120,6 +121,7 @@ __all__ = [
     "ReadOptions",
     "RankedPair",
     "Registration",
+    "Rectification",
     "ReliefMap",
     "ReliefTable",
     "SAMPLE",
@@ -155,6 +157,7 @@ __all__ = [
     "read_control",
     "read_image",
     "recording",
+    "rectify",
     "relief",
     "relief_displacement",
     "relief_displacements",

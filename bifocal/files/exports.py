@@ -85,7 +85,8 @@ def export_points(
     }
     if ending not in writers and ending not in (".ply", ".las", ".laz", ".csv"):
         raise InputError(
-            f"{path}: ending not known; use one of .dxf .ply .las .laz .geojson .xlsx .csv."
+            f"{path}: ending not known; use one of .dxf .ply .las .laz .geojson .xlsx .csv .points "
+            ".txt."
         )
     if world and points.world is None:
         raise InputError(
@@ -122,6 +123,35 @@ def export_points(
             overwrite=overwrite,
         )  # fmt: skip
     return tuple(remarks)
+
+
+def write_shifts(
+    path: Path, picks: FloatArray, feet: FloatArray, places: FloatArray, *, overwrite: bool = False
+) -> None:
+    """Write how far parts of photo 1 must be moved, for programs that warp images.
+
+    Parameters
+    ----------
+    path : path
+        ``.points``: ground control points of QGIS, which lie on the wall, in metres. ``.txt``:
+        from where to where, as ``-distort`` of ImageMagick takes them.
+    picks, feet : ndarray, shape (n, 2)
+        From where to where. [px]
+    places : ndarray, shape (n, 2)
+        X, Y on the wall. [m]
+    overwrite : bool
+        Replace an existing file.
+    """
+    # Both programs count from the corner of the first pixel.
+    picks, feet = picks + 0.5, feet + 0.5
+    head, rows = "", np.hstack([picks, feet])
+    line = "{:.3f},{:.3f} {:.3f},{:.3f}\n"
+    if path.suffix.lower() == ".points":
+        head = "mapX,mapY,sourceX,sourceY,enable,dX,dY,residual\n"
+        rows, line = np.hstack([places, picks * [1, -1]]), "{:.5f},{:.5f},{:.3f},{:.3f},1,0,0,0\n"
+    with atomic_path(path, overwrite=overwrite) as temporary:
+        text = head + "".join(line.format(*row) for row in rows.tolist())
+        temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _sigmas(points: SurveyPoints) -> dict[str, FloatArray]:

@@ -290,7 +290,7 @@ def _check_metres(options: AlignOptions) -> None:
             raise InputError(remark("refused.length_in_mm", **about))
 
 
-def interior_of_photo(info: ImageInfo, data: KnownLens, number: int) -> Interior:
+def interior_of_photo(info: ImageInfo, data: KnownLens, number: int | str = "") -> Interior:
     """Return the best that is known of a photo's interior orientation."""
     if data.lens is not None:
         lens = lens_of_photo(Lens.read(data.lens), info.size, orientation=info.orientation)
@@ -342,7 +342,7 @@ def _control(options: AlignOptions, sizes: tuple[tuple[int, int], tuple[int, int
         control = _with_length(control, options.length, options.site.sigma_control)
     picks = (control.pixels1, control.pixels2)
     for pixels, size, photo in zip(picks, sizes, ("far", "near"), strict=True):
-        _check_inside(control, pixels, size, photo)
+        check_inside(control, pixels, size, photo)
     return control
 
 
@@ -363,7 +363,7 @@ def _with_length(
     )
 
 
-def _check_inside(control: Control, pixels: FloatArray, size: tuple[int, int], photo: str) -> None:
+def check_inside(control: Control, pixels: FloatArray, size: tuple[int, int], photo: str) -> None:
     """Refuse picks outside the photo: they belong to another photo or another size."""
     width, height = size
     outside = (pixels < -0.5).any(axis=1) | (pixels > [width, height]).any(axis=1)

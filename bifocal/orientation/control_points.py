@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, Table, parse_column_map, read_table
@@ -15,6 +16,7 @@ from photocore.tables import Column, Table, parse_column_map, read_table
 #: Length units a heading may say, in metres.
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0}
 
+_ALONE = {"col1": ("col", "column", "colonna", "spalte"), "row1": ("row", "riga", "zeile")}
 COLUMNS = (
     Column("id", ("point", "name", "punto", "punkt", "nr", "no", "number"), kind="text"),
     Column("X", ("X_ref", "X wall", "east", "E", "X control"), unit="m"),
@@ -27,6 +29,10 @@ COLUMNS = (
     Column("row2", ("row near", "y near", "riga2", "zeile2"), unit="px"),
     Column("sigma", ("sigma control", "std"), unit="m"),
 )  # fmt: skip
+#: The same of one photo alone.
+ALONE = tuple(
+    replace(column, aliases=(*column.aliases, *_ALONE.get(column.key, ()))) for column in COLUMNS
+)
 LENGTHS = (
     Column("from", ("point 1", "da", "von", "a"), kind="text", required=True),
     Column("to", ("point 2", "nach", "b"), kind="text", required=True),
@@ -137,6 +143,7 @@ def read_control(
     unit: str = "",
     columns: str | None = None,
     unnamed: str = "",
+    alone: bool = False,
 ) -> Control:
     """Read control points: id, X, Y, r and their pixels col1, row1, col2, row2.
 
@@ -154,6 +161,8 @@ def read_control(
         Which column is which, ``"id=A,X=East"``; by default as the headings say.
     unnamed : str
         Goes before the row's number in the name of a row that has none.
+    alone : bool
+        Whether it is of one photo alone: col1, row1 suffice and may be called col, row.
 
     Returns
     -------
@@ -167,9 +176,11 @@ def read_control(
         Naming every bad cell; if there are no pixels.
     """
     places = parse_column_map(columns, [column.key for column in COLUMNS]) if columns else None
-    table = read_table(path, COLUMNS, column_map=places)
-    keys = ("col1", "row1", "col2", "row2")
+    table = read_table(path, ALONE if alone else COLUMNS, column_map=places)
+    keys = ("col1", "row1") if alone else ("col1", "row1", "col2", "row2")
     missing = [key for key in keys if key not in table.present]
+    if missing and alone:
+        raise InputError(remark("rectify.no_picks", path=path))
     if missing:
         raise InputError(
             f"{path}: the columns {', '.join(missing)} are missing: where the points are seen. "
@@ -195,7 +206,9 @@ def read_control(
         xyz=xyz,
         sigma=spread,
         pixels1=np.column_stack([table.numbers("col1"), table.numbers("row1")]),
-        pixels2=np.column_stack([table.numbers("col2"), table.numbers("row2")]),
+        pixels2=np.full((len(table), 2), np.nan)
+        if alone
+        else np.column_stack([table.numbers("col2"), table.numbers("row2")]),
     )
 
 
@@ -252,7 +265,7 @@ def _metres(table: Table, key: str, unit: str) -> FloatArray:
 def _halves(table: Table, keys: tuple[str, ...]) -> list[CellError]:
     """Return complaints about pixels of which only one coordinate is given."""
     errors = []
-    for first, second in (keys[:2], keys[2:]):
+    for first, second in zip(keys[::2], keys[1::2], strict=True):
         a, b = table.numbers(first), table.numbers(second)
         for row in np.flatnonzero(np.isnan(a) != np.isnan(b)):
             key = first if np.isnan(a[row]) else second

@@ -15,6 +15,8 @@ from bifocal.remarks import remark
 from photocore.arrays import ByteArray, FloatArray
 from photocore.camera.distortion import RadialDivision
 from photocore.camera.pinhole import Pinhole, plane_from_pixel
+from photocore.camera.rotation import nearest_rotation, rotation_from_vector
+from photocore.errors import GeometryError
 
 #: How far the lines of a façade as a whole come out of its wall. On two real pairs (church_1,
 #: church_2) eight directions came out 0.03 to 0.27 degrees off, 0.2 in the root mean square, where
@@ -117,8 +119,53 @@ def lines_of_photos(
     turn, share = facade_rotation(images[0], cameras[0], interiors[0])
     if share < LINES.least_in_line:
         return []
-    parts = zip(images, cameras, interiors, radial, (turn, turn), (1, 2), strict=True)
+    ends = map(line_segments, images)
+    parts = zip(ends, cameras, interiors, radial, (turn, turn), (1, 2), strict=True)
     return [line for part in parts for line in facade_directions(*part)]
+
+
+def facing_wall(image: ByteArray, interior: Interior) -> tuple[FloatArray, list[FacadeDirection]]:
+    """Return which way a camera looks that sees a façade's upright and level lines, and these.
+
+    Parameters
+    ----------
+    image : ndarray, shape (h, w)
+    interior : Interior
+
+    Returns
+    -------
+    rotation : ndarray, shape (3, 3)
+        Camera from plane frame, X along the level lines, Y along the upright ones.
+    lines : list of FacadeDirection
+        One of each.
+
+    Raises
+    ------
+    GeometryError
+        If there are too few of either.
+    """
+    ends, straight = line_segments(image), interior.radial(0.0)
+    turn = np.diag([1.0, -1.0, -1.0])  # facing the wall, the photo's rows downwards
+
+    def seen(turn: FloatArray) -> dict[str, FacadeDirection]:
+        camera = Pinhole(interior.matrix, turn, np.array([0.0, 0.0, 1.0]))
+        return {line.name: line for line in facade_directions(ends, camera, interior, straight)}
+
+    # What is upright tells how far the camera looks up; then what is level, how far to the side.
+    for name, axis in (("upright", 0), ("level", 1)):
+        tried = [
+            turn @ rotation_from_vector(np.deg2rad(angle) * np.eye(3)[axis])
+            for angle in np.arange(-LINES.turned, LINES.turned + 0.1, LINES.tried)
+        ]
+        counts = [line.count if (line := seen(one).get(name)) else 0 for one in tried]
+        turn = tried[int(np.argmax(counts))]
+    for _ in range(3):
+        lines = seen(turn)
+        if len(lines) < 2:
+            raise GeometryError(remark("rectify.few_lines", fewest=LINES.fewest))
+        across, up = lines["level"].direction, lines["upright"].direction
+        turn = nearest_rotation(np.column_stack([across, up, np.cross(across, up)]))
+    return turn, list(lines.values())
 
 
 def contradiction_in_words(line: FacadeDirection, cameras: Cameras, test: float) -> str:
@@ -129,18 +176,19 @@ def contradiction_in_words(line: FacadeDirection, cameras: Cameras, test: float)
 
 
 def facade_directions(
-    image: ByteArray,
+    ends: FloatArray,
     camera: Pinhole,
     interior: Interior,
     radial: RadialDivision,
-    turn: float,
-    number: int,
+    turn: float = 0.0,
+    number: int = 1,
 ) -> list[FacadeDirection]:
     """Return the directions of a photo's upright and level lines, those that can be told.
 
     Parameters
     ----------
-    image : ndarray, shape (h, w), uint8
+    ends : ndarray, shape (n, 2, 2)
+        Of its `line_segments`. [px]
     camera : Pinhole
         In a frame on the wall, tilted against it by a few degrees at most.
     interior : Interior
@@ -157,9 +205,9 @@ def facade_directions(
     m . v = 0. Of ``v = (0, 1, 0) + (u, 0, w)`` (uprights; levels alike) u and w are found by a vote
     and then by least squares in which lines that do not agree count nothing.
     """
-    ends = line_segments(image)
-    ends = ends[np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > LINES.shortest * image.shape[1]]
-    part = np.floor(ends.mean(axis=1) / image.shape[::-1] * LINES.parts) @ [LINES.parts, 1]
+    size = interior.image_size
+    ends = ends[np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > LINES.shortest * size[0]]
+    part = np.floor(ends.mean(axis=1) / size * LINES.parts) @ [LINES.parts, 1]
     seen = radial.undistort(interior.ideal(ends.reshape(-1, 2)))
     flat = np.column_stack([seen, np.ones(len(seen))])
     cosine, sine = np.cos(turn), np.sin(turn)

@@ -166,6 +166,7 @@ def _of_control(typed: Typed, now: Fitted | None) -> Iterator[Slip]:
     for words, meant in (
         (remark("slips.control_rows"), replace(control, pixels1=rows[0], pixels2=rows[1])),
         (remark("slips.control_y"), replace(control, xyz=xyz * [1, -1, 1])),
+        (remark("slips.control_x"), replace(control, xyz=xyz * [-1, 1, 1])),
         (remark("slips.control_xy"), replace(control, xyz=xyz[:, [1, 0, 2]])),
         (remark("slips.control_r"), replace(control, xyz=xyz * [1, 1, -1])),
     ):

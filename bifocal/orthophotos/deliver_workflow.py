@@ -89,6 +89,8 @@ class DeliverTask:
         Between contour lines; None: about 1/25 of the relief. [m]
     language : str
         Of the sheets and sections.
+    camera : str
+        What the sheet says of one photo alone, instead of the distances of two cameras.
     """
 
     scale: float
@@ -100,6 +102,7 @@ class DeliverTask:
     sections: Sequence[str] = ()
     contours: float | None = None
     language: str = "en"
+    camera: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -405,7 +408,7 @@ def _notes(pair: Pair, grid: Grid, wish: DeliverTask, task: OrthoTask) -> tuple[
     relief, say = task.relief or task.points, words_of("bifocal.orthophotos", wish.language)
     return (
         say("pixel", size=grid.gsd * 1000, dpi=dpi_at_scale(grid.gsd, wish.scale)),
-        say(f"photo_{task.image}", d1=pair.image1.distance, d2=pair.image2.distance),
+        wish.camera or say(f"photo_{task.image}", d1=pair.image1.distance, d2=pair.image2.distance),
         *((say("media", media=media_words(pair.layers)),) if pair.layers else ()),
         say("relief_of", name=relief.name) if relief else say("relief_plane", plane=task.plane),
         f"{program()}, {today()}",

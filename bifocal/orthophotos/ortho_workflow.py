@@ -21,6 +21,7 @@ from bifocal.model.geotiff import (
 )
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.pair import Pair
+from bifocal.model.photo_alone import PhotoAlone
 from bifocal.model.points import SurveyPoints
 from bifocal.model.surface import EVERYWHERE, FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.compose import choose_grid, render
@@ -159,7 +160,7 @@ def make_ortho(
                 raise InputError(remark("ortho.nothing_in_common"))
     shares = {source.name.lower(): float(counts[source]) / total for source in Source}
     shares["hidden"] = hidden / total
-    notes += _advice(shares, task)
+    notes += [] if isinstance(pair, PhotoAlone) else _advice(shares, task)
     return RasterResult(
         path=out, grid=grid, shares=shares, remarks=(*pair.remarks, *remarks, *notes)
     )

@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from bifocal.survey.basis import basis
+from bifocal.survey.image_shift import image_shift
 from bifocal.survey.solved_survey import SolvedSurvey
 from bifocal.survey.tolerances import sentence
+from photocore.arrays import FloatArray
 from photocore.jsonfile import to_text
 
 _NUMBERS = ("r", "e1", "e2", "s_c", "X", "Y", "Z", "q", "sigma_X", "sigma_Y", "sigma_r")
@@ -31,6 +33,8 @@ def csv_columns(solution: SolvedSurvey) -> dict[str, Any]:
         columns |= {f"{key} [m]": world[:, i] for i, key in enumerate("ENH")}
     for key in ("r", "e1", "e2", "s_c", "q", "sigma_X", "sigma_Y", "sigma_r"):
         columns[f"{key} [{units.get(key, 'm')}]"] = table[key]
+    unit = image_unit(solution)
+    columns |= {f"{key} [{unit}]": values for key, values in shift_of(solution).items()}
     if solution.georeference is not None:
         sigma = solution.world_sigma
         columns |= {f"sigma_{key} [m]": sigma[:, i] for i, key in enumerate("ENH")}
@@ -57,8 +61,10 @@ def solution_json(solution: SolvedSurvey) -> str:
 
 def _records(solution: SolvedSurvey) -> list[str]:
     table = solution.table
-    keys = [*_NUMBERS, *_more(solution)]
-    columns, world = [table[key].tolist() for key in keys], []
+    shift = shift_of(solution)
+    shown = {key: table[key] for key in (*_NUMBERS, *_more(solution))} | shift
+    columns, world = [values.tolist() for values in shown.values()], []
+    keys = list(shown)
     if solution.georeference is not None:
         placed = np.hstack([solution.world, solution.world_sigma])
         world = placed.T.tolist()
@@ -103,12 +109,24 @@ def _head(solution: SolvedSurvey) -> dict[str, Any]:
             "r": "m",
             "X": "m",
             "e1": length_unit(solution),
+            "x_c": image_unit(solution),
             "sigma_X": "m",
             "sigma_Y": "m",
             "sigma_r": "m",
         },
         "remarks": list(solution.remarks),
     }
+
+
+def shift_of(solution: SolvedSurvey) -> dict[str, FloatArray]:
+    """Return where points belong on photo 1 and the way there; see `image_shift`."""
+    first = solution.photos.photos[0] if solution.photos else solution.pair.image1
+    return image_shift(first, solution.setup, solution.points, solution.table)
+
+
+def image_unit(solution: SolvedSurvey) -> str:
+    """Return the unit of x_c, y_c, dx and dy: that of the points measured."""
+    return "px" if solution.setup is None else solution.setup.unit
 
 
 def length_unit(solution: SolvedSurvey) -> str:

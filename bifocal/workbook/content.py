@@ -11,6 +11,7 @@ from bifocal.model.flags import DOUBTFUL_SHARE, FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.survey.georeferencing import residuals
+from bifocal.survey.image_shift import foot_tangents, image_shift
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable, entries
@@ -84,6 +85,8 @@ class SurveyContent:
         Rows of `Points` in an empty template.
     functions : bool
         Whether the workbook has functions with names.
+    plain : bool
+        Whether a new workbook's formulas are plain: A1 references, no tables or cells by name.
     media : SurveyMedia or None
         Cells of media in an empty template, and of a general pair; None for those that follow from
         the pair. An ideal pair's stand in its set-up.
@@ -110,6 +113,7 @@ class SurveyContent:
     log: Sequence[tuple[str, str, str, str, str]] = ()
     rows: int = POINT_ROWS
     functions: bool = False
+    plain: bool = False
     media: SurveyMedia | None = None
 
     @classmethod
@@ -233,6 +237,10 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
         if key in ("q", "theta_used"):
             blank = np.isnan(values)
         cells[key] = _unless(blank, values)
+    undirected = incomplete | np.isnan(table["theta_used"])
+    first = content.photos[0]
+    shifts = image_shift(first, content.setup, points, table) | foot_tangents(first, table)
+    cells |= {key: _unless(undirected, values) for key, values in shifts.items()}
     cells |= {key: inputs(values) for key, values in table.formula_cells.items()}
     for key in {"g1", "g2"} & table.formula_cells.keys():
         cells[key] = _unless(incomplete, table.formula_cells[key])

@@ -29,6 +29,7 @@ def write_template(
     rows: int = POINT_ROWS,
     media: int | None = None,
     functions: bool = False,
+    plain: bool = False,
     overwrite: bool = False,
 ) -> None:
     """Write an empty survey workbook with live formulas.
@@ -46,6 +47,8 @@ def write_template(
         none by default, for photos in air.
     functions : bool
         Add the formulas of the method as functions with names, and a sheet that explains them.
+    plain : bool
+        Write formulas with A1 references only, for programs that know no names.
     overwrite : bool
         Replace an existing file.
 
@@ -62,7 +65,9 @@ def write_template(
     cells = None if media is None else SurveyMedia.blank(media)
     check_book_path(path)
     check_new_workbook(path, overwrite=overwrite, other="")
-    content = SurveyContent(language=language, rows=rows, media=cells, functions=functions)
+    content = SurveyContent(
+        language=language, rows=rows, media=cells, functions=functions, plain=plain
+    )
     write_book(path, content, overwrite=overwrite)
 
 

@@ -42,6 +42,9 @@ INPUTS: list[tuple[str, ...]] = [
     ("bifocal ortho {} --plane --out o.tif", "wall.pair.json"),
     ("bifocal ortho wall.pair.json --out o.tif --relief {}", "relief.tif"),
     ("bifocal ortho wall.pair.json --out o.tif --points {}", "result.csv", "half"),
+    ("bifocal rectify {} --control control.csv --out o.tif", "far.jpg", "photo"),
+    ("bifocal rectify far.jpg --out o.tif --control {}", "control.csv", "half"),
+    ("bifocal rectify far.jpg --out o.tif --control control.csv --lens {}", "lens.json"),
     ("bifocal mosaic {} ortho2.tif --out o.tif", "ortho1.tif"),
     ("bifocal mosaic ortho1.tif ortho2.tif --out o.tif --relief {}", "relief.tif"),
     ("bifocal view {} --out o.html", "relief.tif"),
@@ -118,6 +121,7 @@ OUTPUTS: list[tuple[str, ...]] = [
     ("bifocal relief wall.pair.json --out o1.tif --preview {}", ".png"),
     ("bifocal relief wall.pair.json --out o1.tif --cloud {}", ".ply"),
     ("bifocal ortho wall.pair.json --plane --out {}", ".tif"),
+    ("bifocal rectify far.jpg --control control.csv --out {}", ".tif"),
     ("bifocal mosaic ortho1.tif ortho2.tif --out {}", ".tif"),
     *(
         ("bifocal export result.csv --out {}", e)

@@ -6,6 +6,7 @@ from tests.attack.lines import ALIGN, CANON, CURVE, RING, SITE, SOLVE, WATER
 
 DELIVER = "bifocal ortho wall.pair.json --relief relief.tif --deliver d --any-size"
 ORTHO = "bifocal ortho wall.pair.json --out o.tif"
+RECTIFY = "bifocal rectify far.jpg --out o.tif"
 ADJUST = "multimedia adjust tank.toml"
 BOARDS = "multimedia boards tank.toml far.jpg --board 9x6"
 SHIFT = "multimedia shift shift.csv --json"
@@ -15,6 +16,23 @@ LINES = "bifocal calibrate far.jpg --lines lines.csv --out o.json"
 
 #: Options that cannot be meant, one by one or together, and what the refusal must name.
 WORDS: list[tuple[str, str]] = [
+    (RECTIFY, "one of --control, --rectangle and --lines"),
+    ("bifocal rectify far.jpg --control control.csv", "--out"),
+    (f"{RECTIFY} --control control.csv --lines --length 1,2,3,4,5", "one of --control"),
+    (f"{RECTIFY} --rectangle 4,3", "four corners"),
+    (f"{RECTIFY} --rectangle 4 --corners 1,2,3,4,5,6,7,8", "--rectangle"),
+    (f"{RECTIFY} --rectangle 4,3 --corners 1,2,3,4", "--corners"),
+    (f"{RECTIFY} --rectangle 4,-3 --corners 9,9,90,9,90,90,9,90", "--rectangle"),
+    (f"{RECTIFY} --rectangle 4,3 --corners 9,9,9,9,9,9,9,9", "on one line"),
+    (f"{RECTIFY} --control control.csv --corners 9,9,90,9,90,90,9,90", "--rectangle W,H"),
+    (f"{RECTIFY} --lines", "--length"),
+    (f"{RECTIFY} --lines --length 1,2,3,4,-5", "--length"),
+    (f"{RECTIFY} --lines --length 1,2,3,4,0", "--length"),
+    (f"{RECTIFY} --control control.csv --deliver d", "--scale"),
+    (f"{RECTIFY} --control control.csv --stands-out 400", "--stands-out"),
+    (f"{RECTIFY} --control control.csv --gsd 0.01mm", "--any-size"),
+    (f"{RECTIFY} --control control.csv --out far.jpg", "far.jpg"),
+    (f"{RECTIFY} --control control.csv --bounds 900,900,950,950", "shows nothing of the area"),
     ("bifocal slove survey.csv", "'slove'.*Did you mean 'solve'"),
     ("bifocal facade-all", "No such command"),
     ("multimedia shfit shift.csv", "Did you mean 'shift'"),
@@ -25,6 +43,8 @@ WORDS: list[tuple[str, str]] = [
     ("bifocal demo --out far.jpg", "far.jpg"),
     ("bifocal demo --out lens.json/d", "lens.json"),
     ("bifocal template o.ods", "o.ods"),
+    ("bifocal template o.ods --plain", "o.ods"),
+    ("bifocal template far.jpg --functions", "far.jpg"),
     ("bifocal template o", "o: "),
     ("bifocal template o.xlsx --lang fr", "--lang.*fr"),
     ("bifocal template o.xlsx --rows 0", "rows"),
@@ -225,6 +245,7 @@ WORDS: list[tuple[str, str]] = [
     ("bifocal view relief.tif --out o.html --ortho relief.tif", "relief.tif"),
     ("bifocal export result.csv", "--out"),
     ("bifocal export result.csv --out o.shp", "o.shp"),
+    ("bifocal export result.csv --out o.points", "result.csv"),
     ("bifocal export result.csv --out o", "o: "),
     ("bifocal export result.csv --out o.csv --order XYZ", "--order"),
     ("bifocal export result.csv --out o.csv --csv-flavour excel-fr", "--csv-flavour"),

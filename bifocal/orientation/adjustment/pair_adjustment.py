@@ -456,7 +456,7 @@ def _control_test(
     missing = np.isnan(np.concatenate([control.pixels1, control.pixels2], axis=1)).sum(axis=1)
     for index in np.flatnonzero(missing < 4):
         if not observations.pick_used[index]:
-            out[index] = _as_one(float((others[index] ** 2).sum()), int(4 - missing[index]))
+            out[index] = as_one(float((others[index] ** 2).sum()), int(4 - missing[index]))
             continue
         block = adjusted.by_unknowns[index]
         # A point that alone determines something has no redundancy: its test says nothing.
@@ -465,11 +465,11 @@ def _control_test(
         usable = values > 0.02
         count = int(usable.sum() - missing[index])
         if count > 0:
-            out[index] = _as_one(float((parts[usable] / values[usable]).sum()), count)
+            out[index] = as_one(float((parts[usable] / values[usable]).sum()), count)
     return out
 
 
-def _as_one(square: float, count: int) -> float:
+def as_one(square: float, count: int) -> float:
     """Return how many standard deviations of one value are as unlikely as a square sum of many."""
     chance = float(chi2.sf(square, count))
     return float(norm.isf(chance / 2)) if chance > 1e-300 else float(np.sqrt(square))

@@ -103,7 +103,7 @@ def _in_air(xyz: FloatArray, pixels: FloatArray, interior: Interior) -> tuple[Pi
             f"{len(xyz)} control points with X, Y and pixels in this photo; a camera needs four, "
             "and nine are advised."
         )
-    _refuse_line(xyz)
+    refuse_line(xyz)
     generator = np.random.default_rng(7)
     width = max(interior.image_size)
     spread = min(3.0 * interior.sigma_focal, 1.3)
@@ -151,10 +151,10 @@ def _solve(xyz: FloatArray, pixels: FloatArray, matrix: FloatArray) -> list[Pinh
     return [camera for camera in found if camera.centre[2] > 0]
 
 
-def _refuse_line(xyz: FloatArray) -> None:
+def refuse_line(xyz: FloatArray) -> None:
     """Refuse points that lie (almost) on one line."""
     singular = np.linalg.svd(xyz - xyz.mean(axis=0), compute_uv=False)
-    if singular[1] < 0.02 * singular[0]:
+    if singular[1] <= 0.02 * singular[0]:
         raise GeometryError(
             "the control points lie on one line; choose them spread over the whole wall."
         )

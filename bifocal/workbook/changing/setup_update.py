@@ -15,7 +15,7 @@ from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.changing.editor import WorkbookEditor
 from photocore.workbook.changing.named_cells import place_of
 from photocore.workbook.making.live_book import BookBuilder
-from photocore.workbook.reading.grid import cell_name, quoted_title
+from photocore.workbook.reading.grid import cell_name, quoted_title, with_names
 
 #: Options that have no cell of their own; those of the distances depend on each other.
 _OTHERS = {"d1", "d2", "pair", "rules", "adjust_setup"}
@@ -114,7 +114,8 @@ def _distances(editor: WorkbookEditor, cells: dict[str, CellValue]) -> set[str]:
     # The difference as people write it: 8.1, not 8.100000000000001.
     cells["delta_d"] = round(float(first) - float(second), 12)
     own = editor.models(d_1[0], d_1[1]).get(d_1[2])
-    follows = own is not None and own.formula.replace(" ", "") == formulas()["d_1"]
+    stands = with_names(own.formula, editor.book.names) if own is not None else ""
+    follows = stands.replace(" ", "") == formulas()["d_1"]
     return {"d_2", "delta_d"} if follows else {"d_1", "d_2", "delta_d"}
 
 

@@ -29,6 +29,7 @@ from photocore.output import free_path
 from photocore.workbook.changing.cells import CellValue, NewColumn, escape
 from photocore.workbook.changing.editor import WorkbookEditor
 from photocore.workbook.changing.named_cells import place_of, type_column, type_value
+from photocore.workbook.changing.plain import MARK, PlainEditor
 from photocore.workbook.making.live_book import BookBuilder, short_formula
 from photocore.workbook.making.live_columns import TEXT_KEYS, row_formula
 from photocore.workbook.making.newbook import RowBlock
@@ -159,7 +160,8 @@ def update_book(
         If the workbook's formulas are made for another kind of measurement, or it cannot be
         changed.
     """
-    editor = WorkbookEditor(source, survey.book)
+    names = () if survey.book is None else survey.book.names
+    editor = (PlainEditor if MARK in names else WorkbookEditor)(source, survey.book)
     content = replace(content, functions="RELIEF_SIGMA" in editor.book.names)
     built = build(content)
     points = editor.table("tblPoints")

@@ -91,7 +91,9 @@ def build(content: SurveyContent) -> BookBuilder:
     charts(builder, content, cells)
     _log(builder, content)
     if content.functions:
-        functions_sheet(builder)
+        functions_sheet(builder, named=not content.plain)
+    if content.plain:
+        builder.make_plain("'Setup'!$A$1")
     builder.open_at("Points" if content.points else "Readme")
     return builder
 
@@ -133,7 +135,7 @@ def _long_sheet(
 ) -> SheetBuilder:
     """Write a sheet that is one table with a row per point, its flags coloured."""
     sheet, rows = builder.sheet(name, note), content.point_rows
-    short = rows > STRUCTURED_ROWS
+    short = rows > STRUCTURED_ROWS and not content.plain
     sheet.table(
         f"tbl{name}", columns, at=(HEAD, 1), rows=rows, cells=cells, repeat=True, short=short
     )

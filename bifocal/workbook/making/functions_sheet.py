@@ -24,14 +24,22 @@ _GIVEN = re.compile(r"\[@(\w+)\]")
 _LINE = 78
 
 
-def functions_sheet(builder: BookBuilder) -> None:
-    """Write the functions: what each takes and gives, an example, a text for Google Sheets."""
+def functions_sheet(builder: BookBuilder, *, named: bool) -> None:
+    """Write the functions: what each takes and gives, an example, a text for Google Sheets.
+
+    Parameters
+    ----------
+    builder : BookBuilder
+        Takes the sheet.
+    named : bool
+        Whether the workbook defines them; else they are what its formulas only call.
+    """
     sheet = builder.sheet("Functions", "functions_how")
     sheet.headings(4, ("name", "description", "value", "unit"), (23, 82, 18, 9))
     row, calls = 6, []
     for name in FUNCTIONS.content["functions"]:
         calls.append(row + 1 + len(FUNCTIONS.columns(name)))
-        row = _function(sheet, row, name)
+        row = _function(sheet, row, name, named=named)
     known, unknown = builder.word("functions_known"), builder.word("functions_unknown")
     # Stored is what a program shows that does not calculate: it knows none.
     text = f'IF(ISERROR(C{calls[0]}),"{unknown}","{known}")'
@@ -41,7 +49,7 @@ def functions_sheet(builder: BookBuilder) -> None:
     sheet.finish(landscape=True, freeze="A5", repeat="4:4")
 
 
-def _function(sheet: SheetBuilder, row: int, name: str) -> int:
+def _function(sheet: SheetBuilder, row: int, name: str, *, named: bool) -> int:
     """Write a function from a row on; return the row of the next one."""
     book, columns = sheet.book, FUNCTIONS.columns(name)
     told = Wording(**FUNCTIONS.content["functions"][name])
@@ -70,15 +78,16 @@ def _function(sheet: SheetBuilder, row: int, name: str) -> int:
     row += 1
     sheet.describe(row, (f"={name}", book.word("by_function")), told.unit)
     sheet.formula(f"C{row}", call, values[-1], form="0.000000")
-    # As an array formula: else Excel reads it as @NAME(...), for one cell.
-    sheet.worksheet[f"C{row}"] = ArrayFormula(f"C{row}", f"={call}")
+    if named:
+        # As an array formula: else Excel reads it as @NAME(...), for one cell.
+        sheet.worksheet[f"C{row}"] = ArrayFormula(f"C{row}", f"={call}")
+        book.define(name, lambda_text(columns))
     row += 1
     text = f"{name}({', '.join(given)}) = {_written(columns, '{}')}"
     sheet.describe(row, ("", book.word("google")))
     sheet.text(f"B{row + 1}", text)
     sheet.worksheet[f"B{row + 1}"].alignment = Alignment(wrap_text=True, vertical="top")
     sheet.worksheet.row_dimensions[row + 1].height = ROW_HEIGHT * (len(text) // _LINE + 1)
-    book.define(name, lambda_text(columns))
     return row + 3
 
 

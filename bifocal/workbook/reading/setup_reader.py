@@ -38,7 +38,7 @@ from photocore.tables import Column, NamedValues, read_named_values
 from photocore.tables.csvread import CsvFile
 from photocore.tables.model import Kind
 from photocore.tables.numbers import Decimal
-from photocore.workbook.reading.grid import SheetFile
+from photocore.workbook.reading.grid import SheetFile, column_letters, quoted_title, with_names
 
 _TEXTS = ("input_unit", "pair_file", *PHOTOS)
 #: No coordinate of a photo or a map is larger.
@@ -226,12 +226,16 @@ def _text(values: NamedValues, key: str) -> str:
 def _formulas(book: SheetFile, values: NamedValues) -> set[str]:
     """Return which cells hold the template's own formula instead of a typed number."""
     own = set()
+    places = {
+        name: f"{quoted_title(sheet)}!${column_letters(column)}${row}"
+        for name, (sheet, row, column) in book.names.items()
+    }
     for key in values.places.keys() & set(TYPED_FORMULAS):
         sheet, cell = values.places[key]
         cell_at = rf'<(?:\w+:)?c r="{cell}"[^>]*><(?:\w+:)?f[^>]*>([^<]*)<'
         match = re.search(cell_at, book.text(sheet))
         # Those of older versions are a part of today's.
-        stands = _plain(match[1]) if match else ""
+        stands = _plain(with_names(match[1], places)) if match else ""
         if stands.startswith("if(") and stands in _plain(formulas()[key]):
             own.add(key)
     return own

@@ -142,6 +142,10 @@ class References:
             if re.match(r"(.*/)?charts/(chart|chartEx)\d*\.xml$", posixpath.normpath(name)):
                 self._replace(name, parts, area, bottom, tag=rb"f")
         self._replace(self.book.part, parts, area, bottom, tag=rb"definedName")
+        last = re.compile(rb"![$]?[A-Z]+[$]?\d+:[$]?[A-Z]+[$]?%d\b" % area.area[2])
+        for other in self.book.sheets:
+            if last.search(self._now(other.part, parts)):
+                self._replace(other.part, parts, area, bottom, tag=rb"f")
 
     def _now(self, name: str, parts: dict[str, bytes | None]) -> bytes:
         changed = parts.get(name)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from openpyxl import Workbook
@@ -16,6 +17,7 @@ from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.worksheet import Worksheet
 
 from photocore.workbook.changing.cells import CellValue
+from photocore.workbook.changing.plain import MARK, PlainFormulas
 from photocore.workbook.making.live_columns import TEXT_KEYS, LiveColumn, row_formula
 from photocore.workbook.making.look import (
     BODY_FONT,
@@ -37,6 +39,7 @@ from photocore.workbook.making.look import (
 from photocore.workbook.making.newbook import RowBlock, finish_book, finished_parts, new_workbook
 from photocore.workbook.making.sketch import Sketch
 from photocore.workbook.making.words import WordBook
+from photocore.workbook.reading.grid import TableArea, split_area
 
 #: The values of a table's columns, by key.
 Cells = Mapping[str, Sequence[CellValue]]
@@ -93,6 +96,37 @@ class BookBuilder:
         for sheet in self.book.worksheets:
             sheet.sheet_view.tabSelected = sheet.title == title
         self.book.calculation.fullCalcOnLoad = True
+
+    def make_plain(self, place: str) -> None:
+        """Write all formulas with A1 references only, and say so by a name that leads to a place.
+
+        Parameters
+        ----------
+        place : str
+            Any cell.
+        """
+        areas = [
+            TableArea(t.name, sheet.title, split_area(t.ref), columns=tuple(t.column_names))
+            for sheet in self.book.worksheets
+            for t in sheet.tables.values()
+        ]
+        names = {name: str(cell.attr_text) for name, cell in self.book.defined_names.items()}
+        plain = PlainFormulas(areas, names).plain
+        for sheet in self.book.worksheets:
+            block = self.blocks.get(sheet.title)
+            formulas: dict[int, Callable[[int], str]] = {}
+            for cell in (cell for row in sheet.iter_rows() for cell in row):
+                if cell.data_type == "f":
+                    text, row = str(cell.value)[1:], int(cell.row)
+                    if block is not None and row == block.row:
+                        repeated = plain(text, "\0")
+                        formulas[cell.column - 1] = partial(_in_row, repeated)
+                    cell.value = "=" + plain(text, row)
+            if block is not None:
+                self.blocks[sheet.title] = replace(block, formulas=formulas)
+            for described in (c for t in sheet.tables.values() for c in t.tableColumns):
+                described.calculatedColumnFormula = None
+        self.define(MARK, place)
 
     def readme(self, lines: Sequence[str], sketch: Sketch, *, rows: int) -> None:
         """Write the sheet `Readme`: paragraphs, "#" marks a heading, and a drawing beside them.
@@ -376,6 +410,10 @@ class SheetBuilder:
 # Programs indent nothing that has no side of its own.
 _UNIT_PLACE = Alignment(horizontal="left", indent=1)
 _LABEL_PLACE = Alignment(wrap_text=True, vertical="bottom", horizontal="center")
+
+
+def _in_row(text: str, row: int) -> str:
+    return text.replace("\0", str(row))
 
 
 def _at(cells: Cells, column: LiveColumn, row: int) -> CellValue:

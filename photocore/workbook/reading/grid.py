@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from functools import lru_cache
@@ -246,3 +247,11 @@ def date_of_serial(serial: float, *, since_1904: bool) -> datetime:
     if not since_1904 and 0 < serial < 60:
         serial += 1
     return origin + timedelta(days=serial)
+
+
+def with_names(text: str, names: Mapping[str, str]) -> str:
+    """Return a formula with names in place of the single cells that they lead to."""
+    for name, place in names.items() if "!" in text else ():
+        cell = re.escape(place).replace("'", "'?")
+        text = re.sub(rf"{cell}(?![\d:])", name, text, flags=re.IGNORECASE)
+    return text

@@ -82,6 +82,8 @@ def test_a_table_of_picks_is_solved_and_the_wrong_photo_stands_in_the_note(files
     assert points[2]["note"].startswith("wrong pick in mid (")
     assert "P3: its rays miss each other" in result.stderr
     assert {"e1", "e2", "e3", "e4"} <= points[0].keys()
+    foot = photos.photos[0].project([[points[0]["X"], points[0]["Y"], 0.0]])[0]
+    np.testing.assert_allclose([points[0]["x_c"], points[0]["y_c"]], foot, atol=1e-9)
 
 
 def test_displacements_count_from_the_nadir_of_each_photo(files):

@@ -1,0 +1,53 @@
+"""``bifocal rectify``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from photocore.cli import print_result, progress_bar, remark
+from photocore.options import declared
+
+
+@declared
+def command(
+    photo: Path, out: Path | None, folder: Path | None, lines: bool, tfw: bool, overwrite: bool,
+    as_json: bool, **given: Any,
+) -> None:  # fmt: skip
+    """Bring one PHOTO of a flat wall to scale.
+
+    The plane comes from four control points or more, from a rectangle of known sides, or from the
+    upright and level lines of a façade and one length. What does not lie on the plane is displaced;
+    the first line tells by how much at most, and only a second photo removes it.
+    """
+    from bifocal.campaigns.rectification import rectify_photo
+
+    if out is None and folder is None:
+        raise click.UsageError("Give --out FILE, --deliver DIR or both.")
+    if folder is not None and given["scale"] is None:
+        raise click.UsageError("--deliver needs the scale of the drawing, e.g. --scale 1:50.")
+    rectangle, length = given["rectangle"] is not None, given["length"] is not None
+    if rectangle + lines + (given["control"] is not None and not rectangle) != 1:
+        raise click.UsageError("Give one of --control, --rectangle and --lines.")
+    if rectangle and (given["corners"] is None) == (given["control"] is None):
+        raise click.UsageError("--rectangle needs its four corners: --corners, or by --control.")
+    if (given["corners"] is not None) > rectangle:
+        raise click.UsageError("--corners are those of a rectangle; give --rectangle W,H.")
+    if lines != length:
+        raise click.UsageError("--lines and --length belong together.")
+    with progress_bar("rectification", quiet=as_json) as progress:
+        done = rectify_photo(
+            photo, out, given, folder=folder, overwrite=overwrite, world_file=tfw, progress=progress
+        )
+    grid, data = done.ortho.grid, done.to_dict()
+    size = f"{grid.width} x {grid.height} px of {grid.gsd * 1000:g} mm"
+    told = [*done.words, f"{out or folder}: {size}"]
+    if done.delivery is not None:
+        made = done.delivery
+        data |= {"folder": str(folder), "files": list(made.files), "sheet": made.sheet}
+        told.append(f"{folder}: {', '.join(made.files)} (sheet {made.sheet})")
+    print_result(data, told, as_json=as_json)
+    for note in done.remarks:  # what relief does comes before all else
+        remark(note)
