@@ -123,8 +123,7 @@ def solve_survey_of_set(
         raise InputError(f"{survey.where}: {needed}")
     sigma, said = measuring.sigma_px, tuple[str, ...]()
     if sigma is None and not any(photo.sigma_pixel for photo in photos.photos):
-        far, near = (points.pixels[photos.number(p.name)] for p in (pair.image1, pair.image2))
-        sigma, said = _sigma_from_misfits(pair, replace(points, pixels1=far, pixels2=near))
+        sigma, said = _sigma_of_set(photos, points)
     table, notes, off = solve_set(photos, points, sigma_px=sigma, limits=measuring.limits)
     noted = ("; ".join(filter(None, both)) for both in zip(points.note, notes, strict=True))
     unused = points.unused
@@ -258,6 +257,18 @@ def _sigma_from_misfits(
         spread = float(np.sqrt(np.mean(kept**2))) if len(kept) else spread
     sigma = max(spread, BEST_SIGMA_PX)
     return sigma, (remark("survey.sigma_found", sigma=sigma, count=int(rows.sum())),)
+
+
+def _sigma_of_set(
+    photos: PhotoSet, points: PointObservations
+) -> tuple[float | None, tuple[str, ...]]:
+    """Return the picks' precision from the misfits of the pair whose are largest; None if few."""
+    found, count = [], len(points.pixels)
+    for far, near, *_ in photos.pairs():
+        if max(far, near) < count:
+            both = replace(points, pixels1=points.pixels[far], pixels2=points.pixels[near])
+            found.append(_sigma_from_misfits(photos.pair(far, near), both))
+    return max(found, key=lambda each: each[0] or 0.0, default=(None, ()))
 
 
 def _ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -> _Arranged:
