@@ -51,6 +51,8 @@ WORDS: list[tuple[str, str]] = [
     ("bifocal template o.xlsx --rows -5", "rows"),
     ("bifocal template o.xlsx --rows 9999999", "rows"),
     ("bifocal template o.xlsx --rows many", "--rows"),
+    ("bifocal doctor nothing.xlsx", "nothing.xlsx"),
+    ("bifocal doctor far.jpg", "far.jpg"),
     ("bifocal doctor --date yesterday", "yesterday.*year-month-day"),
     ("bifocal adjust wall.pair.json --out d", "two pair files or more"),
     ("bifocal adjust wall.pair.json wall.pair.json --out d", "wall: two pair files"),
