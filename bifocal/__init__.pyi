@@ -51,8 +51,9 @@ from .orthophotos.compose import orthophoto
 from .orthophotos.mosaic_in_memory import Mosaic, MosaicOptions, mosaic
 from .orthophotos.ortho_image import OrthoOptions, Orthophoto, Source
 from .rays import Foot
-from .relief_maps.dense_matching import DenseRelief, dense_relief
+from .relief_maps.dense_matching import DenseRelief
 from .relief_maps.registration import Registration
+from .relief_maps.set_relief import dense_relief
 from .reports.relief_view import relief_view
 from .survey.georeferencing import georeference
 from .survey.observations import PointObservations

@@ -170,6 +170,17 @@ def _shift_cell(value: str) -> Callable[[Path], str]:
 PLY = "ply\nformat ascii 1.0\nelement vertex 3\n{}end_header\n{}"
 XYZ = "property float x\nproperty float y\nproperty float z\n"
 
+SET_LINE = "bifocal relief wall.photos.json --out o.tif"
+_SET: list[tuple[tuple[object, ...], Any, str]] = [
+    (("photos",), [], "two photos"),
+    (("photos", 2, "file"), ..., "file"),
+    (("photos", 2, "file"), "gone.jpg", "gone.jpg"),
+    (("photos", 2, "image_size"), [640, 480], "size"),
+    (("photos", 1, "name"), "image1", "image1"),
+    (("photos", 0, "distance"), -3, "distance"),
+    (("format",), "bifocal-photos/9", "format"),
+]
+
 #: A line, the file that is exchanged, what it holds then, and what the refusal must name.
 CONTENTS: list[tuple[str, str, Any, str]] = [
     *(
@@ -199,6 +210,10 @@ CONTENTS: list[tuple[str, str, Any, str]] = [
             '{"a": ' + "9" * 5000 + "}",
             "\ufeff\ufeff{}",
         )
+    ),
+    *(
+        (SET_LINE, "wall.photos.json", edited("wall.photos.json", *path, value=value), culprit)
+        for path, value, culprit in _SET
     ),
     *(
         (LENS_LINE, "lens.json", edited("lens.json", *path, value=value), culprit)

@@ -111,9 +111,9 @@ def _photos_and_pair(folder: Path, rng: np.random.Generator) -> None:
         "image1": {"file": "far.jpg", **photo, "distance": 17.5, "principal_distance": 35},
         "image2": {"file": "near.jpg", **photo, "distance": 9.5, "principal_distance": 19},
     }
-    entries = [{**pair[key], "name": key} for key in ("image1", "image2")]
-    entries.append({**entries[0], "name": "aside", "nadir": [1.5, 0], "distance": 13.0})
-    photos = {"format": "bifocal-photos/1", "photos": entries}
+    three = [dict(pair[key], name=key) for key in ("image1", "image2")]
+    three.append({**three[1], "name": "beside", "distance": 10.0, "nadir": [0.1, 0]})
+    photos = {"format": "bifocal-photos/1", "photos": three}
     lens = {
         "format": "bifocal-lens/1", "model": "opencv", "image_size": [WIDTH, HEIGHT],
         "camera_matrix": [[350, 0, 120], [0, 350, 80], [0, 0, 1]],
@@ -124,8 +124,8 @@ def _photos_and_pair(folder: Path, rng: np.random.Generator) -> None:
     (folder / "street.toml").write_text(STREET)
     (folder / "aquacal.json").write_text(json.dumps(AQUACAL))
     (folder / "lens.xml").write_text(XML)
-    contents = {"wall.pair.json": pair, "wall.photos.json": photos, "lens.json": lens}
-    for name, content in contents.items():
+    files = {"wall.pair.json": pair, "wall.photos.json": photos, "lens.json": lens}
+    for name, content in files.items():
         (folder / name).write_text(json.dumps(content, indent=1), encoding="utf-8")
 
 
@@ -142,7 +142,7 @@ def _point_tables(folder: Path, rng: np.random.Generator) -> None:
     px = "col1 [px],row1 [px],col2 [px],row2 [px]"
     _csv(folder / "picks.csv", f"id,{px}", ids, px1, px2)
     centre = np.array([WIDTH - 1, HEIGHT - 1]) / 2
-    px3 = ((1.5, 0) + (xy - (1.5, 0)) * 13 / (13 - relief)) * (1, -1) / GSD + centre
+    px3 = ((0.1, 0) + (xy - (0.1, 0)) * 10 / (10 - relief)) * (1, -1) / GSD + centre
     _csv(folder / "picks3.csv", f"id,{px},col3 [px],row3 [px]", ids, px1, px2, px3)
     _csv(folder / "control.csv", f"id,X [m],Y [m],r [m],{px}", ids, xy, relief, px1, px2)
     _csv(folder / "lengths.csv", "from,to,length [m]", ["P0"], [["P1"]],
