@@ -46,6 +46,11 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
+def office() -> str | None:
+    """Return where LibreOffice is, None where it is not."""
+    return next((found for name in OFFICE if (found := shutil.which(name))), None)
+
+
 def diagnosis() -> dict[str, Any]:
     """Return what a report of a fault needs: versions, extras, LibreOffice, memory, disk.
 
@@ -53,7 +58,6 @@ def diagnosis() -> dict[str, Any]:
     """
     import rasterio
 
-    office = next((found for name in OFFICE if (found := shutil.which(name))), None)
     return {
         "program": program(),
         "python": sys.version.split()[0],
@@ -64,7 +68,7 @@ def diagnosis() -> dict[str, Any]:
             extra: {name: _version(name) for name in names} for extra, names in EXTRAS.items()
         },
         "problems": [*too_old(), *not_ours()],
-        "libreoffice": office,
+        "libreoffice": office(),
         "cores": cores(),
         "free_memory": free_memory(),
         "free_disk": shutil.disk_usage(Path.cwd()).free,
@@ -82,8 +86,8 @@ def diagnosis_lines(found: dict[str, Any]) -> list[str]:
         hint = "" if all(packages.values()) else f"   ({how_to_install(extra)})"
         lines.append(f"{'extra ' + extra:24} {said}{hint}")
     lines += [f"TO MEND: {problem}." for problem in found["problems"]]
-    office = found["libreoffice"] or "absent (only needed to recalculate workbooks without Excel)"
-    lines.append(f"{'LibreOffice':24} {office}")
+    place = found["libreoffice"] or "absent (only needed to recalculate workbooks without Excel)"
+    lines.append(f"{'LibreOffice':24} {place}")
     lines.append(f"{'cores':24} {found['cores']}")
     lines.append(f"{'free memory':24} {found['free_memory'] / (1 << 30):.1f} GiB")
     lines.append(f"{'free disk here':24} {found['free_disk'] / (1 << 30):.1f} GiB")

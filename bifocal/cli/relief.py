@@ -12,17 +12,19 @@ from photocore.options import declared
 
 @declared
 def command(pair_file: Path, as_json: bool, **wishes: Any) -> None:
-    """Measure the relief of the whole wall from the photos of a pair file or survey workbook.
+    """Measure the relief of the whole wall from the photos of a pair, a set or survey workbook.
 
     Every pixel of the map gets its relief and the standard deviation of it, which comes from the
     photos themselves: points can only move along the radius, so what moves across it is error.
+    Of a set every pair that promises relief is measured: what one cannot see another fills, and
+    where they differ the photos decide.
     """
     from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
-    from bifocal.workbook.pair_workflow import read_pair
+    from bifocal.workbook.pair_workflow import read_photos
 
     with progress_bar("Relief", quiet=as_json) as progress:
         summary, remarks = relief_of_pair(
-            read_pair(pair_file), ReliefJob(**wishes), progress=progress
+            read_photos(pair_file), ReliefJob(**wishes), progress=progress
         )
     data = summary | {"remarks": list(remarks)}
     print_result(data, _lines(summary), as_json=as_json, remarks=remarks)
@@ -41,5 +43,7 @@ def _lines(summary: dict[str, Any]) -> Iterator[str]:
     if summary["sigma_median"] is not None:
         yield f"Sigma     {1000 * summary['sigma_median']:.1f} mm (median of the measured)"
         yield summary["rests_on"]
+    if "pairs" in summary:
+        yield f"Pairs     {', '.join(' + '.join(names) for names in summary['pairs'])}"
     for path in summary["written"]:
         yield f"Written   {path}"

@@ -26,3 +26,13 @@ def photo_info(pair: Pair, number: int) -> ImageInfo:
     info = image_info(pair.photo_file(number))
     pair.photo(number).check_size(info.size, info.path)
     return info
+
+
+def photo_infos(source: Pair | PhotoSet) -> tuple[ImageInfo, ...]:
+    """Return what the photos of a pair or a set say of themselves, in order; as `photo_info`."""
+    if isinstance(source, Pair):
+        return photo_info(source, 1), photo_info(source, 2)
+    infos = tuple(image_info(photo.path) for photo in source.photos)
+    for photo, info in zip(source.photos, infos, strict=True):
+        photo.check_size(info.size, info.path)
+    return infos

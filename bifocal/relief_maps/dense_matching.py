@@ -47,10 +47,16 @@ class DenseRelief(ReliefMap):
         Whether the photos fit each other; its remarks are for the user.
     working_gsd : float
         Pixel at which the photos were matched. [m]
+    used : tuple of tuple of str
+        Of a set the names of the photos of each pair that was measured; empty for a pair.
+    notes : tuple of str
+        What the user should know of a set's pairs.
     """
 
     registration: Registration
     working_gsd: float
+    used: tuple[tuple[str, str], ...] = ()
+    notes: tuple[str, ...] = ()
 
     def summary(self) -> dict[str, object]:
         """Return the figures of `bifocal relief --json`."""
@@ -66,10 +72,11 @@ class DenseRelief(ReliefMap):
             "relief": dict(zip(figures, values, strict=True)),
             "sigma_median": float(np.median(sigma)) if sigma.size else None,
             "registration": asdict(self.registration) | {"remarks": self.registration.remarks},
+            **({"pairs": [list(names) for names in self.used]} if self.used else {}),
         }
 
 
-def dense_relief(
+def pair_relief(
     pair: Pair,
     image1: NDArray[np.generic],
     image2: NDArray[np.generic],
@@ -80,59 +87,7 @@ def dense_relief(
     relief_range: tuple[float, float] | None = None,
     progress: Progress = no_progress,
 ) -> DenseRelief:
-    r"""Measure the relief of everything both photos of a pair show.
-
-    Parameters
-    ----------
-    pair : Pair
-        Geometry; registered, see Notes.
-    image1, image2 : ndarray of uint8 or uint16, shape (height, width[, 3])
-        Far and near photo as taken; lens distortion is removed on the way if the pair has lenses.
-    gsd : float, optional
-        Pixel of the map; by default that of the far photo on the plane. [m] The photos are
-        matched at half a coarser one, so it also costs detail and precision.
-    bounds : tuple of float, optional
-        X min, Y min, X max, Y max; by default all that both photos see of the plane. [m]
-    quality : str
-        ``fast`` matches at half the resolution and refines at the whole one, ``best`` matches
-        also large photos at full resolution.
-    relief_range : tuple of float, optional
-        Least and greatest relief to expect; by default -36 % to +22 % of d2. [m]
-    progress : callable
-        Told how far the work is.
-
-    Returns
-    -------
-    DenseRelief
-        A `ReliefMap` (``r``, ``sigma``, ``quality``, ``plane_from_pixel``) with diagnostics.
-
-    Raises
-    ------
-    InputError
-        If an image, the GSD, the bounds or the quality is unusable.
-    GeometryError
-        If the photos have no common area or do not fit each other.
-
-    Notes
-    -----
-    On the plane photo 2 is a zoom of photo 1 by k(r) about one point e, whatever the offset of the
-    cameras: ``q2 - e = k(r) (q1 - e)``. Flow along the radius from e gives k and so r; flow across
-    it is known to be zero, so its local RMS is the matching precision, and
-
-    .. math:: \sigma_r = \sigma_m B / s', \qquad B = d_1 d_2 / (d_1 - d_2).
-
-    A relative scale error of the photos shifts all relief by B times that error and leaves no
-    residual: the scale must come from control points or distances (`bifocal align`).
-
-    Examples
-    --------
-    >>> from bifocal import SAMPLE, read_image
-    >>> photos = [read_image(SAMPLE / name) for name in ("far.jpg", "near.jpg")]
-    >>> pair = Pair.read(SAMPLE / "facade.pair.json")
-    >>> result = dense_relief(pair, *photos, gsd=0.06, bounds=(-3, -2, 3, 2))
-    >>> result.shape, round(result.gsd, 6)
-    ((67, 100), 0.06)
-    """
+    """Measure the relief of everything both photos of a pair show: `dense_relief` of a pair."""
     grey1, grey2 = greys_of_pair(pair, image1, image2)
     if quality not in QUALITIES:
         raise InputError(f"quality: expected {', '.join(QUALITIES)}, got {quality!r}.")

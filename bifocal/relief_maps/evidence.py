@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -134,12 +134,22 @@ def without_falling(
     return np.asarray(measured & ~(falls * misfit * misfit > most_falling(frame, typical)))
 
 
-def most_falling(frame: Frame, typical: float = 0.0) -> float:
-    """Return the limit of slope times misfit squared, `falls_away`. [grey levels²]"""
+def most_falling(frame: Frame, typical: float = 0.0) -> float | Float32Array:
+    """Return the limit of slope times misfit squared, `falls_away`. [grey levels²]
+
+    It goes by what relief shifts a point between the photos to what it shifts it in photo 2, which
+    is 1 - d2 / d1 for cameras before one another, and b / s2 for cameras beside each other.
+    """
     d1, d2 = frame.distances
+    share: Any = 1 - d2 / d1
+    if frame.pair.sideways:
+        x, y = frame.from_centre()
+        own_x, own_y = offsets(frame.grid.shape, frame.grid.pixel_of(frame.foot(2).nadir))
+        own = np.maximum(np.sqrt(own_x * own_x + own_y * own_y), np.float32(1))
+        share = np.minimum(np.float32(share) * np.sqrt(x * x + y * y) / own, np.float32(1))
     precise = edges.precision(typical)
-    limit = EVIDENCE.falls_away * (1 - d2 / d1) ** EVIDENCE.falls_power
-    return float(precise * limit + (1 - precise) * EVIDENCE.falls_away_imprecise)
+    limit = EVIDENCE.falls_away * share**EVIDENCE.falls_power
+    return precise * limit + (1 - precise) * EVIDENCE.falls_away_imprecise
 
 
 def without_unpatched(

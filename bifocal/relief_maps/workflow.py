@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.files.photos import photo_info
+from bifocal.files.photos import photo_infos
 from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
+from bifocal.model.photo_set import PhotoSet
 from bifocal.model.relief_map import ReliefMap
 from bifocal.relief_maps import dense_relief
 from bifocal.relief_maps.frame import values_at
@@ -61,9 +64,9 @@ class ReliefJob:
 
 @all_or_none()
 def relief_of_pair(
-    pair_file: Pair | Path, job: ReliefJob, *, progress: Progress = no_progress
+    source: Pair | PhotoSet | Path, job: ReliefJob, *, progress: Progress = no_progress
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Make the relief map of a pair file.
+    """Make the relief map of a pair, a pair file or a set.
 
     Returns
     -------
@@ -77,16 +80,19 @@ def relief_of_pair(
     InputError, GeometryError
         If a file or an option is unusable, or the photos do not fit; nothing is then written.
     """
-    pair = Pair.of(pair_file)
-    _check_outputs(job, pair)
-    image1, image2 = (read_image(photo_info(pair, number).path) for number in (1, 2))
+    photos = source if isinstance(source, PhotoSet) else Pair.of(source)
+    infos = photo_infos(photos)
+    _check_outputs(job, *(info.path for info in infos))
+    images = tuple(read_image(info.path) for info in infos)
     result = dense_relief(
-        pair, image1, image2, gsd=job.gsd, bounds=job.bounds, quality=job.quality,
+        photos, *images, gsd=job.gsd, bounds=job.bounds, quality=job.quality,
         relief_range=job.relief_range, progress=progress,
     )  # fmt: skip
     if not result.known.any():
         raise GeometryError(remark("relief.none_within_bounds"))
-    named = "" if isinstance(pair_file, Pair) else Path(pair_file).name
+    of_set = (photos.image1, photos.image2) if isinstance(photos, Pair) else photos.photos
+    pair = photos if isinstance(photos, Pair) else photos.pair(*photos.pairs()[0][:2])
+    named = Path(source).name if isinstance(source, Path | str) else ""
     tags = {
         "BIFOCAL_D1": f"{pair.image1.distance:.6g}",
         "BIFOCAL_D2": f"{pair.image2.distance:.6g}",
@@ -98,7 +104,7 @@ def relief_of_pair(
         write_preview(job.preview, result, overwrite=job.overwrite)
         written.append(job.preview)
     if job.cloud is not None:
-        xyz, attributes = coloured_cloud(result, pair, image1)
+        xyz, attributes = coloured_cloud(result, of_set, images)
         write_cloud(
             job.cloud, xyz, attributes, comment="metres, plane frame",
             descriptions={"sigma": "sigma of relief, m"}, overwrite=job.overwrite,
@@ -108,13 +114,13 @@ def relief_of_pair(
         pair, setup="the pair as given", picks="the photos' own misfit across the radius, measured"
     )
     summary = result.summary() | {"rests_on": basis, "written": [str(path) for path in written]}
-    return summary, (*pair.remarks, *result.registration.remarks)
+    return summary, (*photos.remarks, *result.notes, *result.registration.remarks)
 
 
 def coloured_cloud(
-    relief: ReliefMap, pair: Pair, image1: ImageArray
+    relief: ReliefMap, photos: Sequence[Photo], images: Sequence[ImageArray]
 ) -> tuple[FloatArray, dict[str, NDArray[Any]]]:
-    """Return the known points of a relief map with the colours of photo 1.
+    """Return the known points of a relief map, coloured by the first photo that has each in frame.
 
     Returns
     -------
@@ -123,9 +129,8 @@ def coloured_cloud(
     attributes : dict of str to ndarray, shape (n,)
         ``red``, ``green``, ``blue`` (8 bits), ``sigma`` of the relief [m], ``quality``.
     """
-    picture = to_eight_bit(image1)
-    if picture.ndim == 2:
-        picture = np.repeat(picture[..., None], 3, axis=2)
+    pictures = [to_eight_bit(image) for image in images]
+    pictures = [np.repeat(p[..., None], 3, axis=2) if p.ndim == 2 else p for p in pictures]
     positions, colours = [], []
     for row in range(0, relief.shape[0], _ROWS):
         rows = slice(row, row + _ROWS)
@@ -134,7 +139,7 @@ def coloured_cloud(
             continue
         xyz = np.column_stack([relief.plane_positions(rows)[known], relief.r[rows][known]])
         positions.append(xyz)
-        colours.append(values_at(picture, pair.image1.project(xyz), cv2.INTER_LINEAR))
+        colours.append(_colours(xyz, photos, pictures))
     known = relief.known
     attributes = dict(zip(("red", "green", "blue"), np.concatenate(colours).T, strict=True))
     attributes |= {
@@ -144,12 +149,29 @@ def coloured_cloud(
     return np.concatenate(positions), attributes
 
 
-def _check_outputs(job: ReliefJob, pair: Pair) -> None:
+def _colours(
+    xyz: FloatArray, photos: Sequence[Photo], pictures: Sequence[ImageArray]
+) -> NDArray[Any]:
+    """Return the colours of points in the first photo that has each in frame, (n, 3)."""
+    pixels = photos[0].project(xyz)
+    colours = values_at(pictures[0], pixels, cv2.INTER_LINEAR)
+    for number in range(1, len(photos) if len(photos) > 2 else 1):
+        size = np.array(pictures[number - 1].shape[1::-1])
+        with np.errstate(invalid="ignore"):
+            beyond = ~((pixels >= 0) & (pixels <= size - 1)).all(axis=-1)
+        if not beyond.any():
+            break
+        pixels[beyond] = photos[number].project(xyz[beyond])
+        colours[beyond] = values_at(pictures[number], pixels[beyond], cv2.INTER_LINEAR)
+    return colours
+
+
+def _check_outputs(job: ReliefJob, *inputs: Path) -> None:
     """Refuse, before any work, outputs that could not be written."""
     check_ending(job.out, "the relief map is written as .tif.", ".tif", ".tiff")
     check_ending(job.preview, "the preview is written as .png.", ".png")
     rule = "point clouds are written as .ply, .las or .laz."
     check_ending(job.cloud, rule, ".ply", ".las", ".laz")
     for path in (job.out, job.preview):
-        check_not_input(path, *pair.photo_files)
+        check_not_input(path, *inputs)
     check_all_writable(job.out, job.preview, job.cloud, overwrite=job.overwrite)

@@ -15,7 +15,7 @@ from bifocal.survey.image_shift import foot_tangents, image_shift
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable, entries
-from bifocal.survey.setup import SurveySetup
+from bifocal.survey.setup import SIGMA_RADIAL, SurveySetup
 from bifocal.survey.solved_survey import SolvedSurvey, WorldPoints
 from bifocal.survey.survey_media import SurveyMedia
 from bifocal.survey.tolerances import RULES, ToleranceRule
@@ -386,7 +386,7 @@ def _setup_cells(content: SurveyContent) -> dict[str, CellValue]:
         **{f"off_{axis}{image}": 0 for axis in "xy" for image in "12"},
     }  # fmt: skip
     if content.pair is None:
-        return cells
+        return cells | {"sigma_s": SIGMA_RADIAL}
     for image, photo in enumerate(content.photos, start=1):
         cells |= {
             f"d_{image}": photo.distance,

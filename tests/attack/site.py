@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import zipfile
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -26,6 +27,19 @@ from multimedia import (
     write_project,
 )
 from tests.builders.commands import bifocal_command, multimedia_command
+from tests.builders.foreign_projects import (
+    make_shots,
+    render,
+    to_world,
+    wall_points,
+    write_alicevision,
+    write_bundler,
+    write_colmap_binary,
+    write_colmap_text,
+    write_metashape,
+    write_openmvg,
+    write_opensfm,
+)
 from tests.multimedia.tank import LAYERS, SENSOR, cameras, control
 
 PROGRAMS = {"bifocal": bifocal_command, "multimedia": multimedia_command}
@@ -86,6 +100,7 @@ def make_site(folder: Path) -> None:
     _point_tables(folder, rng)
     _rasters_and_clouds(folder, rng)
     _tank(folder)
+    _projects(folder)
     for name in ("survey.xlsx", "result.csv"):
         words = ["solve", str(folder / "survey.csv"), *GEOMETRY, "--out", str(folder / name)]
         result = CliRunner().invoke(PROGRAMS["bifocal"], words)
@@ -111,9 +126,9 @@ def _photos_and_pair(folder: Path, rng: np.random.Generator) -> None:
         "image1": {"file": "far.jpg", **photo, "distance": 17.5, "principal_distance": 35},
         "image2": {"file": "near.jpg", **photo, "distance": 9.5, "principal_distance": 19},
     }
-    entries = [{**pair[key], "name": key} for key in ("image1", "image2")]
-    entries.append({**entries[0], "name": "aside", "nadir": [1.5, 0], "distance": 13.0})
-    photos = {"format": "bifocal-photos/1", "photos": entries}
+    three = [dict(pair[key], name=key) for key in ("image1", "image2")]
+    three.append({**three[1], "name": "beside", "distance": 10.0, "nadir": [0.1, 0]})
+    photos = {"format": "bifocal-photos/1", "photos": three}
     lens = {
         "format": "bifocal-lens/1", "model": "opencv", "image_size": [WIDTH, HEIGHT],
         "camera_matrix": [[350, 0, 120], [0, 350, 80], [0, 0, 1]],
@@ -124,8 +139,8 @@ def _photos_and_pair(folder: Path, rng: np.random.Generator) -> None:
     (folder / "street.toml").write_text(STREET)
     (folder / "aquacal.json").write_text(json.dumps(AQUACAL))
     (folder / "lens.xml").write_text(XML)
-    contents = {"wall.pair.json": pair, "wall.photos.json": photos, "lens.json": lens}
-    for name, content in contents.items():
+    files = {"wall.pair.json": pair, "wall.photos.json": photos, "lens.json": lens}
+    for name, content in files.items():
         (folder / name).write_text(json.dumps(content, indent=1), encoding="utf-8")
 
 
@@ -142,7 +157,7 @@ def _point_tables(folder: Path, rng: np.random.Generator) -> None:
     px = "col1 [px],row1 [px],col2 [px],row2 [px]"
     _csv(folder / "picks.csv", f"id,{px}", ids, px1, px2)
     centre = np.array([WIDTH - 1, HEIGHT - 1]) / 2
-    px3 = ((1.5, 0) + (xy - (1.5, 0)) * 13 / (13 - relief)) * (1, -1) / GSD + centre
+    px3 = ((0.1, 0) + (xy - (0.1, 0)) * 10 / (10 - relief)) * (1, -1) / GSD + centre
     _csv(folder / "picks3.csv", f"id,{px},col3 [px],row3 [px]", ids, px1, px2, px3)
     _csv(folder / "control.csv", f"id,X [m],Y [m],r [m],{px}", ids, xy, relief, px1, px2)
     _csv(folder / "lengths.csv", "from,to,length [m]", ["P0"], [["P1"]],
@@ -241,6 +256,27 @@ def _tank(folder: Path) -> None:
     _boards(folder)
     write_project(folder / "tank.toml", whole)
     write_experiment(folder / "ptv", whole)
+
+
+def _projects(folder: Path) -> None:
+    """Write a project of each program known, with its photos, and picks in them."""
+    shots, xyz = make_shots(), to_world(wall_points(120))
+    render(shots, folder / "project")
+    for write, name in (
+        (write_colmap_text, "text"), (write_colmap_binary, "binary"),
+        (write_opensfm, "reconstruction.json"), (write_alicevision, "cameras.sfm"),
+        (partial(write_openmvg, nested=True), "sfm_data.json"), (write_bundler, "bundle.out"),
+    ):  # fmt: skip
+        write(folder / "project" / name, shots, xyz)
+    write_metashape(folder / "project" / "cameras.xml", shots)
+    places = {"A": (-1.5, -1, 0), "B": (1.5, -1, 0), "C": (1.4, 1.1, 0)}
+    rows = [
+        f"{name},{shot.file},{','.join(map(str, shot.pixels(to_world(np.array([place])))[0]))}"
+        for name, place in places.items() for shot in shots[:3]
+    ]  # fmt: skip
+    (folder / "project.csv").write_text("\n".join(["id,photo,col [px],row [px]", *rows, ""]))
+    rows = [f"{name},{x},{y},{r}" for name, (x, y, r) in places.items()]
+    (folder / "corners.csv").write_text("\n".join(["id,X [m],Y [m],r [m]", *rows, ""]))
 
 
 def _boards(folder: Path) -> None:

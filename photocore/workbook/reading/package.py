@@ -12,6 +12,7 @@ import zlib
 from collections.abc import Callable, Container, Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, BinaryIO, Literal
 from xml.etree import ElementTree
@@ -36,6 +37,11 @@ _FAST, _THOROUGH = 2, 6
 _OLE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 #: The namespaces of references to relations, of ordinary and of strict workbooks.
 _REFERENCES = re.compile(rb"xmlns:(\w+)=[\"'][^\"']*/officeDocument/(?:2006/)?relationships[\"']")
+#: What spreadsheet programs take: characters of a formula, and how deep its brackets are.
+_LONGEST, _DEEPEST = 8192, 64
+_LONG = re.compile(rb"<(?:\w+:)?f(?:\s[^>]*)?>([^<]{8193,}|(?:[^<(]*\(){65}[^<]*)<")
+#: Formulas are looked at so far into a part: rows further down repeat them.
+_FORMS = 2**21
 #: Small, since the elements of a chunk are made before the first is looked at.
 _CHUNK = 2**15
 #: What unpacking a damaged member may raise.
@@ -225,6 +231,17 @@ def _faults(path: Path, package: zipfile.ZipFile, changed: Container[str]) -> It
             for key in re.findall(own, data):
                 if key.decode() not in relations:
                     yield f"{name} has no relation {key.decode()}"
+        for text in _LONG.findall(data[:_FORMS]):
+            steps = ((letter == 40) - (letter == 41) for letter in re.sub(rb'"[^"]*"', b"", text))
+            size, depth = len(re.sub(rb"&\w+;", b" ", text)), max(accumulate(steps))
+            if size > _LONGEST or depth > _DEEPEST:
+                yield f"{name} has a formula of {size} characters, {depth} brackets deep"
+
+
+def package_faults(path: Path) -> list[str]:
+    """Return why a spreadsheet program would not open a workbook, or ask to repair it."""
+    with open_package(path) as package:
+        return list(_faults(path, package, set(package.namelist())))
 
 
 def read_relations(path: Path, package: zipfile.ZipFile, part: str) -> dict[str, tuple[str, str]]:

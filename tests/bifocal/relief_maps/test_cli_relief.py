@@ -11,7 +11,7 @@ import pytest
 import rasterio
 from click.testing import CliRunner
 
-from bifocal import Pair, ReliefMap, write_image
+from bifocal import Pair, PhotoSet, ReliefMap, write_image
 from tests.builders.commands import bifocal_command as main
 from tests.scenes import bifocal_cameras, facade, render
 
@@ -176,3 +176,23 @@ def test_swapped_photos_are_set_right_with_a_remark(folder, tmp_path):
     code, _, told = run(swapped, "--out", tmp_path / "r.tif")
     assert code == 0
     assert "exchanged" in told
+
+
+def test_a_set_of_photos_is_taken_wherever_a_pair_is(folder, tmp_path):
+    pair = Pair.read(folder / "wall.pair.json")
+    two = PhotoSet(photos=(pair.image2, pair.image1), folder=folder)
+    aside = replace(pair.image2, name="again")
+    two.write(folder / "two.photos.json")
+    replace(two, photos=(*two.photos, aside)).write(folder / "three.photos.json")
+    maps = {}
+    for name in ("wall.pair.json", "two.photos.json", "three.photos.json"):
+        out = tmp_path / f"{name}.tif"
+        code, text, _ = run(folder / name, "--out", out, "--json", "--cloud", f"{out}.ply")
+        assert code == 0
+        maps[name] = ReliefMap.read(out), json.loads(text)
+    (whole, said), (same, _), (three, told) = maps.values()
+    np.testing.assert_array_equal(whole.r, same.r)
+    np.testing.assert_array_equal(whole.sigma, same.sigma)
+    assert "pairs" not in said
+    assert told["pairs"] == [["far", "near"], ["far", "again"]]
+    assert np.nanmedian(np.abs(three.r - whole.r)) < 0.01

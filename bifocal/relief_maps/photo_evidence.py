@@ -1,0 +1,141 @@
+"""What the photos of a set say of a relief: which see a place, and whether they show it alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from bifocal.model.grid import Grid
+from bifocal.model.photo import Photo
+from bifocal.model.ray_field import RayField
+from bifocal.rays import straight
+from bifocal.relief_maps.forward_projection import hidden_on_map
+from bifocal.relief_maps.frame import values_at
+from bifocal.relief_maps.registration import least_absolute
+from bifocal.relief_maps.tuning import FUSION
+from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Witness:
+    """A photo that can be asked what it shows of a place.
+
+    Attributes
+    ----------
+    photo : Photo
+    grey : ndarray of float32, shape (height, width)
+        Its grey values, reduced to about the pixels of the map.
+    size : tuple of int
+        Width and height of the whole photo. [px]
+    """
+
+    photo: Photo
+    grey: Float32Array
+    size: tuple[int, int]
+
+    @classmethod
+    def of(cls, photo: Photo, grey: ByteArray, gsd: float) -> Witness:
+        """Return a photo prepared for a map's pixels."""
+        size = (grey.shape[1], grey.shape[0])
+        scale = min(1.0, photo.gsd(size) / gsd)
+        if scale < 1 / FUSION.coarser:
+            small = (max(16, round(size[0] * scale)), max(16, round(size[1] * scale)))
+            grey = np.asarray(cv2.resize(grey, small, interpolation=cv2.INTER_AREA), np.uint8)
+        return cls(photo, grey.astype(np.float32), size)
+
+    def shows(self, xyz: FloatArray) -> Float32Array:
+        """Return its grey values at points (X, Y, r), shape (n,); NaN outside the photo."""
+        pixels = self.photo.project(xyz)
+        factors = np.array([self.grey.shape[1], self.grey.shape[0]]) / self.size
+        with np.errstate(invalid="ignore"):
+            inside = np.all((pixels >= 0) & (pixels <= np.subtract(self.size, 1)), axis=-1)
+        places = np.where(np.asarray(inside)[:, None], (pixels + 0.5) * factors - 0.5, -10.0)
+        values = values_at(self.grey, places.astype(np.float32), cv2.INTER_LINEAR)
+        return np.where(inside, values, np.float32(np.nan))
+
+
+def shown_by(
+    witnesses: Sequence[Witness], relief: Float32Array, grid: Grid, where: BoolArray
+) -> Float32Array:
+    """Return what each photo shows of some pixels of a map, (photos, n); NaN where it sees none."""
+    row, column = np.nonzero(where & np.isfinite(relief))
+    xyz = np.column_stack([grid.columns_x[column], grid.rows_y[row], relief[row, column]])
+    values = np.full((len(witnesses), len(row)), np.nan, np.float32)
+    for own, witness in zip(values, witnesses, strict=True):
+        own[:] = witness.shows(xyz)
+        if np.isfinite(own).any():
+            foot, rays = witness.photo.foot, None
+            if witness.photo.refracted:
+                low, high = float(np.nanmin(relief)), float(np.nanmax(relief))
+                foot, rays = straight(foot), RayField.over(foot, grid.bounds, (low, high))
+            own[hidden_on_map(relief, grid, foot, rays)[row, column]] = np.nan
+    return values
+
+
+def misfit(
+    witnesses: Sequence[Witness], relief: Float32Array, grid: Grid, where: BoolArray
+) -> Float32Array:
+    """Return how differently the photos show a relief: mean over those that see it. [grey levels]
+
+    Parameters
+    ----------
+    witnesses : sequence of Witness
+        Exposed alike.
+    relief : ndarray of float32, shape (height, width)
+    grid : Grid
+    where : ndarray of bool
+        Pixels that matter; those around them are looked at, too.
+
+    Returns
+    -------
+    ndarray of float32
+        Averaged over a window; as bad as can be where fewer than two photos see it, and elsewhere.
+    """
+    worst = np.float32(FUSION.worst)
+    side = int(FUSION.window)
+    around = cv2.dilate(where.astype(np.uint8), np.ones((side, side), np.uint8)) > 0
+    around &= np.isfinite(relief)
+    grey = shown_by(witnesses, relief, grid, around)
+    count = np.isfinite(grey).sum(axis=0)
+    total = np.nansum(grey, axis=0)
+    mean = total / np.maximum(count, 1)
+    apart = np.nansum(np.minimum(np.abs(grey - mean), worst), axis=0)
+    # The mean of two lies amidst them: they are twice as far from each other.
+    apart = apart / np.maximum(count - 1, 1) * 2 / np.maximum(np.minimum(count, 2), 1)
+    result = np.full(grid.shape, worst, np.float32)
+    result[around] = np.where(count >= 2, np.minimum(apart, worst), worst)
+    return np.asarray(cv2.blur(result, (side, side)))
+
+
+def exposed_alike(witnesses: Sequence[Witness], relief: Float32Array, grid: Grid) -> list[Witness]:
+    """Return the photos exposed like the first that they share a part of the wall with.
+
+    ``I1 = a + b I2 + c x + d y``, robustly, over a few thousand places of the map.
+    """
+    step = max(1, max(grid.shape) // FUSION.exposure_samples)
+    part = np.zeros(grid.shape, bool)
+    part[step // 2 :: step, step // 2 :: step] = True
+    part &= np.isfinite(relief)
+    row, column = np.nonzero(part)
+    xyz = np.column_stack([grid.columns_x[column], grid.rows_y[row], relief[row, column]])
+    shown = shown_by(witnesses, relief, grid, part)
+    done = list(witnesses)
+    for number, witness in enumerate(witnesses):
+        for other in shown[:number]:
+            use = np.isfinite(shown[number]) & np.isfinite(other)
+            if use.sum() < FUSION.exposure_least:
+                continue
+            place = witness.photo.project(xyz) / witness.size * 2 - 1
+            terms = np.column_stack([np.ones(len(xyz)), shown[number], place])
+            a, b, c, d = least_absolute(terms[use], other[use], rounds=8, floor=0.5)
+            height, width = witness.grey.shape
+            across = np.linspace(c, -c, width, dtype=np.float32)[None, :]
+            down = np.linspace(d, -d, height, dtype=np.float32)[:, None]
+            grey = np.float32(a) + np.float32(b) * witness.grey - across - down
+            done[number] = Witness(witness.photo, grey, witness.size)
+            shown[number] = terms @ [a, b, c, d]
+            break
+    return done

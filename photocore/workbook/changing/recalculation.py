@@ -1,0 +1,125 @@
+"""A workbook calculated anew by LibreOffice, where it is: which cells then show something else."""
+
+from __future__ import annotations
+
+import math
+import re
+import subprocess
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from photocore.errors import InputError
+from photocore.workbook.changing.changes import SheetChanges
+from photocore.workbook.changing.splice import splice_sheet
+from photocore.workbook.reading.grid import CellFault, NotCalculated, Value, split_cell
+from photocore.workbook.reading.package import (
+    open_package,
+    package_faults,
+    read_part,
+    rewrite_package,
+)
+from photocore.workbook.reading.xlsx import open_xlsx, read_directory
+
+_FORMULA = re.compile(r'<(?:\w+:)?c r="([A-Z]+\d+)"[^>]*>\s*<(?:\w+:)?f\b[^>]*>([^<]*)')
+_ROWS = 2**20
+#: Numbers that differ by less are alike. [share]
+_ALIKE = 1e-6
+
+
+def examine(path: Path, program: str | None) -> dict[str, Any]:
+    """Return what is wrong with a workbook; the file stays as it is.
+
+    Parameters
+    ----------
+    path : Path
+        An .xlsx or .xlsm file.
+    program : str or None
+        LibreOffice, if it is there.
+
+    Returns
+    -------
+    dict
+        ``faults`` of the package, ``formulas`` and how many of them were ``not_calculated`` yet,
+        ``differ`` (cells that show something else when calculated anew: what is stored and what
+        comes out) and ``unknown`` (cells with functions that LibreOffice does not know).
+
+    Raises
+    ------
+    InputError
+        If it is not a workbook, or LibreOffice makes nothing of it.
+    """
+    stored, faults = open_xlsx(path, max_rows=_ROWS), package_faults(path)
+    cells = [(t, *found) for t in stored.titles for found in _FORMULA.findall(stored.text(t))]
+    differ: dict[str, tuple[str, str]] = {}
+    unknown: list[str] = []
+    blank = 0
+    with open_package(path) as package:
+        names = read_directory(path, package).names
+    lambdas = "|".join(re.escape(n) for n, text in names.items() if "_xlfn.LAMBDA" in text)
+    called = re.compile(rf"\b(?:{lambdas or '(?!)'})\(")
+    with tempfile.TemporaryDirectory() as folder:
+        fresh = stored
+        if program and not faults:
+            fresh = open_xlsx(_converted(path, Path(folder), program), max_rows=_ROWS)
+        for title, cell, text in cells:
+            row, column = split_cell(cell)
+            old, new = (
+                book.grid(title).rows.get(row, {}).get(column, "") for book in (stored, fresh)
+            )
+            if called.search(text) or (new == CellFault("#NAME?") and old != new):
+                unknown.append(f"{title}!{cell}")
+            elif isinstance(old, NotCalculated):
+                blank += 1
+            elif not _alike(old, new):
+                differ[f"{title}!{cell}"] = _shown(old), _shown(new)
+    counted = {"formulas": len(cells), "not_calculated": blank}
+    return {"faults": faults, **counted, "differ": differ, "unknown": unknown}
+
+
+def examination_lines(found: Mapping[str, Any], program: str | None) -> list[str]:
+    """Return what `examine` found for people."""
+    blank = f", {found['not_calculated']} without a result yet" if found["not_calculated"] else ""
+    lines = [*found["faults"], f"{found['formulas']} formulas{blank}"]
+    if program is None:
+        return [*lines, "LibreOffice is not installed: nothing was calculated anew"]
+    lines += [
+        f"{cell}: stored {old}, calculated {new}" for cell, (old, new) in found["differ"].items()
+    ]
+    if found["unknown"]:
+        cells = ", ".join(found["unknown"][:9])
+        lines.append(
+            f"LibreOffice does not know the functions of {len(found['unknown'])} cells: {cells}"
+        )
+    return [*lines, f"{len(found['differ'])} cells differ when calculated anew"]
+
+
+def _converted(path: Path, folder: Path, program: str) -> Path:
+    """Return a copy that LibreOffice calculated: it trusts stored results, so they are left out."""
+    bare, out = folder / f"bare{path.suffix}", folder / "out"
+    with open_package(path) as package:
+        parts: dict[str, bytes | None] = {
+            sheet.part: splice_sheet(
+                path, sheet.part, read_part(path, package, sheet.part), SheetChanges()
+            ).joined(strip=True)
+            for sheet in read_directory(path, package).sheets
+        }
+    rewrite_package(path, bare, parts)
+    own = f"-env:UserInstallation={(folder / 'profile').as_uri()}"
+    words = [program, own, "--headless", "--norestore", "--convert-to", "xlsx", "--outdir"]
+    run = subprocess.run([*words, str(out), str(bare)], capture_output=True, text=True, check=False)
+    if not (out / "bare.xlsx").exists():
+        raise InputError(f"{path}: LibreOffice made nothing of it: {run.stderr.strip():.200}")
+    return out / "bare.xlsx"
+
+
+def _alike(old: Value, new: Value) -> bool:
+    if isinstance(old, float) and isinstance(new, float):
+        return math.isclose(old, new, rel_tol=_ALIKE, abs_tol=1e-12)
+    return old == new
+
+
+def _shown(value: Value) -> str:
+    """Return what a cell holds, for people."""
+    return value.text if isinstance(value, CellFault) else str(value) or "blank"

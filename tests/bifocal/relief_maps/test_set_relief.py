@@ -1,0 +1,177 @@
+"""Dense relief of three photos: far, near, and one a step aside."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from bifocal import Grid, InputError, Pair, PhotoSet, Quality, ReliefMap, dense_relief
+from bifocal.relief_maps.forward_projection import MapBands
+from bifocal.relief_maps.fusion import PairRelief, fused
+from bifocal.relief_maps.photo_evidence import Witness
+from bifocal.relief_maps.turned_plane import TurnedPlane
+from tests.scenes import Exposure, bifocal_cameras, facade
+from tests.scenes.sets import SetRendering, aside, render_set
+
+DARKER = Exposure(gain=0.75, gamma=1.1)
+
+
+@cache
+def shot() -> SetRendering:
+    cameras = bifocal_cameras(size=(768, 512), pixel=0.01476)
+    three = (cameras.far, cameras.near, aside(cameras.near, 1.5))
+    exposures = (Exposure(), Exposure(), DARKER)
+    return render_set(
+        facade(seed=41, texel=0.01), three, rng=np.random.default_rng(41), exposures=exposures
+    )
+
+
+@cache
+def of_three() -> ReliefMap:
+    taken = shot()
+    return dense_relief(taken.photos, *taken.images, gsd=taken.truth.gsd, bounds=taken.truth.bounds)
+
+
+@cache
+def of_two() -> ReliefMap:
+    taken = shot()
+    two = taken.photos.pair(0, 1)
+    return dense_relief(two, *taken.images[:2], gsd=taken.truth.gsd, bounds=taken.truth.bounds)
+
+
+def bands(relief: ReliefMap) -> list[np.ndarray]:
+    return [relief.r, relief.sigma, relief.quality]
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_a_set_of_two_gives_what_the_pair_gives(order):
+    taken = shot()
+    photos = PhotoSet(photos=tuple(taken.photos.photos[number] for number in order))
+    images = [taken.images[number] for number in order]
+    found = dense_relief(photos, *images, gsd=taken.truth.gsd, bounds=taken.truth.bounds)
+    assert found.used == ()
+    for one, other in zip(bands(found), bands(of_two()), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_a_third_photo_measures_the_nadir_and_what_the_pair_cannot_see():
+    taken, three, two = shot(), of_three(), of_two()
+    assert three.used == (("1", "2"), ("1", "3"), ("2", "3"))
+    seen = taken.visible.sum(axis=0) >= 2
+    places = taken.truth.plane_positions()
+    nadir = seen & (np.hypot(places[..., 0], places[..., 1]) < 1)
+
+    def figures(found: ReliefMap) -> tuple[float, float, float, float]:
+        error = np.where(found.known, np.abs(found.r - taken.truth.r), 1.0)
+        lost = np.isin(found.quality, (Quality.UNKNOWN, Quality.HIDDEN))
+        measured = seen & (found.quality == Quality.MEASURED)
+        return (
+            float(np.median(error[nadir])), float(lost[seen].mean()),
+            float((error[seen] > 0.03).mean()), float((error < 2 * found.sigma)[measured].mean()),
+        )  # fmt: skip
+
+    (middle, lost, beyond, held), (middle_of_two, lost_of_two, beyond_of_two, _) = (
+        figures(found) for found in (three, two)
+    )
+    assert middle < 0.4 * middle_of_two
+    assert lost < 0.45 * lost_of_two
+    assert beyond < 0.85 * beyond_of_two
+    assert held > 0.88
+
+
+def test_a_photo_of_something_else_is_left_out_and_named():
+    taken = shot()
+    noise = np.random.default_rng(3).integers(0, 255, taken.images[2].shape).astype(np.uint8)
+    found = dense_relief(
+        taken.photos, *taken.images[:2], noise, gsd=taken.truth.gsd, bounds=taken.truth.bounds
+    )
+    assert found.used == (("1", "2"),)
+    assert [note.split(" are left out")[0] for note in found.notes] == ["1 and 3", "2 and 3"]
+
+
+def test_every_photo_of_the_set_is_asked_for():
+    taken = shot()
+    with pytest.raises(InputError, match="3 photos, 2 images were given"):
+        dense_relief(taken.photos, *taken.images[:2])
+
+
+GRID = Grid.from_bounds((-0.5, -0.5, 0.5, 0.5), gsd=0.02)
+
+
+def witnesses() -> list[Witness]:
+    """Return photos of nothing at all, which cannot decide."""
+    grey = np.full((512, 768), 90, np.uint8)
+    return [Witness.of(photo, grey, 0.02) for photo in shot().photos.photos]
+
+
+def pair_relief(r: float, sigma: float, *, weight: float = 1.0) -> PairRelief:
+    values = np.full(GRID.shape, r, np.float32), np.full(GRID.shape, sigma, np.float32)
+    quality = np.full(GRID.shape, Quality.MEASURED, np.uint8)
+    return PairRelief(MapBands(*values, quality), np.full(GRID.shape, weight, np.float32))
+
+
+def test_pairs_that_agree_are_averaged_by_weight_and_promise_no_more_than_either():
+    both = fused(
+        [pair_relief(0.010, 0.004), pair_relief(0.013, 0.004, weight=2)], witnesses(), GRID
+    )
+    np.testing.assert_allclose(both.r, 0.012, atol=1e-6)
+    assert (both.quality == Quality.MEASURED).all()
+    assert (both.sigma >= 0.004).all()
+
+
+def test_pairs_that_differ_are_unknown_where_photos_cannot_decide():
+    apart = fused([pair_relief(0.0, 0.002), pair_relief(0.1, 0.002)], witnesses(), GRID)
+    assert np.isnan(apart.r).all()
+    assert (apart.quality == Quality.UNKNOWN).all()
+
+
+def test_a_difference_nobody_sees_goes_into_sigma():
+    near = fused([pair_relief(0.0, 0.002), pair_relief(0.02, 0.002)], witnesses(), GRID)
+    assert (near.sigma > 0.0199).all()
+    assert (near.quality == Quality.MEASURED).all()
+
+
+def test_photos_decide_between_pairs_where_they_can():
+    taken = shot()
+    truth = taken.truth
+    greys = [image.mean(axis=2).astype(np.uint8) for image in taken.images]
+    own = [Witness.of(p, g, truth.gsd) for p, g in zip(taken.photos.photos, greys, strict=True)]
+    sigma = np.full(truth.shape, 0.002, np.float32)
+    quality = np.full(truth.shape, Quality.MEASURED, np.uint8)
+    weight = np.ones(truth.shape, np.float32)
+    off = np.zeros(truth.shape, np.float32)
+    off[:, 500:] = 0.25
+    right, wrong = (
+        PairRelief(MapBands(truth.r + shift, sigma, quality), weight) for shift in (0 * off, off)
+    )
+    found = fused([wrong, right], own, truth.grid)
+    differ = taken.visible.all(axis=0) & (off > 0)
+    error = np.abs(found.r - truth.r)[differ]
+    assert (error < 0.01).mean() > 0.8
+    assert (error > 0.01).mean() < 0.05
+
+
+def test_a_turned_plane_sees_the_points_that_the_wall_does_and_brings_them_back():
+    taken = shot()
+    two = taken.photos.photos[1], taken.photos.photos[2]
+    turn = TurnedPlane.for_base(two, np.zeros(2))
+    assert TurnedPlane.for_base(taken.photos.photos[:2], np.zeros(2)) is None
+    pair = Pair(image1=turn.photo(two[0]), image2=turn.photo(two[1]))
+    xyz = np.array([[0.3, -0.4, 0.2], [-1.0, 1.0, -0.5]])
+    there = (xyz - turn.middle) @ turn.rotation.T
+    photos = two[::-1] if pair.exchanged else two
+    for photo, own in zip(photos, (pair.image1, pair.image2), strict=True):
+        np.testing.assert_allclose(own.project(there), photo.project(xyz), atol=1e-7)
+    wide = Grid.from_bounds((-2.0, -2.0, 2.0, 2.0), gsd=0.02)
+    x, y = np.meshgrid(wide.columns_x, wide.rows_y)
+    axes = turn.rotation[2]
+    level = 0.25  # of a wall in front of the plane, over the turned one
+    height = (level - turn.rotation[0, 2] * x - turn.rotation[1, 2] * y) / axes[2]
+    found = ReliefMap.from_relief(height, plane_from_pixel=wide.plane_from_pixel)
+    back = turn.brought_back(found, GRID)
+    np.testing.assert_allclose(back.r, level, atol=1e-4)
+    assert (back.quality == Quality.MEASURED).all()
+    assert replace(found, r=np.full_like(found.r, np.nan)).known.sum() == 0
