@@ -34,6 +34,7 @@ INPUTS: list[tuple[str, ...]] = [
     (ALIGN + f" {SITE} --lens {{}}", "lens.json"),
     (ALIGN + " --control control.csv --lengths {}", "lengths.csv"),
     ("bifocal match {} --out o.xlsx", "wall.pair.json"),
+    ("bifocal match {} --out o.csv", "wall.photos.json"),
     ("bifocal solve {} --out o.xlsx", "survey.xlsx"),
     ("bifocal solve {} --json " + SOLVE, "survey.ods"),
     ("bifocal solve {} --json " + SOLVE, "survey.csv", "half"),

@@ -204,6 +204,7 @@ WORDS: list[tuple[str, str]] = [
     ("bifocal solve picks3.csv --pair wall.photos.json --json --adjust-setup", "adjust_setup"),
     ("bifocal solve survey.csv --pair wall.photos.json --json", "col1"),
     ("bifocal solve picks3.csv --pair wall.photos.json --out o.xlsm", "o.xlsm"),
+    ("bifocal match wall.photos.json --out o.xlsx", "o.csv"),
     ("bifocal pick wall.photos.json --no-browser", "set of 3 photos"),
     ("bifocal solve lens.json --json", "lens.json"),
     ("bifocal solve far.jpg --json", "far.jpg"),
