@@ -31,6 +31,7 @@ WORDS: list[tuple[str, str]] = [
     (f"{RECTIFY} --lines --length 1,2,3,4,0", "--length"),
     (f"{RECTIFY} --control control.csv --deliver d", "--scale"),
     (f"{RECTIFY} --control control.csv --stands-out 400", "--stands-out"),
+    (f"{RECTIFY} --control control.csv --stands-out 0", "--stands-out"),
     (f"{RECTIFY} --control control.csv --gsd 0.01mm", "--any-size"),
     (f"{RECTIFY} --control control.csv --out far.jpg", "far.jpg"),
     (f"{RECTIFY} --control control.csv --bounds 900,900,950,950", "shows nothing of the area"),
