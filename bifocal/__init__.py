@@ -13,6 +13,7 @@ By hand, the equations
 The pair
     Pair, Photo               both cameras; read and write pair files, intersect and project points
     PhotoSet                  two or more photos of one wall; a pair is the set of two
+    photos_from_project, write_colmap   a set from another program's project, and one for COLMAP
     Intersection, SetIntersection   what their `intersect` returns: X, Y, r, covariance, flags
     read_image, write_image   photos as arrays, upright as seen
     Lens                      principal distance, principal point and distortion of a lens
@@ -40,10 +41,9 @@ Sample pairs                  SAMPLE, WATER_SAMPLE: folders of photos with exact
 
 What they take and give: Bounds, CheckResult, FlagLimits, FlatSurface, Foot, Grid, KnownPoints,
 Layers, MapSurface, MediaPath, NamedPoints, OrientationCheck, Pinhole, PlanePicks,
-PointObservations, Progress, ProjectedPoints, RadialDivision, RankedPair, Rectification,
-Registration, ReliefTable, Similarity, SpaceSums,
-Surface, SurveyInput, SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision,
-WeightedSums, Window, WorldPoints.
+PointObservations, Progress, ProjectOptions, ProjectPhotos, ProjectedPoints, RadialDivision,
+RankedPair, Rectification, Registration, ReliefTable, Similarity, SpaceSums, Surface, SurveyInput,
+SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision, WeightedSums, Window, WorldPoints.
 
 Errors are one family with one message each that says what is wrong, where, and how to mend it:
 PhotogrammetryError > InputError (a ValueError) > CellError, WorkbookError, MissingExtraError;

@@ -50,6 +50,8 @@ from .orientation.photo_alignment import align
 from .orthophotos.compose import orthophoto
 from .orthophotos.mosaic_in_memory import Mosaic, MosaicOptions, mosaic
 from .orthophotos.ortho_image import OrthoOptions, Orthophoto, Source
+from .projects.colmap_workflow import write_colmap
+from .projects.photos_workflow import ProjectOptions, ProjectPhotos, photos_from_project
 from .rays import Foot
 from .relief_maps.dense_matching import DenseRelief
 from .relief_maps.registration import Registration
@@ -116,6 +118,8 @@ __all__ = [
     "PlanePicks",
     "PointObservations",
     "Progress",
+    "ProjectOptions",
+    "ProjectPhotos",
     "ProjectedPoints",
     "Quality",
     "RadialDivision",
@@ -153,6 +157,7 @@ __all__ = [
     "mosaic",
     "orthophoto",
     "page_server",
+    "photos_from_project",
     "pick",
     "plane_coordinates",
     "read_control",
@@ -165,5 +170,6 @@ __all__ = [
     "relief_from_displacement",
     "relief_view",
     "solve",
+    "write_colmap",
     "write_image",
 ]

@@ -30,10 +30,17 @@ def read_object(path: Path | str, *, what: str) -> dict[str, Any]:
     InputError
         If the file is missing, is not text, not JSON, or not an object.
     """
-    path = Path(path)
-    text = read_text(path, what, form=" (JSON)")
+    value = read_json(path, what=what)
+    if not isinstance(value, dict):
+        raise InputError(f"{path}: expected a {what}, a JSON object; found {type(value).__name__}.")
+    return value
+
+
+def read_json(path: Path | str, *, what: str) -> Any:
+    """Return what a JSON file holds, whatever that is; raise as `read_object` does."""
+    text = read_text(Path(path), what, form=" (JSON)")
     try:
-        value = json.loads(text)
+        return json.loads(text)
     except json.JSONDecodeError as error:
         raise InputError(
             f"{path}: not valid JSON at line {error.lineno}, column {error.colno}: {error.msg}."
@@ -42,9 +49,6 @@ def read_object(path: Path | str, *, what: str) -> dict[str, Any]:
         raise InputError(f"{path}: holds a whole number of thousands of digits.") from None
     except RecursionError:
         raise InputError(f"{path}: nested too deeply for a {what}.") from None
-    if not isinstance(value, dict):
-        raise InputError(f"{path}: expected a {what}, a JSON object; found {type(value).__name__}.")
-    return value
 
 
 def write_object(

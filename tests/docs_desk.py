@@ -19,6 +19,13 @@ from PIL import Image
 from bifocal import SAMPLE, WATER_SAMPLE, Pair, PhotoSet
 from tests.bifocal.campaigns import sample_tables
 from tests.builders.commands import bifocal_command as main
+from tests.builders.foreign_projects import (
+    Shot,
+    write_alicevision,
+    write_colmap_text,
+    write_metashape,
+    write_opensfm,
+)
 from tests.scenes import demo_scene
 from tests.scenes.arrays import ByteArray
 from tests.scenes.make_sample import PIXEL
@@ -74,7 +81,31 @@ def make_desk(folder: Path) -> None:
             shutil.copyfile(folder / f"{name}_{side}.jpg", folder / "photos" / f"{name}_{side}.jpg")
         shutil.copyfile(folder / f"{name}.csv", folder / "photos" / f"{name}_far.csv")
     (folder / "street.toml").write_text(STREET, encoding="utf-8")
+    _projects(folder, rows)
     _products(folder)
+
+
+def _projects(folder: Path, rows: list[list[float | str]]) -> None:
+    """Write projects of other programs that hold the pair's photos, and picks in them."""
+    shots = []
+    for photo in PhotoSet.read(folder / "wall.pair.json").photos:
+        inverse = np.linalg.inv(photo.plane_from_pixel)  # square to the wall: scale and middle
+        focal = float(photo.distance * inverse[0, 0] / inverse[2, 2])
+        middle = inverse[:2] @ [*photo.nadir, 1] / inverse[2, 2]
+        place = np.array([*photo.nadir, photo.distance])
+        shots.append(
+            Shot(photo.file, SIZE, (focal, focal), tuple(middle), (0, 0, 0, 0, 0),
+                 np.diag([1.0, -1, -1]), place)
+        )  # fmt: skip
+    xyz = np.array([row[1:4] for row in rows], dtype=float)
+    write_colmap_text(folder / "colmap" / "sparse" / "0", shots, xyz)
+    write_opensfm(folder / "reconstruction.json", shots, xyz)
+    write_alicevision(folder / "cameras.sfm", shots, xyz)
+    write_metashape(folder / "cameras.xml", shots)
+    lines = ["id,photo,col [px],row [px]"]
+    for name, *_, col1, row1, col2, row2 in [*rows, ["A", *rows[0][1:]], ["B", *rows[-1][1:]]]:
+        lines += [f"{name},far.jpg,{col1},{row1}", f"{name},near.jpg,{col2},{row2}"]
+    (folder / "picks.csv").write_text("\n".join([*lines, ""]))
 
 
 def _products(folder: Path) -> None:

@@ -22,7 +22,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from bifocal import Lens, Pair, ReliefMap, read_image, solve
+from bifocal import (
+    Lens,
+    Pair,
+    ProjectOptions,
+    ReliefMap,
+    photos_from_project,
+    read_image,
+    solve,
+)
 from bifocal.files.point_tables import read_survey_points
 from multimedia import PhotogrammetryError, read_experiment, read_project
 from multimedia.projects.dem import Dem
@@ -69,6 +77,16 @@ def _experiment(path: Path) -> None:
     read_experiment(path.parents[1])
 
 
+def _project(path: Path) -> None:
+    """Make a set of a project one of whose files is damaged."""
+    photos = next((one for one in path.parents if one.name == "project"), path.parent)
+    options = ProjectOptions(
+        images=photos, points=photos.with_name("project.csv"), wall=("A", "B", "C")
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        photos_from_project(path, Path(folder) / "o.photos.json", options)
+
+
 READERS: dict[str, Reader] = {
     "pair": Reader("wall.pair.json", Pair.read),
     "lens": Reader("lens.json", Lens.read),
@@ -97,6 +115,22 @@ READERS: dict[str, Reader] = {
     "colmap": Reader("cameras.txt", Lens.read),
     "opencv": Reader("lens.yml", Lens.read),
     "metashape": Reader("lens.xml", Lens.read),
+    **{
+        f"project {name}": Reader(f"project/{name}", _project)
+        for name in (
+            "text/cameras.txt",
+            "text/images.txt",
+            "text/points3D.txt",
+            "binary/cameras.bin",
+            "binary/images.bin",
+            "binary/points3D.bin",
+            "cameras.xml",
+            "reconstruction.json",
+            "cameras.sfm",
+            "sfm_data.json",
+            "bundle.out",
+        )
+    },
 }
 
 

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bifocal.model.grid import Bounds, Grid
-from bifocal.model.image import as_grey
+from bifocal.model.image import as_grey, as_photo
 from bifocal.model.interior_orientation import Interior
 from bifocal.model.photo_alone import PhotoAlone
+from bifocal.model.points import SurveyPoints
 from bifocal.model.surface import FlatSurface
 from bifocal.orientation import one_photo
 from bifocal.orientation.align_workflow import KnownLens, check_inside, interior_of_photo
@@ -25,7 +26,7 @@ from bifocal.orthophotos.deliver_workflow import DeliverTask, Delivery, deliver
 from bifocal.orthophotos.ortho_image import Orthophoto
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho, planned_grid
 from bifocal.orthophotos.tiles import RasterResult
-from bifocal.remarks import remark
+from bifocal.remarks import in_language, remark
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.arrays import FloatArray, as_points
 from photocore.cli import Progress, no_progress
@@ -143,10 +144,13 @@ def rectify(
     >>> round(done.ortho.gsd, 5), round(float(done.photo.camera.centre[2]), 2)
     (0.01, 12.0)
     """
-    size = (int(np.shape(image)[1]), int(np.shape(image)[0]))
+    height, width = as_photo(image).shape[:2]
+    interior = interior or Interior.unknown((width, height))
+    if interior.image_size != (width, height):
+        raise InputError(f"image: is {width} x {height} px, its interior is of another size.")
     photo = _oriented(
-        lambda: image, interior or Interior.unknown(size), control=control, rectangle=rectangle,
-        length=length, sigma_pick=sigma_pick, sigma=sigma_control,
+        lambda: image, interior, control=control, rectangle=rectangle, length=length,
+        sigma_pick=sigma_pick, sigma=sigma_control,
     )  # fmt: skip
     ortho = orthophoto(photo.as_pair(), image, gsd=gsd, bounds=bounds)
     return _told(photo, ortho, stands_out)
@@ -205,12 +209,21 @@ def rectify_photo(
         )  # fmt: skip
     else:
         wish = DeliverTask(
-            title=given["title"] or path.stem, camera=words,
+            title=given["title"] or path.stem, camera=in_language(words, given["language"]),
+            control=_drawn(control),
             **{key: given[key] for key in ("scale", "dpi", "paper", "mark", "language")},
         )  # fmt: skip
         done = deliver(pair, folder, task, wish, out=out, overwrite=overwrite, progress=progress)
         ortho = done.ortho
     return replace(_told(photo, ortho, relief, scale), delivery=done)
+
+
+def _drawn(control: Control | None) -> SurveyPoints | None:
+    """Return control points as a drawing takes them."""
+    if control is None:
+        return None
+    blank, sigma = ("",) * len(control.ids), control.sigma[:, 2]
+    return SurveyPoints(ids=control.ids, xyz=control.xyz, sigma_r=sigma, flags=blank, notes=blank)
 
 
 def _oriented(

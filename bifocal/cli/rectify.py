@@ -24,19 +24,22 @@ def command(
     """
     from bifocal.campaigns.rectification import rectify_photo
 
-    if out is None and folder is None:
-        raise click.UsageError("Give --out FILE, --deliver DIR or both.")
-    if folder is not None and given["scale"] is None:
-        raise click.UsageError("--deliver needs the scale of the drawing, e.g. --scale 1:50.")
-    rectangle, length = given["rectangle"] is not None, given["length"] is not None
-    if rectangle + lines + (given["control"] is not None and not rectangle) != 1:
-        raise click.UsageError("Give one of --control, --rectangle and --lines.")
-    if rectangle and (given["corners"] is None) == (given["control"] is None):
-        raise click.UsageError("--rectangle needs its four corners: --corners, or by --control.")
-    if (given["corners"] is not None) > rectangle:
-        raise click.UsageError("--corners are those of a rectangle; give --rectangle W,H.")
-    if lines != length:
-        raise click.UsageError("--lines and --length belong together.")
+    by_points, corners, rectangle, length = (
+        given[name] is not None for name in ("control", "corners", "rectangle", "length")
+    )
+    faults = {
+        "Give --out FILE, --deliver DIR or both.": out is None and folder is None,
+        "--deliver needs the scale of the drawing, e.g. --scale 1:50.":
+            folder is not None and given["scale"] is None,
+        "Give one of --control, --rectangle and --lines.":
+            rectangle + lines + (by_points and not rectangle) != 1,
+        "--rectangle needs its four corners: --corners, or by --control.":
+            rectangle and corners == by_points,
+        "--corners are those of a rectangle; give --rectangle W,H.": corners and not rectangle,
+        "--lines and --length belong together.": lines != length,
+    }  # fmt: skip
+    if fault := next((words for words, wrong in faults.items() if wrong), ""):
+        raise click.UsageError(fault)
     with progress_bar("rectification", quiet=as_json) as progress:
         done = rectify_photo(
             photo, out, given, folder=folder, overwrite=overwrite, world_file=tfw, progress=progress

@@ -96,7 +96,10 @@ def find_files(sources: Sequence[Path], workbook: Path | None = None) -> SurveyF
             raise InputError(f"two workbooks were given, {source} and {workbook}; give one.")
         return _of_workbook(source)
     if ending in PHOTOS:
-        raise InputError(f"{source}: is one photo; give two, the far one first.")
+        raise InputError(
+            f"{source}: is one photo; give two, the far one first, or bring the one to scale with "
+            "bifocal rectify."
+        )
     raise InputError(
         f"{source}: expected a pair file (.pair.json), a survey workbook (.xlsx), a folder or two "
         "photos."

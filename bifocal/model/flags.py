@@ -11,6 +11,8 @@ from photocore.arrays import BoolArray, FloatArray
 
 #: Flags from bad to good; a point gets the first that applies.
 FLAGS = ("NADIR", "OFF-RADIAL", "CHECK", "UNCERTAIN", "WEAK", "ON-PLANE", "OK")
+#: Of these a coordinate is missing, wrong or too uncertain to be held against a check.
+UNCOUNTED = FLAGS[:4]
 #: Default measuring precision of a careful pick. [px]
 SIGMA_PIXEL = 0.5
 #: Beyond this share of d2 the standard deviation of r makes a point UNCERTAIN, beyond half WEAK.

@@ -189,12 +189,12 @@ def read_control(
     if not len(table):
         raise InputError(f"{path}: no control points in the table.")
     names = _names(table.texts("id"), unnamed)
-    xyz = np.column_stack([_metres(table, key, unit) for key in ("X", "Y", "r")])
+    xyz = np.column_stack([metres_of(table, key, unit) for key in ("X", "Y", "r")])
     errors = table.repeated("id") if "id" in table.present else []
     errors += _halves(table, keys)
     if errors:
         raise WorkbookError(errors)
-    own = _metres(table, "sigma", unit)
+    own = metres_of(table, "sigma", unit)
     spread = np.tile(np.where(np.isfinite(own), own, sigma)[:, None], (1, 3))
     spread = np.maximum(spread, 1e-5)
     if sigma_plane is not None:
@@ -230,7 +230,7 @@ def read_lengths(path: Path | str, control: Control) -> Control:
     """Read taped lengths (from, to, length, sigma) between control points and add them."""
     table = read_table(path, LENGTHS)
     index = {name: number for number, name in enumerate(control.ids)}
-    lengths, sigmas = _metres(table, "length", ""), _metres(table, "sigma", "")
+    lengths, sigmas = metres_of(table, "length", ""), metres_of(table, "sigma", "")
     taped: list[tuple[int, int, float]] = []
     spread: list[float] = []
     errors: list[CellError] = []
@@ -252,7 +252,7 @@ def read_lengths(path: Path | str, control: Control) -> Control:
     return replace(control, lengths=(*control.lengths, *taped), sigma_lengths=(*before, *spread))
 
 
-def _metres(table: Table, key: str, unit: str) -> FloatArray:
+def metres_of(table: Table, key: str, unit: str) -> FloatArray:
     """Return a column of lengths in metres, by its heading's unit."""
     said = unit or table.units.get(key, "m")
     if said not in METRES:

@@ -96,9 +96,9 @@ class OrientedPhoto:
         -----
         ``e = r R / (d - r)`` at the distance R from the nadir, Midulla Eq. (1) on the plane.
         """
-        if not relief < self.camera.centre[2]:
-            distance = float(self.camera.centre[2])
-            raise InputError(remark("rectify.before_camera", relief=relief, distance=distance))
+        distance = float(self.camera.centre[2])
+        if not (relief < distance and relief):
+            raise InputError(remark("rectify.stands_out", relief=relief, distance=distance))
 
         def moved(camera: Pinhole) -> FloatArray:
             away = np.linalg.norm(positions - camera.centre[:2], axis=1)

@@ -81,8 +81,8 @@ class DeliverTask:
         Empty: `default_title`.
     paper : str, optional
         ``A4`` to ``A0``; None: the smallest that holds the picture.
-    mark, control : Path, optional
-        Tables of points to draw.
+    mark, control : Path or SurveyPoints, optional
+        Points to draw, or their tables.
     sections : sequence of str
         ``x=1.5``, ``y=2`` or corners.
     contours : float, optional
@@ -98,7 +98,7 @@ class DeliverTask:
     title: str = ""
     paper: str | None = None
     mark: Path | None = None
-    control: Path | None = None
+    control: Path | SurveyPoints | None = None
     sections: Sequence[str] = ()
     contours: float | None = None
     language: str = "en"

@@ -321,6 +321,6 @@ def _tags(pair: Pair, task: OrthoTask) -> dict[str, str]:
         "BIFOCAL_IMAGE": "all" if isinstance(pair, PhotosOfSet) else task.image,
         "BIFOCAL_RELIEF": relief.name if relief else f"plane r = {task.plane:g} m",
         "BIFOCAL_D1": f"{pair.image1.distance:.6g}",
-        "BIFOCAL_D2": f"{pair.image2.distance:.6g}",
+        **({} if isinstance(pair, PhotoAlone) else {"BIFOCAL_D2": f"{pair.image2.distance:.6g}"}),
         **({"BIFOCAL_SCALE": f"1:{task.scale:g}"} if task.scale else {}),
     }

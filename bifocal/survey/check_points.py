@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.survey.reference import AxisErrors, CheckResult, KnownPoints, NamedPoints
+from bifocal.model.flags import UNCOUNTED
+from bifocal.survey.reference import AxisErrors, CheckResult, KnownPoints
+from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.tolerances import RULES, ToleranceRule, judge
 from photocore.arrays import FloatArray
 
+#: Standard deviations of X, Y and relief.
+SIGMAS = ("sigma_X", "sigma_Y", "sigma_r")
+
 
 def check_points(
-    table: NamedPoints, known: KnownPoints, rules: tuple[ToleranceRule, ...] = RULES
+    table: ReliefTable, known: KnownPoints, rules: tuple[ToleranceRule, ...] = RULES
 ) -> CheckResult:
     """Compare solved points with what was measured on site.
 
     Parameters
     ----------
-    table : NamedPoints
-        Solved points.
+    table : ReliefTable
+        Solved points; those flagged as one of `UNCOUNTED` are not counted.
     known : KnownPoints
         Check points; any coordinate may be NaN.
     rules : tuple of ToleranceRule
@@ -29,7 +34,12 @@ def check_points(
         RMSE is ``sqrt(sum(error^2)/n)``: no mean is taken off, a bias counts in full.
     """
     solved = known.coordinates_in(table)
-    errors = np.where(known.used[:, None], solved - known.xyz, np.nan)
+    rows = known.rows_in(table)
+    flags = np.array([*table.flags, ""])[rows]
+    compared = known.used & ~np.isnan(known.xyz).all(axis=1)
+    flagged = compared & np.isin(flags, UNCOUNTED)
+    errors = np.where((known.used & ~flagged)[:, None], solved - known.xyz, np.nan)
+    sigma = np.stack([table[key] for key in SIGMAS], axis=-1) if len(table) else np.zeros((0, 3))
     axes = {name: _statistics(errors[:, i]) for i, name in enumerate("XYZ")}
     accuracy = max((axis.rmse for axis in axes.values() if axis.n), default=float("nan"))
     return CheckResult(
@@ -39,6 +49,8 @@ def check_points(
         axes=axes,
         verdicts=judge(accuracy, rules) if np.isfinite(accuracy) else (),
         missing=known.missing_in(table),
+        flagged={known.ids[row]: str(flags[row]) for row in np.flatnonzero(flagged)},
+        standardised=errors / np.vstack([sigma, np.full((1, 3), np.nan)])[rows],
     )
 
 

@@ -136,6 +136,10 @@ class CheckResult:
         The largest RMSE of the axes against every rule and scale; empty without check points.
     missing : tuple of str
         Check points that were not measured.
+    flagged : mapping of str to str
+        Check points that are not counted for their flag: name to flag.
+    standardised : ndarray, shape (n, 3)
+        Errors over the standard deviations of the solved coordinates; NaN where either is missing.
     """
 
     ids: tuple[str, ...]
@@ -144,13 +148,19 @@ class CheckResult:
     axes: Mapping[str, AxisErrors]
     verdicts: tuple[Verdict, ...]
     missing: tuple[str, ...]
+    flagged: Mapping[str, str] = field(default_factory=dict)
+    standardised: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What the user should know about the names."""
-        if not self.missing:
-            return ()
-        return (remark("survey.no_such_check", names=", ".join(self.missing[:10])),)
+        """What the user should know about the names, and points that are not counted."""
+        said: list[str] = []
+        if self.missing:
+            said.append(remark("survey.no_such_check", names=", ".join(self.missing[:10])))
+        if self.flagged:
+            named = ", ".join(f"{name} ({flag})" for name, flag in list(self.flagged.items())[:10])
+            said.append(remark("survey.flagged_check", count=len(self.flagged), names=named))
+        return tuple(said)
 
     @property
     def accuracy(self) -> float:

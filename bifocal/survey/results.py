@@ -87,6 +87,7 @@ def _head(solution: SolvedSurvey) -> dict[str, Any]:
             ],
             "verdict": verdict_lines(solution),
             "missing": list(solution.check.missing),
+            "flagged": dict(solution.check.flagged),
         },
         "georeference": _georeference(solution),
         "setup_check": _orientation_check(solution),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations_with_replacement
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.survey.georeferencing import residuals
 from bifocal.survey.image_shift import foot_tangents, image_shift
+from bifocal.survey.leave_one_out import leave_one_out
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable, entries
@@ -227,7 +229,8 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
         cells |= {key: inputs(array[:, i]) for i, key in enumerate(keys)}
     if table is None:
         return cells
-    # A formula shows nothing where a measurement is missing, #N/A where relief is undefined.
+    # A formula shows nothing where a measurement is missing or relief is undefined: an error value
+    # would be that of every sum.
     incomplete = np.isnan(table["s1_used"])
     placeless = incomplete | np.isnan(table["theta_used"])
     if not content.is_pair and table.image_scale is None:
@@ -291,8 +294,10 @@ def _radial_variances(content: SurveyContent, blank: BoolArray) -> dict[str, lis
 
 
 def _unless(blank: BoolArray, values: FloatArray) -> list[CellValue]:
-    """Return a column of numbers, blank where a condition holds."""
-    return [None if no else v for no, v in zip(blank.tolist(), values.tolist(), strict=True)]
+    """Return a column of numbers, blank where a condition holds and where they are undefined."""
+    return [
+        None if no or v != v else v for no, v in zip(blank.tolist(), values.tolist(), strict=True)
+    ]
 
 
 def result_cells(
@@ -313,15 +318,25 @@ def result_cells(
     }
 
 
-def check_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
-    """Return every column of `Check` by key."""
-    known, check = content.known, content.check
+def check_cells(
+    content: SurveyContent, points: Mapping[str, Sequence[CellValue]]
+) -> dict[str, list[CellValue]]:
+    """Return every column of `Check` by key, from those of `Points`."""
+    known, check, table = content.known, content.check, content.table
     cells = _named(known.ids, known.used)
     for i, axis in enumerate("XYZ"):
         cells[f"{axis}_ref"] = inputs(known.xyz[:, i])
         if check is not None:
             cells[axis] = inputs(check.solved[:, i])
             cells[f"d{axis}"] = inputs(check.errors[:, i])
+            cells[f"t{axis}"] = inputs(check.standardised[:, i])
+    if check is not None and table is not None:
+        sizes = np.abs(np.nan_to_num(check.standardised)).max(axis=1)
+        tested = ~np.isnan(check.standardised).all(axis=1)
+        cells["sigmas"] = inputs(np.where(tested, sizes, np.nan))
+        cells["out"] = [int(name in check.flagged) for name in known.ids]
+        flags = [*points["flag"], None]
+        cells["flag"] = [flags[row] for row in known.rows_in(table)]
     return cells
 
 
@@ -343,7 +358,22 @@ def control_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
         cells[f"c{world}"] = inputs(np.where(used, near[:, i], 0.0))
         cells[f"v{world}"] = inputs(left[:, i])
     cells["w"] = [int(value) for value in used]
-    return cells | _weight_cells(geo)
+    return cells | _weight_cells(geo) | _left_out_cells(geo)
+
+
+def _left_out_cells(geo: Georeference) -> dict[str, list[CellValue]]:
+    """Return what each control point costs the fit."""
+    found = leave_one_out(geo)
+    cells: dict[str, list[CellValue]] = {}
+    cells |= {key: inputs(getattr(found, key)) for key in ("own", "gain")}
+    cells |= {"v": inputs(found.size), "s0": inputs(found.sigma0)}
+    for (i, a), (j, b) in combinations_with_replacement(enumerate("ENH"), 2):
+        cells[f"d_{a}{b}"] = inputs(found.covariance[:, i, j])
+    fits: list[CellValue] = [
+        None if gain != gain else "CHECK" if row == found.worst else "OK"
+        for row, gain in enumerate(found.gain)
+    ]
+    return cells | {"fit": fits}
 
 
 def _weight_cells(geo: Georeference) -> dict[str, list[CellValue]]:

@@ -11,11 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
-from typing import NamedTuple
 
 import numpy as np
 
-from multimedia.exchange.opencv_camera import camera_of, digits, inexact, opencv_of
+from multimedia.exchange.opencv_camera import camera_of, inexact, opencv_of
 from multimedia.media.camera import Camera
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.interfaces import Interfaces
@@ -23,34 +22,19 @@ from multimedia.media.surfaces import Sphere
 from multimedia.projects.camera_poses import FLIP
 from multimedia.projects.model import ImagePoints, ObjectPoints, Project
 from multimedia.refraction.layers import Layers
-from photocore.arrays import FloatArray, floats_of_words
-from photocore.camera.lensformats import LensData, colmap_lens
-from photocore.camera.rotation import quaternion_from_rotation, rotation_from_quaternion
+from photocore.arrays import floats_of_words
 from photocore.errors import InputError
-from photocore.output import atomic_folder
-from photocore.textfile import read_text
+from photocore.programs.colmap import (
+    CORNER,
+    camera_words,
+    digits,
+    image_words,
+    read_colmap_model,
+    write_colmap_model,
+)
 
-_KIND = "file of a COLMAP model"
 _PORTS = ("FLATPORT", "DOMEPORT")
-#: From the corner of the image, as COLMAP counts, to pixel centres.
-_CORNER = 0.5
 _NONE = -1
-
-
-class _View(NamedTuple):
-    """One image: name, number of its camera, pose, pixels and the points they are of."""
-
-    name: str
-    camera: str
-    rotation: FloatArray
-    translation: FloatArray
-    pixels: FloatArray
-    ids: list[str]
-
-
-def is_colmap(path: Path) -> bool:
-    """Whether a folder holds a text model."""
-    return (path / "cameras.txt").is_file() and (path / "images.txt").is_file()
 
 
 def read_colmap(folder: Path, *, pitch: float, unit: str) -> Project:
@@ -70,28 +54,20 @@ def read_colmap(folder: Path, *, pitch: float, unit: str) -> Project:
     InputError
         Naming file and line of what cannot be read.
     """
-    lenses: dict[str, LensData] = {}
-    media: dict[str, FlatInterface | Interfaces] = {}
-    path = folder / "cameras.txt"
-    for line in _lines(path):
-        words = line.split()
-        if len(words) < 5:
-            raise InputError(f"{path}: {line!r:.60} is not a COLMAP camera line.")
-        lenses[words[0]], used = colmap_lens(words, path, more=True)
-        if words[used:] and words[used] != "NONE":
-            media[f"port{words[0]}"] = _port(words[used:], path)
-    views = _views(folder / "images.txt", lenses)
+    model = read_colmap_model(folder)
+    media = {f"port{k}": _port(words, folder / "cameras.txt")
+             for k, words in model.ports.items() if words and words[0] != "NONE"}  # fmt: skip
+    views, seen = model.images, [view for view in model.images if view.ids]
     names = _names([view.name for view in views])
     cameras = tuple(
-        camera_of(lenses[v.camera], v.rotation, v.translation, pitch=pitch, name=name)
+        camera_of(model.lenses[v.camera], v.rotation, v.translation, pitch=pitch, name=name)
         for v, name in zip(views, names, strict=True)
     )
-    points, seen = folder / "points3D.txt", [view for view in views if view.ids]
     return Project(
         cameras=cameras,
         media=media,
         media_of=tuple(f"port{v.camera}" if f"port{v.camera}" in media else "" for v in views),
-        object_points=_points(points) if points.is_file() else ObjectPoints(),
+        object_points=ObjectPoints(ids=tuple(model.ids), xyz=model.points),
         image_points=ImagePoints(
             cameras=tuple(n for n, v in zip(names, views, strict=True) for _ in v.ids),
             ids=tuple(name for view in seen for name in view.ids),
@@ -119,36 +95,18 @@ def write_colmap(folder: Path, project: Project, *, overwrite: bool = False) -> 
     lines: dict[str, str] = {}
     images, tracks = [], {name: list[str]() for name in numbers}
     for k, (camera, view) in enumerate(zip(project.cameras, views.values(), strict=True), start=1):
-        f, centre, d = view.matrix.diagonal(), view.matrix[:2, 2] + _CORNER, view.coefficients
-        numbered = (*f[:2], *centre)
-        model = "PINHOLE"
-        if view.fisheye:
-            model, numbered = "OPENCV_FISHEYE", (*numbered, *d)
-        elif d.any():
-            model = "FULL_OPENCV" if d[4] else "OPENCV"
-            numbered = (*numbered, *d[:4], *((d[4], 0, 0, 0) if d[4] else ()))
-        port = _port_words(camera, project.interface_of(k - 1))
-        content = f"{model} {view.size[0]} {view.size[1]} {digits(numbered)}{port}"
+        lens = camera_words(view.matrix, view.coefficients, view.size, fisheye=view.fisheye)
+        content = f"{lens}{_port_words(camera, project.interface_of(k - 1))}"
         number = lines.setdefault(content, str(len(lines) + 1))
-        pose = digits((*quaternion_from_rotation(view.rotation), *view.translation))
-        images.append(f"{k} {pose} {number} {camera.name}")
+        images.append(f"{k} {image_words(view.rotation, view.translation, number, camera.name)}")
         rows = project.image_points.of_camera(camera.name)
         images.append(_keypoints(project, camera, rows, k, numbers, tracks))
     points = [
         f"{numbers[name]} {digits(place)} 128 128 128 0 {' '.join(tracks[name])}".rstrip()
         for name, place in zip(project.object_points.ids, project.object_points.xyz, strict=True)
     ]
-    with atomic_folder(folder, overwrite=overwrite) as temporary:
-        for name, head, rows_ in (
-            ("cameras", "CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]",
-             [f"{number} {content}" for content, number in lines.items()]),
-            ("images", "IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n"
-             "#   POINTS2D[] as (X, Y, POINT3D_ID)", images),
-            ("points3D", "POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)",
-             points),
-        ):  # fmt: skip
-            text = "\n".join([f"#   {head}", *rows_]) + "\n"
-            (temporary / f"{name}.txt").write_text(text, encoding="utf-8", newline="\n")
+    cameras = [f"{number} {content}" for content, number in lines.items()]
+    write_colmap_model(folder, cameras, images, points, overwrite=overwrite)
     return tuple(remarks)
 
 
@@ -162,7 +120,7 @@ def _keypoints(
 ) -> str:
     """Return the line of points of an image, and note them in the tracks of their points."""
     assert camera.sensor is not None  # opencv_of has looked
-    pixels = camera.sensor.pixel_from_image(project.image_points.image[list(rows)]) + _CORNER
+    pixels = camera.sensor.pixel_from_image(project.image_points.image[list(rows)]) + CORNER
     parts = []
     for k, (row, pixel) in enumerate(zip(rows, pixels, strict=True)):
         name = project.image_points.ids[row]
@@ -222,60 +180,6 @@ def _port_words(camera: Camera, media: FlatInterface | Interfaces | None) -> str
         f"camera {camera.name}: COLMAP knows flat ports of two or three parallel media and domes "
         "of two concentric spheres, not what this camera looks through."
     )
-
-
-def _views(path: Path, lenses: dict[str, LensData]) -> list[_View]:
-    """Read images.txt: two lines per image, the second of them may be empty."""
-    views: list[_View] = []
-    lines = iter(enumerate(read_text(path, _KIND).splitlines(), start=1))
-    for number, first in lines:
-        if first.startswith("#") or not first.strip():
-            continue
-        _, second = next(lines, (0, ""))
-        words = first.split(maxsplit=9)
-        where = f"{path}, line {number}"
-        if len(words) != 10:
-            raise InputError(
-                f"{where}: expected IMAGE_ID, QW to TZ, CAMERA_ID, NAME; found {first!r:.60}."
-            )
-        if not words[0].isdecimal():
-            raise InputError(f"{where}: IMAGE_ID {words[0]!r:.60} is no whole number.")
-        if words[8] not in lenses:
-            raise InputError(f"{where}: camera {words[8]} is not in cameras.txt.")
-        pose = floats_of_words(words[1:8], path, f"line {number}")
-        table = floats_of_words(second.split(), path, f"line {number + 1}")
-        if len(table) % 3:
-            raise InputError(f"{path}, line {number + 1}: expected X, Y, POINT3D_ID of each point.")
-        table = table.reshape(-1, 3)
-        known = np.flatnonzero(table[:, 2] != _NONE)
-        # Two keypoints of one image may be said to be of one point; the first is kept.
-        known = known[np.sort(np.unique(table[known, 2], return_index=True)[1])]
-        rotation = rotation_from_quaternion(pose[:4], f"{where}, quaternion")
-        ids = [str(int(v)) for v in table[known, 2]]
-        views.append(_View(words[9], words[8], rotation, pose[4:], table[known, :2] - _CORNER, ids))
-    if not views:
-        raise InputError(f"{path}: holds no images.")
-    return views
-
-
-def _points(path: Path) -> ObjectPoints:
-    """Read points3D.txt."""
-    ids, xyz = [], []
-    for line in _lines(path):
-        words = line.split()
-        if len(words) < 4:
-            raise InputError(f"{path}: {line!r:.60} is not a COLMAP point.")
-        ids.append(words[0])
-        xyz.append(floats_of_words(words[1:4], path, f"point {words[0]}"))
-    return ObjectPoints(ids=tuple(ids), xyz=np.array(xyz).reshape(-1, 3))
-
-
-def _lines(path: Path) -> list[str]:
-    return [
-        line
-        for line in read_text(path, _KIND).splitlines()
-        if line.strip() and not line.startswith("#")
-    ]
 
 
 def _names(names: Sequence[str]) -> list[str]:

@@ -13,22 +13,12 @@ from xml.etree.ElementTree import SubElement
 
 import numpy as np
 
-from multimedia.exchange.opencv_camera import OpencvCamera, camera_of, digits, left_out, opencv_of
-from multimedia.media.camera import Camera
+from multimedia.exchange.opencv_camera import OpencvCamera, camera_of, left_out, opencv_of
 from multimedia.projects.model import Project
-from photocore.arrays import FloatArray
 from photocore.camera.fisheye import TERMS
-from photocore.camera.lensformats import LensData, metashape_lens, xml_root
-from photocore.camera.rotation import checked_rotation, nearest_rotation
-from photocore.errors import LARGEST, InputError
 from photocore.output import atomic_path
-from photocore.textfile import read_text
-
-_KIND = "Metashape file"
-#: The chunk's transform where it has none: its frame is the world's.
-_FRAME = dict[str, FloatArray](rotation=np.eye(3), translation=np.zeros(3), scale=np.ones(1))
-#: Printed matrices have at least so many digits.
-_PRINTED = 1e-5
+from photocore.programs.colmap import digits
+from photocore.programs.metashape import FRAME, read_metashape_project
 
 
 def read_metashape(path: Path, *, pitch: float, unit: str) -> Project:
@@ -39,36 +29,17 @@ def read_metashape(path: Path, *, pitch: float, unit: str) -> Project:
     InputError
         Naming what is missing or cannot be used.
     """
-    root = xml_root(path, read_text(path, _KIND, form=" (XML)"))
-    chunk = root if root.tag == "chunk" else root.find(".//chunk")
-    if chunk is None:
-        raise InputError(f"{path}: holds no chunk; export the cameras as Agisoft XML.")
-    sensors = chunk.findall("./sensors/sensor")
-    lenses = {sensor.get("id", ""): _lens(sensor, path) for sensor in sensors}
-    rotation, translation, scale = _world_from_chunk(chunk, path)
-    cameras: list[Camera] = []
-    remarks: list[str] = []
-    for node in chunk.findall("./cameras//camera"):
-        name = node.get("label") or f"camera {node.get('id', '')}"
-        text = node.findtext("transform")
-        if text is None:
-            remarks.append(f"{name}: is not aligned; left out.")
-            continue
-        lens = lenses.get(node.get("sensor_id", ""), "has no calibration")
-        if isinstance(lens, str):
-            raise InputError(f"{path}: the sensor of camera {name} {lens}.")
-        matrix = _numbers(text, 16, path, f"transform of camera {name}").reshape(4, 4)
-        turn = checked_rotation(matrix[:3, :3], f"{path}: transform of {name}", tolerance=_PRINTED)
-        world = rotation @ nearest_rotation(turn)
-        centre = scale * (rotation @ matrix[:3, 3]) + translation
-        cameras.append(camera_of(lens, world.T, -world.T @ centre, pitch=pitch, name=name))
-    if not cameras:
-        raise InputError(f"{path}: holds no aligned camera.")
-    if chunk.find("./transform/scale") is None:
-        remarks.append("the chunk has no transform: its frame and scale are arbitrary.")
+    read = read_metashape_project(path)
+    cameras = tuple(
+        camera_of(v.lens, v.rotation, -v.rotation @ v.centre, pitch=pitch, name=v.name)
+        for v in read.views
+    )
+    said = (
+        () if read.metres else ("the chunk has no transform: its frame and scale are arbitrary.",)
+    )
     return Project(
-        cameras=tuple(cameras), sigma_image=0.5 * pitch, unit=unit, name=path.stem,
-        extra={"source": "Metashape"}, remarks=tuple(remarks),
+        cameras=cameras, sigma_image=0.5 * pitch, unit=unit, name=path.stem,
+        extra={"source": "Metashape"}, remarks=(*read.remarks, *said),
     )  # fmt: skip
 
 
@@ -86,7 +57,7 @@ def write_metashape(path: Path, project: Project, *, overwrite: bool = False) ->
         SubElement(camera, "transform").text = digits(matrix.ravel())
     # The chunk's frame is the project's.
     transform = SubElement(chunk, "transform")
-    for key, default in _FRAME.items():
+    for key, default in FRAME.items():
         SubElement(transform, key).text = digits(default.ravel())
     ElementTree.indent(document)
     with atomic_path(path, overwrite=overwrite) as temporary:
@@ -113,44 +84,3 @@ def _add_sensor(parent: ElementTree.Element, number: int, name: str, view: Openc
     for key, value in {"f": fy, "cx": cx, "cy": cy, "b1": fx - fy, **dict(named)}.items():
         if value or key in ("f", "cx", "cy"):
             SubElement(node, key).text = f"{value:.17g}"
-
-
-def _lens(sensor: ElementTree.Element, path: Path) -> LensData | str:
-    """Return the lens of a sensor, or what is wrong with it."""
-    kind = sensor.get("type", "frame")
-    if kind not in ("frame", "fisheye"):
-        return f"is of the type {kind}; projects hold frame cameras and fisheyes"
-    nodes = sensor.findall("calibration")
-    best = [node for node in nodes if node.get("class") == "adjusted"] or nodes
-    if not best:
-        return "has no calibration"
-    return metashape_lens(best[0], path, fisheye=kind == "fisheye")
-
-
-def _world_from_chunk(
-    chunk: ElementTree.Element, path: Path
-) -> tuple[FloatArray, FloatArray, float]:
-    """Return rotation, translation and scale of the chunk, or of its only component."""
-    node = chunk.find("./transform")
-    if node is None or node.find("scale") is None:
-        found = chunk.findall("./components/component/transform")
-        node = found[0] if len(found) == 1 else None
-    if node is None:
-        return np.eye(3), np.zeros(3), 1.0
-    parts = dict(_FRAME)
-    for key, default in _FRAME.items():
-        if (text := node.findtext(key)) is not None:
-            parts[key] = _numbers(text, default.size, path, f"{key} of the chunk")
-    matrix = parts["rotation"].reshape(3, 3)
-    turn = checked_rotation(matrix, f"{path}: rotation of the chunk", tolerance=_PRINTED)
-    return nearest_rotation(turn), parts["translation"], float(parts["scale"][0])
-
-
-def _numbers(text: str, count: int, path: Path, where: str) -> FloatArray:
-    try:
-        values = np.array([float(word) for word in text.split()])
-    except ValueError:
-        raise InputError(f"{path}: the {where} holds what is no number.") from None
-    if len(values) != count or not (np.abs(values) <= LARGEST).all():
-        raise InputError(f"{path}: the {where} must be {count} numbers, found {len(values)}.")
-    return values

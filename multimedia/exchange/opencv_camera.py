@@ -8,7 +8,6 @@ off, which is mended where they are read and written.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -207,8 +206,3 @@ def left_out(
     if project.object_points.ids or project.image_points.ids:
         remarks.append(f"points are not part of {program}'s {files}; they were not written.")
     return tuple(remarks)
-
-
-def digits(values: Iterable[float]) -> str:
-    """Return numbers with all their digits, a blank between them."""
-    return " ".join(f"{v:.17g}" for v in values)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from multimedia.exchange.aquacal_calibration import is_aquacal, read_aquacal, write_aquacal
-from multimedia.exchange.colmap_model import is_colmap, read_colmap, write_colmap
+from multimedia.exchange.colmap_model import read_colmap, write_colmap
 from multimedia.exchange.metashape_project import read_metashape, write_metashape
 from multimedia.exchange.opencv_calibration import read_opencv, write_opencv
 from multimedia.exchange.opencv_camera import PITCH
@@ -16,6 +16,7 @@ from multimedia.projects.project_file import read_project, write_project
 from photocore.errors import InputError
 from photocore.jsonfile import read_object
 from photocore.output import check_not_input
+from photocore.programs.colmap import is_colmap
 from photocore.textfile import check_name, read_text
 
 _WRITERS: Mapping[str, Callable[..., tuple[str, ...]]] = {

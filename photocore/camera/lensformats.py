@@ -31,6 +31,32 @@ class LensData(NamedTuple):
     source: str
 
 
+def lens_data(
+    focal: Sequence[float],
+    centre: Sequence[float],
+    terms: Sequence[float],
+    size: Sequence[float],
+    source: str,
+    *,
+    fisheye: bool = False,
+) -> LensData:
+    """Return a lens of fx, fy, cx, cy [px] and OpenCV's distortion terms.
+
+    Raises
+    ------
+    InputError
+        If a focal length or a side of the photo is not above zero.
+    """
+    if not (min(focal) > 0 and min(size) > 0):
+        raise InputError(
+            f"{source}: focal lengths and size of the photo must be above zero [px], found "
+            f"{', '.join(f'{v:g}' for v in (*focal, *size))}."
+        )
+    matrix = camera_matrix(focal[0], focal[1] / focal[0], *centre)
+    model = "fisheye" if fisheye else "opencv"
+    return LensData(matrix, np.array(terms, dtype=float), model, (size[0], size[1]), source)
+
+
 def read_foreign_lens(path: Path | str) -> LensData:
     """Return the calibration in a COLMAP, Metashape or OpenCV file, told apart by ending.
 
@@ -79,7 +105,16 @@ _COLMAP: dict[str, tuple[int, tuple[int, int, int, int], Sequence[int | None]]] 
     "OPENCV": (8, (0, 1, 2, 3), (4, 5, 6, 7)),
     "OPENCV_FISHEYE": (8, (0, 1, 2, 3), (4, 5, 6, 7)),
     "FULL_OPENCV": (12, (0, 1, 2, 3), (4, 5, 6, 7, 8, 9, 10, 11)),
+    "SIMPLE_RADIAL_FISHEYE": (4, (0, 0, 1, 2), (3, None, None, None)),
+    "RADIAL_FISHEYE": (5, (0, 0, 1, 2), (3, 4, None, None)),
 }
+#: The numbers that binary files have for them; 7 is FOV.
+COLMAP_NUMBERS = dict(zip((0, 1, 2, 3, 4, 5, 6, 8, 9), _COLMAP, strict=True))
+
+
+def colmap_parameters(model: str) -> int:
+    """Return how many parameters a model that is read has."""
+    return _COLMAP[model][0]
 
 
 def colmap_lens(words: Sequence[str], path: Path, *, more: bool = False) -> tuple[LensData, int]:
@@ -109,7 +144,7 @@ def colmap_lens(words: Sequence[str], path: Path, *, more: bool = False) -> tupl
     lens = LensData(
         camera_matrix(p[fx], p[fy] / p[fx], p[cx] - 0.5, p[cy] - 0.5),
         np.array([0.0 if i is None else p[i] for i in terms]),
-        "fisheye" if model == "OPENCV_FISHEYE" else "opencv",
+        "fisheye" if model.endswith("FISHEYE") else "opencv",
         (width, height),
         f"COLMAP {model}, {path.name}",
     )

@@ -258,12 +258,17 @@ def _mapped_by_camera(camera: Pinhole) -> FloatArray:
 def triangulate(
     first: Pinhole, second: Pinhole, pixels1: FloatArray, pixels2: FloatArray
 ) -> FloatArray:
-    """Return where rays of pixels (n, 2) meet, shape (n, 3); NaN where they do not. [m]
+    """Return where rays of pixels (n, 2) meet, shape (n, 3); NaN where they do not. [m]"""
+    return rays_meeting((first, second), (pixels1, pixels2))
+
+
+def rays_meeting(cameras: Sequence[Pinhole], pixels_of: Sequence[FloatArray]) -> FloatArray:
+    """Return where the rays of two cameras or more meet, shape (n, 3); NaN where they do not. [m]
 
     Linear least squares, each equation in pixels times the depth of the point.
     """
     design, value = [], []
-    for camera, pixels in ((first, pixels1), (second, pixels2)):
+    for camera, pixels in zip(cameras, pixels_of, strict=True):
         mapped = camera.matrix @ camera.rotation
         rows = pixels[:, :, None] * mapped[2] - mapped[:2]
         design.append(rows)

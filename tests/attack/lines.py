@@ -15,6 +15,9 @@ FACADE = (
     "--scale 1:100 --out d"
 )
 
+SET = "o.photos.json"
+PHOTOS = f"bifocal photos {{}} --points project.csv --images project --out {SET}"
+
 #: A line with {} where a file goes in, a valid file of its kind, and the kinds that are no fault.
 INPUTS: list[tuple[str, ...]] = [
     ("bifocal calibrate {} --out o.json", "far.jpg"),
@@ -67,6 +70,22 @@ INPUTS: list[tuple[str, ...]] = [
         "--out o.csv",
         "ptv",
     ),
+    (f"{PHOTOS} --wall A,B,C", "project/cameras.xml"),
+    (PHOTOS, "project/reconstruction.json"),
+    (PHOTOS, "project/cameras.sfm"),
+    (PHOTOS, "project/bundle.out"),
+    (
+        f"bifocal photos project/text --points {{}} --length A,B,3 --out {SET}",
+        "project.csv",
+        "half",
+    ),
+    (
+        f"bifocal photos project/text --points project.csv --control {{}} --out {SET}",
+        "corners.csv",
+        "half",
+    ),
+    (f"bifocal photos project/text --cloud {{}} --out {SET}", "cloud.ply"),
+    ("bifocal photos {} --to colmap --out d", "wall.pair.json"),
     ("bifocal export {} --out o.dxf", "result.csv", "half"),
     ("bifocal export {} --out o.dxf", "survey.xlsx"),
     ("multimedia shift {} --z0 1 --indices 1,1.337 --json", "shift.csv", "half"),
@@ -113,6 +132,8 @@ OUTPUTS: list[tuple[str, ...]] = [
     ("bifocal calibrate far.jpg --lines lines.csv --out {}", ".json"),
     (ALIGN.replace("o.json", "{}") + " --control control.csv", ".json"),
     (ALIGN + " --control control.csv --picture {}", ".png"),
+    (f"{PHOTOS.replace('{}', 'project/text').replace(SET, '{}')}", ".photos.json"),
+    ("bifocal photos wall.pair.json --to colmap --out {}", "", "folder", "no folder"),
     ("bifocal match wall.pair.json --out {}", ".xlsx"),
     ("bifocal match wall.pair.json --out {}", ".csv"),
     (f"bifocal solve survey.csv {SOLVE} --out {{}}", ".xlsx"),

@@ -12,6 +12,7 @@ BOARDS = "multimedia boards tank.toml far.jpg --board 9x6"
 SHIFT = "multimedia shift shift.csv --json"
 BATHY = "multimedia bathymetry cloud.csv --out o.csv"
 LIDAR = "multimedia bathymetry cloud.las --out o.las"
+PHOTOS = "bifocal photos project/text --points project.csv --out o.photos.json"
 LINES = "bifocal calibrate far.jpg --lines lines.csv --out o.json"
 
 #: Options that cannot be meant, one by one or together, and what the refusal must name.
@@ -30,6 +31,7 @@ WORDS: list[tuple[str, str]] = [
     (f"{RECTIFY} --lines --length 1,2,3,4,0", "--length"),
     (f"{RECTIFY} --control control.csv --deliver d", "--scale"),
     (f"{RECTIFY} --control control.csv --stands-out 400", "--stands-out"),
+    (f"{RECTIFY} --control control.csv --stands-out 0", "--stands-out"),
     (f"{RECTIFY} --control control.csv --gsd 0.01mm", "--any-size"),
     (f"{RECTIFY} --control control.csv --out far.jpg", "far.jpg"),
     (f"{RECTIFY} --control control.csv --bounds 900,900,950,950", "shows nothing of the area"),
@@ -81,6 +83,29 @@ WORDS: list[tuple[str, str]] = [
     (f"{CANON.replace('22.7x15.1', '22.7')} --scale 500", "--sensor"),
     (f"{CANON.replace('22.7x15.1', '-22.7x15.1')} --scale 500", "--sensor"),
     (f"{CANON.replace('3072x2048', '1e9x1e9')} --scale 500", "--pixels|pixels"),
+    ("bifocal photos project/text", "--out"),
+    ("bifocal photos --out o.photos.json", "PROJECT"),
+    ("bifocal photos project --out o.photos.json --images nowhere", "nowhere"),
+    ("bifocal photos far.jpg --out o.photos.json", "far.jpg.*no project"),
+    ("bifocal photos wall.pair.json --out o.photos.json", "wall.pair.json.*no project"),
+    ("bifocal photos project/cameras.xml --out o.photos.json", "0 points, too few.*--cloud"),
+    ("bifocal photos project/text --out o.photos.json --wall A,B,C", "--wall.*--points"),
+    ("bifocal photos project/text --out o.photos.json --to meshroom", "--to"),
+    ("bifocal photos project/text --out d --to colmap", "text"),
+    ("bifocal photos wall.pair.json --out d --to colmap --unit m", "--to"),
+    (f"{PHOTOS} --wall A,B", "--wall.*three"),
+    (f"{PHOTOS} --wall A,B,Q", "--wall.*Q"),
+    (f"{PHOTOS} --wall A,B,A", "--wall.*line"),
+    (f"{PHOTOS} --horizontal A", "--horizontal.*two"),
+    (f"{PHOTOS} --length A,B", "--length.*two names"),
+    (f"{PHOTOS} --length A,B,0", "--length.*above zero"),
+    (f"{PHOTOS} --length A,B,nan", "--length.*above zero"),
+    (f"{PHOTOS} --length A,A,3", "--length"),
+    (f"{PHOTOS} --length A,Q,3", "--length.*Q"),
+    (f"{PHOTOS} --length A,B,3 --sigma-length 0", "--sigma-length"),
+    (f"{PHOTOS} --length A,B,3 --unit m", "--length and --unit"),
+    (f"{PHOTOS} --control corners.csv --length A,B,3", "--control.*--length"),
+    (f"{PHOTOS} --unit ft", "--unit"),
     ("bifocal calibrate --out o.json", "IMAGE"),
     ("bifocal calibrate far.jpg", "--out"),
     ("bifocal calibrate far.jpg --out o.json --pattern circles", "--board"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import zipfile
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -26,6 +27,19 @@ from multimedia import (
     write_project,
 )
 from tests.builders.commands import bifocal_command, multimedia_command
+from tests.builders.foreign_projects import (
+    make_shots,
+    render,
+    to_world,
+    wall_points,
+    write_alicevision,
+    write_bundler,
+    write_colmap_binary,
+    write_colmap_text,
+    write_metashape,
+    write_openmvg,
+    write_opensfm,
+)
 from tests.multimedia.tank import LAYERS, SENSOR, cameras, control
 
 PROGRAMS = {"bifocal": bifocal_command, "multimedia": multimedia_command}
@@ -86,6 +100,7 @@ def make_site(folder: Path) -> None:
     _point_tables(folder, rng)
     _rasters_and_clouds(folder, rng)
     _tank(folder)
+    _projects(folder)
     for name in ("survey.xlsx", "result.csv"):
         words = ["solve", str(folder / "survey.csv"), *GEOMETRY, "--out", str(folder / name)]
         result = CliRunner().invoke(PROGRAMS["bifocal"], words)
@@ -238,6 +253,27 @@ def _tank(folder: Path) -> None:
     _boards(folder)
     write_project(folder / "tank.toml", whole)
     write_experiment(folder / "ptv", whole)
+
+
+def _projects(folder: Path) -> None:
+    """Write a project of each program known, with its photos, and picks in them."""
+    shots, xyz = make_shots(), to_world(wall_points(120))
+    render(shots, folder / "project")
+    for write, name in (
+        (write_colmap_text, "text"), (write_colmap_binary, "binary"),
+        (write_opensfm, "reconstruction.json"), (write_alicevision, "cameras.sfm"),
+        (partial(write_openmvg, nested=True), "sfm_data.json"), (write_bundler, "bundle.out"),
+    ):  # fmt: skip
+        write(folder / "project" / name, shots, xyz)
+    write_metashape(folder / "project" / "cameras.xml", shots)
+    places = {"A": (-1.5, -1, 0), "B": (1.5, -1, 0), "C": (1.4, 1.1, 0)}
+    rows = [
+        f"{name},{shot.file},{','.join(map(str, shot.pixels(to_world(np.array([place])))[0]))}"
+        for name, place in places.items() for shot in shots[:3]
+    ]  # fmt: skip
+    (folder / "project.csv").write_text("\n".join(["id,photo,col [px],row [px]", *rows, ""]))
+    rows = [f"{name},{x},{y},{r}" for name, (x, y, r) in places.items()]
+    (folder / "corners.csv").write_text("\n".join(["id,X [m],Y [m],r [m]", *rows, ""]))
 
 
 def _boards(folder: Path) -> None:

@@ -48,9 +48,13 @@ class WallPlane:
 
 
 def planes_of_any_direction(
-    xyz: FloatArray, weight: FloatArray, centres: tuple[FloatArray, FloatArray]
+    xyz: FloatArray,
+    weight: FloatArray,
+    centres: Sequence[FloatArray] = (),
+    *,
+    distance: float | None = None,
 ) -> list[WallPlane]:
-    """Return the planes before both cameras on which points gather, one after the other.
+    """Return the planes before all cameras on which points gather, one after the other.
 
     Parameters
     ----------
@@ -58,10 +62,13 @@ def planes_of_any_direction(
         [m]
     weight : ndarray, shape (n,)
         What each point stands for: ties crowd where there is texture.
-    centres : pair of ndarray, shape (3,)
-        Projection centres. [m]
+    centres : sequence of ndarray, shape (3,)
+        Projection centres; none: where the cameras stand does not matter. [m]
+    distance : float, optional
+        From which the photos were taken.  [default: the first centre's Z] [m]
     """
-    band = WALLS.rough_band * float(centres[0][2])
+    distance = float(centres[0][2]) if distance is None else distance
+    band = WALLS.rough_band * distance
     generator = np.random.default_rng(7)
     free, found = np.ones(len(xyz), dtype=bool), []
     for _ in range(WALLS.most_planes):
@@ -74,11 +81,11 @@ def planes_of_any_direction(
         normals = normals[size > 0] / size[size > 0, None]
         normals *= np.where(normals[:, 2:] < 0, -1.0, 1.0)
         offsets = (normals * corners[size > 0, 0]).sum(axis=1)
-        before = np.stack([normals @ centre - offsets for centre in centres])
         some = generator.choice(left, min(len(left), 1500), replace=False)
         away = np.abs(xyz[some] @ normals.T - offsets)
         scores = weight[some] @ np.maximum(1.0 - away / band, 0.0)
-        scores[(before < 0.05 * centres[0][2]).any(axis=0)] = 0.0
+        for centre in centres:
+            scores[normals @ centre - offsets < 0.05 * distance] = 0.0
         best = int(scores.argmax())
         normal, offset = _refined(xyz[left], weight[left], normals[best], offsets[best], band)
         height = np.abs(xyz @ normal - offset)

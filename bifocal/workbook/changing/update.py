@@ -43,6 +43,12 @@ from photocore.workbook.reading.grid import (
 )
 from photocore.workbook.reading.package import uncollected
 
+#: Tables whose rows are given, and the columns that tell whether they still are those.
+_FIXED = (
+    ("tblPlan", "relief_cm"), ("tblFrame", "share"), ("tblBins", "sigmas_to"),
+    ("tblVectors", "check_row"),
+)  # fmt: skip
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BookUpdate:
@@ -64,7 +70,8 @@ def is_earlier(survey: SurveyInput) -> bool:
     """Tell by its names whether a workbook's sheets were made by an earlier version."""
     names = () if survey.book is None else survey.book.names
     newest = "setup_missing" if "sigma_px" in names else "enlargement_1"
-    came = {"b_lever": newest, "g_k": "g_space"}  # what stands beside what from the start
+    # What stands beside what from the start.
+    came = {"b_lever": newest, "g_k": "g_space", "g_space": "g_alarm"}
     return any(old in names and new not in names for old, new in came.items())
 
 
@@ -184,7 +191,7 @@ def update_book(
         own = editor.table(name)
         if own is not None:
             _table(editor, built, name, [row - own.first for row in sheet_rows])
-    for name, key in (("tblPlan", "relief_cm"), ("tblFrame", "share")):
+    for name, key in _FIXED:
         _fixed_table(editor, built, name, key)
     _verdict(editor, built, content, rules="rules" in given, words=other_words)
     _charts(editor, built, rows)
@@ -203,7 +210,7 @@ def _print_points(editor: WorkbookEditor, count: int, language: str) -> None:
         found = re.search(r">(\d+),", stands.formula if stands else "")
         head = area.area[0]
         if found and move_print_area(editor, area.sheet, head + int(found[1]), head + count):
-            formula = unprinted_formula(word("unprinted", language), count)
+            formula = unprinted_formula(language, count)
             editor.put(*place, "", formula=formula, style=stands.style if stands else "")
 
 

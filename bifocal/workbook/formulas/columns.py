@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from bifocal.model.flags import DOUBTFUL_SHARE, FlagLimits
+from bifocal.model.flags import DOUBTFUL_SHARE, UNCOUNTED, FlagLimits
+from bifocal.survey.georeferencing import ALPHA_POINT
+from bifocal.survey.leave_one_out import ROUNDING
 from bifocal.survey.observations import DOUBT_CODES
 from bifocal.workbook.formulas.placed_formulas import placed_parts
 from photocore.workbook.making.live_columns import FormulaBook, LiveColumn
@@ -98,7 +100,14 @@ def georeference_columns(*, is_pair: bool) -> tuple[LiveColumn, ...]:
         Whether `Points` keeps the covariances of the picks for one pixel, apart from what the
         photos' orientation is worth, which weighs nothing here.
     """
-    return FORMULAS.columns("control", {"pair"} if is_pair else ())
+    limits = {"alpha": f"{ALPHA_POINT:g}", "rounding": f"{ROUNDING:g}"}
+    return FORMULAS.columns("control", {"pair"} if is_pair else (), limits | placed_parts())
+
+
+def check_columns() -> tuple[LiveColumn, ...]:
+    """Return the table of check points: what was measured on site, errors, what does not count."""
+    uncounted = ",".join(f'[@flag]="{flag}"' for flag in UNCOUNTED)
+    return FORMULAS.columns("check", parts={"uncounted": uncounted})
 
 
 def planning_facts(*, media: int, is_pair: bool) -> set[str]:

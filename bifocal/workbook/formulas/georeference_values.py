@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from bifocal.survey.leave_one_out import leave_one_out
 from bifocal.survey.reference import Georeference
 from bifocal.survey.relief_table import ENTRIES
 from bifocal.survey.weighted_similarity import WeightedSums, determinant
@@ -66,6 +69,8 @@ def georeference_values(geo: Georeference | None, model: str) -> dict[str, CellV
             f"g_{name}t": float(geo.offset[i]),
             f"g_x_{axis}": float(constants[i]),
         }
+    left_out = leave_one_out(geo)
+    values |= {"g_squares": float(np.nansum(left_out.own)), "g_spare": left_out.spare}
     return values | _weighted_values(geo) | precision_values(geo)
 
 
@@ -121,4 +126,5 @@ def precision_values(geo: Georeference | None) -> dict[str, CellValue]:
     values |= _entries("g_v_", "ENH", SMALL, found.shift_rates)
     values |= _entries("g_u_", "ENH", SMALL, found.shift_rates @ found.spread)
     values |= {f"g_z_{name}": float(found.covariance[i, i]) for i, name in enumerate("ENH")}
-    return {**values, "g_z_EN": float(found.covariance[0, 1])}
+    mixed = {"EN": (0, 1), "EH": (0, 2), "NH": (1, 2)}
+    return values | {f"g_z_{pair}": float(found.covariance[at]) for pair, at in mixed.items()}

@@ -96,8 +96,8 @@ def turned_covariance(one: str, other: str) -> str:
 
 def placed_parts() -> dict[str, str]:
     """Return parts of formulas, each of a pair: ``turned_EN``, ``added_EN`` and the variances."""
-    cells = {axis: f"{{{{1}} n_{axis}}}" for axis in "ENH"}
-    pairs = ("EE", "NN", "HH", "EN")
+    cells = {axis: f"{{{{1}} n_ {axis}}}" for axis in "ENH"}
+    pairs = [one + other for one, other in combinations_with_replacement("ENH", 2)]
     return {
         **{f"turned_{pair}": turned_covariance(pair[0], pair[1]) for pair in pairs},
         **{f"added_{pair}": added_covariance(pair[0], pair[1], cells) for pair in pairs},

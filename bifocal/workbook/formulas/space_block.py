@@ -21,9 +21,9 @@ from photocore.workbook.making.look import LABEL_FONT
 from photocore.workbook.reading.grid import column_letters
 
 #: First column, right of the table of control points; first row, that nine stand above its keys.
-LEFT, TOP = 60, 3
+LEFT, TOP = 72, 3
 #: First column right of the table: all that stands there is folded away.
-FOLDED = 44
+FOLDED = 55
 #: Name of the whole block, by which its results are stored in a workbook that exists.
 BLOCK = "g_space_block"
 #: Steps range from 1E-13 to 1E+6; a column of usual width holds them so.

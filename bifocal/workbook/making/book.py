@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from openpyxl.styles import Alignment
+from openpyxl.styles import Alignment, Protection
 
 from bifocal.workbook.content import (
     STRUCTURED_ROWS,
@@ -15,13 +15,14 @@ from bifocal.workbook.content import (
     setup_cells,
 )
 from bifocal.workbook.formulas.columns import FORMULAS, results_columns
-from bifocal.workbook.making.cameras_sketch import cameras_sketch
+from bifocal.workbook.formulas.world_state import STATE, STATES, world_state
 from bifocal.workbook.making.charts import charts
 from bifocal.workbook.making.functions_sheet import functions_sheet
 from bifocal.workbook.making.georeference_sheet import georeference
+from bifocal.workbook.making.readme_sheet import readme_sheet
 from bifocal.workbook.making.reference_sheets import check, planning
 from bifocal.workbook.making.setup_sheet import setup_sheet
-from bifocal.workbook.words import WORDS, readme
+from bifocal.workbook.words import WORDS, word
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
 from photocore.workbook.making.live_columns import LiveColumn
@@ -29,8 +30,10 @@ from photocore.workbook.making.look import (
     BODY_FONT,
     DOUBT,
     GOOD,
+    HEAD_FONT,
     WARN_FONT,
     WRONG,
+    colour_where,
     colour_words,
     strike_out,
 )
@@ -54,8 +57,10 @@ FLAG_COLOURS = {
 _SCALE = 92
 #: Name of the column `use` of `Points`, for rules of other sheets, which may not name a table.
 USED = "points_use"
-#: Printed rows of the sheet `Readme`.
-_README_ROWS = 34
+#: Name of all cells below the heading of the names of `Points`, in the table or not.
+TYPED = "points_names"
+#: The last row of a sheet in Excel.
+_LAST_ROW = 1048576
 
 
 def write_book(path: Path | str, content: SurveyContent, *, overwrite: bool = False) -> None:
@@ -78,14 +83,12 @@ def build(content: SurveyContent) -> BookBuilder:
     builder = BookBuilder(language=content.language, words=WORDS)
     builder.book.properties.creator = "bifocal"
     builder.book.properties.title = "bifocal survey"
-    lines = readme(builder.language, media=bool(content.media_cells))
-    sketch = cameras_sketch(builder.word("nadir"), builder.word("sketch"))
-    builder.readme(lines, sketch, rows=_README_ROWS)
-    setup_sheet(builder, content)
     cells = point_cells(content)
+    readme_sheet(builder, content, cells)
+    setup_sheet(builder, content)
     _points(builder, content, cells)
     _results(builder, content, cells)
-    check(builder, content)
+    check(builder, content, cells)
     georeference(builder, content)
     planning(builder, content)
     charts(builder, content, cells)
@@ -143,6 +146,8 @@ def _long_sheet(
     flag, last = column_letters(keys.index("flag") + 1), HEAD + rows
     if "use" in keys:
         used = column_letters(keys.index("use") + 1)
+        builder.define(TYPED, f"'{name}'!$A${HEAD + 1}:$A${_LAST_ROW}")
+        _unlock_below(sheet, columns)
         builder.define(USED, f"'{name}'!${used}${HEAD + 1}:${used}${last}")
         unused = f"AND(ISNUMBER(${used}{HEAD + 1}),${used}{HEAD + 1}=0)"
     else:
@@ -158,6 +163,14 @@ def _long_sheet(
     return sheet
 
 
+def _unlock_below(sheet: SheetBuilder, columns: Sequence[LiveColumn]) -> None:
+    """Let points be typed below the table of a protected sheet, names staying as they are typed."""
+    for number, column in enumerate(columns, start=1):
+        if column.kind == "input":
+            whole = sheet.worksheet.column_dimensions[column_letters(number)]
+            whole.protection, whole.number_format = Protection(locked=False), column.number_format
+
+
 def printed_rows(content: SurveyContent) -> int:
     """Return how many points are printed: all there are, or one page of an empty form."""
     if content.points is None:
@@ -170,16 +183,19 @@ def print_area(sheet: str, columns: int, rows: int) -> str:
     return f"A{1 if sheet == 'Results' else HEAD - 1}:{column_letters(columns)}{HEAD + rows}"
 
 
-def unprinted_formula(words: str, rows: int) -> str:
-    """Return the formula of the warning that points stand below the printed rows."""
-    return f'IF(COUNTA(tblPoints[id])>{rows},"{words}","")'
+def unprinted_formula(language: str, rows: int) -> str:
+    """Return the formula of the warning that points stand below the printed rows, or the table."""
+    below = f"(COUNTA({TYPED})-COUNTA(tblPoints[id]))"
+    waiting = f'IF({below}>0," "&{below}&" {word("waiting", language)}","")'
+    unprinted = f'IF(COUNTA(tblPoints[id])>{rows},"{word("unprinted", language)}","")'
+    return f"{unprinted}&{waiting}"
 
 
 def _printed(sheet: SheetBuilder, area: str, content: SurveyContent) -> None:
     """Print only the rows that hold points, and say so where points stand below them."""
     name = sheet.worksheet.title
     sheet.worksheet.print_area = area
-    formula = unprinted_formula(sheet.book.word("unprinted"), printed_rows(content))
+    formula = unprinted_formula(sheet.book.language, printed_rows(content))
     sheet.formula("E1", formula, None, name=f"unprinted_{name}", font=WARN_FONT)
 
 
@@ -215,6 +231,14 @@ def _title_block(sheet: SheetBuilder, content: SurveyContent, results: Cells) ->
         sheet.worksheet.merge_cells(area)
         sheet.worksheet[left].alignment = _BLOCK_PLACE
     sheet.worksheet.row_dimensions[2].height = 42
+    words = {key: book.word(key) for key in STATES}
+    said, _ = world_state(words, content.georeference)
+    sheet.formula("H1", STATE, said, font=HEAD_FONT)
+    colour_where(sheet.worksheet, "H1", "g_alarm=1", WRONG)
+    for area in ("E1:G1", "H1:O1"):
+        sheet.worksheet.merge_cells(area)
+        sheet.worksheet[area[:2]].alignment = _BLOCK_PLACE
+    sheet.worksheet.row_dimensions[1].height = 40
 
 
 def _log(builder: BookBuilder, content: SurveyContent) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
+
 from photocore.workbook.making.sketch import Place, Sketch
 
 #: Colours that the colour-blind tell apart (Okabe and Ito); dashes and symbols say the same.
@@ -57,6 +60,53 @@ def cameras_sketch(nadir: str, told: str) -> Sketch:
         sketch.text(_at(0.3, d + 0.25), str(n), colour, size=13, bold=True)
         sketch.measure(_at(1.6, d), _at(1.6, d - c), f"c_{n}", colour, (14, 0))
     return sketch
+
+
+def hand_sketch(sketch: Sketch, top: float, words: Sequence[str]) -> None:
+    """Draw how points are measured by hand: from the nadir of a photo; photos of one scale.
+
+    Parameters
+    ----------
+    sketch : Sketch
+        The drawing of the cameras, to which these are added.
+    top : float
+        Where they begin. [pt]
+    words : sequence of str
+        The nadir, and what is as large on both photos.
+    """
+    nadir, alike = words
+    left, right, low, high = 20.0, 250.0, top + 160, top + 28
+    middle = ((left + right) / 2, (low + high) / 2)
+    _frame(sketch, (left, high), (right, low))
+    for start, end in (((left, low), (right, high)), ((left, high), (right, low))):
+        sketch.line(start, end, FAINT, width=0.5, dash="sysDot")
+    for end, name in (((right + 14, middle[1]), "x"), ((middle[0], high - 14), "y")):
+        sketch.line(middle, end, INK, width=0.75)
+        sketch.text((end[0] + 6, end[1] + 3), name, INK, italic=True)
+    sketch.dot(middle, INK, size=7)
+    sketch.text((middle[0] - 28, middle[1] + 14), nadir, INK, size=10)
+    base, seen = (middle[0] + 60, middle[1] - 30), (middle[0] + 90, middle[1] - 45)
+    sketch.measure(middle, seen, "s", FAR, (0, 16))
+    sketch.measure(base, seen, "e", POINT, (-6, -14))
+    sketch.dot(seen, POINT, size=9, form="diamond")
+    sketch.text((middle[0] + 14, middle[1] - 46), "θ", INK, italic=True)
+    below = low + 22
+    for number, corner, size in ((1, left, 110.0), (2, left + 120, 110.0)):
+        _frame(sketch, (corner, below), (corner + size, below + 85))
+        sketch.text((corner + 10, below + 12), str(number), (FAR, NEAR)[number - 1], bold=True)
+        window = corner + 22
+        _frame(sketch, (window, below + 30), (window + 30, below + 70), width=2.0)
+        sketch.dot((corner + (85, 100)[number - 1], below + 40), POINT, size=8, form="diamond")
+        sketch.measure((window, below + 78), (window + 30, below + 78), "", INK, (0, 0))
+    sketch.text((135, below + 97), alike, INK, size=10)
+
+
+def _frame(sketch: Sketch, first: Place, last: Place, *, width: float = 1.25) -> None:
+    """Draw a rectangle between two corners."""
+    (x0, y0), (x1, y1) = first, last
+    corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]
+    for start, end in pairwise(corners):
+        sketch.line(start, end, INK, width=width)
 
 
 def _camera(sketch: Sketch, d: float, c: float, colour: str, dash: str) -> None:

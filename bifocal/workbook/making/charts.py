@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from openpyxl.chart import BarChart, Reference, ScatterChart, Series
+import math
+
+import numpy as np
+from openpyxl.chart import BarChart, LineChart, Reference, ScatterChart, Series
 from openpyxl.chart.layout import Layout, ManualLayout
 from openpyxl.chart.shapes import GraphicalProperties
+from openpyxl.drawing.line import LineEndProperties
 from openpyxl.styles import Font
+from openpyxl.worksheet.pagebreak import Break
 
 from bifocal.workbook.content import CHART_ROWS, SurveyContent
+from bifocal.workbook.formulas.columns import FORMULAS
 from bifocal.workbook.making.reference_sheets import CHECK_HEAD
 from bifocal.workbook.words import word
 from photocore.workbook.changing.cells import CellValue
-from photocore.workbook.making.live_book import BookBuilder, Cells
-from photocore.workbook.making.live_charts import COLOURS, scatter, titled
+from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
+from photocore.workbook.making.live_charts import COLOURS, linked_title, scatter, titled
 from photocore.workbook.making.look import FACE, LABEL, LABEL_FONT
 from photocore.workbook.making.newbook import RowBlock
 from photocore.workbook.reading.grid import column_letters
@@ -22,6 +28,8 @@ HEAD = 4
 #: Column of the first chart data: far enough right to stay out of the charts' way.
 LEFT = 16
 KEYS = ("X", "Y", "s_c", "sigma_r")
+#: Edges between which errors at check points are counted, in sigmas; the outer ones hold all.
+_BINS = (-99, -3, -2, -1, 0, 1, 2, 3, 99)
 
 
 def charts(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
@@ -61,9 +69,107 @@ def charts(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
     sigma.y_axis.number_format = "General"  # 0.00 would say the same of 1 mm and of 4 mm
     sheet.worksheet.add_chart(sigma, "A32")
     _errors(builder, content)
+    _checked(sheet, content, cells, last + 4)
     sheet.finish()
-    sheet.worksheet.print_area = "A1:J65"
-    sheet.worksheet.page_setup.fitToHeight = 1
+    sheet.worksheet.print_area = "A1:J115"
+    sheet.worksheet.row_breaks.append(Break(id=57))
+    sheet.worksheet.page_setup.fitToHeight = 2
+
+
+def _checked(sheet: SheetBuilder, content: SurveyContent, cells: Cells, head: int) -> None:
+    """Draw how large the errors at check points are, and which way they point.
+
+    Parameters
+    ----------
+    sheet, content, cells
+        The sheet, what the workbook holds, and the columns of `Points`.
+    head : int
+        Row of the keys of their numbers, below those of the other charts.
+    """
+    told = sheet.book.word("chart_vectors").split("{n}")
+    bins, vectors = FORMULAS.columns("bins"), FORMULAS.columns("vectors")
+    counts, arrows, scale = _bin_cells(content), *_vector_cells(content)
+    (line,) = FORMULAS.columns("vectors", rows="lines")
+    place = f"{column_letters(LEFT + 6)}{head - 2}"
+    sheet.formula(place, line.formula, scale, form=line.number_format, name=line.key)
+    live = f'"{told[0]}"&{line.key}&"{told[1]}"'
+    said, at = f"{scale:g}".join(told), f"{column_letters(LEFT + 7)}{head - 2}"
+    sheet.formula(at, live, said, name="chart_vectors", font=LABEL_FONT)
+    rows = len(counts["sigmas_from"])
+    sheet.table("tblBins", bins, at=(head, LEFT + 6), rows=rows, cells=counts)
+    left, count = LEFT + 12, content.check_rows
+    sheet.table("tblVectors", vectors, at=(head, left), rows=count, cells=arrows)
+    area = {"min_row": head + 1, "max_row": head + rows}
+    bars, line_of = BarChart(), LineChart()
+    for chart, offset in ((bars, 9), (line_of, 10)):
+        numbers = Reference(sheet.worksheet, min_col=LEFT + offset, **area)
+        chart.series.append(Series(numbers, title=bins[offset - 6].key))
+        chart.set_categories(Reference(sheet.worksheet, min_col=LEFT + 6, **area))
+    bars.series[0].graphicalProperties = GraphicalProperties(solidFill=COLOURS[0])
+    line_of.series[0].graphicalProperties.line.solidFill = COLOURS[1]
+    line_of.series[0].smooth = False
+    bars.title, bars.legend = titled(sheet.book.word("chart_bins")), None
+    bars.x_axis.delete = bars.y_axis.delete = False
+    bars.height, bars.width, bars.gapWidth = 5.5, 16, 20
+    bars += line_of
+    sheet.worksheet.add_chart(bars, "A74")
+    ends = {"min_row": head + 1, "max_row": head + count}
+    x, y = (Reference(sheet.worksheet, min_col=left + i, **ends) for i in (1, 3))
+    plan = scatter("", "X [m]", "Y [m]", x, {"Y": y})
+    for row in range(head + 1, head + 1 + count):
+        x, y = (
+            Reference(sheet.worksheet, min_col=left + i, max_col=left + i + 1, min_row=row)
+            for i in (1, 3)
+        )
+        arrow = Series(y, x, title_from_data=False)
+        arrow.marker.symbol, arrow.smooth = "none", False
+        arrow.graphicalProperties.line.solidFill = COLOURS[1]
+        arrow.graphicalProperties.line.width = 15000
+        arrow.graphicalProperties.line.tailEnd = LineEndProperties(type="triangle")
+        plan.series.append(arrow)
+    plan.title = linked_title("Charts", at, said)
+    _equal_scales(plan, cells)
+    sheet.worksheet.add_chart(plan, "A87")
+
+
+def _bin_cells(content: SurveyContent) -> Cells:
+    """Return how many errors at check points lie between two numbers of sigmas."""
+    check = content.check
+    errors = np.zeros(0) if check is None else check.standardised[~np.isnan(check.standardised)]
+    shares = [math.erf(edge / math.sqrt(2)) / 2 for edge in _BINS]
+    above = np.array([(errors >= edge).sum() for edge in _BINS])
+    return {
+        "bin": [f"< {_BINS[1]}", *(f"{a} … {a + 1}" for a in _BINS[1:-2]), f"> {_BINS[-2]}"],
+        "sigmas_from": list(_BINS[:-1]),
+        "sigmas_to": list(_BINS[1:]),
+        "counted": (above[:-1] - above[1:]).tolist(),
+        "expected": (len(errors) * np.diff(shares)).tolist(),
+    }
+
+
+def _vector_cells(content: SurveyContent) -> tuple[Cells, float]:
+    """Return the ends of the arrows of errors at check points, and how often they are enlarged."""
+    count, check = content.check_rows, content.check
+    start, tip, scale = np.full((count, 2), np.nan), np.full((count, 2), np.nan), 1.0
+    if check is not None and len(check.errors):
+        errors, known = check.errors[:, :2], content.known.xyz[:, :2]
+        span = max(
+            (
+                np.nanmax(column, initial=-np.inf) - np.nanmin(column, initial=np.inf)
+                for column in check.solved[:, :2].T
+            ),
+            default=0.0,
+        )
+        largest = np.nanmax(np.abs(errors), initial=0.0)
+        if largest > 0 and span > 0:
+            raw = float(0.15 * span / largest)
+            scale = round(raw, -math.floor(math.log10(raw)))
+        both = ~np.isnan(errors).any(axis=1, keepdims=True)
+        start[: len(errors)] = np.where(both, known, np.nan)
+        tip[: len(errors)] = start[: len(errors)] + scale * errors
+    ends = {f"{axis}_from": start[:, i].tolist() for i, axis in enumerate("XY")}
+    ends |= {f"{axis}_to": tip[:, i].tolist() for i, axis in enumerate("XY")}
+    return {"check_row": list(range(1, count + 1)), **ends}, scale
 
 
 def _equal_scales(chart: ScatterChart, cells: Cells) -> None:
@@ -98,7 +204,7 @@ def _errors(builder: BookBuilder, content: SurveyContent) -> None:
     chart = BarChart()
     chart.type, chart.style, chart.legend = "col", 10, None
     chart.title = titled(word("chart_error", language))
-    rows = max(len(content.known), 8)
+    rows = content.check_rows
     errors = Reference(sheet, min_col=11, min_row=CHECK_HEAD + 1, max_row=CHECK_HEAD + rows)
     names = Reference(sheet, min_col=1, min_row=CHECK_HEAD + 1, max_row=CHECK_HEAD + rows)
     series = Series(errors, title="dZ")
@@ -109,4 +215,4 @@ def _errors(builder: BookBuilder, content: SurveyContent) -> None:
     chart.x_axis.tickLblPos, chart.y_axis.title = "low", titled("dZ [m]", 1000)
     chart.y_axis.number_format = "General"
     chart.height, chart.width = 7, 16
-    builder.book["Charts"].add_chart(chart, "A49")
+    builder.book["Charts"].add_chart(chart, "A58")

@@ -6,16 +6,18 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from bifocal.survey.remarks import LARGEST_RESIDUAL, SCALE_SHARE
 from bifocal.survey.space_similarity import SpaceSums
 from bifocal.survey.weighted_similarity import TURNS
 from bifocal.workbook.content import SurveyContent, control_cells
 from bifocal.workbook.formulas.columns import FORMULAS, georeference_columns
 from bifocal.workbook.formulas.georeference_values import georeference_values
 from bifocal.workbook.formulas.space_block import STEP_FORM, SpaceBlock
+from bifocal.workbook.formulas.world_state import STATE, STATES, world_state, world_state_formula
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
 from photocore.workbook.making.live_columns import LiveColumn
-from photocore.workbook.making.look import LABEL_FONT
+from photocore.workbook.making.look import HEAD_FONT, LABEL_FONT, NOTE_FONT, WRONG, colour_where
 from photocore.workbook.reading.grid import column_letters
 
 #: Row of the keys of the control points; model and parameters stand above.
@@ -23,7 +25,7 @@ CONTROL_HEAD = 12
 #: First column and rows of the steps of the fit: above the folded columns of the table.
 _LEFT, _TOP, _ROWS = 10, 3, 8
 #: Where the residuals stand, and how far right of them the steps go on.
-_RESIDUALS, _BESIDE = 40, 4
+_RESIDUALS, _BESIDE = 50, 6
 #: Where the words of the head stand, and its formulas: those of `formulas.toml`, in their order.
 _WORDS = {
     **{f"A{4 + i}": f"geo_{word}" for i, word in enumerate(("model", "auto", "used"))},
@@ -40,7 +42,8 @@ _HEAD = (
 def georeference(builder: BookBuilder, content: SurveyContent) -> None:
     """Write control points, the closed-form transformation and the residuals."""
     rows, geo = content.control_rows, content.georeference
-    sheet = builder.sheet("Georeference", "geo_how")
+    sheet = builder.sheet("Georeference")
+    sheet.word("A3", "geo_how", NOTE_FONT)
     for cell, key in _WORDS.items():
         sheet.word(cell, key)
     sheet.input("B4", content.model, name="g_model")
@@ -53,13 +56,20 @@ def georeference(builder: BookBuilder, content: SurveyContent) -> None:
         value = values.get(line.key)
         sheet.formula(cell, line.formula, value, form=line.number_format, name=line.key)
     sums = None if geo is None else geo.sums
+    words = {key: builder.word(key) for key in STATES}
+    said, values["g_alarm"] = world_state(words, geo)
+    sheet.formula("A2", world_state_formula(words), said, name=STATE, font=HEAD_FONT)
+    colour_where(sheet.worksheet, "A2", "g_alarm=1", WRONG)
     space = SpaceBlock(sheet, sums if isinstance(sums, SpaceSums) else None)
     _write_steps(sheet, FORMULAS.columns("georeference", rows="steps", parts=_parts(space)), values)
     cells = control_cells(content)
     columns = georeference_columns(is_pair=content.is_pair)
     sheet.table("tblGeo", columns, at=(CONTROL_HEAD, 1), rows=rows, cells=cells)
     space.finish()
-    for letter, width in (("A", 30), ("G", 13), ("H", 13), ("I", 13)):
+    last = column_letters(len(columns))
+    marked = f"A{CONTROL_HEAD + 1}:{last}{CONTROL_HEAD + rows}"
+    colour_where(sheet.worksheet, marked, f'${last}{CONTROL_HEAD + 1}="CHECK"', WRONG, bold=True)
+    for letter, width in (("A", 25), ("G", 12.5), ("H", 12.5), ("I", 12.5)):
         sheet.worksheet.column_dimensions[letter].width = width
     repeat = f"{CONTROL_HEAD - 1}:{CONTROL_HEAD}"
     sheet.finish(landscape=True, freeze=f"B{CONTROL_HEAD + 1}", repeat=repeat)
@@ -69,6 +79,8 @@ def _parts(space: SpaceBlock) -> dict[str, str]:
     """Return what the steps name of the block of the model 3D, and how many turns there are."""
     return {
         "last": str(TURNS),
+        "scale_share": f"{SCALE_SHARE:g}",
+        "residual": f"{LARGEST_RESIDUAL:g}",
         "turns": " ".join(f"{i}:{i - 1}" for i in range(2, TURNS + 1)),
         "entries": space.entries.range,
         **{f"shift_{axis}": space.shift.column(n) for n, axis in enumerate("XYZ")},

@@ -14,22 +14,30 @@ from bifocal.workbook.formulas.columns import (
     FRAME_SHARES,
     PLANNED_RELIEF,
     PLANNING,
+    check_columns,
     planning_facts,
 )
 from bifocal.workbook.words import word
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
-from photocore.workbook.making.look import GOOD, HEAD_FONT, WRONG, colour_words
+from photocore.workbook.making.look import (
+    DOUBT,
+    GOOD,
+    HEAD_FONT,
+    WRONG,
+    colour_where,
+    colour_words,
+)
 from photocore.workbook.reading.grid import column_letters
 
 #: Row of the keys of the check table; statistics stand above.
 CHECK_HEAD = 12
 _SENSOR = ("sensor_w", "sensor_h")
 #: First column of the verdict, beside the check table.
-VERDICT_LEFT = 14
+VERDICT_LEFT = 20
 
 
-def check(builder: BookBuilder, content: SurveyContent) -> None:
+def check(builder: BookBuilder, content: SurveyContent, points: Cells) -> None:
     """Write errors at check points, their statistics and the verdict."""
     rows = content.check_rows
     sheet = builder.sheet("Check", "check_how")
@@ -52,16 +60,29 @@ def check(builder: BookBuilder, content: SurveyContent) -> None:
     sheet.formula(
         "B9", 'IF(COUNT(B6:D6)=0,"",MAX(B6:D6))', worst, form="0.0000", name="check_worst"
     )
-    cells = check_cells(content)
-    sheet.table("tblCheck", FORMULAS.columns("check"), at=(CHECK_HEAD, 1), rows=rows, cells=cells)
-    sheet.worksheet.column_dimensions["A"].width = 22
-    for letter in ("L", "M"):
+    sheet.word("A10", "flagged")
+    flagged = 0 if content.check is None else len(content.check.flagged)
+    sheet.formula("B10", "SUM(tblCheck[out])", flagged, form="0", name="check_flagged")
+    columns = check_columns()
+    cells = check_cells(content, points)
+    sheet.table("tblCheck", columns, at=(CHECK_HEAD, 1), rows=rows, cells=cells)
+    sheet.worksheet.column_dimensions["A"].width = 18
+    for letter in ("R", "S"):
         sheet.worksheet.column_dimensions[letter].width = 1.5
+    keys = [column.key for column in columns]
+    first, end = CHECK_HEAD + 1, column_letters(len(columns))
+    area = f"A{first}:{end}{CHECK_HEAD + rows}"
+    out, sigmas = (f"${column_letters(keys.index(key) + 1)}{first}" for key in ("out", "sigmas"))
+    for formula, colour in _ROWS.items():
+        formula = formula.format(out=out, sigmas=sigmas)
+        colour_where(sheet.worksheet, area, formula, colour, bold=True, stop=True)
     _verdict(sheet, content, accuracy)
     repeat = f"{CHECK_HEAD - 1}:{CHECK_HEAD}"
     sheet.finish(landscape=True, freeze=f"B{CHECK_HEAD + 1}", repeat=repeat)
 
 
+#: Rows that are coloured: not counted, beyond three sigma, beyond two.
+_ROWS = {"{out}=1": DOUBT, "N({sigmas})>3": WRONG, "N({sigmas})>2": ("FFF2CC", "7F6000")}
 #: Statistics of errors: formula of their column and the cell of their number, attribute.
 _STATISTICS = {
     "n": ("COUNT({0})", "n"),

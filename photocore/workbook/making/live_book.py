@@ -311,7 +311,7 @@ class SheetBuilder:
             self.input(place, value, form=form)
         if column.kind == "value":
             cell.fill, cell.protection = PatternFill(), Protection(locked=True)
-        if column.key in ("flag", "use", "verdict"):
+        if column.key in ("flag", "use", "verdict", "fit"):
             cell.alignment = Alignment(horizontal="center")
         elif column.key == "id":
             cell.alignment = Alignment(horizontal="left")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from openpyxl.chart import Reference, ScatterChart, Series
+from openpyxl.chart.data_source import StrData, StrRef, StrVal
 from openpyxl.chart.shapes import GraphicalProperties
 from openpyxl.chart.text import RichText, Text
 from openpyxl.chart.title import Title
@@ -14,6 +15,7 @@ from openpyxl.drawing.text import (
     ParagraphProperties,
     RegularTextRun,
 )
+from openpyxl.utils import absolute_coordinate
 
 from photocore.workbook.making.look import BLUE
 
@@ -29,6 +31,15 @@ def titled(text: str, size: int = _TITLE) -> Title:
     run = RegularTextRun(rPr=font, t=text)
     paragraph = Paragraph(pPr=ParagraphProperties(defRPr=font), r=[run])
     return Title(tx=Text(rich=RichText(p=[paragraph])), overlay=False)
+
+
+def linked_title(sheet: str, cell: str, text: str) -> Title:
+    """Return a title that follows a cell; ``text`` is what the cell says now."""
+    cache = StrData(ptCount=1, pt=[StrVal(idx=0, v=text)])
+    font = CharacterProperties(sz=_TITLE, b=True)
+    look = RichText(p=[Paragraph(pPr=ParagraphProperties(defRPr=font))])
+    place = f"'{sheet}'!{absolute_coordinate(cell)}"
+    return Title(tx=Text(strRef=StrRef(f=place, strCache=cache)), txPr=look, overlay=False)
 
 
 def scatter(

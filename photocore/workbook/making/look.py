@@ -66,14 +66,30 @@ def colour_words(
     stop: bool | None = None,
 ) -> None:
     """Colour the cells of a column, fill and ink, by the word they hold, which tells the same."""
-    for text, (fill, ink) in colours.items():
-        rule = FormulaRule(
-            formula=[f'${area.partition(":")[0]}="{text}"'],
-            fill=PatternFill("solid", start_color=fill, end_color=fill),
-            font=Font(color=ink, bold=text in bold) if bold else Font(color=ink),
-            stopIfTrue=stop,
-        )
-        sheet.conditional_formatting.add(area, rule)
+    first = area.partition(":")[0]
+    for text, colour in colours.items():
+        weight = (text in bold) if bold else None
+        colour_where(sheet, area, f'${first}="{text}"', colour, bold=weight, stop=stop)
+
+
+def colour_where(
+    sheet: Worksheet,
+    area: str,
+    formula: str,
+    colour: tuple[str, str],
+    *,
+    bold: bool | None = None,
+    stop: bool | None = None,
+) -> None:
+    """Colour the cells of an area, fill and ink, where a formula holds."""
+    fill, ink = colour
+    rule = FormulaRule(
+        formula=[formula],
+        fill=PatternFill("solid", start_color=fill, end_color=fill),
+        font=Font(color=ink) if bold is None else Font(color=ink, bold=bold),
+        stopIfTrue=stop,
+    )
+    sheet.conditional_formatting.add(area, rule)
 
 
 def strike_out(sheet: Worksheet, area: str, formula: str) -> None:

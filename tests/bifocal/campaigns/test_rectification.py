@@ -8,12 +8,24 @@ import os
 from pathlib import Path
 
 import cv2
+import ezdxf
 import numpy as np
 import pytest
+import rasterio
 from click.testing import CliRunner
 
-from bifocal import Control, GeometryError, InputError, Interior, Pinhole, RadialDivision, rectify
+from bifocal import (
+    Control,
+    GeometryError,
+    InputError,
+    Interior,
+    Lens,
+    Pinhole,
+    RadialDivision,
+    rectify,
+)
 from tests.bifocal.orientation.test_facade_lines import MATRIX, SIZE, drawn, view
+from tests.bifocal.orthophotos.test_cli_ortho import page_of
 from tests.builders.commands import bifocal_command
 from tests.builders.pinholes import project
 
@@ -169,6 +181,10 @@ def test_points_on_one_line_are_refused_and_three_of_four_doubted() -> None:
         rectify(image, gsd=0.1, control=control(CORNERS[:3]))
     with pytest.raises(InputError, match="one of control, rectangle and length"):
         rectify(image, gsd=0.1, control=control(), length=([[0, 0], [9, 9]], 1.0))
+    with pytest.raises(InputError, match="its interior is of another size"):
+        rectify(image[:-1], control=control(), interior=LENS)
+    with pytest.raises(InputError, match="expected shape"):
+        rectify(image[0], control=control())
 
 
 def test_a_part_cut_out_of_a_photo_is_taken_as_one() -> None:
@@ -245,3 +261,25 @@ def test_a_drawing_says_what_relief_does(church: Path) -> None:
     names = {path.name for path in (church / "drawing").iterdir()}
     assert names == {"far.tif", "far.tfw", "far.png", "far.dxf", "far.pdf"}
     assert cv2.imread(str(church / "drawing" / "far.png")).shape[1] > 1000
+    page = page_of(church / "drawing" / "far.pdf")
+    assert "Ciò che sporge di 20 cm è spostato fino a 2" in page
+    assert "foto lontana" not in page
+    drawing = ezdxf.readfile(church / "drawing" / "far.dxf").modelspace()
+    assert len(drawing.query('*[layer=="BIFOCAL_CONTROL"]')) >= 12
+    with rasterio.open(church / "drawing" / "far.tif") as picture:
+        assert picture.descriptions == ("red", "green", "blue", "source")
+        assert set(np.unique(picture.read(4))) == {0, 1}
+        assert "BIFOCAL_D2" not in picture.tags()
+
+
+def test_a_known_lens_straightens_the_photo() -> None:
+    lens = Lens(camera_matrix=MATRIX, coefficients=[-0.3, 0.05, 0, 0, 0], image_size=SIZE)
+    picks = lens.distort(seen(DOTS[::2]))
+    known = Interior.from_lens(lens, source="lens.json")
+    image = np.zeros(SIZE[::-1], np.uint8)
+    photo = rectify(image, control=control(DOTS[::2], pixels1=picks), interior=known, gsd=0.1).photo
+    assert np.abs(photo.left_out).max() < 0.001
+    assert photo.camera.centre == pytest.approx(CAMERA.centre, abs=0.005)
+    points = control(DOTS[::2], pixels1=picks)
+    bent = rectify(image, control=points, interior=LENS, sigma_pick=0.1, gsd=0.1)
+    assert any("a lens that bends (--lens)" in note for note in bent.remarks)

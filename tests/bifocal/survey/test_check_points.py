@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from bifocal.survey.tolerances import RULES, judge, sentence
 def table(z):
     n = len(z)
     columns = {"X": np.zeros(n), "Y": np.ones(n), "Z": np.array(z, dtype=float)}
+    columns |= dict.fromkeys(("sigma_X", "sigma_Y", "sigma_r"), np.full(n, 0.01))
     return ReliefTable(
         ids=tuple(f"P{i}" for i in range(n)), columns=columns, flags=("OK",) * n,
         standardised=np.zeros(n), formula_cells={}, image_scale=500.0,
@@ -65,3 +68,24 @@ def test_fixed_tolerances_speak_only_of_their_scales():
 def test_a_rule_needs_one_kind_of_tolerance():
     with pytest.raises(InputError, match="one of them"):
         ToleranceRule(key="x", name="x")
+
+
+def test_flagged_points_are_named_and_do_not_count():
+    flags = ("OK", "OFF-RADIAL", "UNCERTAIN", "WEAK", "ON-PLANE", "CHECK")
+    measured = replace(table([0.11, 9.0, 8.0, 0.42, 0.5, np.nan]), flags=flags)
+    known = relief([f"P{i}" for i in range(6)], [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    check = check_points(measured, known)
+    assert check.flagged == {"P1": "OFF-RADIAL", "P2": "UNCERTAIN", "P5": "CHECK"}
+    assert check.axes["Z"].n == 3
+    assert check.axes["Z"].max_abs == pytest.approx(0.02)
+    assert np.isnan(check.errors[[1, 2, 5]]).all()
+    (said,) = check.remarks
+    assert "P1 (OFF-RADIAL), P2 (UNCERTAIN), P5 (CHECK)" in said
+    unused = check_points(measured, replace(known, use=np.array([True, False, False] * 2)))
+    assert unused.flagged == {}
+
+
+def test_errors_are_told_in_sigmas_of_the_point():
+    check = check_points(table([0.11, 0.2]), relief(["P0", "P1"], [0.1, 0.26]))
+    np.testing.assert_allclose(check.standardised[:, 2], [1.0, -6.0])
+    assert np.isnan(check.standardised[:, :2]).all()

@@ -111,7 +111,7 @@ def test_the_clients_own_tolerance_is_judged_and_written(tmp_path):
     assert "0.2 mm: holds 1:50 (10 mm), fails 1:20 (4 mm)" in result.stdout
     assert "2 cm: holds 1:10 (20 mm)" in result.stdout
     sheet = openpyxl.load_workbook(out, data_only=True)["Check"]
-    assert [sheet["N13"].value, sheet["P15"].value, sheet["Q15"].value] == ["0.2 mm", 10.0, "holds"]
+    assert [sheet["T13"].value, sheet["V15"].value, sheet["W15"].value] == ["0.2 mm", 10.0, "holds"]
     refused(path, "nor a length", options=("--tolerance-rule", "3 miles"))
 
 

@@ -1,0 +1,1 @@
+"""Finished projects of other programs become sets of photos, and sets go on in other programs."""

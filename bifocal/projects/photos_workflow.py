@@ -1,0 +1,336 @@
+"""A finished project of another program in, a set of photos out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePath
+
+import numpy as np
+
+from bifocal.model.lens import Lens
+from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
+from bifocal.model.photo_set import PhotoSet
+from bifocal.projects.project_points import chosen, read_points, sparse_points
+from bifocal.projects.scale import by_control, by_length, of_cameras
+from bifocal.projects.wall_frame import found_frame, framed, turned_by_lines
+from bifocal.remarks import remark
+from photocore.arrays import FloatArray
+from photocore.camera.lensformats import lens_data
+from photocore.camera.pinhole import Pinhole, plane_from_pixel
+from photocore.camera.similarity import Similarity
+from photocore.errors import InputError
+from photocore.images import image_info
+from photocore.output import all_or_none, check_not_input, check_writable, relative_name
+from photocore.programs.model import ForeignProject, ForeignView
+from photocore.programs.photos import PhotoFinder
+from photocore.programs.projects import read_foreign_project
+
+#: Length of a unit that a project may be in. [m]
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+#: Points of a wall whose spread across their line is a smaller share say nothing of its plane.
+NARROWEST = 0.05
+#: Of the wall's points, what a photo must show to belong to the set.
+LEAST_SHARE = 0.02
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProjectOptions:
+    """What is known of a project beside its files.
+
+    Attributes
+    ----------
+    images : path, optional
+        Folder of the photos.  [default: searched about the project]
+    cloud : path, optional
+        Points in the project's frame, where it has none.
+    points : path, optional
+        Table of named points: id, photo, col, row; or id, x, y, z.
+    wall : tuple of str
+        Names of three points of the wall or more; none: the largest façade is found.
+    horizontal : tuple of str
+        Names of two points on a level line.
+    control : path, optional
+        Table id, X, Y, r: frame and scale.
+    length : tuple of str
+        Names of two points and the metres between them.
+    sigma_length, sigma_control : float
+        Standard deviations. [m]
+    unit : str, optional
+        Of the project's lengths, a key of `UNITS`.
+    """
+
+    images: Path | None = None
+    cloud: Path | None = None
+    points: Path | None = None
+    wall: tuple[str, ...] = ()
+    horizontal: tuple[str, ...] = ()
+    control: Path | None = None
+    length: tuple[str, ...] = ()
+    sigma_length: float = 0.003
+    sigma_control: float = 0.003
+    unit: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.wall and len(self.wall) < 3:
+            raise InputError(f"--wall: three points or more, found {len(self.wall)}.")
+        if self.horizontal and len(self.horizontal) != 2:
+            raise InputError(f"--horizontal: two points, found {len(self.horizontal)}.")
+        if self.control and (self.length or self.wall or self.horizontal or self.unit):
+            raise InputError(
+                "--control: gives frame and scale; leave out --wall, --horizontal, --length and "
+                "--unit."
+            )
+        if self.length and self.unit:
+            raise InputError("--length and --unit: both give the scale; leave one out.")
+        for option in ("wall", "horizontal", "control", "length"):
+            if getattr(self, option) and self.points is None:
+                raise InputError(f"--{option}: needs --points, the table of the points it names.")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProjectPhotos:
+    """A set made from a project.
+
+    Attributes
+    ----------
+    photos : PhotoSet
+    program : str
+        Whose project it was.
+    scale : str
+        What makes its lengths metres.
+    remarks : tuple of str
+        What the user should be told.
+    """
+
+    photos: PhotoSet
+    program: str
+    scale: str
+    remarks: tuple[str, ...]
+
+
+def photos_from_project(
+    project: Path | str,
+    out: Path | str,
+    options: ProjectOptions | None = None,
+    *,
+    overwrite: bool = False,
+) -> ProjectPhotos:
+    """Make a set of photos of a wall from another program's project, and write its file.
+
+    Parameters
+    ----------
+    project : path
+        File or folder of COLMAP, Metashape, OpenSfM or OpenDroneMap, AliceVision or Meshroom,
+        OpenMVG, Bundler.
+    out : path
+        File of the set, or ``*.pair.json`` for the two photos that promise the best relief; lens
+        files are written beside it.
+    options : ProjectOptions, optional
+        What is known beside the project.
+    overwrite : bool
+        Whether files that exist may be replaced.
+
+    Returns
+    -------
+    ProjectPhotos
+        The set, what gave its scale, and what to say of it.
+
+    Raises
+    ------
+    InputError, GeometryError
+        Naming what in the project cannot be used, or what is needed beside it.
+    """
+    project, out, options = Path(project), Path(out), options or ProjectOptions()
+    check_not_input(out, project, options.points, options.control)
+    check_writable(out, overwrite=overwrite)
+    finder = PhotoFinder(project, options.images)
+    read = read_foreign_project(project, finder)
+    files = {view.name: finder.find(view.name) for view in read.views}
+    upright = [_upright(view, files[view.name]) for view in read.views]
+    read = read._replace(views=tuple(upright))
+    frame, wall, covariance, scale, said = _frame(read, options)
+    views, left = _of_the_wall(read.views, frame, wall)
+    if left:
+        said.append(remark("projects.left_out", count=len(left), names=", ".join(left[:5])))
+    if len(views) < 2:
+        raise InputError(
+            f"{project}: {len(views)} of {len(read.views)} photos show the wall from its front; "
+            "two are needed. Name three points of the wall with --points and --wall."
+        )
+    if not (options.horizontal or options.control or read.metres):
+        seen = [(_camera(view, frame), Lens(**view.lens._asdict()), path)
+                for view in views if (path := files[view.name])]  # fmt: skip
+        frame, turned = turned_by_lines(frame, seen)
+        said += turned
+    doubts = [remark("projects.no_precision")]
+    if not scale:
+        scale = remark("projects.no_scale")
+        doubts.insert(0, scale)
+    with all_or_none():
+        photos = _photos(views, frame, files, out, overwrite=overwrite)
+        missing = [one.file for one in photos if not (out.parent / one.file).is_file()]
+        if missing:
+            about = {"count": len(missing), "names": ", ".join(missing[:5])}
+            said.append(remark("projects.no_photos", **about))
+        setup = {"way": f"project of {read.program}", "scale": scale, "doubts": doubts}
+        centres = [np.array([*photo.nadir, photo.distance]) for photo in photos]
+        made = PhotoSet(
+            photos=tuple(photos), folder=out.parent, extra={"setup": setup},
+            orientation=of_cameras(centres, covariance) if covariance.any() else None,
+        )  # fmt: skip
+        written: PhotoSet | Pair = made
+        if out.name.endswith(".pair.json"):
+            if not (ranked := made.pairs()):
+                raise InputError(f"{out}: no two photos of the wall tell its relief; write a set.")
+            written = made.pair(ranked[0].far, ranked[0].near)
+        written.write(out, overwrite=overwrite)
+    return ProjectPhotos(
+        photos=made, program=read.program, scale=scale, remarks=(*read.remarks, *said, *doubts)
+    )
+
+
+def _frame(
+    project: ForeignProject, options: ProjectOptions
+) -> tuple[Similarity, FloatArray, FloatArray, str, list[str]]:
+    """Return the wall's frame, points of it, the frame's covariance, its scale, what to say."""
+    named = {} if options.points is None else read_points(options.points, project.views)
+    if options.control is not None:
+        frame, covariance, fits = by_control(named, options.control, options.sigma_control)
+        places = np.array(list(named.values()))
+        return frame, places, covariance, remark("projects.by_control"), [fits]
+    points = sparse_points(project, options.cloud)
+    said: list[str] = []
+    level = chosen(named, options.horizontal, "--horizontal") if options.horizontal else None
+    if options.wall:
+        points = chosen(named, options.wall, "--wall")
+        middle = points.mean(axis=0)
+        _, spread, axes = np.linalg.svd(points - middle, full_matrices=False)
+        if spread[1] < NARROWEST * spread[0]:
+            raise InputError("--wall: its points lie nearly on one line; add one well beside it.")
+        frame = framed(project, axes[2], points, level)
+    else:
+        frame, points, said = found_frame(project, points, level)
+    covariance, scale = np.zeros((7, 7)), ""
+    if options.length:
+        *ends, metres = options.length
+        length = _metres(metres, ends)
+        between = chosen(named, tuple(ends), "--length")
+        frame, covariance = by_length(frame, between, length, options.sigma_length)
+        scale = remark("projects.by_length", ends=" - ".join(ends), length=length)
+    elif options.unit:
+        frame = replace(frame, scale=UNITS[options.unit])
+        scale = remark("projects.by_unit", unit=options.unit)
+    elif project.metres:
+        scale = remark("projects.by_project", by=project.metres)
+    return frame, points, covariance, scale, said
+
+
+def _metres(text: str, ends: Sequence[str]) -> float:
+    try:
+        length = float(text)
+    except ValueError:
+        length = 0.0
+    if len(ends) != 2 or not 0 < length < 1e5 or ends[0] == ends[1]:
+        raise InputError("--length: expected two names and metres above zero, e.g. A,B,4.20.")
+    return length
+
+
+def _of_the_wall(
+    views: Sequence[ForeignView], frame: Similarity, wall: FloatArray
+) -> tuple[list[ForeignView], list[str]]:
+    """Return the photos that show the wall from its front, and the names of the others."""
+    placed, left, places = [], [], frame(wall)
+    for view in views:
+        camera = _camera(view, frame)
+        size = np.array(view.lens.image_size)
+        inside = 0
+        if camera.centre[2] > 0 and camera.rotation[2, 2] < 0:
+            away = (places - camera.centre) @ (camera.matrix @ camera.rotation).T
+            ahead = away[away[:, 2] > 0]
+            pixels = ahead[:, :2] / ahead[:, 2:]
+            inside = int(((pixels > -0.5) & (pixels < size - 0.5)).all(axis=1).sum())
+        if inside >= max(1.0, LEAST_SHARE * len(places)):
+            placed.append(view)
+        else:
+            left.append(PurePath(view.name).name)
+    return placed, left
+
+
+def _camera(view: ForeignView, frame: Similarity) -> Pinhole:
+    return Pinhole(view.lens.camera_matrix, view.rotation @ frame.rotation.T, frame(view.centre))
+
+
+def _photos(
+    views: Sequence[ForeignView], frame: Similarity, files: Mapping[str, Path | None], out: Path, *,
+    overwrite: bool,
+) -> list[Photo]:  # fmt: skip
+    """Return the photos in the wall's frame; write their lenses beside the set."""
+    stem = out.name.split(".")[0]
+    written: dict[tuple[object, ...], tuple[Lens, str]] = {}
+    photos = []
+    for view in views:
+        lens, found = Lens(**view.lens._asdict()), files[view.name]
+        key = (lens.camera_matrix.tobytes(), lens.coefficients.tobytes(), lens.image_size)
+        name = ""
+        if lens.coefficients.any() or lens.model == "fisheye":
+            if key not in written:
+                name = f"{stem}.lens{len(written) + 1}.json"
+                lens.write(out.with_name(name), overwrite=overwrite)
+                written[key] = lens, name
+            lens, name = written[key]
+        camera = _camera(view, frame)
+        photos.append(
+            Photo(
+                plane_from_pixel=plane_from_pixel(camera),
+                nadir=camera.centre[:2],
+                distance=float(camera.centre[2]),
+                file=relative_name(found, out.parent) if found else PurePath(view.name).name,
+                lens=lens if name else None,
+                image_size=lens.image_size,
+                extra={"lens": name} if name else {},
+            )
+        )
+    return photos
+
+
+def _upright(view: ForeignView, path: Path | None) -> ForeignView:
+    """Return a photo as its file shows it, turned upright as its EXIF data say.
+
+    Other programs leave that out of account: the size that they state tells.
+
+    Raises
+    ------
+    InputError
+        If it is of another size, or turned so that its size does not tell.
+    """
+    if path is None:
+        return view
+    info, size = image_info(path), tuple(map(int, view.lens.image_size))
+    if info.size == size and info.orientation in (1, 6, 8):
+        return view
+    if info.orientation in (6, 8) and info.size == size[::-1]:
+        # (x, y) becomes (-y, x) or (y, -x), and so does the vector of tangential terms (p2, p1).
+        clockwise = info.orientation == 6
+        lens, quarter = view.lens, np.array([[0.0, -1.0], [1.0, 0.0]])
+        quarter = quarter if clockwise else quarter.T
+        fx, fy = lens.camera_matrix.diagonal()[:2]
+        column, row = quarter @ lens.camera_matrix[:2, 2]
+        middle = (column + size[1] - 1, row) if clockwise else (column, row + size[0] - 1)
+        terms = lens.coefficients.copy()
+        if lens.model == "opencv" and len(terms) >= 4:
+            terms[[3, 2]] = quarter @ terms[[3, 2]]
+        turned = lens_data(
+            (fy, fx), middle, terms.tolist(), info.size, lens.source,
+            fisheye=lens.model == "fisheye",
+        )  # fmt: skip
+        rotation = view.rotation.copy()
+        rotation[:2] = quarter @ rotation[:2]
+        return view._replace(lens=turned, rotation=rotation)
+    turn = f", turned by its EXIF data ({info.orientation})" if info.orientation != 1 else ""
+    raise InputError(
+        f"{path}: is {info.size[0]} x {info.size[1]} px{turn}, its project says {size[0]:g} x "
+        f"{size[1]:g} px. Name the folder of the photos that were processed with --images; save "
+        "turned ones upright and process them there again."
+    )

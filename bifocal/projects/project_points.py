@@ -1,0 +1,130 @@
+"""Points of another program's project: its own, a cloud's, and those that were picked in photos."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path, PurePath
+
+import numpy as np
+
+from bifocal.model.lens import Lens
+from photocore.arrays import FloatArray
+from photocore.camera.pinhole import Pinhole, rays_meeting
+from photocore.cloud import open_cloud
+from photocore.errors import InputError, WorkbookError
+from photocore.programs.model import ForeignProject, ForeignView
+from photocore.tables import Column, Table, read_table
+
+COLUMNS = (
+    Column("id", ("point", "name", "punto", "punkt"), kind="text", required=True),
+    Column("photo", ("image", "camera", "foto", "bild"), kind="text"),
+    Column("col", ("column", "colonna", "spalte"), unit="px"),
+    Column("row", ("riga", "zeile"), unit="px"),
+    Column("x", ("X model",)),
+    Column("y", ("Y model",)),
+    Column("z", ("Z model",)),
+)
+#: Points among which the wall is looked for; more tell no better.
+MOST_POINTS = 20_000
+
+
+def sparse_points(project: ForeignProject, cloud: Path | None) -> FloatArray:
+    """Return points of a project, or of a cloud in its frame, shape (n, 3)."""
+    points = project.points
+    if cloud is not None:
+        pieces = [piece.xyz for piece in open_cloud(cloud).pieces()]
+        points = np.concatenate(pieces) if pieces else np.empty((0, 3))
+    points = points[np.isfinite(points).all(axis=1)]
+    return points[:: 1 + len(points) // MOST_POINTS]
+
+
+def read_points(path: Path, views: tuple[ForeignView, ...]) -> dict[str, FloatArray]:
+    """Return named points in the project's frame: its coordinates, or picked in its photos.
+
+    Parameters
+    ----------
+    path : path
+        Table: id with x, y, z; or id, photo, col, row, a row for each photo that shows the point.
+    views : tuple of ForeignView
+
+    Returns
+    -------
+    dict
+        Name to coordinates, shape (3,). [unit of the project]
+
+    Raises
+    ------
+    InputError
+        Naming every bad cell, or the point that cannot be intersected.
+    """
+    table = read_table(path, COLUMNS)
+    if {"x", "y", "z"} <= table.present:
+        xyz = np.column_stack([table.numbers(key) for key in ("x", "y", "z")])
+        if errors := table.repeated("id"):
+            raise WorkbookError(errors)
+        named = zip(table.texts("id"), xyz, strict=True)
+        return {name: place for name, place in named if np.isfinite(place).all()}
+    if not {"photo", "col", "row"} <= table.present:
+        raise InputError(
+            f"{path}: expected columns id, photo, col, row (a row for each photo that shows the "
+            "point), or id, x, y, z in the project's own frame."
+        )
+    return _intersected(table, views)
+
+
+def _intersected(table: Table, views: tuple[ForeignView, ...]) -> dict[str, FloatArray]:
+    pixels = np.column_stack([table.numbers("col"), table.numbers("row")])
+    rays: dict[str, list[tuple[Pinhole, FloatArray]]] = {}
+    errors = []
+    for row, (name, photo) in enumerate(zip(table.texts("id"), table.texts("photo"), strict=True)):
+        shown = _called(photo, views)
+        if len(shown) != 1:
+            what = "several photos" if shown else "no photo"
+            message = f'"{photo}" is {what} of the project; name one as the project does.'
+            errors.append(table.error(row, "photo", message))
+        elif not np.isfinite(pixels[row]).all():
+            errors.append(table.error(row, "col", "column and row must both be given."))
+        else:
+            view = shown[0]
+            lens = Lens(**view.lens._asdict())
+            camera = Pinhole(lens.camera_matrix, view.rotation, view.centre)
+            rays.setdefault(name, []).append((camera, lens.undistort(pixels[row])[None]))
+    if errors:
+        raise WorkbookError(errors)
+    points = {}
+    for name, seen in rays.items():
+        place = rays_meeting([c for c, _ in seen], [p for _, p in seen])[0]
+        if len(seen) < 2 or not np.isfinite(place).all():
+            raise InputError(
+                f"{table.file}: point {name} is picked in {len(seen)} photo; its rays meet "
+                "nowhere. Pick it in two photos or more, taken from different places."
+            )
+        points[name] = place
+    return points
+
+
+def _called(photo: str, views: Sequence[ForeignView]) -> list[ForeignView]:
+    """Return the photos of a name: the whole one, else without folders, else without ending."""
+    for part in (PurePath.as_posix, lambda path: path.name, lambda path: path.stem):
+        found = [view for view in views if part(PurePath(view.name)).lower()
+                 == part(PurePath(photo)).lower()]  # fmt: skip
+        if found:
+            return found
+    return []
+
+
+def chosen(points: Mapping[str, FloatArray], names: tuple[str, ...], option: str) -> FloatArray:
+    """Return the coordinates of named points, shape (n, 3).
+
+    Raises
+    ------
+    InputError
+        If one of them is not known.
+    """
+    lacking = [name for name in names if name not in points]
+    if lacking:
+        raise InputError(
+            f"{option}: point {lacking[0]} is not known; give its picks or coordinates in the "
+            "table of --points."
+        )
+    return np.array([points[name] for name in names])

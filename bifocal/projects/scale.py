@@ -1,0 +1,121 @@
+"""What makes the lengths of another program's project metres, and how well they are known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from bifocal.model.orientation_precision import CAMERA
+from bifocal.orientation.control_points import COLUMNS, metres_of
+from bifocal.remarks import remark
+from photocore.arrays import FloatArray
+from photocore.camera.rotation import skew
+from photocore.camera.similarity import Similarity, fit_similarity
+from photocore.errors import InputError, WorkbookError
+from photocore.tables import read_table
+
+#: Control points that miss by more than this share of their extent are not those that were picked.
+MOST_MISS = 0.02
+
+
+def by_length(
+    frame: Similarity, ends: FloatArray, length: float, sigma: float
+) -> tuple[Similarity, FloatArray]:
+    """Return a frame scaled by the length between two points, and the covariance of that.
+
+    Parameters
+    ----------
+    frame : Similarity
+    ends : ndarray, shape (2, 3)
+        In the project's frame.
+    length, sigma : float
+        [m]
+
+    Returns
+    -------
+    Similarity, ndarray of shape (7, 7)
+        Covariance of shift, turn and scale: see `of_cameras`.
+    """
+    covariance = np.zeros((7, 7))
+    covariance[6, 6] = (sigma / length) ** 2
+    return replace(frame, scale=length / float(np.linalg.norm(ends[1] - ends[0]))), covariance
+
+
+def by_control(
+    points: dict[str, FloatArray], path: Path, sigma: float
+) -> tuple[Similarity, FloatArray, str]:
+    """Return the frame of control points, its covariance as `by_length`, and how well it fits.
+
+    Parameters
+    ----------
+    points : dict
+        Named points in the project's frame.
+    path : path
+        Table of the same: id, X, Y, r [m], sigma; r blank: on the wall.
+    sigma : float
+        Standard deviation of a coordinate, where the table has none. [m]
+
+    Raises
+    ------
+    InputError, GeometryError
+        If fewer than three points are in both, or they do not fit.
+    """
+    table = read_table(path, [one for one in COLUMNS if one.key in ("id", "X", "Y", "r", "sigma")])
+    if errors := table.repeated("id"):
+        raise WorkbookError(errors)
+    xyz = np.column_stack([metres_of(table, key, "") for key in ("X", "Y", "r")])
+    xyz[np.isnan(xyz[:, 2]), 2] = 0.0
+    rows = [row for row, name in enumerate(table.texts("id"))
+            if name in points and np.isfinite(xyz[row]).all()]  # fmt: skip
+    if len(rows) < 3:
+        raise InputError(
+            f"{path}: {len(rows)} control points with X and Y bear names of the table of --points; "
+            "three are needed, not on one line."
+        )
+    names = [table.texts("id")[row] for row in rows]
+    target, stated = xyz[rows], metres_of(table, "sigma", "")[rows]
+    frame = fit_similarity([points[name] for name in names], target)
+    missed = np.array([frame(points[name]) for name in names]) - target
+    miss, extent = np.linalg.norm(missed, axis=1), float(np.ptp(target, axis=0).max())
+    if miss.max() > MOST_MISS * extent:
+        raise InputError(
+            f"{path}: control point {names[int(miss.argmax())]} misses by {miss.max():.3g} m after "
+            "the best fit of all; look for an exchanged name or a wrong coordinate or pick."
+        )
+    free = 3 * len(rows) - 7
+    spread = max(
+        float(np.nanmean(np.where(np.isnan(stated), sigma, stated))),
+        float(np.sqrt((missed**2).sum() / free)),
+    )
+    design = np.concatenate([_rates(place) for place in target])
+    covariance = spread**2 * np.linalg.inv(design.T @ design)
+    about = {"count": len(rows), "rms": 1000 * float(np.sqrt((miss**2).mean()))}
+    return frame, covariance, remark("projects.control", worst=1000 * miss.max(), **about)
+
+
+def _rates(place: FloatArray) -> FloatArray:
+    """Return how a place moves with shift, turn and scale of its frame, shape (3, 7)."""
+    return np.column_stack([np.eye(3), -skew(place), place])
+
+
+def of_cameras(centres: Sequence[FloatArray], covariance: FloatArray) -> FloatArray:
+    """Return what the covariance of a frame makes of all cameras in it, as `names_of` counts them.
+
+    Parameters
+    ----------
+    centres : sequence of ndarray, shape (3,)
+        Projection centres in the frame. [m]
+    covariance : ndarray, shape (7, 7)
+        Of shift [m], turn [rad] and scale.
+    """
+    rates = np.zeros((len(centres), len(CAMERA), 7))
+    turn, place = CAMERA.index("turn X"), CAMERA.index("X")
+    # A camera's turn counts from the frame into it: against the turn of what stands in the frame.
+    rates[:, turn : turn + 3, 3:6] = -np.eye(3)
+    for row, centre in zip(rates, centres, strict=True):
+        row[place : place + 3] = _rates(centre)
+    whole = rates.reshape(-1, 7)
+    return np.asarray(whole @ covariance @ whole.T)

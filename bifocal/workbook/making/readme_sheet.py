@@ -1,0 +1,66 @@
+"""The sheet `Readme`: order of work, formulas, flags, how to measure with nothing else."""
+
+from __future__ import annotations
+
+from openpyxl.worksheet.pagebreak import Break
+
+from bifocal.workbook.content import SurveyContent
+from bifocal.workbook.making.cameras_sketch import SIZE, cameras_sketch, hand_sketch
+from bifocal.workbook.words import WORDS, readme
+from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
+from photocore.workbook.making.look import HEAD_FONT, ROW_HEIGHT
+
+#: Printed rows of the first page, where the second begins, and the height of its drawing. [pt]
+_ROWS, _SECOND, _DRAWN = 34, 37, 300.0
+#: Where the first paragraph stands.
+_TOP = 3
+#: The worked row: its name in `Points`, what r and X must be [m], and how nearly.
+_NAME, _KNOWN, _NEARLY = "TEST", {"r": 1.0, "X": 2.0}, 0.002
+
+
+def readme_sheet(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
+    """Write the sheet; where points are measured by hand, what that takes and a worked row.
+
+    Parameters
+    ----------
+    builder : BookBuilder
+    content : SurveyContent
+        What the workbook holds.
+    cells : mapping
+        The columns of `Points`.
+    """
+    lines = readme(builder.language, media=bool(content.media_cells))
+    sketch = cameras_sketch(builder.word("nadir"), builder.word("sketch"))
+    if content.is_pair or content.media_cells:
+        builder.readme(lines, sketch, rows=_ROWS)
+        return
+    lines += [""] * (_SECOND - _TOP - len(lines))
+    lines += str(WORDS.content["readme_hand"][builder.language]).splitlines()
+    top = (_SECOND - _TOP) * ROW_HEIGHT
+    sketch.size = (SIZE[0], top + _DRAWN)
+    sketch.told += f" {builder.word('sketch_hand')}"
+    hand_sketch(sketch, top, (builder.word("nadir"), builder.word("alike")))
+    builder.readme(lines, sketch, rows=len(lines) + _TOP - 1)
+    sheet = SheetBuilder(book=builder, worksheet=builder.book["Readme"])
+    sheet.worksheet.row_breaks.append(Break(id=_SECOND - 1))
+    sheet.worksheet.page_setup.fitToHeight = 2
+    _worked_row(sheet, _TOP + lines.index("{test}"), cells)
+
+
+def _worked_row(sheet: SheetBuilder, row: int, cells: Cells) -> None:
+    """Write the line that says whether the worked row comes out, wherever it stands in `Points`."""
+    say = {key: sheet.book.word(f"test_{key}") for key in ("waits", "holds", "fails")}
+    off = "+".join(
+        f'ABS(INDEX(tblPoints[{key}],MATCH("{_NAME}",tblPoints[id],0))-{value:g})'
+        for key, value in _KNOWN.items()
+    )
+    judged = f'IF({off}<{_NEARLY:g},"{say["holds"]}","{say["fails"]}")'
+    said, ids = "waits", list(cells.get("id", ()))
+    if _NAME in ids:
+        found = [cells[key][ids.index(_NAME)] for key in _KNOWN]
+        numbers = [value for value in found if isinstance(value, int | float)]
+        if len(numbers) == len(found):
+            far = sum(abs(a - b) for a, b in zip(numbers, _KNOWN.values(), strict=True))
+            said = "holds" if far < _NEARLY else "fails"
+    text = f'IFERROR({judged},"{say["waits"]}")'
+    sheet.formula(f"A{row}", text, say[said], name="worked_row", font=HEAD_FONT)

@@ -1,0 +1,64 @@
+"""Where a project's photos lie on this disk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path, PurePath
+
+from photocore.errors import InputError
+from photocore.images import image_info
+
+_ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff")
+#: Folders beside a project in which programs keep its photos.
+_USUAL = ("", "images", "photos", "opensfm/images")
+
+
+class PhotoFinder:
+    """Finds photos by the names that a project has for them.
+
+    Parameters
+    ----------
+    project : path
+        File or folder of the project.
+    images : path, optional
+        Folder of its photos; without it folders about the project are searched.
+    """
+
+    def __init__(self, project: Path, images: Path | None = None) -> None:
+        if images is not None and not images.is_dir():
+            raise InputError(f"{images}: is no folder; name the one that holds the photos.")
+        about = (project.absolute(), *project.absolute().parents)[:4]
+        usual = (folder / name for folder in about for name in _USUAL)
+        self.folders = [images] if images else [one for one in usual if one.is_dir()]
+        self.images = images
+
+    def find(self, name: str) -> Path | None:
+        """Return the file of a photo; None where there is none."""
+        return next((path for path in self._candidates(name) if path.is_file()), None)
+
+    def _candidates(self, name: str) -> Iterator[Path]:
+        own = PurePath(name)
+        if self.images is None and own.is_absolute():
+            yield Path(name)
+        for folder in self.folders:
+            for part in dict.fromkeys((own.as_posix(), own.name)):
+                if not Path(part).is_absolute():
+                    yield folder / part
+            if own.suffix.lower() not in _ENDINGS:  # Metashape's labels have no ending
+                for ending in (*_ENDINGS, *map(str.upper, _ENDINGS)):
+                    yield folder / f"{own.name}{ending}"
+
+    def size(self, name: str) -> tuple[int, int]:
+        """Return width and height of a photo [px]; its project does not tell them.
+
+        Raises
+        ------
+        InputError
+            If the photo is not there.
+        """
+        if (path := self.find(name)) is None:
+            raise InputError(
+                f"{name}: the photo is not beside the project, which does not tell its size; name "
+                "the folder of the photos with --images."
+            )
+        return image_info(path).size

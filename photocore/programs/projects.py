@@ -1,0 +1,80 @@
+"""A finished project of any program that is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from photocore.errors import InputError
+from photocore.programs.alicevision import read_alicevision, read_openmvg
+from photocore.programs.bundler import read_bundler
+from photocore.programs.colmap import is_colmap, read_colmap_project
+from photocore.programs.json_values import JsonValue
+from photocore.programs.metashape import read_metashape_project
+from photocore.programs.model import ForeignProject
+from photocore.programs.opensfm import read_opensfm
+from photocore.programs.photos import PhotoFinder
+from photocore.textfile import check_file, check_name
+
+#: Where programs leave their results below a project's folder.
+_PLACES = (
+    ".", "sparse/0", "sparse", "reconstruction.json", "opensfm/reconstruction.json",
+    "sfm_data.json", "cameras.sfm", "sfm.sfm", "bundle.out", "bundle/bundle.out",
+)  # fmt: skip
+_KNOWN = (
+    "COLMAP (cameras.txt or .bin, images, points3D), Metashape (cameras as .xml), OpenSfM or "
+    "OpenDroneMap (reconstruction.json), AliceVision or Meshroom (.sfm), OpenMVG (sfm_data.json), "
+    "Bundler (bundle.out)"
+)
+#: What to do with a program's own files that only it can read.
+_EXPORT = {
+    ".abc": "In Meshroom, add a ConvertSfMFormat node with the format sfm.",
+    ".mg": "Name the cameras.sfm that its node StructureFromMotion wrote, in MeshroomCache.",
+    ".psx": "In Metashape, File, Export, Export Cameras, Agisoft XML.",
+    ".psz": "In Metashape, File, Export, Export Cameras, Agisoft XML.",
+}
+
+
+def read_foreign_project(path: Path, photos: PhotoFinder) -> ForeignProject:
+    """Return cameras and points of a project, told by its name and content.
+
+    Parameters
+    ----------
+    path : path
+        File or folder.
+    photos : PhotoFinder
+        Of this project.
+
+    Raises
+    ------
+    InputError
+        If it is of no program known here, or naming what in it cannot be used.
+    """
+    check_name(path)
+    if path.is_dir():
+        found = [place for place in map(path.joinpath, _PLACES) if _is_model(place)]
+        if not found:
+            raise InputError(f"{path}: holds no project known here: {_KNOWN}.")
+        path = found[0]
+    if path.is_dir():
+        return read_colmap_project(path)
+    check_file(path, "project")
+    ending = path.suffix.lower()
+    if ending in (".txt", ".bin") and (is_colmap(path.parent) or is_colmap(path.parent, ".bin")):
+        return read_colmap_project(path.parent)
+    if ending == ".xml":
+        return read_metashape_project(path)
+    if ending == ".out":
+        return read_bundler(path, photos.size)
+    if ending in (".json", ".sfm"):
+        value = JsonValue.read(path)
+        if isinstance(value.value, list):
+            return read_opensfm(path, value)
+        if "sfm_data_version" in value or "extrinsics" in value:
+            return read_openmvg(path, value)
+        if "views" in value:
+            return read_alicevision(path, value)
+    raise InputError(f"{path}: is no project known here: {_EXPORT.get(ending, _KNOWN + '.')}")
+
+
+def _is_model(place: Path) -> bool:
+    return place.is_file() or is_colmap(place) or is_colmap(place, ".bin")
