@@ -40,13 +40,15 @@ def write_colmap(photos: PhotoSet, folder: Path | str, *, overwrite: bool = Fals
         raise InputError("the photos look through other media; COLMAP's models of photos in air "
                          "cannot say so.")  # fmt: skip
     cameras: dict[str, str] = {}
-    images = []
+    images, files = [], [photo.file or photo.name for photo in photos.photos]
+    short = [PurePath(file).name for file in files]
+    names = short if len(set(short)) == len(short) else files
     for number, photo in enumerate(photos.photos, start=1):
         with located(photo.name):
             words, rotation, centre = _in_words(photo)
         camera = cameras.setdefault(words, str(len(cameras) + 1))
-        name = PurePath(photo.file or photo.name).name
-        images += [f"{number} {image_words(rotation, -rotation @ centre, camera, name)}", ""]
+        words = image_words(rotation, -rotation @ centre, camera, names[number - 1])
+        images += [f"{number} {words}", ""]
     lines = [f"{number} {words}" for words, number in cameras.items()]
     write_colmap_model(Path(folder), lines, images, [], overwrite=overwrite)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
@@ -267,7 +268,7 @@ def _photos(
     overwrite: bool,
 ) -> list[Photo]:  # fmt: skip
     """Return the photos in the wall's frame; write their lenses beside the set."""
-    stem = out.name.split(".")[0]
+    stem = re.sub(r"(\.photos|\.pair)?\.json$", "", out.name)
     written: dict[tuple[object, ...], tuple[Lens, str]] = {}
     photos = []
     for view in views:

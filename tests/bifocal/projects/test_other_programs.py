@@ -220,6 +220,20 @@ def test_a_set_goes_out_as_colmap_and_comes_back(tmp_path: Path) -> None:
         np.testing.assert_allclose(seen, photo.project(xyz), atol=1e-6)
 
 
+def test_photos_called_alike_in_two_folders_stay_apart(tmp_path: Path) -> None:
+    path, shots, _ = project_of(tmp_path, "colmap text")
+    alike = [shots[0]._replace(file="a/DSC.png"), shots[1]._replace(file="b/DSC.png")]
+    for shot, one in zip(shots, alike, strict=False):
+        (tmp_path / one.file).parent.mkdir()
+        shutil.move(tmp_path / shot.file, tmp_path / one.file)
+    made.write_colmap_text(path, alike, made.to_world(made.wall_points()))
+    out = tmp_path / "st.anna.photos.json"
+    write_colmap(photos_from_project(path, out).photos, tmp_path / "out")
+    words = (tmp_path / "out" / "images.txt").read_text().split()
+    assert {"a/DSC.png", "b/DSC.png"} <= set(words)
+    assert (tmp_path / "st.anna.lens1.json").is_file()
+
+
 def test_a_photo_that_its_exif_data_turn_is_taken_upright(tmp_path: Path) -> None:
     path, shots, _ = project_of(tmp_path, "colmap text")
     out, table = tmp_path / "wall.photos.json", picks(tmp_path, shots[:1] + shots[2:], CORNERS)
