@@ -100,11 +100,12 @@ def _of_radii(
         move = radius - along
     towards = np.stack([np.sin(angle), np.cos(angle)], axis=-1)
     corrected, shift = radius[:, None] * towards, move[:, None] * towards
-    matrix, unit = setup.adjusted[0], np.ones(2)
+    matrix, lens = setup.adjusted[0], setup.lens(1)
     if matrix is not None:
         corrected = apply_homography(np.linalg.inv(matrix), corrected)
-    if setup.unit == "px" and setup.taking.pitch is not None:
-        unit = np.array([setup.taking.pitch, -setup.taking.pitch])
-    nadir = setup.taking.nadir1 if setup.unit == "px" else None
-    corrected = corrected / unit + (nadir or (0.0, 0.0))
-    return corrected, corrected - points.xy1 if matrix is not None else shift / unit
+    if lens is not None:
+        corrected = lens.distort(corrected)
+    unit, nadir = setup.typed_frame(1)
+    corrected = corrected / unit + nadir
+    is_plain = matrix is None and lens is None
+    return corrected, shift / unit if is_plain else corrected - points.xy1

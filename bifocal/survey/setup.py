@@ -10,11 +10,13 @@ import numpy as np
 
 from bifocal.model.flags import SIGMA_PIXEL, FlagLimits
 from bifocal.model.homography import apply_homography
+from bifocal.model.lens import Lens
 from bifocal.model.pair import Pair
 from bifocal.precision import false_relief_of_scale
 from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.refracted_radii import scale_ratio
+from bifocal.survey.survey_lens import SurveyLens, turns_of
 from bifocal.survey.survey_media import SurveyMedia
 from photocore.arrays import FloatArray, positive
 from photocore.errors import GeometryError, InputError, located
@@ -141,6 +143,8 @@ class SurveySetup:
         Unit and precision of what was measured.
     media : SurveyMedia or None
         What the photos look through, where the workbook has cells for it.
+    lenses : tuple of SurveyLens or None
+        Distortion of both lenses, where the workbook has cells for it.
     sensor : tuple of float or None
         Width and height. [mm]
     pair_file : str
@@ -165,6 +169,7 @@ class SurveySetup:
     taking: Taking = field(default_factory=Taking)
     measuring: Measuring = field(default_factory=Measuring)
     media: SurveyMedia | None = None
+    lenses: tuple[SurveyLens, SurveyLens] | None = None
     sensor: Place | None = None
     pair_file: str = ""
     photo1: str = ""
@@ -246,17 +251,56 @@ class SurveySetup:
         """Whether media are typed in the cells there are for them."""
         return bool(self.media and self.media.layers)
 
+    def lens(self, image: int) -> Lens | None:
+        """Return what distorts an image, for millimetres from its nadir; None for nothing.
+
+        Raises
+        ------
+        InputError
+            If its principal distance is missing.
+        """
+        own, c = self.lenses and self.lenses[image - 1], self.taking.c_used[image - 1]
+        if own is None or (c is None and not own.distorts):
+            return None
+        if c is None:
+            raise InputError(remark("setup.lens_without_c", image=image))
+        return own.lens(c, *self.typed_frame(image))
+
+    def typed_frame(self, image: int) -> tuple[FloatArray, Place]:
+        """Return what brings typed coordinates from the nadir to millimetres, and the nadir."""
+        taking = self.taking
+        if self.unit != "px" or taking.pitch is None:
+            return np.ones(2), (0.0, 0.0)
+        nadir = (taking.nadir1, taking.nadir2)[image - 1]
+        return np.array([taking.pitch, -taking.pitch]), nadir or (0.0, 0.0)
+
+    def _free(self, image: int, lens: Lens | None, seen: FloatArray) -> FloatArray:
+        """Return coordinates free of distortion, refusing a lens that folds the photo over."""
+        if lens is None:
+            return seen
+        free = lens.undistort(seen)
+        # The formulas' turns lead there too, and the way back to the pick.
+        scale = turns_of(lens, seen, image)[f"lens{image}"][:, None]
+        ways = lens.principal_point + (seen - lens.principal_point) * scale - free
+        missed = np.abs(np.hstack([ways, lens.distort(free) - seen])).max(axis=1)
+        allowed = 1e-9 * lens.camera_matrix[0, 0]
+        if not (missed <= allowed)[~np.isnan(seen).any(axis=1)].all():
+            place = f"{self.where}: " if self.where else ""
+            raise InputError(f"{place}{remark('setup.lens_folds', image=image)}")
+        return free
+
     def in_millimetres(self, points: PointObservations) -> PointObservations:
         """Return the points as image coordinates of `pair`, without raw pixels."""
-        own, (first, second) = self.taking, self.adjusted
-        is_plain = first is None and second is None
+        first, second = self.adjusted
+        lenses = self.lens(1), self.lens(2)
+        is_plain = all(part is None for part in (first, second, *lenses))
         if self.unit == "mm" and is_plain and not points.has_pixels.any():
             return points
         typed = (points.xy1, points.xy2)
-        if self.unit == "px" and own.pitch is not None:
-            flip = np.array([own.pitch, -own.pitch])
-            nadirs = (own.nadir1 or (0.0, 0.0), own.nadir2 or (0.0, 0.0))
-            typed = ((typed[0] - nadirs[0]) * flip, (typed[1] - nadirs[1]) * flip)
+        if self.unit == "px":
+            (unit, nadir1), (_, nadir2) = self.typed_frame(1), self.typed_frame(2)
+            typed = ((typed[0] - nadir1) * unit, (typed[1] - nadir2) * unit)
+        typed = self._free(1, lenses[0], typed[0]), self._free(2, lenses[1], typed[1])
         if first is not None:
             typed = (apply_homography(first, typed[0]), typed[1])
         if second is not None:
@@ -270,6 +314,7 @@ class SurveySetup:
             self, taking=self.taking.exchanged(), adjusted=self.adjusted[::-1],
             photo1=self.photo2, photo2=self.photo1,
             media=self.media and self.media.exchanged(),
+            lenses=self.lenses and (self.lenses[1], self.lenses[0]),
         )  # fmt: skip
 
     def check_scales(self, tolerance: float = SCALE_TOLERANCE) -> str:

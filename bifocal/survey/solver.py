@@ -234,6 +234,11 @@ def _ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -> _Arr
         points = replace(points, xy1=points.pixels1, xy2=points.pixels2)
         setup = setup.but(unit="px")
     pair = setup.pair()
+    if setup.lenses and (setup.lenses[0].distorts or setup.lenses[1].distorts):
+        if adjust:
+            raise InputError(f"{survey.where}: {remark('setup.lens_adjusted')}")
+        if (points.use & points.is_polar & ~points.is_cartesian).any():
+            raise InputError(f"{survey.where}: {remark('setup.lens_of_radii')}")
     remarks = [*setup.remarks, setup.check_scales(scale_tolerance)]
     refuse_wrong_unit(setup, points, survey.where, said=survey.unit)
     remarks += wide_remarks(setup, points)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -19,6 +19,7 @@ from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable, entries
 from bifocal.survey.setup import SIGMA_RADIAL, SurveySetup
 from bifocal.survey.solved_survey import SolvedSurvey, WorldPoints
+from bifocal.survey.survey_lens import turns_of
 from bifocal.survey.survey_media import SurveyMedia
 from bifocal.survey.tolerances import RULES, ToleranceRule
 from bifocal.survey.weighted_similarity import weights_of
@@ -92,6 +93,8 @@ class SurveyContent:
     media : SurveyMedia or None
         Cells of media in an empty template, and of a general pair; None for those that follow from
         the pair. An ideal pair's stand in its set-up.
+    lens : bool
+        Whether an empty template has cells for the distortion of each lens.
     """
 
     language: str = "en"
@@ -117,6 +120,7 @@ class SurveyContent:
     functions: bool = False
     plain: bool = False
     media: SurveyMedia | None = None
+    lens: bool = False
 
     @classmethod
     def of(cls, solved: SolvedSurvey) -> SurveyContent:
@@ -145,6 +149,11 @@ class SurveyContent:
         return 0 if self.bent is None else self.bent.media
 
     @property
+    def has_lens(self) -> bool:
+        """Whether there are cells for the distortion of each lens."""
+        return self.lens if self.setup is None else self.setup.lenses is not None
+
+    @property
     def is_pair(self) -> bool:
         """Whether the points are raw pixels of a general pair."""
         return self.pair is not None and self.setup is None
@@ -171,7 +180,9 @@ class SurveyContent:
         """Return the columns of `Points`; of an ideal pair those of the inputs that are there."""
         if self.is_pair:
             return pair_points(undistorted=self.undistorted, media=self.media_cells)
-        return ideal_points(**there, adjusted=self.corrected, media=self.media_cells)
+        return ideal_points(
+            **there, adjusted=self.corrected, media=self.media_cells, lens=self.has_lens
+        )
 
     @property
     def placed(self) -> WorldPoints:
@@ -244,6 +255,8 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     first = content.photos[0]
     shifts = image_shift(first, content.setup, points, table) | foot_tangents(first, table)
     cells |= {key: _unless(undirected, values) for key, values in shifts.items()}
+    if content.has_lens:
+        cells |= _lens_columns(content, undirected)
     cells |= {key: inputs(values) for key, values in table.formula_cells.items()}
     for key in {"g1", "g2"} & table.formula_cells.keys():
         cells[key] = _unless(incomplete, table.formula_cells[key])
@@ -261,6 +274,26 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     cells["flag"] = [
         flag if given else None for flag, given in zip(table.flags, typed, strict=True)
     ]
+    return cells
+
+
+def _lens_columns(content: SurveyContent, blank: BoolArray) -> dict[str, list[CellValue]]:
+    """Return the columns that take lens distortion out of picks, and put it into the foot's."""
+    setup, points, table = content.setup, content.points, content.table
+    assert setup is not None
+    assert points is not None
+    assert table is not None
+    plain, first = replace(setup, lenses=None, adjusted=(None, None)), setup.lens(1)
+    seen, cells = plain.in_millimetres(points), dict[str, list[CellValue]]()
+    for image, xy in ((1, seen.xy1), (2, seen.xy2)):
+        lens = setup.lens(image)
+        if lens is not None:
+            cells |= {key: inputs(values) for key, values in turns_of(lens, xy, image).items()}
+    if first is not None:
+        shift = image_shift(content.photos[0], setup, points, table)
+        feet = np.stack([shift["x_c"], shift["y_c"]], axis=-1)
+        turns = turns_of(first, plain.in_millimetres(replace(points, xy1=feet)).xy1, 1)
+        cells["grown"] = _unless(blank, 1 / turns["lens1"])
     return cells
 
 
@@ -414,6 +447,7 @@ def _setup_cells(content: SurveyContent) -> dict[str, CellValue]:
         "input_unit": "mm", "k_off": limits.off_radial, "k_plane": limits.on_plane,
         "unit_x": 1, "unit_y": 1, "k_12": 1.0, "enlargement_1": 1, "enlargement_2": 1,
         **{f"off_{axis}{image}": 0 for axis in "xy" for image in "12"},
+        **{f"lens_{image}_{axis}": 0 for axis in "uv" for image in "12"},
     }  # fmt: skip
     if content.pair is None:
         return cells | {"sigma_s": SIGMA_RADIAL}
@@ -440,6 +474,11 @@ def _setup_cells(content: SurveyContent) -> dict[str, CellValue]:
     cells |= {"pitch": setup.taking.pitch, "input_unit": setup.unit, "sigma_s": setup.precision}
     if setup.unit == "px" and setup.taking.pitch is not None:
         cells |= {"unit_x": setup.taking.pitch, "unit_y": -setup.taking.pitch}
+    for image, lens in enumerate(setup.lenses or (), start=1):
+        typed = {f"lens_{image}_{name}": getattr(lens, name) for name in ("k1", "k2", "x", "y")}
+        u, v = lens.middle(*setup.typed_frame(image)).tolist()
+        c = setup.taking.c_used[image - 1]
+        cells |= typed | {f"lens_{image}_c": c, f"lens_{image}_u": u, f"lens_{image}_v": v}
     for image, matrix in enumerate(setup.adjusted, start=1):
         if matrix is not None:
             cells |= dict(zip(adjustment_names(image), matrix.ravel().tolist(), strict=True))

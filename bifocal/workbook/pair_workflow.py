@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bifocal.model.lens import Lens
 from bifocal.model.orientation_precision import of_distances
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
@@ -197,11 +198,14 @@ def _ideal(setup: SurveySetup, folder: Path) -> Pair:
         pixel_size=pitch, nadir1=nadirs[0], nadir2=nadirs[1], sigma=setup.precision / pitch,
     )  # fmt: skip
     photos = [
-        replace(photo, file=name, image_size=size, plane_from_pixel=_corrected(photo, matrix))
-        for photo, name, size, matrix in zip(
-            pair.as_given, names, sizes, setup.adjusted, strict=True
+        replace(
+            photo, file=name, image_size=size, plane_from_pixel=_corrected(photo, matrix),
+            lens=_in_pixels(setup.lens(image), pitch, nadirs[image - 1], size),
         )
-    ]
+        for image, photo, name, size, matrix in zip(
+            (1, 2), pair.as_given, names, sizes, setup.adjusted, strict=True
+        )
+    ]  # fmt: skip
     if setup.media and setup.refracted:
         through = [setup.media.through(number) for number in (1, 2)]
         photos = [
@@ -214,6 +218,17 @@ def _ideal(setup: SurveySetup, folder: Path) -> Pair:
         folder=folder,
         remarks=tuple(f"{setup.where}: {remark}" for remark in remarks),
     )
+
+
+def _in_pixels(
+    lens: Lens | None, pitch: float, nadir: tuple[float, float], size: tuple[int, int]
+) -> Lens | None:
+    """Return a lens for the pixels of a photo that is stated in millimetres from its nadir."""
+    if lens is None or not lens.coefficients.any():
+        return None
+    c, (u, v) = lens.camera_matrix[0, 0] / pitch, lens.principal_point / pitch
+    matrix = np.array([[c, 0.0, nadir[0] + u], [0.0, c, nadir[1] - v], [0.0, 0.0, 1.0]])
+    return replace(lens, camera_matrix=matrix, image_size=size)
 
 
 def _corrected(photo: Photo, matrix: FloatArray | None) -> FloatArray:

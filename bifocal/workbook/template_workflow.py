@@ -28,6 +28,7 @@ def write_template(
     language: str = "en",
     rows: int = POINT_ROWS,
     media: int | None = None,
+    lens: bool = False,
     functions: bool = False,
     plain: bool = False,
     overwrite: bool = False,
@@ -45,6 +46,8 @@ def write_template(
     media : int, optional
         How many media `Setup` gets cells for: 2 for a water surface, 3 for air, glass and water;
         none by default, for photos in air.
+    lens : bool
+        Whether `Setup` gets cells for the distortion of each lens, which formulas then take out.
     functions : bool
         Add the formulas of the method as functions with names, and a sheet that explains them.
     plain : bool
@@ -66,7 +69,7 @@ def write_template(
     check_book_path(path)
     check_new_workbook(path, overwrite=overwrite, other="")
     content = SurveyContent(
-        language=language, rows=rows, media=cells, functions=functions, plain=plain
+        language=language, rows=rows, media=cells, lens=lens, functions=functions, plain=plain
     )
     write_book(path, content, overwrite=overwrite)
 

@@ -43,6 +43,8 @@ from photocore.workbook.reading.grid import column_letters, quoted_title, split_
 
 #: Name of the headings of the results in a workbook of the user's own.
 MARK = "bifocal_results"
+#: What a survey is for: these columns come first, the steps to them are folded away behind.
+_RESULTS = ("r", "X", "Y", "sigma_r", "flag", "E", "N", "H")
 #: Under which headings raw pixels stand, where an ideal pair takes them for coordinates.
 _RAW = {"x1": "col1", "y1": "row1", "x2": "col2", "y2": "row2"}
 
@@ -111,7 +113,10 @@ def add_results(
         columns=_inputs(table.columns, content),
         factors={key: factor for key, factor in factors.items() if key not in typed},
     )
-    put_result_columns(editor, own, _columns(own, content), mark=MARK)
+    columns = sorted(
+        _columns(own, content), key=lambda column: (*_RESULTS, column.key).index(column.key)
+    )
+    put_result_columns(editor, own, columns, mark=MARK)
     return editor.save(target, overwrite=overwrite)
 
 
@@ -175,6 +180,7 @@ def _column(column: LiveColumn, values: Sequence[CellValue]) -> ResultColumn:
         values=values,
         formula=column.formula,
         number_format="0." + "0" * column.places if column.places else "",
+        folded=column.key not in _RESULTS,
     )
 
 

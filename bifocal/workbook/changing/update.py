@@ -95,7 +95,9 @@ def is_same_kind(survey: SurveyInput, content: SurveyContent) -> bool:
     """Tell whether a survey workbook has the formulas that what came out of it needs."""
     names = () if survey.book is None else survey.book.names
     measured = content.is_pair == ("col1" in survey.table.present)
-    return measured and content.media_cells == media_count(names) and not is_earlier(survey)
+    alike = content.has_lens == ("lens_1_k1" in names)
+    alike &= content.media_cells == media_count(names)
+    return measured and alike and not is_earlier(survey)
 
 
 def check_kind(source: Path, survey: SurveyInput, content: SurveyContent) -> None:

@@ -37,6 +37,7 @@ def ideal_points(
     code: bool = True,
     adjusted: Collection[int] = (),
     media: int = 0,
+    lens: bool = False,
 ) -> tuple[LiveColumn, ...]:
     """Return the `Points` table of an ideal pair.
 
@@ -49,8 +50,11 @@ def ideal_points(
         Images whose coordinates are corrected by the cells a1_11 ..., a2_11 ... of `Setup`.
     media : int
         How many media `Setup` has cells for; 0 in air.
+    lens : bool
+        Whether `Setup` has cells for the distortion of each lens: only coordinates are freed of it.
     """
-    there = {"xy": xy, "polar": polar, "theta": theta, "code": code, "media": media}
+    polar, theta = polar and not lens, theta and not lens
+    there = {"xy": xy, "polar": polar, "theta": theta, "code": code, "media": media, "lens": lens}
     facts = {name for name, has in there.items() if has} | {f"corrected{i}" for i in adjusted}
     codes = (f'LEFT(UPPER(TRIM([@code])),{len(word)})="{word}"' for word in DOUBT_CODES)
     doubt = {"doubt_codes": ",".join(codes), "doubt_share": repr(DOUBTFUL_SHARE)}

@@ -140,7 +140,13 @@ def _stated(media: int) -> tuple[str, ...]:
     return index_names(media)[1:]
 
 
-def groups(*, is_pair: bool, media: int) -> Groups:
+def lens_cells() -> Groups:
+    """Return the cells of lens distortion: those typed, and those calculated."""
+    typed, calculated = FORMULAS.content["setup"]["lens"]
+    return tuple(typed.split()), tuple(calculated.split())
+
+
+def groups(*, is_pair: bool, media: int, lens: bool = False) -> Groups:
     """Return the cells of `Setup` group by group; the last group is calculated.
 
     Parameters
@@ -149,9 +155,14 @@ def groups(*, is_pair: bool, media: int) -> Groups:
         Whether the points are raw pixels of a general pair.
     media : int
         How many media there are cells for; 0 in air.
+    lens : bool
+        Whether there are cells for the distortion of each lens.
     """
     cells = FORMULAS.content["setup"]["pair" if is_pair else "ideal"]
     first, *others, last = (tuple(group.split()) for group in cells)
+    if lens:
+        typed, calculated = lens_cells()
+        others, last = [typed, *others], (*last, *calculated)
     if not media:
         return (first, *others, last)
     return (first, media_names(media), *others, (*last, *calculated_names(media, is_pair=is_pair)))

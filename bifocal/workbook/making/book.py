@@ -104,7 +104,7 @@ def build(content: SurveyContent) -> BookBuilder:
 def _points(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
     """Write what was measured and, beside it, all results as formulas."""
     columns = content.point_columns()
-    note = "points_pair" if content.is_pair else "points_how"
+    note = "points_pair" if content.is_pair else "points_lens" if content.has_lens else "points_how"
     sheet = _long_sheet(builder, "Points", note, columns, content, cells)
     keys = [column.key for column in columns]
     first_result = keys.index("note") + 2
@@ -116,7 +116,7 @@ def _points(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
         freeze=f"B{HEAD + 1}",
         repeat=f"{HEAD - 1}:{HEAD}",
         scale=_SCALE,
-        breaks=(len(columns), (first_result,)),
+        breaks=(len(columns), (first_result, keys.index("x_c") + 1)),
     )
 
 

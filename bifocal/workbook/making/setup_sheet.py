@@ -39,7 +39,7 @@ def setup_sheet(builder: BookBuilder, content: SurveyContent) -> None:
     line = state_formula(words, is_pair=content.is_pair)
     sheet.formula("A3", line, state(cells, words), name="setup_state", font=HEAD_FONT)
     sheet.headings(4, ("name", "description", "value", "unit"), (15, 61, 18, 9))
-    listed = groups(is_pair=content.is_pair, media=content.media_cells)
+    listed = groups(is_pair=content.is_pair, media=content.media_cells, lens=content.has_lens)
     row = 5
     for group in listed:
         for name in group:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.survey.setup import Measuring, SurveySetup, Taking
+from bifocal.survey.survey_lens import SurveyLens
 from bifocal.survey.survey_media import (
     FEWEST,
     HEIGHTS,
@@ -29,6 +30,7 @@ from bifocal.workbook.formulas.setup_cells import (
     TYPED_FORMULAS,
     cells_of,
     formulas,
+    lens_cells,
     numbers,
 )
 from bifocal.workbook.words import headings, term
@@ -83,7 +85,8 @@ def read_setup(survey: OpenSurvey) -> SurveySetup:
         columns = [c for c in (*columns, *titles) if c.key.casefold() in book.names]
     else:
         # Cells of media are found by name only: no workbook of a user's own has them otherwise.
-        columns = [c for c in columns if c.key not in media_names(MOST)]
+        named_only = (*media_names(MOST), *lens_cells()[0])
+        columns = [c for c in columns if c.key not in named_only]
     values = read_named_values(
         book, columns, sheet="Setup", decimal=decimal, errors=complaints, several=True, given=given
     )
@@ -120,6 +123,7 @@ def read_setup(survey: OpenSurvey) -> SurveySetup:
         nadirs=nadirs,
         adjusted=_adjusted(book),
         media=media,
+        lenses=_lenses(book, values),
         places=values.places,
         where=where,
         remarks=tuple(values.remarks),
@@ -169,6 +173,17 @@ def _media(book: SheetFile, values: NamedValues, errors: list[CellError]) -> Sur
     return media
 
 
+def _lenses(book: SheetFile, values: NamedValues) -> tuple[SurveyLens, SurveyLens] | None:
+    """Return the distortion of both lenses; None where the workbook has no cells for it."""
+    if "lens_1_k1" not in book.names:
+        return None
+    keys = ("k1", "k2", "x", "y")
+    first, second = (
+        SurveyLens(**{key: values.given(f"lens_{image}_{key}") for key in keys}) for image in "12"
+    )
+    return first, second
+
+
 def _bad_indices(media: SurveyMedia) -> dict[str, str]:
     """Return what is wrong with refractive indices, by cell."""
     low, high = INDEX_LIMITS
@@ -207,7 +222,7 @@ def is_general(book: SheetFile) -> bool:
 
 def _columns() -> list[Column]:
     columns = []
-    for key in (*numbers(), *media_names(MOST), *_general_names(), *_TEXTS):
+    for key in (*numbers(), *media_names(MOST), *lens_cells()[0], *_general_names(), *_TEXTS):
         known = term("setup", key)
         unit = known.unit if known is not None and key not in _TEXTS else ""
         kind: Kind = "text" if key in _TEXTS else "number"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from operator import itemgetter
 
@@ -29,6 +29,8 @@ class SheetChanges:
         (any more) are left as they are.
     added : list of NewRows
         Rows to be added, with formulas, formats and results.
+    columns : dict
+        Column to its width and whether it is folded away; columns side by side, new to the sheet.
     restates : bool
         Whether a number may be given among the results for a cell that holds one, to replace it.
     """
@@ -37,10 +39,11 @@ class SheetChanges:
     cached: dict[int, dict[int, CellValue]] = field(default_factory=dict)
     added: list[NewRows] = field(default_factory=list)
     placed: dict[int, dict[int, NewCell]] = field(default_factory=dict)
+    columns: dict[int, tuple[float, bool]] = field(default_factory=dict)
     restates: bool = False
 
     def __bool__(self) -> bool:
-        return bool(self.inputs or self.cached or self.added or self.placed)
+        return bool(self.inputs or self.cached or self.added or self.placed or self.columns)
 
     def rows(self) -> list[int]:
         """Return the numbers of the rows with cells to be typed or added, in order."""
@@ -119,6 +122,41 @@ class Spliced:
             position = end
         pieces.append(view[position:])
         return b"".join(pieces)
+
+
+def column_edits(
+    head: bytes, prefix: str, columns: Mapping[int, tuple[float, bool]]
+) -> Iterator[tuple[int, int, bytes]]:
+    """Yield the edits of a sheet, up to its rows, that give columns their widths and fold them.
+
+    Parameters
+    ----------
+    head : bytes
+        The sheet in front of its rows.
+    prefix : str
+        Of its tags.
+    columns : mapping
+        As in `SheetChanges`.
+    """
+    form = re.search(rb"<(?:\w+:)?sheetFormatPr\b", head)
+    if form and b"outlineLevelCol" not in head and any(folded for _, folded in columns.values()):
+        yield form.end(), form.end(), b' outlineLevelCol="1"'
+    known = re.search(rb"<(?:\w+:)?cols\b.*</(?:\w+:)?cols\s*>", head, re.DOTALL)
+    made = {}
+    for tag in re.findall(rb"<(?:\w+:)?col\s[^>]*>", known[0] if known else b""):
+        low, high = (int(*re.findall(rb"\s%s=.(\d+)" % key, tag)) for key in (b"min", b"max"))
+        for first, last in ((low, min(high, min(columns) - 1)), (max(low, max(columns) + 1), high)):
+            if first <= last:
+                own = re.sub(rb"(\smin=.)\d+", rb"\g<1>%d" % first, tag)
+                own = re.sub(rb"(\smax=.)\d+", rb"\g<1>%d" % last, own)
+                made[first] = own.rstrip(b"/>") + b"/>"
+    for column, (width, folded) in columns.items():
+        fold = ' outlineLevel="1" hidden="1"' if folded else ""
+        text = f'min="{column}" max="{column}" width="{width:g}" customWidth="1"{fold}'
+        made[column] = f"<{prefix}col {text}/>".encode()
+    whole = b"".join(tag for _, tag in sorted(made.items()))
+    tags = b"<%scols>%s</%scols>" % (prefix.encode(), whole, prefix.encode())
+    yield (*(known.span() if known else (len(head), len(head))), tags)
 
 
 def _ends(columns: Collection[int]) -> tuple[int, ...]:

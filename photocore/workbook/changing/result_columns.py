@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from photocore.workbook.changing.cells import CellValue
+from photocore.workbook.changing.changes import SheetChanges
 from photocore.workbook.changing.editor import WorkbookEditor
 from photocore.workbook.reading.grid import (
     Value,
@@ -18,6 +19,8 @@ from photocore.workbook.reading.grid import (
     split_area,
 )
 
+#: The least width of a column, in characters.
+_WIDTH = 10.0
 _COUNTED = re.compile(r"(COUNT\([^()]*\))")
 _CELL = re.compile(r"\[@(\w+)\]")
 
@@ -38,6 +41,8 @@ class ResultColumn:
         With ``[@key]`` for the cell of the same row of an input or result column; empty for values.
     number_format : str
         How numbers are shown; empty as in the table.
+    folded : bool
+        Whether the column is grouped and folded away: a step on the way, not a result.
     """
 
     key: str
@@ -45,6 +50,7 @@ class ResultColumn:
     values: Sequence[CellValue]
     formula: str = ""
     number_format: str = ""
+    folded: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -122,10 +128,13 @@ def put_result_columns(
     head = table.head or min(table.rows)
     places = _known(editor, table, columns, mark, adopted)
     last = max([0, *(max(cells, default=0) for cells in grid.values())])
+    widths = editor.changes.setdefault(table.sheet, SheetChanges()).columns
     for column in columns:
         if column.key not in places:
             last += 1
             places[column.key] = last
+            # Room for the heading, in the bold letters that headings have.
+            widths[last] = max(_WIDTH, 1.15 * len(column.heading) + 1), column.folded
     data, heads = editor.styles_of(table.sheet, table.rows[0]), editor.styles_of(table.sheet, head)
     like = next((data[n] for n in reversed(list(table.columns.values())) if data.get(n)), "")
     like_head = next((heads[n] for n in reversed(list(table.columns.values())) if heads.get(n)), "")

@@ -11,7 +11,7 @@ from xml.parsers import expat
 
 from photocore.errors import InputError
 from photocore.workbook.changing.cells import CellValue, NewCell, cell_xml, type_and_content
-from photocore.workbook.changing.changes import SheetChanges, Spliced
+from photocore.workbook.changing.changes import SheetChanges, Spliced, column_edits
 from photocore.workbook.changing.formfill import FormFiller
 from photocore.workbook.changing.formulas import areas_of_arrays
 from photocore.workbook.reading.grid import cell_name, column_number
@@ -112,6 +112,9 @@ class _Splicer:
                 raise InputError(
                     f"{self.path}: damaged, the part {self.part} is not valid XML ({error})."
                 ) from None
+        if self.changes.columns:
+            head = self.data[: self.data_start]
+            self.edits += column_edits(head, self.prefix, self.changes.columns)
         if self.dimension and self.edits:
             self.grow_dimension(*self.dimension)
         self.edits.sort(key=itemgetter(0, 1))

@@ -10,9 +10,11 @@ from bifocal import Measuring, Pair, Photo, PointObservations, SurveySetup, Taki
 from bifocal.survey.image_shift import image_shift
 from bifocal.survey.point_survey import solve_points
 from bifocal.workbook.export_workflow import export
+from bifocal.workbook.making.book import write_book
 from bifocal.workbook.output import write_result
 from bifocal.workbook.template_workflow import write_survey
 from photocore.errors import InputError
+from tests.bifocal.workbook.test_survey_workbook import ideal_content
 from tests.recalculate import recalculated, rows_of
 
 XYZ = np.array([[2.0, 0.0, 1.0], [-3.0, 2.0, -0.4], [1.0, -2.5, 0.3]])
@@ -137,3 +139,23 @@ def test_a_workbook_alone_moves_the_image_as_the_exact_relief_says(tmp_path):
     seen, foot = pair.project(true)[0], pair.project(true * [1, 1, 0])[0]
     left = seen - foot - griddata(feet, first - feet, foot, method="linear")
     assert np.hypot(*left.T).max() < 0.3 * np.hypot(*(seen - foot).T).max()
+
+
+@pytest.mark.office
+def test_corrected_coordinates_are_carried_back_to_what_was_typed(tmp_path):
+    first = np.array([[1.001, 2e-3, 0.05], [-1e-3, 0.999, -0.03], [1e-5, -2e-5, 1.0]])
+    second = np.array([[1.002, -1e-3, 0.02], [1e-3, 1.001, 0.01], [-1e-5, 1e-5, 1.0]])
+    write_book(tmp_path / "a.xlsx", content := ideal_content(adjusted=(first, second)))
+    rows = rows_of(recalculated(tmp_path / "a.xlsx", tmp_path), "Points", 4)
+    setup, table = content.setup, content.table
+    assert setup is not None
+    feet = image_shift(content.photos[0], setup, content.points, table)
+    for key in ("x_c", "dy"):
+        good = np.isfinite(feet[key])
+        found = [row[key] for row, is_good in zip(rows, good, strict=False) if is_good]
+        np.testing.assert_allclose(found, feet[key][good], rtol=1e-11, atol=1e-9)
+    # By hand: the matrix takes the corrected position, in mm, to the foot of the point.
+    mm = (np.stack([feet["x_c"], feet["y_c"]], -1) - setup.taking.nadir1) * [0.00739, -0.00739]
+    below = mm @ first[2, :2] + 1.0
+    foot = (mm @ first[:2, :2].T + first[:2, 2]) / below[:, None]
+    np.testing.assert_allclose(np.hypot(*foot.T), np.abs(table["s_c"]), rtol=1e-9)

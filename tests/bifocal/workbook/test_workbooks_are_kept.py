@@ -292,7 +292,7 @@ def test_results_are_new_live_columns_of_the_users_own_table(tmp_path, name):
     book = openpyxl.load_workbook(path, data_only=True)
     assert book.sheetnames == ["Note", "Facciata", "My chart", "Setup"]
     found = {cell.value: cell.column for cell in book["Facciata"][head]}
-    assert list(found)[: len(heads) + 2] == [None, *heads, "s1_used [mm]"][: len(heads) + 2]
+    assert list(found)[: len(heads) + 2] == [None, *heads, "r [m]"][: len(heads) + 2]
     live = openpyxl.load_workbook(path)["Facciata"]
     for row, (_, x, y, r) in enumerate(POINTS, start=head + 1):
         values = [book["Facciata"].cell(row, found[f"{key} [m]"]).value for key in "XYrZ"]

@@ -1,0 +1,91 @@
+"""Results beside a table of the user's own: what was asked for first, steps folded, all in view."""
+
+from __future__ import annotations
+
+import openpyxl
+import pytest
+from click.testing import CliRunner
+from openpyxl.worksheet.dimensions import ColumnDimension
+
+from tests.builders.commands import bifocal_command as main
+from tests.recalculate import recalculated
+from tests.workbook_lint import lint
+
+FIRST = ["r [m]", "X [m]", "Y [m]", "sigma_r [m]", "flag"]
+
+
+@pytest.fixture
+def solved(tmp_path):
+    """Return the sheet of an own table after results went into it."""
+    book = openpyxl.Workbook()
+    sheet = book.active
+    sheet.append(["Point", "x1 [mm]", "y1 [mm]", "x2 [mm]", "y2 [mm]"])
+    sheet.append(["A", 4.2424, 0, 4.4706, 0])
+    sheet.append(["B", 6.1, 2.2, 6.3, 2.27])
+    sheet.column_dimensions["A"].width = 21
+    # As programs leave it: one width for all columns to the last.
+    rest = ColumnDimension(sheet, index="B", min=2, max=16384, width=11.5, customWidth=True)
+    sheet.column_dimensions["B"] = rest
+    sheet.print_area = "A1:E3"
+    path = tmp_path / "own.xlsx"
+    book.save(path)
+    given = ["--d1", "17.5", "--d2", "9.5", "--c1", "35", "--c2", "19"]
+    done = CliRunner().invoke(main, ["solve", str(path), *given, "--out", str(path), "--overwrite"])
+    assert done.exit_code == 0, done.stderr
+    return path
+
+
+def widths(sheet):
+    """Return width, and whether it is folded, of each column by number."""
+    return {
+        number: (known.width, known.hidden, known.outlineLevel)
+        for known in sheet.column_dimensions.values()
+        for number in range(known.min, min(known.max, 60) + 1)
+    }
+
+
+def test_results_come_first_and_the_steps_are_folded(solved):
+    sheet = openpyxl.load_workbook(solved)["Sheet"]
+    heads = [cell.value for cell in sheet[1]]
+    assert heads[5:10] == FIRST
+    known = widths(sheet)
+    for number, head in enumerate(heads[5:], start=6):
+        width, hidden, level = known[number]
+        assert width >= len(head) + 1
+        assert (hidden, level) == ((False, 0) if head in FIRST else (True, 1))
+    assert "s1_used [mm]" in heads
+    assert sheet.sheet_format.outlineLevelCol == 1
+
+
+def test_other_columns_and_the_print_area_are_as_they_were(solved):
+    sheet = openpyxl.load_workbook(solved)["Sheet"]
+    known, last = widths(sheet), sheet.max_column
+    assert known[1] == (21, False, 0)
+    assert {known[number] for number in (2, 5, last + 1, 60)} == {(11.5, False, 0)}
+    assert sheet.print_area == "'Sheet'!$A$1:$E$3"
+    assert lint(solved) == []
+
+
+def test_widths_that_the_user_chose_later_stay(solved):
+    book = openpyxl.load_workbook(solved)
+    book["Sheet"].column_dimensions["F"].width = 33
+    book["Sheet"].column_dimensions["K"].hidden = False
+    book.save(solved)
+    done = CliRunner().invoke(main, ["solve", str(solved), "--out", str(solved), "--overwrite"])
+    # Formulas that openpyxl left without results are calculated by the program that opens the file.
+    assert done.exit_code == 0, done.stderr
+    known = widths(openpyxl.load_workbook(solved)["Sheet"])
+    assert known[6][0] == 33
+    assert not known[11][1]
+
+
+@pytest.mark.office
+def test_formulas_of_reordered_columns_recalculate_to_the_same(solved, tmp_path):
+    stored = openpyxl.load_workbook(solved, data_only=True)["Sheet"]
+    fresh = recalculated(solved, tmp_path)["Sheet"]
+    for row in (2, 3):
+        for column in range(6, stored.max_column + 1):
+            value = stored.cell(row, column).value
+            assert fresh.cell(row, column).value == (
+                pytest.approx(value, rel=1e-12) if isinstance(value, float) else value
+            )
