@@ -139,12 +139,16 @@ def orientation_effect(
     ndarray, shape (n, 3, k)
         NaN where a point is.
     """
+    return np.asarray(_by_orientation(photos, xyz) @ independent(covariance))
+
+
+def independent(covariance: FloatArray) -> FloatArray:
+    """Return what independent errors of sigma 1 add to the parameters, (k, k): a root of it."""
     scale = np.sqrt(np.diag(covariance))
     safe = np.where(scale > 0, scale, 1.0)
     # As a correlation: radians, metres and pixels differ by many powers of ten.
     values, vectors = np.linalg.eigh(covariance / np.outer(safe, safe))
-    factor = safe[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-    return np.asarray(_by_orientation(photos, xyz) @ factor)
+    return np.asarray(safe[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def _by_orientation(photos: Sequence[PlanePhoto], xyz: FloatArray) -> FloatArray:
