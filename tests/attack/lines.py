@@ -42,6 +42,7 @@ INPUTS: list[tuple[str, ...]] = [
     ("bifocal relief {} --out o.tif", "wall.photos.json"),
     ("bifocal adjust {} wall.pair.json --out d", "wall.pair.json"),
     ("bifocal ortho {} --plane --out o.tif", "wall.pair.json"),
+    ("bifocal ortho {} --plane --out o.tif", "wall.photos.json"),
     ("bifocal ortho wall.pair.json --out o.tif --relief {}", "relief.tif"),
     ("bifocal ortho wall.pair.json --out o.tif --points {}", "result.csv", "half"),
     ("bifocal rectify {} --control control.csv --out o.tif", "far.jpg", "photo"),

@@ -218,6 +218,8 @@ WORDS: list[tuple[str, str]] = [
     ("bifocal relief wall.pair.json --out o.tif --preview o.tif", "o.tif"),
     ("bifocal relief wall.pair.json --out o.tif --cloud o.xyz", "o.xyz"),
     ("bifocal ortho wall.pair.json --plane", "--out|--deliver"),
+    ("bifocal ortho wall.photos.json --plane --out o.tif --image 2", "--image"),
+    ("bifocal ortho wall.photos.json --plane --deliver d --scale 1:50", "--deliver"),
     (f"{ORTHO} --plane --relief relief.tif", "--plane|--relief|one"),
     (f"{ORTHO} --plane 1e10", "plane|camera"),
     (f"{ORTHO} --plane 20", "plane|camera"),
