@@ -199,11 +199,13 @@ def _level(data: bytes) -> int:
     return _FAST if len(data) > SMALL else _THOROUGH
 
 
-def _refuse_damage(path: Path, old: zipfile.ZipFile, target: Path, changed: Container[str]) -> None:
+def _refuse_damage(
+    path: Path, old: zipfile.ZipFile, target: Path, changed: Mapping[str, bytes | None]
+) -> None:
     """Refuse changed parts that are no XML or refer to what is not there, unless they did so."""
     with zipfile.ZipFile(target) as new:
-        found = (f for f in _faults(path, new, changed) if f not in {*_faults(path, old, changed)})
-        fault = next(found, "")
+        found = _faults(path, new, changed, made=changed)
+        fault = next((f for f in found if f not in {*_faults(path, old, changed)}), "")
     if fault:
         raise InputError(
             f"{path}: nothing was written, since no program would open the changed workbook "
@@ -211,13 +213,20 @@ def _refuse_damage(path: Path, old: zipfile.ZipFile, target: Path, changed: Cont
         )
 
 
-def _faults(path: Path, package: zipfile.ZipFile, changed: Container[str]) -> Iterator[str]:
-    """Yield why a spreadsheet program would not open a package."""
-    names = {*package.namelist()}
+def _faults(
+    path: Path,
+    package: zipfile.ZipFile,
+    changed: Container[str],
+    made: Mapping[str, bytes | None] | None = None,
+) -> Iterator[str]:
+    """Yield why a spreadsheet program would not open a package; parts at hand are not unpacked."""
+    names, known = {*package.namelist()}, made or {}
     for name in ("", *package.namelist()):
         try:
             relations = read_relations(path, package, name)
-            data = package.read(name) if name in changed and name.endswith(".xml") else b"<x/>"
+            data = b"<x/>"
+            if name in changed and name.endswith(".xml"):
+                data = known.get(name) or package.read(name)
             expat.ParserCreate(namespace_separator=" ").Parse(data, True)
         except (InputError, expat.ExpatError) as error:
             yield f"{name} is not valid XML: {str(error).partition(': line')[0]}"
