@@ -17,6 +17,7 @@ from photocore.images import read_image, write_image
 from .calibration.board_calibration import Calibration
 from .calibration.board_photos import calibrate
 from .campaigns.rectification import Rectification, rectify
+from .campaigns.verification import FileState, Verification, verify
 from .collimation.session import Session
 from .collimation.workflow import PageServer, page_server, pick
 from .demo import SAMPLE, WATER_SAMPLE
@@ -57,6 +58,7 @@ from .relief_maps.dense_matching import DenseRelief
 from .relief_maps.registration import Registration
 from .relief_maps.set_relief import dense_relief
 from .reports.relief_view import relief_view
+from .reports.worked_point import WorkedPoint
 from .survey.georeferencing import georeference
 from .survey.observations import PointObservations
 from .survey.orientation_check import OrientationCheck
@@ -84,6 +86,7 @@ __all__ = [
     "Control",
     "ConvergenceError",
     "DenseRelief",
+    "FileState",
     "FlagLimits",
     "FlatSurface",
     "Foot",
@@ -148,6 +151,8 @@ __all__ = [
     "WeightedSums",
     "Window",
     "WorkbookError",
+    "Verification",
+    "WorkedPoint",
     "WorldPoints",
     "align",
     "calibrate",
@@ -170,6 +175,7 @@ __all__ = [
     "relief_from_displacement",
     "relief_view",
     "solve",
+    "verify",
     "write_colmap",
     "write_image",
 ]
