@@ -44,7 +44,7 @@ class PlanePicks:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class IntersectedPoints:
+class MeasuredPoints:
     """Points in the plane frame with their precision, however many rays met in them.
 
     Attributes
@@ -96,7 +96,7 @@ class IntersectedPoints:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Intersection(IntersectedPoints):
+class Intersection(MeasuredPoints):
     """Points in the plane frame with their precision.
 
     Attributes

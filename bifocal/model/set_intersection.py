@@ -12,8 +12,8 @@ from scipy.stats import chi2
 from bifocal import rays
 from bifocal.model.flags import FlagLimits, point_flags
 from bifocal.model.intersection import (
-    IntersectedPoints,
     Intersection,
+    MeasuredPoints,
     PlanePicks,
     inverse_3x3,
 )
@@ -34,7 +34,7 @@ _AT_ONCE = 4000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SetIntersection(IntersectedPoints):
+class SetIntersection(MeasuredPoints):
     """Points in the plane frame from two or more photos of a set of m, with their precision.
 
     Attributes
