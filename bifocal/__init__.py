@@ -37,15 +37,13 @@ The page
     pick                      orient, pick and draw in the browser, as the command `bifocal pick`
     page_server, PageServer, Session   the same without a browser, for programs that drive it
     recording                 what the outputs written within it say made them
-    verify, Verification      a delivery held against the hashes kept when it was made
 Sample pairs                  SAMPLE, WATER_SAMPLE: folders of photos with exact truth
 
-What they take and give: Bounds, CheckResult, FileState, FlagLimits, FlatSurface, Foot, Grid,
-KnownPoints, Layers, MapSurface, MediaPath, NamedPoints, OrientationCheck, Pinhole, PlanePicks,
+What they take and give: Bounds, CheckResult, FlagLimits, FlatSurface, Foot, Grid, KnownPoints,
+Layers, MapSurface, MediaPath, NamedPoints, OrientationCheck, Pinhole, PlanePicks,
 PointObservations, Progress, ProjectOptions, ProjectPhotos, ProjectedPoints, RadialDivision,
 RankedPair, Rectification, Registration, ReliefTable, Similarity, SpaceSums, Surface, SurveyInput,
-SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision, WeightedSums, Window, WorkedPoint,
-WorldPoints.
+SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision, WeightedSums, Window, WorldPoints.
 
 Errors are one family with one message each that says what is wrong, where, and how to mend it:
 PhotogrammetryError > InputError (a ValueError) > CellError, WorkbookError, MissingExtraError;

@@ -17,7 +17,6 @@ from photocore.images import read_image, write_image
 from .calibration.board_calibration import Calibration
 from .calibration.board_photos import calibrate
 from .campaigns.rectification import Rectification, rectify
-from .campaigns.verification import FileState, Verification, verify
 from .collimation.session import Session
 from .collimation.workflow import PageServer, page_server, pick
 from .demo import SAMPLE, WATER_SAMPLE
@@ -58,7 +57,6 @@ from .relief_maps.dense_matching import DenseRelief
 from .relief_maps.registration import Registration
 from .relief_maps.set_relief import dense_relief
 from .reports.relief_view import relief_view
-from .reports.worked_point import WorkedPoint
 from .survey.georeferencing import georeference
 from .survey.observations import PointObservations
 from .survey.orientation_check import OrientationCheck
@@ -86,7 +84,6 @@ __all__ = [
     "Control",
     "ConvergenceError",
     "DenseRelief",
-    "FileState",
     "FlagLimits",
     "FlatSurface",
     "Foot",
@@ -151,8 +148,6 @@ __all__ = [
     "WeightedSums",
     "Window",
     "WorkbookError",
-    "Verification",
-    "WorkedPoint",
     "WorldPoints",
     "align",
     "calibrate",
@@ -175,7 +170,6 @@ __all__ = [
     "relief_from_displacement",
     "relief_view",
     "solve",
-    "verify",
     "write_colmap",
     "write_image",
 ]

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-import bifocal
+from bifocal.campaigns.verification import verify as verified
 from tests.bifocal.campaigns.sample_tables import FAR, NEAR, write_tables
 from tests.builders.commands import bifocal_command as main
 
@@ -72,7 +72,7 @@ def test_a_delivery_is_whole_as_folder_and_as_archive_and_stays_untouched(wall, 
     assert state_of(wall) == before
     lines = CliRunner().invoke(main, ["verify", str(wall)]).stdout.splitlines()
     assert lines[0] == "unchanged   align/.made.json"
-    assert lines[-1] == f"Digest of the delivery: {bifocal.verify(wall).digest}"
+    assert lines[-1] == f"Digest of the delivery: {verified(wall).digest}"
 
 
 def test_what_is_changed_missing_or_not_listed_is_named(wall):

@@ -12,7 +12,8 @@ import ezdxf
 import numpy as np
 import pytest
 
-from bifocal import SAMPLE, InputError, Pair, ReliefMap, verify
+from bifocal import SAMPLE, InputError, Pair, ReliefMap
+from bifocal.campaigns.verification import verify
 from bifocal.collimation import job_process, job_tasks
 from bifocal.collimation.live_orientation import control_of, live_orientation
 from bifocal.collimation.project import find_files
