@@ -96,7 +96,7 @@ def _stations_sheet(sheet: Any, plan: Plan, language: str, results: dict[str, An
         cell = sheet.cell(3, column, say(key))
         cell.alignment = Alignment(wrap_text=True, vertical="top")
         sheet.column_dimensions[cell.column_letter].width = 44 if key == "note" else 11
-    sheet.row_dimensions[3].height = 45
+    sheet.row_dimensions[3].height = 60
     for row, station in enumerate(plan.stations, start=5):
         sheet.row_dimensions[row].height = 30 if station.note else 15
         values = (
