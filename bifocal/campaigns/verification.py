@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from bifocal.campaigns.pair_job import FIRST_STEP, PRODUCTS, PairJob
-from bifocal.campaigns.step_store import RECORD, read_record, record_key
+from bifocal.campaigns.step_store import FORMAT, RECORD, read_record, record_key
 from bifocal.campaigns.workflow import facade
 from bifocal.files.point_tables import read_survey_points
 from bifocal.model.pair import Pair
@@ -31,6 +31,7 @@ from photocore.workbook.reading.package import UNPACKING, check_names
 
 #: A file of an archive that grows more when unpacked, and is larger, is no product of ours.
 _RATIO, _LARGE = 250, 64 << 20
+_PAIR = ".pair.json"
 #: State of what is not made anew.
 _LEFT = "not remade"
 
@@ -133,21 +134,20 @@ def verify(
         raise InputError(f"{sources}: no such folder; name that of the photos and tables.")
     with _opened(path) as folder:
         records = _records(folder)
-        found = _visible(folder)
-        listed = dict(_listed(folder, records, found))
+        hashes = {name: file_hash(folder / name) for name in sorted(_visible(folder))}
+        listed = dict(_listed(folder, records, hashes))
         if not listed:
             raise InputError(
                 f"{path}: holds no record of a delivery ({RECORD} in each folder, or {SUMS}). Name "
                 "the folder that facade or survey made; copies must take its hidden files along."
             )
-        hashes = {name: file_hash(folder / name) for name in sorted(found)}
         sums = "".join(f"{digest}  {name}\n" for name, digest in hashes.items())
         files = [*_judged(hashes, listed), *_broken(records)]
         return Verification(
             files=tuple(sorted(files, key=lambda one: one.file)),
             worked=tuple(_worked(folder, hashes)),
             remade=tuple(_remade(folder, records, sources, progress)) if remake else (),
-            digest=hashlib.sha256(sums.encode()).hexdigest(),
+            digest=hashlib.sha256(os.fsencode(sums)).hexdigest(),
         )
 
 
@@ -208,37 +208,40 @@ def _visible(folder: Path) -> set[str]:
 
 def _records(folder: Path) -> dict[str, dict[str, Any]]:
     """Return the records of steps by their place; an empty one where it cannot be read."""
-    records: dict[str, dict[str, Any]] = {}
-    for path in sorted(folder.rglob(RECORD)):
-        name = path.relative_to(folder)
-        if any(part[0] == "." for part in name.parts[:-1]):
-            continue
-        records[name.as_posix()] = {}
-        if read_record(path.parent) is not None:
-            with suppress(InputError, KeyError, TypeError, AttributeError):
-                data = read_object(path, what="record")
-                dict(data["outputs"]), list(data["after"]), dict(data["options"])
-                dict(map(tuple, data["inputs"].values()))
-                record_key(data, {})
-                records[name.as_posix()] = data
-    return records
+    places = (path.relative_to(folder) for path in sorted(folder.rglob(RECORD)))
+    return {
+        place.as_posix(): _record(folder / place)
+        for place in places
+        if not any(part[0] == "." for part in place.parts[:-1])
+    }
+
+
+def _record(path: Path) -> dict[str, Any]:
+    with suppress(InputError, KeyError, TypeError, ValueError, AttributeError):
+        data = read_object(path, what="record")
+        texts = [data["program"], data["date"], data["step"], data["key"], *data["after"]]
+        texts += [*data["outputs"].values(), *chain(*_inputs(data).values())]
+        whole = all(isinstance(text, str) for text in texts) and isinstance(data["options"], dict)
+        if whole and data["format"] == FORMAT:
+            return data
+    return {}
 
 
 def _listed(
-    folder: Path, records: Mapping[str, dict[str, Any]], found: set[str]
+    folder: Path, records: Mapping[str, dict[str, Any]], hashes: Mapping[str, str]
 ) -> Iterator[tuple[str, str]]:
-    """Yield the files that should be there with their hashes; a record has none of its own."""
-    for name in found:
+    """Yield the files that should be there with their hashes; a list has none of its own."""
+    # What went in may lie beside what came out; photos of two folders may have one name.
+    sources = [file for data in records.values() for file in _inputs(data).values()]
+    for name, digest in hashes.items():
+        known = [one for source, one in sources if source == PurePosixPath(name).name]
+        if known:
+            yield name, digest if digest in known else known[0]
         if PurePosixPath(name).name == SUMS:
             yield name, ""
-            for line in read_text(folder / name, "list of hashes").splitlines():
-                digest, _, file = line.partition("  ")
-                yield _inside(name, file), digest
-    # What went in may lie beside what came out, and is known by its name.
-    sources = {name: digest for data in records.values() for name, digest in _inputs(data).values()}
-    for name in found:
-        if PurePosixPath(name).name in sources:
-            yield name, sources[PurePosixPath(name).name]
+            for line in filter(None, read_text(folder / name, "list of hashes").splitlines()):
+                told, _, file = line.partition(" ")
+                yield _inside(name, file[1:]), told.lower()
     for name, data in records.items():
         yield name, ""
         for file, digest in data.get("outputs", {}).items():
@@ -297,7 +300,7 @@ def _worked(folder: Path, hashes: Mapping[str, str]) -> Iterator[WorkedPoint]:
         for other in hashes:
             # Damaged ones are told of as changed files; the point then fails.
             with suppress(InputError):
-                if PurePosixPath(other).name == f"{title}.pair.json":
+                if PurePosixPath(other).name == f"{title}{_PAIR}":
                     pairs.append(Pair.read(folder / other))
                 if PurePosixPath(other).name in (f"{title}_points.xlsx", f"{title}_points.csv"):
                     points.append(read_survey_points(folder / other)[0].xyz)
@@ -319,7 +322,10 @@ def _remade(
             if PurePosixPath(name).parent.parent == parent and data
         }
         if FIRST_STEP not in steps or any("pair" in data["inputs"] for data in steps.values()):
-            yield FileState(file=parent.as_posix(), state=_LEFT, why="made of several pairs")
+            why = "made of several pairs"
+            yield from (
+                FileState(file=(parent / step).as_posix(), state=_LEFT, why=why) for step in steps
+            )
             continue
         with temporary_folder() as place:
             job = _job(folder, folder / parent, steps, sources, place)
@@ -339,15 +345,17 @@ def _job(
     root: Path, folder: Path, steps: Mapping[str, dict[str, Any]], sources: Path | None, place: Path
 ) -> PairJob:
     """Return the work that the records of a pair tell of, with copies of all that went in."""
-    (pair,) = (name for name in steps[FIRST_STEP]["outputs"] if name.endswith(".pair.json"))
+    pair = next((name for name in steps[FIRST_STEP]["outputs"] if name.endswith(_PAIR)), "")
     options = {key: value for data in steps.values() for key, value in data["options"].items()}
-    photos = read_object(folder / FIRST_STEP / pair, what="pair file")
+    wanted = {role: file for data in steps.values() for role, file in _inputs(data).items()}
+    photos = Pair.read(folder / FIRST_STEP / pair)
+    if not {"far", "near"} <= set(wanted):
+        raise InputError(f"{folder / FIRST_STEP / RECORD}: lacks the photos; it may not.")
     # The pair file names the photos as seen from its folder: they must lie there again.
-    ways = [str(photos[key]["file"]) for key in ("image1", "image2")]
-    up = max(way.count("..") for way in ways)
+    ways = [photos.image1.file, photos.image2.file]
+    up = min(max(way.count("..") for way in ways), 32)
     home = place.joinpath(*["up"] * up, "delivery")
     files: dict[str, Path] = {}
-    wanted = {role: file for data in steps.values() for role, file in _inputs(data).items()}
     for role, (name, digest) in wanted.items():
         way = next((way for way in ways if PurePosixPath(way).name == name), "")
         target = Path(os.path.normpath(home / FIRST_STEP / way))
@@ -357,7 +365,7 @@ def _job(
         target.parent.mkdir(parents=True, exist_ok=True)
         files[role] = Path(shutil.copyfile(source, target))
     return PairJob(
-        name=str(options.get("title", pair.removesuffix(".pair.json"))), folder=home,
+        name=str(options.get("title", pair.removesuffix(_PAIR))), folder=home,
         far=files.pop("far"), near=files.pop("near"), date=steps[FIRST_STEP]["date"],
         files={role: path for role, path in files.items() if role in FILES},
         options={key: value for key, value in options.items() if key != "title"},

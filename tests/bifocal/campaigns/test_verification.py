@@ -142,12 +142,13 @@ def archive(path: Path, members: dict[str, bytes]) -> Path:
 
 def test_what_is_no_delivery_is_refused_in_one_message(tmp_path):
     (tmp_path / "empty").mkdir()
-    record = {"format": "bifocal-step/1", "step": "a", "program": "p", "key": "k", "inputs": {},
-              "after": [], "options": {}, "remarks": [], "seconds": 0,
+    record = {"format": "bifocal-step/1", "step": "a", "program": "p", "date": "d",
+              "key": "k", "inputs": {}, "after": [], "options": {}, "remarks": [], "seconds": 0,
               "outputs": {"../../secret": "0"}}  # fmt: skip
     (tmp_path / "text.zip").write_text("not an archive")
     half = archive(tmp_path / "half.zip", {"a/b.txt": bytes(range(256)) * 99})
     half.write_bytes(half.read_bytes()[:-40])
+    deep = '{"a":' * 50_000
     for path, words in (
         (tmp_path / "nothing", "no such folder or archive"),
         (tmp_path / "empty", "holds no record of a delivery"),
@@ -164,3 +165,13 @@ def test_what_is_no_delivery_is_refused_in_one_message(tmp_path):
         assert str(path) in told or ".made.json" in told
         assert told.count("\n") == 1
     assert sorted(path.name for path in tmp_path.rglob("a")) == []
+    for text in ("[]", deep, json.dumps(record | {"inputs": {"far": ["a", []]}, "outputs": {}})):
+        sent = archive(tmp_path / "sent.zip", {"a/.made.json": text.encode()})
+        assert states(verify(sent, status=1)[0]) == {".made.json": "changed"}
+
+
+def test_a_list_of_hashes_as_other_programs_write_it_is_read(tmp_path):
+    (tmp_path / "a b.txt").write_text("x")
+    digest = hashlib.sha256(b"x").hexdigest().upper()
+    (tmp_path / "SHA256SUMS").write_text(f"{digest} *a b.txt\n{digest}  gone.txt\n\n")
+    assert states(verify(tmp_path, status=1)[0]) == {"gone.txt": "missing"}
