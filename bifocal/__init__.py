@@ -14,7 +14,6 @@ The pair
     Pair, Photo               both cameras; read and write pair files, intersect and project points
     PhotoSet                  two or more photos of one wall; a pair is the set of two
     photos_from_project, write_colmap   a set from another program's project, and one for COLMAP
-    Intersection, SetIntersection   what their `intersect` returns: X, Y, r, covariance, flags
     read_image, write_image   photos as arrays, upright as seen
     Lens                      principal distance, principal point and distortion of a lens
     calibrate, Calibration    a lens from photos of a board
@@ -29,7 +28,7 @@ The whole wall
     dense_relief, DenseRelief measured relief with its precision, pixel by pixel
     ReliefMap, Quality        relief on a grid, its GeoTIFF, and where each pixel's comes from
     orthophoto, Orthophoto, OrthoOptions, Source   the photo to scale, moved by its relief
-    rectify, compare          one photo alone to scale on its wall; what has changed between two dates
+    rectify, compare          one photo alone to scale; two dates of a wall compared
     mosaic, Mosaic, MosaicOptions   several orthophotos or relief maps made one
     relief_view               the relief in three dimensions, as a page of HTML
 The page
@@ -39,10 +38,10 @@ The page
 Sample pairs                  SAMPLE, WATER_SAMPLE: folders of photos with exact truth
 
 What they take and give: Bounds, ChangedRegion, CheckResult, Comparison, FlagLimits, FlatSurface,
-Foot, Grid, KnownPoints, Layers, MapSurface, MediaPath, NamedPoints, OrientationCheck, Pinhole,
-PlanePicks, PointObservations, Progress, ProjectOptions, ProjectPhotos, ProjectedPoints,
-RadialDivision, RankedPair, Rectification, Registration, ReliefTable, Similarity, SpaceSums,
-Surface, SurveyInput, SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision,
+Foot, Grid, Intersection, KnownPoints, Layers, MapSurface, MediaPath, NamedPoints, OrientationCheck,
+Pinhole, PlanePicks, PointObservations, Progress, ProjectOptions, ProjectPhotos, ProjectedPoints,
+RadialDivision, RankedPair, Rectification, Registration, ReliefTable, SetIntersection, Similarity,
+SpaceSums, Surface, SurveyInput, SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision,
 WeightedSums, Window, WorldPoints.
 
 Errors are one family with one message each that says what is wrong, where, and how to mend it:

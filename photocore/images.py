@@ -21,6 +21,7 @@ from photocore.arrays import ByteArray
 from photocore.decoding import decoded, decoders_words, refuse_damaged_jpeg
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_ending
+from photocore.png_text import with_provenance
 from photocore.provenance import note
 from photocore.raster import RasterFile
 from photocore.textfile import check_file
@@ -228,7 +229,8 @@ def write_image(path: Path | str, image: ImageArray, *, overwrite: bool = False)
     if not done:
         raise InputError(f"{path}: an image of {image.dtype} {image.shape} cannot be written so.")
     with atomic_path(path, overwrite=overwrite) as temporary:
-        temporary.write_bytes(data.tobytes())
+        packed = data.tobytes()
+        temporary.write_bytes(with_provenance(packed) if ending == ".png" else packed)
 
 
 def _refuse_early(path: Path) -> None:

@@ -63,6 +63,7 @@ def make_desk(folder: Path) -> None:
     for name, part in PARTS.items():
         _pair(folder, name, part, (f"{name}_far.jpg", f"{name}_near.jpg"))
         _table(folder / f"{name}.csv", _inside(rows, part))
+    _set(folder, rows)
     wall = Pair.read(folder / "wall.pair.json")
     three = (wall.image1, wall.image2, replace(wall.image2, name="again"))
     PhotoSet(photos=three).write(folder / "porch.photos.json")
@@ -199,6 +200,18 @@ def _pair(folder: Path, name: str, part: tuple[int, int], files: tuple[str, str]
             principal_distance=focal, image_size=(last - first, SIZE[1]),
         ))  # fmt: skip
     replace(pair, image1=sides[0], image2=sides[1]).write(folder / f"{name}.pair.json")
+
+
+def _set(folder: Path, rows: list[list[float | str]]) -> None:
+    """Write the pair with a third photo as a set, and picks in all three."""
+    pair = Pair.read(folder / "wall.pair.json")
+    mid = replace(pair.image1, name="mid", file="", nadir=pair.image1.nadir + 1.5, distance=14.0)
+    named = replace(pair.image1, name="far"), mid, replace(pair.image2, name="near")
+    PhotoSet(photos=named).write(folder / "wall.photos.json")
+    picks = [[row[0], *row[4:6], *mid.project(np.array(row[1:4], float)), *row[6:]] for row in rows]
+    head = ["id", *(f"{axis}{k} [px]" for k in (1, 2, 3) for axis in ("col", "row"))]
+    with (folder / "picks.csv").open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows([head, *picks])
 
 
 def _workbook(folder: Path, rows: list[list[float | str]]) -> None:

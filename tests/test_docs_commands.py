@@ -102,7 +102,7 @@ FIRST = {
     "help of bifocal undistort": "mkdir corrected",
 }  # fmt: skip
 #: Help that goes on where that of another command ends: what it reports on is made there.
-GOES_ON = {"help of bifocal report": "help of bifocal facade"}
+GOES_ON = {f"help of bifocal {name}": "help of bifocal facade" for name in ("report", "verify")}
 #: Lines that want the sample at its full size.
 WHOLE = "--what targets"
 #: Options added so that the line costs seconds: the page's own products are made by other lines.

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import rasterio
 from click.testing import CliRunner
+from PIL import Image
 
 import bifocal
 from bifocal import SAMPLE
@@ -43,10 +44,11 @@ def made(tmp_path_factory) -> Path:
         "--bounds=-1,-1,1,1", "--deliver", out / "sheet")  # fmt: skip
     run("report", PAIR, "--control", targets, "--out", out / "report.html")
     run("report", PAIR, "--control", targets, "--out", out / "report.pdf")
-    run("align", SAMPLE / "far.jpg", SAMPLE / "near.jpg", "--as-set-up", "--no-picture",
+    run("align", SAMPLE / "far.jpg", SAMPLE / "near.jpg", "--as-set-up",
         "--distance1", 17.5, "--distance2", 9.5,
         "--focal1", 35, "--focal2", 19, "--sensor-width", 22.7,
         "--out", out / "p.pair.json")  # fmt: skip
+    run("view", SAMPLE / "truth.tif", "--out", out / "view.html")
     return out
 
 
@@ -58,7 +60,12 @@ def told(path: Path) -> str:
     if path.suffix == ".xlsx":
         with zipfile.ZipFile(path) as package:
             return package.read("docProps/core.xml").decode()
+    if path.suffix == ".png":
+        with Image.open(path) as picture:
+            return picture.text["Comment"]
     data = path.read_bytes()
+    if path.suffix == ".html":  # without the report's own section
+        return data.decode().partition('<meta name="provenance" content="')[2].partition('"')[0]
     if path.suffix == ".pdf":
         texts = [data.decode("latin-1")]
         for part in data.split(b"<feff")[1:]:
@@ -75,11 +82,15 @@ INPUTS = {
     "p.pair.json": ("far.jpg", "near.jpg"),
     "report.html": ("targets.csv", "facade.pair.json", "far.jpg"),
     "report.pdf": ("targets.csv", "facade.pair.json", "far.jpg"),
+    "sheet/*.png": ("facade.pair.json", "far.jpg"),
+    "p.pair.png": ("far.jpg", "near.jpg"),
+    "view.html": ("truth.tif",),
     "sheet/*.tif": ("facade.pair.json", "far.jpg"),
     "sheet/*.pdf": ("facade.pair.json", "far.jpg"),
     "sheet/*.dxf": ("facade.pair.json", "far.jpg"),
 }
-COMMANDS = {"r": "solve", "points": "export", "p": "align", "report": "report", "sheet": "ortho"}
+COMMANDS = {"r": "solve", "points": "export", "p": "align", "report": "report", "sheet": "ortho",
+            "view": "view"}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", INPUTS)

@@ -50,13 +50,14 @@ def test_a_remark_is_known_by_its_words_wherever_it_stands(key):
 @pytest.mark.parametrize("key", [key for key in KEYS if not key.startswith("word.")])
 def test_a_remark_is_used(key):
     section, name = key.split(".")
-    stem = re.escape(f'"{section}.')
-    said = {found for text in CODE.values() for found in re.findall(rf"{stem}[\w{{}}\' .]*", text)}
-    assert any(name.startswith(one.removeprefix(f'"{section}.').split("{")[0]) for one in said)
+    stem = rf"[\"']{re.escape(section)}\."
+    said = {found for text in CODE.values() for found in re.findall(rf"{stem}([\w{{}}' .]*)", text)}
+    assert any(name.startswith(re.split("[{']", one)[0]) for one in said)
 
 
 def test_every_remark_that_code_names_has_words():
-    named = {key for text in CODE.values() for key in re.findall(r'\bremark\(\s*"([\w.]+)"', text)}
+    call = re.compile(r"""\bremark\(\s*(["'])([\w.]+)\1""")
+    named = {key for text in CODE.values() for _, key in call.findall(text)}
     assert named
     assert named <= set(KEYS)
 

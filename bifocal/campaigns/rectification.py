@@ -183,7 +183,7 @@ def rectify_photo(
     if given["control"] is not None:
         control = read_control(
             given["control"], sigma=given["sigma_control"], sigma_plane=CONTROL.sigma_on_wall,
-            unit=given["unit"] or "", columns=given["columns"], alone=True,
+            unit=given["unit"] or "", columns=given["columns"], photos=1,
         )  # fmt: skip
         check_inside(control, control.pixels1, info.size, path.name)
     rectangle = given["rectangle"]

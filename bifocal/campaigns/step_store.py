@@ -93,14 +93,21 @@ def step_key(step: Step, earlier: Mapping[str, StepRecord], hashes: FileHashes) 
         check_name(path)
         check_file(path)
     content = {
-        "format": FORMAT,
         "program": program(),
         "step": step.name,
         # By name as well: pair files and drawings speak of the files they were made from.
-        "files": {role: [path.name, hashes(path)] for role, path in step.files.items()},
-        "after": {name: dict(earlier[name].outputs) for name in step.after},
+        "inputs": {role: [path.name, hashes(path)] for role, path in step.files.items()},
         "options": dict(step.options),
     }
+    return record_key(content, {name: earlier[name].outputs for name in step.after})
+
+
+def record_key(made: Mapping[str, Any], after: Mapping[str, Mapping[str, str]]) -> str:
+    """Return the key of a record, given as plain data, that follows steps with these outputs."""
+    content = {
+        "format": FORMAT, "program": made["program"], "step": made["step"],
+        "files": made["inputs"], "after": after, "options": made["options"],
+    }  # fmt: skip
     text = json.dumps(json.loads(to_text(content)), sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
 

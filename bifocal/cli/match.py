@@ -16,17 +16,22 @@ from photocore.options import declared
 def command(pair: Path, out: Path, count: int, what: str, as_json: bool, **options: Any) -> None:
     """Find the same details of the wall in both photos of PAIR, a pair file or survey workbook.
 
+    Of a set of photos (.photos.json) those of its best pair are found in all others too.
+
     Discs, chequers and coded markers are found and measured by their centres; natural detail is
     matched along the radial lines. Every point is checked by how far off its line it fits.
     """
     from bifocal.matching.matching import MatchSettings
-    from bifocal.workbook.match_workflow import match_photos, match_summary
+    from bifocal.survey.set_survey import best_pair
+    from bifocal.workbook.match_workflow import match_photos, match_set_file, match_summary
     from bifocal.workbook.pair_workflow import is_workbook, read_pair
+    from bifocal.workbook.sources import set_or_pair
 
     low, high = options.pop("relief_min"), options.pop("relief_max")
     if low is not None and high is not None and low >= high:
         raise click.UsageError("--relief-min must be below --relief-max.")
-    source = read_pair(pair)
+    photos, _ = set_or_pair(pair)
+    source = read_pair(pair) if photos is None else best_pair(photos)
     reliefs = None
     if low is not None or high is not None:
         near = source.image2.distance
@@ -34,6 +39,11 @@ def command(pair: Path, out: Path, count: int, what: str, as_json: bool, **optio
     settings = MatchSettings(
         count=count, relief_range=reliefs, features=what != "targets", targets=what != "features"
     )
+    if photos is not None:
+        told = match_set_file(photos, out, settings, overwrite=options["overwrite"])
+        shown = _set_lines(told)
+        print_result({**told, "out": out}, shown, as_json=as_json, remarks=photos.remarks)
+        return
     found = match_photos(source if is_workbook(pair) else pair, out, settings, **options)
     summary = match_summary(*found)
     notes = (*found[0].remarks, *_remarks(summary["kinds"], what))
@@ -54,6 +64,17 @@ def _remarks(kinds: dict[str, int], what: str) -> Iterator[str]:
             "Only targets found in both photos are listed: discs 5 to 120 px across on a plate of "
             "one grey, two-by-two chequers, coded markers. Pick the others by hand."
         )
+
+
+def _set_lines(summary: dict[str, Any]) -> Iterator[str]:
+    """Yield what was found in a set."""
+    picks = ", ".join(f"{name} {number}" for name, number in summary["photos"].items())
+    low, high = summary["relief_range"]
+    yield f"{summary['count']} points, {summary['in_three']} in three photos or more ({picks})."
+    yield (
+        f"Relief from {low:.2f} to {high:.2f} m, sigma of r {1000 * summary['sigma_r_median']:.1f} "
+        f"mm at the median; picks of {summary['sigma_px']:.2f} px."
+    )
 
 
 def _lines(summary: dict[str, Any]) -> Iterator[str]:

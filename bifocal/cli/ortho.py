@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bifocal.options import DRAWING, OF_PAIR
+from bifocal.remarks import remark as remark_of
 from photocore.cli import print_result, progress_bar, remark
+from photocore.errors import InputError
 from photocore.options import declared
 
 if TYPE_CHECKING:
@@ -20,17 +22,19 @@ def command(
     pair: Path, out: Path | None, relief: Path | None, points: Path | None, plane: float | None,
     folder: Path | None, title: str, tfw: bool, overwrite: bool, as_json: bool, **given: Any,
 ) -> None:  # fmt: skip
-    """Make the orthophoto of a wall from the photos of a PAIR file or survey workbook.
+    """Make the orthophoto of a wall from the photos of a PAIR file, set or survey workbook.
 
     Every pixel is taken from the original photo, moved by its own relief. Relief comes from a
     map, from measured points, or is none (--plane); by default from the points of the workbook,
     if PAIR is one: its set-up is then taken as typed. What the camera cannot see stays empty; the
     last band says where each pixel comes from (0 nothing, 1 and 2 the photos, 3 both, 4 filled,
-    5 a photo on interpolated relief, 6 a photo on the plane).
+    5 a photo on interpolated relief, 6 a photo on the plane). Of a set each pixel is taken from
+    the photo that sees it best: 11 is its first photo, 12 the second, 3 a transition.
     """
+    from bifocal.model.photo_set import PhotoSet
     from bifocal.orthophotos.deliver_workflow import DeliverTask, default_title, deliver
     from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho, not_measured
-    from bifocal.workbook.pair_workflow import is_workbook, points_of, read_pair
+    from bifocal.workbook.pair_workflow import is_workbook, points_of, read_photos
 
     if out is None and folder is None:
         raise click.UsageError("Give --out FILE, --deliver DIR or both.")
@@ -40,7 +44,9 @@ def command(
         raise click.UsageError("--deliver needs the scale of the drawing, e.g. --scale 1:50.")
     if sum(choice is not None for choice in (relief, points, plane)) > 1:
         raise click.UsageError("Give one of --relief, --points and --plane.")
-    source = read_pair(pair)
+    source = read_photos(pair)
+    if isinstance(source, PhotoSet) and folder is not None:
+        raise InputError(remark_of("ortho.set_not_delivered"))
     own: Path | SurveyPoints | None = points
     if relief is None and points is None and plane is None and is_workbook(pair):
         own = points_of(pair)
@@ -58,7 +64,7 @@ def command(
     )
     files: dict[str, object] = {}
     with progress_bar("orthophoto", quiet=as_json) as progress:
-        if folder is not None and scale is not None:
+        if folder is not None and scale is not None and not isinstance(source, PhotoSet):
             wish = DeliverTask(title=title or default_title(source, pair), **drawing)
             done = deliver(
                 source, folder, task, wish, out=out, overwrite=overwrite, progress=progress

@@ -20,7 +20,8 @@ def command(survey: tuple[Path, ...], out: Path | None, as_json: bool, **options
     """Solve measured points: relief r, displacements, coordinates, precision, check points.
 
     SURVEY is a survey workbook, or any table (.xlsx, .xlsm, .ods, .csv) with the headings id and
-    x1 y1 x2 y2, or s1 s2 theta, or col1 row1 col2 row2 (raw pixels, with --pair).
+    x1 y1 x2 y2, or s1 s2 theta, or col1 row1 col2 row2 (raw pixels, with --pair; of a set of photos
+    col3 row3 and more, blank where not seen).
     - is a table on stdin.
     Or give two lists of picks, of photo 1 and of photo 2 (.csv, .xlsx, .dxf), joined by the names
     of the points, with --pair: a pair file, or a survey workbook for its set-up.

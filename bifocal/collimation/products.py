@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Sequence
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.jsonfile import read_object, write_object
 from photocore.output import free_path
+from photocore.provenance import SUMS
 
 #: Longer side of the relief's picture. [px]
 OVERLAY_SIDE = 2048
@@ -78,11 +80,15 @@ class Products:
         return [{"name": n, "bytes": p.stat().st_size} for n, p in sorted(offered.items())]
 
     def zipped(self, workbook: Path) -> bytes:
-        """Return all files offered for download as one archive."""
+        """Return all files offered for download as one archive, with the list of their hashes."""
         buffer = io.BytesIO()
         with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+            sums = ""
             for name, path in sorted(self.downloads(workbook).items()):
-                archive.write(path, name)
+                data = path.read_bytes()
+                sums += f"{sha256(data).hexdigest()}  {name}\n"
+                archive.writestr(zipfile.ZipInfo.from_file(path, name), data, zipfile.ZIP_DEFLATED)
+            archive.writestr(SUMS, sums)
         return buffer.getvalue()
 
     def facts(self, kind: str) -> dict[str, Any] | None:

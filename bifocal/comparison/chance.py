@@ -132,6 +132,7 @@ def chance(
     taper = 0.5 * (1 + np.cos(np.pi * np.minimum(lags / reach, 1.0)))
     covariance = products / np.maximum(pairs, 1.0) * taper
     covariance *= least
+    covariance[0, 0] += 1e-6  # two maps that are the same
     amplitude = np.sqrt(np.maximum(np.fft.rfft2(covariance).real, 0.0))
     amplitude *= np.sqrt(covariance[0, 0] / np.fft.irfft2(amplitude**2, shape)[0, 0])
     means = np.empty((CHANCE.draws, len(patches.radii), *z.shape), np.float32)

@@ -1,10 +1,18 @@
-"""What the photos of a pair say of themselves."""
+"""What the photos of a pair or set say of themselves."""
 
 from __future__ import annotations
 
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
 from photocore.images import ImageInfo, image_info
+
+
+def set_photo_info(photos: PhotoSet, number: int) -> ImageInfo:
+    """Return what a photo of a set, counted from 0, says of itself; see `photo_info`."""
+    photo = photos.photos[number]
+    info = image_info(photo.path)
+    photo.check_size(info.size, info.path)
+    return info
 
 
 def photo_info(pair: Pair, number: int) -> ImageInfo:

@@ -6,13 +6,13 @@ import struct
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
 from bifocal.model.geotiff import METRES_PER_INCH, RasterReader
 from photocore.arrays import ByteArray
 from photocore.output import atomic_path
+from photocore.png_text import SIGNATURE, chunk, provenance_chunk
 
 #: Rows read at a time: one row of tiles of the file.
 ROWS = 512
@@ -34,19 +34,21 @@ def write_png(path: Path, reader: RasterReader, *, dpi: float, overwrite: bool) 
     """Write the raster as a PNG with its resolution; empty pixels are transparent."""
     grid = reader.grid
     with atomic_path(path, overwrite=overwrite) as temporary, temporary.open("wb") as file:
-        file.write(b"\x89PNG\r\n\x1a\n")
+        file.write(SIGNATURE)
         # 8 bits, colour with alpha, no interlace.
-        _chunk(file, b"IHDR", struct.pack(">IIBBBBB", grid.width, grid.height, 8, 6, 0, 0, 0))
+        file.write(chunk(b"IHDR", struct.pack(">IIBBBBB", grid.width, grid.height, 8, 6, 0, 0, 0)))
+        file.write(provenance_chunk())
         per_metre = round(dpi / METRES_PER_INCH)
-        _chunk(file, b"pHYs", struct.pack(">IIB", per_metre, per_metre, 1))
+        file.write(chunk(b"pHYs", struct.pack(">IIB", per_metre, per_metre, 1)))
         packer = zlib.compressobj(3)
         above = np.zeros((1, grid.width * 4), np.uint8)
         for colours, valid in colour_strips(reader):
             pixels = np.dstack([colours, valid]).reshape(len(colours), -1)
-            _chunk(file, b"IDAT", packer.compress(predicted(pixels, above)))
+            if packed := packer.compress(predicted(pixels, above)):
+                file.write(chunk(b"IDAT", packed))
             above = pixels[-1:]
-        _chunk(file, b"IDAT", packer.flush())
-        _chunk(file, b"IEND", b"")
+        file.write(chunk(b"IDAT", packer.flush()))
+        file.write(chunk(b"IEND", b""))
 
 
 def predicted(pixels: ByteArray, above: ByteArray) -> bytes:
@@ -56,10 +58,3 @@ def predicted(pixels: ByteArray, above: ByteArray) -> bytes:
     rows[0, 1:] = pixels[0] - above[0]
     rows[1:, 1:] = pixels[1:] - pixels[:-1]
     return rows.tobytes()
-
-
-def _chunk(file: BinaryIO, kind: bytes, data: bytes) -> None:
-    if not data and kind == b"IDAT":
-        return
-    file.write(struct.pack(">I", len(data)) + kind + data)
-    file.write(struct.pack(">I", zlib.crc32(kind + data)))

@@ -323,18 +323,18 @@ def directions_at(pair: Pair, pixels1: FloatArray, relief: FloatArray) -> FloatA
 def local_zoom(pair: Pair, pixels1: FloatArray, relief: FloatArray) -> FloatArray:
     """Return the derivative of photo 2 by photo 1 under the zoom k(r), shape (n, 2, 2)."""
     factor = zoom_factor(relief, d1=pair.image1.distance, d2=pair.image2.distance)
-    metres1 = _raw_metres(pair.image1, pixels1)
-    metres2 = _raw_metres(pair.image2, seen_at(pair, pixels1, relief))
+    metres1 = raw_metres(pair.image1, pixels1)
+    metres2 = raw_metres(pair.image2, seen_at(pair, pixels1, relief))
     if pair.refracted:
-        metres1 = _raw_metres(pair.image1, pixels1, relief)
-        metres2 = _raw_metres(pair.image2, seen_at(pair, pixels1, relief), relief)
+        metres1 = raw_metres(pair.image1, pixels1, relief)
+        metres2 = raw_metres(pair.image2, seen_at(pair, pixels1, relief), relief)
         factor = np.where(np.isfinite(metres2).all(axis=(1, 2)), 1.0, np.nan)
     bad = ~(np.abs(np.linalg.det(np.nan_to_num(metres2))) > 0) | ~np.isfinite(factor)
     metres2[bad] = np.eye(2)
     return np.nan_to_num(np.linalg.inv(metres2) @ metres1 * factor[:, None, None])
 
 
-def _raw_metres(photo: Photo, pixels: FloatArray, relief: FloatArray | float = 0.0) -> FloatArray:
+def raw_metres(photo: Photo, pixels: FloatArray, relief: FloatArray | float = 0.0) -> FloatArray:
     """Return the derivative of points at a relief by the raw pixel, lens included. [m/px]"""
     metres = photo.metres_per_pixel(pixels, relief)
     if photo.lens is None:

@@ -44,7 +44,7 @@ class PlanePicks:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class IntersectedPoints:
+class MeasuredPoints:
     """Points in the plane frame with their precision, however many rays met in them.
 
     Attributes
@@ -96,7 +96,7 @@ class IntersectedPoints:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Intersection(IntersectedPoints):
+class Intersection(MeasuredPoints):
     """Points in the plane frame with their precision.
 
     Attributes
@@ -176,8 +176,8 @@ def intersect(
         residuals=np.concatenate(residuals, axis=1),
         misfit=_misfit(near.metres_per_pixel, *meeting(q1 - centre, q2 - centre)),
         standardised=standardised,
-        e1=_displacement(a1, xyz, far.foot),
-        e2=_displacement(a2, xyz, near.foot),
+        e1=displacement(a1, xyz, far.foot),
+        e2=displacement(a2, xyz, near.foot),
         adjusted1=a1,
         adjusted2=a2,
         flags=point_flags(
@@ -256,7 +256,7 @@ def _misfit(
     return np.copysign(np.linalg.norm(_pixels(metres2, normal * across[:, None]), axis=1), across)
 
 
-def _displacement(q: FloatArray, xyz: FloatArray, camera: rays.Foot) -> FloatArray:
+def displacement(q: FloatArray, xyz: FloatArray, camera: rays.Foot) -> FloatArray:
     """Return how far relief moves points outwards, from where they stand on the plane. [m]"""
     seen = rays.object_rays(q, camera).position
     return _outward(seen - xyz[:, :2], xyz[:, :2] - camera.nadir)

@@ -139,12 +139,16 @@ def orientation_effect(
     ndarray, shape (n, 3, k)
         NaN where a point is.
     """
+    return np.asarray(_by_orientation(photos, xyz) @ independent(covariance))
+
+
+def independent(covariance: FloatArray) -> FloatArray:
+    """Return what independent errors of sigma 1 add to the parameters, (k, k): a root of it."""
     scale = np.sqrt(np.diag(covariance))
     safe = np.where(scale > 0, scale, 1.0)
     # As a correlation: radians, metres and pixels differ by many powers of ten.
     values, vectors = np.linalg.eigh(covariance / np.outer(safe, safe))
-    factor = safe[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-    return np.asarray(_by_orientation(photos, xyz) @ factor)
+    return np.asarray(safe[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def _by_orientation(photos: Sequence[PlanePhoto], xyz: FloatArray) -> FloatArray:
@@ -253,15 +257,15 @@ def of_photos(covariance: FloatArray, numbers: Sequence[int], count: int) -> Flo
     return covariance[np.ix_(chosen, chosen)]
 
 
-def moved(covariance: FloatArray, axes: FloatArray) -> FloatArray:
-    """Return the covariance in a frame whose axes are the rows of ``axes``."""
+def moved(covariance: FloatArray, axes: FloatArray, count: int = 2) -> FloatArray:
+    """Return the covariance of so many photos in a frame whose axes are the rows of ``axes``."""
     turn = np.eye(len(covariance))
-    for number in (0, 1):
+    for number in range(count):
         for name in ("turn X", "X"):
             first = number * len(CAMERA) + CAMERA.index(name)
             turn[first : first + 3, first : first + 3] = axes
-        if len(covariance) > len(NAMES):  # the interfaces lean about the same axes
-            first = len(covariance) - (1 - number) * len(PLACING) - 3
+        if len(covariance) > count * len(CAMERA):  # the interfaces lean about the same axes
+            first = len(covariance) - (count - 1 - number) * len(PLACING) - 3
             turn[first : first + 3, first : first + 3] = axes
     return turn @ covariance @ turn.T
 

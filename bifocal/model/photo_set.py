@@ -372,7 +372,8 @@ def _names(photos: tuple[Photo, ...]) -> tuple[str, ...]:
         If two photos are called alike.
     """
     stems = [Path(photo.file).stem or f"photo {k}" for k, photo in enumerate(photos, start=1)]
-    if len(set(stems)) < len(stems):  # as cameras count them, in one folder for each
+    unnamed = [stem for photo, stem in zip(photos, stems, strict=True) if not photo.name]
+    if len(set(unnamed)) < len(unnamed):  # as cameras count them, in one folder for each
         stems = [photo.file or stem for photo, stem in zip(photos, stems, strict=True)]
     names = [photo.name or stem for photo, stem in zip(photos, stems, strict=True)]
     twice = sorted({name for name in names if names.count(name) > 1})

@@ -12,12 +12,12 @@ from scipy.stats import chi2
 from bifocal import rays
 from bifocal.model.flags import FlagLimits, point_flags
 from bifocal.model.intersection import (
-    IntersectedPoints,
     Intersection,
+    MeasuredPoints,
     PlanePicks,
     inverse_3x3,
 )
-from bifocal.model.orientation_precision import pixel_rates
+from bifocal.model.orientation_precision import independent, pixel_rates
 from bifocal.model.photo import Photo
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.camera.distortion import inverse_2x2
@@ -34,7 +34,7 @@ _AT_ONCE = 4000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SetIntersection(IntersectedPoints):
+class SetIntersection(MeasuredPoints):
     """Points in the plane frame from two or more photos of a set of m, with their precision.
 
     Attributes
@@ -51,11 +51,18 @@ class SetIntersection(IntersectedPoints):
         Picks that may be the wrong one where a point is flagged OFF-RADIAL: they explain the
         misfits as well as any. Several where rays cannot tell, as along the radius of three photos
         on one axis.
+    own_covariance : ndarray, shape (n, 3, 3)
+        What of the covariance is each point's own, from its picks. [m²]
+    effect : ndarray, shape (n, 3, k), or None
+        What independent errors of the orientation, of sigma 1, move each point by, the same k
+        errors for all; None where its covariance is not known. [m]
     """
 
     residuals: FloatArray
     slips: FloatArray
     suspects: BoolArray
+    own_covariance: FloatArray
+    effect: FloatArray | None = None
 
     def with_pair(
         self, places: IntArray, photos: tuple[int, int], points: Intersection
@@ -131,13 +138,18 @@ def intersect_rays(
     residuals = np.stack([shift[..., 0] for shift in shifts], axis=1)
     known = np.asarray(np.isfinite(xyz).all(axis=1))
     sigmas = np.array([pick.sigma_px for pick in picks])
-    covariance, total = np.full((len(xyz), 3, 3), np.nan), np.full(len(xyz), np.nan)
+    own, total = np.full((len(xyz), 3, 3), np.nan), np.full(len(xyz), np.nan)
+    root = None if orientation is None else independent(orientation)
+    effect = None if root is None else np.full((len(xyz), 3, len(root)), np.nan)
     slips, saved = np.full((2, *seen.shape), np.nan)
     for start in range(0, len(xyz), _AT_ONCE):
         part = start + np.flatnonzero(known[start : start + _AT_ONCE])
-        covariance[part], total[part], slips[part], saved[part] = _precision_and_tests(
-            photos, xyz[part], residuals[part], seen[part], sigmas, orientation
+        own[part], moved, total[part], slips[part], saved[part] = _precision_and_tests(
+            photos, xyz[part], residuals[part], seen[part], sigmas, root
         )
+        if effect is not None:
+            effect[part] = moved
+    covariance = own if effect is None else own + effect @ effect.transpose(0, 2, 1)
     standardised, redundant = _deviate(total, 2 * count - 3), count > 2
     distances = np.array([photo.distance for photo in photos])
     flags = point_flags(
@@ -159,6 +171,8 @@ def intersect_rays(
         standardised=standardised,
         slips=np.where(redundant[:, None], slips, np.nan),
         suspects=wrong[:, None] & (saved > most[:, None] - _AS_LIKELY),
+        own_covariance=own,
+        effect=effect,
         flags=flags,
         sigma_px=float(np.sqrt(np.mean(sigmas**2))),
     )
@@ -219,9 +233,9 @@ def _precision_and_tests(
     residuals: FloatArray,
     seen: BoolArray,
     sigmas: FloatArray,
-    orientation: FloatArray | None,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return covariances (n, 3, 3), v'Mv (n), slips [px] and what leaving out each photo saves."""
+    root: FloatArray | None,
+) -> tuple[FloatArray, ...]:
+    """Return own covariances, effect of the orientation, v'Mv, slips, what each photo's saves."""
     points, count = residuals.shape[:2]
     design, by_orientation = pixel_rates(photos, xyz)
     rows = np.repeat(seen, 2, axis=1)
@@ -232,11 +246,11 @@ def _precision_and_tests(
     of_picks = np.zeros((points, 2 * count, 2 * count))
     np.einsum("nii->ni", of_picks)[:] = np.where(rows, np.repeat(sigmas, 2) ** 2, 1.0)
     spread = of_picks + _FREE * design @ covariance @ design.transpose(0, 2, 1)
-    if orientation is not None:
-        rates = np.where(rows[..., None], by_orientation, 0.0)
-        effect = covariance @ gain @ rates
-        covariance = covariance + effect @ orientation @ effect.transpose(0, 2, 1)
-        spread = spread + rates @ orientation @ rates.transpose(0, 2, 1)
+    effect = np.zeros((points, 3, 0))
+    if root is not None:
+        rates = np.where(rows[..., None], by_orientation, 0.0) @ root
+        effect = -covariance @ gain @ rates
+        spread = spread + rates @ rates.transpose(0, 2, 1)
     inverse = np.linalg.inv(spread)
     miss = np.where(seen[..., None], residuals, 0.0).reshape(points, 2 * count, 1)
     pull = inverse @ miss
@@ -249,7 +263,7 @@ def _precision_and_tests(
     slip = (np.linalg.inv(blocks) @ pulls[..., None])[..., 0]
     saved = (slip * pulls).sum(axis=-1)
     blank = np.where(seen, 1.0, np.nan)
-    return covariance, total, np.linalg.norm(slip, axis=-1) * blank, saved * blank
+    return covariance, effect, total, np.linalg.norm(slip, axis=-1) * blank, saved * blank
 
 
 def _deviate(total: FloatArray, degrees: FloatArray) -> FloatArray:

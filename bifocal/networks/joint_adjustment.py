@@ -7,21 +7,25 @@ state it. Points are eliminated, what remains is sparse: `photocore.adjustment.s
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from bifocal.model.orientation_precision import CAMERA
 from bifocal.model.pair_media import PairMedia
+from bifocal.networks.camera_knowledge import SHARED
 from bifocal.networks.joint_observations import JointObservations, with_enough_rays, with_rays
 from photocore.adjustment import OUTLIER_LIMIT, Fit, huber_weights, standardised
+from photocore.adjustment.blocks import BlockEquations
 from photocore.adjustment.network import Network, NetworkState, Rows
 from photocore.adjustment.sparse import SparseEquations
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.camera.pinhole import PARAMETERS, Pinhole
 from photocore.errors import GeometryError
 
-#: What is unknown of a camera, by its place in `PARAMETERS`; the focal length comes first.
+#: What is unknown of a camera, by its place in `CAMERA`; the focal length comes first.
 ESTIMATED = (0, 4, 5, 6, 7, 8, 9)
 #: Rounds in which gross errors are taken out, the worst of every point each time.
 ROUNDS = 8
@@ -32,6 +36,9 @@ COARSE, FAR_OFF = 3, 10.0
 #: 2 mm of which one coordinate is wrong by 0.3 to 1 m, 8 to 22 rays are lost with 1, at most one
 #: with 10, 30 or 100, and the point is named.
 LOOSE = 100.0
+#: In a set points lie off the wall by so much of the nearest camera's distance: with all of it
+#: those seen at a small angle wander towards the cameras, and nothing settles.
+SHALLOW = 0.1
 #: Rounding error of pixels and metres, as a share of their standard deviations.
 ROUNDING = 1e-9
 #: Redundancy from which rays of one stated precision tell how good they truly are.
@@ -40,10 +47,11 @@ ENOUGH = 20.0
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointUnknowns:
-    """Cameras, and the points' coordinates, shape (p, 3). [m]"""
+    """Cameras, the points' coordinates (p, 3) [m], and in a set each lens's k1, k2 (m, 2)."""
 
     cameras: tuple[Pinhole, ...]
     xyz: FloatArray
+    radial: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,6 +95,8 @@ class JointAdjustment(JointUnknowns):
         Covariance of the `ESTIMATED` of each camera.
     between : ndarray, shape (k, 7, 7)
         Covariance between the far and the near camera of each pair.
+    of_cameras : ndarray, shape (12 m, 12 m)
+        Covariance of `CAMERA` of all cameras of a set, one after the other; else empty.
     """
 
     observations: JointObservations
@@ -100,6 +110,7 @@ class JointAdjustment(JointUnknowns):
     left_in: tuple[Blunder, ...]
     by_camera: FloatArray
     between: FloatArray
+    of_cameras: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def orientation(self, pair: int) -> FloatArray:
         """Return the covariance of a pair's cameras as its file states it, shape (k, k).
@@ -190,12 +201,22 @@ def _coarse(
 
 
 def _unknowns(state: NetworkState) -> JointUnknowns:
-    return JointUnknowns(cameras=tuple(state.blocks["camera"].values()), xyz=state.points)
+    radial = np.array(list(state.blocks["radial"].values())).reshape(-1, 2)
+    cameras = tuple(state.blocks["camera"].values())
+    return JointUnknowns(cameras=cameras, xyz=state.points, radial=radial)
+
+
+def _stepped(block: Any, at: list[int], step: FloatArray) -> Any:
+    """Return a camera or a radial distortion after a step of some of `CAMERA`."""
+    whole = np.bincount(at, step, len(CAMERA)).astype(np.float64)
+    if isinstance(block, Pinhole):
+        return block.stepped(whole[: len(PARAMETERS)])
+    return block + whole[len(PARAMETERS) :]
 
 
 def _away(system: _System) -> FloatArray:
     """Return how far points are seen from where they were measured, shape (n,). [px]"""
-    return np.linalg.norm(system.rays(system.start)[0] - system.seen.pixels, axis=1)
+    return np.linalg.norm(system.rays(system.start)[0], axis=1)
 
 
 def _off_control(seen: JointObservations, state: JointUnknowns) -> FloatArray:
@@ -242,15 +263,21 @@ class _System:
     """
 
     def __init__(self, seen: JointObservations, start: JointUnknowns, focal: FloatArray) -> None:
-        self.seen = seen
-        count = len(seen.names)
-        free = np.ones((count, len(ESTIMATED)), dtype=bool)
+        self.seen, known = seen, seen.cameras
+        count, stay = len(seen.names), len(PARAMETERS)
+        free = np.zeros((count, len(CAMERA)), dtype=bool)
+        free[:, ESTIMATED] = True
         free[:, 0] = seen.sigma_focal > 0
-        if not seen.frame_is_known:
+        owner = np.repeat(np.arange(count)[:, None], len(CAMERA), axis=1)
+        if known is not None:
+            free = known.free
+            owner[:, SHARED] = np.array(known.lens)[:, None]
+        elif not seen.frame_is_known:
             # Seven are free: the far camera, and for the scale the near one's distance.
-            free[0], free[1, -1] = False, False
-        self.column = np.where(free, np.cumsum(free.ravel()).reshape(free.shape) - 1, -1)
-        names = [PARAMETERS[e] for e in ESTIMATED]
+            free[0], free[1, CAMERA.index("Z")] = False, False
+        self.own_free = free & (owner == np.arange(count)[:, None])
+        number = np.where(self.own_free, np.cumsum(self.own_free).reshape(free.shape) - 1, -1)
+        self.column = np.where(free, number[owner, np.arange(len(CAMERA))], -1)
         order = np.argsort(seen.camera, kind="stable")
         self.own = np.split(order, np.searchsorted(seen.camera[order], np.arange(1, count)))
         self.fixed = np.argwhere(np.isfinite(seen.known))
@@ -258,48 +285,66 @@ class _System:
         self.used = np.bincount(seen.point, minlength=len(seen.ids)) > 0
         self.loose = np.flatnonzero(self.used & ~np.isfinite(seen.known[:, 2]))
         self.reach = float(min(camera.centre[2] for camera in start.cameras))
-        self.focal = np.flatnonzero(free[:, 0])
+        self.reach *= 1.0 if known is None else SHALLOW
+        self.focal = np.flatnonzero(free[:, 0]) if known is None else np.zeros(0, np.int64)
         self.first_focal = np.log(focal)
-        self.start = NetworkState(
-            blocks={"camera": dict(enumerate(start.cameras))},
-            points=start.xyz,
-            drift=np.zeros(free.sum()),
-        )
+        labels = [f"{seen.names[i]}: {CAMERA[k]}" for i, k in np.argwhere(self.own_free).tolist()]
+        # The ends of a taped length meet in one row and are not eliminated.
+        taped = known.lengths if known else ()
+        self.lengths = tuple(one for one in taped if self.used[[*one[:2]]].all())
+        ends = sorted({k for one in self.lengths for k in one[:2]})
         shape = (len(self.used), 3)
+        self.kept = np.full(shape, -1)
+        self.kept[ends] = len(labels) + np.arange(3 * len(ends)).reshape(-1, 3)
+        labels += [f"{seen.ids[k]}: {axis}" for k in ends for axis in "XYr"]
+        eliminated = self.used & (self.kept[:, 0] < 0)
+        radial = start.radial if len(start.radial) else np.zeros((count, 2))
+        self.start = NetworkState(
+            blocks={"camera": dict(enumerate(start.cameras)), "radial": dict(enumerate(radial))},
+            points=start.xyz,
+            drift=np.zeros(len(labels)),
+        )
         self.network = Network(
-            labels=[f"{seen.names[i]}: {names[k]}" for i, k in np.argwhere(free).tolist()],
-            columns={"camera": {
-                k: {e: at for e, at in zip(ESTIMATED, own, strict=True) if at >= 0}
+            labels=labels,
+            columns={kind: {
+                k: {e: at for e, at in enumerate(own) if at >= 0 and (e < stay) == first}
                 for k, own in enumerate(self.column.tolist())
-            }},
-            free=np.broadcast_to(self.used[:, None], shape), kept=np.full(shape, -1),
-            names=[f"{seen.ids[k]}: {axis}" for k in np.flatnonzero(self.used) for axis in "XYr"],
-            terms=(self._rays, self._known),
-            step=lambda camera, at, step: camera.stepped(np.bincount(at, step, len(PARAMETERS))),
-            what="the pairs", rounding=ROUNDING,
-            kind=SparseEquations, largest=0,
+            } for kind, first in (("camera", True), ("radial", False))},
+            free=np.broadcast_to(eliminated[:, None], shape), kept=self.kept,
+            names=[f"{seen.ids[k]}: {axis}" for k in np.flatnonzero(eliminated) for axis in "XYr"],
+            terms=(self._rays, self._known, *([self._cameras] if known else [])),
+            step=_stepped, what="the pairs" if known is None else "the photos", rounding=ROUNDING,
+            kind=SparseEquations if known is None else BlockEquations, largest=0,
         )  # fmt: skip
 
     def rays(self, state: NetworkState) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return pixels (n, 2), derivatives by the points (n, 2, 3) and the cameras (n, 2, 7)."""
-        count = len(self.seen.camera)
-        pixels, by_point = np.empty((count, 2)), np.empty((count, 2, 3))
-        by_camera = np.empty((count, 2, len(ESTIMATED)))
+        """Return misfits (n, 2) [px], derivatives by the points (n, 2, 3) and cameras (n, 2, 12).
+
+        A ray's misfit is where its point is seen less where it was measured.
+        """
+        seen, count, known = self.seen, len(self.seen.camera), self.seen.cameras
+        misfit, by_point = np.empty((count, 2)), np.empty((count, 2, 3))
+        by_camera = np.zeros((count, 2, len(CAMERA)))
         for number, camera in state.blocks["camera"].items():
             rows = self.own[number]
-            media, side = self.seen.media_of(number)
-            view = media.view(side, camera, state.points[self.seen.point[rows]])
-            pixels[rows], by_point[rows] = view.pixels, view.by_point
-            by_camera[rows] = view.by_camera[:, :, ESTIMATED]
-        return pixels, by_point, by_camera
+            media, side = seen.media_of(number)
+            view = media.view(side, camera, state.points[seen.point[rows]])
+            by_point[rows], by_camera[rows, :, : len(PARAMETERS)] = view.by_point, view.by_camera
+            straight = seen.pixels[rows]
+            if known is not None and self.column[number, -1] >= 0:
+                bent = known.interiors[number].radial(*state.blocks["radial"][number])
+                by_camera[rows, :, len(PARAMETERS) :] = -bent.undistorted_by_k(straight)
+                straight = bent.undistort(straight)
+            misfit[rows] = view.pixels - straight
+        return misfit, by_point, by_camera
 
     def _rays(self, state: NetworkState, rows: Rows) -> bool:
         seen = self.seen
-        pixels, by_point, by_camera = self.rays(state)
-        if not np.isfinite(pixels).all():
+        misfit, by_point, by_camera = self.rays(state)
+        if not np.isfinite(misfit).all():
             return False
         weight = 1.0 / seen.sigma[:, None, None]
-        lines = rows.add((pixels - seen.pixels) * weight[:, 0])
+        lines = rows.add(misfit * weight[:, 0])
         rows.by_label(lines[..., None], self.column[seen.camera][:, None], by_camera * weight)
         rows.by_points(lines, seen.point[:, None], by_point * weight)
         return True
@@ -311,6 +356,11 @@ class _System:
         lengths = np.array([state.blocks["camera"][k].matrix[0, 0] for k in focal])
         drift = np.log(lengths) - self.first_focal[focal]
         rows.known(self.column[focal, 0], drift, seen.sigma_focal[focal])
+        return True
+
+    def _cameras(self, state: NetworkState, rows: Rows) -> bool:
+        assert self.seen.cameras is not None
+        self.seen.cameras.observe(state, rows, self.column, self.lengths)
         return True
 
 
@@ -385,27 +435,30 @@ def _adjusted(
 ) -> JointAdjustment:
     """Return the result with its precision; blunders taken out, and left in."""
     linear = fit.linear
-    assert isinstance(linear, SparseEquations)
+    assert isinstance(linear, BlockEquations)
     factor = max(sigma0, 1.0) ** 2
-    size = len(ESTIMATED)
-    cofactor = linear.cofactor.tocsr()
+    cofactor = csr_matrix(linear.cofactor)
 
     def part(first: IntArray, second: IntArray) -> FloatArray:
-        block = np.zeros((size, size))
+        block = np.zeros((len(first), len(second)))
         a, b = np.flatnonzero(first >= 0), np.flatnonzero(second >= 0)
         if len(a) and len(b):
             block[np.ix_(a, b)] = cofactor[first[a]][:, second[b]].toarray()
         return block
 
-    place = system.column
+    place, every = system.column[:, ESTIMATED], system.column.ravel()
     by_camera = factor * np.array([part(columns, columns) for columns in place])
     between = factor * np.array([part(place[far], place[near]) for far, near in seen.pairs])
     covariance = factor * linear.block_cofactor
+    for k in np.flatnonzero(system.kept[:, 0] >= 0):
+        covariance[k] = factor * part(system.kept[k], system.kept[k])
     covariance[~system.used] = np.nan
-    xyz = np.where(system.used[:, None], fit.state.points, np.nan)
+    last = _unknowns(fit.state)
+    xyz = np.where(system.used[:, None], last.xyz, np.nan)
     return JointAdjustment(
-        cameras=_unknowns(fit.state).cameras, xyz=xyz, observations=seen, covariance=covariance,
+        cameras=last.cameras, radial=last.radial, xyz=xyz, observations=seen, covariance=covariance,
         sigma0=sigma0, redundancy=fit.redundancy - len(system.loose), iterations=fit.iterations,
-        residuals=system.rays(fit.state)[0] - seen.pixels, control=xyz - given.known,
+        residuals=system.rays(fit.state)[0], control=xyz - given.known,
         blunders=blunders[0], left_in=blunders[1], by_camera=by_camera, between=between,
+        of_cameras=factor * part(every, every) if seen.cameras else np.zeros((0, 0)),
     )  # fmt: skip

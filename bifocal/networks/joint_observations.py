@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bifocal.model.pair_media import PairMedia
+from bifocal.networks.camera_knowledge import CameraKnowledge
 from photocore.arrays import BoolArray, FloatArray, IntArray
 
 #: Of fewer points with known coordinates no frame follows.
@@ -41,6 +42,8 @@ class JointObservations:
         empty where all are in air.
     pairs : tuple of (int, int)
         The far and the near camera of each pair; empty: 0 and 1, 2 and 3, and so on.
+    cameras : CameraKnowledge or None
+        Of a set of photos; None where only focal lengths, poses and points are unknown.
     """
 
     names: tuple[str, ...]
@@ -54,6 +57,7 @@ class JointObservations:
     sigma_focal: FloatArray
     media: tuple[tuple[PairMedia, int], ...] = ()
     pairs: tuple[tuple[int, int], ...] = ()
+    cameras: CameraKnowledge | None = None
 
     def __post_init__(self) -> None:
         if not self.pairs:
@@ -66,7 +70,9 @@ class JointObservations:
 
     @property
     def frame_is_known(self) -> bool:
-        """Whether control points hold the frame; else the first pair's cameras do."""
+        """Whether control points or the wall hold the frame; else the first pair's cameras do."""
+        if self.cameras is not None and self.cameras.by_wall:
+            return True
         return int(np.isfinite(self.known).all(axis=1).sum()) >= FEWEST_KNOWN
 
 
@@ -113,7 +119,9 @@ def with_enough_rays(observations: JointObservations) -> JointObservations:
     seen = np.unique(np.column_stack([observations.point, observations.camera]), axis=0)
     count = np.bincount(seen[:, 0], minlength=len(observations.ids))
     fixed = np.isfinite(observations.known).all(axis=1) & (count > 0)
-    if fixed.sum() < FEWEST_KNOWN:
+    if observations.cameras is not None and observations.cameras.by_wall:
+        fixed = np.isfinite(observations.known[:, 2]) & (count > 0)
+    elif fixed.sum() < FEWEST_KNOWN:
         fixed[:] = False
     enough = (count >= 2) | fixed
     held = enough & bool(fixed.any())

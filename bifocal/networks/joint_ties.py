@@ -64,7 +64,10 @@ class SharedPoints:
 
 
 def common_features(
-    features: Sequence[Features], shapes: Sequence[tuple[int, ...]], together: BoolArray
+    features: Sequence[Features],
+    shapes: Sequence[tuple[int, ...]],
+    together: BoolArray,
+    most: int = MOST_MATCHES,
 ) -> SharedPoints:
     """Return the points that features of several photos show.
 
@@ -75,6 +78,8 @@ def common_features(
     shapes : sequence of (height, width)
     together : ndarray of bool, shape (m, m)
         Which photos may show the same part of the wall.
+    most : int
+        Common points of two photos that are kept.
 
     Notes
     -----
@@ -92,7 +97,7 @@ def common_features(
 
     for first, second in combinations(range(len(features)), 2):
         if together[first, second]:
-            for a, b in _matches(features[first], features[second], shapes[first]).tolist():
+            for a, b in _matches(features[first], features[second], shapes[first], most):
                 parent[root(start[first] + a)] = root(start[second] + b)
     roots = np.array([root(k) for k in range(len(parent))], dtype=np.int64)
     photo = np.repeat(np.arange(len(features)), np.diff(start))
@@ -108,29 +113,30 @@ def common_features(
     )
 
 
-def _matches(first: Features, second: Features, shape: tuple[int, ...]) -> IntArray:
-    """Return matches of two photos, shape (k, 2), none where they share too little."""
+def _matches(
+    first: Features, second: Features, shape: tuple[int, ...], most: int
+) -> list[list[int]]:
+    """Return matches of two photos, rows of both, none where they share too little."""
     rows1, rows2 = match_features(first, second)
     fits = alike(first, second, rows1, rows2)
     rows1, rows2 = rows1[fits], rows2[fits]
     if len(rows1) < FEWEST_MATCHES:
-        return np.zeros((0, 2), np.int64)
+        return []
     tolerance = TOLERANCE * max(first.reduction, second.reduction)
     cv2.setRNGSeed(0)
     matrix, inside = cv2.findFundamentalMat(
         first.pixels[rows1], second.pixels[rows2], cv2.USAC_MAGSAC, tolerance, 0.999, 5000
     )
     if matrix is None or inside is None:
-        return np.zeros((0, 2), np.int64)
+        return []
     good = inside.ravel() > 0
     if good.sum() < max(FEWEST_MATCHES, 0.3 * len(good)):
-        return np.zeros((0, 2), np.int64)
+        return []
     found = np.column_stack([rows1[good], rows2[good]]).astype(np.int64)
     # Features come strongest first.
-    keep = spread_evenly(
-        first.pixels[found[:, 0]], np.arange(len(found), dtype=float), shape, MOST_MATCHES
-    )
-    return found[keep]
+    keep = spread_evenly(first.pixels[found[:, 0]], np.arange(len(found), dtype=float), shape, most)
+    found_again: list[list[int]] = found[keep].tolist()
+    return found_again
 
 
 def into_one_frame(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -63,6 +63,8 @@ class AlignOptions:
     Attributes
     ----------
     lenses : pair of KnownLens
+    other_lenses : KnownLens
+        Of the third photo of a set and those that follow.
     site : SiteMeasures
     auto : bool
     as_set_up : bool
@@ -82,6 +84,7 @@ class AlignOptions:
     """
 
     lenses: tuple[KnownLens, KnownLens] = field(default_factory=lambda: (KnownLens(), KnownLens()))
+    other_lenses: KnownLens = field(default_factory=KnownLens)
     site: SiteMeasures = field(default_factory=SiteMeasures)
     auto: bool = False
     as_set_up: bool = False
@@ -103,7 +106,7 @@ class AlignOptions:
                     for name in ("lens", "focal", "pixel_size", "sensor_width")
                 }
             )
-            for number in (1, 2)
+            for number in (1, 2, "")
         )
         site = ("distance1", "distance2", "delta_d", "sigma_control", "sigma_pick", "wall")
         measures = {name: given[name] for name in site if given.get(name) is not None}
@@ -113,6 +116,7 @@ class AlignOptions:
         line, length = horizontal or vertical, given.get("length")
         return cls(
             lenses=(lenses[0], lenses[1]),
+            other_lenses=lenses[2],
             site=SiteMeasures(**measures),
             auto=bool(given.get("auto")),
             as_set_up=bool(given.get("as_set_up")),
@@ -148,8 +152,8 @@ def align_photos(
             f"{out.name}: a pair file ends in .json; write --out {out.stem}.pair.json."
         )
     check_ending(picture, "a picture is written as .png, .jpg or .tif.", *WRITTEN)
-    way, options = _way(options)
-    _check_metres(options)
+    way, options = way_of(options)
+    check_metres(options)
     check_not_input(picture, far, near)
     check_all_writable(out, picture, overwrite=overwrite)
     infos = image_info(far), image_info(near)
@@ -165,7 +169,7 @@ def align_photos(
     else:
         if way == "site" and not options.auto and options.length is None:
             _check_focal((first, second))
-        control = _control(options, (first.interior.image_size, second.interior.image_size))
+        control = control_of(options, (first.interior.image_size, second.interior.image_size))
         oriented = orient_pair(
             (first, second), control=control, site=options.site, media=options.media
         )
@@ -237,10 +241,10 @@ def check_way(options: AlignOptions) -> None:
     InputError
         Naming what is missing.
     """
-    _way(options)
+    way_of(options)
 
 
-def _way(options: AlignOptions) -> tuple[str, AlignOptions]:
+def way_of(options: AlignOptions) -> tuple[str, AlignOptions]:
     """Return which way into the pair file the options describe."""
     site = options.site
     measured = [value for value in (site.distance1, site.distance2, site.delta_d) if value]
@@ -278,7 +282,7 @@ def _check_focal(photos: tuple[PhotoInput, PhotoInput]) -> None:
         raise InputError(remark("refused.no_exif", first=first, second=second))
 
 
-def _check_metres(options: AlignOptions) -> None:
+def check_metres(options: AlignOptions) -> None:
     """Refuse distances and lengths in millimetres; control points tell of distances themselves."""
     site = options.site
     given = {"--delta-d": site.delta_d, "--length": options.length and options.length[1]}
@@ -323,8 +327,8 @@ def interior_of_photo(info: ImageInfo, data: KnownLens, number: int | str = "") 
     return replace(found, is_typed=data.focal is not None)
 
 
-def _control(options: AlignOptions, sizes: tuple[tuple[int, int], tuple[int, int]]) -> Control:
-    """Return the control points and lengths the options name."""
+def control_of(options: AlignOptions, sizes: Sequence[tuple[int, int]]) -> Control:
+    """Return the control points and lengths the options name, picked in photos of these sizes."""
     control = Control()
     if options.control is not None:
         control = read_control(
@@ -333,6 +337,7 @@ def _control(options: AlignOptions, sizes: tuple[tuple[int, int], tuple[int, int
             sigma_plane=CONTROL.sigma_on_wall,
             unit=options.unit,
             columns=options.columns,
+            photos=len(sizes),
         )
     if options.lengths is not None:
         if options.control is None:
@@ -340,8 +345,8 @@ def _control(options: AlignOptions, sizes: tuple[tuple[int, int], tuple[int, int
         control = read_lengths(options.lengths, control)
     if options.length is not None:
         control = _with_length(control, options.length, options.site.sigma_control)
-    picks = (control.pixels1, control.pixels2)
-    for pixels, size, photo in zip(picks, sizes, ("far", "near"), strict=True):
+    names = ("far", "near") if len(sizes) == 2 else [f"{k}." for k in range(1, len(sizes) + 1)]
+    for pixels, size, photo in zip(control.picks, sizes, names, strict=False):
         check_inside(control, pixels, size, photo)
     return control
 
@@ -353,12 +358,14 @@ def _with_length(
     count = len(control.ids)
     ends = np.array(length[0], dtype=np.float64).reshape(2, 2)
     sigmas = np.full((2, 3), max(sigma, CONTROL.sigma_on_wall))
+    unseen = np.full((2, 2), np.nan)
     return Control(
         ids=(*control.ids, "length, one end", "length, other end"),
         xyz=np.concatenate([control.xyz, [[np.nan, np.nan, 0.0]] * 2]),
         sigma=np.concatenate([control.sigma, sigmas]),
         pixels1=np.concatenate([control.pixels1, ends]),
-        pixels2=np.concatenate([control.pixels2, np.full((2, 2), np.nan)]),
+        pixels2=np.concatenate([control.pixels2, unseen]),
+        more=tuple(np.concatenate([picks, unseen]) for picks in control.more),
         lengths=(*control.lengths, (count, count + 1, length[1])),
     )
 

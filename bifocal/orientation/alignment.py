@@ -105,13 +105,13 @@ def make_alignment(
     cameras = adjusted.cameras
     covariance = _of_pixels(adjusted, observations)
     if observations.free_datum:
-        axes, note = _facade_axes(cameras[0], photos[0], direction)
+        axes, note = facade_axes(cameras[0], photos[0], direction)
         origin = cameras[0].centre * [1.0, 1.0, 0.0]
         cameras = cameras[0].moved(axes, origin), cameras[1].moved(axes, origin)
         covariance = moved(covariance, axes)
         oriented = replace(oriented, assumed=(*oriented.assumed, note))
     far, near = (
-        _photo(camera, interior, _lens_of(interior, radial), (adjusted.media, number))
+        photo_of(camera, interior, lens_of(interior, radial), (adjusted.media, number))
         for number, (camera, interior, radial) in enumerate(
             zip(cameras, observations.interiors, adjusted.radial, strict=True)
         )
@@ -160,7 +160,7 @@ def _of_pixels(adjusted: AdjustedPair, observations: PairObservations) -> FloatA
     return adjusted.covariance * np.outer(unit, unit)
 
 
-def _facade_axes(
+def facade_axes(
     far: Pinhole, photo: PhotoInput, direction: tuple[FloatArray, bool] | None
 ) -> tuple[FloatArray, str]:
     """Return axes along the façade, shape (3, 3), and what they rest on."""
@@ -182,7 +182,7 @@ def _facade_axes(
     return np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]]), note
 
 
-def _lens_of(interior: Interior, radial: FloatArray) -> Lens | None:
+def lens_of(interior: Interior, radial: FloatArray) -> Lens | None:
     """Return the lens the pair's pixels need: the file's, or the estimated radial one."""
     if interior.lens is not None or not radial.any():
         return interior.lens
@@ -201,7 +201,7 @@ def _lens_of(interior: Interior, radial: FloatArray) -> Lens | None:
     )
 
 
-def _photo(
+def photo_of(
     camera: Pinhole, interior: Interior, lens: Lens | None, seen: tuple[PairMedia, int]
 ) -> Photo:
     """Return the photo of a camera; ``seen`` are the media and which of their cameras it is."""

@@ -60,6 +60,8 @@ class Control:
     sigma_lengths : tuple of float
         Standard deviations of these; where they are left out or NaN, that of the best coordinate,
         3 mm at most. [m]
+    more : tuple of ndarray, each of shape (n, 2)
+        Picks in the third photo of a set and those that follow. [px]
     """
 
     ids: tuple[str, ...] = ()
@@ -69,11 +71,12 @@ class Control:
     pixels2: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     lengths: tuple[tuple[int, int, float], ...] = ()
     sigma_lengths: tuple[float, ...] = ()
+    more: tuple[FloatArray, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.ids)
-        shapes = [self.xyz.shape, self.sigma.shape, self.pixels1.shape, self.pixels2.shape]
-        if shapes != [(count, 3), (count, 3), (count, 2), (count, 2)]:
+        shapes = [self.xyz.shape, self.sigma.shape, *(picks.shape for picks in self.picks)]
+        if shapes != [(count, 3)] * 2 + [(count, 2)] * len(self.picks):
             raise InputError(f"control: {count} ids but arrays of shape {shapes}.")
         if len(self.sigma_lengths) not in (0, len(self.lengths)):
             raise InputError("control: sigma_lengths and lengths are not equally many.")
@@ -81,6 +84,16 @@ class Control:
     def exchanged(self) -> Control:
         """Return the same points with far and near photo exchanged."""
         return replace(self, pixels1=self.pixels2, pixels2=self.pixels1)
+
+    @property
+    def picks(self) -> tuple[FloatArray, ...]:
+        """Picks in every photo, as they were given."""
+        return (self.pixels1, self.pixels2, *self.more)
+
+    def of(self, far: int, near: int) -> Control:
+        """Return the points of two photos of a set, by their numbers from 0."""
+        picks = self.picks if self.ids else [np.zeros((0, 2))] * (max(far, near) + 1)
+        return replace(self, pixels1=picks[far], pixels2=picks[near], more=())
 
     @property
     def positioned(self) -> BoolArray:
@@ -143,7 +156,7 @@ def read_control(
     unit: str = "",
     columns: str | None = None,
     unnamed: str = "",
-    alone: bool = False,
+    photos: int = 2,
 ) -> Control:
     """Read control points: id, X, Y, r and their pixels col1, row1, col2, row2.
 
@@ -161,8 +174,9 @@ def read_control(
         Which column is which, ``"id=A,X=East"``; by default as the headings say.
     unnamed : str
         Goes before the row's number in the name of a row that has none.
-    alone : bool
-        Whether it is of one photo alone: col1, row1 suffice and may be called col, row.
+    photos : int
+        How many there are; of more than two the pixels are col3, row3 and so on, of one alone col1,
+        row1, which may be called col, row.
 
     Returns
     -------
@@ -175,16 +189,21 @@ def read_control(
     WorkbookError, InputError
         Naming every bad cell; if there are no pixels.
     """
-    places = parse_column_map(columns, [column.key for column in COLUMNS]) if columns else None
-    table = read_table(path, ALONE if alone else COLUMNS, column_map=places)
-    keys = ("col1", "row1") if alone else ("col1", "row1", "col2", "row2")
+    alone = photos == 1
+    keys = tuple(f"{axis}{k}" for k in range(1, photos + 1) for axis in ("col", "row"))
+    wanted = ALONE if alone else (*COLUMNS, *(Column(key, unit="px") for key in keys[4:]))
+    places = parse_column_map(columns, [column.key for column in wanted]) if columns else None
+    table = read_table(path, wanted, column_map=places)
     missing = [key for key in keys if key not in table.present]
     if missing and alone:
         raise InputError(remark("rectify.no_picks", path=path))
     if missing:
+        each = "both photos (col1, row1, col2, row2)."
+        if photos > 2:
+            each = f"every photo that shows it (col1, row1 to {', '.join(keys[-2:])}), else blank."
         raise InputError(
             f"{path}: the columns {', '.join(missing)} are missing: where the points are seen. "
-            "Each control point needs its pixel in both photos (col1, row1, col2, row2)."
+            f"Each control point needs its pixel in {each}"
         )
     if not len(table):
         raise InputError(f"{path}: no control points in the table.")
@@ -201,15 +220,15 @@ def read_control(
         on_wall = np.isfinite(xyz[:, :2]).all(axis=1) & np.isnan(xyz[:, 2])
         xyz[on_wall, 2] = 0.0
         spread[on_wall, 2] = sigma_plane
+    picks = [
+        np.column_stack([table.numbers(column), table.numbers(row)])
+        for column, row in zip(keys[::2], keys[1::2], strict=True)
+    ]
+    picks += [np.full((len(table), 2), np.nan)] * alone
     return Control(
-        ids=tuple(names),
-        xyz=xyz,
-        sigma=spread,
-        pixels1=np.column_stack([table.numbers("col1"), table.numbers("row1")]),
-        pixels2=np.full((len(table), 2), np.nan)
-        if alone
-        else np.column_stack([table.numbers("col2"), table.numbers("row2")]),
-    )
+        ids=tuple(names), xyz=xyz, sigma=spread,
+        pixels1=picks[0], pixels2=picks[1], more=tuple(picks[2:]),
+    )  # fmt: skip
 
 
 def _names(texts: Sequence[str], before: str) -> list[str]:

@@ -47,7 +47,7 @@ def local_maps(
 
 
 def refine_ties(
-    observations: PairObservations, adjusted: AdjustedPair, images: Images
+    observations: PairObservations, adjusted: PairUnknowns, images: Images
 ) -> tuple[FloatArray, BoolArray]:
     """Return the ties' positions in photo 2 to a tenth of a pixel, and which could be refined."""
     interiors, ties = observations.interiors, (observations.tie1, observations.tie2)

@@ -13,8 +13,11 @@ from numpy.typing import ArrayLike
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.image import ImageArray
 from bifocal.model.pair import Pair
+from bifocal.model.photo_set import PhotoSet
+from bifocal.model.photos_of_set import PhotosOfSet
 from bifocal.model.relief_map import ReliefMap
 from bifocal.model.surface import FlatSurface, MapSurface, Surface
+from bifocal.orthophotos.best_view import chosen
 from bifocal.orthophotos.ortho_image import OrthoOptions, Orthophoto, Source
 from bifocal.orthophotos.pull_push import fill_holes
 from bifocal.orthophotos.rectify import SourcePhoto, footprint
@@ -43,7 +46,7 @@ class _Look(NamedTuple):
 
 
 def orthophoto(
-    pair: Pair,
+    pair: Pair | PhotoSet,
     image: ImageArray | Sequence[ImageArray],
     relief: ReliefMap | Surface | ArrayLike | None = None,
     *,
@@ -59,10 +62,11 @@ def orthophoto(
 
     Parameters
     ----------
-    pair : Pair
+    pair : Pair or PhotoSet
     image : ndarray, shape (h, w, 3) or (h, w), uint8 or uint16
         The photo, RGB. A sequence (image 1, image 2) renders from both: from the far photo
-        wherever it sees the wall, else from the near one.
+        wherever it sees the wall, else from the near one. Of a set all its photos, in its order:
+        each pixel from the one that sees it best.
     relief : ReliefMap, Surface or float, optional
         Where the wall is; a number is a parallel plane, None the reference plane. [m]
     gsd : float, optional
@@ -106,14 +110,18 @@ def orthophoto(
     """
     options = options or OrthoOptions()
     surface = as_surface(relief)
+    if isinstance(pair, PhotoSet):
+        pair, image = _of_set(pair, image)
+    count = len(pair.photos) if isinstance(pair, PhotosOfSet) else 2
     if isinstance(image, np.ndarray):
         if source not in (1, 2):
             raise InputError(f"source: must be 1 or 2, got {source}.")
         images = {source: image}
     else:
         images = dict(enumerate(image, start=1))
-        if len(images) != 2:
-            raise InputError(f"image: expected one photo or two, got {len(images)}.")
+        if len(images) != count:
+            expected = "one photo or two" if count == 2 else f"{count} photos"
+            raise InputError(f"image: expected {expected}, got {len(images)}.")
     for number, pixels in images.items():
         pair.photo(number).check_size(pixels.shape[1::-1], f"image {number}")
     first = min(images)
@@ -136,7 +144,15 @@ def orthophoto(
     )
 
 
-#: Said when no pixel of an orthophoto could be taken from a photo.
+def _of_set(
+    photos: PhotoSet, image: ImageArray | Sequence[ImageArray]
+) -> tuple[Pair, ImageArray | Sequence[ImageArray]]:
+    """Return what renders a set, a set of two as its pair, and the images in its order."""
+    if len(photos) > 2:
+        return PhotosOfSet.of_set(photos), [image] if isinstance(image, np.ndarray) else image
+    pair = photos.pair(0, 1)
+    swapped = photos.photos[0].distance < photos.photos[1].distance
+    return pair, image[::-1] if swapped and not isinstance(image, np.ndarray) else image
 
 
 def as_surface(relief: ReliefMap | Surface | ArrayLike | None) -> Surface:
@@ -244,6 +260,8 @@ def _choose(
 ) -> tuple[ImageArray, ByteArray]:
     """Return colours and sources of a window: the better view, feathered where both see it."""
     usable = [look.inside & ~look.hidden for look in looks]
+    if len(views) > 2:
+        return chosen(views, [look.image for look in looks], usable, grid, options.feather)
     if len(views) == 1:
         source = np.where(usable[0], np.uint8(views[0].number), np.uint8(0))
         return _masked(looks[0].image, usable[0]), source

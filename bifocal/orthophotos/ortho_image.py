@@ -20,8 +20,12 @@ Interpolation = Literal["nearest", "linear", "cubic", "lanczos"]
 INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
 
 
+#: The photo of a set with number n is told as this and n.
+OF_SET = 10
+
+
 class Source(IntEnum):
-    """Where a pixel of an orthophoto comes from (its last band)."""
+    """Where a pixel of an orthophoto comes from (its last band); of a set `OF_SET` + n, too."""
 
     NONE = 0
     IMAGE_1 = 1

@@ -22,10 +22,12 @@ from bifocal.model.geotiff import (
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.pair import Pair
 from bifocal.model.photo_alone import PhotoAlone
+from bifocal.model.photo_set import PhotoSet
+from bifocal.model.photos_of_set import PhotosOfSet
 from bifocal.model.points import SurveyPoints
 from bifocal.model.surface import EVERYWHERE, FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.compose import choose_grid, render
-from bifocal.orthophotos.ortho_image import OrthoOptions, Source
+from bifocal.orthophotos.ortho_image import OF_SET, OrthoOptions, Source
 from bifocal.orthophotos.radiometry import corrected_photo, match_exposure
 from bifocal.orthophotos.rectify import SourcePhoto
 from bifocal.orthophotos.tiles import RasterResult, write_tiles
@@ -103,7 +105,7 @@ class OrthoTask:
 
 
 def make_ortho(
-    pair_path: Pair | Path,
+    pair_path: Pair | PhotoSet | Path,
     out: Path,
     task: OrthoTask,
     *,
@@ -111,7 +113,7 @@ def make_ortho(
     world_file: bool = False,
     progress: Progress = no_progress,
 ) -> RasterResult:
-    """Render the orthophoto of a pair into a GeoTIFF; colours, source band, validity mask.
+    """Render the orthophoto of a pair or a set into a GeoTIFF: colours, source band, mask.
 
     Raises
     ------
@@ -119,11 +121,17 @@ def make_ortho(
         If an input is missing or does not fit, the size is not plausible, or writing fails.
     """
     check_ending(out, ORTHO_ENDING, ".tif", ".tiff")
+    if isinstance(pair_path, PhotoSet):
+        pair_path = PhotosOfSet.of_set(pair_path)
     pair = Pair.of(pair_path)
     check_not_input(out, task.relief, *pair.photo_files)
     check_writable(out, overwrite=overwrite)
     with open_surface(task, pair) as (surface, _, remarks):
-        numbers = {"1": (1,), "2": (2,), "both": (1, 2)}[task.image]
+        numbers: tuple[int, ...] = {"1": (1,), "2": (2,), "both": (1, 2)}[task.image]
+        if isinstance(pair, PhotosOfSet):
+            if task.image != "1":
+                raise InputError(remark("ortho.image_of_set"))
+            numbers = tuple(range(1, len(pair.photos) + 1))
         images = {number: read_image(photo_info(pair, number).path) for number in numbers}
         height, width = images[numbers[0]].shape[:2]
         grid = _grid(pair, numbers[0], (width, height), surface, task)
@@ -153,14 +161,17 @@ def make_ortho(
             world_file=world_file,
         ) as writer:
             counts = write_tiles(
-                writer, tiles(), sources=len(Source), masked=True, progress=progress,
+                writer, tiles(), sources=OF_SET + len(numbers) + 1, masked=True, progress=progress,
                 what="orthophoto",
             )  # fmt: skip
             if counts[0] == total and not hidden:
                 raise InputError(remark("ortho.nothing_in_common"))
     shares = {source.name.lower(): float(counts[source]) / total for source in Source}
+    if isinstance(pair, PhotosOfSet):
+        for number, photo in enumerate(pair.photos, start=OF_SET + 1):
+            shares[photo.name] = float(counts[number]) / total
     shares["hidden"] = hidden / total
-    notes += [] if isinstance(pair, PhotoAlone) else _advice(shares, task)
+    notes += [] if isinstance(pair, PhotoAlone | PhotosOfSet) else _advice(shares, task)
     return RasterResult(
         path=out, grid=grid, shares=shares, remarks=(*pair.remarks, *remarks, *notes)
     )
@@ -286,13 +297,20 @@ def _sources(
         photos.append(
             SourcePhoto.prepare(photo, image, number=number, gsd=grid.gsd, chromatic=chromatic)
         )
-    if len(photos) == 2:
-        first, second = (photo.image for photo in photos)
+    for place in range(1, len(photos)):
+        first, second = photos[0].image, photos[place].image
         if first.dtype != second.dtype or first.ndim != second.ndim:
             raise InputError(remark("ortho.photos_differ"))
-        if task.match:
-            photos[1], note = match_exposure(photos[0], photos[1], surface, grid)
-            remarks.append(note)
+        if not task.match:
+            continue
+        for other in photos[:place]:  # the first that shares a part of the wall
+            matched, note = match_exposure(other, photos[place], surface, grid)
+            if matched is not photos[place]:
+                break
+        photos[place] = matched
+        remarks.append(
+            note if len(photos) == 2 else remark("ortho.of_image", number=place + 1, note=note)
+        )
     return photos, remarks
 
 
@@ -300,7 +318,7 @@ def _tags(pair: Pair, task: OrthoTask) -> dict[str, str]:
     """Return what the file should remember of its making."""
     relief = task.relief or task.points
     return {
-        "BIFOCAL_IMAGE": task.image,
+        "BIFOCAL_IMAGE": "all" if isinstance(pair, PhotosOfSet) else task.image,
         "BIFOCAL_RELIEF": relief.name if relief else f"plane r = {task.plane:g} m",
         "BIFOCAL_D1": f"{pair.image1.distance:.6g}",
         **({} if isinstance(pair, PhotoAlone) else {"BIFOCAL_D2": f"{pair.image2.distance:.6g}"}),

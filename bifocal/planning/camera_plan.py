@@ -133,6 +133,10 @@ class Plan:
         Bound of the area of uncertainty. [m]
     media : PairMedia
         What the photos look through.
+    object_size : tuple of float or None
+        Width and height of the wall. [m]
+    free_space : float or None
+        Room in front of the wall. [m]
     """
 
     sensor: CameraSensor
@@ -140,6 +144,8 @@ class Plan:
     sigma_px: float
     sigma_r_max: float
     media: PairMedia = field(default_factory=PairMedia.none)
+    object_size: tuple[float, float] | None = None
+    free_space: float | None = None
 
     @property
     def best(self) -> Station:

@@ -147,7 +147,10 @@ def plan_stations(
     drafts.sort(key=lambda s: (not s.feasible, float(f"{s.sigma_r_rms:.9g}"), -s.gsd, s.d1))
     limit = sigma_r_max or 3 * drafts[0].sigma_r_rms
     stations = tuple(_with_uncertainty(s, sigma_px, limit) for s in drafts)
-    return Plan(sensor=sensor, stations=stations, sigma_px=sigma_px, sigma_r_max=limit, media=media)
+    return Plan(
+        sensor=sensor, stations=stations, sigma_px=sigma_px, sigma_r_max=limit, media=media,
+        object_size=object_size, free_space=free_space,
+    )  # fmt: skip
 
 
 def _station(

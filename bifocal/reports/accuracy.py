@@ -8,10 +8,12 @@ import numpy as np
 
 from bifocal.reports.content import PairContent
 from bifocal.survey.reference import CheckResult
-from bifocal.survey.tolerances import SCALES, Verdict
+from bifocal.survey.tolerances import SCALES, judge
 from photocore.reports.document import Banner, Block, Paragraph, TextTable
 from photocore.reports.words import Words
 
+#: What is judged by itself: the plan of a drawing, and what stands out of it.
+_PARTS = {"part_drawing": "XY", "part_relief": "Z"}
 #: Points shown in a table; the workbook has them all.
 MOST_POINTS = 60
 #: Errors over their sigmas (RMS) that chance explains, however many the points: an error of the
@@ -31,7 +33,7 @@ def accuracy_blocks(content: PairContent, say: Words) -> Iterator[Block]:
         yield Banner(text=say("verdict_none"))
         return
     yield _banner(content, check, say)
-    yield _verdict_table(check.verdicts, say)
+    yield _verdict_table(check, say)
     yield _point_table(content, check, say)
     hidden = int(np.isfinite(check.errors).any(axis=1).sum()) - MOST_POINTS
     if hidden > 0:
@@ -62,17 +64,31 @@ def millimetres(length: float | None) -> str:
 def _banner(content: PairContent, check: CheckResult, say: Words) -> Banner:
     count = int(np.isfinite(check.errors).any(axis=1).sum())
     key = "verdict_check" if content.has_check else "verdict_control"
-    main = [verdict for verdict in check.verdicts if verdict.rule == check.verdicts[0].rule]
-    held = [verdict.scale for verdict in main if verdict.holds]
-    details = [say("good_for", scale=min(held)) if held else say("good_for_none")]
-    scale, good = content.task.scale, bool(held)
-    if scale:
-        limit = main[0].rule.tolerance(round(scale))
-        good = limit is not None and check.accuracy <= limit
-        details.append(say("wanted_yes" if good else "wanted_no", scale=f"{scale:g}"))
+    rule, asked = check.verdicts[0].rule, content.task.scale
+    details, good = [], set()
+    for part, accuracy in _accuracies(check).items():
+        held = [verdict.scale for verdict in judge(accuracy, (rule,)) if verdict.holds]
+        said = [say("good_for", scale=min(held)) if held else say("good_for_none")]
+        holds = bool(held)
+        if asked:
+            limit = rule.tolerance(round(asked))
+            holds = limit is not None and accuracy <= limit
+            said.append(say("wanted_yes" if holds else "wanted_no", scale=f"{asked:g}"))
+        known = bool(np.isfinite(accuracy))
+        verdict = " ".join(said) if known else say("part_none")
+        details.append(say(part, accuracy=millimetres(accuracy), verdict=verdict))
+        good |= {holds} if known else set()
     details += _foundation(content, check, say)
     text = say(key, accuracy=millimetres(check.accuracy), n=count)
-    return Banner(text=text, details=tuple(details), good=good)
+    return Banner(text=text, details=tuple(details), good=good.pop() if len(good) == 1 else None)
+
+
+def _accuracies(check: CheckResult) -> dict[str, float]:
+    """Return the RMSE of the worst axis of drawing and relief; NaN where nothing was compared."""
+    return {
+        part: max((check.axes[a].rmse for a in axes if check.axes[a].n), default=float("nan"))
+        for part, axes in _PARTS.items()
+    }
 
 
 def _foundation(content: PairContent, check: CheckResult, say: Words) -> Iterator[str]:
@@ -103,19 +119,22 @@ def _foundation(content: PairContent, check: CheckResult, say: Words) -> Iterato
         yield say("far_off", names=", ".join(f"{check.ids[k]} ({size[k]:.1f} σ)" for k in off[:5]))
 
 
-def _verdict_table(verdicts: tuple[Verdict, ...], say: Words) -> TextTable:
-    rules = list(dict.fromkeys(verdict.rule.key for verdict in verdicts))
-    names = {verdict.rule.key: verdict.rule.name for verdict in verdicts}
-    found = {(verdict.scale, verdict.rule.key): verdict for verdict in verdicts}
-    rows = []
-    for scale in SCALES:
-        cells = []
-        for rule in rules:
-            verdict = found.get((scale, rule))
-            word = "" if verdict is None else say("holds" if verdict.holds else "fails")
-            cells.append("-" if verdict is None else f"{verdict.tolerance * 1000:.3g} mm: {word}")
-        rows.append([f"1:{scale}", *cells])
-    headings = [say("scale"), *(names[rule] for rule in rules)]
+def _verdict_table(check: CheckResult, say: Words) -> TextTable:
+    names = {verdict.rule.key: verdict.rule.name for verdict in check.verdicts}
+    found = {(verdict.scale, verdict.rule.key): verdict.tolerance for verdict in check.verdicts}
+    accuracies = _accuracies(check).values()
+
+    def cell(limit: float | None) -> str:
+        if limit is None:
+            return "-"
+        words = (
+            say("holds" if one <= limit else "fails") if np.isfinite(one) else "-"
+            for one in accuracies
+        )
+        return f"{limit * 1000:.3g} mm: {' / '.join(words)}"
+
+    rows = [[f"1:{scale}", *(cell(found.get((scale, key))) for key in names)] for scale in SCALES]
+    headings = [say("scale"), *names.values()]
     return TextTable(headings=headings, rows=rows, caption=say("rule_table"))
 
 

@@ -16,6 +16,7 @@ from bifocal.model.relief_map import ReliefMap
 from photocore.arrays import ByteArray, Float32Array
 from photocore.errors import InputError
 from photocore.provenance import program, today
+from photocore.reports.html_page import provenance_text
 from photocore.reports.words import words_of
 
 #: Points of the mesh: what 16-bit indices reach, in every browser.
@@ -89,7 +90,7 @@ def relief_view(
     texts |= {
         "nowebgl": say("view_nowebgl"), "title": title or say("relief_map"), "language": language,
         "low": f"{-reach:+.2f}", "high": f"{reach:+.2f}",
-        "made": say("made", program=program(), date=today()),
+        "made": say("made", program=program(), date=today()), "provenance": provenance_text(),
     }  # fmt: skip
     page = files("bifocal.reports").joinpath("relief_view.html").read_text(encoding="utf-8")
     escaped = {key: html.escape(text) for key, text in texts.items()}

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import html
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bifocal.media import media_words
+from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.rays import object_rays
 from bifocal.reports.accuracy import millimetres
@@ -14,6 +18,84 @@ from bifocal.reports.content import PairContent
 from photocore.arrays import FloatArray
 from photocore.reports.document import Block, Heading, Paragraph
 from photocore.reports.words import Words
+
+_NUMBER = r"(-?\d+\.\d+)"
+#: The two pixels of a method page, and what is found of them; the same in every language.
+_PIXELS = re.compile(rf"\({_NUMBER}, {_NUMBER}\)_1   \({_NUMBER}, {_NUMBER}\)_2")
+_FOUND = re.compile(rf"r = .* = {_NUMBER} m.*?X = {_NUMBER} m    Y = {_NUMBER} m", re.DOTALL)
+#: Half of the last digit that is printed of a pixel [px] and of a place [m], and a little more.
+_LAST_PIXEL, _LAST_PLACE = 0.00051, 0.000051
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkedPoint:
+    """The worked point of a report, computed anew.
+
+    Attributes
+    ----------
+    report : str
+    printed, computed : tuple of float
+        X, Y and r, as the report says and as the pair file gives for the pixels it prints. [m]
+    holds : bool
+        Whether these agree within the digits printed, and the table of points has such a point.
+    """
+
+    report: str
+    printed: tuple[float, ...]
+    computed: tuple[float, ...]
+    holds: bool
+
+    def sentence(self) -> str:
+        """Return it in one line."""
+        printed, computed = (
+            "X = {:.4f} m, Y = {:.4f} m, r = {:.4f} m".format(*place)
+            for place in (self.printed, self.computed)
+        )
+        word = "holds" if self.holds else "DOES NOT HOLD"
+        return f"{self.report}: the worked point {word}: {printed}; computed anew {computed}"
+
+
+def recomputed(
+    page: str, pairs: Sequence[Pair], points: Sequence[FloatArray], report: str
+) -> WorkedPoint | None:
+    """Return the worked point of a report (HTML), computed anew; None where it has none.
+
+    Parameters
+    ----------
+    page : str
+        The report.
+    pairs : sequence of Pair
+        One of which it speaks.
+    points : sequence of ndarray, shape (n, 3)
+        Tables of X, Y, r; the point must be in each. [m]
+    report : str
+        Its name.
+    """
+    text = html.unescape(page)
+    pixels = _PIXELS.search(text)
+    found = _FOUND.search(text, pixels.end()) if pixels else None
+    if pixels is None or found is None:
+        return None
+    r, x, y = map(float, found.groups())
+    printed = np.array([x, y, r])
+    # The digits printed, then each pixel coordinate moved by what was rounded off.
+    picks = np.array([float(number) for number in pixels.groups()])
+    picks = picks + _LAST_PIXEL * np.vstack([np.zeros(4), np.eye(4)])
+    holds, nearest = False, np.full(3, np.nan)
+    for pair in pairs:
+        ideal = replace(
+            pair, image1=replace(pair.image1, lens=None), image2=replace(pair.image2, lens=None)
+        )
+        xyz = ideal.intersect(picks[:, :2], picks[:, 2:]).xyz
+        allowed = np.abs(xyz[1:] - xyz[0]).sum(axis=0) + _LAST_PLACE
+        listed = [(np.abs(table - printed) <= allowed).all(axis=1).any() for table in points]
+        same = bool((np.abs(xyz[0] - printed) <= allowed).all() and all(listed))
+        if same or not holds:
+            holds, nearest = same, xyz[0]
+    return WorkedPoint(
+        report=report, printed=tuple(printed.tolist()), computed=tuple(nearest.tolist()),
+        holds=holds,
+    )  # fmt: skip
 
 
 def method_blocks(content: PairContent, say: Words) -> Iterator[Block]:

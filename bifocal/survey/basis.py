@@ -15,7 +15,7 @@ def basis(solution: SolvedSurvey) -> str:
 
 def _setup(solution: SolvedSurvey) -> str:
     corrected = ", corrected by points of the plane" if solution.adjusted else ""
-    known = "the pair as given"
+    known = "the pair as given" if solution.photos is None else "the photos as given"
     if solution.setup is not None:
         known = "d_1, d_2, c_1, c_2 and nadir points as typed"
     return known + corrected

@@ -184,7 +184,7 @@ def _measured_control(
         wall=wall,
         world=control.xyz,
         covariance=covariance,
-        effect=None if solved is None else solved.effect_of_orientation(wall),
+        effect=None if solved is None else solved.effect_of_orientation(control.rows_in(points)),
         used=control.used,
         missing=control.missing_in(points),
     )

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 import numpy as np
 
 from bifocal.media import MediaPath
@@ -11,6 +14,7 @@ from bifocal.rays import apparent_of_plane
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.setup import SurveySetup
+from bifocal.survey.survey_lens import turns_of
 from photocore.arrays import FloatArray
 
 
@@ -69,6 +73,30 @@ def foot_tangents(photo: Photo, table: ReliefTable) -> dict[str, FloatArray]:
         way = media.radial_rays(tangent)
         tangent = tangent - (tangent * way.arm - radius) / way.pace
     return turns
+
+
+def lens_turns(
+    setup: SurveySetup, points: PointObservations, shift: Mapping[str, FloatArray]
+) -> dict[str, FloatArray]:
+    """Return the columns that free picks of lens distortion, and ``grown``, which puts it back.
+
+    Parameters
+    ----------
+    setup, points : SurveySetup, PointObservations
+        As typed.
+    shift : mapping
+        What `image_shift` found.
+    """
+    plain, columns = replace(setup, lenses=None, adjusted=(None, None)), dict[str, FloatArray]()
+    feet = replace(points, xy1=np.stack([shift["x_c"], shift["y_c"]], axis=-1))
+    seen, foot = plain.in_millimetres(points), plain.in_millimetres(feet).xy1
+    for image, xy in ((1, seen.xy1), (2, seen.xy2)):
+        lens = setup.lens(image)
+        if lens is not None:
+            columns |= turns_of(lens, xy, image)
+            if image == 1:
+                columns["grown"] = 1 / turns_of(lens, foot, 1)["lens1"]
+    return columns
 
 
 def _of_pixels(

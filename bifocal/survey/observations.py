@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -22,6 +23,11 @@ TEXTS = ("id", "code", "note")
 PLANE_CODES = ("PLANE", "PIANO", "EBENE")
 #: What a code begins with where a pick was accepted in doubt: its relief may be any.
 DOUBT_CODES = ("DOUBTFUL", "DUBBIO", "ZWEIFELHAFT")
+
+
+def pixel_keys(number: int) -> tuple[str, str]:
+    """Return the keys of the columns of raw pixels of a photo, counted from 1."""
+    return f"col{number}", f"row{number}"
 
 
 #: Stands for columns that were not given; replaced by blanks when the object is made.
@@ -60,6 +66,8 @@ class PointObservations:
         The user's own words; a code of `PLANE_CODES` marks a point of the reference plane.
     r_measured : ndarray, shape (n,)
         Relief measured on site, to check against. [m]
+    others : ndarray, shape (n, k, 2)
+        Raw (column, row) in the third photo and more of a set. [px]
     """
 
     ids: tuple[str, ...]
@@ -72,6 +80,7 @@ class PointObservations:
     code: tuple[str, ...] = ()
     note: tuple[str, ...] = ()
     r_measured: FloatArray = _ABSENT
+    others: FloatArray = _ABSENT
 
     def __post_init__(self) -> None:
         n, set_ = len(self.ids), object.__setattr__
@@ -83,6 +92,10 @@ class PointObservations:
                 raise InputError(f"{name}: expected shape ({n}, {columns}), found {array.shape}.")
             array.setflags(write=False)
             set_(self, name, array)
+        others = np.empty((n, 0, 2)) if self.others is None else np.array(self.others, float)
+        if others.ndim != 3 or others.shape[::2] != (n, 2):
+            raise InputError(f"others: expected shape ({n}, k, 2), found {others.shape}.")
+        set_(self, "others", others)
         measured = _blank(n, 1)[:, 0] if self.r_measured is None else self.r_measured
         set_(self, "r_measured", np.array(measured, dtype=np.float64))
         set_(self, "use", np.ones(n, bool) if self.use is None else np.array(self.use, dtype=bool))
@@ -100,7 +113,10 @@ class PointObservations:
         InputError
             If a key is unknown, a column is no list of values, or columns differ in length.
         """
-        unknown = [key for key in columns if key not in (*NUMBERS, *TEXTS, "use")]
+        more = [int(key[3:]) for key in columns if re.fullmatch(r"(col|row)([3-9]|[1-9]\d+)", key)]
+        numbers = range(3, max(more, default=2) + 1)
+        pixels = [key for number in numbers for key in pixel_keys(number)]
+        unknown = [key for key in columns if key not in (*NUMBERS, *TEXTS, *pixels, "use")]
         if unknown:
             known = ", ".join((*TEXTS, *NUMBERS, "use"))
             raise InputError(f"points: there is no column {unknown[0]!r}; known are {known}.")
@@ -128,6 +144,7 @@ class PointObservations:
             polar=stacked("s1", "s2", "theta"),
             pixels1=stacked("col1", "row1"),
             pixels2=stacked("col2", "row2"),
+            others=stacked(*pixels).reshape(n, -1, 2) if pixels else _ABSENT,
             r_measured=as_floats(columns.get("r_measured", blank), "r_measured"),
             use=columns.get("use", np.ones(n, dtype=bool)),
             code=tuple(columns.get("code", ())),
@@ -150,7 +167,14 @@ class PointObservations:
     @property
     def has_pixels(self) -> BoolArray:
         """Which points have any raw pixel, shape (n,)."""
-        return _any_given(self.pixels1, self.pixels2)
+        return _any_given(
+            self.pixels1, self.pixels2, self.others.reshape(len(self), 2 * self.others.shape[1])
+        )
+
+    @property
+    def pixels(self) -> tuple[FloatArray, ...]:
+        """Raw (column, row) in every photo, each of shape (n, 2). [px]"""
+        return (self.pixels1, self.pixels2, *self.others.transpose(1, 0, 2))
 
     @property
     def is_polar(self) -> BoolArray:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bifocal.model.pair import Pair
-from photocore.arrays import FloatArray
+from photocore.arrays import FloatArray, IntArray
 
 #: Entries of a symmetric matrix of X, Y, Z, and where they stand.
 ENTRIES = {"XX": (0, 0), "XY": (0, 1), "YY": (1, 1), "XZ": (0, 2), "YZ": (1, 2), "ZZ": (2, 2)}
@@ -43,6 +43,8 @@ class ReliefTable:
         Precision of a pick, where the covariances are kept for one pixel (``k_XX`` ...). [px]
     pair : Pair or None
         The geometry, where its own precision is in the covariances.
+    effect : ndarray, shape (n, 3, k), or None
+        The same of points of a set of photos: what errors common to all points move each by. [m]
     """
 
     ids: tuple[str, ...]
@@ -53,6 +55,7 @@ class ReliefTable:
     image_scale: float | None
     sigma_px: float | None = None
     pair: Pair | None = None
+    effect: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -79,12 +82,18 @@ class ReliefTable:
             return self.covariance
         return np.asarray(self.sigma_px**2 * symmetric(self.formula_cells, "k_"))
 
-    def effect_of_orientation(self, xyz: FloatArray) -> FloatArray | None:
+    def effect_of_orientation(self, rows: IntArray | None = None) -> FloatArray | None:
         """Return what errors common to all points move them by, shape (n, 3, k) [m]; None if none.
 
-        See `bifocal.model.pair.Pair.effect_of_orientation`.
+        Of all points, or of some rows, NaN for -1; see `bifocal.model.pair.Pair.
+        effect_of_orientation`.
         """
-        return None if self.pair is None else self.pair.effect_of_orientation(xyz)
+        if self.effect is None and self.pair is None:
+            return None
+        values = self.xyz if self.effect is None else self.effect
+        if rows is not None:
+            values = np.concatenate([values, np.full((1, *values.shape[1:]), np.nan)])[rows]
+        return self.pair.effect_of_orientation(values) if self.pair is not None else values
 
 
 def symmetric(columns: Mapping[str, FloatArray], prefix: str = "cov_") -> FloatArray:

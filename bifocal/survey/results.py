@@ -38,10 +38,17 @@ def csv_columns(solution: SolvedSurvey) -> dict[str, Any]:
     if solution.georeference is not None:
         sigma = solution.world_sigma
         columns |= {f"sigma_{key} [m]": sigma[:, i] for i, key in enumerate("ENH")}
+    columns |= {f"{key} [{length_unit(solution)}]": table[key] for key in _more(solution)}
     columns["flag"] = list(table.flags)
     if any(solution.points.note):
         columns["note"] = list(solution.points.note)
     return columns
+
+
+def _more(solution: SolvedSurvey) -> list[str]:
+    """Return the displacements on the third photo and more of a set."""
+    count = 2 if solution.photos is None else len(solution.photos)
+    return [f"e{number}" for number in range(3, count + 1)]
 
 
 def solution_json(solution: SolvedSurvey) -> str:
@@ -55,8 +62,9 @@ def solution_json(solution: SolvedSurvey) -> str:
 def _records(solution: SolvedSurvey) -> list[str]:
     table = solution.table
     shift = shift_of(solution)
-    columns = [values.tolist() for values in (*(table[key] for key in _NUMBERS), *shift.values())]
-    world, keys = [], [*_NUMBERS, *shift]
+    shown = {key: table[key] for key in (*_NUMBERS, *_more(solution))} | shift
+    columns, world = [values.tolist() for values in shown.values()], []
+    keys = list(shown)
     if solution.georeference is not None:
         placed = np.hstack([solution.world, solution.world_sigma])
         world = placed.T.tolist()
@@ -69,9 +77,14 @@ def _records(solution: SolvedSurvey) -> list[str]:
     use = ["true" if value else "false" for value in solution.points.use]
     template = (
         '{{"id": {}, ' + ", ".join(f'"{key}": {{}}' for key in keys)
-        + ', "flag": "{}", "use": {}}}'
+        + ', "flag": "{}", "use": {}'
     )  # fmt: skip
-    return [template.format(*row) for row in zip(names, *numbers, table.flags, use, strict=True)]
+    texts = [table.flags, use]
+    if solution.photos is not None:
+        template += ', "note": {}'
+        texts.append([json.dumps(text, ensure_ascii=False) for text in solution.points.note])
+    template += "}}"
+    return [template.format(*row) for row in zip(names, *numbers, *texts, strict=True)]
 
 
 def _head(solution: SolvedSurvey) -> dict[str, Any]:
@@ -108,7 +121,8 @@ def _head(solution: SolvedSurvey) -> dict[str, Any]:
 
 def shift_of(solution: SolvedSurvey) -> dict[str, FloatArray]:
     """Return where points belong on photo 1 and the way there; see `image_shift`."""
-    return image_shift(solution.pair.image1, solution.setup, solution.points, solution.table)
+    first = solution.photos.photos[0] if solution.photos else solution.pair.image1
+    return image_shift(first, solution.setup, solution.points, solution.table)
 
 
 def image_unit(solution: SolvedSurvey) -> str:

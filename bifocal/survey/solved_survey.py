@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.model.pair import Pair
+from bifocal.model.photo_set import PhotoSet
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.orientation_check import OrientationCheck
 from bifocal.survey.reference import CheckResult, Georeference
@@ -62,7 +63,7 @@ class WorldPoints:
         own = table.own_covariance
         if geo.precision is None or own is None:
             return geo.covariance_of(table.xyz, table.covariance)
-        effect = table.effect_of_orientation(table.xyz)
+        effect = table.effect_of_orientation()
         return geo.covariance_of(table.xyz, own, ids=table.ids, effect=effect)
 
     @property
@@ -79,7 +80,7 @@ class WorldPoints:
     def common(self) -> FloatArray:
         """What the orientation still adds to E, N, H once placed, shape (n, 3, 3). [m²]"""
         geo, table = self.georeference, self.table
-        effect = table.effect_of_orientation(table.xyz)
+        effect = table.effect_of_orientation()
         if geo is None or effect is None or geo.precision is None:
             return np.full((len(table), 3, 3), np.nan)
         return geo.common(self.near, effect)
@@ -96,7 +97,9 @@ class SolvedSurvey:
     setup : SurveySetup or None
         Of an ideal pair; None for one given by homographies.
     pair : Pair
-        The geometry.
+        The geometry; of a set of photos its best pair.
+    photos : PhotoSet or None
+        The set of more than two photos that the points were measured in.
     media : SurveyMedia or None
         What the photos of a pair given by homographies look through, where that was stated.
     sigma_px : float or None
@@ -130,6 +133,7 @@ class SolvedSurvey:
     survey: SurveyInput
     setup: SurveySetup | None
     pair: Pair
+    photos: PhotoSet | None = None
     media: SurveyMedia | None = None
     sigma_px: float | None = None
     points: PointObservations

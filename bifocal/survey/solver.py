@@ -9,6 +9,7 @@ import numpy as np
 from bifocal.model.flags import FlagLimits
 from bifocal.model.homography import apply_homography
 from bifocal.model.pair import Pair
+from bifocal.model.photo_set import PhotoSet
 from bifocal.remarks import remark
 from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
@@ -31,6 +32,7 @@ from bifocal.survey.remarks import (
     unused_remarks,
     wide_remarks,
 )
+from bifocal.survey.set_survey import best_pair, solve_set
 from bifocal.survey.setup import SCALE_TOLERANCE, SurveySetup
 from bifocal.survey.solved_survey import Corrections, SolvedSurvey
 from bifocal.survey.survey_input import SurveyInput
@@ -102,6 +104,41 @@ def solve_survey(
         sigma_px=sigma_px, points=points, table=table, check=check, rules=rules,
         georeference=world, orientation_check=plane, adjusted=adjust,
         corrections=arranged.corrections, remarks=tuple(dict.fromkeys(filter(None, remarks))),
+    )  # fmt: skip
+
+
+def solve_survey_of_set(
+    survey: SurveyInput, photos: PhotoSet, *, rules: tuple[ToleranceRule, ...] = RULES
+) -> SolvedSurvey:
+    """Solve what was measured in three photos and more.
+
+    Raises
+    ------
+    InputError
+        If there are no raw pixels.
+    """
+    points, measuring, pair = survey.points, survey.setup.measuring, best_pair(photos)
+    if not points.has_pixels.any():
+        needed = remark("survey.set_pixels", count=len(photos))
+        raise InputError(f"{survey.where}: {needed}")
+    sigma, said = measuring.sigma_px, tuple[str, ...]()
+    if sigma is None and not any(photo.sigma_pixel for photo in photos.photos):
+        sigma, said = _sigma_of_set(photos, points)
+    table, notes, off = solve_set(photos, points, sigma_px=sigma, limits=measuring.limits)
+    noted = ("; ".join(filter(None, both)) for both in zip(points.note, notes, strict=True))
+    unused = points.unused
+    known, control = survey.known.without(unused), survey.control.without(unused)
+    check = check_points(table, known, rules)
+    world, world_remarks = _placed(control, table, survey.model)
+    remarks = (
+        *survey.remarks, *said, *off, *check.remarks,
+        *unused_remarks(unused, Check=survey.known, Georeference=survey.control),
+        *opposite_signs_remark(table, known), *world_remarks,
+    )  # fmt: skip
+    return SolvedSurvey(
+        survey=survey, setup=None, pair=pair, photos=photos, sigma_px=sigma,
+        points=replace(points, note=tuple(noted)), table=table, check=check, rules=rules,
+        georeference=world, remarks=tuple(dict.fromkeys(filter(None, remarks))),
     )  # fmt: skip
 
 
@@ -220,6 +257,18 @@ def _sigma_from_misfits(
         spread = float(np.sqrt(np.mean(kept**2))) if len(kept) else spread
     sigma = max(spread, BEST_SIGMA_PX)
     return sigma, (remark("survey.sigma_found", sigma=sigma, count=int(rows.sum())),)
+
+
+def _sigma_of_set(
+    photos: PhotoSet, points: PointObservations
+) -> tuple[float | None, tuple[str, ...]]:
+    """Return the picks' precision from the misfits of the pair whose are largest; None if few."""
+    found, count = [], len(points.pixels)
+    for far, near, *_ in photos.pairs():
+        if max(far, near) < count:
+            both = replace(points, pixels1=points.pixels[far], pixels2=points.pixels[near])
+            found.append(_sigma_from_misfits(photos.pair(far, near), both))
+    return max(found, key=lambda each: each[0] or 0.0, default=(None, ()))
 
 
 def _ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -> _Arranged:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -12,14 +12,13 @@ from bifocal.model.flags import DOUBTFUL_SHARE, FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.survey.georeferencing import residuals
-from bifocal.survey.image_shift import foot_tangents, image_shift
+from bifocal.survey.image_shift import foot_tangents, image_shift, lens_turns
 from bifocal.survey.leave_one_out import leave_one_out
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable, entries
 from bifocal.survey.setup import SIGMA_RADIAL, SurveySetup
 from bifocal.survey.solved_survey import SolvedSurvey, WorldPoints
-from bifocal.survey.survey_lens import turns_of
 from bifocal.survey.survey_media import SurveyMedia
 from bifocal.survey.tolerances import RULES, ToleranceRule
 from bifocal.survey.weighted_similarity import weights_of
@@ -254,9 +253,11 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     undirected = incomplete | np.isnan(table["theta_used"])
     first = content.photos[0]
     shifts = image_shift(first, content.setup, points, table) | foot_tangents(first, table)
+    if content.setup is not None and content.has_lens:
+        more = lens_turns(content.setup, points, shifts)
+        shifts["grown"] = more.pop("grown", np.full(len(points), np.nan))
+        cells |= {key: inputs(values) for key, values in more.items()}
     cells |= {key: _unless(undirected, values) for key, values in shifts.items()}
-    if content.has_lens:
-        cells |= _lens_columns(content, undirected)
     cells |= {key: inputs(values) for key, values in table.formula_cells.items()}
     for key in {"g1", "g2"} & table.formula_cells.keys():
         cells[key] = _unless(incomplete, table.formula_cells[key])
@@ -274,26 +275,6 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     cells["flag"] = [
         flag if given else None for flag, given in zip(table.flags, typed, strict=True)
     ]
-    return cells
-
-
-def _lens_columns(content: SurveyContent, blank: BoolArray) -> dict[str, list[CellValue]]:
-    """Return the columns that take lens distortion out of picks, and put it into the foot's."""
-    setup, points, table = content.setup, content.points, content.table
-    assert setup is not None
-    assert points is not None
-    assert table is not None
-    plain, first = replace(setup, lenses=None, adjusted=(None, None)), setup.lens(1)
-    seen, cells = plain.in_millimetres(points), dict[str, list[CellValue]]()
-    for image, xy in ((1, seen.xy1), (2, seen.xy2)):
-        lens = setup.lens(image)
-        if lens is not None:
-            cells |= {key: inputs(values) for key, values in turns_of(lens, xy, image).items()}
-    if first is not None:
-        shift = image_shift(content.photos[0], setup, points, table)
-        feet = np.stack([shift["x_c"], shift["y_c"]], axis=-1)
-        turns = turns_of(first, plain.in_millimetres(replace(points, xy1=feet)).xy1, 1)
-        cells["grown"] = _unless(blank, 1 / turns["lens1"])
     return cells
 
 

@@ -8,13 +8,17 @@ from typing import Any
 import numpy as np
 
 from bifocal.files.haze import read_greys
-from bifocal.files.photos import photo_info
+from bifocal.files.photos import photo_info, set_photo_info
 from bifocal.matching.matches import Matches
 from bifocal.matching.matching import MatchSettings, match_pair, precision
+from bifocal.matching.set_matching import match_set
 from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
+from bifocal.model.photo_set import PhotoSet
+from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations
 from bifocal.workbook.template_workflow import write_survey
+from photocore.arrays import ByteArray
 from photocore.output import check_ending
 from photocore.workbook.making.newbook import check_new_workbook
 
@@ -74,6 +78,40 @@ def match_pair_file(pair_path: Pair | Path, settings: MatchSettings) -> tuple[Pa
     paths = photo_info(pair, 1).path, photo_info(pair, 2).path
     images = read_greys(*paths, in_water=pair.refracted)
     return pair, match_pair(pair, images, settings)
+
+
+def match_set_file(
+    photos: PhotoSet, out: Path, settings: MatchSettings, *, overwrite: bool = False
+) -> dict[str, Any]:
+    """Find homologous points in three photos and more, write them as a table, return a summary.
+
+    Raises
+    ------
+    InputError, GeometryError
+        If a file is at fault, or photos and set do not belong together.
+    """
+    check_ending(
+        out, remark("photo_set.matches_as_table", name=out.with_suffix(".csv").name), ".csv"
+    )
+    check_new_workbook(out, overwrite=overwrite)
+    paths = [set_photo_info(photos, number).path for number in range(len(photos))]
+
+    def greys(first: int, second: int) -> tuple[ByteArray, ByteArray]:
+        return read_greys(paths[first], paths[second], in_water=photos.layers is not None)
+
+    found = match_set(photos, greys, settings)
+    found.write(out, overwrite=overwrite)
+    picked = np.isfinite(found.pixels[..., 0])
+    low, high = np.nanpercentile(found.points.xyz[:, 2], [1, 99])
+    return {
+        "count": len(found.ids),
+        "photos": dict(zip(photos.names, picked.sum(axis=1).tolist(), strict=True)),
+        "in_three": int((picked.sum(axis=0) > 2).sum()),
+        "kinds": {kind: found.kinds.count(kind) for kind in sorted(set(found.kinds))},
+        "sigma_px": found.sigma_px,
+        "relief_range": [low, high],
+        "sigma_r_median": float(np.nanmedian(found.points.sigma[:, 2])),
+    }
 
 
 #: A part of the photo with fewer features counts as empty: one or two may be chance.

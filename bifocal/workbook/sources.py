@@ -10,6 +10,8 @@ from typing import Any
 from bifocal.model.lens import Lens
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
+from bifocal.model.photo_entries import SET_FORMAT
+from bifocal.model.photo_set import PhotoSet
 from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.setup import SurveySetup
@@ -18,6 +20,7 @@ from bifocal.survey.units import refuse_far_stations
 from bifocal.workbook.reading.pick_lists import joined, left_over, read_picks
 from bifocal.workbook.reading.reader import ReadOptions, read_survey
 from photocore.errors import GeometryError, InputError
+from photocore.jsonfile import read_object
 
 Lists = tuple[Path | str, Path | str]
 Source = Path | str | PointObservations | SurveyInput | Mapping[str, Any] | Lists
@@ -49,6 +52,19 @@ def measured(source: Source, options: ReadOptions, unit: str | None) -> tuple[Su
             "frame give the columns: dict(frame) with pandas, frame.to_dict() with polars."
         )
     return read_survey(source, options), Path(source)
+
+
+def set_or_pair(
+    given: PhotoSet | Pair | Path | str | None,
+) -> tuple[PhotoSet | None, Pair | Path | str | None]:
+    """Return a set of more than two photos, or what is a pair's; a set of two is one."""
+    photos = given if isinstance(given, PhotoSet) else None
+    if isinstance(given, Path | str) and Path(given).suffix.lower() == ".json":
+        is_set = read_object(given, what="pair file").get("format") == SET_FORMAT
+        photos = PhotoSet.read(given) if is_set else None
+    if photos is None or len(photos) > 2:
+        return photos, None if photos else given  # type: ignore[return-value]
+    return None, Pair.from_dict(photos.to_dict(), folder=photos.folder)
 
 
 def set_up(

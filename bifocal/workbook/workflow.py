@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 from bifocal.model.pair import Pair
+from bifocal.model.photo_set import PhotoSet
+from bifocal.remarks import remark
 from bifocal.survey.setup import SCALE_TOLERANCE, Measuring, Taking, given_of
 from bifocal.survey.solved_survey import SolvedSurvey
-from bifocal.survey.solver import solve_survey
+from bifocal.survey.solver import solve_survey, solve_survey_of_set
+from bifocal.survey.survey_input import SurveyInput
 from bifocal.survey.survey_media import SurveyMedia
 from bifocal.survey.tolerances import RULES, ToleranceRule, as_rule
 from bifocal.survey.units import refuse_not_above_zero
 from bifocal.workbook.formulas.setup_cells import cells_of
 from bifocal.workbook.reading.reader import ReadOptions
-from bifocal.workbook.sources import Source, given_pair, measured, set_up
+from bifocal.workbook.sources import Source, given_pair, measured, set_or_pair, set_up
+from photocore.errors import InputError
 
 
 def solve(
     source: Source,
     *,
-    pair: Pair | Path | str | None = None,
+    pair: PhotoSet | Pair | Path | str | None = None,
     taking: Taking | None = None,
     measuring: Measuring | None = None,
     adjust_setup: bool = False,
@@ -37,11 +42,12 @@ def solve(
     source : path, mapping, PointObservations, SurveyInput or tuple of two paths
         A survey workbook or table (``.xlsx .xlsm .ods .csv``), or columns by key: ``id`` and
         ``x1 y1 x2 y2`` [mm or px], or ``s1 s2`` [mm] and ``theta`` [deg], or ``col1 row1 col2
-        row2`` [px]; each of shape (n,), NaN where blank. Two paths: the picks of photo 1 and of
-        photo 2 (`bifocal.workbook.reading.pick_lists.read_picks`), joined by name.
-    pair : Pair or path, optional
-        Pair or pair file, for raw pixels, or a survey workbook whose set-up, check and control
-        points are taken; default the workbook's own set-up.
+        row2`` [px], of a set of photos more; each of shape (n,), NaN where blank. Two paths: the
+        picks of photo 1 and of photo 2 (`bifocal.workbook.reading.pick_lists.read_picks`), joined
+        by name.
+    pair : Pair, PhotoSet or path, optional
+        Pair, set of photos or the file of either, for raw pixels, or a survey workbook whose
+        set-up, check and control points are taken; default the workbook's own set-up.
     taking : Taking, optional
         Distances [m], principal distances [mm] and the like, in place of those of `Setup`.
     measuring : Measuring, optional
@@ -91,8 +97,12 @@ def solve(
     refuse_not_above_zero(**given, scale_tolerance=scale_tolerance)
     judged = tuple(as_rule(rule) for rule in rules) or RULES
     asked = given | {n: v for n, v in (("pair", pair), ("model", model)) if v is not None}
-    options = replace(reading or ReadOptions(), given=tuple(cells_of(asked)))
+    photos, pair = set_or_pair(pair)
+    count = 2 if photos is None else len(photos)
+    options = replace(reading or ReadOptions(), given=tuple(cells_of(asked)), photos=count)
     survey, path = measured(source, options, given.get("unit"))
+    if photos is not None:
+        return _solved_of_set(survey, photos, path, asked, rules=judged, adjust=adjust_setup)
     survey, pair = set_up(survey, pair, given, options)
     general, pair_path, pair_remarks = given_pair(survey, path, pair)
     # What is wrong with the pair comes first.
@@ -105,3 +115,38 @@ def solve(
         count = media.media if media else 0
         media = SurveyMedia.of_photos((general.image1, general.image2), count)
     return replace(solved, media=media, source=path, pair_path=pair_path, given=asked)
+
+
+def _solved_of_set(
+    survey: SurveyInput,
+    photos: PhotoSet,
+    path: Path,
+    asked: Mapping[str, Any],
+    *,
+    rules: tuple[ToleranceRule, ...],
+    adjust: bool,
+) -> SolvedSurvey:
+    """Return what was measured in three photos and more, solved.
+
+    Raises
+    ------
+    InputError
+        If an option goes with pairs alone, or there are no points.
+    """
+    names = {"pair", "model", *(f.name for f in fields(Measuring))}
+    idle = ["adjust_setup"] if adjust else [name for name in asked if name not in names]
+    if idle:
+        raise InputError(remark("survey.not_of_a_set", option=idle[0], count=len(photos)))
+    if not len(survey.points):
+        raise InputError(f"{survey.where}: there is no point. Fill in the measured points.")
+    given = {name: value for name, value in asked.items() if name not in ("pair", "model")}
+    said = (*photos.remarks, *survey.remarks)
+    survey = replace(
+        survey,
+        setup=survey.setup.but(**given),
+        model=asked.get("model", survey.model),
+        remarks=said,
+    )
+    solved = solve_survey_of_set(survey, photos, rules=rules)
+    file = None if isinstance(asked["pair"], PhotoSet) else Path(asked["pair"])
+    return replace(solved, source=path, pair_path=file, given=asked)

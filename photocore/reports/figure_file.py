@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from photocore.output import atomic_path
+from photocore.png_text import with_provenance
 
 
 def write_figure(path: Path | str, figure: Any, *, overwrite: bool, **options: Any) -> None:
@@ -32,6 +33,8 @@ def write_figure(path: Path | str, figure: Any, *, overwrite: bool, **options: A
         If the file cannot be written.
     """
     written = BytesIO()
-    figure.savefig(written, format=Path(path).suffix.lower().lstrip("."), **options)
+    ending = Path(path).suffix.lower().lstrip(".")
+    figure.savefig(written, format=ending, **options)
+    data = written.getvalue()
     with atomic_path(path, overwrite=overwrite) as temporary:
-        temporary.write_bytes(written.getbuffer())
+        temporary.write_bytes(with_provenance(data) if ending == "png" else data)

@@ -14,6 +14,7 @@ from urllib.parse import quote
 
 from photocore.cli import Progress, no_progress
 from photocore.output import atomic_path
+from photocore.provenance import provenance
 from photocore.reports.document import (
     Banner,
     Block,
@@ -51,6 +52,11 @@ _LEFT = "\n".join(
 )
 
 
+def provenance_text() -> str:
+    """Return the provenance as one line, for the head of a page."""
+    return "; ".join(provenance().lines())
+
+
 def write_html(
     path: Path, document: Document, *, overwrite: bool = False, progress: Progress = no_progress
 ) -> None:
@@ -63,7 +69,9 @@ def write_html(
     text = (
         f'<!DOCTYPE html>\n<html lang="{document.language}">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f'<meta name="generator" content="{subject}">\n<title>{title}</title>\n'
+        f'<meta name="generator" content="{subject}">\n'
+        f'<meta name="provenance" content="{html.escape(provenance_text())}">\n'
+        f"<title>{title}</title>\n"
         f"<style>{_STYLE}{_LEFT}\n</style>\n</head>\n<body>\n"
         + "\n".join(parts)
         + "\n</body>\n</html>\n"

@@ -48,6 +48,7 @@ DEEP = "[" * 100_000
 BIG = 10**400
 NAN, INF = float("nan"), float("inf")
 PAIR_LINE = "bifocal solve picks.csv --pair wall.pair.json --json"
+SET_LINE = "bifocal solve picks3.csv --pair wall.photos.json --json"
 LENS_LINE = "bifocal undistort far.jpg --lens lens.json"
 SOLVE_LINE = f"bifocal solve survey.csv {SOLVE} --json"
 TANK_LINE = "multimedia project tank.toml --json"
@@ -85,6 +86,15 @@ _PAIR: list[tuple[tuple[object, ...], object, str]] = [
        {"indices": [1, 1.5, 1.3], "thicknesses": []}, {"indices": [1, -1], "thicknesses": []})),
     (("image1", "lens"), 3, "lens"), (("image1", "lens"), "nowhere.json", "nowhere.json"),
     (("image1", "file"), 3, "file"),
+]  # fmt: skip
+#: Of a set the same, and what it has more.
+_SET: list[tuple[tuple[object, ...], object, str]] = [
+    *((("photos", 1, *path[1:]), value, culprit) for path, value, culprit in _PAIR
+      if path[0] == "image1" and len(path) > 1 and value != 9.5),
+    (("format",), "bifocal-photos/9", "format"), (("photos",), ..., "photos"),
+    (("photos",), {}, "photos"), (("photos",), [1, 2, 3], "photos"),
+    (("photos", 2), None, "photos"), (("photos", 2, "name"), 3, "name"),
+    (("photos", 2, "name"), "image1", "image1"), (("orientation",), {"covariance": []}, "36"),
 ]  # fmt: skip
 _LENS: list[tuple[tuple[object, ...], object, str]] = [
     *(
@@ -241,6 +251,14 @@ CONTENTS: list[tuple[str, str, Any, str]] = [
         (PAIR_LINE, "wall.pair.json", edited("wall.pair.json", *path, value=value), culprit)
         for path, value, culprit in _PAIR
     ),
+    *(
+        (SET_LINE, "wall.photos.json", edited("wall.photos.json", *path, value=value), culprit)
+        for path, value, culprit in _SET
+    ),
+    (SET_LINE, "picks3.csv", row("picks3.csv", "Q,1,2,3,,,"), "Q.*row2"),
+    (SET_LINE, "picks3.csv", row("picks3.csv", "Q,1,2,,,,"), "Q.*two photos"),
+    (SET_LINE, "picks3.csv", row("picks3.csv", "Q,1,2,3,4,five,6"), "five"),
+    (SET_LINE, "picks3.csv", swapped("picks3.csv", "row3 [px]", "rowX"), "row3"),
     *(
         (PAIR_LINE, "wall.pair.json", text, "wall.pair.json")
         for text in (

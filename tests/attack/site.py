@@ -157,6 +157,9 @@ def _point_tables(folder: Path, rng: np.random.Generator) -> None:
     _csv(folder / "survey.csv", "id,x1 [mm],y1 [mm],x2 [mm],y2 [mm]", ids, mm1, mm2)
     px = "col1 [px],row1 [px],col2 [px],row2 [px]"
     _csv(folder / "picks.csv", f"id,{px}", ids, px1, px2)
+    centre = np.array([WIDTH - 1, HEIGHT - 1]) / 2
+    px3 = ((0.1, 0) + (xy - (0.1, 0)) * 10 / (10 - relief)) * (1, -1) / GSD + centre
+    _csv(folder / "picks3.csv", f"id,{px},col3 [px],row3 [px]", ids, px1, px2, px3)
     _csv(folder / "control.csv", f"id,X [m],Y [m],r [m],{px}", ids, xy, relief, px1, px2)
     _csv(folder / "lengths.csv", "from,to,length [m]", ["P0"], [["P1"]],
          [[f"{np.linalg.norm(xy[0] - xy[1]):.4f}"]])  # fmt: skip

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.remarks import remark
-from bifocal.survey.observations import PointObservations
+from bifocal.survey.observations import PointObservations, pixel_keys
 from bifocal.survey.reference import KnownPoints
 from bifocal.survey.survey_input import SurveyInput, where_of, with_measured
 from bifocal.workbook.reading.setup_reader import LARGEST, OpenSurvey, is_general, read_setup
@@ -59,6 +59,9 @@ class ReadOptions:
         Leave hidden rows out.
     given : collection of str
         Cells of the set-up that options replace, by their names; ``pair`` replaces them all.
+    photos : int
+        Photos that the points were measured in; of more than two raw pixels alone are read, and a
+        point may be blank in any.
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -66,6 +69,7 @@ class ReadOptions:
     decimal: Decimal | None = None
     visible_only: bool = False
     given: Collection[str] = ()
+    photos: int = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,11 +91,18 @@ class _KnownTable:
     text_cells: tuple[str, ...] = ()
 
 
-def point_columns(*, shared: Sequence[str] = ()) -> list[Column]:
+def _more_pixels(photos: int) -> list[str]:
+    """Return the keys of raw pixels of the third photo and more."""
+    return [key for number in range(3, photos + 1) for key in pixel_keys(number)]
+
+
+def point_columns(*, shared: Sequence[str] = (), photos: int = 2) -> list[Column]:
     """Return the columns of measured points with every heading that is understood.
 
     Parameters
     ----------
+    photos : int
+        Photos that they were measured in.
     shared : sequence of str
         Keys that also take the headings "x y x y" or "col row col row" of photos 1 and 2. Tables
         of points often hold X and Y on the wall too, so this is tried where nothing else fits.
@@ -100,6 +111,10 @@ def point_columns(*, shared: Sequence[str] = ()) -> list[Column]:
     for key in ("id", *_XY, *_POLAR, *_PIXELS, "use", "code", "note", "r_measured"):
         more = [_SHARED[key], *([_OTHER[key]] if key in _OTHER else [])] if key in shared else []
         columns.append(_understood(key, more=more, unit=_UNITS.get(key, "")))
+    for key in _more_pixels(photos):
+        names = [name for name in headings("columns", f"{key[:3]}1") if "1" in name]
+        others = (name.replace("1", key[3:]) for name in names)
+        columns.append(Column(key, tuple(others), kind="number", unit="px"))
     return columns
 
 
@@ -143,8 +158,11 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
     survey = OpenSurvey(open_tables(path), options.decimal, options.given)
     book, errors = survey.book, survey.errors
     table = _read_points(survey, options)
-    _require_coordinates(table, book, path)
-    points, unit = _observations(table, errors)
+    if options.photos > 2:
+        _require_photos(table, options.photos)
+    else:
+        _require_coordinates(table, book, path)
+    points, unit = _observations(table, errors, options.photos)
     sheets = book if isinstance(book, SheetFile) else None
     setup = read_setup(survey)
     check = _known(survey, "Check", ("X_ref", "Y_ref", "Z_ref"))
@@ -243,7 +261,11 @@ def _read_points(survey: OpenSurvey, options: ReadOptions) -> Table:
         try:
             table = read_table(
                 book,
-                [c for c in point_columns(shared=shared) if c.key not in followed],
+                [
+                    column
+                    for column in point_columns(shared=shared, photos=options.photos)
+                    if column.key not in followed
+                ],
                 name="Points",
                 sheet=options.sheet,
                 decimal=survey.decimal,
@@ -300,7 +322,32 @@ def _require_coordinates(table: Table, book: object, path: Path | str) -> None:
     )
 
 
-def _observations(table: Table, errors: list[CellError]) -> tuple[PointObservations, str]:
+def _require_photos(table: Table, photos: int) -> None:
+    """Refuse a table that lacks the raw pixels of two photos of a set, or half of one's.
+
+    Raises
+    ------
+    InputError
+        Naming the missing columns.
+    """
+    groups = [pixel_keys(number) for number in range(1, photos + 1)]
+    whole = [keys for keys in groups if table.present.issuperset(keys)]
+    halves = [key for keys in groups for key in keys if keys not in whole]
+    broken = [
+        key for keys in groups if keys not in whole and table.present & {*keys} for key in keys
+    ]
+    if broken or len(whole) < 2:
+        lacking = next(key for key in broken or halves if key not in table.present)
+        raise InputError(
+            f"{where_of(table)}: there is no column {lacking}. Points of a set of {photos} photos "
+            f"need col1 row1 ... col{photos} row{photos} [px], of two photos or more, blank where "
+            'not seen; say which columns they are: --columns "id=A,col1=B,...".'
+        )
+
+
+def _observations(
+    table: Table, errors: list[CellError], photos: int = 2
+) -> tuple[PointObservations, str]:
     """Return the points and the unit of x1..y2 that the headings say."""
     faulty = {(error.cell, error.column) for error in errors}
     ids = table.texts("id")
@@ -311,11 +358,12 @@ def _observations(table: Table, errors: list[CellError]) -> tuple[PointObservati
         about = {"cell": table.cell(0, "theta"), "heading": table.headings["theta"]}
         table.remarks.append(remark("survey.angle_as_theta", **about))
     errors += table.repeated("id")
-    errors += table.too_large((*_XY, *_POLAR, *_PIXELS, "r_measured"), LARGEST)
+    more = _more_pixels(photos)
+    errors += table.too_large((*_XY, *_POLAR, *_PIXELS, *more, "r_measured"), LARGEST)
     use = table.numbers("use")
     unit, factor = _unit_of_xy(table, errors)
     units = dict(zip(_POLAR, (TO_MM, TO_MM, TO_DEGREES), strict=True))
-    units |= {key: {"px": 1.0} for key in _PIXELS} | {"r_measured": _TO_M}
+    units |= {key: {"px": 1.0} for key in (*_PIXELS, *more)} | {"r_measured": _TO_M}
     columns = {key: table.in_unit(key, factors, errors) for key, factors in units.items()}
     columns |= {key: table.numbers(key) * factor for key in _XY}
     texts = {"id": ids, "code": table.texts("code"), "note": table.texts("note")}
@@ -372,6 +420,9 @@ def _check_rows(
         if used[row] and not ids[row] and (table.cell(row, "id"), "id") not in faulty:
             errors.append(table.error(row, "id", "the point has no name; give it one."))
     xy, pixels = np.hstack([points.xy1, points.xy2]), np.hstack([points.pixels1, points.pixels2])
+    if points.others.size:
+        _check_photos(table, points, errors)
+        return
     groups = ((_XY, xy), (_PIXELS, pixels), (("s1", "s2"), polar[:, :2]))
     for keys, values in groups:
         given = ~np.isnan(values)
@@ -390,6 +441,27 @@ def _check_rows(
                 f"{polar[row, i]:g} mm at point {ids[row]}: a radial distance must be above zero; "
                 "at the nadir itself there is no relief to measure. Set use = 0 or measure it "
                 "again."
+            )
+            errors.append(table.error(row, key, message))
+
+
+def _check_photos(table: Table, points: PointObservations, errors: list[CellError]) -> None:
+    """Complain about used points with half a pick, or picks in fewer than two photos of a set."""
+    given = ~np.isnan(np.stack(points.pixels, axis=1))
+    for row in np.flatnonzero(points.use).tolist():
+        halves = np.argwhere(given[row].any(axis=1)[:, None] & ~given[row])
+        seen = given[row].all(axis=1)
+        if len(halves):
+            photo, axis = halves[0].tolist()
+            keys = pixel_keys(photo + 1)
+            message = _incomplete(points.ids[row], keys, [keys[axis]])
+            errors.append(table.error(row, keys[axis], message))
+        elif seen.sum() < 2:
+            key = pixel_keys(int(np.flatnonzero(~seen)[0]) + 1)[0]
+            where = f"only on image {int(np.flatnonzero(seen)[0]) + 1}" if seen.any() else "on none"
+            message = (
+                f"point {points.ids[row]} is measured {where}; measure it on two photos or more, "
+                "or set use = 0."
             )
             errors.append(table.error(row, key, message))
 

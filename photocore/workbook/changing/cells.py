@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import repeat
+from functools import lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -200,6 +200,44 @@ class RowFormula:
         return "".join(moved) + self.rest
 
 
+@dataclass(frozen=True, slots=True)
+class RowText:
+    """A formula of many rows, with a `row_mark` wherever the number of its row belongs.
+
+    Parameters
+    ----------
+    text : str
+        The formula, without the equals sign.
+
+    Examples
+    --------
+    >>> RowText(f"A{row_mark()}*{row_mark(4)}")(7)
+    'A7*3'
+    """
+
+    text: str
+
+    def __call__(self, row: int) -> str:
+        """Return the formula as it stands in a row."""
+        return _MARK.sub(lambda mark: str(row - int(mark[1])), self.text)
+
+    def escaped(self) -> RowText:
+        """Return the formula as `escape` leaves it, its marks as they are."""
+        pieces = _MARK.split(self.text)
+        pieces[::2] = map(escape, pieces[::2])
+        pieces[1::2] = map(row_mark, pieces[1::2])
+        return RowText("".join(pieces))
+
+
+def row_mark(head: int | str = 0) -> str:
+    """Return what stands for the number of a row, counted from below another one."""
+    return f"\0{head}\1"
+
+
+#: XML cannot hold the characters around it, so that a mark is never part of a text.
+_MARK = re.compile("\0([0-9]+)\1")
+
+
 #: What a new cell may do to what stands in its place. ``typed``: replace a typed value, never a
 #: formula. ``prepared``: nothing may stand there. ``filled``: what stands there stays, a formula
 #: takes the result. ``over``: replace anything.
@@ -277,12 +315,39 @@ class NewRows:
         return [*zip(kinds, zip(*(texts for _, texts in columns), strict=True), strict=True)]
 
     def xml(self, rows: range, prefix: str) -> Iterator[str]:
-        """Yield the XML of the cells of rows, row by row."""
+        """Yield the XML of the cells of rows, row by row.
+
+        The rows differ by little but their numbers, which take the places of marks all at once.
+        """
         part = slice(rows.start - self.first, rows.stop - self.first)
-        columns = []
-        for column, values, style, formula in self.columns:
-            names = [f"{column_letters(column)}{row}" for row in rows]
-            formulas = map(formula, rows) if callable(formula) else repeat(formula or "")
-            others = repeat(prefix), repeat(style)
-            columns.append(map(cell_xml, names, values[part], formulas, *others))
-        return map("".join, zip(*columns, strict=True))
+        columns = [_column_xml(c, c.values[part], rows, prefix) for c in self.columns]
+        texts = [c.formula.text for c in self.columns if isinstance(c.formula, RowText)]
+        marks = [(row_mark(head), int(head)) for head in {"0", *_MARK.findall("".join(texts))}]
+        for row, cells in zip(rows, zip(*columns, strict=True), strict=True):
+            xml = "".join(cells)
+            for mark, head in marks:
+                xml = xml.replace(mark, str(row - head))
+            yield xml
+
+
+def _column_xml(
+    column: NewColumn, values: Sequence[CellValue], rows: range, prefix: str
+) -> Iterator[str]:
+    """Yield the XML of the cells of a column, with marks for the numbers of their rows."""
+    name, formula = f"{column_letters(column.column)}{row_mark()}", column.formula
+    if callable(formula) and not isinstance(formula, RowText):
+        for row, value in zip(rows, values, strict=True):
+            yield cell_xml(name, value, formula(row), prefix, column.style)
+        return
+    text = formula.text if isinstance(formula, RowText) else formula or ""
+
+    @lru_cache(typed=True)  # flags and blanks are many, and few of them differ
+    def cell(value: CellValue) -> str:
+        return cell_xml(name, value, text, prefix, column.style)
+
+    head, _, tail = cell(0.5).rpartition("0.5")
+    for value in values:
+        if isinstance(value, float) and value - value == 0.0:  # by far the most frequent
+            yield f"{head}{number_text(float(value))}{tail}"
+        else:
+            yield cell(value)

@@ -109,7 +109,8 @@ class Spliced:
 
         The changes, which may be as many bytes as the sheet, are let go.
         """
-        edits, self.edits = self.edits, []
+        edits = [*self.edits]
+        self.edits.clear()  # not only let go: what made them holds the same list
         if strip and self.strips:
             edits = sorted([*edits, *self.strips], key=itemgetter(0, 1))
         if not edits:

@@ -382,7 +382,7 @@ class _Splicer:
     def add_cells(self, before: int, place: tuple[int, int, str, str]) -> None:
         """Insert the new cells of this row whose columns lie before one."""
         columns = [column for column in self.new if column < before]
-        self.insert("".join([self.xml(c, self.new.pop(c)) for c in columns]), place)
+        self.insert("".join([self.xml(c, self.new.pop(c)) for c in columns]).encode(), place)
 
     def xml(self, column: int, cell: NewCell, row: int = 0) -> str:
         """Return the XML of a cell of this row, or of another one."""
@@ -402,18 +402,22 @@ class _Splicer:
             lines = map(self.row_xml, rows)
         tag = f"{self.prefix}row"
         pieces = zip(rows, lines, strict=True)
-        self.insert("".join([f'<{tag} r="{n}">{xml}</{tag}>' for n, xml in pieces if xml]), place)
+        made = bytearray()  # rows of a large sheet are never held one by one
+        for number, xml in pieces:
+            if xml:
+                made += f'<{tag} r="{number}">{xml}</{tag}>'.encode()
+        self.insert(made, place)
 
     def row_xml(self, row: int) -> str:
         """Return the XML of the cells of a new row."""
         new = self.changes.cells(row).items()
         return "".join([self.xml(column, cell, row) for column, cell in new])
 
-    def insert(self, xml: str, place: tuple[int, int, str, str]) -> None:
+    def insert(self, xml: bytes | bytearray, place: tuple[int, int, str, str]) -> None:
         """Insert XML at a place (start, end, text before, text behind)."""
         if xml:
             start, end, opening, closing = place
-            self.edits.append((start, end, f"{opening}{xml}{closing}".encode()))
+            self.edits.append((start, end, opening.encode() + xml + closing.encode()))
             self.result.inputs_changed = True
 
     def closing(self, name: str, start: int) -> tuple[int, int, str, str]:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 
 from openpyxl import Workbook
@@ -16,7 +15,7 @@ from openpyxl.workbook.defined_name import DefinedName
 from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.worksheet import Worksheet
 
-from photocore.workbook.changing.cells import CellValue
+from photocore.workbook.changing.cells import CellValue, RowText, row_mark
 from photocore.workbook.changing.plain import MARK, PlainFormulas
 from photocore.workbook.making.live_columns import TEXT_KEYS, LiveColumn, row_formula
 from photocore.workbook.making.look import (
@@ -114,13 +113,12 @@ class BookBuilder:
         plain = PlainFormulas(areas, names).plain
         for sheet in self.book.worksheets:
             block = self.blocks.get(sheet.title)
-            formulas: dict[int, Callable[[int], str]] = {}
+            formulas: dict[int, RowText] = {}
             for cell in (cell for row in sheet.iter_rows() for cell in row):
                 if cell.data_type == "f":
                     text, row = str(cell.value)[1:], int(cell.row)
                     if block is not None and row == block.row:
-                        repeated = plain(text, "\0")
-                        formulas[cell.column - 1] = partial(_in_row, repeated)
+                        formulas[cell.column - 1] = RowText(plain(text, row_mark()))
                     cell.value = "=" + plain(text, row)
             if block is not None:
                 self.blocks[sheet.title] = replace(block, formulas=formulas)
@@ -412,10 +410,6 @@ _UNIT_PLACE = Alignment(horizontal="left", indent=1)
 _LABEL_PLACE = Alignment(wrap_text=True, vertical="bottom", horizontal="center")
 
 
-def _in_row(text: str, row: int) -> str:
-    return text.replace("\0", str(row))
-
-
 def _at(cells: Cells, column: LiveColumn, row: int) -> CellValue:
     values = cells.get(column.key, ())
     return values[row - 1] if row <= len(values) else column.spare
@@ -441,10 +435,8 @@ def _block(
     return RowBlock(row=first, columns=listed, formulas=formulas)
 
 
-def short_formula(
-    table: str, text: str, letters: Mapping[str, str], head: int
-) -> Callable[[int], str]:
-    """Return a function of the row that writes a formula with A1 references.
+def short_formula(table: str, text: str, letters: Mapping[str, str], head: int) -> RowText:
+    """Return a formula with A1 references.
 
     Parameters
     ----------
@@ -457,12 +449,5 @@ def short_formula(
     head : int
         Row of the keys.
     """
-    text = text.replace(f"ROW()-ROW({table}[[#Headers],[id]])", "\0")
-    parts = re.split(r"\[@(\w+)\]", text)
-    pieces = [letters[part] if i % 2 else part for i, part in enumerate(parts)]
-
-    def formula(row: int) -> str:
-        joined = "".join(f"{part}{row}" if i % 2 else part for i, part in enumerate(pieces))
-        return joined.replace("\0", str(row - head))
-
-    return formula
+    text = text.replace(f"ROW()-ROW({table}[[#Headers],[id]])", row_mark(head))
+    return RowText(re.sub(r"\[@(\w+)\]", lambda key: letters[key[1]] + row_mark(), text))

@@ -16,7 +16,7 @@ import io
 import math
 import re
 import zipfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,7 +27,14 @@ import numpy as np
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable, free_path
 from photocore.provenance import provenance
-from photocore.workbook.changing.cells import CellValue, NewColumn, NewRows, escape, name_cell
+from photocore.workbook.changing.cells import (
+    CellValue,
+    NewColumn,
+    NewRows,
+    RowText,
+    escape,
+    name_cell,
+)
 from photocore.workbook.changing.changes import SheetChanges
 from photocore.workbook.changing.formulas import ModelCell, model_cells
 from photocore.workbook.changing.splice import splice_sheet
@@ -59,14 +66,14 @@ class RowBlock:
         Number of the prototype row, the first of the block.
     columns : sequence of (sequence of CellValue)
         Values of columns A, B, ... ; in a formula column these are the results.
-    formulas : mapping of int to callable
-        Column (0 = A) to a function of the row number that returns the formula, the prototype's own
-        in its row; where absent the prototype's formula is repeated as it stands.
+    formulas : mapping of int to RowText
+        Column (0 = A) to its formula, the prototype's own in its row; where absent the prototype's
+        formula is repeated as it stands.
     """
 
     row: int
     columns: Sequence[Sequence[CellValue]]
-    formulas: Mapping[int, Callable[[int], str]] = field(default_factory=dict)
+    formulas: Mapping[int, RowText] = field(default_factory=dict)
 
     def changes(self, prototype: Mapping[int, ModelCell]) -> SheetChanges:
         """Return what makes the rows of a sheet with this prototype row."""
@@ -84,9 +91,9 @@ class RowBlock:
         changes.added.append(NewRows(self.row + 1, count - 1, columns))
         return changes
 
-    def _formula(self, index: int, text: str) -> Callable[[int], str]:
-        own, constant = self.formulas.get(index), escape(text)
-        return (lambda row: escape(own(row))) if own else (lambda _: constant)
+    def _formula(self, index: int, text: str) -> str | RowText:
+        own = self.formulas.get(index)
+        return own.escaped() if own else escape(text)
 
 
 def finish_book(

@@ -45,7 +45,7 @@ _FORMS = 2**21
 #: Small, since the elements of a chunk are made before the first is looked at.
 _CHUNK = 2**15
 #: What unpacking a damaged member may raise.
-_UNPACKING = (
+UNPACKING = (
     zipfile.BadZipFile,
     zlib.error,
     lzma.LZMAError,
@@ -114,15 +114,9 @@ def check_members(path: Path, members: list[zipfile.ZipInfo]) -> None:
     refuse = f"{path}: refused, this is not an ordinary workbook: "
     if len(members) > MOST_MEMBERS:
         raise InputError(f"{refuse}it has {len(members)} parts, more than {MOST_MEMBERS}.")
-    seen = set()
+    check_names(refuse, members)
     total = 0
     for member in members:
-        name = member.filename
-        if name.startswith(("/", "\\")) or ".." in name.replace("\\", "/").split("/"):
-            raise InputError(f"{refuse}the part {name!r:.80} lies outside the package.")
-        if name in seen:
-            raise InputError(f"{refuse}it holds the part {name!r:.80} twice.")
-        seen.add(name)
         if member.flag_bits & 1:
             raise InputError(
                 f"{path}: is protected by a password. Save it as .xlsx without a password."
@@ -136,7 +130,21 @@ def check_members(path: Path, members: list[zipfile.ZipInfo]) -> None:
             )
         largest = LARGEST_RATIO if member.file_size > SMALL else LARGEST_RATIO_OF_SMALL
         if member.file_size > _RATIO_MATTERS_FROM and ratio > largest:
-            raise InputError(f"{refuse}the part {name!r:.80} grows {ratio:.0f}-fold when unpacked.")
+            raise InputError(
+                f"{refuse}the part {member.filename!r:.80} grows {ratio:.0f}-fold when unpacked."
+            )
+
+
+def check_names(refuse: str, members: list[zipfile.ZipInfo]) -> None:
+    """Refuse, in words that begin so, members that lie outside their package or are there twice."""
+    seen = set()
+    for member in members:
+        name = member.filename
+        if name.startswith(("/", "\\")) or ".." in name.replace("\\", "/").split("/"):
+            raise InputError(f"{refuse}the part {name!r:.80} lies outside the package.")
+        if name in seen:
+            raise InputError(f"{refuse}it holds the part {name!r:.80} twice.")
+        seen.add(name)
 
 
 def read_part(path: Path, package: zipfile.ZipFile, name: str) -> bytes:
@@ -199,11 +207,13 @@ def _level(data: bytes) -> int:
     return _FAST if len(data) > SMALL else _THOROUGH
 
 
-def _refuse_damage(path: Path, old: zipfile.ZipFile, target: Path, changed: Container[str]) -> None:
+def _refuse_damage(
+    path: Path, old: zipfile.ZipFile, target: Path, changed: Mapping[str, bytes | None]
+) -> None:
     """Refuse changed parts that are no XML or refer to what is not there, unless they did so."""
     with zipfile.ZipFile(target) as new:
-        found = (f for f in _faults(path, new, changed) if f not in {*_faults(path, old, changed)})
-        fault = next(found, "")
+        found = _faults(path, new, changed, made=changed)
+        fault = next((f for f in found if f not in {*_faults(path, old, changed)}), "")
     if fault:
         raise InputError(
             f"{path}: nothing was written, since no program would open the changed workbook "
@@ -211,13 +221,20 @@ def _refuse_damage(path: Path, old: zipfile.ZipFile, target: Path, changed: Cont
         )
 
 
-def _faults(path: Path, package: zipfile.ZipFile, changed: Container[str]) -> Iterator[str]:
-    """Yield why a spreadsheet program would not open a package."""
-    names = {*package.namelist()}
+def _faults(
+    path: Path,
+    package: zipfile.ZipFile,
+    changed: Container[str],
+    made: Mapping[str, bytes | None] | None = None,
+) -> Iterator[str]:
+    """Yield why a spreadsheet program would not open a package; parts at hand are not unpacked."""
+    names, known = {*package.namelist()}, made or {}
     for name in ("", *package.namelist()):
         try:
             relations = read_relations(path, package, name)
-            data = package.read(name) if name in changed and name.endswith(".xml") else b"<x/>"
+            data = b"<x/>"
+            if name in changed and name.endswith(".xml"):
+                data = known.get(name) or package.read(name)
             expat.ParserCreate(namespace_separator=" ").Parse(data, True)
         except (InputError, expat.ExpatError) as error:
             yield f"{name} is not valid XML: {str(error).partition(': line')[0]}"
@@ -395,7 +412,7 @@ def _unpacking(path: Path, name: str) -> Iterator[None]:
         yield
     except KeyError:
         raise InputError(f"{path}: is not a workbook, the part {name} is missing.") from None
-    except _UNPACKING as error:
+    except UNPACKING as error:
         raise InputError(
             f"{path}: damaged, the part {name} cannot be unpacked. Open it in the spreadsheet "
             "program and save it again."

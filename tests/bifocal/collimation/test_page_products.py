@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from bifocal import SAMPLE, InputError, Pair, ReliefMap
+from bifocal.campaigns.verification import verify
 from bifocal.collimation import job_process, job_tasks
 from bifocal.collimation.live_orientation import control_of, live_orientation
 from bifocal.collimation.project import find_files
@@ -294,7 +295,11 @@ def test_points_and_lines_become_a_drawing_in_space(tmp_path) -> None:
             np.testing.assert_allclose(place, [row["X"], row["Y"], row["r"]], atol=1e-9)
         session.sync.step()
         archive = zipfile.ZipFile(BytesIO(client.get("/download/all.zip").content))
-        assert archive.namelist() == ["facade.xlsx"]
+        assert archive.namelist() == ["facade.xlsx", "SHA256SUMS"]
+        (tmp_path / "sent.zip").write_bytes(client.get("/download/all.zip").content)
+        found = verify(tmp_path / "sent.zip")
+        assert [one.file for one in found.files] == ["SHA256SUMS", "facade.xlsx"]
+        assert found.same
 
 
 def test_a_proposed_orientation_is_shown_and_accepted(tmp_path) -> None:

@@ -36,6 +36,8 @@ def test_photos_keep_their_order_and_are_called_as_told_or_as_their_file():
     assert three().names == ("1", "far", "2")
     twins = PhotoSet(photos=(photo(9.5, file="near/1.jpg"), photo(17.5, file="far/1.jpg")))
     assert twins.names == ("near/1.jpg", "far/1.jpg")
+    named = PhotoSet(photos=(photo(9.5, file="1.jpg"), photo(17.5, file="1.jpg", name="far")))
+    assert named.names == ("1", "far")
     assert PhotoSet(photos=(photo(9.5), photo(17.5))).names == ("photo 1", "photo 2")
 
 

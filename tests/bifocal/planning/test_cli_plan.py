@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import openpyxl
 import pytest
 from click.testing import CliRunner
 
+from bifocal import PairMedia
+from bifocal.planning.camera_plan import planned_pair, sigma_at
 from tests.builders.commands import bifocal_command as main
+from tests.office import recalculated, stored
 from tests.workbook_lint import lint
 
 CANON = ["--sensor", "22.7x15.1", "--pixels", "3072x2048"]
@@ -44,6 +48,48 @@ def test_the_workbook_holds_the_stations_and_two_charts_of_precision(tmp_path):
     assert again.exit_code == 1
     assert "--overwrite" in again.stderr
     assert run(*LENSES, *CANON, "--scale", "500", "--out", str(out), "--overwrite").exit_code == 0
+
+
+@pytest.mark.parametrize("language", ["en", "it", "de"])
+def test_the_workbook_follows_what_is_changed_on_site(tmp_path, language):
+    """Equal to the plan as written, and to the library after d1, c2, pixels and wall change."""
+    out = tmp_path / "plan.xlsx"
+    wishes = ["--object", "30x9", "--scale", "500", "--free-space", "15", "--language", language]
+    assert run(*LENSES, *CANON, *wishes, "--out", str(out)).exit_code == 0
+    shown, found = stored(out), recalculated(out, tmp_path / "office")
+    for title, cells in shown.items():
+        assert set(found[title]) >= {c for c, v in cells.items() if v != ""}
+        for cell, value in cells.items():
+            if value != "":
+                wanted = value if isinstance(value, str) else pytest.approx(value, rel=1e-9)
+                assert found[title][cell] == wanted, (title, cell)
+    if language != "en":
+        return
+    book = openpyxl.load_workbook(out)
+    sheet, places = book["Planning"], book.defined_names
+    changed = {"pitch": 0.005, "px_across": 4000, "sigma_px": 0.8, "free_space": 12}
+    for name, value in changed.items():
+        sheet[places[name].attr_text.split("!")[1].replace("$", "")] = value
+    sheet["B5"], sheet["C5"], sheet["E5"] = 13.2, 7.7, 18.5
+    sheet["B6"] = 5.0
+    book.save(tmp_path / "site.xlsx")
+    found = recalculated(tmp_path / "site.xlsx", tmp_path / "office")
+    heads = {value: cell[:-1] for cell, value in found["Planning"].items() if cell[1:] == "4"}
+    row = {key: found["Planning"].get(f"{letter}5") for key, letter in heads.items()}
+    c1 = row["c1"]
+    pair = planned_pair(PairMedia.none(), (13.2, 7.7), (c1, 18.5), pitch=0.005, sigma_px=0.8)
+    # What both photos show, by hand: columns x pitch x d/c of the smaller.
+    width, height = (n * 0.005 * min(13.2 / c1, 7.7 / 18.5) for n in (4000, 2048))
+    reach = np.hypot(width, height)
+    wanted = sigma_at(pair, np.array([1.0, reach / np.sqrt(12), reach / 2])) * 1000
+    assert [row[key] for key in ("width", "height")] == pytest.approx([width, height])
+    names = ("sigma_1m", "sigma_rms", "sigma_corner")
+    assert [row[key] for key in names] == pytest.approx(wanted, rel=1e-9)
+    assert found["Sigma r"]["B4"] == pytest.approx(wanted[2], rel=1e-9)
+    # 30 x 9 m, photos of 7.54 x 3.86 m that share a fifth: 1 + 22.46/6.03 and 1 + 5.14/3.09.
+    assert (row["feasible"], row["photos"]) == ("no", "5 x 3")
+    assert found["Planning"][f"{heads['sigma_1m']}6"] == "d1 > d2"
+    assert not any(str(v).startswith("#") for cells in found.values() for v in cells.values())
 
 
 @pytest.mark.parametrize(

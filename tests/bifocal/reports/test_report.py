@@ -22,7 +22,7 @@ from bifocal.reports.accuracy import accuracy_blocks
 from bifocal.reports.content import read_content
 from bifocal.reports.pair_report import _provenance, report_document
 from bifocal.reports.workflow import ReportTask, find_pairs
-from photocore.reports.document import Document
+from photocore.reports.document import Banner, Document
 from photocore.reports.words import LANGUAGES, texts_of, words_of
 from photocore.reports.writing import write_document
 from tests.bifocal.campaigns.sample_tables import CONTROL, FAR, NEAR, write_tables
@@ -71,18 +71,44 @@ def test_accuracy_stands_first_with_a_verdict_per_scale(page):
     errors = [re.findall(r"<td>(-?\d+\.\d)</td>", rest) for _, rest in rows]
     compared = [line for line in errors if len(line) >= 4][:16]
     assert len(compared) == 16
-    worst = max(
-        math.sqrt(sum(float(line[axis]) ** 2 for line in compared) / 16) for axis in range(3)
-    )
+    rmse = [math.sqrt(sum(float(line[axis]) ** 2 for line in compared) / 16) for axis in range(3)]
     said = float(re.search(r"(\d+\.\d*) mm at 16", text)[1])
-    assert said == pytest.approx(worst, abs=0.06)
-    # 0.18 mm at 1:100 is 18 mm on the wall, at 1:20 3.6 mm.
+    assert said == pytest.approx(max(rmse), abs=0.06)
+    # Drawing and relief, each by itself. 0.18 mm at 1:100 is 18 mm on the wall, at 1:20 3.6 mm.
+    parts = {"Drawing (X, Y)": max(rmse[:2]), "Relief (r)": rmse[2]}
     limits = {scale: 0.18 * scale for scale in (10, 20, 50, 100, 200, 500)}
     for scale, limit in limits.items():
-        word = "yes" if worst <= limit else "NO"
-        assert re.search(rf"<td>1:{scale}</td><td>{limit:.3g} mm: {word}</td>", page), scale
-    asked = "is held" if worst <= limits[50] else "is NOT held"
-    assert f"The scale asked for, 1:50, {asked}" in text
+        words = " / ".join("yes" if worst <= limit else "NO" for worst in parts.values())
+        assert re.search(rf"<td>1:{scale}</td><td>{limit:.3g} mm: {words}</td>", page), scale
+    for part, worst in parts.items():
+        finest = min(scale for scale, limit in limits.items() if worst <= limit)
+        asked = "is held" if worst <= limits[50] else "is NOT held"
+        line = f"mm: Good for 1:{finest} and smaller. The scale asked for, 1:50, {asked}."
+        found = re.search(rf"{re.escape(part)}, (\d+\.\d*) {re.escape(line)}", text)
+        assert float(found[1]) == pytest.approx(worst, abs=0.06)
+
+
+def test_a_good_drawing_is_not_thrown_away_for_its_relief(tables):
+    control, check = tables
+    solution = read_content(PAIR, ReportTask(control=control, check=check)).solution
+
+    def verdict(**rmse: float) -> Banner:
+        known = {axis: replace(solution.check.axes[axis], rmse=v) for axis, v in rmse.items()}
+        axes = {**solution.check.axes, **known}
+        content = read_content(PAIR, ReportTask(control=control, check=check, scale=50.0))
+        content = replace(
+            content, solution=replace(solution, check=replace(solution.check, axes=axes))
+        )
+        return next(accuracy_blocks(content, words_of("bifocal.reports", "en")))
+
+    banner = verdict(X=0.0089, Y=0.0049, Z=0.0156)
+    assert banner.details[:2] == (
+        "Drawing (X, Y), 8.90 mm: Good for 1:50 and smaller. The scale asked for, 1:50, is held.",
+        "Relief (r), 15.6 mm: Good for 1:100 and smaller. The scale asked for, 1:50, is NOT held.",
+    )
+    assert banner.good is None
+    assert verdict(X=0.002, Y=0.002, Z=0.002).good is True
+    assert verdict(X=0.02, Y=0.002, Z=0.02).good is False
 
 
 def verdict_of(control: Path, check: Path | None, **known: object) -> tuple[str, ...]:
@@ -283,7 +309,7 @@ def test_every_text_is_there_in_three_languages_with_the_same_blanks(package):
 def test_a_text_is_given_in_the_language_asked_for():
     assert (
         words_of("bifocal.reports", "it")("good_for", scale=50)
-        == "Adatto a disegni in scala 1:50 e minori."
+        == "Adatto alla scala 1:50 e minori."
     )
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 import time
 import zipfile
 
@@ -65,6 +67,28 @@ def write_many(path, count):
     points = PointObservations(ids=ids, pixels1=pixels1, pixels2=pixels2)
     write_survey(path, points, pair=pair, overwrite=True)
     return xyz
+
+
+#: Writes a template, then says what that took: seconds of processor and kB of memory.
+_TEMPLATE = """
+import resource, sys, time
+from bifocal.workbook.template_workflow import write_template
+begin = time.process_time()
+write_template(sys.argv[1], rows=20_000)
+took = time.process_time() - begin
+print(took, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+@pytest.mark.acceptance
+@pytest.mark.skipif(sys.platform != "linux", reason="counts memory in kB")
+def test_a_new_book_of_twenty_thousand_rows_takes_seconds_and_little_memory(tmp_path):
+    command = [sys.executable, "-c", _TEMPLATE, str(tmp_path / "t.xlsx")]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    took, memory = map(float, said.split())
+    # 4 s on an idle machine; on a busy one a second of processor does half the work.
+    assert took < 12
+    assert memory < 440_000
 
 
 @pytest.mark.acceptance

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import io
+import math
 
+import numpy as np
 import openpyxl
 import pytest
 
 from bifocal import InputError
+from photocore.workbook.changing.cells import NewColumn, NewRows, RowText, row_mark
 from photocore.workbook.making.newbook import RowBlock, finish_book
 
 
@@ -40,9 +43,40 @@ def test_rows_carry_values_formulas_and_formats(tmp_path):
 
 
 def test_formulas_may_change_from_row_to_row(tmp_path):
-    block = RowBlock(row=2, columns=[[1.0, 2.0], [2.0, 4.0]], formulas={1: lambda r: f"A{r}*2"})
+    double = RowText(f"A{row_mark()}*2")
+    block = RowBlock(row=2, columns=[[1.0, 2.0], [2.0, 4.0]], formulas={1: double})
     sheet = openpyxl.load_workbook(finished(tmp_path, block))["T"]
     assert [sheet["B2"].value, sheet["B3"].value] == ["=A2*2", "=A3*2"]
+
+
+def test_formulas_with_marks_make_the_rows_that_functions_make():
+    values = [
+        -0.0,
+        math.nan,
+        "",
+        "a<b\x00",
+        None,
+        True,
+        1,
+        np.float64(-0.0),
+        np.float64(0.1),
+        "",
+        1.0,
+    ]
+    text = RowText(f'IF(A{row_mark()}<{row_mark(4)},"&",0)').escaped()
+
+    def function(row):
+        return f'IF(A{row}&lt;{row - 4},"&amp;",0)'
+
+    made = []
+    for formula in (text, function):
+        columns = [NewColumn(3, values, "7", formula), NewColumn(28, values, "", "B1")]
+        columns.append(NewColumn(30, values))
+        block = NewRows(6, len(values), columns)
+        made.append([*block.xml(range(7, 17), "")])
+        assert formula(9) == function(9)
+    assert made[0] == made[1]
+    assert made[0][1].startswith('<c r="C8" s="7" t="str"><f>IF(A8&lt;4,"&amp;",0)</f>')
 
 
 def test_single_results_and_numbers_keep_every_digit(tmp_path):

@@ -1,0 +1,327 @@
+"""Photos of one wall set up together: ties of all, control, tapes and the wall, one adjustment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bifocal.matching.features import Features, find_features
+from bifocal.networks.camera_knowledge import CameraKnowledge
+from bifocal.networks.joint_adjustment import JointAdjustment, JointUnknowns, adjust_jointly
+from bifocal.networks.joint_observations import JointObservations, with_rays
+from bifocal.networks.joint_ties import SharedPoints, common_features
+from bifocal.networks.set_start import FirstCameras, first_cameras_of
+from bifocal.orientation import validation
+from bifocal.orientation.adjustment.pair_observations import (
+    INDEPENDENT,
+    PairObservations,
+    PairUnknowns,
+)
+from bifocal.orientation.control_points import Control, SiteMeasures
+from bifocal.orientation.orientation_stages import PhotoInput
+from bifocal.orientation.tie_points import refine_ties
+from bifocal.orientation.tuning import TIES, WALLS
+from bifocal.orientation.walls.reference_plane import narrow_face
+from photocore.adjustment import OUTLIER_LIMIT
+from photocore.adjustment.outliers import robust_sigma
+from photocore.arrays import BoolArray, FloatArray
+from photocore.camera.pinhole import project_with_jacobian
+from photocore.cli import Progress, no_progress
+from photocore.errors import GeometryError
+
+#: Features of a photo, and pixels in which they are looked for.
+FEATURES, PIXELS = 8000, 6e6
+#: Common points of two photos that are kept.
+MATCHES = 600
+#: Precision of features as found, of the searched photo, and of patches before they tell it. [px]
+FOUND, REFINED = 0.5, 0.2
+#: Chance from which a point tells of the wall's plane.
+LEAST_CHANCE = 0.05
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OrientedSet:
+    """Cameras of all photos, with what led to them.
+
+    Attributes
+    ----------
+    first : FirstCameras
+    adjusted : JointAdjustment
+        Points: control in the order of its table, then ties.
+    control : Control
+    sigma_tie : float
+        Precision of a tie's coordinate. [px]
+    on_wall : int
+        Ties that tell of the wall's plane.
+    free_frame : bool
+        Whether origin and turn of the frame are free.
+    way : str
+        ``control``, ``site`` or ``auto``.
+    """
+
+    first: FirstCameras
+    adjusted: JointAdjustment
+    control: Control
+    sigma_tie: float
+    on_wall: int
+    free_frame: bool
+    way: str
+
+
+def orient_set(
+    photos: Sequence[PhotoInput],
+    *,
+    control: Control,
+    site: SiteMeasures,
+    progress: Progress = no_progress,
+) -> OrientedSet:
+    """Return the cameras of two or more photos of one wall.
+
+    Parameters
+    ----------
+    photos : sequence of PhotoInput
+        In any order, with their images.
+    control : Control
+        With the picks of every photo; may be empty.
+    site : SiteMeasures
+        Distance 1 is that of the first photo, distance 2 of the second.
+
+    Raises
+    ------
+    GeometryError
+        If a photo is blurred or shares too little with the others, or no two make a pair.
+    """
+    features = []
+    for k, photo in enumerate(photos):
+        progress(k, len(photos) + 2, photo.name)
+        assert photo.grey is not None
+        validation.check_sharp(photo.name, photo.grey)
+        found = find_features(photo.grey, limit=FEATURES, budget=PIXELS)
+        features.append(replace(found, pixels=photo.interior.ideal(found.pixels)))
+    progress(len(photos), len(photos) + 2, "matches")
+    seen = _seen(photos, features, control)
+    first = first_cameras_of(photos, seen, control, site)
+    progress(len(photos) + 1, len(photos) + 2, "adjustment")
+    observed = _observed(photos, seen, control, site, first)
+    is_tie = observed.point >= len(control.ids)
+    reduction = np.array([part.reduction for part in features])
+    observed = replace(
+        observed, sigma=np.where(is_tie, FOUND * reduction[observed.camera], site.sigma_pick)
+    )
+    start = JointUnknowns(cameras=first.cameras, xyz=first.xyz, radial=first.radial)
+    before = [
+        (first.xyz[observed.point] - camera.centre) @ camera.rotation[2] > 0
+        for camera in first.cameras
+    ]
+    there = np.array(before)[observed.camera, np.arange(len(is_tie))]
+    # A tie whose rays run along each other would wander on them.
+    observed = with_rays(observed, there & (~is_tie | first.met[observed.point]))
+    state = adjust_jointly(observed, start)
+    for _ in range(2):  # the second pass searches around better places
+        observed = _refined(photos, observed, state, first, len(control.ids))
+        state = _readjusted(observed, state, first)
+    for _ in range(2):  # a few wrong patches hide each other
+        observed, sigma = _without_gross(state, len(control.ids))
+        state = _readjusted(observed, state, first)
+    return _adjusted(observed, state, first, control, site, sigma)
+
+
+def _readjusted(
+    observed: JointObservations, state: JointAdjustment, first: FirstCameras
+) -> JointAdjustment:
+    """Return everything adjusted from where it was."""
+    start = JointUnknowns(
+        cameras=state.cameras, radial=state.radial,
+        xyz=np.where(np.isfinite(state.xyz), state.xyz, first.xyz),
+    )  # fmt: skip
+    return adjust_jointly(observed, start)
+
+
+def _without_gross(state: JointAdjustment, control: int) -> tuple[JointObservations, float]:
+    """Return the rays without those that most ties contradict, and the precision of these. [px]"""
+    seen = state.observations
+    ties = seen.point >= control
+    free = max(state.redundancy / (2 * len(seen.point)), 0.05)
+    sigma = max(robust_sigma(state.residuals[ties].ravel()) / float(np.sqrt(free)), TIES.best)
+    off = np.abs(state.residuals).max(axis=1)
+    kept = ~ties | (off < OUTLIER_LIMIT * sigma)
+    return with_rays(replace(seen, sigma=np.where(ties, sigma, seen.sigma)), kept), sigma
+
+
+def _seen(
+    photos: Sequence[PhotoInput], features: Sequence[Features], control: Control
+) -> SharedPoints:
+    """Return where control points and then ties are seen, free of the lens files' distortion."""
+    shapes = [photo.interior.image_size[::-1] for photo in photos]
+    ties = common_features(features, shapes, ~np.eye(len(photos), dtype=bool), most=MATCHES)
+    count, picks = len(control.ids), control.picks if control.ids else ()
+    picked = [np.flatnonzero(np.isfinite(own).all(axis=1)) for own in picks]
+    parts = [photos[k].interior.ideal(picks[k][rows]) for k, rows in enumerate(picked)]
+    return SharedPoints(
+        photo=np.r_[np.repeat(np.arange(len(picked)), [len(r) for r in picked]), ties.photo]
+        .astype(np.int64),
+        point=np.concatenate([*picked, ties.point + count]),
+        pixels=np.concatenate([*parts, ties.pixels]),
+        count=count + ties.count,
+    )  # fmt: skip
+
+
+def _observed(
+    photos: Sequence[PhotoInput], seen: SharedPoints, control: Control, site: SiteMeasures,
+    first: FirstCameras,
+) -> JointObservations:  # fmt: skip
+    """Return all rays, in the frame of control, or without enough of it of the first pair."""
+    known, sigma = np.full((seen.count, 3), np.nan), np.ones((seen.count, 3))
+    held: dict[int, tuple[str, ...]] = {}
+    one_body = len({(i.image_size, i.is_calibrated) for i in first.interiors}) == 1
+    one_body &= not first.interiors[0].is_calibrated
+    centres = 0.002 * float(np.hypot(*first.interiors[0].image_size))
+    if _holds_frame(control):
+        known[: len(control.ids)], sigma[: len(control.ids)] = control.xyz, control.sigma
+    else:
+        pose = ("turn X", "turn Y", "turn Z", "X", "Y", "Z")
+        held = {first.far: pose, first.near: ("Z",)}
+    return JointObservations(
+        names=tuple(photo.name for photo in photos), camera=seen.photo, point=seen.point,
+        pixels=seen.pixels, sigma=np.full(len(seen.photo), site.sigma_pick),
+        ids=(*control.ids, *(f"tie {k + 1}" for k in range(seen.count - len(control.ids)))),
+        known=known, sigma_known=sigma, sigma_focal=np.zeros(len(photos)),
+        cameras=CameraKnowledge(
+            interiors=first.interiors, lens=first.lens, held=held, by_wall=bool(held),
+            sigma_body=centres if one_body else None,
+        ),
+    )  # fmt: skip
+
+
+def _holds_frame(control: Control) -> bool:
+    """Whether control points alone hold the frame: four that two photos or more show."""
+    if not control.ids:
+        return False
+    shown = sum(np.isfinite(picks).all(axis=1).astype(int) for picks in control.picks)
+    return int((control.positioned & (shown >= 2)).sum()) >= 4
+
+
+def _refined(
+    photos: Sequence[PhotoInput], observed: JointObservations, state: JointUnknowns,
+    first: FirstCameras, fewest: int,
+) -> JointObservations:  # fmt: skip
+    """Return ties matched by patches to a tenth of a pixel.
+
+    A tie stays where its first photo shows it; the other photos show it where patches agree.
+    """
+    is_tie = observed.point >= fewest
+    home = np.full(len(observed.ids), len(photos))
+    np.minimum.at(home, observed.point[is_tie], observed.camera[is_tie])
+    place = np.full((len(observed.ids), 2), np.nan)
+    at_home = is_tie & (observed.camera == home[observed.point])
+    place[observed.point[at_home]] = observed.pixels[at_home]
+    pixels, good = observed.pixels.copy(), ~is_tie | at_home
+    greys = [photo.grey for photo in photos if photo.grey is not None]
+    for one, first_grey in enumerate(greys):
+        for other, grey in enumerate(greys):
+            rays = is_tie & (observed.camera == other) & (home[observed.point] == one) & ~at_home
+            if rays.any():
+                pixels[rays], good[rays] = refine_ties(
+                    PairObservations(
+                        interiors=(first.interiors[one], first.interiors[other]),
+                        tie1=place[observed.point[rays]], tie2=pixels[rays],
+                        tie_used=np.ones(int(rays.sum()), dtype=bool),
+                    ),
+                    PairUnknowns(
+                        cameras=(state.cameras[one], state.cameras[other]),
+                        radial=state.radial[[one, other]],
+                    ),
+                    (first_grey, grey),
+                )  # fmt: skip
+    sigma = np.where(is_tie, REFINED, observed.sigma)
+    return with_rays(replace(observed, pixels=pixels, sigma=sigma), good)
+
+
+def _adjusted(
+    observed: JointObservations, state: JointAdjustment, first: FirstCameras, control: Control,
+    site: SiteMeasures, sigma_tie: float,
+) -> OrientedSet:  # fmt: skip
+    """Return everything adjusted once, with control, tapes, lines and the wall.
+
+    Errors of ties are smooth over a photo: they count as `INDEPENDENT` ones.
+    """
+    ties = observed.point >= len(control.ids)
+    crowd = np.bincount(observed.camera[ties], minlength=len(observed.names)) / INDEPENDENT
+    sigma = np.where(
+        ties, sigma_tie * np.sqrt(np.maximum(crowd, 1.0))[observed.camera], site.sigma_pick
+    )
+    known, spread = observed.known.copy(), observed.sigma_known.copy()
+    knowledge, on_wall = observed.cameras, np.zeros(len(known), dtype=bool)
+    assert knowledge is not None
+    free_frame = knowledge.by_wall and control.positioned.sum() < 2
+    pair = first.pair.observations
+    if knowledge.by_wall:
+        count = len(control.ids)
+        known[:count], spread[:count] = control.xyz, control.sigma
+        on_wall, rough = _wall(state, count, sigma_tie)
+        known[on_wall, 2], spread[on_wall, 2] = 0.0, rough[on_wall]
+        held = {first.far: ("turn Z", "X", "Y")} if free_frame else {}
+        cameras = {1: first.far, 2: first.near}
+        tilts = {} if pair.sigma_tilt is None else dict.fromkeys(cameras.values(), pair.sigma_tilt)
+        knowledge = replace(
+            knowledge, held=held, sigma_tilts=tilts,
+            lines=tuple((cameras[line.camera], line) for line in pair.lines),
+        )  # fmt: skip
+    own = {"distance1": {0: 1.0}, "distance2": {1: 1.0}, "delta_d": {0: 1.0, 1: -1.0}}
+    spreads = control.sigma_lengths or (np.nan,) * len(control.lengths)
+    usual = float(control.sigma.min(initial=0.003))
+    knowledge = replace(
+        knowledge,
+        distances=tuple(
+            (shares, float(getattr(site, name)), site.sigma)
+            for name, shares in own.items() if getattr(site, name) is not None
+        ),
+        lengths=tuple(
+            (a, b, metres, usual if np.isnan(s) else s)
+            for (a, b, metres), s in zip(control.lengths, spreads, strict=True)
+        ),
+    )  # fmt: skip
+    observed = replace(observed, sigma=sigma, known=known, sigma_known=spread, cameras=knowledge)
+    return OrientedSet(
+        first=first, adjusted=_readjusted(observed, state, first), control=control,
+        sigma_tie=sigma_tie, on_wall=int(on_wall.sum()), free_frame=bool(free_frame),
+        way="auto" if knowledge.by_wall else "control",
+    )  # fmt: skip
+
+
+def _wall(state: JointAdjustment, control: int, sigma_tie: float) -> tuple[BoolArray, FloatArray]:
+    """Return which ties tell of the wall's plane, and by what sigma they lie on it, (p,). [m]
+
+    Roughness is common to stretches of the wall, as in `bifocal.orientation.tie_points.with_wall`.
+
+    Raises
+    ------
+    GeometryError
+        If there is no wall.
+    """
+    seen, xyz = state.observations, state.xyz
+    camera = max(state.cameras, key=lambda one: float(one.centre[2]))
+    normal = np.zeros((len(xyz), 3, 3))
+    for k, own in enumerate(state.cameras):
+        points = seen.point[seen.camera == k]
+        by = project_with_jacobian(own, xyz[points]).by_point / sigma_tie
+        np.add.at(normal, points, by.transpose(0, 2, 1) @ by)
+    there = np.isfinite(xyz).all(axis=1) & (np.linalg.eigvalsh(normal)[:, 0] > 1.0)
+    there[:control] = False
+    sigma = np.full(len(xyz), np.nan)
+    sigma[there] = np.sqrt(np.linalg.inv(normal[there])[:, 2, 2])
+    face = narrow_face(xyz[there], sigma[there], band=WALLS.rough_band * float(camera.centre[2]))
+    chance = np.zeros(len(xyz))
+    chance[there] = face.chance
+    width = 0.1 * 2 * camera.matrix[0, 2] * camera.centre[2] / camera.matrix[0, 0]
+    cells = len(np.unique(np.floor(xyz[chance > LEAST_CHANCE, :2] / width), axis=0))
+    if chance.sum() < TIES.fewest_on_wall or cells < TIES.fewest_cells:
+        raise GeometryError(
+            f"no plane: too few details that {len(state.cameras)} photos share lie on one. Frame "
+            "them so that the wall fills them, or give control points on the wall (--control)."
+        )
+    common = max(float(chance.sum()) / max(cells / 4.0, 3.0), 1.0)
+    with np.errstate(divide="ignore"):
+        return chance > LEAST_CHANCE, np.hypot(face.roughness, 1e-5) * np.sqrt(common / chance)

@@ -1,0 +1,265 @@
+"""First cameras of a set of photos: one pair as always, the others by resection, one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import cv2
+import numpy as np
+
+from bifocal.model.interior_orientation import SAME_FOCAL, SIGMA_RADIAL, Interior
+from bifocal.networks.joint_ties import FEWEST_MATCHES, SharedPoints
+from bifocal.orientation.absolute_orientation import orient_pair
+from bifocal.orientation.control_points import Control, SiteMeasures
+from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
+from bifocal.orientation.starts.space_resection import resect
+from photocore.arrays import BoolArray, FloatArray, IntArray
+from photocore.camera.pinhole import Pinhole, camera_matrix, homogeneous, ray_on_plane
+from photocore.errors import ConvergenceError, GeometryError
+
+#: So many pairs are tried, the most promising first.
+TRIED = 5
+#: Rays that meet at a larger angle tell no more: their photos match less well. [rad]
+WIDE = 0.3
+#: Rays that meet at a smaller one give no place to resect by: 1 less the angle's cosine.
+NARROW = 2e-4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FirstCameras:
+    """Cameras to start from.
+
+    Attributes
+    ----------
+    far, near : int
+        Photos of the first pair.
+    pair : OrientedPair
+    cameras, interiors : tuple
+        Of all photos, in the frame of the first pair.
+    lens : tuple of int
+        Of each photo, the first of the same unknown lens.
+    radial : ndarray, shape (m, 2)
+    xyz : ndarray, shape (p, 3)
+        Of points whose rays do not meet, roughly on the wall.
+    met : ndarray of bool, shape (p,)
+        Which points' rays do, at a fair angle.
+    """
+
+    far: int
+    near: int
+    pair: OrientedPair
+    cameras: tuple[Pinhole, ...]
+    interiors: tuple[Interior, ...]
+    lens: tuple[int, ...]
+    radial: FloatArray
+    xyz: FloatArray
+    met: BoolArray
+
+
+def first_cameras_of(
+    photos: Sequence[PhotoInput], seen: SharedPoints, control: Control, site: SiteMeasures
+) -> FirstCameras:
+    """Return first cameras of all photos.
+
+    Parameters
+    ----------
+    photos : sequence of PhotoInput
+    seen : SharedPoints
+        Control points first, in their order, then ties; pixels free of the lens files' distortion.
+    control, site
+        As of a pair; distance 1 is that of the first photo, distance 2 of the second.
+
+    Raises
+    ------
+    GeometryError
+        If no two photos make a pair, for the reason of the most promising, or one photo shares too
+        few points with the others.
+    """
+    (far, near), pair = _first_pair(photos, seen, control, site)
+    interiors = [photo.interior for photo in photos]
+    interiors[far], interiors[near] = pair.observations.interiors
+    lens = _lenses(interiors)
+    radial = np.zeros((len(photos), 2))
+    radial[[far, near]] = pair.adjusted.radial
+    for k, first in enumerate(lens):
+        its = next((j for j in (far, near) if lens[j] == first), None)
+        if its is not None:
+            interiors[k], radial[k] = interiors[its], radial[its]
+        elif radial.any() and not interiors[k].is_calibrated:
+            interiors[k] = replace(interiors[k], sigma_radial=SIGMA_RADIAL)
+    cameras = {far: pair.adjusted.cameras[0], near: pair.adjusted.cameras[1]}
+    pixels = seen.pixels.copy()
+    for k, interior in enumerate(interiors):
+        rays = seen.photo == k
+        pixels[rays] = interior.radial(*radial[k]).undistort(pixels[rays])
+    known = np.full((seen.count, 3), np.nan)
+    known[: len(control.ids)] = control.xyz
+    while len(cameras) < len(photos):
+        xyz = np.where(np.isfinite(known), known, _meeting(cameras, seen, pixels))
+        there = np.asarray(np.isfinite(xyz).all(axis=1))[seen.point]
+        count = [-1 if k in cameras else int((there & (seen.photo == k)).sum())
+                 for k in range(len(photos))]  # fmt: skip
+        k = int(np.argmax(count))
+        rays = there & (seen.photo == k)
+        try:
+            camera, agree = resect(xyz[seen.point[rays]], pixels[rays], interiors[k])
+        except GeometryError:
+            agree = np.zeros(1, dtype=bool)
+        if agree.sum() < min(FEWEST_MATCHES, max(len(agree), 4)) or agree.mean() < 0.5:
+            raise GeometryError(
+                f"{photos[k].name}: shares too few details with the other photos ({count[k]}, "
+                f"{agree.sum()} of them agree) to be set up with them. Photos must overlap and be "
+                "taken from not too different directions: leave it out, or pick control points."
+            )
+        cameras[k] = camera
+    for k, leader in enumerate(lens):  # what is one unknown begins with one value
+        if leader != k:
+            whole, centre = cameras[leader].matrix, cameras[k].matrix[:2, 2]
+            matrix = camera_matrix(whole[0, 0], whole[1, 1] / whole[0, 0], *centre)
+            cameras[k], radial[k] = cameras[k]._replace(matrix=matrix), radial[leader]
+    xyz = _meeting(cameras, seen, pixels)
+    middle, unknown = np.nanmedian(xyz, axis=0), np.asarray(np.isnan(xyz).any(axis=1))
+    for k, camera in cameras.items():  # what is seen under too small an angle stands on the wall
+        rays = np.flatnonzero((seen.photo == k) & unknown[seen.point])
+        xyz[seen.point[rays]] = ray_on_plane(camera, pixels[rays])
+    return FirstCameras(
+        far=far, near=near, pair=pair, cameras=tuple(cameras[k] for k in range(len(photos))),
+        interiors=tuple(interiors), lens=lens, radial=radial,
+        xyz=np.where(np.isfinite(xyz), xyz, middle), met=~unknown,
+    )  # fmt: skip
+
+
+def _first_pair(
+    photos: Sequence[PhotoInput], seen: SharedPoints, control: Control, site: SiteMeasures
+) -> tuple[tuple[int, int], OrientedPair]:
+    """Return the best pair that today's way orients, and its photos, the far one first."""
+    reasons: list[GeometryError | ConvergenceError] = []
+    for one, other in _promising(photos, seen, control, site)[:TRIED]:
+        for far, near in ((one, other), (other, one)):
+            try:
+                pair = orient_pair(
+                    (photos[far], photos[near]), control=control.of(far, near),
+                    site=_measures(site, far, near),
+                )  # fmt: skip
+            except (GeometryError, ConvergenceError) as error:
+                reasons.append(error)
+                break
+            if not pair.exchanged:
+                return (far, near), pair
+    if reasons:
+        raise reasons[0]
+    raise GeometryError(
+        "no two of the photos can be set up as a pair: they need common details, and four control "
+        "points in both or a distance or length of one of them (--distance1 is that of the first "
+        "photo, --distance2 of the second, --length and --wall are in the first)."
+    )
+
+
+def _measures(site: SiteMeasures, far: int, near: int) -> SiteMeasures:
+    """Return what was measured of two photos: the distances go with their photos."""
+    taped = {0: site.distance1, 1: site.distance2}
+    both = {far, near} == {0, 1}
+    return replace(
+        site, distance1=taped.get(far), distance2=taped.get(near), ordered=True,
+        delta_d=site.delta_d if both else None, parallel=site.parallel and both,
+    )  # fmt: skip
+
+
+def _promising(
+    photos: Sequence[PhotoInput], seen: SharedPoints, control: Control, site: SiteMeasures
+) -> list[tuple[int, int]]:
+    """Return the pairs that may be oriented, those whose rays meet best first.
+
+    Of each, the photo first that seems to be taken from farther away.
+    """
+    found = []
+    for pair, ties in _common(seen, len(photos), len(control.ids)):
+        one, other = pair
+        picked = control.of(one, other)
+        enough = all(
+            (picked.positioned & np.isfinite(p).all(axis=1)).sum() >= 4
+            for p in (picked.pixels1, picked.pixels2)
+        )
+        own = _measures(site, one, other)
+        scaled = own.distance1 or own.distance2 or own.delta_d or (control.lengths and one == 0)
+        if enough or ((scaled or picked.positioned.sum() >= 2) and (site.wall is None or not one)):
+            told = _promise(photos[one].interior, photos[other].interior, *ties)
+            found.append((enough, abs(told), pair if told >= 0 or site.wall else pair[::-1]))
+    return [pair for *_, pair in sorted(found, reverse=True)]
+
+
+def _common(
+    seen: SharedPoints, photos: int, first: int
+) -> Iterator[tuple[tuple[int, int], tuple[FloatArray, FloatArray]]]:
+    """Yield all two photos with the ties that both show, if these are no chance."""
+    pixels = np.full((photos, seen.count, 2), np.nan)
+    pixels[seen.photo, seen.point] = seen.pixels
+    pixels = pixels[:, first:]
+    for one, other in combinations(range(photos), 2):
+        both = np.isfinite(pixels[one] + pixels[other]).all(axis=1)
+        if both.sum() >= FEWEST_MATCHES:
+            yield (one, other), (pixels[one, both], pixels[other, both])
+
+
+def _promise(first: Interior, second: Interior, x1: FloatArray, x2: FloatArray) -> float:
+    """Return how well rays of common points meet: their angles' square sum, up to `WIDE`.
+
+    Negative where the second camera stands farther from them.
+    """
+    y1, y2 = (homogeneous(x) @ np.linalg.inv(i.matrix).T for i, x in ((first, x1), (second, x2)))
+    cv2.setRNGSeed(7)
+    limit = 3.0 / min(first.focal, second.focal)
+    a, b = np.ascontiguousarray(y1[:, :2]), np.ascontiguousarray(y2[:, :2])
+    matrix, inside = cv2.findEssentialMat(a, b, np.eye(3), cv2.RANSAC, 0.999, limit)
+    if matrix is None or matrix.shape != (3, 3):
+        return 0.0
+    _, turn, shift, inside, xyz = cv2.recoverPose(
+        matrix, a, b, np.eye(3), distanceThresh=1e3, mask=inside
+    )
+    good = inside.ravel() > 0
+    if not good.any():
+        return 0.0
+    there = (xyz[:3] / xyz[3]).T[good]
+    depth2 = (there @ turn.T + shift.T)[:, 2]
+    farther = np.median(there[:, 2]) >= np.median(depth2)
+    d1, d2 = y1[good], y2[good] @ turn
+    sine = np.linalg.norm(np.cross(d1, d2), axis=1)
+    sine /= np.linalg.norm(d1, axis=1) * np.linalg.norm(d2, axis=1)
+    told = float((np.minimum(sine, WIDE) ** 2).sum())
+    return told if farther else -told
+
+
+def _lenses(interiors: Sequence[Interior]) -> tuple[int, ...]:
+    """Return, of each photo, the first of the same lens, of which no file tells more."""
+
+    def same(one: Interior, other: Interior) -> bool:
+        if one.is_assumed or one.is_calibrated or other.is_calibrated:
+            return False
+        if one.image_size != other.image_size:
+            return False
+        return bool(abs(np.log(one.focal / other.focal)) < SAME_FOCAL)
+
+    return tuple(
+        next((j for j in range(k) if same(interiors[j], own)), k) for k, own in enumerate(interiors)
+    )
+
+
+def _meeting(cameras: Mapping[int, Pinhole], seen: SharedPoints, pixels: FloatArray) -> FloatArray:
+    """Return where all rays of each point meet, shape (p, 3); NaN at too small angles. [m]"""
+    normal, right = np.zeros((seen.count, 3, 3)), np.zeros((seen.count, 3))
+    for k, camera in cameras.items():
+        rays: IntArray = np.flatnonzero(seen.photo == k)
+        along = homogeneous(pixels[rays]) @ np.linalg.inv(camera.matrix).T @ camera.rotation
+        along /= np.linalg.norm(along, axis=1)[:, None]
+        across = np.eye(3) - along[:, :, None] * along[:, None, :]
+        np.add.at(normal, seen.point[rays], across)
+        np.add.at(right, seen.point[rays], across @ camera.centre)
+    xyz = np.full((seen.count, 3), np.nan)
+    good = np.linalg.eigvalsh(normal)[:, 0] > NARROW
+    xyz[good] = np.linalg.solve(normal[good], right[good][..., None])[..., 0]
+    for k, camera in cameras.items():  # wrong matches meet behind a camera
+        points = seen.point[seen.photo == k]
+        xyz[points[(xyz[points] - camera.centre) @ camera.rotation[2] <= 0]] = np.nan
+    return xyz

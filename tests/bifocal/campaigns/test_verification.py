@@ -1,0 +1,177 @@
+"""`bifocal verify`: what was changed in a delivery is named, and nothing is written into it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import zipfile
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from bifocal.campaigns.verification import verify as verified
+from tests.bifocal.campaigns.sample_tables import FAR, NEAR, write_tables
+from tests.builders.commands import bifocal_command as main
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> Path:
+    """A folder with photos, tables, and a delivery without relief beside them."""
+    place = tmp_path_factory.mktemp("made")
+    control, check = write_tables(place)
+    for photo in (FAR, NEAR):
+        shutil.copyfile(photo, place / photo.name)
+    words = ["facade", place / "far.jpg", place / "near.jpg", "--control", control, "--check",
+             check, "--products", "points,report", "--language", "de", "--out", place / "wall",
+             "--date", "2026-11-22"]  # fmt: skip
+    result = CliRunner().invoke(main, [*map(str, words)])
+    assert result.exit_code == 0, result.stderr
+    return place
+
+
+@pytest.fixture
+def wall(made: Path, tmp_path: Path) -> Path:
+    """A copy of the delivery, of which its photos are not where they were."""
+    return Path(shutil.copytree(made / "wall", tmp_path / "wall"))
+
+
+def verify(*words: object, status: int = 0) -> tuple[dict, str]:
+    result = CliRunner().invoke(main, ["verify", *map(str, words), "--json"])
+    assert result.exit_code == status, result.stderr
+    return json.loads(result.stdout) if result.stdout else {}, result.stderr
+
+
+def states(found: dict) -> dict[str, str]:
+    return {one["file"]: one["state"] for one in found["files"] if one["state"] != "unchanged"}
+
+
+def zipped(folder: Path, path: Path) -> Path:
+    return Path(shutil.make_archive(str(path), "zip", folder.parent, folder.name))
+
+
+def state_of(folder: Path) -> dict[Path, tuple[int, bytes]]:
+    return {
+        path: (path.stat().st_mtime_ns, path.read_bytes())
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def test_a_delivery_is_whole_as_folder_and_as_archive_and_stays_untouched(wall, tmp_path):
+    before = state_of(wall)
+    found, _ = verify(wall)
+    assert found["same"]
+    assert {one["state"] for one in found["files"]} == {"unchanged"}
+    assert len(found["files"]) == len(before) - 1  # all but the memory of hashes
+    (point,) = found["worked"]
+    assert point["holds"]
+    assert point["printed"] == pytest.approx(point["computed"], abs=5e-4)
+    assert found["digest"] == verify(zipped(wall, tmp_path / "sent"))[0]["digest"]
+    assert state_of(wall) == before
+    lines = CliRunner().invoke(main, ["verify", str(wall)]).stdout.splitlines()
+    assert lines[0] == "unchanged   align/.made.json"
+    assert lines[-1] == f"Digest of the delivery: {verified(wall).digest}"
+
+
+def test_what_is_changed_missing_or_not_listed_is_named(wall):
+    book = wall / "points/wall_points.xlsx"
+    book.write_bytes(book.read_bytes()[:-1] + b"x")
+    (wall / "report/wall_report.pdf").unlink()
+    (wall / "letter.txt").write_text("Dear client")
+    found, told = verify(wall, status=1)
+    assert states(found) == {
+        "points/wall_points.xlsx": "changed", "report/wall_report.pdf": "missing",
+        "letter.txt": "not listed",
+    }  # fmt: skip
+    assert told.startswith(f"Error: {wall}: is not what was made: ")
+    assert all(f"1 {word}" in told for word in ("changed", "missing", "not listed"))
+
+
+def test_a_step_or_a_record_that_was_exchanged_is_noticed(wall):
+    """Whoever writes a new hash into a record breaks the chain to the steps after it."""
+    pair = wall / "align/wall.pair.json"
+    pair.write_text(pair.read_text().replace('"distance": 1', '"distance": 2', 1))
+    record = wall / "align/.made.json"
+    data = json.loads(record.read_text())
+    data["outputs"]["wall.pair.json"] = hashlib.sha256(pair.read_bytes()).hexdigest()
+    record.write_text(json.dumps(data))
+    found, told = verify(wall, status=1)
+    assert states(found) == {"points/.made.json": "changed", "report/.made.json": "changed"}
+    assert not found["worked"][0]["holds"]
+    assert "1 worked point wrong" in told
+    shutil.rmtree(wall / "align")
+    record = wall / "points/.made.json"
+    record.write_text("[]")
+    found, _ = verify(wall, status=1)
+    assert states(found)["align/.made.json"] == "missing"
+    assert states(found)["points/.made.json"] == "changed"
+    assert states(found)["points/wall_points.xlsx"] == "not listed"
+
+
+def test_a_report_whose_worked_point_was_written_anew_is_noticed(wall):
+    page = wall / "report/wall_report.html"
+    text = page.read_text("utf-8")
+    x = text.index("\nX = ") if "\nX = " in text else text.index("<pre>X = ")
+    digit = text.index(".", x) + 2
+    page.write_text(text[:digit] + str((int(text[digit]) + 5) % 10) + text[digit + 1 :], "utf-8")
+    found, _ = verify(wall, status=1)
+    assert states(found) == {"report/wall_report.html": "changed"}
+    assert not found["worked"][0]["holds"]
+
+
+def test_products_made_anew_have_the_same_bytes_and_sources_are_known_by_their_hash(made, wall):
+    before = state_of(wall)
+    (wall / ".hashes.json").unlink()
+    _, told = verify(wall, "--remake", status=1)
+    assert "is not found" in told
+    assert "--sources" in told
+    found, _ = verify(wall, "--remake", "--sources", made)
+    assert {one["state"] for one in found["remade"]} == {"unchanged"}
+    assert "report/wall_report.pdf" in {one["file"] for one in found["remade"]}
+    assert {path for path in before if path.name != ".hashes.json"} == set(state_of(wall))
+
+
+def archive(path: Path, members: dict[str, bytes]) -> Path:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as package:
+        for name, content in members.items():
+            package.writestr(name, content)
+    return path
+
+
+def test_what_is_no_delivery_is_refused_in_one_message(tmp_path):
+    (tmp_path / "empty").mkdir()
+    record = {"format": "bifocal-step/1", "step": "a", "program": "p", "date": "d",
+              "key": "k", "inputs": {}, "after": [], "options": {}, "remarks": [], "seconds": 0,
+              "outputs": {"../../secret": "0"}}  # fmt: skip
+    (tmp_path / "text.zip").write_text("not an archive")
+    half = archive(tmp_path / "half.zip", {"a/b.txt": bytes(range(256)) * 99})
+    half.write_bytes(half.read_bytes()[:-40])
+    deep = '{"a":' * 50_000
+    for path, words in (
+        (tmp_path / "nothing", "no such folder or archive"),
+        (tmp_path / "empty", "holds no record of a delivery"),
+        (tmp_path / "text.zip", "is no zip archive"),
+        (half, "is no zip archive"),
+        (archive(tmp_path / "bomb.zip", {"a": bytes(80 << 20)}), "too large"),
+        (archive(tmp_path / "out.zip", {"../a": b""}), "lies outside"),
+        (archive(tmp_path / "record.zip", {"a/.made.json": json.dumps(record).encode()}),
+         "outside its folder"),
+    ):  # fmt: skip
+        found, told = verify(path, status=1)
+        assert not found
+        assert words in told
+        assert str(path) in told or ".made.json" in told
+        assert told.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.rglob("a")) == []
+    for text in ("[]", deep, json.dumps(record | {"inputs": {"far": ["a", []]}, "outputs": {}})):
+        sent = archive(tmp_path / "sent.zip", {"a/.made.json": text.encode()})
+        assert states(verify(sent, status=1)[0]) == {".made.json": "changed"}
+
+
+def test_a_list_of_hashes_as_other_programs_write_it_is_read(tmp_path):
+    (tmp_path / "a b.txt").write_text("x")
+    digest = hashlib.sha256(b"x").hexdigest().upper()
+    (tmp_path / "SHA256SUMS").write_text(f"{digest} *a b.txt\n{digest}  gone.txt\n\n")
+    assert states(verify(tmp_path, status=1)[0]) == {"gone.txt": "missing"}

@@ -1,0 +1,157 @@
+"""Photos of one wall set up together: as precise as said, in any order, refused with a reason."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from bifocal import (
+    SAMPLE,
+    Control,
+    InputError,
+    Interior,
+    Pinhole,
+    read_control,
+    read_image,
+)
+from bifocal.model.orientation_precision import CAMERA
+from bifocal.networks.camera_knowledge import CameraKnowledge
+from bifocal.networks.joint_adjustment import JointUnknowns, adjust_jointly
+from bifocal.networks.joint_observations import JointObservations
+from bifocal.networks.set_alignment import align_set
+from tests.bifocal.campaigns.sample_tables import write_tables
+from tests.builders.pinholes import camera_matrix, project, rotation_from_vector
+from tests.scenes.make_sample import PIXEL
+
+SIZE = (3072, 2048)
+#: 35, 28 and 19 mm at one scale, and 19 mm from a step aside.
+STANDS = ((35, 0.0, 17.5), (28, 0.0, 14.0), (19, 0.0, 9.5), (19, 1.5, 9.5))
+
+
+def simulated(rng: np.random.Generator, *, by_wall: bool):
+    """Return observations of four photos, a start, true cameras, and true points."""
+    lens = (0, 1, 2, 2)
+    focals = np.array([5.0 / 0.0221 * mm for mm in (35, 28, 19)]) * np.exp(rng.normal(0, 0.005, 3))
+    bent = rng.normal(0, 0.01, 3)
+    xyz = np.column_stack([rng.uniform(-3.3, 3.3, 300), rng.uniform(-2.2, 2.2, 300), np.zeros(300)])
+    xyz[100:, 2] = rng.uniform(-0.6, 0.8, 200)
+    interiors, cameras, raw = [], [], []
+    for (mm, x, z), own in zip(STANDS, lens, strict=True):
+        nominal = Interior.from_focal(
+            5.0 / 0.0221 * mm, image_size=SIZE, sigma=0.005, source=f"{mm} mm"
+        )
+        interiors.append(replace(nominal, sigma_radial=0.01, sigma_centre=3.0))
+        middle = nominal.centre + rng.normal(0, 3.0, 2)
+        turn = np.diag([1.0, -1, -1]) @ rotation_from_vector([0, -np.arctan(x / z), 0])
+        turn = turn @ rotation_from_vector(rng.normal(0, 0.003, 3))
+        matrix = camera_matrix(focals[own], np.exp(rng.normal(0, 0.001)) if own < 2 else 1.0,
+                               *middle)  # fmt: skip
+        cameras.append(Pinhole(matrix, turn, np.array([x, 0.0, z]) + rng.normal(0, 0.05, 3)))
+        raw.append(interiors[-1].radial(bent[own]).distort(project(cameras[-1], xyz)))
+    rays = [(k, p) for k, pixels in enumerate(raw) for p, (c, r) in enumerate(pixels)
+            if 0 < c < SIZE[0] and 0 < r < SIZE[1]]  # fmt: skip
+    camera, point = np.array(rays).T
+    pixels = np.array([raw[k][p] for k, p in rays]) + rng.normal(0, 0.3, (len(rays), 2))
+    known, sigma = np.full((300, 3), np.nan), np.full((300, 3), 0.003)
+    if by_wall:
+        known[:100, 2] = rng.normal(0, 0.003, 100)
+    else:
+        known[90:110] = xyz[90:110] + rng.normal(0, 0.003, (20, 3))
+    return (
+        JointObservations(
+            names=tuple("abcd"), camera=camera, point=point, pixels=pixels,
+            sigma=np.full(len(rays), 0.3), ids=tuple(f"P{k}" for k in range(300)), known=known,
+            sigma_known=sigma, sigma_focal=np.zeros(4),
+            cameras=CameraKnowledge(
+                interiors=tuple(interiors), lens=lens, by_wall=by_wall,
+                held={0: ("X", "Y", "turn Z")} if by_wall else {},
+                distances=(({0: 1.0}, cameras[0].centre[2] + rng.normal(0, 0.005), 0.005),),
+                lengths=((2, 97, np.linalg.norm(xyz[2] - xyz[97]) + rng.normal(0, 0.002), 0.002),),
+            ),
+        ),
+        JointUnknowns(
+            cameras=tuple(
+                c._replace(matrix=camera_matrix(i.focal, 1.0, *i.centre))
+                for c, i in zip(cameras, interiors, strict=True)
+            ),
+            xyz=xyz + rng.normal(0, 0.02, xyz.shape), radial=np.zeros((4, 2)),
+        ),
+        cameras, xyz,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("by_wall", [False, True])
+def test_cameras_and_points_of_a_set_are_as_precise_as_their_sigmas_say(by_wall):
+    centres, focals, points = [], [], []
+    for seed in range(8):
+        seen, start, cameras, xyz = simulated(np.random.default_rng(seed), by_wall=by_wall)
+        got = adjust_jointly(seen, start)
+        sigma = np.sqrt(np.diag(got.of_cameras)).reshape(4, -1)
+        spread = np.sqrt(np.diagonal(got.covariance, axis1=1, axis2=2))
+        off = (got.xyz - xyz) / spread
+        points.append(np.nanmean(off**2))
+        for k, (one, true) in enumerate(zip(got.cameras, cameras, strict=True)):
+            focals.append(np.log(one.matrix[0, 0] / true.matrix[0, 0]) / sigma[k, 0])
+            free = sigma[k, 7:10] > 0
+            centres += ((one.centre - true.centre)[free] / sigma[k, 7:10][free]).tolist()
+        # One lens is one unknown; each photo has a principal point of its own.
+        place = 2 * len(CAMERA), 3 * len(CAMERA)
+        assert got.of_cameras[place] == pytest.approx(got.of_cameras[place[0], place[0]])
+        assert got.of_cameras[place[0] + 2, place[1] + 2] < 0.9 * sigma[2, 2] * sigma[3, 2]
+    for ratio in (np.sqrt(np.mean(np.square(centres))), np.sqrt(np.mean(np.square(focals)))):
+        assert 0.75 < ratio < 1.25
+    assert 0.85 < np.sqrt(np.mean(points)) < 1.15
+
+
+@pytest.fixture(scope="module")
+def three(tmp_path_factory):
+    """Far and near photo of the sample at half size, and the far one turned where it stood."""
+    folder = tmp_path_factory.mktemp("set")
+    far, near = (read_image(SAMPLE / f"{name}.jpg") for name in ("far", "near"))
+    half = [cv2.resize(p, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) for p in (far, near)]
+    size = (half[0].shape[1], half[0].shape[0])
+    matrix = camera_matrix(17.5 / (2 * PIXEL), 1.0, (size[0] - 1) / 2, (size[1] - 1) / 2)
+    turn = rotation_from_vector([0.01, -0.02, 0.05])
+    carried = matrix @ turn @ np.linalg.inv(matrix)
+    half.insert(1, cv2.warpPerspective(half[0], carried, size, flags=cv2.INTER_CUBIC))
+    for name, photo in zip(("near", "turned", "far"), half[::-1], strict=True):
+        cv2.imwrite(str(folder / f"{name}.png"), photo[..., ::-1])
+    control, _ = write_tables(folder)
+    with control.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    with (folder / "set.csv").open("w", encoding="utf-8") as file:
+        file.write("id,X [m],Y [m],r [m],col1,row1,col2,row2,col3,row3\n")
+        for row in rows:
+            picks = [(float(row[f"{a}{k} [px]"]) - 0.5) / 2 for k in (2, 1) for a in ("col", "row")]
+            place = (row[name] for name in ("id", "X [m]", "Y [m]", "r [m]"))
+            near_far = (*map(str, picks[:2]), "", "", *map(str, picks[2:]))
+            file.write(",".join((*place, *near_far)) + "\n")
+    return folder, half[::-1]
+
+
+@pytest.mark.acceptance
+def test_three_photos_in_any_order_become_a_set_by_control(three):
+    folder, images = three
+    size = (images[0].shape[1], images[0].shape[0])
+    control = read_control(folder / "set.csv", sigma=0.003, sigma_plane=0.005, photos=3)
+    lenses = [
+        Interior.from_focal(distance / (2 * PIXEL), image_size=size, sigma=0.002, source="known")
+        for distance in (9.5, 17.5, 17.5)
+    ]
+    near, turned, far = align_set(images, interiors=lenses, control=control).photos.photos
+    assert far.distance == pytest.approx(17.5, abs=0.1)
+    assert near.distance == pytest.approx(9.5, abs=0.06)
+    assert turned.distance == pytest.approx(far.distance, abs=0.01)
+
+
+def test_a_set_is_refused_with_the_reason(three):
+    folder, images = three
+    with pytest.raises(InputError, match="one for each"):
+        align_set(images, interiors=[])
+    with pytest.raises(InputError, match="col4, row4 are missing"):
+        read_control(folder / "set.csv", sigma=0.003, sigma_plane=None, photos=4)
+    assert Control().of(0, 3).pixels2.shape == (0, 2)
