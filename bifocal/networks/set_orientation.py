@@ -12,7 +12,7 @@ from bifocal.networks.camera_knowledge import CameraKnowledge
 from bifocal.networks.joint_adjustment import JointAdjustment, JointUnknowns, adjust_jointly
 from bifocal.networks.joint_observations import JointObservations, with_rays
 from bifocal.networks.joint_ties import SharedPoints, common_features
-from bifocal.networks.set_start import FirstCameras, first_cameras_of
+from bifocal.networks.set_start import FirstCameras, first_cameras_of, meeting
 from bifocal.orientation import validation
 from bifocal.orientation.adjustment.pair_observations import (
     INDEPENDENT,
@@ -121,17 +121,24 @@ def orient_set(
     state = adjust_jointly(observed, start)
     for _ in range(2):  # the second pass searches around better places
         observed = _refined(photos, observed, state, first, len(control.ids))
-        state = _readjusted(observed, state, first)
+        state = _readjusted(observed, state, first, len(control.ids))
     for _ in range(2):  # a few wrong patches hide each other
         observed, sigma = _without_gross(state, len(control.ids))
-        state = _readjusted(observed, state, first)
+        state = _readjusted(observed, state, first, len(control.ids))
     return _adjusted(observed, state, first, control, site, sigma)
 
 
 def _readjusted(
-    observed: JointObservations, state: JointAdjustment, first: FirstCameras
+    observed: JointObservations, state: JointAdjustment, first: FirstCameras, control: int
 ) -> JointAdjustment:
-    """Return everything adjusted from where it was."""
+    """Return everything adjusted from where it was, without ties that wander along their rays."""
+    seen = SharedPoints(
+        photo=observed.camera, point=observed.point, pixels=observed.pixels, count=len(observed.ids)
+    )
+    places = meeting(dict(enumerate(state.cameras)), seen, seen.pixels)
+    met = np.asarray(np.isfinite(places).all(axis=1))
+    met[:control] = True
+    observed = with_rays(observed, met[observed.point])
     start = JointUnknowns(
         cameras=state.cameras, radial=state.radial,
         xyz=np.where(np.isfinite(state.xyz), state.xyz, first.xyz),
@@ -285,9 +292,9 @@ def _adjusted(
     )  # fmt: skip
     observed = replace(observed, sigma=sigma, known=known, sigma_known=spread, cameras=knowledge)
     return OrientedSet(
-        first=first, adjusted=_readjusted(observed, state, first), control=control,
-        sigma_tie=sigma_tie, on_wall=int(on_wall.sum()), free_frame=bool(free_frame),
-        way="auto" if knowledge.by_wall else "control",
+        first=first, adjusted=_readjusted(observed, state, first, len(control.ids)),
+        control=control, sigma_tie=sigma_tie, on_wall=int(on_wall.sum()),
+        free_frame=bool(free_frame), way="auto" if knowledge.by_wall else "control",
     )  # fmt: skip
 
 

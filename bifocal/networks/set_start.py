@@ -97,7 +97,7 @@ def first_cameras_of(
     known = np.full((seen.count, 3), np.nan)
     known[: len(control.ids)] = control.xyz
     while len(cameras) < len(photos):
-        xyz = np.where(np.isfinite(known), known, _meeting(cameras, seen, pixels))
+        xyz = np.where(np.isfinite(known), known, meeting(cameras, seen, pixels))
         there = np.asarray(np.isfinite(xyz).all(axis=1))[seen.point]
         count = [-1 if k in cameras else int((there & (seen.photo == k)).sum())
                  for k in range(len(photos))]  # fmt: skip
@@ -119,7 +119,7 @@ def first_cameras_of(
             whole, centre = cameras[leader].matrix, cameras[k].matrix[:2, 2]
             matrix = camera_matrix(whole[0, 0], whole[1, 1] / whole[0, 0], *centre)
             cameras[k], radial[k] = cameras[k]._replace(matrix=matrix), radial[leader]
-    xyz = _meeting(cameras, seen, pixels)
+    xyz = meeting(cameras, seen, pixels)
     middle, unknown = np.nanmedian(xyz, axis=0), np.asarray(np.isnan(xyz).any(axis=1))
     for k, camera in cameras.items():  # what is seen under too small an angle stands on the wall
         rays = np.flatnonzero((seen.photo == k) & unknown[seen.point])
@@ -246,7 +246,7 @@ def _lenses(interiors: Sequence[Interior]) -> tuple[int, ...]:
     )
 
 
-def _meeting(cameras: Mapping[int, Pinhole], seen: SharedPoints, pixels: FloatArray) -> FloatArray:
+def meeting(cameras: Mapping[int, Pinhole], seen: SharedPoints, pixels: FloatArray) -> FloatArray:
     """Return where all rays of each point meet, shape (p, 3); NaN at too small angles. [m]"""
     normal, right = np.zeros((seen.count, 3, 3)), np.zeros((seen.count, 3))
     for k, camera in cameras.items():
