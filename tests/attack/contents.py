@@ -170,12 +170,12 @@ def _shift_cell(value: str) -> Callable[[Path], str]:
 PLY = "ply\nformat ascii 1.0\nelement vertex 3\n{}end_header\n{}"
 XYZ = "property float x\nproperty float y\nproperty float z\n"
 
-SET_LINE = "bifocal relief wall.photos.json --out o.tif"
-_SET: list[tuple[tuple[object, ...], Any, str]] = [
+RELIEF_SET_LINE = "bifocal relief wall.photos.json --out o.tif"
+_RELIEF_SET: list[tuple[tuple[object, ...], Any, str]] = [
     (("photos",), [], "two photos"),
     (("photos", 2, "file"), ..., "file"),
     (("photos", 2, "file"), "gone.jpg", "gone.jpg"),
-    (("photos", 2, "image_size"), [640, 480], "size"),
+    (("photos", 2, "image_size"), [640, 480], "640 x 480"),
     (("photos", 1, "name"), "image1", "image1"),
     (("photos", 0, "distance"), -3, "distance"),
     (("format",), "bifocal-photos/9", "format"),
@@ -276,8 +276,8 @@ CONTENTS: list[tuple[str, str, Any, str]] = [
         )
     ),
     *(
-        (SET_LINE, "wall.photos.json", edited("wall.photos.json", *path, value=value), culprit)
-        for path, value, culprit in _SET
+        (RELIEF_SET_LINE, "wall.photos.json", edited("wall.photos.json", *path, value=value), culprit)
+        for path, value, culprit in _RELIEF_SET
     ),
     *(
         (LENS_LINE, "lens.json", edited("lens.json", *path, value=value), culprit)

@@ -195,7 +195,9 @@ def made(path, features):
 
 
 def outside_cells(data):
-    """Return a sheet without its cells and without what states their extent."""
+    """Return a sheet without its cells, what states their extent, and which columns are folded."""
+    data = re.sub(rb' outlineLevelCol="\d+"', b"", data)
+    data = re.sub(rb"<(\w+:)?cols>.*?</(\w+:)?cols>", b"", data, flags=re.DOTALL)
     data = re.sub(rb"<(\w+:)?sheetData\b.*</(\w+:)?sheetData\s*>", b"", data, flags=re.DOTALL)
     return re.sub(rb"<(\w+:)?dimension [^>]*>", b"", data)
 
