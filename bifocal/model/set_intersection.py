@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import ndtri_exp
-from scipy.stats import chi2
 
 from bifocal import rays
 from bifocal.model.flags import FlagLimits, point_flags
@@ -268,4 +266,7 @@ def _precision_and_tests(
 
 def _deviate(total: FloatArray, degrees: FloatArray) -> FloatArray:
     """Return the normal deviate as improbable, both sides, as chi² of some degrees of freedom."""
+    from scipy.special import ndtri_exp  # late: a survey of pairs does without scipy
+    from scipy.stats import chi2
+
     return np.asarray(-ndtri_exp(chi2.logsf(total, np.maximum(degrees, 1)) - np.log(2.0)))

@@ -276,7 +276,8 @@ CONTENTS: list[tuple[str, str, Any, str]] = [
         )
     ),
     *(
-        (RELIEF_SET_LINE, "wall.photos.json", edited("wall.photos.json", *path, value=value), culprit)
+        (RELIEF_SET_LINE, file, edited(file, *path, value=value), culprit)
+        for file in ("wall.photos.json",)
         for path, value, culprit in _RELIEF_SET
     ),
     *(
