@@ -23,7 +23,6 @@ from bifocal.workbook.changing.own_table import add_results
 from bifocal.workbook.changing.update import check_kind, is_same_kind, update_book
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.making.book import write_book
-from bifocal.workbook.pair_workflow import survey_points
 from bifocal.workbook.template_workflow import MOST_ROWS, log_row
 from photocore.errors import InputError
 from photocore.output import check_not_input, relative_name
@@ -85,6 +84,8 @@ def write_result(
     if ending not in (".xlsx", ".xlsm"):
         raise InputError(f"{path}: results are written as .xlsx, .xlsm or .csv.")
     if solution.photos is not None:
+        from bifocal.workbook.pair_workflow import survey_points  # late: it reads photos
+
         said = export_points(path, survey_points(solution), overwrite=overwrite)
         return " ".join([remark("survey.set_as_values", count=len(solution.photos)), *said])
     solution.pair.refuse_ports_that_lean(f"{path}: a survey workbook")

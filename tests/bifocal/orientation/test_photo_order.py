@@ -13,7 +13,7 @@ import pytest
 
 from bifocal import Control, GeometryError, Interior, SiteMeasures
 from bifocal.collimation.job_tasks import task_of
-from bifocal.orientation.align_workflow import AlignOptions, KnownLens, _way, align_photos
+from bifocal.orientation.align_workflow import AlignOptions, KnownLens, align_photos, way_of
 from bifocal.orientation.approximate_orientation import Given, order_of
 from bifocal.orientation.starts.photo_order import first_is_far
 from bifocal.orientation.starts.relative_orientation import Ties
@@ -128,7 +128,7 @@ def test_missing_focal_lengths_are_found_before_the_work(views, monkeypatch) -> 
 def test_both_distances_are_taken_the_same_way_by_page_and_command(tmp_path) -> None:
     """A wall that is not flat shows itself how the cameras stood to it."""
     both = SiteMeasures(distance1=16.0, distance2=8.0)
-    ways = [_way(AlignOptions(site=both, auto=auto)) for auto in (False, True)]
+    ways = [way_of(AlignOptions(site=both, auto=auto)) for auto in (False, True)]
     assert ways[0][0] == ways[1][0] == "site"
     assert ways[0][1].site == ways[1][1].site
     folder = sample_folder(tmp_path)

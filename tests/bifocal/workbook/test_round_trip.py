@@ -202,6 +202,16 @@ def outside_cells(data):
     return re.sub(rb"<(\w+:)?dimension [^>]*>", b"", data)
 
 
+def columns_of(data):
+    """Return what is stated of each column of a sheet, by its number: width, style and the like."""
+    stated = {}
+    for col in re.findall(rb"<(?:\w+:)?col ([^>]*?)/?>", data):
+        said = dict(re.findall(rb'(\w+)="([^"]*)"', col))
+        first, last = int(said.pop(b"min")), int(said.pop(b"max"))
+        stated |= dict.fromkeys(range(first, min(last, first + 500) + 1), said)
+    return stated
+
+
 def cells_of(path, title):
     from photocore.workbook.changing.editor import WorkbookEditor
 
@@ -233,6 +243,9 @@ def test_results_go_in_and_all_else_stays(tmp_path, features):
         if "formulas" not in features:
             assert kept == cells
     last = max(max(cells) for cells in rows_before.values())
+    stated, kept = columns_of(before[field]), columns_of(after[field])
+    for column in range(1, last + 1):
+        assert kept.get(column) == stated.get(column)
     heads = {rows_after[3][column]: column for column in rows_after[3] if column > last}
     for i, r in enumerate(solution.table["r"].tolist()):
         assert rows_after[4 + i][heads["r [m]"]] == r

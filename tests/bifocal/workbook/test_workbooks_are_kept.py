@@ -156,7 +156,7 @@ def test_another_language_changes_labels_and_nothing_the_user_wrote(tmp_path):
     assert book["Points"]["A1"].value == "Punti misurati e loro rilievo"
     assert book["Points"]["A3"].value == "Punto"
     assert book["Points"]["K5"].value == "Point"
-    assert '"tiene"' in book["Check"]["Q13"].value
+    assert '"tiene"' in book["Check"]["W13"].value
     assert "Pagina" in book["Setup"].oddFooter.right.text
     with zipfile.ZipFile(path) as package:
         assert b"Punti sul muro" in package.read("xl/charts/chart1.xml")
