@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -26,8 +25,6 @@ from photocore.errors import GeometryError, InputError, located
 from photocore.jsonfile import read_object, write_object
 from photocore.series import check_index
 
-#: Cameras whose base rises less from the plane, per length along it, stand beside each other.
-SIDEWAYS = 0.05
 #: Parameters of two cameras in air.
 _IN_AIR = len(orientation_precision.NAMES)
 
@@ -242,17 +239,6 @@ class Pair:
     def zoom_centre(self) -> FloatArray:
         """The point e about which image 2 is a zoom of image 1, shape (2,). [m]"""
         return rays.zoom_centre(self.image1.foot, self.image2.foot)
-
-    @property
-    def steepness(self) -> float:
-        """How much the base rises from the plane per length along it; without end on one axis."""
-        aside = float(np.hypot(*(self.image1.nadir - self.image2.nadir)))
-        return (self.d1 - self.d2) / aside if aside > 0 else math.inf
-
-    @property
-    def sideways(self) -> bool:
-        """Whether the cameras stand beside each other rather than before one another."""
-        return self.steepness < SIDEWAYS
 
     @property
     def layers(self) -> Layers | None:

@@ -142,7 +142,7 @@ def most_falling(frame: Frame, typical: float = 0.0) -> float | Float32Array:
     """
     d1, d2 = frame.distances
     share: Any = 1 - d2 / d1
-    if frame.pair.sideways:
+    if frame.sideways:
         x, y = frame.from_centre()
         own_x, own_y = offsets(frame.grid.shape, frame.grid.pixel_of(frame.foot(2).nadir))
         own = np.maximum(np.sqrt(own_x * own_x + own_y * own_y), np.float32(1))

@@ -40,6 +40,8 @@ class Frame:
     pair : Pair
     fields : tuple of RayField, or None
         The rays of both photos where the pair looks through media.
+    sideways : bool
+        Whether the cameras, of a set, stand beside each other rather than before one another.
     """
 
     grid: Grid
@@ -49,6 +51,7 @@ class Frame:
     seen2: BoolArray
     pair: Pair
     fields: tuple[RayField, RayField] | None = None
+    sideways: bool = False
 
     @property
     def centre(self) -> FloatArray:
@@ -239,6 +242,8 @@ def make_frame(
     image2: NDArray[np.uint8],
     grid: Grid,
     relief_range: tuple[float, float] | None = None,
+    *,
+    sideways: bool = False,
 ) -> Frame:
     """Bring both photos onto the grid; each is sampled once, through lens and homography.
 
@@ -256,8 +261,9 @@ def make_frame(
         )
         fields = first_rays, second_rays
     return Frame(
-        grid=grid, image1=first, image2=second, seen1=seen1, seen2=seen2, pair=pair, fields=fields
-    )
+        grid=grid, image1=first, image2=second, seen1=seen1, seen2=seen2, pair=pair, fields=fields,
+        sideways=sideways,
+    )  # fmt: skip
 
 
 def _on_grid(photo: Photo, image: ByteArray, grid: Grid) -> tuple[ByteArray, BoolArray]:

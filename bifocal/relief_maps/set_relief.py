@@ -24,13 +24,15 @@ from bifocal.relief_maps.orientation_sigma import orientation_sigma
 from bifocal.relief_maps.photo_evidence import Witness
 from bifocal.relief_maps.seed import usual_range
 from bifocal.relief_maps.tuning import FUSION
-from bifocal.relief_maps.turned_plane import TurnedPlane
+from bifocal.relief_maps.turned_plane import TurnedPlane, steepness
 from bifocal.remarks import remark
 from photocore.arrays import ByteArray, Float32Array, FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import GeometryError, InputError
 
 Image = NDArray[np.generic]
+#: Cameras whose base rises less from the plane, per length along it, stand beside each other.
+_SIDEWAYS = 0.05
 
 
 def dense_relief(
@@ -124,6 +126,7 @@ class _Wishes(NamedTuple):
     bounds: Bounds | None
     quality: str
     relief_range: tuple[float, float] | None
+    sideways: bool = False
 
     def fulfilled(
         self, pair: Pair, image1: Image, image2: Image, progress: Progress
@@ -299,7 +302,8 @@ def _measured(
     left, bottom, right, top = part.bounds
     middle = np.array([left + right, bottom + top]) / 2
     turn = None if pair.refracted else TurnedPlane.for_base(two, middle)
-    wishes = wishes._replace(gsd=part.gsd, bounds=part.bounds)
+    sideways = steepness(two) < _SIDEWAYS
+    wishes = wishes._replace(gsd=part.gsd, bounds=part.bounds, sideways=sideways)
     if turn is None:
         relief = wishes.fulfilled(pair, images[far], images[near], progress)
         bands = MapBands(relief.r, relief.sigma, relief.quality)

@@ -7,6 +7,7 @@ aside. The map of that plane is brought back by the rays of its own normal.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import cv2
@@ -19,6 +20,13 @@ from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import values_at
 from bifocal.relief_maps.tuning import FUSION
 from photocore.arrays import FloatArray
+
+
+def steepness(photos: tuple[Photo, Photo]) -> float:
+    """Return how much a base rises from the plane per length along it; infinite on one axis."""
+    one, other = photos
+    aside = float(np.hypot(*(one.nadir - other.nadir)))
+    return abs(one.distance - other.distance) / aside if aside > 0 else math.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,15 +54,13 @@ class TurnedPlane:
         middle : ndarray, shape (2,)
             Of what both photos see. [m]
         """
-        one, other = photos
-        base = np.append(one.nadir - other.nadir, one.distance - other.distance)
-        aside = float(np.hypot(*base[:2]))
-        if abs(base[2]) >= FUSION.least_steepness * aside:
+        rise = steepness(photos)
+        if rise >= FUSION.least_steepness:
             return None
-        away = np.append(base[:2], 0.0) / aside
-        if base[2] < 0:  # whichever is farther stays so
-            away = -away
-        turn = np.arctan(FUSION.least_steepness) - np.arctan(abs(base[2]) / aside)
+        one, other = sorted(photos, key=lambda photo: -photo.distance)  # the farther stays so
+        away = np.append(one.nadir - other.nadir, 0.0)
+        away /= np.linalg.norm(away)
+        turn = np.arctan(FUSION.least_steepness) - np.arctan(rise)
         axis = np.array([0.0, 0.0, np.cos(turn)]) + np.sin(turn) * away
         x = np.cross([0.0, 1.0, 0.0], axis)
         x /= np.linalg.norm(x)

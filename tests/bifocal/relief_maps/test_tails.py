@@ -24,7 +24,7 @@ from bifocal.relief_maps import (
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame, radial_stretch
 from bifocal.relief_maps.map_completion import _spread_inwards, tidied
-from bifocal.relief_maps.tuning import COARSE, EDGES, LEVELS, MAP, PROJECTION
+from bifocal.relief_maps.tuning import COARSE, EDGES, EVIDENCE, LEVELS, MAP, PROJECTION
 from photocore.shrinkage import shrink_noise
 
 METRES = [[0.01, 0, -0.995], [0, -0.01, 0.995], [0, 0, 1]]
@@ -190,6 +190,18 @@ def test_less_parallax_takes_less_misfit_to_doubt_what_falls_away():
         frame = frame_of(Pair(image1=FAR, image2=replace(NEAR, distance=distance)))
         doubted.append(falling(frame, relief, misfit)[99, 158:169].any())
     assert doubted == [False, True]
+
+
+def test_cameras_beside_each_other_have_a_limit_of_their_own_in_a_set_alone():
+    pair = Pair(image1=FAR, image2=replace(FAR, distance=17.4, nadir=(8.0, 0.0)))
+    frame = frame_of(pair)
+    plain = EVIDENCE.falls_away * (1 - 17.4 / 17.5) ** EVIDENCE.falls_power
+    precise = edges.precision(0.0)
+    expected = precise * plain + (1 - precise) * EVIDENCE.falls_away_imprecise
+    assert evidence.most_falling(frame) == expected
+    of_set = evidence.most_falling(replace(frame, sideways=True))
+    assert np.shape(of_set) == frame.grid.shape
+    assert (of_set > 10 * expected).all()
 
 
 def step_in_photo_1(edge: float, height: float, difference: float) -> Frame:
