@@ -26,14 +26,14 @@ class Witness:
     Attributes
     ----------
     photo : Photo
-    grey : ndarray of float32, shape (height, width)
+    grey : ndarray of uint8 or float32, shape (height, width)
         Its grey values, reduced to about the pixels of the map.
     size : tuple of int
         Width and height of the whole photo. [px]
     """
 
     photo: Photo
-    grey: Float32Array
+    grey: ByteArray | Float32Array
     size: tuple[int, int]
 
     @classmethod
@@ -44,7 +44,7 @@ class Witness:
         if scale < 1 / FUSION.coarser:
             small = (max(16, round(size[0] * scale)), max(16, round(size[1] * scale)))
             grey = np.asarray(cv2.resize(grey, small, interpolation=cv2.INTER_AREA), np.uint8)
-        return cls(photo, grey.astype(np.float32), size)
+        return cls(photo, grey, size)
 
     def shows(self, xyz: FloatArray) -> Float32Array:
         """Return its grey values at points (X, Y, r), shape (n,); NaN outside the photo."""
@@ -53,7 +53,10 @@ class Witness:
         with np.errstate(invalid="ignore"):
             inside = np.all((pixels >= 0) & (pixels <= np.subtract(self.size, 1)), axis=-1)
         places = np.where(np.asarray(inside)[:, None], (pixels + 0.5) * factors - 0.5, -10.0)
-        values = values_at(self.grey, places.astype(np.float32), cv2.INTER_LINEAR)
+        if not inside.any():
+            return np.full(len(xyz), np.nan, np.float32)
+        grey = np.asarray(self.grey, np.float32)
+        values = values_at(grey, places.astype(np.float32), cv2.INTER_LINEAR)
         return np.where(inside, values, np.float32(np.nan))
 
 

@@ -154,6 +154,9 @@ def _of_set(
     for photo, grey in zip(photos.photos, greys, strict=True):
         photo.check_size(grey.shape[::-1], photo.name)
     grid = _grid(photos, greys, wishes)
+    witnesses = [
+        Witness.of(photo, grey, grid.gsd) for photo, grey in zip(photos.photos, greys, strict=True)
+    ]
     parts = [
         _Part(part, _best_pairs(photos, greys, part)) for _, _, part in grid.tiles(FUSION.tile)
     ]
@@ -179,10 +182,6 @@ def _of_set(
                 found.append(one)
             done += 1
         if found:
-            witnesses = [
-                Witness.of(photo, grey, grid.gsd)
-                for photo, grey in zip(photos.photos, greys, strict=True)
-            ]
             column, row = part.grid.whole_offset_in(grid) or (0, 0)
             cut = np.s_[row : row + part.grid.height, column : column + part.grid.width]
             bands.put(cut, fused(found, witnesses, part.grid))
