@@ -309,9 +309,10 @@ def _upright(view: ForeignView, path: Path | None) -> ForeignView:
     if path is None:
         return view
     info, size = image_info(path), tuple(map(int, view.lens.image_size))
-    if info.size == size and info.orientation in (1, 6, 8):
+    known = (1,) if size[0] == size[1] else (1, 6, 8)
+    if info.size == size and info.orientation in known:
         return view
-    if info.orientation in (6, 8) and info.size == size[::-1]:
+    if info.orientation in known[1:] and info.size == size[::-1]:
         # (x, y) becomes (-y, x) or (y, -x), and so does the vector of tangential terms (p2, p1).
         clockwise = info.orientation == 6
         lens, quarter = view.lens, np.array([[0.0, -1.0], [1.0, 0.0]])
