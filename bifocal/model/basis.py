@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bifocal.model.orientation_precision import NAMES
 from bifocal.model.pair import Pair
 from bifocal.precision import false_relief_of_scale
 
@@ -30,6 +31,9 @@ of relief and in no sigma.'
     d1, d2 = pair.straight_distances
     slip = float(false_relief_of_scale(0.01, d1=d1, d2=d2))
     share = f"of which 1 % of scale is {slip:.2f} m of relief and in no sigma"
-    if pair.whole_orientation is not None:
+    if (known := pair.whole_orientation) is not None:
+        lens = [NAMES.index(f"focal length {number}") for number in (1, 2)]
         share = "with the covariance of its orientation"
+        if not known[lens].any():  # another program's cameras, placed in a frame by what is known
+            share = "with the covariance of its frame and scale alone"
     return f"Sigmas rest on: {picks}; {setup}, {share}{'; ' + more if more else ''}."

@@ -20,6 +20,7 @@ from bifocal import (
     read_image,
     write_colmap,
 )
+from bifocal.model.basis import rests_on
 from photocore.programs.photos import PhotoFinder
 from photocore.programs.projects import read_foreign_project
 from tests.builders import foreign_projects as made
@@ -184,6 +185,8 @@ def test_sigmas_hold_what_the_length_and_the_control_are_worth(tmp_path: Path) -
     np.testing.assert_allclose(
         pair.covariance_of_orientation(place)[0], 1e-4 * place.T @ place, atol=1e-9
     )
+    said = rests_on(pair, setup="the pair as given", picks="picks")
+    assert said.endswith("the pair as given, with the covariance of its frame and scale alone.")
     control = tmp_path / "control.csv"
     lines = [f"{name},{x},{y},{r}" for name, (x, y, r) in CORNERS.items()]
     control.write_text("id,X [m],Y [m],r [m]\n" + "\n".join(lines) + "\n")
@@ -253,6 +256,20 @@ def test_a_photo_that_its_exif_data_turn_is_taken_upright(tmp_path: Path) -> Non
         column, row = straight.T
         upright = [height - 1 - row, column] if orientation == 6 else [row, width - 1 - column]
         np.testing.assert_allclose(turned.project(xyz)[1], np.transpose(upright), atol=1e-6)
+
+
+@pytest.mark.parametrize("orientation", [6, 8])
+def test_a_square_photo_that_its_exif_data_turn_is_refused(
+    tmp_path: Path, orientation: int
+) -> None:
+    path, shots, _ = project_of(tmp_path, "colmap text")
+    xyz = made.to_world(made.wall_points())
+    made.write_colmap_text(path, [shots[0]._replace(size=(200, 200)), *shots[1:]], xyz)
+    data = Image.Exif()
+    data[274] = orientation
+    Image.new("L", (200, 200), 90).save(tmp_path / shots[0].file, exif=data)
+    with pytest.raises(InputError, match=rf"turned by its EXIF data \({orientation}\)"):
+        photos_from_project(path, tmp_path / "wall.photos.json")
 
 
 def test_photos_are_found_where_programs_keep_them(tmp_path: Path) -> None:
