@@ -14,12 +14,12 @@ from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.model.photo_set import PhotoSet
 from bifocal.projects.project_points import chosen, read_points, sparse_points
-from bifocal.projects.scale import by_control, by_length, of_cameras
+from bifocal.projects.scale import by_control, of_cameras
 from bifocal.projects.wall_frame import found_frame, framed, turned_by_lines
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.camera.lensformats import lens_data
-from photocore.camera.pinhole import Pinhole, plane_from_pixel
+from photocore.camera.pinhole import Pinhole, plane_from_pixel, project
 from photocore.camera.similarity import Similarity
 from photocore.errors import InputError
 from photocore.images import image_info
@@ -208,7 +208,7 @@ def _frame(
         points = chosen(named, options.wall, "--wall")
         middle = points.mean(axis=0)
         _, spread, axes = np.linalg.svd(points - middle, full_matrices=False)
-        if spread[1] < NARROWEST * spread[0]:
+        if spread[1] <= NARROWEST * spread[0]:
             raise InputError("--wall: its points lie nearly on one line; add one well beside it.")
         frame = framed(project, axes[2], points, level)
     else:
@@ -217,8 +217,13 @@ def _frame(
     if options.length:
         *ends, metres = options.length
         length = _metres(metres, ends)
-        between = chosen(named, tuple(ends), "--length")
-        frame, covariance = by_length(frame, between, length, options.sigma_length)
+        one, other = chosen(named, tuple(ends), "--length")
+        if not (apart := float(np.linalg.norm(other - one))):
+            raise InputError(
+                f"--length: {ends[0]} and {ends[1]} are one place in {options.points}."
+            )
+        frame = replace(frame, scale=length / apart)
+        covariance[6, 6] = (options.sigma_length / length) ** 2
         scale = remark("projects.by_length", ends=" - ".join(ends), length=length)
     elif options.unit:
         frame = replace(frame, scale=UNITS[options.unit])
@@ -248,9 +253,7 @@ def _of_the_wall(
         size = np.array(view.lens.image_size)
         inside = 0
         if camera.centre[2] > 0 and camera.rotation[2, 2] < 0:
-            away = (places - camera.centre) @ (camera.matrix @ camera.rotation).T
-            ahead = away[away[:, 2] > 0]
-            pixels = ahead[:, :2] / ahead[:, 2:]
+            pixels = project(camera, places)
             inside = int(((pixels > -0.5) & (pixels < size - 0.5)).all(axis=1).sum())
         if inside >= max(1.0, LEAST_SHARE * len(places)):
             placed.append(view)

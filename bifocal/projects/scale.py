@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,33 +20,10 @@ from photocore.tables import read_table
 MOST_MISS = 0.02
 
 
-def by_length(
-    frame: Similarity, ends: FloatArray, length: float, sigma: float
-) -> tuple[Similarity, FloatArray]:
-    """Return a frame scaled by the length between two points, and the covariance of that.
-
-    Parameters
-    ----------
-    frame : Similarity
-    ends : ndarray, shape (2, 3)
-        In the project's frame.
-    length, sigma : float
-        [m]
-
-    Returns
-    -------
-    Similarity, ndarray of shape (7, 7)
-        Covariance of shift, turn and scale: see `of_cameras`.
-    """
-    covariance = np.zeros((7, 7))
-    covariance[6, 6] = (sigma / length) ** 2
-    return replace(frame, scale=length / float(np.linalg.norm(ends[1] - ends[0]))), covariance
-
-
 def by_control(
     points: dict[str, FloatArray], path: Path, sigma: float
 ) -> tuple[Similarity, FloatArray, str]:
-    """Return the frame of control points, its covariance as `by_length`, and how well it fits.
+    """Return the frame of control points, its covariance (`of_cameras`), and how well it fits.
 
     Parameters
     ----------

@@ -209,6 +209,15 @@ def _similarity(source: np.ndarray, target: np.ndarray) -> tuple[float, np.ndarr
     return scale, turn, target.mean(0) - scale * turn @ source.mean(0)
 
 
+def test_a_length_between_two_names_of_one_place_is_refused(tmp_path: Path) -> None:
+    path, shots, _ = project_of(tmp_path, "colmap text")
+    table = picks(tmp_path, shots, {"A": CORNERS["A"], "B": CORNERS["A"]})
+    with pytest.raises(InputError, match="A and B are one place"):
+        photos_from_project(
+            path, tmp_path / "o.photos.json", ProjectOptions(points=table, length=("A", "B", "3"))
+        )
+
+
 def test_a_set_goes_out_as_colmap_and_comes_back(tmp_path: Path) -> None:
     path, shots, _ = project_of(tmp_path, "opensfm")
     options = ProjectOptions(points=picks(tmp_path, shots, CORNERS), length=("A", "B", "3"))
