@@ -80,8 +80,14 @@ def read_colmap_model(folder: Path) -> ColmapModel:
     InputError
         Naming file and place of what cannot be read.
     """
-    if not is_colmap(folder) and is_colmap(folder, ".bin"):
-        return _binary_model(folder)
+    binary = not is_colmap(folder) and is_colmap(folder, ".bin")
+    model = _binary_model(folder) if binary else _text_model(folder)
+    if not model.images:
+        raise InputError(f"{folder / 'images'}{'.bin' if binary else '.txt'}: holds no images.")
+    return model
+
+
+def _text_model(folder: Path) -> ColmapModel:
     lenses: dict[str, LensData] = {}
     ports: dict[str, Sequence[str]] = {}
     path = folder / "cameras.txt"
@@ -94,7 +100,7 @@ def read_colmap_model(folder: Path) -> ColmapModel:
     images = list(_images(folder / "images.txt", lenses))
     points = folder / "points3D.txt"
     ids, xyz = _points(points) if points.is_file() else ([], np.empty((0, 3)))
-    return _whole(ColmapModel(lenses, ports, images, ids, xyz), path)
+    return ColmapModel(lenses, ports, images, ids, xyz)
 
 
 def write_colmap_model(
@@ -164,12 +170,6 @@ def image_words(rotation: FloatArray, translation: FloatArray, camera: str, name
 def digits(values: Sequence[float] | FloatArray) -> str:
     """Return numbers with all their digits, a blank between them."""
     return " ".join(f"{v:.17g}" for v in values)
-
-
-def _whole(model: ColmapModel, path: Path) -> ColmapModel:
-    if not model.images:
-        raise InputError(f"{path.with_stem('images')}: holds no images.")
-    return model
 
 
 def _images(path: Path, lenses: dict[str, LensData]) -> Iterator[ColmapImage]:
@@ -251,24 +251,18 @@ class _Bytes:
         """Return how many follow."""
         return int(self.take("Q")[0])
 
-    def finite(self, count: int) -> FloatArray:
-        """Return so many float64, all of them numbers."""
-        values = np.array(self.take(f"{count}d"))
-        if not (np.abs(values) <= LARGEST).all():
+    def finite(self, count: int, kind: Any = "<f8") -> Any:
+        """Return so many values of a kind, all of them numbers that float64 can hold."""
+        kind = np.dtype(kind)
+        values = np.frombuffer(self.data, kind, count, self.skip(count * kind.itemsize))
+        if not (np.abs(values["xy"] if kind.names else values) <= LARGEST).all():
             raise InputError(f"{self.path}: holds what is no finite number before {self.place}.")
         return values
 
     def keypoints(self) -> FloatArray:
         """Return x, y and the number of the point of all that follow, shape (n, 3)."""
-        count = self.count()
-        start = self.skip(24 * count)
-        pixels, ids = (
-            np.frombuffer(self.data, kind, 3 * count, start).reshape(-1, 3)
-            for kind in ("<f8", "<i8")
-        )
-        if not (np.abs(pixels[:, :2]) <= LARGEST).all():
-            raise InputError(f"{self.path}: holds what is no finite number before {self.place}.")
-        return np.column_stack([pixels[:, :2], ids[:, 2]])
+        rows = self.finite(self.count(), [("xy", "<f8", 2), ("id", "<i8")])
+        return np.column_stack([rows["xy"], rows["id"]])
 
     def text(self) -> str:
         """Return the text up to the next zero."""
@@ -307,5 +301,4 @@ def _binary_model(folder: Path) -> ColmapModel:
             xyz.append(file.finite(3))
             file.skip(11)  # colour and error
             file.skip(8 * file.count())
-    model = ColmapModel(lenses, {}, images, ids, np.array(xyz).reshape(-1, 3))
-    return _whole(model, folder / "images.bin")
+    return ColmapModel(lenses, {}, images, ids, np.array(xyz).reshape(-1, 3))

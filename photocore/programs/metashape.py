@@ -12,10 +12,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from photocore.arrays import FloatArray
+from photocore.arrays import FloatArray, floats_of_words
 from photocore.camera.lensformats import LensData, metashape_lens, xml_root
 from photocore.camera.rotation import checked_rotation, nearest_rotation
-from photocore.errors import LARGEST, InputError
+from photocore.errors import InputError
 from photocore.programs.model import ForeignProject, ForeignView
 from photocore.textfile import read_text
 
@@ -94,10 +94,7 @@ def _world_from_chunk(
 
 
 def _numbers(text: str, count: int, path: Path, where: str) -> FloatArray:
-    try:
-        values = np.array([float(word) for word in text.split()])
-    except ValueError:
-        raise InputError(f"{path}: the {where} holds what is no number.") from None
-    if len(values) != count or not (np.abs(values) <= LARGEST).all():
+    values = floats_of_words(text.split(), path, where)
+    if len(values) != count:
         raise InputError(f"{path}: the {where} must be {count} numbers, found {len(values)}.")
     return values
