@@ -24,7 +24,7 @@ SIGMA_RADIAL = 0.1
 SAME_FOCAL = 0.01
 
 #: Upright pixel from stored pixel for each EXIF orientation: the linear part.
-_TURNS = {
+TURNS = {
     1: ((1, 0), (0, 1)), 2: ((-1, 0), (0, 1)), 3: ((-1, 0), (0, -1)), 4: ((1, 0), (0, -1)),
     5: ((0, 1), (1, 0)), 6: ((0, -1), (1, 0)), 7: ((0, -1), (-1, 0)), 8: ((0, 1), (-1, 0)),
 }  # fmt: skip
@@ -245,7 +245,7 @@ def lens_of_photo(lens: Lens, size: tuple[int, int], *, orientation: int = 1) ->
         )
     matrix = np.diag([factor, factor, 1.0]) @ lens.camera_matrix
     matrix[:2, 2] += (factor - 1.0) / 2.0  # pixel centres are at integers
-    turn = np.array(_TURNS[orientation], dtype=np.float64)
+    turn = np.array(TURNS[orientation], dtype=np.float64)
     coefficients = np.array(lens.coefficients)
     if orientation != 1:
         matrix = _turned_matrix(matrix, turn, size)

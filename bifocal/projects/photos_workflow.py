@@ -9,6 +9,7 @@ from pathlib import Path, PurePath
 
 import numpy as np
 
+from bifocal.model.interior_orientation import TURNS, lens_of_photo
 from bifocal.model.lens import Lens
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
@@ -18,7 +19,7 @@ from bifocal.projects.scale import by_control, of_cameras
 from bifocal.projects.wall_frame import found_frame, framed, turned_by_lines
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.camera.lensformats import lens_data
+from photocore.camera.lensformats import LensData
 from photocore.camera.pinhole import Pinhole, plane_from_pixel, project
 from photocore.camera.similarity import Similarity
 from photocore.errors import InputError
@@ -316,22 +317,10 @@ def _upright(view: ForeignView, path: Path | None) -> ForeignView:
     if info.size == size and info.orientation in known:
         return view
     if info.orientation in known[1:] and info.size == size[::-1]:
-        # (x, y) becomes (-y, x) or (y, -x), and so does the vector of tangential terms (p2, p1).
-        clockwise = info.orientation == 6
-        lens, quarter = view.lens, np.array([[0.0, -1.0], [1.0, 0.0]])
-        quarter = quarter if clockwise else quarter.T
-        fx, fy = lens.camera_matrix.diagonal()[:2]
-        column, row = quarter @ lens.camera_matrix[:2, 2]
-        middle = (column + size[1] - 1, row) if clockwise else (column, row + size[0] - 1)
-        terms = lens.coefficients.copy()
-        if lens.model == "opencv" and len(terms) >= 4:
-            terms[[3, 2]] = quarter @ terms[[3, 2]]
-        turned = lens_data(
-            (fy, fx), middle, terms.tolist(), info.size, lens.source,
-            fisheye=lens.model == "fisheye",
-        )  # fmt: skip
+        lens = lens_of_photo(Lens(**view.lens._asdict()), info.size, orientation=info.orientation)
         rotation = view.rotation.copy()
-        rotation[:2] = quarter @ rotation[:2]
+        rotation[:2] = np.array(TURNS[info.orientation]) @ rotation[:2]
+        turned = LensData(*(getattr(lens, name) for name in LensData._fields))
         return view._replace(lens=turned, rotation=rotation)
     turn = f", turned by its EXIF data ({info.orientation})" if info.orientation != 1 else ""
     raise InputError(
