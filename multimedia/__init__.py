@@ -28,6 +28,7 @@ Cameras
     project, projection_status   image coordinates through the media, and why there are none
     image_rays                the ray of an image point in the object's medium
     resect, Resection         a camera from control points
+    resect_many, CameraPoses  the frames of a moving camera at once
     intersect, IntersectedPoints   points from image points, least squares
     intersect_rays, intersect_pairs   fast ways without precision
     PointStatus               why a point is missing or doubtful
