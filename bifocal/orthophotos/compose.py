@@ -10,6 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bifocal.faces.faced_surface import FacedSurface, beneath
+from bifocal.faces.faces import Faces
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.image import ImageArray
 from bifocal.model.pair import Pair
@@ -50,6 +52,7 @@ def orthophoto(
     image: ImageArray | Sequence[ImageArray],
     relief: ReliefMap | Surface | ArrayLike | None = None,
     *,
+    faces: Faces | None = None,
     gsd: float | None = None,
     bounds: Bounds | None = None,
     source: int = 1,
@@ -69,6 +72,8 @@ def orthophoto(
         each pixel from the one that sees it best.
     relief : ReliefMap, Surface or float, optional
         Where the wall is; a number is a parallel plane, None the reference plane. [m]
+    faces : Faces, optional
+        Planes, edges and occluders that were drawn; relief obeys them at the orthophoto's pixels.
     gsd : float, optional
         Pixel size; by default that of the relief map, else of the photo in its middle. [m]
     bounds : tuple of float, optional
@@ -110,6 +115,8 @@ def orthophoto(
     """
     options = options or OrthoOptions()
     surface = as_surface(relief)
+    if faces:
+        surface = FacedSurface(surface, faces)
     if isinstance(pair, PhotoSet):
         pair, image = _of_set(pair, image)
     count = len(pair.photos) if isinstance(pair, PhotosOfSet) else 2
@@ -183,7 +190,8 @@ def choose_grid(
 ) -> Grid:
     """Return the grid asked for, by default the relief map's own, else that of the photo."""
     photo = pair.photo(number)
-    own = surface.grid if isinstance(surface, MapSurface) else None
+    under = beneath(surface)
+    own = under.grid if isinstance(under, MapSurface) else None
     if own is not None and bounds is None and (gsd is None or gsd == own.gsd):
         return own
     if gsd is None:
@@ -224,6 +232,7 @@ def render_window(
         # Where relief is unknown that of the surroundings shows the photo itself, slightly off.
         relief, _ = fill_holes(relief, ~unknown, unknown)
     looks = [_look(view, surface, wide, relief, options) for view in views]
+    looks = _past_occluders(views, looks, surface, wide)
     image, source = _choose(views, looks, wide, options)
     hidden: BoolArray = (source == Source.NONE) & np.logical_or.reduce([o.hidden for o in looks])
     if isinstance(surface, CompletedSurface):
@@ -253,6 +262,26 @@ def _look(
     if options.mask_hidden:
         hidden = tidied(hidden_from(surface, grid, view.photo.foot, relief)) & inside
     return _Look(view.sample(column, row, options.interpolation), inside, hidden)
+
+
+def _past_occluders(
+    views: Sequence[SourcePhoto], looks: list[_Look], surface: Surface, grid: Grid
+) -> list[_Look]:
+    """Return how photos see a window with what occluders cover hidden."""
+    under = surface.surface if isinstance(surface, CompletedSurface) else surface
+    if not isinstance(under, FacedSurface) or not under.faces.occluders:
+        return looks
+    covered = under.occluded(grid)
+    first = next((view.photo.foot for view in views if view.number == 1), None)
+    passed = []
+    for view, look in zip(views, looks, strict=True):
+        own = covered
+        if view.number != 1:
+            own = np.zeros(grid.shape, bool)
+            if first is not None:
+                own = under.occluded_in(grid, view.photo.foot, first)
+        passed.append(look._replace(hidden=look.hidden | (own & look.inside)))
+    return passed
 
 
 def _choose(

@@ -10,6 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.faces.faced_surface import FacedSurface, beneath
+from bifocal.faces.faces import Faces
+from bifocal.faces.faces_files import given_faces
 from bifocal.files.photos import photo_info
 from bifocal.files.point_tables import read_survey_points
 from bifocal.model.geotiff import (
@@ -25,6 +28,7 @@ from bifocal.model.photo_alone import PhotoAlone
 from bifocal.model.photo_set import PhotoSet
 from bifocal.model.photos_of_set import PhotosOfSet
 from bifocal.model.points import SurveyPoints
+from bifocal.model.relief_map import measured_part
 from bifocal.model.surface import EVERYWHERE, FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.compose import choose_grid, render
 from bifocal.orthophotos.ortho_image import OF_SET, OrthoOptions, Source
@@ -61,6 +65,8 @@ class OrthoTask:
         Ids of points along edges.
     plane : float
         Relief of the plane where neither is given. [m]
+    faces : Faces or Path, optional
+        Planes, edges and occluders that were drawn, or their file.
     image : str
         ``1``, ``2`` or ``both``.
     gsd, bounds
@@ -83,6 +89,7 @@ class OrthoTask:
     points: Path | SurveyPoints | None = None
     breaklines: Sequence[Sequence[str]] = ()
     plane: float = 0.0
+    faces: Faces | Path | None = None
     image: str = "1"
     gsd: float | None = None
     bounds: Bounds | None = None
@@ -201,6 +208,7 @@ def open_surface(
     task: OrthoTask, pair: Pair
 ) -> Iterator[tuple[Surface, RasterReader | None, tuple[str, ...]]]:
     """Yield the relief asked for, checked against the cameras' distances, its map, and remarks."""
+    faces, told = given_faces(task.faces)
     with ExitStack() as stack:
         surface: Surface = FlatSurface(task.plane)
         reader: RasterReader | None = None
@@ -214,13 +222,16 @@ def open_surface(
                 surface = MapSurface(reader.grid, reader.read_floats)
         elif task.points is not None:
             surface, remarks = _triangles(task.points, task.breaklines)
+        if faces:
+            measured = None if reader is None else measured_part(reader)
+            surface = FacedSurface(surface, faces, measured)
         low, high = surface.extremes(EVERYWHERE)
         nearest = min(pair.image1.distance, pair.image2.distance)
         named = task.relief or (task.points.name if task.points is not None else "relief")
         if high >= nearest or low < -20 * pair.image1.distance:
             about = {"name": named, "low": low, "high": high, "near": nearest}
             raise InputError(remark("ortho.relief_of_another_pair", **about))
-        yield surface, reader, remarks
+        yield surface, reader, (*remarks, *told)
 
 
 def _triangles(
@@ -266,8 +277,9 @@ def planned_grid(pair: Pair, surface: Surface, task: OrthoTask) -> Grid:
 def _grid(pair: Pair, first: int, size: tuple[int, int], surface: Surface, task: OrthoTask) -> Grid:
     """Return the grid, or ask back if it cannot be meant."""
     bounds = task.bounds
-    if bounds is None and isinstance(surface, TriangleSurface):
-        bounds = surface.bounds
+    under = beneath(surface)
+    if bounds is None and isinstance(under, TriangleSurface):
+        bounds = under.bounds
     grid = choose_grid(pair, first, size, surface, gsd=task.gsd, bounds=bounds)
     own = pair.photo(first).gsd(size)
     ratio = grid.gsd / own
