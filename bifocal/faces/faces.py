@@ -81,7 +81,7 @@ class Occluder:
     relief: float | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Faces:
     """All that was drawn of a wall; where faces overlap the later one counts.
 

@@ -61,7 +61,8 @@ def orthophoto(
     """Return the orthophoto of a wall in memory.
 
     Every pixel is taken from the original photo in one step that joins relief, homography and
-    lens distortion. Pixels that relief hides from the camera are left empty.
+    lens distortion. The picture is whole unless asked for otherwise; its source says of each
+    pixel what it rests on.
 
     Parameters
     ----------
@@ -205,7 +206,7 @@ def render(
     views: Sequence[SourcePhoto], surface: Surface, grid: Grid, options: OrthoOptions
 ) -> Iterator[tuple[int, int, Tile]]:
     """Yield (column, row, tile) of an orthophoto, each in memory that does not grow with it."""
-    if options.complete:
+    if not options.measured_only:
         surface = CompletedSurface(surface, grid)
     for column, row, window in grid.tiles(COMPOSE.tile):
         yield column, row, render_window(views, surface, window, options)
@@ -215,7 +216,7 @@ def render_window(
     views: Sequence[SourcePhoto], surface: Surface, window: Grid, options: OrthoOptions
 ) -> Tile:
     """Return one window of an orthophoto."""
-    close = options.fill or options.complete
+    close = options.fill or not options.measured_only
     margin = COMPOSE.fill_reach if close else 0
     if options.mask_hidden:
         margin = max(margin, TIDYING.margin)
@@ -321,10 +322,13 @@ def _share_of_first(
         return np.where(second, np.float32(0), np.float32(1))
     if feather == 0:
         return first.astype(np.float32)
-    # Towards the rim of the first photo's part the second fades in, where it sees the wall at all.
-    depth = cv2.distanceTransform(first.astype(np.uint8), cv2.DIST_L2, 3)
+    # The second fades in towards where it alone sees the wall, not towards any other rim.
+    alone = second & ~first
+    if not alone.any():
+        return first.astype(np.float32)
+    depth = cv2.distanceTransform((~alone).astype(np.uint8), cv2.DIST_L2, 3)
     share = np.clip(depth / np.float32(feather), 0, 1)
-    return np.where(second, share, first.astype(np.float32)).astype(np.float32)
+    return np.where(second & first, share, first.astype(np.float32)).astype(np.float32)
 
 
 def _masked(image: ImageArray, keep: BoolArray) -> ImageArray:

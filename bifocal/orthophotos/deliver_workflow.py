@@ -403,7 +403,8 @@ def _notes(pair: Pair, grid: Grid, wish: DeliverTask, task: OrthoTask) -> tuple[
     relief, say = task.relief or task.points, words_of("bifocal.orthophotos", wish.language)
     return (
         say("pixel", size=grid.gsd * 1000, dpi=dpi_at_scale(grid.gsd, wish.scale)),
-        wish.camera or say(f"photo_{task.image}", d1=pair.image1.distance, d2=pair.image2.distance),
+        wish.camera
+        or say(f"photo_{task.photo_words}", d1=pair.image1.distance, d2=pair.image2.distance),
         *((say("media", media=media_words(pair.layers)),) if pair.layers else ()),
         say("relief_of", name=relief.name) if relief else say("relief_plane", plane=task.plane),
         f"{program()}, {today()}",

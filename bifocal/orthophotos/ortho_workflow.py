@@ -68,7 +68,7 @@ class OrthoTask:
     faces : Faces or Path, optional
         Planes, edges and occluders that were drawn, or their file.
     image : str
-        ``1``, ``2`` or ``both``.
+        ``1``, ``2`` or ``both``; empty: of a whole picture both, else 1.
     gsd, bounds
         Pixel size and box; None for the natural ones. [m]
     scale : float, optional
@@ -90,7 +90,7 @@ class OrthoTask:
     breaklines: Sequence[Sequence[str]] = ()
     plane: float = 0.0
     faces: Faces | Path | None = None
-    image: str = "1"
+    image: str = ""
     gsd: float | None = None
     bounds: Bounds | None = None
     scale: float | None = None
@@ -101,10 +101,16 @@ class OrthoTask:
     any_size: bool = False
     overviews: bool | None = None
 
+    @property
+    def photo_words(self) -> str:
+        """Which photos it is made of: ``1``, ``2`` or ``both``."""
+        return self.image or ("1" if self.options.measured_only else "both")
+
     @classmethod
     def from_given(cls, given: Mapping[str, Any], **more: Any) -> OrthoTask:
         """Return the task of options by the names of the command's; absent ones by default."""
         own = {key: value for key, value in given.items() if value is not None}
+        own.pop("complete", None)  # of survey files from when whole pictures were asked for
         if "mask" in own:
             own["mask_hidden"] = own.pop("mask")
         how = {item.name: own.pop(item.name) for item in fields(OrthoOptions) if item.name in own}
@@ -134,12 +140,9 @@ def make_ortho(
     check_not_input(out, task.relief, *pair.photo_files)
     check_writable(out, overwrite=overwrite)
     with open_surface(task, pair) as (surface, _, remarks):
-        numbers: tuple[int, ...] = {"1": (1,), "2": (2,), "both": (1, 2)}[task.image]
-        if isinstance(pair, PhotosOfSet):
-            if task.image != "1":
-                raise InputError(remark("ortho.image_of_set"))
-            numbers = tuple(range(1, len(pair.photos) + 1))
-        images = {number: read_image(photo_info(pair, number).path) for number in numbers}
+        images, said = _images(pair, task)
+        remarks += said
+        numbers = tuple(images)
         height, width = images[numbers[0]].shape[:2]
         grid = _grid(pair, numbers[0], (width, height), surface, task)
         photos, notes = _sources(pair, images, surface, grid, task)
@@ -184,6 +187,32 @@ def make_ortho(
     )
 
 
+def _images(pair: Pair, task: OrthoTask) -> tuple[dict[int, ImageArray], tuple[str, ...]]:
+    """Return the photos that give the colours by their numbers, and remarks.
+
+    A near photo that nobody asked for, and that cannot be used beside the far one, is left out.
+    """
+    if isinstance(pair, PhotosOfSet):
+        if task.image:
+            raise InputError(remark("ortho.image_of_set"))
+        numbers = range(1, len(pair.photos) + 1)
+        return {number: read_image(photo_info(pair, number).path) for number in numbers}, ()
+    words = "1" if isinstance(pair, PhotoAlone) else task.photo_words
+    chosen: tuple[int, ...] = {"1": (1,), "2": (2,), "both": (1, 2)}[words]
+    images = {chosen[0]: read_image(photo_info(pair, chosen[0]).path)}
+    for number in chosen[1:]:
+        try:
+            images[number] = read_image(photo_info(pair, number).path)
+            first, second = images[1], images[number]
+            if first.dtype != second.dtype or first.ndim != second.ndim:
+                raise InputError(remark("ortho.photos_differ"))
+        except InputError as error:
+            if task.image:
+                raise
+            return {1: images[1]}, (remark("ortho.far_photo_alone", why=str(error)),)
+    return images, ()
+
+
 def not_measured(shares: dict[str, float], language: str = "en") -> str:
     """Return in words how much of a picture was not measured; empty if all that is seen was."""
     say, parts = words_of("bifocal.orthophotos", language), ("interpolated", "plane", "filled")
@@ -192,14 +221,14 @@ def not_measured(shares: dict[str, float], language: str = "en") -> str:
 
 def _advice(shares: dict[str, float], task: OrthoTask) -> list[str]:
     """Return what could be done about the empty part of a picture."""
-    if shares["none"] < PIXELS.worth_a_remark or task.options.complete:
+    if shares["none"] < PIXELS.worth_a_remark or not task.options.measured_only:
         return []
     ways = []
-    if task.image != "both":
+    if task.photo_words != "both":
         ways.append(remark("ortho.way_both"))
     if not task.options.fill:
         ways.append(remark("ortho.way_fill"))
-    ways.append(remark("ortho.way_complete"))
+    ways.append(remark("ortho.way_whole"))
     return [remark("ortho.empty", share=shares["none"], ways="; ".join(ways))]
 
 
@@ -330,7 +359,7 @@ def _tags(pair: Pair, task: OrthoTask) -> dict[str, str]:
     """Return what the file should remember of its making."""
     relief = task.relief or task.points
     return {
-        "BIFOCAL_IMAGE": "all" if isinstance(pair, PhotosOfSet) else task.image,
+        "BIFOCAL_IMAGE": "all" if isinstance(pair, PhotosOfSet) else task.photo_words,
         "BIFOCAL_RELIEF": relief.name if relief else f"plane r = {task.plane:g} m",
         "BIFOCAL_D1": f"{pair.image1.distance:.6g}",
         **({} if isinstance(pair, PhotoAlone) else {"BIFOCAL_D2": f"{pair.image2.distance:.6g}"}),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from bifocal.faces.faces import Faces
 from bifocal.faces.faces_files import given_faces
+from bifocal.faces.suggestions import suggest_faces
 from bifocal.files.photos import photo_infos
 from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
@@ -119,6 +120,9 @@ def relief_of_pair(
             descriptions={"sigma": "sigma of relief, m"}, overwrite=job.overwrite,
         )  # fmt: skip
         written.append(job.cloud)
+    if job.suggested is not None:
+        suggest_faces(result, of_set, images).write(job.suggested, overwrite=job.overwrite)
+        written.append(job.suggested)
     basis = rests_on(
         pair, setup="the pair as given", picks="the photos' own misfit across the radius, measured"
     )
@@ -181,6 +185,7 @@ def _check_outputs(job: ReliefJob, *inputs: Path) -> None:
     check_ending(job.preview, "the preview is written as .png.", ".png")
     rule = "point clouds are written as .ply, .las or .laz."
     check_ending(job.cloud, rule, ".ply", ".las", ".laz")
-    for path in (job.out, job.preview):
-        check_not_input(path, *inputs)
-    check_all_writable(job.out, job.preview, job.cloud, overwrite=job.overwrite)
+    check_ending(job.suggested, "suggested faces are written as .geojson.", ".geojson")
+    for path in (job.out, job.preview, job.suggested):
+        check_not_input(path, *inputs, *((job.faces,) if isinstance(job.faces, Path) else ()))
+    check_all_writable(job.out, job.preview, job.cloud, job.suggested, overwrite=job.overwrite)
