@@ -36,7 +36,7 @@ The page
     recording                 what the outputs written within it say made them
 Sample pairs                  SAMPLE, WATER_SAMPLE: folders of photos with exact truth
 
-What they take and give: Bounds, BreakLine, ChangedRegion, CheckResult, Comparison, Face, Faces,
+They take and give: Bounds, BreakLine, ChangedRegion, CheckResult, Comparison, Face, Faces,
 FlagLimits, FlatSurface, Foot, Grid, Intersection, KnownPoints, Layers, MapSurface, MediaPath,
 NamedPoints, Occluder, OrientationCheck, Pinhole, PlanePicks, PointObservations, Progress,
 ProjectedPoints, ProjectOptions, ProjectPhotos, RadialDivision, RankedPair, Rectification,
