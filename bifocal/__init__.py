@@ -7,8 +7,7 @@ relief. X runs right, Y up, relief r towards the cameras [m]; pixels are (column
 By hand, the equations
     relief                    r from the radial distances of a point on both photos, Eq. (6)
     relief_from_displacement, relief_displacement   of one photo, Eqs. (2) and (1)
-    relief_displacements      those on both, from the distances, Eq. (5)
-    plane_coordinates         x, y from radial distance and angle, Eq. (7)
+    relief_displacements, plane_coordinates   those on both, Eq. (5); x, y of one, Eq. (7)
 The pair
     Pair, Photo               both cameras; read and write pair files, intersect and project points
     PhotoSet                  two or more photos of one wall; a pair is the set of two
@@ -36,7 +35,7 @@ The page
     recording                 what the outputs written within it say made them
 Sample pairs                  SAMPLE, WATER_SAMPLE: folders of photos with exact truth
 
-They take and give: Bounds, BreakLine, ChangedRegion, CheckResult, Comparison, Face, Faces,
+What they take and give: Bounds, BreakLine, ChangedRegion, CheckResult, Comparison, Face, Faces,
 FlagLimits, FlatSurface, Foot, Grid, Intersection, KnownPoints, Layers, MapSurface, MediaPath,
 NamedPoints, Occluder, OrientationCheck, Pinhole, PlanePicks, PointObservations, Progress,
 ProjectedPoints, ProjectOptions, ProjectPhotos, RadialDivision, RankedPair, Rectification,
