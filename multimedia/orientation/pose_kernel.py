@@ -196,11 +196,10 @@ def point_equations(
     # On the axis V' t^2 = (F' - V) / 2 and rho^2 vanish together; what V' is does not matter there.
     by_rho2 = (value - slope) * value / (np.maximum(rho2, 1e-300) * slope)
     change = _less(_times(m, 1.0 + by_w), by_rho2, along)
-    rows = (
-        _row(lens[0], x, y, scale, c, rotation, moving, m, change, value / slope + by_w, away, u),
-        _row(lens[1], x, y, scale, c, rotation, moving, m, change, value / slope + by_w, away, u),
-    )
-    return settled & (first > 0.0) & (depth >= 0.0) & (seen[2] < 0.0), x, y, rows[0], rows[1]
+    by_height = value / slope + by_w
+    by_x = _row(lens[0], x, y, scale, c, rotation, moving, m, change, by_height, away, u)
+    by_y = _row(lens[1], x, y, scale, c, rotation, moving, m, change, by_height, away, u)
+    return settled & (first > 0.0) & (depth >= 0.0) & (seen[2] < 0.0), x, y, by_x, by_y
 
 
 def _rows(
