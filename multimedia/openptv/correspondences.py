@@ -9,6 +9,7 @@ import numpy as np
 
 from multimedia.media.camera import Camera, Sensor
 from multimedia.media.projection import Media, project
+from multimedia.openptv.ray_meetings import meeting_rays
 from multimedia.orientation.intersection import intersect_rays
 from multimedia.orientation.object_rays import image_rays, nearest_points
 from photocore.arrays import FloatArray, IntArray
@@ -19,8 +20,6 @@ TOLERANCE = 2.0
 #: Frames of targets that have nothing to do with each other, and how far they are displaced: so
 #: many pixels, or so many tolerances. Risk of calling chance particles.
 DECOYS, _DISPLACED, RISK = 2, (40.0, 10.0), 0.001
-#: Pairs of rays worked on at a time.
-_BLOCK = 200_000
 
 
 def correspondences(
@@ -66,18 +65,24 @@ def correspondences(
         raise InputError(f"correspondences: {len(cameras)} cameras, at least {fewest} to agree.")
     image = [s.image_from_pixel(t.reshape(-1, 2)) for s, t in zip(sensors, targets, strict=True)]
     rays = [image_rays(c, i, m) for c, i, m in zip(cameras, image, media, strict=True)]
+    widths = [
+        _widths(c, origins, tolerance * float(sensor.pixel_size.max()))
+        for c, sensor, (origins, _) in zip(cameras, sensors, rays, strict=True)
+    ]
     found: list[IntArray] = [np.empty((0, len(cameras)), dtype=np.int64)]
-    for a, b in combinations(range(len(cameras)), 2):
-        step = max(1, _BLOCK // max(1, len(image[b])))
-        for first in range(0, len(image[a]), step):
-            rows = np.arange(first, min(first + step, len(image[a])))
-            one, two = (m.ravel() for m in np.meshgrid(rows, np.arange(len(image[b]))))
-            pairs = [(rays[a][k][one], rays[b][k][two]) for k in range(2)]
-            with np.errstate(invalid="ignore"):
-                points = nearest_points(pairs[0], pairs[1])
-            found.append(_seen(cameras, targets, media, sensors, points, tolerance))
-            own = (found[-1][:, a] == one) & (found[-1][:, b] == two)
-            found[-1] = found[-1][own & ((found[-1] >= 0).sum(axis=1) >= fewest)]
+    for a, b in proposing_pairs(len(cameras), fewest):
+        one, two = meeting_rays(rays[a], rays[b], widths[a], widths[b])
+        pairs = [(rays[a][k][one], rays[b][k][two]) for k in range(2)]
+        points = nearest_points(pairs[0], pairs[1])
+        numbers = np.full((len(points), len(cameras)), -1, dtype=np.int64)
+        for k in {*range(len(cameras))} - {a, b}:
+            numbers[:, k] = _seen(cameras[k], targets[k], media[k], sensors[k], points, tolerance)
+        enough = (numbers >= 0).sum(axis=1) >= fewest - 2
+        one, two, points, numbers = one[enough], two[enough], points[enough], numbers[enough]
+        for k, own in ((a, one), (b, two)):
+            seen = _seen(cameras[k], targets[k], media[k], sensors[k], points, tolerance)
+            numbers[:, k] = np.where(seen == own, own, -1)
+        found.append(numbers[(numbers[:, [a, b]] >= 0).all(axis=1)])
     numbers = np.unique(np.concatenate(found), axis=0)
     # The row behind the last, -1, is that of no target.
     padded = [np.vstack([i, [np.nan, np.nan]]) for i in image]
@@ -88,6 +93,26 @@ def correspondences(
     xyz, numbers, misfit = xyz[good], numbers[good], misfit[good]
     kept = _each_once(numbers, np.lexsort((misfit, -(numbers >= 0).sum(axis=1))))
     return xyz[kept], numbers[kept], misfit[kept]
+
+
+def proposing_pairs(cameras: int, fewest: int) -> list[tuple[int, int]]:
+    """Return pairs of cameras of which so many cameras, whichever they are, hold at least one.
+
+    Of cameras in one group less than that, two stand in one group.
+
+    >>> proposing_pairs(4, 3)
+    [(0, 2), (1, 3)]
+    """
+    groups = fewest - 1
+    return [(a, b) for a, b in combinations(range(cameras), 2) if a % groups == b % groups]
+
+
+def _widths(camera: Camera, origins: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
+    """Return how far a target's ray may miss its particle: where it starts, and more per length."""
+    # On oblique rays what the tolerance moves at the face counts a little more than square to it.
+    per_length = 2.0 * tolerance / camera.principal_distance
+    away = origins - camera.centre
+    return per_length * np.sqrt(np.einsum("ni,ni->n", away, away)), per_length
 
 
 def expected_by_chance(
@@ -139,26 +164,23 @@ def is_chance(found: FloatArray, chance: FloatArray) -> bool:
 
 
 def _seen(
-    cameras: Sequence[Camera],
-    targets: Sequence[FloatArray],
-    media: Sequence[Media],
-    sensors: Sequence[Sensor],
+    camera: Camera,
+    targets: FloatArray,
+    media: Media,
+    sensor: Sensor,
     points: FloatArray,
     tolerance: float,
 ) -> IntArray:
-    """Return the nearest target of every camera to where it sees each point, -1 where none is."""
+    """Return the nearest target to where a camera sees each point, -1 where none is, shape (n,)."""
     from scipy.spatial import cKDTree
 
-    numbers = np.full((len(points), len(cameras)), -1, dtype=np.int64)
-    alive = np.flatnonzero(np.isfinite(points).all(axis=1))
-    for k, camera in enumerate(cameras):
-        if not len(targets[k]) or not len(alive):
-            continue
-        places = sensors[k].pixel_from_image(project(camera, points[alive], media[k]))
-        good = np.isfinite(places).all(axis=1)
-        away, nearest = cKDTree(targets[k]).query(places[good], distance_upper_bound=tolerance)
-        hit = np.isfinite(away)
-        numbers[alive[good][hit], k] = nearest[hit]
+    numbers = np.full(len(points), -1, dtype=np.int64)
+    if not len(targets) or not len(points):
+        return numbers
+    places = sensor.pixel_from_image(project(camera, points, media))
+    good = np.flatnonzero(np.isfinite(places).all(axis=1))
+    away, nearest = cKDTree(targets).query(places[good], distance_upper_bound=tolerance)
+    numbers[good] = np.where(np.isfinite(away), nearest, -1)
     return numbers
 
 
