@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -65,24 +66,16 @@ def correspondences(
         raise InputError(f"correspondences: {len(cameras)} cameras, at least {fewest} to agree.")
     image = [s.image_from_pixel(t.reshape(-1, 2)) for s, t in zip(sensors, targets, strict=True)]
     rays = [image_rays(c, i, m) for c, i, m in zip(cameras, image, media, strict=True)]
-    widths = [
-        _widths(c, origins, tolerance * float(sensor.pixel_size.max()))
-        for c, sensor, (origins, _) in zip(cameras, sensors, rays, strict=True)
-    ]
-    found: list[IntArray] = [np.empty((0, len(cameras)), dtype=np.int64)]
-    for a, b in proposing_pairs(len(cameras), fewest):
-        one, two = meeting_rays(rays[a], rays[b], widths[a], widths[b])
-        pairs = [(rays[a][k][one], rays[b][k][two]) for k in range(2)]
-        points = nearest_points(pairs[0], pairs[1])
-        numbers = np.full((len(points), len(cameras)), -1, dtype=np.int64)
-        for k in {*range(len(cameras))} - {a, b}:
-            numbers[:, k] = _seen(cameras[k], targets[k], media[k], sensors[k], points, tolerance)
-        enough = (numbers >= 0).sum(axis=1) >= fewest - 2
-        one, two, points, numbers = one[enough], two[enough], points[enough], numbers[enough]
-        for k, own in ((a, one), (b, two)):
-            seen = _seen(cameras[k], targets[k], media[k], sensors[k], points, tolerance)
-            numbers[:, k] = np.where(seen == own, own, -1)
-        found.append(numbers[(numbers[:, [a, b]] >= 0).all(axis=1)])
+    frame = _Frame(cameras, targets, media, sensors, rays, tolerance, fewest)
+    few = proposing_pairs(len(cameras), fewest)
+    found = [np.empty((0, len(cameras)), dtype=np.int64)]
+    found += [frame.proposals(a, b, np.arange(len(targets[a])), np.arange(len(targets[b])))
+              for a, b in few]  # fmt: skip
+    # What they leave is sought from all pairs: rays of a poor calibration miss each other.
+    taken = np.concatenate(found)
+    left = [np.setdiff1d(np.arange(len(t)), taken[:, k]) for k, t in enumerate(targets)]
+    others = combinations(range(len(cameras)), 2)
+    found += [frame.proposals(a, b, left[a], left[b]) for a, b in others if (a, b) not in few]
     numbers = np.unique(np.concatenate(found), axis=0)
     # The row behind the last, -1, is that of no target.
     padded = [np.vstack([i, [np.nan, np.nan]]) for i in image]
@@ -105,14 +98,6 @@ def proposing_pairs(cameras: int, fewest: int) -> list[tuple[int, int]]:
     """
     groups = fewest - 1
     return [(a, b) for a, b in combinations(range(cameras), 2) if a % groups == b % groups]
-
-
-def _widths(camera: Camera, origins: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
-    """Return how far a target's ray may miss its particle: where it starts, and more per length."""
-    # On oblique rays what the tolerance moves at the face counts a little more than square to it.
-    per_length = 2.0 * tolerance / camera.principal_distance
-    away = origins - camera.centre
-    return per_length * np.sqrt(np.einsum("ni,ni->n", away, away)), per_length
 
 
 def expected_by_chance(
@@ -163,25 +148,56 @@ def is_chance(found: FloatArray, chance: FloatArray) -> bool:
     return bool((by_chance | (ours == 0)).all() and theirs[-1] > 0)
 
 
-def _seen(
-    camera: Camera,
-    targets: FloatArray,
-    media: Media,
-    sensor: Sensor,
-    points: FloatArray,
-    tolerance: float,
-) -> IntArray:
-    """Return the nearest target to where a camera sees each point, -1 where none is, shape (n,)."""
-    from scipy.spatial import cKDTree
+@dataclass(frozen=True, slots=True, eq=False)
+class _Frame:
+    """Targets of all cameras, and their rays in the object."""
 
-    numbers = np.full(len(points), -1, dtype=np.int64)
-    if not len(targets) or not len(points):
+    cameras: Sequence[Camera]
+    targets: Sequence[FloatArray]
+    media: Sequence[Media]
+    sensors: Sequence[Sensor]
+    rays: Sequence[tuple[FloatArray, FloatArray]]
+    tolerance: float
+    fewest: int
+
+    def width(self, camera: int, some: IntArray) -> tuple[FloatArray, float]:
+        """Return how far rays may miss their particle: where they start, and more per length."""
+        # On oblique rays what the tolerance moves at the face counts more than square to it.
+        pitch = float(self.sensors[camera].pixel_size.max())
+        per_length = 2.0 * self.tolerance * pitch / self.cameras[camera].principal_distance
+        away = self.rays[camera][0][some] - self.cameras[camera].centre
+        return per_length * np.sqrt(np.einsum("ni,ni->n", away, away)), per_length
+
+    def proposals(self, a: int, b: int, some: IntArray, others: IntArray) -> IntArray:
+        """Return the targets of all cameras of what some of camera a and of b propose, (p, m)."""
+        (o1, d1), (o2, d2) = self.rays[a], self.rays[b]
+        first, second = (o1[some], d1[some]), (o2[others], d2[others])
+        one, two = meeting_rays(first, second, self.width(a, some), self.width(b, others))
+        one, two = some[one], others[two]
+        points = nearest_points([o1[one], o2[two]], [d1[one], d2[two]])
+        numbers = np.full((len(points), len(self.cameras)), -1, dtype=np.int64)
+        for k in {*range(len(self.cameras))} - {a, b}:
+            numbers[:, k] = self.seen(k, points)
+        enough = (numbers >= 0).sum(axis=1) >= self.fewest - 2
+        one, two, points, numbers = one[enough], two[enough], points[enough], numbers[enough]
+        for k, own in ((a, one), (b, two)):
+            numbers[:, k] = np.where(self.seen(k, points) == own, own, -1)
+        return numbers[(numbers[:, [a, b]] >= 0).all(axis=1)]
+
+    def seen(self, camera: int, points: FloatArray) -> IntArray:
+        """Return the nearest target to where a camera sees each point, -1 where none is, (n,)."""
+        from scipy.spatial import cKDTree
+
+        numbers = np.full(len(points), -1, dtype=np.int64)
+        targets = self.targets[camera]
+        if not len(targets) or not len(points):
+            return numbers
+        image = project(self.cameras[camera], points, self.media[camera])
+        places = self.sensors[camera].pixel_from_image(image)
+        good = np.flatnonzero(np.isfinite(places).all(axis=1))
+        away, nearest = cKDTree(targets).query(places[good], distance_upper_bound=self.tolerance)
+        numbers[good] = np.where(np.isfinite(away), nearest, -1)
         return numbers
-    places = sensor.pixel_from_image(project(camera, points, media))
-    good = np.flatnonzero(np.isfinite(places).all(axis=1))
-    away, nearest = cKDTree(targets).query(places[good], distance_upper_bound=tolerance)
-    numbers[good] = np.where(np.isfinite(away), nearest, -1)
-    return numbers
 
 
 def _misfits(
