@@ -159,6 +159,13 @@ COMMANDS: Mapping[str, Mapping[str, Reader]] = {
     "control.paste": {"text": _TEXT},
     "tape.set": {**_TAPE, "length?": positive_of, "sigma?": positive_of},
     "tape.delete": _TAPE,
+    "control.use": {**_NAME, "use": _FLAG},
+    "length.set": {
+        "image": image_of, "ends": _of([_PICK, _PICK], "two pixels"), "length": positive_of,
+        "sigma?": positive_of,
+    },
+    "length.delete": {},
+    "wall.set": {"column?": number_of, "row?": number_of},
     "photo.set": {"image": image_of, "focal_mm?": positive_of, "sensor_width_mm?": positive_of},
     "setup.set": {f"{key}?": _index if key in INDICES else positive_of for key in SETUP},
     "stage.set": {"stage": _one_of(*STAGES)},

@@ -9,6 +9,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from bifocal.collimation.proposals import wall_sheet
 from bifocal.collimation.stated_media import media_from_dict
 from bifocal.matching.matching import MatchSettings
 from bifocal.model.geotiff import gsd_at_scale
@@ -26,6 +27,7 @@ from bifocal.workbook.match_workflow import match_pair_file
 from bifocal.workbook.pair_workflow import read_pair
 from photocore.cli import Progress
 from photocore.errors import PhotogrammetryError
+from photocore.images import image_info
 from photocore.interrupts import end_on_signals
 from photocore.jsonfile import plain
 
@@ -73,6 +75,7 @@ def _align(task: Task, progress: Progress) -> dict[str, Any]:
         lenses=(lenses[0], lenses[1]),
         site=site,
         auto=task["auto"],
+        one_lens=task["auto"],
         as_set_up=task["as_set_up"],
         media=media_from_dict(task["media"]),
         control=_path(task["control"]),
@@ -81,7 +84,15 @@ def _align(task: Task, progress: Progress) -> dict[str, Any]:
     alignment = align_photos(
         Path(task["far"]), Path(task["near"]), Path(task["out"]), options, overwrite=True
     )
-    return alignment_as_dict(alignment)
+    sizes = [image_info(Path(task[which])).size for which in ("far", "near")]
+    if alignment.pair.photo_file(1).name != Path(task["far"]).name:
+        sizes.reverse()
+    sheets = zip((alignment.tie1, alignment.tie2), sizes, strict=True)
+    return alignment_as_dict(alignment) | {
+        "free_scale": task["free_scale"],
+        "planes": alignment.setup["planes"],
+        "wall": [wall_sheet(ties, alignment.wall, size) for ties, size in sheets],
+    }
 
 
 def _match(task: Task, progress: Progress) -> dict[str, Any]:

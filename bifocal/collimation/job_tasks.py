@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from bifocal.collimation.drawing import write_points_drawing
 from bifocal.collimation.fields import FieldError, positive_of
 from bifocal.collimation.jobs import PageJob
 from bifocal.collimation.live_orientation import control_of, lenses_of, site_of
+from bifocal.collimation.proposals import NOMINAL
 from bifocal.collimation.session import Session
 from bifocal.collimation.stated_media import lacking, media_as_dict, media_of
 from bifocal.collimation.wording import say, without_options
@@ -29,8 +30,8 @@ KINDS = ("align", "match", "relief", "ortho", "deliver")
 Options = Mapping[str, Any]
 
 
-def start_job(session: Session, kind: str, options: Options) -> PageJob:
-    """Start a job of a survey.
+def start_job(session: Session, kind: str, options: Options, *, quiet: bool = False) -> PageJob:
+    """Start a job of a survey; a ``quiet`` one makes way for any that the user starts.
 
     Raises
     ------
@@ -38,7 +39,7 @@ def start_job(session: Session, kind: str, options: Options) -> PageJob:
         If another one runs, the survey is not far enough for it, or an option is impossible.
     """
     return session.jobs.start(
-        kind, partial(task_of, session, kind, options), partial(finish, session)
+        kind, partial(task_of, session, kind, options), partial(finish, session), quiet=quiet
     )
 
 
@@ -135,8 +136,10 @@ def _align_task(session: Session, options: Options) -> dict[str, Any]:
     given = [site.distance1, site.distance2, site.delta_d]
     way = options.get("way") or ("control" if len(control.ids) else "auto")
     way = _through_media(session, way, given)
-    if way == "auto" and not any(given) and not control.lengths:
-        raise InputError(remark("page.no_size"))
+    # One measure alone multiplies all lengths, whenever it is typed.
+    free = way == "auto" and sum(map(bool, given)) < 2 and not control.lengths
+    if free:
+        site = replace(site, distance1=NOMINAL, distance2=None, delta_d=None)
     tables: dict[str, Path | None] = {"control": None, "lengths": None}
     if way == "control":
         tables = _write_control(session, control)
@@ -149,6 +152,7 @@ def _align_task(session: Session, options: Options) -> dict[str, Any]:
         "lenses": [plain(asdict(lens)) for lens in lenses_of(state)],
         "auto": way not in ("control", "as set up"),
         "as_set_up": way == "as set up",
+        "free_scale": free,
         "media": media_as_dict(media_of(state.setup, session.pictures.pair)),
         **{key: None if path is None else str(path.resolve()) for key, path in tables.items()},
     }

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.collimation.fields import FieldError
 from bifocal.collimation.pyramids import Pyramid, RectifiedPhoto, wall_grid
-from bifocal.collimation.records import Pixel
+from bifocal.collimation.records import Change, Picks, Pixel
 from bifocal.collimation.tile_store import TileStore
 from bifocal.matching.snapping import snap
 from bifocal.matching.suggestions import radial_line, suggest
@@ -104,6 +105,18 @@ class Pictures:
         if len(self.pyramids) < 2:
             raise InputError(remark("page.give_photos"))
         return self.pyramids[0].halved(0), self.pyramids[1].halved(0)
+
+    def check_picks(self, op: str, changes: Sequence[Change]) -> None:
+        """Refuse picks outside their photos."""
+        sizes = [info.size for info in self.infos]
+        if len(sizes) < 2 and op.endswith(".pick"):
+            raise InputError(remark("page.give_photos"))
+        for change in changes:
+            picks: Picks = getattr(change.after, "picks", (None, None))
+            for image, (pick, size) in enumerate(zip(picks, sizes, strict=False), start=1):
+                if pick and not all(-0.5 <= p <= n - 0.5 for p, n in zip(pick, size, strict=True)):
+                    about = {"name": change.key, "width": size[0], "height": size[1]}
+                    raise FieldError(remark("page.pick_outside", image=image, **about))
 
     def needed_pair(self) -> Pair:
         """Return the pair.

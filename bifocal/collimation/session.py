@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from bifocal.collimation.commands import changes_of
-from bifocal.collimation.fields import NOTES, FieldError, fields_of
+from bifocal.collimation.fields import NOTES, fields_of
 from bifocal.collimation.jobs import JobRunner
 from bifocal.collimation.journal import Journal
 from bifocal.collimation.live_orientation import LiveOrientation, live_orientation
@@ -22,9 +22,11 @@ from bifocal.collimation.measures import measure
 from bifocal.collimation.pictures import Pictures
 from bifocal.collimation.products import Products, accept_pair
 from bifocal.collimation.project import SurveyFiles
-from bifocal.collimation.records import Change, PickedPoint, Picks, SurveyState
+from bifocal.collimation.proposals import measure_of, rescale
+from bifocal.collimation.records import Change, PickedPoint, SurveyState
+from bifocal.collimation.uncertainty import how_good
 from bifocal.collimation.workbook.rows import PointRow, row_of
-from bifocal.collimation.workbook.setup import ideal_setup, pair_of
+from bifocal.collimation.workbook.setup import ideal_setup, pair_of, typed_of
 from bifocal.collimation.workbook.sync import WorkbookSync
 from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
@@ -66,6 +68,7 @@ class Session:
         self.results: LiveResults | None = None
         self.orientation: tuple[object, LiveOrientation] | None = None
         self.proposal: dict[str, Any] | None = None
+        self._good: tuple[LiveResults, dict[str, Any] | None] | None = None
         self.state = SurveyState()
         self.journal = Journal(files.journal)
         try:
@@ -74,7 +77,10 @@ class Session:
             self.pictures = Pictures(files.folder / f".{files.stem}.tiles", photos, pair)
             self.results = None if pair is None else self._results(pair)
             self.products = Products(files)
-            self.jobs = JobRunner(self.lock, self.tell, self.changed, lambda: self.spoken)
+            self.jobs = JobRunner(
+                self.lock, self.tell, self.changed, lambda: self.spoken,
+                lambda: self.state.revision,
+            )  # fmt: skip
             self.sync = WorkbookSync(self)
             self._replay_all()
             self.journal.cut()
@@ -121,11 +127,23 @@ class Session:
             first = Pair.read(path).photo_file(1)
             if not first.samefile(self.pictures.infos[0].path):
                 self.command({"op": "photos.exchange", "found": True})
-            record = {"op": "proposed", "pair": path.name, "report": dict(report)}
-            self._write(record)
-            self.proposal = record
-            self._show_proposal()
+            self._note_proposed(path, report)
+            self.follow_scale()
             self.changed()
+
+    def _note_proposed(self, path: Path, report: Mapping[str, Any]) -> None:
+        self.proposal = {"op": "proposed", "pair": path.name, "report": dict(report)}
+        self._write(self.proposal)
+        self._show_proposal()
+
+    def follow_scale(self) -> None:
+        """Bring a proposed orientation that the photos alone gave to the scale that is known now."""
+        path, report = self.proposed_path, (self.proposal or {}).get("report", {})
+        if path is None or not report.get("free_scale"):
+            return
+        measure = measure_of(self.state)
+        if report.get("scale") != measure:
+            self._note_proposed(path, rescale(path, report, measure))
 
     def _show_proposal(self) -> None:
         path = self.proposed_path
@@ -170,7 +188,7 @@ class Session:
             return
         pair = pair_of(self.files)
         known = self.pictures.pair
-        if pair is None or (known is not None and _typed(pair) == _typed(known)):
+        if pair is None or (known is not None and typed_of(pair) == typed_of(known)):
             return
         photos = [pair.photo_file(1), pair.photo_file(2)]
         if photos != [info.path for info in self.pictures.infos]:
@@ -182,6 +200,9 @@ class Session:
         path = self.proposed_path
         if path is None:
             raise InputError(remark("page.no_orientation"))
+        report = (self.proposal or {})["report"]
+        if report.get("free_scale") and not report.get("scale"):
+            raise InputError(remark("page.no_size"))
         target = self.products.place("pair", ".pair.json")
         if path != target:
             accept_pair(path, target)
@@ -269,6 +290,7 @@ class Session:
             if isinstance(known, str) and known in self.answered:
                 return self.answered[known]
             result = self._checked(fields_of(command))
+            self.follow_scale()
             if isinstance(known, str):
                 self._remember_answer(known, result)
             self.changed()
@@ -308,7 +330,7 @@ class Session:
             command["name"] = changes[0].key
         if write:
             if op in _PICKING:
-                self._check_picks(op, changes)
+                self.pictures.check_picks(op, changes)
             self._write(command)
         self.state = trial
         self._apply(changes)
@@ -414,18 +436,6 @@ class Session:
         stamp = datetime.now(UTC).isoformat(timespec="milliseconds")
         self.journal.append({**record, "time": stamp})
 
-    def _check_picks(self, op: str, changes: Sequence[Change]) -> None:
-        """Refuse picks outside their photos."""
-        sizes = [info.size for info in self.pictures.infos]
-        if len(sizes) < 2 and op.endswith(".pick"):
-            raise InputError(remark("page.give_photos"))
-        for change in changes:
-            picks: Picks = getattr(change.after, "picks", (None, None))
-            for image, (pick, size) in enumerate(zip(picks, sizes, strict=False), start=1):
-                if pick and not all(-0.5 <= p <= n - 0.5 for p, n in zip(pick, size, strict=True)):
-                    about = {"name": change.key, "width": size[0], "height": size[1]}
-                    raise FieldError(remark("page.pick_outside", image=image, **about))
-
     # ---- listeners
 
     def changed(self) -> None:
@@ -466,6 +476,14 @@ class Session:
             self.orientation = facts, live_orientation(state, infos, said, pair)
         return self.orientation[1]
 
+    def how_good(self) -> dict[str, Any] | None:
+        """Return how good relief is; None before the photos are oriented."""
+        if self.results is None:
+            return None
+        if self._good is None or self._good[0] is not self.results:
+            self._good = self.results, how_good(self.pictures, self.results)
+        return self._good[1]
+
     def measure(self, names: Sequence[str]) -> dict[str, float | None]:
         """Return distances and angles between points."""
         self.pictures.needed_pair()
@@ -479,15 +497,3 @@ class Session:
                 raise InputError(remark("page.point_in_one", name=name))
             places.append(place)
         return measure(places)
-
-
-def _typed(pair: Pair) -> list[object]:
-    """Return what a workbook says of its pair, for comparison."""
-    return [
-        [
-            *(photo.file, photo.plane_from_pixel.tolist(), list(photo.nadir)),
-            *(photo.distance, photo.principal_distance, photo.sigma_pixel),
-            *(photo.layers, photo.z0),
-        ]
-        for photo in (pair.image1, pair.image2)
-    ]
