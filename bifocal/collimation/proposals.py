@@ -19,6 +19,8 @@ from photocore.arrays import BoolArray, Float32Array, FloatArray
 NOMINAL = 10.0
 #: Longer side of the picture in which the wall's outline is drawn, and how far a tie speaks. [px]
 SHEET, REACH = 256, 7
+#: Outlines of less than this share of the sheet are specks.
+SPECK = 0.02
 #: Where fewer points than this speak, by that picture's cell, nothing is known.
 FAINT = 0.004
 
@@ -86,7 +88,7 @@ def wall_sheet(pixels: FloatArray, wall: BoolArray, size: tuple[int, int]) -> li
     return [
         (step * (outline[:, 0] + 0.5) - 0.5).round(1).tolist()
         for outline in outlines
-        if cv2.contourArea(outline) > 4 * REACH
+        if cv2.contourArea(outline) > SPECK * sheet.sum()
     ]
 
 

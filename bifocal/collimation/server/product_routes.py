@@ -36,7 +36,8 @@ async def _photos(request: Request) -> Response:
 
         def take() -> dict[str, Any]:
             session.check_new_photos()
-            session.give_photos(take_photos(session.files.folder, files))
+            there = [info.path for info in session.pictures.infos]
+            session.give_photos(take_photos(session.files.folder, files, there))
             return state_of(session)
 
         return answer(await in_thread(take))

@@ -76,7 +76,8 @@ export function listen(app) {
     if (event.defaultPrevented || document.querySelector("dialog[open]")) return;
     const key = (event.ctrlKey || event.metaKey ? "Ctrl+" : "") + event.key;
     if (typing(event.target)) {
-      if (event.key === "Escape" || event.key === "Enter") event.target.blur();
+      // Within a form, Enter sends it.
+      if (event.key === "Escape" || (event.key === "Enter" && !event.target.form)) event.target.blur();
       return;
     }
     const focused = event.target.matches?.("button, a, summary, input") && ["Enter", " "].includes(event.key);

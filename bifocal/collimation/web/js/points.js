@@ -257,7 +257,8 @@ export class PointsStage {
   #look() {
     const { guide } = this.picker;
     for (const image of [1, 2]) {
-      this.loupe.look(image, this.picker.sight(image), guide?.image === image ? guide.line : null);
+      const place = this.picker.sight(image) ?? this.paneOf(image)?.middle(image);
+      this.loupe.look(image, place, guide?.image === image ? guide.line : null);
     }
   }
 

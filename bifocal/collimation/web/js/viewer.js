@@ -169,6 +169,13 @@ export class Pane extends EventTarget {
     return this.frame.toPhoto(image, this.unplace(pixel));
   }
 
+  /** The photo pixel in the middle of what is shown, within a photo of the survey; null before. */
+  middle(image) {
+    if (!this.width) return null;
+    const pixel = this.photo(image, [this.width / 2, this.height / 2]);
+    return pixel.every(Number.isFinite) ? pixel : null;
+  }
+
   setLayers(layers) {
     this.map.setLayers(layers);
   }
