@@ -25,6 +25,7 @@ from bifocal.collimation.records import (
     CODES,
     Change,
     DrawnLine,
+    DrawnShape,
     Known,
     PickedControl,
     PickedPoint,
@@ -39,6 +40,8 @@ from photocore.errors import InputError
 
 #: A larger survey is another one.
 MOST_POINTS = 20_000
+#: So many shapes, of so many corners, a person draws.
+MOST_SHAPES, MOST_CORNERS = 2_000, 500
 
 
 def changes_of(state: SurveyState, command: Fields) -> list[Change]:
@@ -164,6 +167,28 @@ def _line_set(state: SurveyState, command: Fields) -> list[Change]:
 def _line_delete(state: SurveyState, command: Fields) -> list[Change]:
     line = _named("lines", state, command)
     return [Change("lines", line.name, line, None)]
+
+
+def _shape_set(state: SurveyState, command: Fields) -> list[Change]:
+    kind, name = command["kind"], command.get("name")
+    if name is None:
+        number = len(state.shapes) + 1
+        while (name := f"{kind[0].upper()}{number}") in state.shapes:
+            number += 1
+    least = 2 if kind == "break" else 3
+    if not least <= len(command["corners"]) <= MOST_CORNERS:
+        raise FieldError(remark("page.shape_corners", least=least))
+    before = state.shapes.get(name)
+    if before is None and len(state.shapes) >= MOST_SHAPES:
+        raise InputError(remark("page.most_points", most=MOST_SHAPES))
+    layer = command.get("layer") or ("" if before is None else before.layer)
+    shape = DrawnShape(name=name, kind=kind, corners=tupled(command["corners"]), layer=layer)
+    return [Change("shapes", name, before, shape)]
+
+
+def _shape_delete(state: SurveyState, command: Fields) -> list[Change]:
+    shape = _named("shapes", state, command)
+    return [Change("shapes", shape.name, shape, None)]
 
 
 def _control_name(state: SurveyState, command: Fields) -> str:
@@ -297,7 +322,7 @@ def _exchange(state: SurveyState, command: Fields) -> None:
     if not (lens_ratio(state.lenses.get(1, {}), state.lenses.get(2, {})) or 0.0) > 1.0:
         state.lenses = {3 - image: lens for image, lens in state.lenses.items()}
     state.scale = {k: replace(one, image=3 - one.image) for k, one in state.scale.items()}
-    state.wall = {}
+    state.wall, state.shapes = {}, {}
     state.ordered = command.get("found") is not True
     state.forget_orientation()
     state.done, state.undone = (
@@ -312,7 +337,7 @@ def _turned(record: Any) -> Any:
     """Return a record with the picks of both photos exchanged, where it has some."""
     if isinstance(record, ScaleLength):
         return replace(record, image=3 - record.image)
-    if isinstance(record, WallSpot):  # of the other photo now
+    if isinstance(record, WallSpot | DrawnShape):  # of the other photo now
         return None
     if not hasattr(record, "picks"):
         return record
@@ -364,6 +389,8 @@ _RECORDS: dict[Any, Callable[[SurveyState, Fields], list[Change]]] = {
     "points.add": _points_add,
     "line.set": _line_set,
     "line.delete": _line_delete,
+    "shape.set": _shape_set,
+    "shape.delete": _shape_delete,
     "control.set": _control_set,
     "control.pick": _control_pick,
     "control.rename": _control_rename,

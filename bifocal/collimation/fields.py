@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from bifocal.collimation.records import CODES, Pixel
+from bifocal.collimation.records import CODES, SHAPES, Pixel
 from bifocal.collimation.stated_media import INDICES, MEDIA
 from bifocal.remarks import remark
 from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX
@@ -152,6 +152,13 @@ COMMANDS: Mapping[str, Mapping[str, Reader]] = {
     "point.delete": _NAME,
     "line.set": {**_NAME, "layer?": text_of, "points?": _TEXTS, "closed?": _FLAG},
     "line.delete": _NAME,
+    "shape.set": {
+        "name?": _if_any(text_of),
+        "kind": _one_of(*SHAPES),
+        "corners": _of([[float, float, float]], "a list of [column, row, relief]"),
+        "layer?": text_of,
+    },
+    "shape.delete": _NAME,
     "control.set": {"name?": _if_any(text_of), **_PLACE},
     "control.pick": {"name?": _if_any(text_of), **_PIXEL},
     "control.rename": {**_NAME, "new": text_of},
@@ -161,7 +168,9 @@ COMMANDS: Mapping[str, Mapping[str, Reader]] = {
     "tape.delete": _TAPE,
     "control.use": {**_NAME, "use": _FLAG},
     "length.set": {
-        "image": image_of, "ends": _of([_PICK, _PICK], "two pixels"), "length": positive_of,
+        "image": image_of,
+        "ends": _of([_PICK, _PICK], "two pixels"),
+        "length": positive_of,
         "sigma?": positive_of,
     },
     "length.delete": {},

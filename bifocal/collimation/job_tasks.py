@@ -26,7 +26,7 @@ from photocore.jsonfile import plain
 from photocore.output import free_path
 from photocore.tables import write_csv
 
-KINDS = ("align", "match", "relief", "ortho", "deliver")
+KINDS = ("align", "match", "relief", "ortho", "deliver", "suggest")
 Options = Mapping[str, Any]
 
 
@@ -61,16 +61,28 @@ def task_of(session: Session, kind: str, options: Options) -> dict[str, Any]:
     if kind == "match":
         count = positive_of(options, "count") or 500
         return pair | {"count": int(min(count, 5000)), "features": options.get("what") != "targets"}
-    products = session.products
+    if kind == "suggest":
+        relief = session.products.current("relief")
+        if relief is None:
+            raise InputError(remark("page.no_relief"))
+        return pair | {"relief": str(relief.resolve())}
     if kind == "relief":
-        out = products.place("relief", ".relief.tif")
-        said = _said(options, "gsd", "bounds", "quality")
-        return pair | {"out": str(out), "overwrite": products.is_own(out), "options": said}
+        return pair | _relief_task(session, options)
     task = pair | _ortho_options(session, options)
     if kind == "ortho":
-        out = products.place("ortho", ".ortho.tif")
-        return task | {"out": str(out), "overwrite": products.is_own(out)}
-    return task | _deliver_options(session, options)
+        return task | _ortho_task(session)
+    return task | _deliver_options(session, options, pair)
+
+
+def _relief_task(session: Session, options: Options) -> dict[str, Any]:
+    out = session.products.place("relief", ".relief.tif")
+    said = _said(options, "gsd", "bounds", "quality")
+    return {"out": str(out), "overwrite": session.products.is_own(out), "options": said}
+
+
+def _ortho_task(session: Session) -> dict[str, Any]:
+    out = session.products.place("ortho", ".ortho.tif")
+    return {"out": str(out), "overwrite": session.products.is_own(out)}
 
 
 def _said(options: Options, *keys: str) -> dict[str, Any]:
@@ -100,7 +112,8 @@ def _ortho_options(session: Session, options: Options) -> dict[str, Any]:
     }
 
 
-def _deliver_options(session: Session, options: Options) -> dict[str, Any]:
+def _deliver_options(session: Session, options: Options, pair: Options) -> dict[str, Any]:
+    """Return what drawings and documents are told, and what is made before them."""
     products = session.products
     folder = products.folder / f"{products.stem}-delivered"
     own = any(kind == "deliver" for kind in products.made.values())
@@ -109,10 +122,24 @@ def _deliver_options(session: Session, options: Options) -> dict[str, Any]:
     title = options.get("title") or ""
     if not isinstance(title, str) or len(title) > 120:
         raise FieldError(remark("page.title_line"))
+    before: dict[str, Any] = {}
+    surface = _ortho_options(session, options)
+    for kind, task in (("relief", _relief_task(session, options)), ("ortho", _ortho_task(session))):
+        if products.current(kind) is None and (kind == "ortho" or surface["points"] is None):
+            before[kind] = {**pair, **task}
+            if kind == "relief":
+                surface["relief"] = str(Path(task["out"]).resolve())
+    if "ortho" in before:
+        before["ortho"] = {**before["ortho"], **surface}
+    ortho = products.current("ortho") or products.place("ortho", ".ortho.tif")
     return {
         "out": str(folder),
         "overwrite": own,
         "title": title,
+        "stem": products.stem,
+        "before": before,
+        "relief": surface["relief"],
+        "ortho": str(ortho.resolve()),
         "drawing": {
             **_said(options, "scale", "dpi", "sheet", "sections"),
             "language": session.spoken,
@@ -208,14 +235,21 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
     kind = task["kind"]
     told = " ".join(without_options(said, session.spoken) for said in result.get("remarks", ()))
     if kind == "align":
+        if task["free_scale"] and len(control_of(session.state).ids):
+            return ""  # the user took it in hand meanwhile
         session.propose(Path(task["out"]), result)
         return told
     if kind == "match":
         session.command({"op": "points.add", "points": result["points"]})
         return ""
+    if kind == "suggest":
+        session.suggested = result["shapes"]
+        return "" if result["shapes"] else say("shapes", "none", session.spoken)
     names = [Path(task["out"]).name]
     if kind == "deliver":
         folder = Path(task["out"])
+        for first, paths in result["made"].items():
+            session.note_made(first, paths)
         names = [f"{folder.name}/{name}" for name in result["files"]]
         if any(point.is_complete for point in session.state.points.values()):
             drawing = folder / f"{session.products.stem}_points.dxf"

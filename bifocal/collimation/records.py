@@ -125,10 +125,33 @@ class DrawnLine:
     closed: bool = False
 
 
+#: A corner of a shape: column and row in photo 1 [px], relief there [m].
+Corner = tuple[float, float, float]
+#: Shapes that relief and orthophoto obey, and outlines that are measured and drawn.
+SHAPES = ("face", "break", "occluder", "outline")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrawnShape:
+    """A polygon or line drawn on the wall: one of `SHAPES`; outlines lie on a layer."""
+
+    name: str
+    kind: str
+    corners: tuple[Corner, ...]
+    layer: str = ""
+
+
 #: An orientation that was accepted: its pair file, and what was reported of it.
 Accepted = dict[str, Any]
 Record = (
-    PickedPoint | PickedControl | TapedLength | DrawnLine | ScaleLength | WallSpot | Accepted
+    PickedPoint
+    | PickedControl
+    | TapedLength
+    | DrawnLine
+    | DrawnShape
+    | ScaleLength
+    | WallSpot
+    | Accepted
 )
 
 
@@ -153,7 +176,7 @@ class SurveyState:
 
     Attributes
     ----------
-    points, control, tapes, lines : dict
+    points, control, tapes, lines, shapes : dict
         Records by name; tapes by ``from|to``.
     scale, wall : dict
         The length that gives the scale, as ``length``; the spot that names the wall, as ``spot``.
@@ -177,6 +200,7 @@ class SurveyState:
     control: dict[str, PickedControl] = field(default_factory=dict)
     tapes: dict[str, TapedLength] = field(default_factory=dict)
     lines: dict[str, DrawnLine] = field(default_factory=dict)
+    shapes: dict[str, DrawnShape] = field(default_factory=dict)
     scale: dict[str, ScaleLength] = field(default_factory=dict)
     wall: dict[str, WallSpot] = field(default_factory=dict)
     orientation: dict[str, Accepted] = field(default_factory=dict)

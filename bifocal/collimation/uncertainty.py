@@ -24,9 +24,7 @@ _SHADE = (60, 60, 220, 110)  # BGRA
 _SHORTEST = 6
 
 
-def relief_sigma(
-    pictures: Pictures, results: LiveResults, computed: int = COMPUTED
-) -> FloatArray:
+def relief_sigma(pictures: Pictures, results: LiveResults, computed: int = COMPUTED) -> FloatArray:
     """Return sigma of the relief of points on the wall, shape (h, w), over the wall's grid. [m]
 
     NaN where not both photos show the wall.

@@ -247,8 +247,9 @@ def deviations_of(cameras: Cameras, covariance: FloatArray, media: PairMedia) ->
         by_scale[at("Z", number)] = -sign * rate / straight
         by_relief[at("Z", number)] = -sign * rate / straight**2
     d1, d2 = (media.near_axis(k, camera)[0] for k, camera in enumerate(cameras))
-    scale, relief = (float(np.sqrt(np.abs(row @ covariance @ row))) for row in (by_scale, by_relief))
-    return out | {"scale": scale, "relief_scale": relief / abs(1 / d2 - 1 / d1)}
+    variances = (abs(float(row @ covariance @ row)) for row in (by_scale, by_relief))
+    scale, relief = map(np.sqrt, variances)
+    return out | {"scale": float(scale), "relief_scale": float(relief / abs(1 / d2 - 1 / d1))}
 
 
 def _diagnostics(

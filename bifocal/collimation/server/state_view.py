@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.collimation.asked import goodness, oriented_live
 from bifocal.collimation.commands import lens_ratio
 from bifocal.collimation.fields import SETUP
 from bifocal.collimation.live_orientation import LiveOrientation, lenses_of
 from bifocal.collimation.session import Session
+from bifocal.collimation.shapes import measures_of
 from bifocal.collimation.wording import say, without_options
 from bifocal.model.pair import Pair
 from bifocal.orientation.align_workflow import interior_of_photo
@@ -25,7 +27,7 @@ def state_of(session: Session) -> dict[str, Any]:
     with session.lock:
         state, live = session.state, None
         if session.files.pair is None or state.control:
-            live = session.oriented_live()
+            live = oriented_live(session)
         return {
             "serving": session.serving,
             "revision": session.revision,
@@ -56,6 +58,8 @@ def state_of(session: Session) -> dict[str, Any]:
                 {"name": x.name, "layer": x.layer, "points": list(x.points), "closed": x.closed}
                 for x in state.lines.values()
             ],
+            "shapes": _shapes(session),
+            "suggested": session.suggested,
             "length_unit": _length_unit(session),
             "selection": None,
             "products": {
@@ -136,6 +140,14 @@ def _focal_said(session: Session, number: int, info: ImageInfo) -> str:
     return say("focal", key, language, focal=known.focal, share=100 * known.sigma_focal)
 
 
+def _shapes(session: Session) -> list[dict[str, Any]]:
+    pair = session.pictures.pair
+    return [
+        {**asdict(shape), **({} if pair is None else plain(measures_of(shape, pair)))}
+        for shape in session.state.shapes.values()
+    ]
+
+
 def _drawn_length(session: Session) -> dict[str, Any] | None:
     drawn = session.state.scale.get("length")
     return None if drawn is None else asdict(drawn)
@@ -149,7 +161,7 @@ def _unscaled(session: Session) -> bool:
 
 def _how_good(session: Session) -> str:
     """Say in a line how good relief is; nothing where that is not known."""
-    known = None if _unscaled(session) else session.how_good()
+    known = None if _unscaled(session) else goodness(session)
     if known is None or known["middle"] is None or known["rim"] is None:
         return ""
     language, scale = session.spoken, known["scale"]

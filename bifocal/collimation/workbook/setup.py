@@ -74,6 +74,7 @@ def typed_setup(setup: SurveySetup, pair: Pair) -> dict[str, CellValue]:
             cells |= {f"nadir_{number}_col": nadir[0], f"nadir_{number}_row": nadir[1]}
     return cells
 
+
 def typed_of(pair: Pair) -> list[object]:
     """Return what a workbook says of its pair, for comparison."""
     return [
