@@ -155,7 +155,7 @@ def _deliver(task: Task, progress: Progress) -> dict[str, Any]:
     made: dict[str, list[str]] = {}
     told: list[str] = []
     for kind, first, last in (("relief", 0.0, 0.5), ("ortho", 0.5, 0.65)):
-        if before := task["before"].get(kind):
+        if before := task.get("before", {}).get(kind):
             told += _WORKS[kind](before, _within(progress, first, last))["remarks"]
             made[kind] = [Path(before["out"]).name]
     pair = read_pair(path)

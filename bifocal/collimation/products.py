@@ -15,7 +15,7 @@ from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap, measured_part
 from bifocal.model.surface import MapSurface
-from bifocal.orthophotos.shading import shaded
+from bifocal.orthophotos.shading import shaded, tints
 from bifocal.remarks import remark
 from bifocal.reports.content import ortho_thumbnail
 from photocore.arrays import FloatArray
@@ -125,6 +125,7 @@ class Products:
             if kind == "relief":
                 facts["range"] = relief_limits(self.relief())
                 facts["histogram"] = _histogram(self.relief())
+                facts["colours"] = colours()
             self._facts[kind] = version, facts
         return self._facts[kind][1]
 
@@ -222,6 +223,12 @@ def relief_limits(relief: ReliefMap) -> tuple[float, float]:
         return 0.0, 0.0
     low, high = np.percentile(known, [0.5, 99.5])
     return float(low), float(high)
+
+
+def colours() -> list[str]:
+    """Return the colours from the farthest back over the wall to what stands out most."""
+    rgb = np.rint(tints(np.linspace(-1, 1, 17), (-1.0, 1.0))).astype(int)
+    return [f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in rgb]
 
 
 def _histogram(relief: ReliefMap) -> dict[str, Any]:

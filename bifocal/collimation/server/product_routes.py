@@ -28,6 +28,7 @@ from bifocal.collimation.uncertainty import precision_contours, uncertainty_pict
 from bifocal.faces.faces_files import beside
 from photocore.arrays import FloatArray, as_points
 from photocore.jsonfile import plain
+from photocore.output import relative_name
 
 _FRESH = {"cache-control": "no-store"}
 
@@ -98,10 +99,15 @@ def _attachment(name: str) -> dict[str, str]:
 def bundle_of(session: Session) -> dict[str, Path]:
     """Return all that *Download all* holds: products, workbook, photos and lens files by name."""
     with session.lock:
-        more = {info.path.name: info.path for info in session.pictures.infos}
+        more = {}
+        for info in session.pictures.infos:
+            inside = info.path.resolve().is_relative_to(session.files.folder.resolve())
+            name = relative_name(info.path, session.files.folder) if inside else info.path.name
+            more[name] = info.path
         pair = session.pictures.pair
         if pair is not None and session.files.pair is not None:
             folder = session.files.pair.parent
+            more[session.files.pair.name] = session.files.pair
             for number in (1, 2):
                 lens = pair.photo(number).extra.get("lens")
                 if isinstance(lens, str) and (folder / lens).is_file():
@@ -136,12 +142,11 @@ async def _value(request: Request) -> Response:
     session = session_of(request)
 
     def value() -> dict[str, Any]:
-        found = session.products.value(x, y)
-        picks = None
+        found: dict[str, Any] = dict(session.products.value(x, y))
         if found["r"] is not None:
             place = np.array([[x, y, found["r"]]])
-            picks = [one[0] for one in session.pictures.needed_pair().project(place)]
-        return plain({**found, "picks": picks})
+            found["picks"] = [one[0] for one in session.pictures.needed_pair().project(place)]
+        return plain(found)
 
     return answer(await in_thread(value))
 

@@ -295,10 +295,11 @@ def test_points_and_lines_become_a_drawing_in_space(tmp_path) -> None:
             np.testing.assert_allclose(place, [row["X"], row["Y"], row["r"]], atol=1e-9)
         session.sync.step()
         archive = zipfile.ZipFile(BytesIO(client.get("/download/all.zip").content))
-        assert archive.namelist() == ["facade.xlsx", "SHA256SUMS"]
+        whole = ["facade.pair.json", "facade.xlsx", "far.jpg", "near.jpg", "SHA256SUMS"]
+        assert archive.namelist() == whole  # photos and pair, so that it opens elsewhere
         (tmp_path / "sent.zip").write_bytes(client.get("/download/all.zip").content)
         found = verify(tmp_path / "sent.zip")
-        assert [one.file for one in found.files] == ["SHA256SUMS", "facade.xlsx"]
+        assert [one.file for one in found.files] == sorted(whole)
         assert found.same
 
 

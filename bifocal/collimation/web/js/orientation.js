@@ -101,6 +101,11 @@ export class OrientationStage {
     return accepted;
   }
 
+  /** Let go of the tool in hand. */
+  leave() {
+    return this.wallCard.dismiss();
+  }
+
   /** A click in a photo: for the tool in hand, else a control point. */
   click(pane, pixel) {
     const photo = pane.photo(pane.image, pixel);

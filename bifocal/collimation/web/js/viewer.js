@@ -49,8 +49,28 @@ async function loadTile(tile, address) {
   return tile.setImage(whole);
 }
 
+/** Place on the map -> CSS pixel of a frame. */
+const onScreen = ({ coordinateToPixelTransform: [a, b, c, d, e, f] }, [x, y]) => [a * x + c * y + e, b * x + d * y + f];
+
+/** Show of a layer what lies within a frame alone: outside there is no photo, and no black. */
+function clipped(layer, frame) {
+  layer.on("prerender", (event) => {
+    const { context } = event;
+    context.save();
+    context.beginPath();
+    frame.forEach((pixel, index) => {
+      const place = ol.render.getRenderPixel(event, onScreen(event.frameState, toMap(pixel)));
+      if (index) context.lineTo(...place);
+      else context.moveTo(...place);
+    });
+    context.closePath();
+    context.clip();
+  });
+  layer.on("postrender", ({ context }) => context.restore());
+}
+
 /** Layer of one tile pyramid; `info` is what the server says of it. `place`: where its grid lies. */
-export function tileLayer(view, className, address, info, place = null) {
+export function tileLayer(view, className, address, info, place = null, frame = null) {
   const [left, top, scale] = place ?? [0, 0, 1];
   const extent = [left, top - info.height * scale, left + info.width * scale, top];
   const resolutions = [];
@@ -72,7 +92,9 @@ export function tileLayer(view, className, address, info, place = null) {
   });
   // No `preload`: its timers outlive a layer's move to another map and end in an error. The coarse
   // tiles of the whole picture, loaded at the start, stand in for what is not there yet.
-  return new ol.layer.Tile({ className, extent, source });
+  const layer = new ol.layer.Tile({ className, extent, source });
+  if (frame?.length > 2) clipped(layer, frame);
+  return layer;
 }
 
 /** Layer of one picture that covers `extent` of the grid (columns and rows of its outer edges). */
