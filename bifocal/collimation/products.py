@@ -13,7 +13,7 @@ from bifocal.collimation.project import SurveyFiles
 from bifocal.model.geotiff import RasterReader
 from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
-from bifocal.model.relief_map import ReliefMap, measured_part
+from bifocal.model.relief_map import TOLD, ReliefMap
 from bifocal.model.surface import MapSurface
 from bifocal.orthophotos.shading import shaded, tints
 from bifocal.remarks import remark
@@ -157,19 +157,24 @@ class Products:
         hatched : bool
             Whether what was not measured is paler and hatched.
         """
-        relief, path = self.relief(), self.current("relief")
-        assert path is not None
+        relief = self.relief()
         limits = relief_limits(relief)
         span = (limits[0] if low is None else low, limits[1] if high is None else high)
-        step = max(1.0, max(relief.shape) / OVERLAY_SIDE)
-        grid = Grid.from_bounds(relief.bounds, gsd=relief.gsd * step)
-        with RasterReader(path) as reader:
-            picture, known = shaded(
-                MapSurface.of_array(relief.r, relief.grid), grid, limits=span,
-                measured=measured_part(reader) if hatched else None,
-                # Lines as on a sheet on which a pixel is a third of a millimetre.
-                scale=grid.gsd * 3000,
-            )  # fmt: skip
+        step = max(1, round(max(relief.shape) / OVERLAY_SIDE))
+        r = relief.r[::step, ::step]
+        fine = relief.grid
+        height, width = r.shape
+        grid = Grid(x0=fine.x0, y0=fine.y0, gsd=fine.gsd * step, width=width, height=height)
+        measured = None
+        if hatched:
+            told = np.isin(relief.quality[::step, ::step], TOLD)
+            if told.any():
+                measured = MapSurface.of_array(np.where(told, r, np.float32("nan")), grid)
+        # Lines as on a sheet on which a pixel is a third of a millimetre.
+        picture, known = shaded(
+            MapSurface.of_array(r, grid), grid, limits=span, measured=measured,
+            scale=grid.gsd * 3000,
+        )  # fmt: skip
         return _png(np.dstack([picture[..., ::-1], known]))
 
     def value(self, x: float, y: float) -> dict[str, float | None]:
@@ -277,4 +282,4 @@ def _small(picture: Any) -> Any:
 
 
 def _png(picture: Any) -> bytes:
-    return cv2.imencode(".png", picture)[1].tobytes()
+    return cv2.imencode(".png", picture, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1].tobytes()

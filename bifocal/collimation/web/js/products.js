@@ -171,6 +171,7 @@ export class ProductsStage {
     this.view = pixelView(this.wall.width, this.wall.height);
     this.pane = new Pane({ label: t("pane.products"), view: this.view, frame: this.wall,
       painter: (context, pane) => this.#draw(context, pane) });
+    this.pane.frameTo(this.wall.frameOf(1, state.photos[0]));
     this.pane.addEventListener("hover", ({ detail }) => this.#ask(detail.pixel));
     this.pane.addEventListener("pick", ({ detail }) => this.#click(this.pane.unplace(detail.pixel)));
     this.photos.replaceChildren(this.pane.element, this.range.element);

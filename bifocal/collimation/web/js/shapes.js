@@ -129,7 +129,7 @@ export class Shapes {
     const size = [width && `${number(width, 3)} × ${number(height, 3)} m`, area && `${number(area, 3)} m²`,
       kind === "break" && length && `${number(length, 3)} m`].filter(Boolean).join(" · ");
     return h("tr", { onpointerenter: () => { this.hot = name; this.stage.pane?.paint(); }, onpointerleave: () => { this.hot = null; this.stage.pane?.paint(); } },
-      h("th", { scope: "row" }, h("span", { class: "swatch", style: `background:${INK[kind]}` }), name), h("td", {}, t(`shape.${kind}`)),
+      h("th", { scope: "row" }, h("span", { class: `swatch ${kind}` }), name), h("td", {}, t(`shape.${kind}`)),
       h("td", {}, h("span", { class: "with-unit" }, level, h("span", { class: "unit" }, "m"))), h("td", { class: "number" }, size),
       h("td", {}, button("×", () => this.app.send("shape.delete", { name }), { class: "icon", "aria-label": t("list.deleteOf", { name }) })));
   }

@@ -213,9 +213,16 @@ export class Pane extends EventTarget {
     this.map.dispose();
   }
 
+  /** Show these pixels of the grid where all is to be shown: the rest is empty. */
+  frameTo(frame) {
+    const places = frame.map(toMap);
+    const [x, y] = [0, 1].map((axis) => places.map((place) => place[axis]));
+    this.extent = [Math.min(...x), Math.min(...y), Math.max(...x), Math.max(...y)];
+  }
+
   /** Show the whole grid. */
   fit() {
-    const [left, bottom, right, top] = this.view.getProjection().getExtent();
+    const [left, bottom, right, top] = this.extent ?? this.view.getProjection().getExtent();
     const [width, height] = [this.width || 800, this.height || 600];
     this.view.setCenter([(left + right) / 2, (bottom + top) / 2]);
     this.view.setResolution(1.04 * Math.max((right - left) / width, (top - bottom) / height));

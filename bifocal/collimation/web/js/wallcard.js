@@ -68,16 +68,17 @@ export class WallCard {
   async #end(image, [column, row]) {
     const ends = [...this.ends, [column, row]];
     this.ends = ends;
+    if (ends.length === 2) {
+      // What is typed next is the length.
+      this.tool = null;
+      this.length.value = "";
+      this.length.focus();
+    }
     this.stage.refresh();
     const radius = this.stage.picker.reach;
     const found = await this.app.connection.ask("/api/snap", { image, column, row, radius }).catch(() => null);
     if (this.ends === ends && found && found.kind !== "none") {
       this.ends = [...ends.slice(0, -1), [found.column, found.row]];
-    }
-    if (this.ends.length === 2) {
-      this.tool = null;
-      this.length.focus();
-      this.length.select();
     }
     this.stage.refresh();
   }
