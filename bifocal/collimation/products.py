@@ -24,7 +24,7 @@ from photocore.jsonfile import read_object, write_object
 from photocore.output import free_path
 
 #: Longer side of the relief's picture. [px]
-OVERLAY_SIDE = 2048
+OVERLAY_SIDE = 1536
 #: Longer side of a product's preview. [px]
 PREVIEW = 480
 #: Bars of the relief's histogram.
