@@ -170,11 +170,10 @@ def _line_delete(state: SurveyState, command: Fields) -> list[Change]:
 
 
 def _shape_set(state: SurveyState, command: Fields) -> list[Change]:
-    kind, name = command["kind"], command.get("name")
-    if name is None:
-        number = len(state.shapes) + 1
-        while (name := f"{kind[0].upper()}{number}") in state.shapes:
-            number += 1
+    kind, number = command["kind"], len(state.shapes) + 1
+    while (free := f"{kind[0].upper()}{number}") in state.shapes:
+        number += 1
+    name = command.get("name") or free
     least = 2 if kind == "break" else 3
     if not least <= len(command["corners"]) <= MOST_CORNERS:
         raise FieldError(remark("page.shape_corners", least=least))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import queue
 import threading
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
@@ -28,7 +29,7 @@ class FirstOrientation:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._tried: Any = None
-        self._leave = lambda: None
+        self._leave: Callable[[], None] | None = None
 
     def start(self) -> None:
         """Watch from now on, until the session ends."""
@@ -45,7 +46,8 @@ class FirstOrientation:
                 except queue.Empty:
                     break
             if event is None:
-                self._leave()
+                if self._leave is not None:
+                    self._leave()
                 return
 
     def look(self) -> None:

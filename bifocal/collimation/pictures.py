@@ -91,7 +91,9 @@ class Pictures:
         """Show an orthophoto."""
         with RasterReader(path) as file:
             size = (file.width, file.height)
-        self.tiles.register("ortho-0", Pyramid(size, lambda: _ortho_pixels(path)), *_facts(path), int(EMPTY))
+        self.tiles.register(
+            "ortho-0", Pyramid(size, lambda: _ortho_pixels(path)), *_facts(path), int(EMPTY)
+        )
 
     def warm_up(self) -> None:
         """Read both photos, so that the first suggestion does not wait for it."""

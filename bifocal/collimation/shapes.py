@@ -45,7 +45,7 @@ def corners_of(pair: Pair, places: FloatArray) -> FloatArray:
 
 def met(pair: Pair, relief: ReliefMap, pixels: FloatArray) -> FloatArray:
     """Return X, Y, r where rays of photo 1 meet a relief map, shape (n, 3); r NaN where unknown."""
-    r = np.zeros(len(pixels))
+    r: FloatArray = np.zeros(len(pixels))
     for _ in range(ROUNDS):
         places = _at_relief(pair, pixels, np.nan_to_num(r))
         r = relief.sample(places[:, :2])

@@ -91,7 +91,8 @@ def scaled_by_length(
     moved = -inverse @ by_camera[:, rows]
     by_orientation = (apart / now**2) @ (moved[1] - moved[0])
     of_ends = float(np.sqrt((((apart / now) @ inverse) ** 2).sum())) * SIGMA_END
-    return _scaled(pair, length / now, by_orientation, float(np.hypot(sigma, of_ends)) / length)
+    relative = float(np.hypot(sigma / length, of_ends / now))
+    return _scaled(pair, length / now, by_orientation, relative)
 
 
 def _scaled(pair: Pair, factor: float, by_orientation: FloatArray, relative: float) -> Pair:
@@ -125,11 +126,6 @@ def _scaled(pair: Pair, factor: float, by_orientation: FloatArray, relative: flo
             first = number * len(CAMERA) + CAMERA.index("X")
             scales[first : first + 3] = factor
             places[first : first + 3] = [*photo.nadir, photo.distance]
-        # A datum fixed in one camera's foot stays there.
-        places[np.diag(covariance) == 0] = 0.0
-        for number in (1, 2):
-            place = NAMES.index(f"Z {number}")
-            places[place] = pair.photo(number).distance
         moves = scales[:, None] * (np.eye(len(NAMES)) - np.outer(places, by_orientation))
         covariance = moves @ covariance @ moves.T + relative**2 * np.outer(
             scales * places, scales * places

@@ -37,7 +37,7 @@ class _Outlet:
 def streamed_zip(files: Mapping[str, Path]) -> Iterator[bytes]:
     """Yield an archive of files by name, with the list of their hashes, piece by piece."""
     outlet, sums = _Outlet(), ""
-    with zipfile.ZipFile(outlet, "w", zipfile.ZIP_DEFLATED) as archive:  # type: ignore[arg-type]
+    with zipfile.ZipFile(outlet, "w", zipfile.ZIP_DEFLATED) as archive:  # type: ignore[call-overload]
         for name, path in sorted(files.items()):
             entry = zipfile.ZipInfo.from_file(path, name)
             packed = path.suffix.lower() in PACKED
