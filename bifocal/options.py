@@ -30,7 +30,7 @@ OF_STEP = {
     "ortho": (*PICTURE, "gsd", "cog"),
     "drawing": (*DRAWING, *PICTURE, "language", "cog"),
     "view": ("language",),
-    "report": ("language", "unit", "scale", *PROJECT),
+    "report": ("control", "check", "language", "unit", "scale", *PROJECT),
 }
 
 

@@ -419,7 +419,7 @@ def facade_job(
         far=far,
         near=near,
         files={role: path for role, path in said.items() if role in FILES},
-        options={"times": True} | {key: value for key, value in said.items() if key not in FILES},
+        options={key: value for key, value in said.items() if key not in FILES},
         way="facade",
         products=tuple(p for p in PRODUCTS if p in products) if products else MOST_PRODUCTS,
         overwrite=overwrite,

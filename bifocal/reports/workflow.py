@@ -131,7 +131,8 @@ def _remembered(home: Path, task: ReportTask) -> dict[str, Any]:
             known |= options
             if (name := str(record.get("step"))) != "report":
                 time = _Time(float(record.get("seconds", 0)), str(record.get("machine", "")))
-                steps.append(StepTold.of(name, options, time))
+                files = {role: Path(file) for role, (file, _) in record["inputs"].items()}
+                steps.append(StepTold.of(name, {**options, **files}, time))
     scale = task.scale or known.get("scale")
     return {
         "steps": tuple(steps),

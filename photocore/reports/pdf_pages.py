@@ -175,7 +175,8 @@ class _Pages:
         )
 
     def _text(self, text: str, *, size: float, weight: str = "normal", mono: bool = False) -> None:
-        letter, indent = size * _MM * (_MONO if mono else _WIDE), 4.0 if mono else 0.0
+        wide = _MONO if mono else _WIDE if weight == "normal" else _WIDEST
+        letter, indent = size * _MM * wide, 4.0 if mono else 0.0
         width = int((INNER - indent) / letter)
         family = {"family": "monospace"} if mono else {}
         lines = textwrap.wrap(text, width, drop_whitespace=not mono) or [""]
