@@ -25,10 +25,10 @@ SET_UP, MAP, PICTURE, DRAWING, JOINT, PROJECT = (
 #: What each step of a pair asks for.
 OF_STEP = {
     "align": ("control", *SET_UP),
-    "relief": (*MAP, "cog"),
+    "relief": ("faces", *MAP, "cog"),
     "points": ("control", "check", "unit", "language"),
-    "ortho": (*PICTURE, "gsd", "cog"),
-    "drawing": (*DRAWING, *PICTURE, "language", "cog"),
+    "ortho": ("faces", *PICTURE, "gsd", "cog"),
+    "drawing": ("control", "faces", *DRAWING, *PICTURE, "language", "cog"),
     "view": ("language",),
     "report": ("control", "check", "language", "unit", "scale", *PROJECT),
 }

@@ -75,7 +75,11 @@ class Option:
         value = self.attributes.get("default")
         kind = self.attributes.get("type")
         if value in (None, "", ()):
-            return False if "is_flag" in self.attributes and value is None else None
+            return (
+                False
+                if value is None and {"is_flag", "hidden"} & self.attributes.keys() == {"is_flag"}
+                else None
+            )
         return kind.convert(value, None, None) if isinstance(value, str) and kind else value
 
     def typed_as(self, value: Any, *, in_file: bool = False) -> list[str]:

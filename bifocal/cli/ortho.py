@@ -31,6 +31,7 @@ def command(
     5 a photo on interpolated relief, 6 a photo on the plane). Of a set each pixel is taken from
     the photo that sees it best: 11 is its first photo, 12 the second, 3 a transition.
     """
+    from bifocal.faces.faces_files import faces_path, keep_faces
     from bifocal.model.photo_set import PhotoSet
     from bifocal.orthophotos.deliver_workflow import DeliverTask, default_title, deliver
     from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho, not_measured
@@ -47,6 +48,8 @@ def command(
     source = read_photos(pair)
     if isinstance(source, PhotoSet) and folder is not None:
         raise InputError(remark_of("ortho.set_not_delivered"))
+    drawn = given["faces"]
+    given["faces"] = faces_path(drawn, pair)
     own: Path | SurveyPoints | None = points
     if relief is None and points is None and plane is None and is_workbook(pair):
         own = points_of(pair)
@@ -77,6 +80,7 @@ def command(
                 progress=progress,
             )  # fmt: skip
     grid, shares = result.grid, result.shares
+    remarks = (*result.remarks, *keep_faces(drawn, pair))
     lines = [
         f"{result.path}: {grid.width} x {grid.height} px of {grid.gsd * 1000:g} mm; "
         f"{100 * (1 - shares['none']):.1f} % covered, {100 * shares['hidden']:.1f} % hidden"
@@ -85,4 +89,4 @@ def command(
         lines.append(f"Not measured: {told}")
     if files:
         lines.append(f"{folder}: {', '.join(done.files)} (sheet {done.sheet})")
-    print_result(result.to_dict() | files, lines, as_json=as_json, remarks=result.remarks)
+    print_result(result.to_dict() | files, lines, as_json=as_json, remarks=remarks)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bifocal.faces.faced_surface import FacedSurface
 from bifocal.files.strips import write_png
 from bifocal.media import media_words
 from bifocal.model.geotiff import (
@@ -22,7 +23,7 @@ from bifocal.model.geotiff import (
 from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
 from bifocal.model.points import SurveyPoints
-from bifocal.model.relief_map import Quality
+from bifocal.model.relief_map import Quality, measured_part
 from bifocal.model.surface import FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.contour_lines import contour_grid, contours
 from bifocal.orthophotos.drawing import Contour, Drawing, Legend, PrintSheet, round_step
@@ -168,7 +169,7 @@ def deliver(
             notes=_notes(pair, grid, wish, task), language=wish.language,
         )  # fmt: skip
         sheet = PrintSheet.fitting(drawing, wish.paper)
-        measured = _measured(reader) or surface
+        measured = _measured(reader, surface)
         cuts = tuple(
             section(surface, grid, cut, step=gsd, measured=measured, letter=section_letter(number))
             for number, cut in enumerate(wish.sections)
@@ -378,19 +379,13 @@ def _band(reader: RasterReader | None, number: int) -> Surface | None:
     return None
 
 
-def _measured(reader: RasterReader | None) -> Surface | None:
-    """Return the measured part of a relief map; None where no map tells, or nothing was."""
-    if reader is None or reader.bands < 3 or not reader.names[2].startswith("quality"):
-        return None
-
-    def fetch(*window: int) -> Float32Array:
-        quality = reader.read(*window, bands=[3])[:, :, 0]
-        return np.where(quality == Quality.MEASURED, reader.read_floats(*window), np.float32("nan"))
-
+def _measured(reader: RasterReader | None, surface: Surface) -> Surface:
+    """Return what of a relief was measured or drawn; all of it where no map tells."""
     # A map of which nothing was measured is drawn as it is, hatched by no one.
-    with suppress(InputError):
-        return MapSurface(reader.grid, fetch)
-    return None
+    told = None if reader is None else measured_part(reader)
+    if told is None:
+        return surface
+    return FacedSurface(told, surface.faces) if isinstance(surface, FacedSurface) else told
 
 
 def _points(source: Path | SurveyPoints | None) -> tuple[SurveyPoints | None, tuple[str, ...]]:
@@ -408,7 +403,8 @@ def _notes(pair: Pair, grid: Grid, wish: DeliverTask, task: OrthoTask) -> tuple[
     relief, say = task.relief or task.points, words_of("bifocal.orthophotos", wish.language)
     return (
         say("pixel", size=grid.gsd * 1000, dpi=dpi_at_scale(grid.gsd, wish.scale)),
-        wish.camera or say(f"photo_{task.image}", d1=pair.image1.distance, d2=pair.image2.distance),
+        wish.camera
+        or say(f"photo_{task.photo_words}", d1=pair.image1.distance, d2=pair.image2.distance),
         *((say("media", media=media_words(pair.layers)),) if pair.layers else ()),
         say("relief_of", name=relief.name) if relief else say("relief_plane", plane=task.plane),
         f"{program()}, {today()}",

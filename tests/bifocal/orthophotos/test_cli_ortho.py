@@ -64,7 +64,8 @@ def test_a_relief_map_survives_its_file(wall: Path) -> None:
 
 
 def test_the_orthophoto_has_colours_source_band_mask_and_place(wall: Path) -> None:
-    done = run(wall, "--relief", "relief.tif", "--out", "o.tif", "--tfw", "--json")
+    measured = ("--relief", "relief.tif", "--measured-only")
+    done = run(wall, *measured, "--out", "o.tif", "--tfw", "--json")
     assert done.exit_code == 0, done.output
     result = json.loads(done.stdout)
     assert result["shares"]["hidden"] > 0.001
@@ -277,7 +278,7 @@ def test_the_sheet_of_a_whole_picture_says_what_was_not_measured(wall: Path) -> 
     r[100:200, 100:200] = np.nan
     replace(relief, r=r).write(wall / "relief.tif", overwrite=True)
     done = run(
-        wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50", "--complete",
+        wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50",
         "--section", "y=-1.2",
     )  # fmt: skip
     assert done.exit_code == 0, done.output
