@@ -28,7 +28,7 @@ OF_STEP = {
     "relief": ("faces", *MAP, "cog"),
     "points": ("control", "check", "unit", "language"),
     "ortho": ("faces", *PICTURE, "gsd", "cog"),
-    "drawing": ("control", "faces", *DRAWING, *PICTURE, "language", "cog"),
+    "drawing": ("control", "check", "faces", *DRAWING, *PICTURE, "language", "cog"),
     "view": ("language",),
     "report": ("control", "check", "language", "unit", "scale", *PROJECT),
 }

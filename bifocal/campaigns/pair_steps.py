@@ -7,17 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bifocal.campaigns.step_store import Step, StepRecord, read_record
 from bifocal.faces.faces_files import faces_path
-from bifocal.options import DRAWING, FILES, MAP, OF_STEP, PICTURE, PROJECT, SET_UP, typed
+from bifocal.options import DRAWING, FILES, MAP, OF_PAIR, OF_STEP, PICTURE, PROJECT, SET_UP, typed
 from photocore.cli import Progress
 from photocore.errors import InputError
 from photocore.textfile import file_name
 
 if TYPE_CHECKING:
+    from bifocal.model.points import SurveyPoints
     from bifocal.orthophotos.ortho_workflow import OrthoTask
 
 #: What may be wanted of a pair, in the order of work.
@@ -141,7 +143,7 @@ def steps_of(job: PairJob) -> list[Step]:
     if "ortho" in wanted:
         steps.append(_ortho_step(job))
     if "drawing" in wanted:
-        steps.append(_drawing_step(job))
+        steps.append(_drawing_step(job, tuple(step.name for step in steps)))
     if "view" in wanted:
         steps.append(_view_step(job, tuple(step.name for step in steps)))
     steps = [replace(step, command=_command(job, step)) for step in steps]
@@ -160,7 +162,8 @@ def _command(job: PairJob, step: Step) -> str:
         return job.told[step.name].command
     photos = {"far": job.far, "near": job.near}
     wanted = OF_STEP[step.name]
-    said = {key: value for key, value in {**job.files, **job.options}.items() if key in wanted}
+    everything = {**job.files, **job.options}
+    said = {key: everything[key] for key in OF_PAIR if key in wanted and key in everything}
     if job.way == "facade":
         return " ".join(["bifocal facade", *(p.name for p in photos.values()), *typed(said)])
     keys = [f'{role} = "{path.name}"' for role, path in photos.items()]
@@ -297,22 +300,39 @@ def _ortho_step(job: PairJob) -> Step:
     return Step(name="ortho", files=files, after=("align", "relief"), options=options, make=make)
 
 
-def _drawing_step(job: PairJob) -> Step:
+def _drawing_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
     options = {"scale": SCALE} | _some(job, *DRAWING, *PICTURE, "language", "cog")
-    tables = {role: job.files[role] for role in ("control", "mark") if role in job.files}
+    tables = {role: job.files[role] for role in ("control", "check", "mark") if role in job.files}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver
 
         drawing = {key: options[key] for key in (*DRAWING, "language") if key in options}
-        wish = DeliverTask(title=job.name, **drawing, mark=job.files.get("mark"))
+        wish = DeliverTask(
+            title=job.name, **drawing, mark=job.files.get("mark"),
+            cad=_points_to_draw(job, solved="points" in earlier),
+        )  # fmt: skip
         task = _ortho_task(job, options)
         return deliver(job.pair_path, place, task, wish, progress=progress).ortho.remarks
 
     return Step(
-        name="drawing", files={**_photos(job), **_faces(job), **tables}, after=("align", "relief"),
+        name="drawing", files={**_photos(job), **_faces(job), **tables},
+        after=tuple(name for name in ("align", "relief", "points") if name in earlier),
         options=options, make=make,
     )  # fmt: skip
+
+
+def _points_to_draw(job: PairJob, *, solved: bool) -> dict[str, SurveyPoints]:
+    """Return what a drawing for CAD holds: known points where they are, and as they were solved."""
+    from bifocal.files.point_tables import read_survey_points
+    from bifocal.orientation.control_points import known_points
+
+    unit = str(job.options.get("unit", ""))
+    points = {role: known_points(path, unit=unit) for role, path in tables_of(job).items()}
+    if solved:
+        (table,) = (job.folder / "points").glob(f"{escape(job.title)}_points.*")
+        points["points"] = read_survey_points(table)[0]
+    return points
 
 
 def _view_step(job: PairJob, earlier: tuple[str, ...]) -> Step:

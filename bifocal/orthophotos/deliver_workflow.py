@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -84,6 +85,11 @@ class DeliverTask:
         ``A4`` to ``A0``; None: the smallest that holds the picture.
     mark, control : Path or SurveyPoints, optional
         Points to draw, or their tables.
+    cad : mapping of str to SurveyPoints
+        Of ``points``, ``control`` and ``check``: what the drawing for CAD holds though the sheet
+        does not show it.
+    layers : str
+        How those of drawings are called: ``language``, ``bifocal`` or ``ncs``.
     sections : sequence of str
         ``x=1.5``, ``y=2`` or corners.
     contours : float, optional
@@ -100,6 +106,8 @@ class DeliverTask:
     paper: str | None = None
     mark: Path | None = None
     control: Path | SurveyPoints | None = None
+    cad: Mapping[str, SurveyPoints] = field(default_factory=dict)
+    layers: str = "language"
     sections: Sequence[str] = ()
     contours: float | None = None
     language: str = "en"
@@ -166,7 +174,7 @@ def deliver(
         grid = planned_grid(pair, surface, task)
         drawing = Drawing(
             title=title, grid=grid, scale=scale, points=points, control=control,
-            notes=_notes(pair, grid, wish, task), language=wish.language,
+            notes=_notes(pair, grid, wish, task), language=wish.language, layers=wish.layers,
         )  # fmt: skip
         sheet = PrintSheet.fitting(drawing, wish.paper)
         measured = _measured(reader, surface)
@@ -192,19 +200,19 @@ def deliver(
         guess = not_measured(result.shares, wish.language)
         told = (drawing.say("guessed", shares=guess),) if guess else ()
         picture = replace(drawing, notes=(*told, *drawing.notes))
-        missing = _pictures(place, name, picture, sheet, relief.lines if relief else ())
+        more = {role: rest for role, rest in wish.cad.items() if getattr(drawing, role) is None}
+        missing = _pictures(place, name, picture, sheet, relief.lines if relief else (), more)
         if missing.names:
             remarks += (remark("drawing.without_name", count=missing.names),)
         if missing.points:
             remarks += (remark("drawing.outside", count=missing.points),)
         if relief:
-            share = _draw_relief(place, f"{name}_relief", relief, drawing, sheet)
+            share = _draw_relief(place, f"{name}_relief", relief, drawing, sheet, more)
             if share:
                 remarks += (remark("drawing.relief_not_measured", share=share),)
         for number, cut in enumerate(cuts, start=1):
             for writer, ending in ((write_section_dxf, "dxf"), (write_section_svg, "svg")):
-                target = place / f"{name}_section{number}.{ending}"
-                writer(target, cut, scale=scale, say=drawing.say)
+                writer(place / f"{name}_section{number}.{ending}", cut, drawing=drawing)
         if out is not None and extra != (f"{name}.tif",):
             shutil.copyfile(place / f"{name}.tif", place / out.name if inside else copy)
         files = tuple(sorted(item.name for item in place.iterdir()))
@@ -271,16 +279,18 @@ def default_title(source: Pair | Path, path: Path | None = None) -> str:
 
 
 def _pictures(
-    place: Path, name: str, drawing: Drawing, sheet: PrintSheet, lines: tuple[Contour, ...]
-) -> LeftOut:
+    place: Path, name: str, drawing: Drawing, sheet: PrintSheet, lines: tuple[Contour, ...],
+    more: Mapping[str, Any],
+) -> LeftOut:  # fmt: skip
     """Write PNG, drawing and print sheet of a raster; return what the sheet left out.
 
-    The drawing has the contour lines whatever the sheet shows: CAD switches their layer off.
+    The drawing has contour lines and more points whatever the sheet shows: CAD switches their
+    layers off.
     """
     dpi = dpi_at_scale(drawing.grid.gsd, drawing.scale)
     with RasterReader(place / f"{name}.tif") as reader:
         write_png(place / f"{name}.png", reader, dpi=dpi, overwrite=False)
-        everything = replace(drawing, contours=lines)
+        everything = replace(drawing, contours=lines, **more)
         write_drawing(place / f"{name}.dxf", everything, sheet, f"{name}.png", overwrite=False)
         return write_sheet(place / f"{name}.pdf", drawing, sheet, reader, overwrite=False)
 
@@ -311,8 +321,9 @@ def _prepared(
 
 
 def _draw_relief(
-    place: Path, name: str, relief: _Relief, drawing: Drawing, sheet: PrintSheet
-) -> float:
+    place: Path, name: str, relief: _Relief, drawing: Drawing, sheet: PrintSheet,
+    more: Mapping[str, Any],
+) -> float:  # fmt: skip
     """Write the relief as numbers, and shaded with contour lines as picture, drawing and sheet.
 
     Returns the share of the picture whose relief is known but was not measured.
@@ -343,7 +354,7 @@ def _draw_relief(
         drawing, kind="relief", contours=relief.lines, notes=(words, *drawing.notes),
         legend=legend,
     )  # fmt: skip
-    _pictures(place, name, drawing, sheet, relief.lines)
+    _pictures(place, name, drawing, sheet, relief.lines, more)
     return share
 
 
