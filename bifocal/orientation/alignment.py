@@ -23,6 +23,7 @@ from bifocal.orientation.facade_lines import facade_rotation
 from bifocal.orientation.media_report import media_in_words
 from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput, Photos
+from bifocal.orientation.tie_coverage import tie_statistics
 from bifocal.orientation.tie_points import (
     tie_positions,
 )
@@ -150,14 +151,27 @@ def make_alignment(
 def _of_pixels(adjusted: AdjustedPair, observations: PairObservations) -> FloatArray:
     """Return the covariance of the cameras as the pair file counts it, shape (24, 24)."""
     unit = np.ones(len(adjusted.covariance))
-    for number, (camera, interior) in enumerate(
-        zip(adjusted.cameras, observations.interiors, strict=True)
-    ):
-        # The distortion's radius counts in principal distances: there of the camera as adjusted.
-        ratio = (camera.matrix[0, 0] / interior.focal) ** 2
+    for number, factors in enumerate(_radial_units(adjusted, observations)):
         first = number * len(CAMERA) + CAMERA.index("k1")
-        unit[first : first + 2] = ratio, ratio**2
+        unit[first : first + 2] = factors
     return adjusted.covariance * np.outer(unit, unit)
+
+
+def _radial_units(adjusted: AdjustedPair, observations: PairObservations) -> FloatArray:
+    """Return what k1 and k2 of either photo are multiplied by for the pair file, shape (2, 2).
+
+    The distortion's radius counts in principal distances: there of the camera as adjusted.
+    """
+    cameras = zip(adjusted.cameras, observations.interiors, strict=True)
+    ratios = np.array([(camera.matrix[0, 0] / given.focal) ** 2 for camera, given in cameras])
+    return np.column_stack([ratios, ratios**2])
+
+
+def _radial(adjusted: AdjustedPair, observations: PairObservations) -> FloatArray | None:
+    """Return k1 and k2 of either photo as the covariance counts them; None where not estimated."""
+    if not any(interior.sigma_radial for interior in observations.interiors):
+        return None
+    return np.asarray(adjusted.radial * _radial_units(adjusted, observations))
 
 
 def facade_axes(
@@ -274,7 +288,9 @@ def _diagnostics(
             "count": int(observations.tie_used.sum()),
             "on_wall": int((observations.wall & observations.tie_used).sum()),
             "sigma_px": sigma_tie,
+            **tie_statistics(observations, adjusted),
         },
+        "radial": _radial(adjusted, observations),
         "planes": [
             {"offset": face.offset, "share": face.share, "pixel": list(face.pixel)}
             for face in oriented.faces
@@ -308,6 +324,11 @@ def _diagnostics(
             }
             for index, name in enumerate(control.ids)
         ]
+    spreads = control.sigma_lengths or (None,) * len(control.lengths)
+    out["lengths"] = [
+        {"from": control.ids[a], "to": control.ids[b], "length": length, "sigma": sigma}
+        for (a, b, length), sigma in zip(control.lengths, spreads, strict=True)
+    ]
     return out
 
 
