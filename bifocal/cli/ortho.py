@@ -56,7 +56,7 @@ def command(
     breaklines = [line.split(",") for line in given.pop("breaklines")]
     if breaklines and own is None:
         raise click.UsageError("--breakline joins measured points; give their table by --points.")
-    for name in (*DRAWING[3:], "control"):
+    for name in (*DRAWING[4:], "control"):
         if drawing[name] and folder is None:
             flag = OF_PAIR[name].flag
             raise click.UsageError(f"{flag} is drawn into a folder; give --deliver DIR.")

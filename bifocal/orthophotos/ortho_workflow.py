@@ -182,6 +182,9 @@ def make_ortho(
             shares[photo.name] = float(counts[number]) / total
     shares["hidden"] = hidden / total
     notes += [] if isinstance(pair, PhotoAlone | PhotosOfSet) else _advice(shares, task)
+    own = photo_pixel(pair, task)
+    if grid.gsd < PIXELS.said * own:
+        notes.append(remark("ortho.finer_than_photo", size=1000 * grid.gsd, own=1000 * own))
     return RasterResult(
         path=out, grid=grid, shares=shares, remarks=(*pair.remarks, *remarks, *notes)
     )
@@ -301,6 +304,12 @@ def planned_grid(pair: Pair, surface: Surface, task: OrthoTask) -> Grid:
     """Return the grid the task will have, without decoding a photo; asks back like `make_ortho`."""
     number = 2 if task.image == "2" else 1
     return _grid(pair, number, photo_info(pair, number).size, surface, task)
+
+
+def photo_pixel(pair: Pair, task: OrthoTask) -> float:
+    """Return the side of a pixel of the photo that gives most colours, on the wall. [m]"""
+    number = 2 if task.image == "2" else 1
+    return pair.photo(number).gsd(photo_info(pair, number).size)
 
 
 def _grid(pair: Pair, first: int, size: tuple[int, int], surface: Surface, task: OrthoTask) -> Grid:
