@@ -347,11 +347,12 @@ def _fixed_table(editor: WorkbookEditor, built: BookBuilder, name: str, key: str
     if area is None:
         return
     headings, given, grid = area.headings(), content.cells[key], editor.grid(area.sheet).rows
-    if key not in headings or area.length != len(given):
+    rows = range(area.length)
+    if key not in headings or area.length > len(given):
         return
-    stand = [grid.get(area.first + i, {}).get(headings[key]) for i in range(len(given))]
-    if stand == [float(value or 0) for value in given]:
-        _table(editor, built, name, range(len(given)))
+    stand = [grid.get(area.first + row, {}).get(headings[key]) for row in rows]
+    if stand == [float(given[row] or 0) for row in rows]:
+        _table(editor, built, name, rows)
 
 
 def _verdict(
