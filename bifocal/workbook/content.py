@@ -15,9 +15,10 @@ from bifocal.survey.georeferencing import residuals
 from bifocal.survey.image_shift import foot_tangents, image_shift, lens_turns
 from bifocal.survey.leave_one_out import leave_one_out
 from bifocal.survey.observations import PointObservations
+from bifocal.survey.other_photos import OF_ALL, OtherPhoto
 from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable, entries
-from bifocal.survey.setup import SIGMA_RADIAL, SurveySetup
+from bifocal.survey.setup import SCALE_TOLERANCE, SIGMA_RADIAL, SurveySetup
 from bifocal.survey.solved_survey import SolvedSurvey, WorldPoints
 from bifocal.survey.survey_media import SurveyMedia
 from bifocal.survey.tolerances import RULES, ToleranceRule
@@ -25,11 +26,19 @@ from bifocal.survey.weighted_similarity import weights_of
 from bifocal.workbook.formulas.columns import (
     NEAR,
     adjustment_names,
+    compared,
     ideal_points,
+    other_numbers,
     pair_points,
 )
 from bifocal.workbook.formulas.media_formulas import setup_values
-from bifocal.workbook.formulas.setup_cells import MATRICES, NADIRS, PHOTOS, setup_checks
+from bifocal.workbook.formulas.setup_cells import (
+    MATRICES,
+    NADIRS,
+    PHOTOS,
+    other_cells,
+    setup_checks,
+)
 from photocore.arrays import BoolArray, FloatArray
 from photocore.workbook.changing.cells import CellValue, name_cell
 from photocore.workbook.making.live_columns import LiveColumn
@@ -94,6 +103,8 @@ class SurveyContent:
         the pair. An ideal pair's stand in its set-up.
     lens : bool
         Whether an empty template has cells for the distortion of each lens.
+    other_photos : int
+        How many photos an empty template has columns for beside those of the pair.
     """
 
     language: str = "en"
@@ -120,6 +131,7 @@ class SurveyContent:
     plain: bool = False
     media: SurveyMedia | None = None
     lens: bool = False
+    other_photos: int = 0
 
     @classmethod
     def of(cls, solved: SolvedSurvey) -> SurveyContent:
@@ -153,6 +165,11 @@ class SurveyContent:
         return self.lens if self.setup is None else self.setup.lenses is not None
 
     @property
+    def others(self) -> int:
+        """How many photos there are columns for beside those of the pair."""
+        return self.other_photos if self.setup is None else len(self.setup.others)
+
+    @property
     def is_pair(self) -> bool:
         """Whether the points are raw pixels of a general pair."""
         return self.pair is not None and self.setup is None
@@ -180,8 +197,9 @@ class SurveyContent:
         if self.is_pair:
             return pair_points(undistorted=self.undistorted, media=self.media_cells)
         return ideal_points(
-            **there, adjusted=self.corrected, media=self.media_cells, lens=self.has_lens
-        )
+            **there, adjusted=self.corrected, media=self.media_cells, lens=self.has_lens,
+            others=self.others,
+        )  # fmt: skip
 
     @property
     def placed(self) -> WorldPoints:
@@ -229,6 +247,10 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
         (("col1", "row1"), points.pixels1),
         (("col2", "row2"), points.pixels2),
     ]
+    groups += [
+        ((f"x{k}", f"y{k}"), points.other_xy[:, i])
+        for i, k in enumerate(other_numbers(points.other_xy.shape[1]))
+    ]
     if content.undistorted:
         for image, photo, raw in zip(
             "12", content.photos, (points.pixels1, points.pixels2), strict=True
@@ -247,6 +269,8 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
         placeless[:] = True
     for key, values in table.columns.items():
         blank = placeless if key in _PLACES or key.startswith("cov_") else incomplete
+        if key in OF_ALL or key.startswith(("r_1_", "sigma_1_")):
+            blank = np.isnan(values)
         if key in ("q", "theta_used"):
             blank = np.isnan(values)
         cells[key] = _unless(blank, values)
@@ -354,6 +378,28 @@ def check_cells(
     return cells
 
 
+def compare_cells(
+    content: SurveyContent, points: Mapping[str, Sequence[CellValue]]
+) -> dict[str, list[CellValue]]:
+    """Return every column of the table that holds pairs of photos beside each other."""
+    known, check, table = content.known, content.check, content.table
+    if check is None or table is None:
+        return {}
+    cells = {"id": [name_cell(name) for name in known.ids]}
+    measured = np.where(np.isnan(check.errors[:, 2]), np.nan, known.xyz[:, 2])
+    cells["Z_ref"] = inputs(measured)
+    rows = known.rows_in(table)
+    for r, sigma in compared(content.others):
+        found, precision = (
+            np.array([*(np.nan if v is None else v for v in points[key]), np.nan], float)[rows]
+            for key in (r, sigma)
+        )
+        errors = found - measured
+        cells |= {r: inputs(found), f"e_{r}": inputs(errors)}
+        cells[sigma] = inputs(np.where(np.isnan(errors), np.nan, precision))
+    return cells
+
+
 def control_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     """Return every column of `Georeference` by key."""
     control, geo = content.control, content.georeference
@@ -445,6 +491,7 @@ def _setup_cells(content: SurveyContent) -> dict[str, CellValue]:
     cells["sigma_r_max"] = limits.relief_limit(content.pair.d2)
     if setup is None:
         return cells | _pair_cells(content, first, second)
+    cells |= _other_cells(setup)
     if first.scale_number is not None and second.scale_number is not None:
         cells["k_12"] = second.scale_number / first.scale_number
     cells |= {"photo_1": setup.photo1 or None, "photo_2": setup.photo2 or None}
@@ -468,6 +515,26 @@ def _setup_cells(content: SurveyContent) -> dict[str, CellValue]:
         cells |= {f"nadir_{image}_col": column, f"nadir_{image}_row": row}
         if setup.unit == "px":
             cells |= {f"off_x{image}": column, f"off_y{image}": row}
+    return cells
+
+
+def _other_cells(setup: SurveySetup) -> dict[str, CellValue]:
+    """Return the cells of photos beside those of the pair."""
+    cells: dict[str, CellValue] = {}
+    scale1 = OtherPhoto(d=setup.taking.d1, c=setup.taking.c1).scale
+    for k, other in enumerate(setup.others, start=3):
+        column, row = other.nadir or (None, None)
+        typed = (other.c, other.d, other.enlargement or 1, column, row)
+        cells |= dict(zip(other_cells(k), typed, strict=True))
+        scale = other.scale
+        cells[f"m_{k}"] = None if scale != scale else scale * 1000
+        ratio = scale * (other.enlargement or 1) / scale1
+        if ratio == ratio:
+            agree = abs(ratio - 1) <= SCALE_TOLERANCE
+            cells[f"check_scale_{k}"] = "OK" if agree else "CHECK"
+        is_px = setup.unit == "px"
+        cells |= {f"off_x{k}": (column or 0) if is_px else 0}
+        cells |= {f"off_y{k}": (row or 0) if is_px else 0}
     return cells
 
 

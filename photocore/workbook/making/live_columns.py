@@ -150,7 +150,7 @@ class _Formulas:
         for row in rows:
             if not holds(row.get("when", ""), self.facts):
                 continue
-            words = self.filled(row["each"]).split() if "each" in row else [None]
+            words = self.filled(row["each"], given).split() if "each" in row else [None]
             for word in words:
                 own = given if word is None else (word, *(word.split(":") if ":" in word else word))
                 if "rows" in row:
