@@ -140,9 +140,7 @@ def _of_pair(
     return (relief(*rays, **lengths), sigma_relief(*rays, **lengths, **sigmas)), rate
 
 
-def _together(
-    seen: _Seen, precision: float
-) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+def _together(seen: _Seen, precision: float) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
     """Return the points by all rays, and the turns that lead there."""
     x, y, w, d, _ = seen
 

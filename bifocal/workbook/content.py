@@ -4,39 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations_with_replacement
 
 import numpy as np
 
 from bifocal.model.flags import DOUBTFUL_SHARE, FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
-from bifocal.survey.georeferencing import residuals
 from bifocal.survey.image_shift import foot_tangents, image_shift, lens_turns
-from bifocal.survey.leave_one_out import leave_one_out
 from bifocal.survey.observations import PointObservations
-from bifocal.survey.other_photos import OF_ALL, OtherPhoto
+from bifocal.survey.other_photos import OF_ALL
 from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
-from bifocal.survey.relief_table import ReliefTable, entries
-from bifocal.survey.setup import SCALE_TOLERANCE, SIGMA_RADIAL, SurveySetup
+from bifocal.survey.relief_table import ReliefTable
+from bifocal.survey.setup import SIGMA_RADIAL, SurveySetup
 from bifocal.survey.solved_survey import SolvedSurvey, WorldPoints
 from bifocal.survey.survey_media import SurveyMedia
 from bifocal.survey.tolerances import RULES, ToleranceRule
-from bifocal.survey.weighted_similarity import weights_of
 from bifocal.workbook.formulas.columns import (
     NEAR,
     adjustment_names,
-    compared,
     ideal_points,
     other_numbers,
     pair_points,
 )
 from bifocal.workbook.formulas.media_formulas import setup_values
+from bifocal.workbook.formulas.other_values import other_values
 from bifocal.workbook.formulas.setup_cells import (
     MATRICES,
     NADIRS,
     PHOTOS,
-    other_cells,
     setup_checks,
 )
 from photocore.arrays import BoolArray, FloatArray
@@ -228,7 +223,7 @@ def inputs(values: FloatArray) -> list[CellValue]:
     return [None if value != value else value for value in values.tolist()]
 
 
-def _named(names: Sequence[str], used: BoolArray) -> dict[str, list[CellValue]]:
+def named_rows(names: Sequence[str], used: BoolArray) -> dict[str, list[CellValue]]:
     """Return the columns that every table of points begins with."""
     return {"id": [name_cell(name) for name in names], "use": [int(value) for value in used]}
 
@@ -238,7 +233,7 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     points, table = content.points, content.table
     if points is None:
         return {}
-    cells = _named(points.ids, points.use)
+    cells = named_rows(points.ids, points.use)
     cells |= {"code": list(points.code), "note": list(points.note)}
     groups = [
         (("x1", "y1"), points.xy1),
@@ -356,110 +351,6 @@ def result_cells(
     }
 
 
-def check_cells(
-    content: SurveyContent, points: Mapping[str, Sequence[CellValue]]
-) -> dict[str, list[CellValue]]:
-    """Return every column of `Check` by key, from those of `Points`."""
-    known, check, table = content.known, content.check, content.table
-    cells = _named(known.ids, known.used)
-    for i, axis in enumerate("XYZ"):
-        cells[f"{axis}_ref"] = inputs(known.xyz[:, i])
-        if check is not None:
-            cells[axis] = inputs(check.solved[:, i])
-            cells[f"d{axis}"] = inputs(check.errors[:, i])
-            cells[f"t{axis}"] = inputs(check.standardised[:, i])
-    if check is not None and table is not None:
-        sizes = np.abs(np.nan_to_num(check.standardised)).max(axis=1)
-        tested = ~np.isnan(check.standardised).all(axis=1)
-        cells["sigmas"] = inputs(np.where(tested, sizes, np.nan))
-        cells["out"] = [int(name in check.flagged) for name in known.ids]
-        flags = [*points["flag"], None]
-        cells["flag"] = [flags[row] for row in known.rows_in(table)]
-    return cells
-
-
-def compare_cells(
-    content: SurveyContent, points: Mapping[str, Sequence[CellValue]]
-) -> dict[str, list[CellValue]]:
-    """Return every column of the table that holds pairs of photos beside each other."""
-    known, check, table = content.known, content.check, content.table
-    if check is None or table is None:
-        return {}
-    cells = {"id": [name_cell(name) for name in known.ids]}
-    measured = np.where(np.isnan(check.errors[:, 2]), np.nan, known.xyz[:, 2])
-    cells["Z_ref"] = inputs(measured)
-    rows = known.rows_in(table)
-    for r, sigma in compared(content.others):
-        found, precision = (
-            np.array([*(np.nan if v is None else v for v in points[key]), np.nan], float)[rows]
-            for key in (r, sigma)
-        )
-        errors = found - measured
-        cells |= {r: inputs(found), f"e_{r}": inputs(errors)}
-        cells[sigma] = inputs(np.where(np.isnan(errors), np.nan, precision))
-    return cells
-
-
-def control_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
-    """Return every column of `Georeference` by key."""
-    control, geo = content.control, content.georeference
-    cells = _named(control.ids, control.used)
-    cells |= {axis: inputs(control.xyz[:, i]) for i, axis in enumerate("ENH")}
-    if geo is None:
-        return cells
-    cells["found_bad"] = [0 if name in geo.bad else None for name in geo.ids]
-    used, fit = geo.used, geo.world_from_wall
-    centred = geo.solved - fit.source_centre
-    left = residuals(fit, geo.solved, control.xyz - geo.origin, geo.offset)
-    near = geo.near
-    for i, (axis, world) in enumerate(zip("XYZ", "ENH", strict=True)):
-        cells[axis] = inputs(geo.solved[:, i])
-        cells[f"c{axis}"] = inputs(np.where(used, centred[:, i], 0.0))
-        cells[f"c{world}"] = inputs(np.where(used, near[:, i], 0.0))
-        cells[f"v{world}"] = inputs(left[:, i])
-    cells["w"] = [int(value) for value in used]
-    return cells | _weight_cells(geo) | _left_out_cells(geo)
-
-
-def _left_out_cells(geo: Georeference) -> dict[str, list[CellValue]]:
-    """Return what each control point costs the fit."""
-    found = leave_one_out(geo)
-    cells: dict[str, list[CellValue]] = {}
-    cells |= {key: inputs(getattr(found, key)) for key in ("own", "gain")}
-    cells |= {"v": inputs(found.size), "s0": inputs(found.sigma0)}
-    for (i, a), (j, b) in combinations_with_replacement(enumerate("ENH"), 2):
-        cells[f"d_{a}{b}"] = inputs(found.covariance[:, i, j])
-    fits: list[CellValue] = [
-        None if gain != gain else "CHECK" if row == found.worst else "OK"
-        for row, gain in enumerate(found.gain)
-    ]
-    return cells | {"fit": fits}
-
-
-def _weight_cells(geo: Georeference) -> dict[str, list[CellValue]]:
-    """Return covariances of the control points, their weights, and weights times design."""
-    if geo.covariance is None:
-        return {}
-    cells = {key: inputs(values) for key, values in entries(geo.covariance, "q_").items()}
-    size, used = len(geo.ids), geo.used
-    flat = geo.model == "2D"
-    weights = np.zeros((size, 3, 3))
-    weights[used] = weights_of(geo.covariance[used], flat=flat)
-    centred = np.zeros((size, 3))
-    centred[used] = geo.solved[used] - geo.world_from_wall.source_centre
-    east, north, height = np.where(used[:, None], geo.near, 0.0).T
-    zero, turned = np.zeros(size), 1.0 if flat else 0.0
-    design = [
-        (east, turned * north, -north), (north, -turned * east, east), (zero, height, zero)
-    ]  # fmt: skip
-    cells |= {key: inputs(values) for key, values in entries(weights, "p_").items()}
-    columns = {f"u_{{}}{name}": np.stack(d, axis=-1) for name, d in zip("pqm", design, strict=True)}
-    for key, column in {**columns, "h_{}": centred}.items():
-        weighted = np.einsum("nij,nj->ni", weights, column)
-        cells |= {key.format(axis): inputs(weighted[:, i]) for i, axis in enumerate("XYZ")}
-    return cells
-
-
 def setup_cells(content: SurveyContent) -> dict[str, CellValue]:
     """Return the value of every named cell of `Setup`; what is absent is blank."""
     pair, is_pair, media = content.pair, content.is_pair, content.bent
@@ -476,6 +367,8 @@ def _setup_cells(content: SurveyContent) -> dict[str, CellValue]:
         **{f"off_{axis}{image}": 0 for axis in "xy" for image in "12"},
         **{f"lens_{image}_{axis}": 0 for axis in "uv" for image in "12"},
     }  # fmt: skip
+    for k in other_numbers(content.others):
+        cells |= {f"off_x{k}": 0, f"off_y{k}": 0, f"enlargement_{k}": 1}
     if content.pair is None:
         return cells | {"sigma_s": SIGMA_RADIAL}
     for image, photo in enumerate(content.photos, start=1):
@@ -491,7 +384,7 @@ def _setup_cells(content: SurveyContent) -> dict[str, CellValue]:
     cells["sigma_r_max"] = limits.relief_limit(content.pair.d2)
     if setup is None:
         return cells | _pair_cells(content, first, second)
-    cells |= _other_cells(setup)
+    cells |= other_values(setup)
     if first.scale_number is not None and second.scale_number is not None:
         cells["k_12"] = second.scale_number / first.scale_number
     cells |= {"photo_1": setup.photo1 or None, "photo_2": setup.photo2 or None}
@@ -515,26 +408,6 @@ def _setup_cells(content: SurveyContent) -> dict[str, CellValue]:
         cells |= {f"nadir_{image}_col": column, f"nadir_{image}_row": row}
         if setup.unit == "px":
             cells |= {f"off_x{image}": column, f"off_y{image}": row}
-    return cells
-
-
-def _other_cells(setup: SurveySetup) -> dict[str, CellValue]:
-    """Return the cells of photos beside those of the pair."""
-    cells: dict[str, CellValue] = {}
-    scale1 = OtherPhoto(d=setup.taking.d1, c=setup.taking.c1).scale
-    for k, other in enumerate(setup.others, start=3):
-        column, row = other.nadir or (None, None)
-        typed = (other.c, other.d, other.enlargement or 1, column, row)
-        cells |= dict(zip(other_cells(k), typed, strict=True))
-        scale = other.scale
-        cells[f"m_{k}"] = None if scale != scale else scale * 1000
-        ratio = scale * (other.enlargement or 1) / scale1
-        if ratio == ratio:
-            agree = abs(ratio - 1) <= SCALE_TOLERANCE
-            cells[f"check_scale_{k}"] = "OK" if agree else "CHECK"
-        is_px = setup.unit == "px"
-        cells |= {f"off_x{k}": (column or 0) if is_px else 0}
-        cells |= {f"off_y{k}": (row or 0) if is_px else 0}
     return cells
 
 

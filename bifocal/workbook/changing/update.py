@@ -196,7 +196,10 @@ def update_book(
     for name, sheet_rows in (("tblCheck", survey.known_rows), ("tblGeo", survey.control_rows)):
         own = editor.table(name)
         if own is not None:
-            _table(editor, built, name, [row - own.first for row in sheet_rows])
+            places = [row - own.first for row in sheet_rows]
+            _table(editor, built, name, places)
+            if name == "tblCheck" and "tblCompare" in built.tables:
+                _table(editor, built, "tblCompare", places, own.length)
     for name, key in _FIXED:
         _fixed_table(editor, built, name, key)
     _verdict(editor, built, content, rules="rules" in given, words=other_words)

@@ -11,7 +11,7 @@ from bifocal.model.flags import DOUBTFUL_SHARE, UNCOUNTED, FlagLimits
 from bifocal.survey.georeferencing import ALPHA_POINT
 from bifocal.survey.leave_one_out import ROUNDING
 from bifocal.survey.observations import DOUBT_CODES
-from bifocal.survey.other_photos import TURNS
+from bifocal.survey.other_photos import CHANCE, TURNS
 from bifocal.workbook.formulas.placed_formulas import placed_parts
 from photocore.workbook.making.live_columns import FormulaBook, LiveColumn
 
@@ -55,15 +55,17 @@ def ideal_points(
     lens : bool
         Whether `Setup` has cells for the distortion of each lens: only coordinates are freed of it.
     others : int
-        How many photos there are columns for beside those of the pair.
+        How many photos there are columns for beside those of the pair: coordinates in all.
     """
-    polar, theta = polar and not lens, theta and not lens
+    coordinates = lens or others > 0
+    polar, theta = polar and not coordinates, theta and not coordinates
     there = {"xy": xy, "polar": polar, "theta": theta, "code": code, "media": media, "lens": lens}
     there["others"] = others
     facts = {name for name, has in there.items() if has} | {f"corrected{i}" for i in adjusted}
     codes = (f'LEFT(UPPER(TRIM([@code])),{len(word)})="{word}"' for word in DOUBT_CODES)
     doubt = {"doubt_codes": ",".join(codes), "doubt_share": repr(DOUBTFUL_SHARE)}
-    return FORMULAS.columns("ideal_points", facts, doubt | _layers(media) | placed_parts() | _sums(others))
+    parts = doubt | _layers(media) | placed_parts() | _sums(others)
+    return FORMULAS.columns("ideal_points", facts, parts)
 
 
 def other_numbers(others: int) -> range:
@@ -80,7 +82,7 @@ def compared(others: int) -> tuple[tuple[str, str], ...]:
 def compare_columns(others: int) -> tuple[LiveColumn, ...]:
     """Return the table of check points with relief of every pair beside each other."""
     kinds = " ".join(f"{r}:{sigma}" for r, sigma in compared(others))
-    return FORMULAS.columns("compare", parts={"kinds": kinds})
+    return FORMULAS.columns("compare", parts={"kinds": kinds, "contradictory": f"{CHANCE:.9g}"})
 
 
 def _sums(others: int) -> dict[str, str]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,14 @@ from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations, pixel_keys
 from bifocal.survey.reference import KnownPoints
 from bifocal.survey.survey_input import SurveyInput, where_of, with_measured
-from bifocal.workbook.reading.setup_reader import LARGEST, OpenSurvey, is_general, read_setup
+from bifocal.workbook.formulas.columns import other_numbers
+from bifocal.workbook.reading.setup_reader import (
+    LARGEST,
+    OpenSurvey,
+    is_general,
+    other_count,
+    read_setup,
+)
 from bifocal.workbook.words import LANGUAGES, headings, word
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import (
@@ -96,13 +104,20 @@ def _more_pixels(photos: int) -> list[str]:
     return [key for number in range(3, photos + 1) for key in pixel_keys(number)]
 
 
-def point_columns(*, shared: Sequence[str] = (), photos: int = 2) -> list[Column]:
+def _other_xy(others: int) -> list[str]:
+    """Return the keys of image coordinates of the photos beside an ideal pair."""
+    return [f"{axis}{number}" for number in other_numbers(others) for axis in "xy"]
+
+
+def point_columns(*, shared: Sequence[str] = (), photos: int = 2, others: int = 0) -> list[Column]:
     """Return the columns of measured points with every heading that is understood.
 
     Parameters
     ----------
     photos : int
         Photos that they were measured in.
+    others : int
+        Photos beside an ideal pair, of which the workbook has coordinates.
     shared : sequence of str
         Keys that also take the headings "x y x y" or "col row col row" of photos 1 and 2. Tables
         of points often hold X and Y on the wall too, so this is tried where nothing else fits.
@@ -111,6 +126,7 @@ def point_columns(*, shared: Sequence[str] = (), photos: int = 2) -> list[Column
     for key in ("id", *_XY, *_POLAR, *_PIXELS, "use", "code", "note", "r_measured"):
         more = [_SHARED[key], *([_OTHER[key]] if key in _OTHER else [])] if key in shared else []
         columns.append(_understood(key, more=more, unit=_UNITS.get(key, "")))
+    columns += [Column(key, (key,), kind="number") for key in _other_xy(others)]
     for key in _more_pixels(photos):
         names = [name for name in headings("columns", f"{key[:3]}1") if "1" in name]
         others = (name.replace("1", key[3:]) for name in names)
@@ -254,6 +270,7 @@ def _read_points(survey: OpenSurvey, options: ReadOptions) -> Table:
     book = survey.book
     # In the workbook of a general pair x1..y2 are formulas that follow from the raw pixels.
     general = isinstance(book, SheetFile) and is_general(book)
+    others = other_count(book.names) if isinstance(book, SheetFile) else 0
     followed = {*_XY, *_POLAR} if general else set()
     for shared in ((), _PIXELS, _XY):
         last = shared == _XY
@@ -263,7 +280,7 @@ def _read_points(survey: OpenSurvey, options: ReadOptions) -> Table:
                 book,
                 [
                     column
-                    for column in point_columns(shared=shared, photos=options.photos)
+                    for column in point_columns(shared=shared, photos=options.photos, others=others)
                     if column.key not in followed
                 ],
                 name="Points",
@@ -369,6 +386,12 @@ def _observations(
     texts = {"id": ids, "code": table.texts("code"), "note": table.texts("note")}
     used = np.isnan(use) | (use != 0)
     points = PointObservations.from_columns({**texts, "use": used, **columns})
+    keys = [key for key in table.present if re.fullmatch(r"[xy][3-9]", key)]
+    if keys:
+        keys = _other_xy(len(keys) // 2)
+        errors += table.too_large(keys, LARGEST)
+        typed = np.stack([table.numbers(key) * factor for key in keys], axis=-1)
+        points = replace(points, other_xy=typed.reshape(len(table), -1, 2))
     _check_rows(table, points, faulty, errors)
     return points, unit
 
