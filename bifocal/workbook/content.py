@@ -22,6 +22,7 @@ from bifocal.survey.tolerances import RULES, ToleranceRule
 from bifocal.workbook.formulas.columns import (
     NEAR,
     adjustment_names,
+    compared,
     ideal_points,
     other_numbers,
     pair_points,
@@ -100,6 +101,8 @@ class SurveyContent:
         Whether an empty template has cells for the distortion of each lens.
     other_photos : int
         How many photos an empty template has columns for beside those of the pair.
+    changes : mapping of str to float, or None
+        What is added to values of the set-up on the sheet `WhatIf`; None where there is none.
     """
 
     language: str = "en"
@@ -127,6 +130,7 @@ class SurveyContent:
     media: SurveyMedia | None = None
     lens: bool = False
     other_photos: int = 0
+    changes: Mapping[str, float] | None = None
 
     @classmethod
     def of(cls, solved: SolvedSurvey) -> SurveyContent:
@@ -291,6 +295,10 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     else:
         cells |= _radial_variances(content, placeless)
     typed = points.has_pixels | points.is_cartesian | points.is_polar
+    if content.others:
+        pairs = [np.isfinite(table.columns[r]) for r, _ in compared(content.others)[:-1]]
+        letters = np.where(pairs, np.array(list("ABCDE")[: len(pairs)])[:, None], "")
+        cells["pair"] = [" ".join(filter(None, own)) or None for own in letters.T]
     cells["flag"] = [
         flag if given else None for flag, given in zip(table.flags, typed, strict=True)
     ]

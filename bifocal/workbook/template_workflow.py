@@ -31,6 +31,7 @@ def write_template(
     media: int | None = None,
     lens: bool = False,
     photos: int = 2,
+    what_if: bool = False,
     functions: bool = False,
     plain: bool = False,
     overwrite: bool = False,
@@ -53,6 +54,8 @@ def write_template(
     photos : int
         How many photos there are columns for: of more than two, relief by each pair of photo 1 and
         another stands beside that of all.
+    what_if : bool
+        Add a sheet that shows what changes of distances, lenses and pixel do to every relief.
     functions : bool
         Add the formulas of the method as functions with names, and a sheet that explains them.
     plain : bool
@@ -74,12 +77,14 @@ def write_template(
         raise InputError(f"photos: must be 2 to {MOST_PHOTOS}, got {photos}.")
     if photos > 2 and (media or lens):
         raise InputError(f"photos: {photos} are for photos in air without lens cells.")
+    if what_if and media:
+        raise InputError("what_if: is for photos in air.")
     cells = None if media is None else SurveyMedia.blank(media)
     check_book_path(path)
     check_new_workbook(path, overwrite=overwrite, other="")
     content = SurveyContent(
         language=language, rows=rows, media=cells, lens=lens, functions=functions, plain=plain,
-        other_photos=photos - 2,
+        other_photos=photos - 2, changes={} if what_if else None,
     )  # fmt: skip
     write_book(path, content, overwrite=overwrite)
 

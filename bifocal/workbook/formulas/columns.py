@@ -73,6 +73,20 @@ def other_numbers(others: int) -> range:
     return range(3, 3 + others)
 
 
+def other_keys(others: int) -> list[str]:
+    """Return the keys of image coordinates of so many photos beside those of a pair."""
+    return [f"{axis}{number}" for number in other_numbers(others) for axis in "xy"]
+
+
+def pair_letter(photo: int) -> str:
+    """Return what the pair of photo 1 and another one is called: A with photo 2.
+
+    >>> pair_letter(2), pair_letter(3)
+    ('A', 'B')
+    """
+    return chr(ord("A") + photo - 2)
+
+
 def compared(others: int) -> tuple[tuple[str, str], ...]:
     """Return the columns of relief that are compared, and of their sigmas: pair A, B, ..., all."""
     pairs = [(f"r_1_{k}", f"sigma_1_{k}") for k in other_numbers(others)]
@@ -93,12 +107,15 @@ def _sums(others: int) -> dict[str, str]:
     return {
         "sum": f"({'+'.join(term.format(k) for k in photos)})",
         "before": ",".join(before),
+        "paired": "&".join(
+            f'IF(ISNUMBER([@r_1_{k}])," {pair_letter(k)}","")' for k in other_numbers(others)
+        ) or '""',
         "seen": ",".join(f"[@wall_x{k}]" for k in photos),
         "photos": " ".join(map(str, photos)),
         "others": " ".join(map(str, other_numbers(others))),
-        "other_xy": " ".join(f"x{k} y{k}" for k in other_numbers(others)),
+        "other_xy": " ".join(other_keys(others)),
         "turns": " ".join(f"{turn}:{turn + 1}" for turn in range(TURNS)),
-        "turned": f"turn_{TURNS}",
+        "last_r": f"turn_{TURNS}",
         "last_turn": str(TURNS),
         **{f"{axis}{k}": f"([@{axis}{k}]-off_{axis}{k})*unit_{axis}"
            for k in other_numbers(others) for axis in "xy"},

@@ -24,6 +24,7 @@ from bifocal.workbook.making.georeference_sheet import georeference
 from bifocal.workbook.making.readme_sheet import readme_sheet
 from bifocal.workbook.making.reference_sheets import check, planning
 from bifocal.workbook.making.setup_sheet import setup_sheet
+from bifocal.workbook.making.what_if_sheet import what_if_sheet
 from bifocal.workbook.words import WORDS, word
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
@@ -95,6 +96,8 @@ def build(content: SurveyContent) -> BookBuilder:
         compare(builder, content, cells)
     georeference(builder, content)
     planning(builder, content)
+    if content.changes is not None:
+        what_if_sheet(builder, content)
     charts(builder, content, cells)
     _log(builder, content)
     if content.functions:
@@ -113,7 +116,7 @@ def _points(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
     keys = [column.key for column in columns]
     breaks = [keys.index("note") + 2, keys.index("x_c") + 1]
     if content.others:
-        breaks.append(keys.index("r_1_3") + 1)
+        breaks.append(keys.index("pair") + 1)
     sheet.worksheet.sheet_properties.outlinePr.summaryRight = True
     # Each page begins with the names: the title would be cut off there, so it heads the page.
     sheet.worksheet.oddHeader.left.text = builder.word("Points")

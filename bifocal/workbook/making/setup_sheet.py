@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from openpyxl.styles import Alignment
 
 from bifocal.workbook.content import SurveyContent, setup_cells
-from bifocal.workbook.formulas.columns import adjustment_names
+from bifocal.workbook.formulas.columns import adjustment_names, pair_letter
 from bifocal.workbook.formulas.media_formulas import INDEX_LIMITS
 from bifocal.workbook.formulas.setup_cells import (
     STATES,
@@ -105,7 +105,7 @@ def _setup_cell(
 
 def pair_names(others: int) -> list[str]:
     """Return what the pairs of photo 1 with each other one are called, by their photos."""
-    return [f"{chr(63 + photo)} (1-{photo})" for photo in range(2, 3 + others)]
+    return [f"{pair_letter(photo)} (1-{photo})" for photo in range(2, 3 + others)]
 
 
 def _beside(

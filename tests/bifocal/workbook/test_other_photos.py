@@ -162,3 +162,11 @@ def test_impossible_forms_and_set_ups_are_refused(tmp_path):
         .table.columns["r_1_4"]
         .size
     )
+
+
+def test_half_a_pick_in_another_photo_is_named(tmp_path):
+    xyz, seen = picks()
+    seen[2, 4, 1] = np.nan
+    result = run("solve", form(tmp_path / "half.xlsx", seen, xyz))
+    assert result.exit_code == 1
+    assert "point P4 lacks y3" in result.stderr
