@@ -91,7 +91,8 @@ def of_all_photos(
     quotient of sums over the photos, which a cell can hold.
     """
     seen = _seen(setup, points)
-    columns, cells = {}, {}
+    columns: dict[str, FloatArray] = {}
+    cells: dict[str, FloatArray] = {}
     for k, (x, y, weight) in enumerate(zip(seen.x.T, seen.y.T, seen.weight.T, strict=True), 1):
         cells |= {f"wall_x{k}": x, f"wall_y{k}": y, f"weight{k}": weight}
         if k > 2:
@@ -134,10 +135,10 @@ def _of_pair(
     if not d[far] > d[near]:
         blank = np.full(len(radii), np.nan)
         return (blank, blank), rate
-    rays = (radii[:, far], radii[:, near])
-    lengths = {"d1": d[far], "d2": d[near]}
-    sigmas = {"sigma_1": precision * seen.scales[far], "sigma_2": precision * seen.scales[near]}
-    return (relief(*rays, **lengths), sigma_relief(*rays, **lengths, **sigmas)), rate
+    s1, s2, d1, d2 = radii[:, far], radii[:, near], d[far], d[near]
+    sigma_1, sigma_2 = precision * seen.scales[far], precision * seen.scales[near]
+    sigma = sigma_relief(s1, s2, d1=d1, d2=d2, sigma_1=sigma_1, sigma_2=sigma_2)
+    return (relief(s1, s2, d1=d1, d2=d2), sigma), rate
 
 
 def _together(seen: _Seen, precision: float) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:

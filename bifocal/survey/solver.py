@@ -121,7 +121,9 @@ def _with_others(
     setup = replace(setup, adjusted=found[::-1] if arranged.pair.exchanged else found)
     columns, cells = of_all_photos(setup, survey.points)
     doubtful = contradictions(table.ids, np.where(survey.points.use, columns["chance"], np.nan))
-    said = [remark("survey.picks_contradict", names=", ".join(doubtful[:10]))] if doubtful else []
+    said: list[str] = []
+    if doubtful:
+        said.append(remark("survey.picks_contradict", names=", ".join(doubtful[:10])))
     table = replace(
         table, columns={**table.columns, **columns}, formula_cells={**table.formula_cells, **cells}
     )

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from openpyxl.chart import BarChart, Reference, Series
 from openpyxl.chart.shapes import GraphicalProperties
+from openpyxl.styles import Alignment
 
 from bifocal.survey.what_if import CHANGED, what_if
 from bifocal.workbook.content import CHART_ROWS, SurveyContent, inputs, setup_cells
@@ -19,6 +20,8 @@ from photocore.workbook.making.live_charts import COLOURS, scatter, titled
 
 #: Rows of the changes, of the charts, and of the keys of the table.
 FIRST, CHARTS, HEAD = 5, 12, 30
+#: What is drawn against each other.
+_DRAWN = ("s_c", "change")
 #: What is changed while nothing was typed: what a tape and a calibration are worth.
 DEFAULTS = {"d_1": 0.01, "d_2": 0.01, "c_1": 0.05, "c_2": 0.05, "pitch": 0.0}
 
@@ -31,6 +34,9 @@ def what_if_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     found = what_if(content.setup.taking, content.table, changes)
     found["s_c"] = content.table["s_c"]
     cells = {key: inputs(column[:CHART_ROWS]) for key, column in found.items()}
+    drawn = ~np.isnan(found["change"])
+    for key in _DRAWN:
+        cells[f"plot_{key}"] = np.where(drawn, found[key], np.nan)[:CHART_ROWS].tolist()
     return {"id": [name_cell(name) for name in content.table.ids[:CHART_ROWS]], **cells}
 
 
@@ -39,6 +45,8 @@ def what_if_sheet(builder: BookBuilder, content: SurveyContent) -> None:
     sheet, cells = builder.sheet("WhatIf", "what_if_how"), what_if_cells(content)
     changes = {**DEFAULTS, **(content.changes or {})}
     sheet.headings(FIRST - 1, ("name", "value", "change", "becomes", "max", "rms_change"))
+    for letter in "CDEF":
+        sheet.worksheet[f"{letter}{FIRST - 1}"].alignment = Alignment(horizontal="right")
     for row, name in enumerate(CHANGED, start=FIRST):
         _changed(sheet, row, name, setup_cells(content).get(name), changes[name])
         _effect(sheet, row, f"by_{name}", cells)
@@ -60,10 +68,10 @@ def what_if_sheet(builder: BookBuilder, content: SurveyContent) -> None:
     bars.y_axis.number_format = "General"
     keys, ends = [column.key for column in columns], {"min_row": HEAD + 1, "max_row": HEAD + rows}
     x, y = (
-        Reference(sheet.worksheet, min_col=keys.index(key) + 1, **ends) for key in ("s_c", "change")
+        Reference(sheet.worksheet, min_col=keys.index(f"plot_{key}") + 1, **ends) for key in _DRAWN
     )
     dots = scatter(builder.word("chart_changes"), "s' [mm]", "r [m]", x, {"change": y})
-    dots.y_axis.number_format = "General"
+    dots.y_axis.number_format, dots.visible_cells_only = "General", False
     for chart, place in ((bars, f"A{CHARTS}"), (dots, f"G{CHARTS}")):
         chart.height, chart.width = 8.5, 12.5
         sheet.worksheet.add_chart(chart, place)

@@ -123,8 +123,8 @@ def point_columns(*, shared: Sequence[str] = (), photos: int = 2, others: int = 
     columns += [Column(key, (key,), kind="number") for key in other_keys(others)]
     for key in _more_pixels(photos):
         names = [name for name in headings("columns", f"{key[:3]}1") if "1" in name]
-        others = (name.replace("1", key[3:]) for name in names)
-        columns.append(Column(key, tuple(others), kind="number", unit="px"))
+        further = (name.replace("1", key[3:]) for name in names)
+        columns.append(Column(key, tuple(further), kind="number", unit="px"))
     return columns
 
 
