@@ -365,12 +365,13 @@ def _fixed_table(editor: WorkbookEditor, built: BookBuilder, name: str, key: str
     if area is None:
         return
     headings, given, grid = area.headings(), content.cells[key], editor.grid(area.sheet).rows
-    rows = range(area.length)
-    if key not in headings or area.length > len(given):
+    # Check points are counted; the table has as many rows as there were when it was made.
+    if key not in headings or (key != "check_row" and area.length != len(given)):
         return
-    stand = [grid.get(area.first + row, {}).get(headings[key]) for row in rows]
-    if stand == [float(given[row] or 0) for row in rows]:
-        _table(editor, built, name, rows)
+    count = min(area.length, len(given))
+    stand = [grid.get(area.first + i, {}).get(headings[key]) for i in range(count)]
+    if stand == [float(value or 0) for value in given[:count]]:
+        _table(editor, built, name, range(count))
 
 
 def _verdict(
