@@ -38,6 +38,8 @@ PRODUCTS = ("relief", "points", "ortho", "drawing", "view", "report")
 MOST_PRODUCTS = ("relief", "points", "drawing", "view", "report")
 #: The first step of every pair.
 FIRST_STEP = "align"
+#: How the file of a set of photos ends.
+SET_ENDING = ".photos.json"
 #: How the file is called that a step makes before all others, behind the pair's name.
 MADE = {
     "align": ".pair.json",
@@ -68,6 +70,8 @@ class PairJob:
         Where the folders of its steps lie.
     far, near : Path
         Photos.
+    more : tuple of Path
+        The others of a set.
     files : mapping of str to Path
         By the names of `bifocal.options.FILES`, where given.
     options : mapping
@@ -86,12 +90,18 @@ class PairJob:
     folder: Path
     far: Path
     near: Path
+    more: tuple[Path, ...] = ()
     files: Mapping[str, Path] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
     products: tuple[str, ...] = MOST_PRODUCTS
     overwrite: bool = False
     date: str = ""
     joint: Path | None = None
+
+    @property
+    def photos(self) -> tuple[Path, ...]:
+        """All photos, as they were named."""
+        return (self.far, self.near, *self.more)
 
     @property
     def title(self) -> str:
@@ -106,7 +116,8 @@ class PairJob:
 
     def product(self, step: str) -> Path:
         """Return the file that a step makes before all others."""
-        return self.folder / step / f"{self.title}{MADE[step]}"
+        made = SET_ENDING if self.more and step == FIRST_STEP else MADE[step]
+        return self.folder / step / f"{self.title}{made}"
 
     def ortho_path(self, steps: Sequence[str]) -> Path | None:
         """Return the orthophoto that these steps make, that of the drawing first."""
@@ -121,7 +132,7 @@ class PairJob:
         from photocore.images import image_info
 
         pixels = 0
-        for path in (self.far, self.near):
+        for path in self.photos:
             try:
                 width, height = image_info(path).size
             except InputError:
@@ -343,24 +354,32 @@ def _align_step(job: PairJob) -> Step:
     files = _align_files(job)
     options = _some(job, *SET_UP)
 
-    def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
+    def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.orientation.align_workflow import AlignOptions, align_photos
 
         out = place / job.product("align").name
-        made = align_photos(
-            job.far, job.near, out, AlignOptions.from_given({**options, **files}),
-            picture=out.with_suffix("").with_suffix(".pair.png"),
-        )  # fmt: skip
+        told = AlignOptions.from_given({**options, **files})
+        if job.more:
+            from bifocal.networks.set_workflow import align_photo_set
+
+            return align_photo_set(job.photos, out, told, progress=progress).remarks
+        picture = out.with_suffix("").with_suffix(".pair.png")
+        made = align_photos(job.far, job.near, out, told, picture=picture)
         return tuple(dict.fromkeys((*made.pair.remarks, *made.remarks)))
 
-    photos = {"far": job.far, "near": job.near}
-    return Step(name=FIRST_STEP, files={**photos, **files}, options=options, make=make)
+    return Step(name=FIRST_STEP, files={**_named(job), **files}, options=options, make=make)
+
+
+def _named(job: PairJob) -> dict[str, Path]:
+    """Return the photos by their part in it."""
+    others = {f"photo {number}": path for number, path in enumerate(job.more, start=3)}
+    return {"far": job.far, "near": job.near, **others}
 
 
 def _photos(job: PairJob) -> dict[str, Path]:
     """Return what a step after the alignment looks at: the photos, the pair file of all pairs."""
     joint = {} if job.joint is None else {"pair": job.pair_path}
-    return {"far": job.far, "near": job.near, **joint}
+    return {**_named(job), **joint}
 
 
 def _relief_step(job: PairJob) -> Step:
@@ -389,17 +408,17 @@ def _points_step(job: PairJob) -> Step:
     options = _some(job, "language", "unit")
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
-        from bifocal.model.pair import Pair
+        from bifocal.model.photo_set import pair_or_set
         from bifocal.reports.control_survey import is_exchanged, solve_control
         from bifocal.workbook.output import write_result
 
-        pair = Pair.read(job.pair_path)
+        pair = pair_or_set(job.pair_path)
         tables = {"control": None, **tables_of(job)}
         solution = solve_control(
-            job.pair_path, **tables, exchanged=is_exchanged(pair, job.far),
+            job.pair_path, **tables, exchanged=is_exchanged(pair, job.far), photos=len(job.photos),
             language=options.get("language", "en"), unit=options.get("unit", ""),
         )  # fmt: skip
-        if pair.leans:
+        if solution.pair.leans:
             write_result(place / f"{job.title}_points.csv", solution)
             told = (
                 "ports that lean have no formulas in a survey workbook: the points are a text "

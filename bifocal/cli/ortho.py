@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bifocal.options import DRAWING, OF_PAIR
-from bifocal.remarks import remark as remark_of
 from photocore.cli import print_result, progress_bar, remark
-from photocore.errors import InputError
 from photocore.options import declared
 
 if TYPE_CHECKING:
@@ -31,7 +29,6 @@ def command(
     5 a photo on interpolated relief, 6 a photo on the plane). Of a set each pixel is taken from
     the photo that sees it best: 11 is its first photo, 12 the second, 3 a transition.
     """
-    from bifocal.model.photo_set import PhotoSet
     from bifocal.orthophotos.deliver_workflow import DeliverTask, default_title, deliver
     from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho, not_measured
     from bifocal.workbook.pair_workflow import is_workbook, points_of, read_photos
@@ -45,8 +42,6 @@ def command(
     if sum(choice is not None for choice in (relief, points, plane)) > 1:
         raise click.UsageError("Give one of --relief, --points and --plane.")
     source = read_photos(pair)
-    if isinstance(source, PhotoSet) and folder is not None:
-        raise InputError(remark_of("ortho.set_not_delivered"))
     own: Path | SurveyPoints | None = points
     if relief is None and points is None and plane is None and is_workbook(pair):
         own = points_of(pair)
@@ -64,7 +59,7 @@ def command(
     )
     files: dict[str, object] = {}
     with progress_bar("orthophoto", quiet=as_json) as progress:
-        if folder is not None and scale is not None and not isinstance(source, PhotoSet):
+        if folder is not None and scale is not None:
             wish = DeliverTask(title=title or default_title(source, pair), **drawing)
             done = deliver(
                 source, folder, task, wish, out=out, overwrite=overwrite, progress=progress

@@ -171,6 +171,21 @@ def adjust_jointly(observations: JointObservations, start: JointUnknowns) -> Joi
     return _adjusted(observations, seen, system, fit, sigma0, (tuple(blunders), tuple(found)))
 
 
+def settled_jointly(
+    observations: JointObservations, start: JointUnknowns
+) -> tuple[JointObservations, JointUnknowns, FloatArray]:
+    """Return rays without those far off, what most of them agree on, and misfits (n, 2) [px].
+
+    Control holds the frame loosely; nothing is said of precision.
+    """
+    seen = with_enough_rays(observations)
+    focal = np.array([camera.matrix[0, 0] for camera in start.cameras])
+    start, tests, _ = _coarse(seen, start, focal)
+    seen = with_rays(seen, tests < FAR_OFF)
+    system = _System(seen, start, focal)
+    return seen, start, system.rays(system.start)[0]
+
+
 def _coarse(
     seen: JointObservations, start: JointUnknowns, focal: FloatArray
 ) -> tuple[JointUnknowns, FloatArray, FloatArray]:

@@ -9,7 +9,12 @@ import numpy as np
 
 from bifocal.matching.features import Features, find_features
 from bifocal.networks.camera_knowledge import CameraKnowledge
-from bifocal.networks.joint_adjustment import JointAdjustment, JointUnknowns, adjust_jointly
+from bifocal.networks.joint_adjustment import (
+    JointAdjustment,
+    JointUnknowns,
+    adjust_jointly,
+    settled_jointly,
+)
 from bifocal.networks.joint_observations import JointObservations, with_rays
 from bifocal.networks.joint_ties import SharedPoints, common_features
 from bifocal.networks.set_start import FirstCameras, first_cameras_of, meeting
@@ -110,7 +115,7 @@ def orient_set(
     observed = replace(
         observed, sigma=np.where(is_tie, FOUND * reduction[observed.camera], site.sigma_pick)
     )
-    start = JointUnknowns(cameras=first.cameras, xyz=first.xyz, radial=first.radial)
+    state = JointUnknowns(cameras=first.cameras, xyz=first.xyz, radial=first.radial)
     before = [
         (first.xyz[observed.point] - camera.centre) @ camera.rotation[2] > 0
         for camera in first.cameras
@@ -118,43 +123,38 @@ def orient_set(
     there = np.array(before)[observed.camera, np.arange(len(is_tie))]
     # A tie whose rays run along each other would wander on them.
     observed = with_rays(observed, there & (~is_tie | first.met[observed.point]))
-    state = adjust_jointly(observed, start)
+    count = len(control.ids)
     for _ in range(2):  # the second pass searches around better places
-        observed = _refined(photos, observed, state, first, len(control.ids))
-        state = _readjusted(observed, state, first, len(control.ids))
+        observed, state, _ = settled_jointly(observed, state)
+        observed = _met(_refined(photos, observed, state, first, count), state, count)
     for _ in range(2):  # a few wrong patches hide each other
-        observed, sigma = _without_gross(state, len(control.ids))
-        state = _readjusted(observed, state, first, len(control.ids))
+        observed, state, misfit = settled_jointly(observed, state)
+        observed, sigma = _without_gross(observed, misfit, count)
+        observed = _met(observed, state, count)
     return _adjusted(observed, state, first, control, site, sigma)
 
 
-def _readjusted(
-    observed: JointObservations, state: JointAdjustment, first: FirstCameras, control: int
-) -> JointAdjustment:
-    """Return everything adjusted from where it was, without ties that wander along their rays."""
+def _met(observed: JointObservations, state: JointUnknowns, control: int) -> JointObservations:
+    """Return the rays without ties that wander along them."""
     seen = SharedPoints(
         photo=observed.camera, point=observed.point, pixels=observed.pixels, count=len(observed.ids)
     )
     places = meeting(dict(enumerate(state.cameras)), seen, seen.pixels)
     met = np.asarray(np.isfinite(places).all(axis=1))
     met[:control] = True
-    observed = with_rays(observed, met[observed.point])
-    start = JointUnknowns(
-        cameras=state.cameras, radial=state.radial,
-        xyz=np.where(np.isfinite(state.xyz), state.xyz, first.xyz),
-    )  # fmt: skip
-    return adjust_jointly(observed, start)
+    return with_rays(observed, met[observed.point])
 
 
-def _without_gross(state: JointAdjustment, control: int) -> tuple[JointObservations, float]:
+def _without_gross(
+    observed: JointObservations, misfit: FloatArray, control: int
+) -> tuple[JointObservations, float]:
     """Return the rays without those that most ties contradict, and the precision of these. [px]"""
-    seen = state.observations
-    ties = seen.point >= control
-    free = max(state.redundancy / (2 * len(seen.point)), 0.05)
-    sigma = max(robust_sigma(state.residuals[ties].ravel()) / float(np.sqrt(free)), TIES.best)
-    off = np.abs(state.residuals).max(axis=1)
-    kept = ~ties | (off < OUTLIER_LIMIT * sigma)
-    return with_rays(replace(seen, sigma=np.where(ties, sigma, seen.sigma)), kept), sigma
+    ties = observed.point >= control
+    free = max(1.0 - 1.5 * len(np.unique(observed.point[ties])) / max(ties.sum(), 1), 0.05)
+    sigma = max(robust_sigma(misfit[ties].ravel()) / float(np.sqrt(free)), TIES.best)
+    kept = ~ties | (np.abs(misfit).max(axis=1) < OUTLIER_LIMIT * sigma)
+    stated = np.where(ties, sigma, observed.sigma)
+    return with_rays(replace(observed, sigma=stated), kept), sigma
 
 
 def _seen(
@@ -247,7 +247,7 @@ def _refined(
 
 
 def _adjusted(
-    observed: JointObservations, state: JointAdjustment, first: FirstCameras, control: Control,
+    observed: JointObservations, state: JointUnknowns, first: FirstCameras, control: Control,
     site: SiteMeasures, sigma_tie: float,
 ) -> OrientedSet:  # fmt: skip
     """Return everything adjusted once, with control, tapes, lines and the wall.
@@ -267,7 +267,7 @@ def _adjusted(
     if knowledge.by_wall:
         count = len(control.ids)
         known[:count], spread[:count] = control.xyz, control.sigma
-        on_wall, rough = _wall(state, count, sigma_tie)
+        on_wall, rough = _wall(observed, state, count, sigma_tie)
         known[on_wall, 2], spread[on_wall, 2] = 0.0, rough[on_wall]
         held = {first.far: ("turn Z", "X", "Y")} if free_frame else {}
         cameras = {1: first.far, 2: first.near}
@@ -292,13 +292,15 @@ def _adjusted(
     )  # fmt: skip
     observed = replace(observed, sigma=sigma, known=known, sigma_known=spread, cameras=knowledge)
     return OrientedSet(
-        first=first, adjusted=_readjusted(observed, state, first, len(control.ids)),
-        control=control, sigma_tie=sigma_tie, on_wall=int(on_wall.sum()),
+        first=first, adjusted=adjust_jointly(observed, state), control=control,
+        sigma_tie=sigma_tie, on_wall=int(on_wall.sum()),
         free_frame=bool(free_frame), way="auto" if knowledge.by_wall else "control",
     )  # fmt: skip
 
 
-def _wall(state: JointAdjustment, control: int, sigma_tie: float) -> tuple[BoolArray, FloatArray]:
+def _wall(
+    seen: JointObservations, state: JointUnknowns, control: int, sigma_tie: float
+) -> tuple[BoolArray, FloatArray]:
     """Return which ties tell of the wall's plane, and by what sigma they lie on it, (p,). [m]
 
     Roughness is common to stretches of the wall, as in `bifocal.orientation.tie_points.with_wall`.
@@ -308,7 +310,7 @@ def _wall(state: JointAdjustment, control: int, sigma_tie: float) -> tuple[BoolA
     GeometryError
         If there is no wall.
     """
-    seen, xyz = state.observations, state.xyz
+    xyz = state.xyz
     camera = max(state.cameras, key=lambda one: float(one.centre[2]))
     normal = np.zeros((len(xyz), 3, 3))
     for k, own in enumerate(state.cameras):

@@ -121,9 +121,7 @@ def make_ortho(
         If an input is missing or does not fit, the size is not plausible, or writing fails.
     """
     check_ending(out, ORTHO_ENDING, ".tif", ".tiff")
-    if isinstance(pair_path, PhotoSet):
-        pair_path = PhotosOfSet.of_set(pair_path)
-    pair = Pair.of(pair_path)
+    pair = PhotosOfSet.of(pair_path)
     check_not_input(out, task.relief, *pair.photo_files)
     check_writable(out, overwrite=overwrite)
     with open_surface(task, pair) as (surface, _, remarks):
