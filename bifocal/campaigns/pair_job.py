@@ -336,11 +336,12 @@ def _some(job: PairJob, *names: str) -> dict[str, Any]:
 
 def refusal(job: PairJob) -> str:
     """Return why a pair cannot be aligned as it is described; empty where nothing is missing."""
+    from bifocal.networks.set_workflow import way_of_set
     from bifocal.orientation.align_workflow import AlignOptions, check_way
 
-    step = _align_step(job)
+    step, check = _align_step(job), way_of_set if job.more else check_way
     try:
-        check_way(AlignOptions.from_given({**step.options, **_align_files(job)}))
+        check(AlignOptions.from_given({**step.options, **_align_files(job)}))
     except InputError as error:
         return str(error)
     return ""

@@ -306,9 +306,7 @@ def _sources(
             if matched is not photos[place]:
                 break
         photos[place] = matched
-        remarks.append(
-            note if len(photos) == 2 else remark("ortho.of_image", number=place + 1, note=note)
-        )
+        remarks.append(note)
     return photos, remarks
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,9 @@ from photocore.errors import InputError
 from photocore.jsonfile import read_object
 from photocore.output import check_writable
 from photocore.reports.writing import check_report, write_document
+
+#: How the files of pairs and of sets end.
+_ENDINGS = re.compile(r"\.(pair|photos)\.json$")
 
 __all__ = ["ReportTask", "report_of", "write_report"]
 
@@ -87,7 +91,7 @@ def find_pairs(folder: Path, task: ReportTask) -> tuple[list[Path], list[ReportT
     InputError
         If there is none.
     """
-    sources = sorted(folder.glob("align/*.pair.json")) or sorted(folder.glob("*/align/*.pair.json"))
+    sources = _aligned(folder, "") or _aligned(folder, "*/")
     if not sources:
         raise InputError(
             f"{folder}: holds no pair made by `bifocal facade` or `bifocal survey` (align/*.pair."
@@ -95,7 +99,7 @@ def find_pairs(folder: Path, task: ReportTask) -> tuple[list[Path], list[ReportT
         )
     tasks, found = [], []
     for source in sources:
-        home, name = source.parent.parent, source.name.removesuffix(".pair.json")
+        home, name = source.parent.parent, _ENDINGS.sub("", source.name)
         orthos = (home / "drawing" / f"{name}.tif", home / "ortho" / f"{name}_ortho.tif")
         relief = home / "relief" / f"{name}_relief.tif"
         view = home / "view" / f"{name}_view.html"
@@ -109,6 +113,12 @@ def find_pairs(folder: Path, task: ReportTask) -> tuple[list[Path], list[ReportT
         found.append(workbook if workbook.is_file() else _pair_file(source, folder))
         tasks.append(replace(task, **given))
     return found, tasks
+
+
+def _aligned(folder: Path, within: str) -> list[Path]:
+    """Return the files of the pairs and sets that were set up."""
+    found = folder.glob(f"{within}align/*.json")
+    return sorted(path for path in found if _ENDINGS.search(path.name))
 
 
 def _pair_file(own: Path, folder: Path) -> Path:
