@@ -36,8 +36,9 @@ from photocore.camera.pinhole import project_with_jacobian
 from photocore.cli import Progress, no_progress
 from photocore.errors import GeometryError
 
-#: Features of a photo, and pixels in which they are looked for.
-FEATURES, PIXELS = 8000, 6e6
+#: Features of so many photos, of more fewer each: matching all with all takes time in proportion to
+#: the photos. And pixels in which they are looked for.
+FEATURES, PHOTOS, PIXELS = 8000, 3, 6e6
 #: Common points of two photos that are kept.
 MATCHES = 600
 #: Precision of features as found, of the searched photo, and of patches before they tell it. [px]
@@ -98,12 +99,12 @@ def orient_set(
     GeometryError
         If a photo is blurred or shares too little with the others, or no two make a pair.
     """
-    features = []
+    features, most = [], int(FEATURES * min(1.0, PHOTOS / len(photos)) ** 0.5)
     for k, photo in enumerate(photos):
         progress(k, len(photos) + 2, photo.name)
         assert photo.grey is not None
         validation.check_sharp(photo.name, photo.grey)
-        found = find_features(photo.grey, limit=FEATURES, budget=PIXELS)
+        found = find_features(photo.grey, limit=most, budget=PIXELS)
         features.append(replace(found, pixels=photo.interior.ideal(found.pixels)))
     progress(len(photos), len(photos) + 2, "matches")
     seen = _seen(photos, features, control)

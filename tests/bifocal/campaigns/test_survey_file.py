@@ -111,10 +111,11 @@ def test_photos_of_a_pair_may_be_a_list_and_are_a_set(tmp_path):
     assert set(steps_of(job)[1].files) == {"far", "near", "photo 3"}
     assert "of two photos" in refusal(replace(job, options={**job.options, "as_set_up": True}))
     for wrong, said in (
-        ('photos = ["a.jpg"]', "list photos"), ('far = "a.jpg"\nphotos = ["a.jpg", "b.jpg"]', "both"),
-        ('joint = true\n[[pair]]\nphotos = ["a.jpg", "b.jpg", "c.jpg"]', "joint = true adjusts pairs"),
-    ):  # fmt: skip
-        path.write_text(wrong if "[[" in wrong else f"[[pair]]\n{wrong}\n")
+        ('[[pair]]\nphotos = ["a.jpg"]', "list photos"),
+        ('[[pair]]\nfar = "a.jpg"\nphotos = ["a.jpg", "b.jpg"]', "both"),
+        (f"joint = true\n{path.read_text()}", "joint = true adjusts pairs"),
+    ):
+        path.write_text(wrong)
         with pytest.raises(InputError, match=said):
             read_survey_file(path)
 

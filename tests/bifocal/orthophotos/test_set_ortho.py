@@ -120,10 +120,8 @@ def test_a_set_is_drawn_to_scale_and_reported(folder, tmp_path):
     table = tmp_path / "check.csv"
     table.write_text("\n".join([",".join(["id", "X [m]", "Y [m]", "r [m]", *heads]), *rows]))
     page = tmp_path / "report.html"
-    told = CliRunner().invoke(
-        main,
-        ["report", str(folder / "wall.photos.json"), "--check", str(table), "--out", str(page)],
-    )
+    asked = (folder / "wall.photos.json", "--check", table, "--out", page)
+    told = CliRunner().invoke(main, ["report", *map(str, asked)])
     assert told.exit_code == 0, told.output
     html = page.read_text(encoding="utf-8")
     assert "9 independent check points" in html
