@@ -18,6 +18,7 @@ The pair
     Lens                      principal distance, principal point and distortion of a lens
     calibrate, Calibration    a lens from photos of a board
     align, Alignment          a pair from two photos and what was measured on site
+    align_set, SetAlignment   a set of photos oriented together
     Control, Interior, SiteMeasures, PairMedia, read_control   what `align` is told
 Points
     solve, SolvedSurvey       relief, coordinates, precision, check of measured points
