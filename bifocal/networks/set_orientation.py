@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bifocal.matching.features import Features, find_features
+from bifocal.matching.features import Features, find_features, spread_evenly
 from bifocal.networks.camera_knowledge import CameraKnowledge
 from bifocal.networks.joint_adjustment import (
     JointAdjustment,
@@ -39,8 +39,8 @@ from photocore.errors import GeometryError
 #: Features of so many photos, of more fewer each: matching all with all takes time in proportion to
 #: the photos. And pixels in which they are looked for.
 FEATURES, PHOTOS, PIXELS = 8000, 3, 6e6
-#: Common points of two photos that are kept.
-MATCHES = 600
+#: Common points of two photos that are looked at, and rays of a photo that are kept.
+MATCHES, RAYS = 600, 500
 #: Precision of features as found, of the searched photo, and of patches before they tell it. [px]
 FOUND, REFINED = 0.5, 0.2
 #: Chance from which a point tells of the wall's plane.
@@ -163,7 +163,8 @@ def _seen(
 ) -> SharedPoints:
     """Return where control points and then ties are seen, free of the lens files' distortion."""
     shapes = [photo.interior.image_size[::-1] for photo in photos]
-    ties = common_features(features, shapes, ~np.eye(len(photos), dtype=bool), most=MATCHES)
+    every = common_features(features, shapes, ~np.eye(len(photos), dtype=bool), most=MATCHES)
+    ties = _spread(every, shapes)
     count, picks = len(control.ids), control.picks if control.ids else ()
     picked = [np.flatnonzero(np.isfinite(own).all(axis=1)) for own in picks]
     parts = [photos[k].interior.ideal(picks[k][rows]) for k, rows in enumerate(picked)]
@@ -173,6 +174,22 @@ def _seen(
         point=np.concatenate([*picked, ties.point + count]),
         pixels=np.concatenate([*parts, ties.pixels]),
         count=count + ties.count,
+    )  # fmt: skip
+
+
+def _spread(ties: SharedPoints, shapes: Sequence[tuple[int, int]]) -> SharedPoints:
+    """Return some hundred rays of each photo, of points that most photos show, evenly spread."""
+    count = np.bincount(ties.point, minlength=ties.count)
+    keep = np.zeros(len(ties.photo), dtype=bool)
+    for k, shape in enumerate(shapes):
+        own = np.flatnonzero(ties.photo == k)
+        few = 1.0 / count[ties.point[own]]
+        keep[own[spread_evenly(ties.pixels[own], few, shape, RAYS)]] = True
+    keep &= (np.bincount(ties.point[keep], minlength=ties.count) >= 2)[ties.point]
+    number = np.cumsum(np.bincount(ties.point[keep], minlength=ties.count) > 0) - 1
+    return SharedPoints(
+        photo=ties.photo[keep], point=number[ties.point[keep]], pixels=ties.pixels[keep],
+        count=int(number[-1]) + 1 if len(number) else 0,
     )  # fmt: skip
 
 
