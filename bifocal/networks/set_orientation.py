@@ -40,7 +40,7 @@ from photocore.errors import GeometryError
 #: the photos. And pixels in which they are looked for.
 FEATURES, PHOTOS, PIXELS = 8000, 3, 6e6
 #: Common points of two photos that are looked at, and rays of a photo that are kept.
-MATCHES, RAYS = 600, 500
+MATCHES, RAYS = 600, 300
 #: Precision of features as found, of the searched photo, and of patches before they tell it. [px]
 FOUND, REFINED = 0.5, 0.2
 #: Chance from which a point tells of the wall's plane.
@@ -125,11 +125,11 @@ def orient_set(
     # A tie whose rays run along each other would wander on them.
     observed = with_rays(observed, there & (~is_tie | first.met[observed.point]))
     count = len(control.ids)
-    for _ in range(2):  # the second pass searches around better places
-        observed, state, _ = settled_jointly(observed, state)
+    for rounds in (3, 1):  # the second pass searches around better places
+        observed, state, _ = settled_jointly(observed, state, rounds)
         observed = _met(_refined(photos, observed, state, first, count), state, count)
     for _ in range(2):  # a few wrong patches hide each other
-        observed, state, misfit = settled_jointly(observed, state)
+        observed, state, misfit = settled_jointly(observed, state, 1)
         observed, sigma = _without_gross(observed, misfit, count)
         observed = _met(observed, state, count)
     return _adjusted(observed, state, first, control, site, sigma)

@@ -7,8 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from bifocal.model.photo_set import PhotoSet
 from bifocal.networks.set_alignment import SetAlignment, set_alignment
 from bifocal.networks.set_orientation import orient_set
@@ -79,8 +77,7 @@ def align_photo_set(
     ]
     control = control_of(options, [photo.interior.image_size for photo in photos])
     oriented = orient_set(photos, control=control, site=options.site, progress=progress)
-    line = options.line and (np.array(options.line[0], np.float64).reshape(2, 2), options.line[1])
-    made = set_alignment(replace(oriented, way=way), photos, line)
+    made = set_alignment(replace(oriented, way=way), photos, options.direction)
     stem = out.name[: -len(ENDING)]
     entries = []
     for k, (path, photo) in enumerate(zip(paths, made.photos.photos, strict=True)):
