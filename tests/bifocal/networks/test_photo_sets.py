@@ -143,13 +143,13 @@ def test_three_photos_in_any_order_become_a_set_its_points_and_report(three, mon
     monkeypatch.chdir(folder)
     focal = {place: f"{place / (2 * PIXEL) / 100:.6g}" for place in (9.5, 17.5)}
     line = ["facade", "near.png", "turned.png", "far.png", "--control", "set.csv", "--focal1",
-            focal[9.5], "--focal", focal[17.5], "--pixel-size", "0.01", "--products",
-            "points,report", "--out", "porch"]  # fmt: skip
+            focal[9.5], "--focal", focal[17.5], "--pixel-size", "0.01", "--distance1", "9.5",
+            "--products", "points,report", "--out", "porch"]  # fmt: skip
     result = CliRunner().invoke(main, line)
     assert result.exit_code == 0, result.output
     near, turned, far = PhotoSet.read("porch/align/porch.photos.json").photos
-    assert far.distance == pytest.approx(17.5, abs=0.4)
-    assert near.distance == pytest.approx(9.5, abs=0.2)
+    assert far.distance == pytest.approx(17.5, abs=0.1)
+    assert near.distance == pytest.approx(9.5, abs=0.03)
     assert turned.distance == pytest.approx(far.distance, abs=0.02)
     control = read_control("set.csv", sigma=0.003, sigma_plane=0.005, photos=3)
     page = Path("porch/report/porch_report.html").read_text(encoding="utf-8")
