@@ -27,7 +27,7 @@ Cameras
     Brown, Fisheye            distortion of a lens, or the law of a fisheye
     project, projection_status   image coordinates through the media, and why there are none
     image_rays                the ray of an image point in the object's medium
-    resect, Resection         a camera from control points
+    resect, Resection, resect_many, CameraPoses   a camera from control points; many of them
     intersect, IntersectedPoints   points from image points, least squares
     intersect_rays, intersect_pairs   fast ways without precision
     PointStatus               why a point is missing or doubtful

@@ -61,6 +61,8 @@ from .orientation.epipolar_curves import (
     epipolar_curve,
 )
 from .orientation.intersection import IntersectedPoints, intersect, intersect_pairs, intersect_rays
+from .orientation.many_resections import CameraPoses as CameraPoses
+from .orientation.many_resections import resect_many as resect_many
 from .orientation.object_rays import image_rays
 from .orientation.point_status import PointStatus
 from .orientation.resection import Resection, resect

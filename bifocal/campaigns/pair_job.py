@@ -22,6 +22,7 @@ from bifocal.campaigns.step_store import (
     run_step,
     step_key,
 )
+from bifocal.faces.faces_files import faces_path
 from bifocal.options import DRAWING, MAP, PICTURE, SET_UP
 from photocore.cli import Progress, no_progress, unforeseen_message
 from photocore.errors import InputError, PhotogrammetryError
@@ -97,6 +98,15 @@ class PairJob:
     overwrite: bool = False
     date: str = ""
     joint: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Take the faces kept beside the pair, where none are given and they are not refused."""
+        given = self.files.get("faces")
+        beside = self.folder / FIRST_STEP / f"{self.title}{MADE[FIRST_STEP]}"
+        faces = faces_path(given, beside, self.pair_path)
+        if faces != given:
+            rest = {role: path for role, path in self.files.items() if role != "faces"}
+            object.__setattr__(self, "files", rest | ({"faces": faces} if faces else {}))
 
     @property
     def photos(self) -> tuple[Path, ...]:
@@ -383,6 +393,10 @@ def _photos(job: PairJob) -> dict[str, Path]:
     return {**_named(job), **joint}
 
 
+def _faces(job: PairJob) -> dict[str, Path]:
+    return {"faces": job.files["faces"]} if "faces" in job.files else {}
+
+
 def _relief_step(job: PairJob) -> Step:
     options = _some(job, *MAP, "cog")
 
@@ -392,12 +406,14 @@ def _relief_step(job: PairJob) -> Step:
         out = place / job.product("relief").name
         task = ReliefJob(
             out=out, preview=out.with_suffix(".png"), gsd=options.get("relief_gsd"),
+            faces=job.files.get("faces"),
             **_some(job, *MAP[1:]),
         )  # fmt: skip
         _, remarks = relief_of_pair(job.pair_path, task, progress=progress)
         return remarks
 
-    return Step(name="relief", files=_photos(job), after=("align",), options=options, make=make)
+    files = {**_photos(job), **_faces(job)}
+    return Step(name="relief", files=files, after=("align",), options=options, make=make)
 
 
 def tables_of(job: PairJob) -> dict[str, Path]:
@@ -444,8 +460,8 @@ def _ortho_task(job: PairJob, options: Mapping[str, Any]) -> OrthoTask:
 
     return OrthoTask.from_given(
         {key: options[key] for key in (*PICTURE, "gsd") if key in options},
-        relief=job.product("relief"),
-    )
+        relief=job.product("relief"), faces=job.files.get("faces"),
+    )  # fmt: skip
 
 
 def _ortho_step(job: PairJob) -> Step:
@@ -458,9 +474,8 @@ def _ortho_step(job: PairJob) -> Step:
         task = _ortho_task(job, options)
         return make_ortho(job.pair_path, out, task, progress=progress).remarks
 
-    return Step(
-        name="ortho", files=_photos(job), after=("align", "relief"), options=options, make=make
-    )
+    files = {**_photos(job), **_faces(job)}
+    return Step(name="ortho", files=files, after=("align", "relief"), options=options, make=make)
 
 
 def _drawing_step(job: PairJob) -> Step:
@@ -476,7 +491,7 @@ def _drawing_step(job: PairJob) -> Step:
         return deliver(job.pair_path, place, task, wish, progress=progress).ortho.remarks
 
     return Step(
-        name="drawing", files={**_photos(job), **tables}, after=("align", "relief"),
+        name="drawing", files={**_photos(job), **_faces(job), **tables}, after=("align", "relief"),
         options=options, make=make,
     )  # fmt: skip
 

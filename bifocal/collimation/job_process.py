@@ -10,6 +10,7 @@ from time import monotonic
 from typing import Any
 
 from bifocal.collimation.stated_media import media_from_dict
+from bifocal.faces.faces_files import faces_path
 from bifocal.matching.matching import MatchSettings
 from bifocal.model.geotiff import gsd_at_scale
 from bifocal.orientation.align_workflow import (
@@ -105,7 +106,10 @@ def _match(task: Task, progress: Progress) -> dict[str, Any]:
 
 
 def _relief(task: Task, progress: Progress) -> dict[str, Any]:
-    job = ReliefJob(out=Path(task["out"]), overwrite=task["overwrite"], **task["options"])
+    job = ReliefJob(
+        out=Path(task["out"]), overwrite=task["overwrite"], faces=faces_path(None, task["pair"]),
+        **task["options"],
+    )  # fmt: skip
     summary, remarks = relief_of_pair(read_pair(task["pair"]), job, progress=progress)
     return {"summary": summary, "remarks": remarks}
 
@@ -114,7 +118,10 @@ def _ortho_task(task: Task) -> OrthoTask:
     said = dict(task["options"])
     if "scale" in said:
         said.setdefault("gsd", gsd_at_scale(task["dpi"] or DPI, said["scale"]))
-    return OrthoTask.from_given(said, relief=_path(task["relief"]), points=_path(task["points"]))
+    return OrthoTask.from_given(
+        said, relief=_path(task["relief"]), points=_path(task["points"]),
+        faces=faces_path(None, task["pair"]),
+    )  # fmt: skip
 
 
 def _ortho(task: Task, progress: Progress) -> dict[str, Any]:

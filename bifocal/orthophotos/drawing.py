@@ -14,6 +14,7 @@ import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.model.points import SurveyPoints
+from bifocal.orthophotos.ortho_image import Source
 from bifocal.orthophotos.tuning import SHEET
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import InputError
@@ -159,6 +160,10 @@ class Drawing:
         Lines for the title block.
     legend : Legend, optional
         Of a relief.
+    hatched : tuple of (Source, float)
+        What lines lie over in an orthophoto, and its share of the picture.
+    spots : ndarray, shape (n, 3)
+        X, Y and relief of spot heights. [m]
     language : str
     """
 
@@ -172,6 +177,8 @@ class Drawing:
     sections: tuple[Section, ...] = ()
     notes: tuple[str, ...] = field(default=())
     legend: Legend | None = None
+    hatched: tuple[tuple[Source, float], ...] = ()
+    spots: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
     language: str = "en"
 
     @property
@@ -190,6 +197,11 @@ class Drawing:
         xmin, ymin, xmax, ymax = self.grid.bounds
         gaps = np.abs([end[0] - xmin, end[0] - xmax, end[1] - ymin, end[1] - ymax])
         return bool(gaps.min() * 1000.0 / self.scale < SHEET.beyond)
+
+    def spot_words(self) -> list[tuple[float, float, str]]:
+        """Return X, Y [m] and words of the spot heights; on a flat wall they have millimetres."""
+        digits = 2 if np.abs(self.spots[:, 2]).max(initial=0.0) >= 0.1 else 3
+        return [(x, y, signed(r, digits)) for x, y, r in self.spots.tolist()]
 
     def grid_step(self) -> float:
         """Return the spacing of grid crosses: about 5 cm on paper, a round number. [m]"""

@@ -14,7 +14,7 @@ from bifocal.orthophotos.contour_lines import contour_labels
 from bifocal.orthophotos.drawing import TABLES, Drawing, PrintSheet, Section
 from bifocal.orthophotos.dxf_canvas import DxfCanvas
 from bifocal.orthophotos.sheet_margins import SheetMargins
-from bifocal.orthophotos.tuning import CONTOURS, SHEET
+from bifocal.orthophotos.tuning import CONTOURS, SHEET, SPOTS
 from photocore.output import atomic_path
 
 
@@ -59,6 +59,10 @@ def write_drawing(
     _points(model, drawing.points, "BIFOCAL_POINTS", 2.0 * paper)
     _points(model, drawing.control, "BIFOCAL_CONTROL", 2.0 * paper)
     _contours(model, drawing, paper)
+    for x, y, words in drawing.spot_words():
+        model.add_point((x, y), dxfattribs={"layer": "BIFOCAL_SPOT_HEIGHTS"})
+        add_text(model, words, (x + paper, y + 0.5 * paper), 0.72 * SPOTS.size * paper,
+                 "BIFOCAL_SPOT_HEIGHTS")  # fmt: skip
     for cut in drawing.sections:
         style = {"layer": "BIFOCAL_SECTION_LINES", **dashed(model, "DASHDOT", SHEET.cut * paper)}
         model.add_lwpolyline(cut.path.tolist(), dxfattribs=style)

@@ -9,7 +9,7 @@ import numpy as np
 
 from bifocal.model.grid import Bounds
 from bifocal.model.photo import Photo
-from bifocal.model.relief_map import Quality, ReliefMap
+from bifocal.model.relief_map import TOLD, Quality, ReliefMap
 from bifocal.reports.content import SIDE, PairContent, ReportedPhoto
 from photocore.arrays import FloatArray
 from photocore.reports.words import Words
@@ -165,7 +165,7 @@ def draw_relief(figure: Any, content: PairContent, say: Words) -> None:
     extent = extent_of(bounds)
     reach = max(float(np.nanpercentile(np.abs(part.r), 98)), 1e-3)
     image = axes.imshow(part.r, extent=extent, vmin=-reach, vmax=reach, **_styles()["relief"])
-    guessed = (part.quality > Quality.MEASURED) & np.isfinite(part.r)
+    guessed = ~np.isin(part.quality, TOLD) & np.isfinite(part.r)
     if guessed.any() and not guessed.all():
         axes.contourf(guessed.astype(float), extent=extent, **_styles()["guessed"])
     bar = colour_bar(figure, image, say("relief_axis"), extend="both")
