@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bifocal.campaigns.pair_job import PairJob, tables_of
+from bifocal.campaigns.pair_steps import PairJob, tables_of
 from bifocal.faces.faces_files import read_faces
 from bifocal.model.lens import Lens
 from bifocal.orientation.control_points import read_control

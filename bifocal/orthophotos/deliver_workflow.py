@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -90,6 +90,11 @@ class DeliverTask:
         ``A4`` to ``A0``; None: the smallest that holds the picture.
     mark, control : Path or SurveyPoints, optional
         Points to draw, or their tables.
+    cad : mapping of str to SurveyPoints
+        Of ``points``, ``control`` and ``check``: what the drawing for CAD holds though the sheet
+        does not show it.
+    layers : str
+        How those of drawings are called: ``language``, ``bifocal`` or ``ncs``.
     sections : sequence of str
         ``x=1.5``, ``y=2`` or corners.
     contours : float, optional
@@ -108,6 +113,8 @@ class DeliverTask:
     paper: str | None = None
     mark: Path | None = None
     control: Path | SurveyPoints | None = None
+    cad: Mapping[str, SurveyPoints] = field(default_factory=dict)
+    layers: str = "language"
     sections: Sequence[str] = ()
     contours: float | None = None
     hatch: bool = True
@@ -176,7 +183,8 @@ def deliver(
         grid = planned_grid(pair, surface, task)
         drawing = Drawing(
             title=title, grid=grid, scale=scale, points=points, control=control,
-            notes=_notes(pair, grid, wish, task, reader), language=wish.language,
+            notes=_notes(pair, grid, wish, task, reader), language=wish.language, cad=wish.cad,
+            layers=wish.layers,
         )  # fmt: skip
         sheet = PrintSheet.fitting(drawing, wish.paper)
         measured = _measured(reader, surface)
@@ -211,8 +219,7 @@ def deliver(
                 remarks += (remark("drawing.relief_not_measured", share=share),)
         for number, cut in enumerate(cuts, start=1):
             for writer, ending in ((write_section_dxf, "dxf"), (write_section_svg, "svg")):
-                target = place / f"{name}_section{number}.{ending}"
-                writer(target, cut, scale=scale, say=drawing.say)
+                writer(place / f"{name}_section{number}.{ending}", cut, drawing=drawing)
         if out is not None and extra != (f"{name}.tif",):
             shutil.copyfile(place / f"{name}.tif", place / out.name if inside else copy)
         files = tuple(sorted(item.name for item in place.iterdir()))
