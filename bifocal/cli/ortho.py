@@ -52,7 +52,8 @@ def command(
     if breaklines and own is None:
         raise click.UsageError("--breakline joins measured points; give their table by --points.")
     for name in (*DRAWING[4:], "control"):
-        if drawing[name] and folder is None:
+        by_default = drawing[name] == OF_PAIR[name].attributes.get("default")
+        if drawing[name] and not by_default and folder is None:
             flag = OF_PAIR[name].flag
             raise click.UsageError(f"{flag} is drawn into a folder; give --deliver DIR.")
     if relief is None and own is None and plane is None:
