@@ -20,7 +20,8 @@ LIBRARIES = (
     "matplotlib", "ezdxf", "laspy", "click",
 )  # fmt: skip
 EXTRAS = {
-    "lens": ("lensfunpy",), "fast": ("pyarrow",), "cluster": ("dask", "distributed"),
+    "lens": ("lensfunpy",), "fast": ("pyarrow", "numba"),
+    "cluster": ("dask", "distributed"),
 }  # fmt: skip
 OFFICE = ("soffice", "libreoffice")
 

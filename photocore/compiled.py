@@ -1,0 +1,117 @@
+"""Loops over plain arrays, compiled by numba where the extra ``fast`` is installed.
+
+numpy stays the road of every formula. A kernel is a second one for what numpy does slowly (many
+small problems, loops that depend on their last step) and must give the same numbers to rounding.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from functools import cache, update_wrapper
+from importlib.util import find_spec
+from types import FunctionType
+from typing import Any, Generic, ParamSpec, TypeVar
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+#: Loading numba and a kernel from the disk takes about twice as long. [s]
+_WORTH_LOADING = 0.25
+
+
+class Kernel(Generic[P, T]):
+    """A function that numba compiles when it is first called; without numba, the function itself.
+
+    The machine code is kept on the disk beside the module, or in the user's cache. It runs without
+    Python's lock, so threads run it side by side.
+
+    Parameters
+    ----------
+    function : callable
+        Of arrays and numbers, in the part of Python and numpy that numba knows. Other kernels
+        that it calls stand in the same module: the disk's copy is renewed when that changes.
+
+    Attributes
+    ----------
+    plain : callable
+        The function as it was written.
+
+    Examples
+    --------
+    >>> @compiled
+    ... def total(numbers):
+    ...     sum_ = 0.0
+    ...     for number in numbers:
+    ...         sum_ += number
+    ...     return sum_
+    >>> total.plain([1.0, 2.5])
+    3.5
+    """
+
+    def __init__(self, function: Callable[P, T]) -> None:
+        self.plain = function
+        self._run: Callable[P, T] | None = None
+        self._spent = 0.0
+        update_wrapper(self, function)
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> T:
+        """Return what the function returns, from machine code where there is numba."""
+        return self.machine_code()(*args, **kwargs)
+
+    def pays(self, seconds: float) -> bool:
+        """Return whether to call this rather than go the road of numpy.
+
+        Parameters
+        ----------
+        seconds : float
+            What the road of numpy would take now, roughly. It adds up over the calls: one small
+            problem is not worth loading numba for, thousands are.
+
+        Returns
+        -------
+        pays : bool
+            False without numba.
+        """
+        if self._run is None:
+            self._spent += seconds
+            if "numba" not in sys.modules and self._spent < _WORTH_LOADING:
+                return False
+        return _numba() is not None
+
+    def machine_code(self) -> Callable[P, T]:
+        """Return the compiled function, which other kernels may call."""
+        if self._run is None:
+            self._run = self._made()
+        return self._run
+
+    def _made(self) -> Callable[P, T]:
+        numba = _numba()
+        if numba is None:
+            return self.plain
+        code, names = self.plain.__code__, dict(self.plain.__globals__)
+        for name in code.co_names:
+            if isinstance(names.get(name), Kernel):
+                names[name] = names[name].machine_code()
+        bound = FunctionType(code, names, code.co_name, self.plain.__defaults__)
+        try:
+            return numba.njit(cache=True, nogil=True)(bound)
+        except RuntimeError:  # neither the module's folder nor the user's cache may be written
+            return numba.njit(nogil=True)(bound)
+
+
+def compiled(function: Callable[P, T]) -> Kernel[P, T]:
+    """Return a function as a `Kernel`; the decorator."""
+    return Kernel(function)
+
+
+@cache
+def _numba() -> Any:
+    """Return numba; None where it is absent or refuses the numpy that is installed."""
+    if find_spec("numba") is None:
+        return None
+    try:
+        import numba
+    except ImportError:
+        return None
+    return numba

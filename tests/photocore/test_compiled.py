@@ -1,0 +1,81 @@
+"""Kernels: the same numbers with numba and without, loaded when it pays, kept on the disk."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from photocore import compiled as module
+from photocore.compiled import Kernel, compiled
+
+MODULE = """
+import numpy as np
+from photocore.compiled import compiled
+
+SCALE = 3.0
+
+
+@compiled
+def square(number, power=2):
+    return SCALE * number**power
+
+
+@compiled
+def sum_of_squares(numbers):
+    total = 0.0
+    for number in numbers:
+        total += square(number)
+    return total
+"""
+
+
+def _run(folder: Path, code: str, **environment: str) -> str:
+    (folder / "kernels.py").write_text(MODULE, encoding="utf-8")
+    path = os.pathsep.join([str(folder), str(Path(module.__file__).parents[1])])
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": path, **environment},
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def test_kernels_call_each_other_and_are_kept_on_the_disk(tmp_path: Path) -> None:
+    pytest.importorskip("numba")
+    cache = tmp_path / "cache"
+    code = "import kernels, numpy; print(kernels.sum_of_squares(numpy.array([1.0, 2.0])))"
+    assert _run(tmp_path, code, NUMBA_CACHE_DIR=str(cache)) == "15.0"
+    assert [path.suffix for path in sorted(cache.rglob("kernels.*"))].count(".nbi") == 2
+
+
+def test_without_numba_the_function_itself_is_called(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_numba", lambda: None)
+    kernel = compiled(lambda numbers: sum(numbers))
+    assert not kernel.pays(1e9)
+    assert kernel([1, 2]) == 3
+
+
+def test_numba_that_refuses_the_installed_numpy_counts_as_absent(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "numba.py").write_text("raise ImportError('Numba needs NumPy 2.3 or less')")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "numba", raising=False)
+    assert module._numba.__wrapped__() is None
+
+
+def test_a_kernel_pays_once_the_road_of_numpy_has_taken_long(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(module, "_numba", lambda: np)
+    monkeypatch.setitem(sys.modules, "numba", None)
+    monkeypatch.delitem(sys.modules, "numba")
+    kernel: Kernel = compiled(lambda: None)
+    assert [kernel.pays(0.1) for _ in range(4)] == [False, False, True, True]
