@@ -30,6 +30,7 @@ from bifocal.orthophotos.drawing_files import write_drawing
 from bifocal.orthophotos.ortho_workflow import (
     ORTHO_ENDING,
     OrthoTask,
+    fetch_quality,
     make_ortho,
     not_measured,
     open_surface,
@@ -380,12 +381,12 @@ def _band(reader: RasterReader | None, number: int) -> Surface | None:
 
 def _measured(reader: RasterReader | None) -> Surface | None:
     """Return the measured part of a relief map; None where no map tells, or nothing was."""
-    if reader is None or reader.bands < 3 or not reader.names[2].startswith("quality"):
+    measured = None if reader is None else fetch_quality(reader)
+    if reader is None or measured is None:
         return None
 
     def fetch(*window: int) -> Float32Array:
-        quality = reader.read(*window, bands=[3])[:, :, 0]
-        return np.where(quality == Quality.MEASURED, reader.read_floats(*window), np.float32("nan"))
+        return np.where(measured(*window) > 0, reader.read_floats(*window), np.float32("nan"))
 
     # A map of which nothing was measured is drawn as it is, hatched by no one.
     with suppress(InputError):

@@ -25,7 +25,8 @@ from bifocal.model.photo_alone import PhotoAlone
 from bifocal.model.photo_set import PhotoSet
 from bifocal.model.photos_of_set import PhotosOfSet
 from bifocal.model.points import SurveyPoints
-from bifocal.model.surface import EVERYWHERE, FlatSurface, MapSurface, Surface
+from bifocal.model.relief_map import Quality
+from bifocal.model.surface import EVERYWHERE, Fetch, FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.compose import choose_grid, render
 from bifocal.orthophotos.ortho_image import OF_SET, OrthoOptions, Source
 from bifocal.orthophotos.radiometry import corrected_photo, match_exposure
@@ -34,7 +35,7 @@ from bifocal.orthophotos.tiles import RasterResult, write_tiles
 from bifocal.orthophotos.triangles import TriangleSurface
 from bifocal.orthophotos.tuning import PIXELS
 from bifocal.remarks import remark
-from photocore.arrays import ByteArray
+from photocore.arrays import ByteArray, Float32Array
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
 from photocore.images import ImageArray, read_image
@@ -211,7 +212,7 @@ def open_surface(
             reader = stack.enter_context(RasterReader(task.relief))
             check_relief(reader)
             with located(task.relief):
-                surface = MapSurface(reader.grid, reader.read_floats)
+                surface = MapSurface(reader.grid, reader.read_floats, fetch_quality(reader))
         elif task.points is not None:
             surface, remarks = _triangles(task.points, task.breaklines)
         low, high = surface.extremes(EVERYWHERE)
@@ -221,6 +222,18 @@ def open_surface(
             about = {"name": named, "low": low, "high": high, "near": nearest}
             raise InputError(remark("ortho.relief_of_another_pair", **about))
         yield surface, reader, remarks
+
+
+def fetch_quality(reader: RasterReader) -> Fetch | None:
+    """Return what reads where a relief map is measured, 1 or 0; None where it does not tell."""
+    if reader.bands < 3 or not reader.names[2].startswith("quality"):
+        return None
+
+    def fetch(*window: int) -> Float32Array:
+        quality = reader.read(*window, bands=[3])[:, :, 0]
+        return (quality == Quality.MEASURED).astype(np.float32)
+
+    return fetch
 
 
 def _triangles(

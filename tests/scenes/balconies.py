@@ -6,6 +6,7 @@ parallax. It fills photos of 11 x 7.5 m; nothing is tuned on seeds of 1100 and a
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -47,7 +48,7 @@ def _rustication(scene: Scene, palette: Palette, rng: np.random.Generator) -> No
         for left, right in ((-9.0, -4.15), (-2.45, -0.75), (0.75, 2.45), (4.15, 9.0)):
             edges = np.arange(left, right - 0.1, 0.85) + (0.425 if row % 2 else 0.0)
             edges = np.unique(np.clip([left, *edges, right], left, right))
-            for start, end in zip(edges[:-1], edges[1:], strict=True):
+            for start, end in itertools.pairwise(edges):
                 if end - start > 0.1:
                     inner = (start + 0.012, end - 0.012)
                     block = (low + 0.012, low + 0.408)
@@ -72,7 +73,9 @@ def _french_window(scene: Scene, palette: Palette, rng: np.random.Generator, *, 
         for slat in np.arange(low, high - 0.03, 0.07):
             profile = [(slat, 0.01), (slat + 0.01, 0.01), (slat + 0.04, out), (slat + 0.03, out)]
             scene.add(prism(profile, (left, right), palette.wood))
-    scene.add(box((x - half - 0.1, x + half + 0.1), (high, high + 0.12), (-0.05, 0.15), palette.trim))
+    scene.add(
+        box((x - half - 0.1, x + half + 0.1), (high, high + 0.12), (-0.05, 0.15), palette.trim)
+    )
 
 
 def _balcony(scene: Scene, palette: Palette, *, x: float, out: float) -> None:
