@@ -16,9 +16,11 @@ os.environ["OMP_NUM_THREADS"] = "1"
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 
@@ -33,8 +35,10 @@ from multimedia import (
     intersect_rays,
     project,
     resect,
+    resect_many,
 )
 from multimedia.openptv.experiment import write_experiment
+from multimedia.orientation.pose_kernel import fitted_pose
 from multimedia.projects.model import Project
 
 RNG = np.random.default_rng(20240601)
@@ -162,8 +166,8 @@ def intersection(optv: Optv | None) -> None:
 
 
 def resection(optv: Optv | None) -> None:
-    """Exterior orientation from 20 000 and from 200 points, start 20 mm and 2 degrees off."""
-    for count in (200, 20_000):
+    """Exterior orientation, start 20 mm and 2 degrees off; then 1000 cameras of 20 points."""
+    for count in (20, 50, 200, 20_000):
         xyz = points(count)
         truth = CAMERAS[2]
         image = project(truth, xyz, WALL)
@@ -191,8 +195,23 @@ def resection(optv: Optv | None) -> None:
 
             assert np.abs(np.array(work().get_pos()) - truth.centre).max() < 1e-3
             theirs = best(work, count, repeats=3)
-        ours = best(lambda s=start, p=xyz, i=image: resect(s, p, i, WALL), count, repeats=3)
-        line(f"resection, {count} points, us per point", ours, theirs, "us", 1e6)
+        plain = patch.object(fitted_pose, "pays", lambda _: False)
+        for what, road in (("plain", plain), ("compiled", nullcontext())):
+            with road:
+                for _ in range(300 if count < 1000 else 1):
+                    resect(start, xyz, image, WALL)
+                repeats = 50 if count < 1000 else 3
+                ours = best(lambda s=start, p=xyz, i=image: resect(s, p, i, WALL), count, repeats)
+            line(f"resection, {count} points, {what}, us per point", ours, theirs, "us", 1e6)
+    xyz, truth = points(20), [replace(CAMERAS[2], centre=CAMERAS[2].centre + d)
+                              for d in RNG.uniform(-20, 20, (1000, 3))]  # fmt: skip
+    images = np.stack([project(camera, xyz, WALL) for camera in truth])
+    images += 0.002 * RNG.standard_normal(images.shape)
+    start = [CAMERAS[2]] * len(truth)
+    one = resect(CAMERAS[2], xyz, images[7], WALL).camera.centre
+    assert np.abs(resect_many(start, xyz, images, WALL).centre[7] - one).max() < 1e-6
+    seconds = best(lambda: resect_many(start, xyz, images, WALL), len(truth))
+    line("resections of 20 points, 1000 cameras, us per camera", seconds, None, "us", 1e6)
 
 
 def epipolar(optv: Optv | None) -> None:

@@ -6,10 +6,8 @@ relief. X runs right, Y up, relief r towards the cameras [m]; pixels are (column
 
 By hand, the equations
     relief                    r from the radial distances of a point on both photos, Eq. (6)
-    relief_from_displacement  r from one displacement, Eq. (2)
-    relief_displacement       the displacement on one photo, Eq. (1)
-    relief_displacements      those on both, from the distances, Eq. (5)
-    plane_coordinates         x, y from radial distance and angle, Eq. (7)
+    relief_from_displacement, relief_displacement   of one photo, Eqs. (2) and (1)
+    relief_displacements, plane_coordinates   those on both, Eq. (5); x, y of one, Eq. (7)
 The pair
     Pair, Photo               both cameras; read and write pair files, intersect and project points
     PhotoSet                  two or more photos of one wall; a pair is the set of two
@@ -37,12 +35,13 @@ The page
     recording                 what the outputs written within it say made them
 Sample pairs                  SAMPLE, WATER_SAMPLE: folders of photos with exact truth
 
-What they take and give: Bounds, ChangedRegion, CheckResult, Comparison, FlagLimits, FlatSurface,
-Foot, Grid, Intersection, KnownPoints, Layers, MapSurface, MediaPath, NamedPoints, OrientationCheck,
-Pinhole, PlanePicks, PointObservations, Progress, ProjectOptions, ProjectPhotos, ProjectedPoints,
-RadialDivision, RankedPair, Rectification, Registration, ReliefTable, SetIntersection, Similarity,
-SpaceSums, Surface, SurveyInput, SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision,
-WeightedSums, Window, WorldPoints.
+What they take and give: Bounds, BreakLine, ChangedRegion, CheckResult, Comparison, Face, Faces,
+FlagLimits, FlatSurface, Foot, Grid, Intersection, KnownPoints, Layers, MapSurface, MediaPath,
+NamedPoints, Occluder, OrientationCheck, Pinhole, PlanePicks, PointObservations, Progress,
+ProjectedPoints, ProjectOptions, ProjectPhotos, RadialDivision, RankedPair, Rectification,
+Registration, ReliefTable, SetIntersection, Similarity, SpaceSums, suggest_faces, Surface,
+SurveyInput, SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision, WeightedSums, Window,
+WorldPoints.
 
 Errors are one family with one message each that says what is wrong, where, and how to mend it:
 PhotogrammetryError > InputError (a ValueError) > CellError, WorkbookError, MissingExtraError;

@@ -28,6 +28,8 @@ from .equations import (
     relief_displacements,
     relief_from_displacement,
 )
+from .faces.faces import BreakLine, Face, Faces, Occluder
+from .faces.suggestions import suggest_faces
 from .files.provenance import recording
 from .matching.homologous_points import match
 from .matching.matches import Matches
@@ -77,6 +79,11 @@ from .workbook.workflow import solve
 __version__: str
 
 __all__ = [
+    "suggest_faces",
+    "Occluder",
+    "Faces",
+    "Face",
+    "BreakLine",
     "Alignment",
     "Bounds",
     "Calibration",

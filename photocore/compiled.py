@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from functools import cache, update_wrapper
+from functools import cache, cached_property, update_wrapper
 from importlib.util import find_spec
 from types import FunctionType
 from typing import Any, Generic, ParamSpec, TypeVar
@@ -18,6 +18,10 @@ T = TypeVar("T")
 
 #: Loading numba and a kernel from the disk takes about twice as long. [s]
 _WORTH_LOADING = 0.25
+
+
+#: Without Python's lock; divided by zero is infinite, as in numpy: no test at every division.
+_HOW = {"nogil": True, "error_model": "numpy"}
 
 
 class Kernel(Generic[P, T]):
@@ -31,11 +35,14 @@ class Kernel(Generic[P, T]):
     function : callable
         Of arrays and numbers, in the part of Python and numpy that numba knows. Other kernels
         that it calls stand in the same module: the disk's copy is renewed when that changes.
+    plain : callable, optional
+        The same as numpy does it well, where a loop is too slow without numba.
 
     Attributes
     ----------
     plain : callable
-        The function as it was written.
+        What is called without numba: by default the function as it was written, with the plain
+        ones of the kernels that it calls.
 
     Examples
     --------
@@ -49,15 +56,19 @@ class Kernel(Generic[P, T]):
     3.5
     """
 
-    def __init__(self, function: Callable[P, T]) -> None:
-        self.plain = function
+    def __init__(self, function: Callable[P, T], plain: Callable[P, T] | None = None) -> None:
+        self._written, self._numpy = function, plain
         self._run: Callable[P, T] | None = None
         self._spent = 0.0
         update_wrapper(self, function)
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> T:
         """Return what the function returns, from machine code where there is numba."""
-        return self.machine_code()(*args, **kwargs)
+        try:
+            return self.machine_code()(*args, **kwargs)
+        except OSError:  # a full disk does not take the machine code: do without a copy of it
+            self._run = self._uncached()
+            return self._run(*args, **kwargs)
 
     def pays(self, seconds: float) -> bool:
         """Return whether to call this rather than go the road of numpy.
@@ -79,6 +90,11 @@ class Kernel(Generic[P, T]):
                 return False
         return _numba() is not None
 
+    @cached_property
+    def plain(self) -> Callable[P, T]:
+        """The function without numba."""
+        return self._numpy or self._bound(lambda kernel: kernel.plain)
+
     def machine_code(self) -> Callable[P, T]:
         """Return the compiled function, which other kernels may call."""
         if self._run is None:
@@ -89,15 +105,24 @@ class Kernel(Generic[P, T]):
         numba = _numba()
         if numba is None:
             return self.plain
-        code, names = self.plain.__code__, dict(self.plain.__globals__)
+        bound = self._bound(lambda kernel: kernel.machine_code())
+        try:
+            return numba.njit(cache=True, **_HOW)(bound)
+        except RuntimeError:  # neither the module's folder nor the user's cache may be written
+            return self._uncached()
+
+    def _uncached(self) -> Any:
+        numba = _numba()
+        return numba.njit(**_HOW)(self._bound(lambda kernel: kernel._uncached()))
+
+    def _bound(self, made: Callable[[Any], Any]) -> Any:
+        """Return the function with what is made of the kernels that it calls in their place."""
+        written: Any = self._written
+        code, names = written.__code__, dict(written.__globals__)
         for name in code.co_names:
             if isinstance(names.get(name), Kernel):
-                names[name] = names[name].machine_code()
-        bound = FunctionType(code, names, code.co_name, self.plain.__defaults__)
-        try:
-            return numba.njit(cache=True, nogil=True)(bound)
-        except RuntimeError:  # neither the module's folder nor the user's cache may be written
-            return numba.njit(nogil=True)(bound)
+                names[name] = made(names[name])
+        return FunctionType(code, names, code.co_name, written.__defaults__)
 
 
 def compiled(function: Callable[P, T]) -> Kernel[P, T]:

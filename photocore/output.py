@@ -313,7 +313,7 @@ def told_as(path: Path, temporary: Path) -> Iterator[None]:
 def atomic_folder(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
     """Yield a temporary folder; on success all its files move into ``path``, otherwise none.
 
-    Existing files of other names in ``path`` stay.
+    Existing files of other names in ``path`` stay. A new folder comes whole, by one rename.
 
     Raises
     ------
@@ -326,12 +326,13 @@ def atomic_folder(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
         raise InputError(f"{path}: is a file; name a folder.")
     made_folders: list[Path] = []
     temporary: Path | None = None
-    done = False
+    done, is_new = False, not path.exists()
+    home, stem = (path.parent, f".{path.name[:60]}") if is_new else (path, ".writing")
     try:
-        _make_folder(path, made_folders)
-        _remove_left_over(path, ".writing", "")
+        _make_folder(home, made_folders)
+        _remove_left_over(home, stem, "")
         with interrupts.held():
-            temporary = Path(tempfile.mkdtemp(prefix=_prefix(".writing"), dir=path))
+            temporary = Path(tempfile.mkdtemp(prefix=_prefix(stem), dir=home))
             interrupts.temporary.add(temporary)
         with told_as(path, temporary):
             yield temporary
@@ -341,11 +342,17 @@ def atomic_folder(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
             raise InputError(
                 f"{path}: holds {', '.join(sorted(taken)[:5])} already; add --overwrite to replace."
             )
+        is_new = is_new and not path.exists()
         for name in files:
-            _make_folder((path / name).parent, made_folders)
-            check_writable(path / name, overwrite=overwrite)
+            if not is_new:
+                _make_folder((path / name).parent, made_folders)
+                check_writable(path / name, overwrite=overwrite)
             (temporary / name).chmod(_mode_for((path / name).resolve()))
-        _put_in_place([(temporary / name, (path / name).resolve()) for name in files])
+        if is_new:
+            temporary.chmod(_mode_for(path, 0o777))
+            _put_in_place([(temporary, path)])
+        else:
+            _put_in_place([(temporary / name, (path / name).resolve()) for name in files])
         done = True
     except OSError as error:
         raise _not_written(path, error) from error
@@ -473,13 +480,13 @@ def _is_running(process: int) -> bool:
     return True
 
 
-def _mode_for(place: Path) -> int:
+def _mode_for(place: Path, plain: int = 0o666) -> int:
     """Return the mode of the file that is replaced, or what a plain open() would give."""
     if place.exists():
         return stat.S_IMODE(place.stat().st_mode)
     mask = os.umask(0)
     os.umask(mask)
-    return 0o666 & ~mask
+    return plain & ~mask
 
 
 def relative_name(path: Path | str, folder: Path) -> str:

@@ -210,7 +210,7 @@ def _set(folder: Path, rows: list[list[float | str]]) -> None:
     PhotoSet(photos=named).write(folder / "wall.photos.json")
     picks = [[row[0], *row[4:6], *mid.project(np.array(row[1:4], float)), *row[6:]] for row in rows]
     head = ["id", *(f"{axis}{k} [px]" for k in (1, 2, 3) for axis in ("col", "row"))]
-    with (folder / "picks.csv").open("w", newline="", encoding="utf-8") as file:
+    with (folder / "set_picks.csv").open("w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows([head, *picks])
 
 

@@ -46,6 +46,7 @@ NOT_RUN = {
     "python benchmarks/relief_ablation.py": MINUTES,
     "python benchmarks/relief_tuning.py": MINUTES,
     "python benchmarks/bench_shift.py": MINUTES,
+    "python benchmarks/bench_tracking.py": MINUTES,
     "python -m benchmarks.bench_page 100": MINUTES,
     "python -m benchmarks.peers": MINUTES,
     "python docs/make_page_pictures.py": "wants a browser, and writes into docs",
@@ -95,14 +96,25 @@ ONLY = {
 #: Files of the tank that a page about façades takes for granted too.
 ALSO = {"index.md": ("experiment", "bed.tif")}
 #: What is taken under another name.
-UNDER = {"underwater-adjustment.md": {"test_cavity": "experiment"}}
+UNDER = {
+    "underwater-adjustment.md": {"test_cavity": "experiment"},
+    "photo-sets.md": {"set_picks.csv": "picks.csv"},
+    "help of bifocal solve": {"set_picks.csv": "picks.csv"},
+}
+#: A folder as it is delivered.
+DELIVER = (
+    "bifocal facade far.jpg near.jpg --control points.csv --scale 1:50 --out DIR --quality fast "
+    "--products relief"
+)
 #: Lines of other pages that come first.
 FIRST = {
     "help of multimedia bathymetry": "multimedia waterlevel high_tiepoints.csv --out water.json",
     "help of bifocal undistort": "mkdir corrected",
+    "help of bifocal facade": DELIVER, "surveys.md": DELIVER,
 }  # fmt: skip
 #: Help that goes on where that of another command ends: what it reports on is made there.
 GOES_ON = {f"help of bifocal {name}": "help of bifocal facade" for name in ("report", "verify")}
+GOES_ON |= dict.fromkeys(("reports.md", "delivery.md"), "facade.md")
 #: Lines that want the sample at its full size.
 WHOLE = "--what targets"
 #: Options added so that the line costs seconds: the page's own products are made by other lines.

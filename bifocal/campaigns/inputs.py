@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from bifocal.campaigns.pair_job import PairJob, tables_of
+from bifocal.campaigns.pair_steps import PairJob, tables_of
+from bifocal.faces.faces_files import read_faces
 from bifocal.model.lens import Lens
 from bifocal.orientation.control_points import read_control
 from photocore.images import image_info
@@ -20,6 +21,8 @@ def check_files(job: PairJob) -> None:
     for path in (job.far, job.near, *job.files.values()):
         check_name(path)
         check_file(path)
+    if "faces" in job.files:
+        read_faces(job.files["faces"])
     for path in (job.far, job.near):
         image_info(path)
     for role in sorted({"lens", "lens1", "lens2"} & job.files.keys()):

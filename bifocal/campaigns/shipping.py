@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from bifocal.campaigns.pair_job import PairJob, PairOutcome, run_pair
+from bifocal.campaigns.pair_job import PairOutcome, run_pair
+from bifocal.campaigns.pair_steps import PairJob
 from bifocal.campaigns.step_store import receive_step
 from photocore.errors import InputError
 from photocore.provenance import FileHashes

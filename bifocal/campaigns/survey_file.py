@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from bifocal.campaigns.pair_job import PRODUCTS, PairJob, tables_of
+from bifocal.campaigns.pair_steps import PRODUCTS, PairJob, tables_of
 from bifocal.options import FILES, JOINT, OF_PAIR
 from photocore.errors import InputError
 from photocore.textfile import file_name, read_toml

@@ -11,13 +11,12 @@ from typing import Any
 
 from bifocal.campaigns.folder_locks import locked
 from bifocal.campaigns.inputs import check_files
-from bifocal.campaigns.pair_job import (
+from bifocal.campaigns.pair_job import PairOutcome, plan_of
+from bifocal.campaigns.pair_steps import (
     FIRST_STEP,
     MOST_PRODUCTS,
     PRODUCTS,
     PairJob,
-    PairOutcome,
-    plan_of,
     refusal,
     steps_of,
 )
@@ -421,6 +420,7 @@ def facade_job(
         near=near,
         files={role: path for role, path in said.items() if role in FILES},
         options={key: value for key, value in said.items() if key not in FILES},
+        way="facade",
         products=tuple(p for p in PRODUCTS if p in products) if products else MOST_PRODUCTS,
         overwrite=overwrite,
     )

@@ -9,7 +9,8 @@ from photocore.cli import print_result, progress_bar
 from photocore.options import declared
 
 if TYPE_CHECKING:
-    from bifocal.campaigns.pair_job import PairJob, PairOutcome
+    from bifocal.campaigns.pair_job import PairOutcome
+    from bifocal.campaigns.pair_steps import PairJob
 
 #: What to look at first.
 _TO_OPEN = ("report/*.html", "drawing/*.pdf", "points/*.xlsx", "relief/*.png", "ortho/*.tif")

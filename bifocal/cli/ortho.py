@@ -31,6 +31,7 @@ def command(
     5 a photo on interpolated relief, 6 a photo on the plane). Of a set each pixel is taken from
     the photo that sees it best: 11 is its first photo, 12 the second, 3 a transition.
     """
+    from bifocal.faces.faces_files import faces_path, keep_faces
     from bifocal.model.photo_set import PhotoSet
     from bifocal.orthophotos.deliver_workflow import DeliverTask, default_title, deliver
     from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho, not_measured
@@ -47,13 +48,15 @@ def command(
     source = read_photos(pair)
     if isinstance(source, PhotoSet) and folder is not None:
         raise InputError(remark_of("ortho.set_not_delivered"))
+    drawn = given["faces"]
+    given["faces"] = faces_path(drawn, pair)
     own: Path | SurveyPoints | None = points
     if relief is None and points is None and plane is None and is_workbook(pair):
         own = points_of(pair)
     breaklines = [line.split(",") for line in given.pop("breaklines")]
     if breaklines and own is None:
         raise click.UsageError("--breakline joins measured points; give their table by --points.")
-    for name in (*DRAWING[3:], "control"):
+    for name in (*DRAWING[4:], "control"):
         if drawing[name] and folder is None:
             flag = OF_PAIR[name].flag
             raise click.UsageError(f"{flag} is drawn into a folder; give --deliver DIR.")
@@ -77,6 +80,7 @@ def command(
                 progress=progress,
             )  # fmt: skip
     grid, shares = result.grid, result.shares
+    remarks = (*result.remarks, *keep_faces(drawn, pair))
     lines = [
         f"{result.path}: {grid.width} x {grid.height} px of {grid.gsd * 1000:g} mm; "
         f"{100 * (1 - shares['none']):.1f} % covered, {100 * shares['hidden']:.1f} % hidden"
@@ -85,4 +89,4 @@ def command(
         lines.append(f"Not measured: {told}")
     if files:
         lines.append(f"{folder}: {', '.join(done.files)} (sheet {done.sheet})")
-    print_result(result.to_dict() | files, lines, as_json=as_json, remarks=result.remarks)
+    print_result(result.to_dict() | files, lines, as_json=as_json, remarks=remarks)

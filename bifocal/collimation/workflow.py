@@ -14,6 +14,7 @@ from pathlib import Path
 
 import uvicorn
 
+from bifocal.collimation.first_orientation import FirstOrientation
 from bifocal.collimation.project import find_files
 from bifocal.collimation.server.access import Access
 from bifocal.collimation.server.application import application
@@ -104,6 +105,7 @@ def page_server(
             access.keep(number, url)
             session.sync.start()
             warm.start()
+            FirstOrientation(session).start()
             yield PageServer(
                 url, access.token, session, uvicorn.Server(config), listening, access.page
             )

@@ -194,7 +194,7 @@ def _write_dxf(
             add_ellipse(model, (x, y, z), ellipses[i], layer_of_ellipses)
     places = dict(zip(points.ids, coordinates.tolist(), strict=True))
     for line in lines:
-        vertices = [places[name] for name in line.ids if name in places]
+        vertices = [*line.places] or [places[name] for name in line.ids if name in places]
         layer = layer_name(line.layer)
         if layer not in drawing.layers:
             drawing.layers.add(layer)

@@ -14,6 +14,8 @@ from photocore.arrays import ByteArray
 from photocore.output import atomic_path
 from photocore.png_text import SIGNATURE, chunk, provenance_chunk
 
+#: RGB and validity of a picture, from the top.
+Strips = Iterator[tuple[ByteArray, ByteArray]]
 #: Rows read at a time: one row of tiles of the file.
 ROWS = 512
 
@@ -30,8 +32,10 @@ def colour_strips(reader: RasterReader) -> Iterator[tuple[ByteArray, ByteArray]]
         yield colours, reader.read(*size, mask=True)
 
 
-def write_png(path: Path, reader: RasterReader, *, dpi: float, overwrite: bool) -> None:
-    """Write the raster as a PNG with its resolution; empty pixels are transparent."""
+def write_png(
+    path: Path, reader: RasterReader, *, dpi: float, overwrite: bool, strips: Strips | None = None
+) -> None:
+    """Write the raster, or strips of it, as PNG with its resolution; empty is transparent."""
     grid = reader.grid
     with atomic_path(path, overwrite=overwrite) as temporary, temporary.open("wb") as file:
         file.write(SIGNATURE)
@@ -42,7 +46,7 @@ def write_png(path: Path, reader: RasterReader, *, dpi: float, overwrite: bool) 
         file.write(chunk(b"pHYs", struct.pack(">IIB", per_metre, per_metre, 1)))
         packer = zlib.compressobj(3)
         above = np.zeros((1, grid.width * 4), np.uint8)
-        for colours, valid in colour_strips(reader):
+        for colours, valid in strips or colour_strips(reader):
             pixels = np.dstack([colours, valid]).reshape(len(colours), -1)
             if packed := packer.compress(predicted(pixels, above)):
                 file.write(chunk(b"IDAT", packed))

@@ -33,7 +33,7 @@ LOCAL_CRS = (
 RELIEF_BANDS = (
     "relief [m]",
     "sigma [m]",
-    "quality (1 measured, 2 interpolated, 3 hidden, 0 unknown)",
+    "quality (1 measured, 2 interpolated, 3 hidden, 4 drawn, 0 unknown)",
 )
 #: Metres per unit of the DPI tag.
 METRES_PER_INCH = 0.0254

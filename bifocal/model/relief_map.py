@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from pathlib import Path
@@ -13,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bifocal.model.geotiff import RELIEF_BANDS, RasterReader, check_relief, create_raster
 from bifocal.model.grid import Grid, Gridded
+from bifocal.model.surface import Fetch, MapSurface
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray, as_points, read_only
 from photocore.errors import InputError
 from photocore.raster import BLOCK
@@ -25,6 +27,12 @@ class Quality(IntEnum):
     MEASURED = 1
     INTERPOLATED = 2
     HIDDEN = 3
+    #: On a face that was drawn, or a plane that was typed.
+    DRAWN = 4
+
+
+#: What relief is known by; the rest was made up from around.
+TOLD = (Quality.MEASURED, Quality.DRAWN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,7 +47,7 @@ class ReliefMap(Gridded):
         Standard deviation of r; NaN where r is. [m]
     quality : ndarray of uint8, shape (height, width)
         A `Quality` per pixel: measured in both photos, interpolated from its neighbours, hidden
-        from at least one camera (relief taken from the surface behind), or unknown.
+        from at least one camera (relief taken from the surface behind), drawn, or unknown.
     plane_from_pixel : ndarray, shape (3, 3)
         Affine map from (column, row, 1) to (X, Y, 1): square pixels, rows downwards. [m]
 
@@ -188,3 +196,26 @@ class ReliefMap(Gridded):
         at = np.where(inside[..., None], pixels, 0.0).reshape(-1, 2).T[::-1]
         values = map_coordinates(band, at, np.float64, order=order, mode="nearest")
         return values.reshape(inside.shape), inside
+
+
+def told_pixels(reader: RasterReader) -> Fetch | None:
+    """Return what reads 1 where a relief map is measured or drawn; None where it is silent."""
+    if reader.bands < 3 or not reader.names[2].startswith("quality"):
+        return None
+    return lambda *window: np.isin(reader.read(*window, bands=[3])[:, :, 0], TOLD).astype(
+        np.float32
+    )
+
+
+def measured_part(reader: RasterReader) -> MapSurface | None:
+    """Return what of an open relief map was measured or drawn; None where it does not say."""
+    told = told_pixels(reader)
+    if told is None:
+        return None
+
+    def fetch(*window: int) -> Float32Array:
+        return np.where(told(*window) > 0, reader.read_floats(*window), np.float32("nan"))
+
+    with suppress(InputError):  # nothing was
+        return MapSurface(reader.grid, fetch)
+    return None

@@ -69,6 +69,9 @@ class AlignOptions:
     auto : bool
     as_set_up : bool
         Whether the distances and focal lengths are taken exactly as they are.
+    one_lens : bool
+        Whether one lens took both photos, whose focal length the photos are to tell where nothing
+        else does.
     columns : str or None
         Which column of the control table is which.
     control, lengths : Path or None
@@ -88,6 +91,7 @@ class AlignOptions:
     site: SiteMeasures = field(default_factory=SiteMeasures)
     auto: bool = False
     as_set_up: bool = False
+    one_lens: bool = False
     columns: str | None = None
     control: Path | None = None
     lengths: Path | None = None
@@ -120,6 +124,7 @@ class AlignOptions:
             site=SiteMeasures(**measures),
             auto=bool(given.get("auto")),
             as_set_up=bool(given.get("as_set_up")),
+            one_lens=bool(given.get("one_lens")),
             columns=given.get("columns"),
             control=given.get("control"),
             lengths=given.get("lengths"),
@@ -158,11 +163,15 @@ def align_photos(
     check_all_writable(out, picture, overwrite=overwrite)
     infos = image_info(far), image_info(near)
     greys = read_greys(far, near, in_water=bool(options.media))
+    interiors = [
+        interior_of_photo(info, known, number)
+        for number, (info, known) in enumerate(zip(infos, options.lenses, strict=True), start=1)
+    ]
+    if options.one_lens and all(interior.is_assumed for interior in interiors):
+        interiors = [Interior.sought(info.size) for info in infos]
     first, second = (
-        PhotoInput(grey=grey, interior=interior_of_photo(info, known, number), name=info.path.name)
-        for number, (info, known, grey) in enumerate(
-            zip(infos, options.lenses, greys, strict=True), start=1
-        )
+        PhotoInput(grey=grey, interior=interior, name=info.path.name)
+        for info, interior, grey in zip(infos, interiors, greys, strict=True)
     )
     if way == "as set up":
         oriented = pair_as_set_up((first, second), options.site, options.media)

@@ -10,6 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bifocal.faces.faced_surface import FacedSurface, beneath
+from bifocal.faces.faces import Faces
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.image import ImageArray
 from bifocal.model.pair import Pair
@@ -50,6 +52,7 @@ def orthophoto(
     image: ImageArray | Sequence[ImageArray],
     relief: ReliefMap | Surface | ArrayLike | None = None,
     *,
+    faces: Faces | None = None,
     gsd: float | None = None,
     bounds: Bounds | None = None,
     source: int = 1,
@@ -58,7 +61,8 @@ def orthophoto(
     """Return the orthophoto of a wall in memory.
 
     Every pixel is taken from the original photo in one step that joins relief, homography and
-    lens distortion. Pixels that relief hides from the camera are left empty.
+    lens distortion. The picture is whole unless asked for otherwise; its source says of each
+    pixel what it rests on.
 
     Parameters
     ----------
@@ -69,6 +73,8 @@ def orthophoto(
         each pixel from the one that sees it best.
     relief : ReliefMap, Surface or float, optional
         Where the wall is; a number is a parallel plane, None the reference plane. [m]
+    faces : Faces, optional
+        Planes, edges and occluders that were drawn; relief obeys them at the orthophoto's pixels.
     gsd : float, optional
         Pixel size; by default that of the relief map, else of the photo in its middle. [m]
     bounds : tuple of float, optional
@@ -110,6 +116,8 @@ def orthophoto(
     """
     options = options or OrthoOptions()
     surface = as_surface(relief)
+    if faces:
+        surface = FacedSurface(surface, faces)
     if isinstance(pair, PhotoSet):
         pair, image = _of_set(pair, image)
     count = len(pair.photos) if isinstance(pair, PhotosOfSet) else 2
@@ -185,7 +193,8 @@ def choose_grid(
 ) -> Grid:
     """Return the grid asked for, by default the relief map's own, else that of the photo."""
     photo = pair.photo(number)
-    own = surface.grid if isinstance(surface, MapSurface) else None
+    under = beneath(surface)
+    own = under.grid if isinstance(under, MapSurface) else None
     if own is not None and bounds is None and (gsd is None or gsd == own.gsd):
         return own
     if gsd is None:
@@ -199,7 +208,7 @@ def render(
     views: Sequence[SourcePhoto], surface: Surface, grid: Grid, options: OrthoOptions
 ) -> Iterator[tuple[int, int, Tile]]:
     """Yield (column, row, tile) of an orthophoto, each in memory that does not grow with it."""
-    if options.complete:
+    if not options.measured_only:
         surface = CompletedSurface(surface, grid)
     for column, row, window in grid.tiles(COMPOSE.tile):
         yield column, row, render_window(views, surface, window, options)
@@ -209,7 +218,7 @@ def render_window(
     views: Sequence[SourcePhoto], surface: Surface, window: Grid, options: OrthoOptions
 ) -> Tile:
     """Return one window of an orthophoto."""
-    close = options.fill or options.complete
+    close = options.fill or not options.measured_only
     margin = COMPOSE.fill_reach if close else 0
     if options.mask_hidden:
         margin = max(margin, TIDYING.margin)
@@ -226,6 +235,7 @@ def render_window(
         # Where relief is unknown that of the surroundings shows the photo itself, slightly off.
         relief, _ = fill_holes(relief, ~unknown, unknown)
     looks = [_look(view, surface, wide, relief, options) for view in views]
+    looks = _past_occluders(views, looks, surface, wide)
     image, source = _choose(views, looks, wide, options)
     hidden: BoolArray = (source == Source.NONE) & np.logical_or.reduce([o.hidden for o in looks])
     if isinstance(surface, CompletedSurface):
@@ -255,6 +265,26 @@ def _look(
     if options.mask_hidden:
         hidden = tidied(hidden_from(surface, grid, view.photo.foot, relief)) & inside
     return _Look(view.sample(column, row, options.interpolation), inside, hidden)
+
+
+def _past_occluders(
+    views: Sequence[SourcePhoto], looks: list[_Look], surface: Surface, grid: Grid
+) -> list[_Look]:
+    """Return how photos see a window with what occluders cover hidden."""
+    under = surface.surface if isinstance(surface, CompletedSurface) else surface
+    if not isinstance(under, FacedSurface) or not under.faces.occluders:
+        return looks
+    covered = under.occluded(grid)
+    first = next((view.photo.foot for view in views if view.number == 1), None)
+    passed = []
+    for view, look in zip(views, looks, strict=True):
+        own = covered
+        if view.number != 1:
+            own = np.zeros(grid.shape, bool)
+            if first is not None:
+                own = under.occluded_in(grid, view.photo.foot, first)
+        passed.append(look._replace(hidden=look.hidden | (own & look.inside)))
+    return passed
 
 
 def _choose(
@@ -294,10 +324,13 @@ def _share_of_first(
         return np.where(second, np.float32(0), np.float32(1))
     if feather == 0:
         return first.astype(np.float32)
-    # Towards the rim of the first photo's part the second fades in, where it sees the wall at all.
-    depth = cv2.distanceTransform(first.astype(np.uint8), cv2.DIST_L2, 3)
+    # The second fades in towards where it alone sees the wall, not towards any other rim.
+    alone = second & ~first
+    if not alone.any():
+        return first.astype(np.float32)
+    depth = cv2.distanceTransform((~alone).astype(np.uint8), cv2.DIST_L2, 3)
     share = np.clip(depth / np.float32(feather), 0, 1)
-    return np.where(second, share, first.astype(np.float32)).astype(np.float32)
+    return np.where(second & first, share, first.astype(np.float32)).astype(np.float32)
 
 
 def _masked(image: ImageArray, keep: BoolArray) -> ImageArray:

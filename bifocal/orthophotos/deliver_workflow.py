@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from bifocal.faces.faced_surface import FacedSurface
 from bifocal.files.strips import write_png
 from bifocal.media import media_words
 from bifocal.model.geotiff import (
@@ -22,18 +24,19 @@ from bifocal.model.geotiff import (
 from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
 from bifocal.model.points import SurveyPoints
-from bifocal.model.relief_map import Quality
+from bifocal.model.relief_map import Quality, measured_part
 from bifocal.model.surface import FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.contour_lines import contour_grid, contours
 from bifocal.orthophotos.drawing import Contour, Drawing, Legend, PrintSheet, round_step
 from bifocal.orthophotos.drawing_files import write_drawing
+from bifocal.orthophotos.hatching import DIRECTIONS, hatched_strips
 from bifocal.orthophotos.ortho_workflow import (
     ORTHO_ENDING,
     OrthoTask,
-    fetch_quality,
     make_ortho,
     not_measured,
     open_surface,
+    photo_pixel,
     planned_grid,
     survey_points_of,
 )
@@ -41,10 +44,11 @@ from bifocal.orthophotos.pdf_sheet import LeftOut, write_sheet
 from bifocal.orthophotos.section_files import write_section_dxf, write_section_svg
 from bifocal.orthophotos.sections import section, section_letter
 from bifocal.orthophotos.shading import colour_limits, shaded, tints, unmeasured
+from bifocal.orthophotos.spot_heights import spot_heights
 from bifocal.orthophotos.tiles import RasterResult
-from bifocal.orthophotos.tuning import COMPOSE, CONTOURS
+from bifocal.orthophotos.tuning import COMPOSE, CONTOURS, SHEET
 from bifocal.remarks import remark
-from photocore.arrays import Float32Array, positive
+from photocore.arrays import Float32Array, FloatArray, positive
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import (
@@ -84,10 +88,17 @@ class DeliverTask:
         ``A4`` to ``A0``; None: the smallest that holds the picture.
     mark, control : Path or SurveyPoints, optional
         Points to draw, or their tables.
+    cad : mapping of str to SurveyPoints
+        Of ``points``, ``control`` and ``check``: what the drawing for CAD holds though the sheet
+        does not show it.
+    layers : str
+        How those of drawings are called: ``language``, ``bifocal`` or ``ncs``.
     sections : sequence of str
         ``x=1.5``, ``y=2`` or corners.
     contours : float, optional
         Between contour lines; None: about 1/25 of the relief. [m]
+    hatch : bool
+        Lines over what is not measured.
     language : str
         Of the sheets and sections.
     camera : str
@@ -100,8 +111,11 @@ class DeliverTask:
     paper: str | None = None
     mark: Path | None = None
     control: Path | SurveyPoints | None = None
+    cad: Mapping[str, SurveyPoints] = field(default_factory=dict)
+    layers: str = "language"
     sections: Sequence[str] = ()
     contours: float | None = None
+    hatch: bool = True
     language: str = "en"
     camera: str = ""
 
@@ -126,6 +140,7 @@ class _Relief:
     limits: tuple[float, float]
     beyond: tuple[bool, bool]
     lines: tuple[Contour, ...]
+    spots: FloatArray
 
 
 def deliver(
@@ -166,10 +181,11 @@ def deliver(
         grid = planned_grid(pair, surface, task)
         drawing = Drawing(
             title=title, grid=grid, scale=scale, points=points, control=control,
-            notes=_notes(pair, grid, wish, task), language=wish.language,
+            notes=_notes(pair, grid, wish, task, reader), language=wish.language, cad=wish.cad,
+            layers=wish.layers,
         )  # fmt: skip
         sheet = PrintSheet.fitting(drawing, wish.paper)
-        measured = _measured(reader) or surface
+        measured = _measured(reader, surface)
         cuts = tuple(
             section(surface, grid, cut, step=gsd, measured=measured, letter=section_letter(number))
             for number, cut in enumerate(wish.sections)
@@ -189,22 +205,19 @@ def deliver(
         result = make_ortho(
             pair_path, place / f"{name}.tif", task, world_file=True, progress=progress
         )
-        guess = not_measured(result.shares, wish.language)
-        told = (drawing.say("guessed", shares=guess),) if guess else ()
-        picture = replace(drawing, notes=(*told, *drawing.notes))
-        missing = _pictures(place, name, picture, sheet, relief.lines if relief else ())
+        picture = _with_shares(drawing, result.shares, hatch=wish.hatch)
+        missing = _pictures(place, name, picture, sheet, relief, hatch=wish.hatch)
         if missing.names:
             remarks += (remark("drawing.without_name", count=missing.names),)
         if missing.points:
             remarks += (remark("drawing.outside", count=missing.points),)
         if relief:
-            share = _draw_relief(place, f"{name}_relief", relief, drawing, sheet)
+            share = _draw_relief(place, f"{name}_relief", relief, drawing, sheet, hatch=wish.hatch)
             if share:
                 remarks += (remark("drawing.relief_not_measured", share=share),)
         for number, cut in enumerate(cuts, start=1):
             for writer, ending in ((write_section_dxf, "dxf"), (write_section_svg, "svg")):
-                target = place / f"{name}_section{number}.{ending}"
-                writer(target, cut, scale=scale, say=drawing.say)
+                writer(place / f"{name}_section{number}.{ending}", cut, drawing=drawing)
         if out is not None and extra != (f"{name}.tif",):
             shutil.copyfile(place / f"{name}.tif", place / out.name if inside else copy)
         files = tuple(sorted(item.name for item in place.iterdir()))
@@ -270,19 +283,34 @@ def default_title(source: Pair | Path, path: Path | None = None) -> str:
     return folder if len(folder) >= _SHORT else "wall"
 
 
+def _with_shares(drawing: Drawing, shares: dict[str, float], *, hatch: bool) -> Drawing:
+    """Return a drawing that says how much of its picture is not measured: by hatches, or a note."""
+    if hatch:
+        parts = ((source, shares[source.name.lower()]) for source in DIRECTIONS)
+        return replace(drawing, hatched=tuple((source, share) for source, share in parts if share))
+    guess = not_measured(shares, drawing.language)
+    told = (drawing.say("guessed", shares=guess),) if guess else ()
+    return replace(drawing, notes=(*told, *drawing.notes))
+
+
 def _pictures(
-    place: Path, name: str, drawing: Drawing, sheet: PrintSheet, lines: tuple[Contour, ...]
-) -> LeftOut:
+    place: Path, name: str, drawing: Drawing, sheet: PrintSheet, relief: _Relief | None, *,
+    hatch: bool,
+) -> LeftOut:  # fmt: skip
     """Write PNG, drawing and print sheet of a raster; return what the sheet left out.
 
-    The drawing has the contour lines whatever the sheet shows: CAD switches their layer off.
+    The drawing has contour lines and spot heights whatever the sheet shows: CAD switches their
+    layers off.
     """
     dpi = dpi_at_scale(drawing.grid.gsd, drawing.scale)
     with RasterReader(place / f"{name}.tif") as reader:
-        write_png(place / f"{name}.png", reader, dpi=dpi, overwrite=False)
-        everything = replace(drawing, contours=lines)
+        strips = partial(hatched_strips, reader, drawing.scale, hatch=hatch)
+        write_png(place / f"{name}.png", reader, dpi=dpi, overwrite=False, strips=strips())
+        everything = drawing
+        if relief is not None:
+            everything = replace(drawing, contours=relief.lines, spots=relief.spots)
         write_drawing(place / f"{name}.dxf", everything, sheet, f"{name}.png", overwrite=False)
-        return write_sheet(place / f"{name}.pdf", drawing, sheet, reader, overwrite=False)
+        return write_sheet(place / f"{name}.pdf", drawing, sheet, strips(), overwrite=False)
 
 
 def _prepared(
@@ -306,12 +334,12 @@ def _prepared(
     )  # fmt: skip
     return _Relief(
         surface=surface, measured=measured, reader=reader, interval=interval, limits=limits,
-        beyond=beyond, lines=lines,
+        beyond=beyond, lines=lines, spots=spot_heights(measured, drawing.grid, drawing.scale),
     )  # fmt: skip
 
 
 def _draw_relief(
-    place: Path, name: str, relief: _Relief, drawing: Drawing, sheet: PrintSheet
+    place: Path, name: str, relief: _Relief, drawing: Drawing, sheet: PrintSheet, *, hatch: bool
 ) -> float:
     """Write the relief as numbers, and shaded with contour lines as picture, drawing and sheet.
 
@@ -322,12 +350,13 @@ def _draw_relief(
     guessed = 0
     with create_raster(
         place / f"{name}.tif", grid, bands=3, dtype=np.uint8, colour=True, world_file=True,
-        dpi=dpi_at_scale(grid.gsd, drawing.scale), overviews=True,
+        dpi=dpi_at_scale(grid.gsd, drawing.scale), overviews=True, names=("red", "green", "blue"),
     ) as writer:  # fmt: skip
         for column, row, part in grid.tiles(COMPOSE.tile):
             picture, known = shaded(
-                relief.surface, part, limits=(low, high), measured=measured, scale=drawing.scale
-            )
+                relief.surface, part, limits=(low, high), scale=drawing.scale,
+                measured=measured if hatch else None,
+            )  # fmt: skip
             guessed += int(np.count_nonzero((known > 0) & np.isnan(measured.window(part))))
             writer.write(picture, column=column, row=row, mask=known > 0)
     share = guessed / (grid.width * grid.height)
@@ -335,15 +364,15 @@ def _draw_relief(
     colours = np.rint(tints(scale, (low, high))).astype(int).tolist()
     legend = Legend(
         limits=(low, high), beyond=relief.beyond, colours=tuple((r, g, b) for r, g, b in colours),
-        guessed=share,
+        guessed=share if hatch else 0.0,
     )  # fmt: skip
     lowest, highest = legend.words
     words = drawing.say("contours", low=lowest, high=highest, interval=relief.interval)
     drawing = replace(
         drawing, kind="relief", contours=relief.lines, notes=(words, *drawing.notes),
-        legend=legend,
+        legend=legend, spots=relief.spots,
     )  # fmt: skip
-    _pictures(place, name, drawing, sheet, relief.lines)
+    _pictures(place, name, drawing, sheet, relief, hatch=False)
     return share
 
 
@@ -379,19 +408,13 @@ def _band(reader: RasterReader | None, number: int) -> Surface | None:
     return None
 
 
-def _measured(reader: RasterReader | None) -> Surface | None:
-    """Return the measured part of a relief map; None where no map tells, or nothing was."""
-    measured = None if reader is None else fetch_quality(reader)
-    if reader is None or measured is None:
-        return None
-
-    def fetch(*window: int) -> Float32Array:
-        return np.where(measured(*window) > 0, reader.read_floats(*window), np.float32("nan"))
-
+def _measured(reader: RasterReader | None, surface: Surface) -> Surface:
+    """Return what of a relief was measured or drawn; all of it where no map tells."""
     # A map of which nothing was measured is drawn as it is, hatched by no one.
-    with suppress(InputError):
-        return MapSurface(reader.grid, fetch)
-    return None
+    told = None if reader is None else measured_part(reader)
+    if told is None:
+        return surface
+    return FacedSurface(told, surface.faces) if isinstance(surface, FacedSurface) else told
 
 
 def _points(source: Path | SurveyPoints | None) -> tuple[SurveyPoints | None, tuple[str, ...]]:
@@ -404,12 +427,39 @@ def _points(source: Path | SurveyPoints | None) -> tuple[SurveyPoints | None, tu
     return points, tuple(remarks)
 
 
-def _notes(pair: Pair, grid: Grid, wish: DeliverTask, task: OrthoTask) -> tuple[str, ...]:
+def _accuracy(pair: Pair, grid: Grid, task: OrthoTask, reader: RasterReader | None) -> list[float]:
+    """Return photo pixel, and of what was measured the typical sigma of position and relief. [mm]
+
+    A point is off by what its relief is off times the slope of its ray, s / (d - r), and by the
+    pick of a photo pixel.
+    """
+    own = photo_pixel(pair, task)
+    if reader is None or reader.bands < 3:
+        return [1000 * own]
+    coarse = Grid.from_bounds(grid.bounds, gsd=max(grid.shape) * grid.gsd / SHEET.looked_at)
+    r, sigma, quality = np.moveaxis(reader.nearest(coarse, bands=[1, 2, 3]), -1, 0)
+    known = np.isfinite(r) & np.isfinite(sigma) & (quality == Quality.MEASURED)
+    if not known.any():
+        return [1000 * own]
+    photo = pair.photo(2 if task.image == "2" else 1)
+    x, y = np.meshgrid(coarse.columns_x - photo.nadir[0], coarse.rows_y - photo.nadir[1])
+    slope = np.hypot(x, y)[known] / (photo.distance - r[known])
+    place = np.hypot(slope * sigma[known], photo.precision() * own)
+    return [1000 * own, 1000 * float(np.median(place)), 1000 * float(np.median(sigma[known]))]
+
+
+def _notes(
+    pair: Pair, grid: Grid, wish: DeliverTask, task: OrthoTask, reader: RasterReader | None
+) -> tuple[str, ...]:
     """Return the lines of the title block."""
+    precise = _accuracy(pair, grid, task, reader)
+    known = dict(zip(("own", "place", "relief"), precise, strict=False))
     relief, say = task.relief or task.points, words_of("bifocal.orthophotos", wish.language)
     return (
         say("pixel", size=grid.gsd * 1000, dpi=dpi_at_scale(grid.gsd, wish.scale)),
-        wish.camera or say(f"photo_{task.image}", d1=pair.image1.distance, d2=pair.image2.distance),
+        say("accuracy" if len(known) > 1 else "photo_pixel", **known),
+        wish.camera
+        or say(f"photo_{task.photo_words}", d1=pair.image1.distance, d2=pair.image2.distance),
         *((say("media", media=media_words(pair.layers)),) if pair.layers else ()),
         say("relief_of", name=relief.name) if relief else say("relief_plane", plane=task.plane),
         f"{program()}, {today()}",

@@ -47,20 +47,21 @@ class OrthoOptions:
         ``cubic`` (default), ``linear``, ``nearest`` or ``lanczos``.
     mask_hidden : bool
         Leave pixels empty that the camera cannot see; otherwise they show what hides them.
+    measured_only : bool
+        Leave empty what has no known relief or is hidden. Otherwise the picture is whole: where
+        relief is unknown a photo is shown on relief interpolated from around
+        (`Source.INTERPOLATED`), far from all of it on the plane (`Source.PLANE`), and what no
+        photo sees takes the colours around it (`Source.FILLED`).
     fill : bool
-        Close holes with the colours around them; such pixels are marked `Source.FILLED`.
-    complete : bool
-        A whole picture: where relief is unknown the photo is shown on relief interpolated from
-        around (`Source.INTERPOLATED`), far from all of it on the plane (`Source.PLANE`), and
-        holes are closed as by ``fill``.
+        Of a picture of what is measured only, close holes with the colours around them.
     feather : float
         Width of the transition between two photos. [px]
     """
 
     interpolation: Interpolation = "cubic"
     mask_hidden: bool = True
+    measured_only: bool = False
     fill: bool = False
-    complete: bool = False
     feather: float = 8.0
 
     def __post_init__(self) -> None:

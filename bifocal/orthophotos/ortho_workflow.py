@@ -10,6 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.faces.faced_surface import FacedSurface, beneath
+from bifocal.faces.faces import Faces
+from bifocal.faces.faces_files import given_faces
 from bifocal.files.photos import photo_info
 from bifocal.files.point_tables import read_survey_points
 from bifocal.model.geotiff import (
@@ -25,8 +28,8 @@ from bifocal.model.photo_alone import PhotoAlone
 from bifocal.model.photo_set import PhotoSet
 from bifocal.model.photos_of_set import PhotosOfSet
 from bifocal.model.points import SurveyPoints
-from bifocal.model.relief_map import Quality
-from bifocal.model.surface import EVERYWHERE, Fetch, FlatSurface, MapSurface, Surface
+from bifocal.model.relief_map import measured_part, told_pixels
+from bifocal.model.surface import EVERYWHERE, FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.compose import choose_grid, render
 from bifocal.orthophotos.ortho_image import OF_SET, OrthoOptions, Source
 from bifocal.orthophotos.radiometry import corrected_photo, match_exposure
@@ -35,7 +38,7 @@ from bifocal.orthophotos.tiles import RasterResult, write_tiles
 from bifocal.orthophotos.triangles import TriangleSurface
 from bifocal.orthophotos.tuning import PIXELS
 from bifocal.remarks import remark
-from photocore.arrays import ByteArray, Float32Array
+from photocore.arrays import ByteArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
 from photocore.images import ImageArray, read_image
@@ -62,8 +65,10 @@ class OrthoTask:
         Ids of points along edges.
     plane : float
         Relief of the plane where neither is given. [m]
+    faces : Faces or Path, optional
+        Planes, edges and occluders that were drawn, or their file.
     image : str
-        ``1``, ``2`` or ``both``.
+        ``1``, ``2`` or ``both``; empty: of a whole picture both, else 1.
     gsd, bounds
         Pixel size and box; None for the natural ones. [m]
     scale : float, optional
@@ -84,7 +89,8 @@ class OrthoTask:
     points: Path | SurveyPoints | None = None
     breaklines: Sequence[Sequence[str]] = ()
     plane: float = 0.0
-    image: str = "1"
+    faces: Faces | Path | None = None
+    image: str = ""
     gsd: float | None = None
     bounds: Bounds | None = None
     scale: float | None = None
@@ -95,10 +101,16 @@ class OrthoTask:
     any_size: bool = False
     overviews: bool | None = None
 
+    @property
+    def photo_words(self) -> str:
+        """Which photos it is made of: ``1``, ``2`` or ``both``."""
+        return self.image or ("1" if self.options.measured_only else "both")
+
     @classmethod
     def from_given(cls, given: Mapping[str, Any], **more: Any) -> OrthoTask:
         """Return the task of options by the names of the command's; absent ones by default."""
         own = {key: value for key, value in given.items() if value is not None}
+        own.pop("complete", None)  # of survey files from when whole pictures were asked for
         if "mask" in own:
             own["mask_hidden"] = own.pop("mask")
         how = {item.name: own.pop(item.name) for item in fields(OrthoOptions) if item.name in own}
@@ -128,12 +140,9 @@ def make_ortho(
     check_not_input(out, task.relief, *pair.photo_files)
     check_writable(out, overwrite=overwrite)
     with open_surface(task, pair) as (surface, _, remarks):
-        numbers: tuple[int, ...] = {"1": (1,), "2": (2,), "both": (1, 2)}[task.image]
-        if isinstance(pair, PhotosOfSet):
-            if task.image != "1":
-                raise InputError(remark("ortho.image_of_set"))
-            numbers = tuple(range(1, len(pair.photos) + 1))
-        images = {number: read_image(photo_info(pair, number).path) for number in numbers}
+        images, said = _images(pair, task)
+        remarks += said
+        numbers = tuple(images)
         height, width = images[numbers[0]].shape[:2]
         grid = _grid(pair, numbers[0], (width, height), surface, task)
         photos, notes = _sources(pair, images, surface, grid, task)
@@ -173,9 +182,38 @@ def make_ortho(
             shares[photo.name] = float(counts[number]) / total
     shares["hidden"] = hidden / total
     notes += [] if isinstance(pair, PhotoAlone | PhotosOfSet) else _advice(shares, task)
+    own = photo_pixel(pair, task)
+    if grid.gsd < PIXELS.said * own:
+        notes.append(remark("ortho.finer_than_photo", size=1000 * grid.gsd, own=1000 * own))
     return RasterResult(
         path=out, grid=grid, shares=shares, remarks=(*pair.remarks, *remarks, *notes)
     )
+
+
+def _images(pair: Pair, task: OrthoTask) -> tuple[dict[int, ImageArray], tuple[str, ...]]:
+    """Return the photos that give the colours by their numbers, and remarks.
+
+    A near photo that nobody asked for, and that cannot be used beside the far one, is left out.
+    """
+    if isinstance(pair, PhotosOfSet):
+        if task.image:
+            raise InputError(remark("ortho.image_of_set"))
+        numbers = range(1, len(pair.photos) + 1)
+        return {number: read_image(photo_info(pair, number).path) for number in numbers}, ()
+    words = "1" if isinstance(pair, PhotoAlone) else task.photo_words
+    chosen: tuple[int, ...] = {"1": (1,), "2": (2,), "both": (1, 2)}[words]
+    images = {chosen[0]: read_image(photo_info(pair, chosen[0]).path)}
+    for number in chosen[1:]:
+        try:
+            images[number] = read_image(photo_info(pair, number).path)
+            first, second = images[1], images[number]
+            if first.dtype != second.dtype or first.ndim != second.ndim:
+                raise InputError(remark("ortho.photos_differ"))
+        except InputError as error:
+            if task.image:
+                raise
+            return {1: images[1]}, (remark("ortho.far_photo_alone", why=str(error)),)
+    return images, ()
 
 
 def not_measured(shares: dict[str, float], language: str = "en") -> str:
@@ -186,14 +224,14 @@ def not_measured(shares: dict[str, float], language: str = "en") -> str:
 
 def _advice(shares: dict[str, float], task: OrthoTask) -> list[str]:
     """Return what could be done about the empty part of a picture."""
-    if shares["none"] < PIXELS.worth_a_remark or task.options.complete:
+    if shares["none"] < PIXELS.worth_a_remark or not task.options.measured_only:
         return []
     ways = []
-    if task.image != "both":
+    if task.photo_words != "both":
         ways.append(remark("ortho.way_both"))
     if not task.options.fill:
         ways.append(remark("ortho.way_fill"))
-    ways.append(remark("ortho.way_complete"))
+    ways.append(remark("ortho.way_whole"))
     return [remark("ortho.empty", share=shares["none"], ways="; ".join(ways))]
 
 
@@ -202,6 +240,7 @@ def open_surface(
     task: OrthoTask, pair: Pair
 ) -> Iterator[tuple[Surface, RasterReader | None, tuple[str, ...]]]:
     """Yield the relief asked for, checked against the cameras' distances, its map, and remarks."""
+    faces, told = given_faces(task.faces)
     with ExitStack() as stack:
         surface: Surface = FlatSurface(task.plane)
         reader: RasterReader | None = None
@@ -212,28 +251,19 @@ def open_surface(
             reader = stack.enter_context(RasterReader(task.relief))
             check_relief(reader)
             with located(task.relief):
-                surface = MapSurface(reader.grid, reader.read_floats, fetch_quality(reader))
+                surface = MapSurface(reader.grid, reader.read_floats, told_pixels(reader))
         elif task.points is not None:
             surface, remarks = _triangles(task.points, task.breaklines)
+        if faces:
+            measured = None if reader is None else measured_part(reader)
+            surface = FacedSurface(surface, faces, measured)
         low, high = surface.extremes(EVERYWHERE)
         nearest = min(pair.image1.distance, pair.image2.distance)
         named = task.relief or (task.points.name if task.points is not None else "relief")
         if high >= nearest or low < -20 * pair.image1.distance:
             about = {"name": named, "low": low, "high": high, "near": nearest}
             raise InputError(remark("ortho.relief_of_another_pair", **about))
-        yield surface, reader, remarks
-
-
-def fetch_quality(reader: RasterReader) -> Fetch | None:
-    """Return what reads where a relief map is measured, 1 or 0; None where it does not tell."""
-    if reader.bands < 3 or not reader.names[2].startswith("quality"):
-        return None
-
-    def fetch(*window: int) -> Float32Array:
-        quality = reader.read(*window, bands=[3])[:, :, 0]
-        return (quality == Quality.MEASURED).astype(np.float32)
-
-    return fetch
+        yield surface, reader, (*remarks, *told)
 
 
 def _triangles(
@@ -276,11 +306,18 @@ def planned_grid(pair: Pair, surface: Surface, task: OrthoTask) -> Grid:
     return _grid(pair, number, photo_info(pair, number).size, surface, task)
 
 
+def photo_pixel(pair: Pair, task: OrthoTask) -> float:
+    """Return the side of a pixel of the photo that gives most colours, on the wall. [m]"""
+    number = 2 if task.image == "2" else 1
+    return pair.photo(number).gsd(photo_info(pair, number).size)
+
+
 def _grid(pair: Pair, first: int, size: tuple[int, int], surface: Surface, task: OrthoTask) -> Grid:
     """Return the grid, or ask back if it cannot be meant."""
     bounds = task.bounds
-    if bounds is None and isinstance(surface, TriangleSurface):
-        bounds = surface.bounds
+    under = beneath(surface)
+    if bounds is None and isinstance(under, TriangleSurface):
+        bounds = under.bounds
     grid = choose_grid(pair, first, size, surface, gsd=task.gsd, bounds=bounds)
     own = pair.photo(first).gsd(size)
     ratio = grid.gsd / own
@@ -331,7 +368,7 @@ def _tags(pair: Pair, task: OrthoTask) -> dict[str, str]:
     """Return what the file should remember of its making."""
     relief = task.relief or task.points
     return {
-        "BIFOCAL_IMAGE": "all" if isinstance(pair, PhotosOfSet) else task.image,
+        "BIFOCAL_IMAGE": "all" if isinstance(pair, PhotosOfSet) else task.photo_words,
         "BIFOCAL_RELIEF": relief.name if relief else f"plane r = {task.plane:g} m",
         "BIFOCAL_D1": f"{pair.image1.distance:.6g}",
         **({} if isinstance(pair, PhotoAlone) else {"BIFOCAL_D2": f"{pair.image2.distance:.6g}"}),

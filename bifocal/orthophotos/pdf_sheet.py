@@ -16,13 +16,12 @@ from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
-from bifocal.files.strips import colour_strips, predicted
-from bifocal.model.geotiff import RasterReader
+from bifocal.files.strips import Strips, predicted
 from bifocal.orthophotos.canvas import BLUE, WHITE, Colour, Pen, Place, text_width
 from bifocal.orthophotos.contour_lines import contour_labels
 from bifocal.orthophotos.drawing import Drawing, PrintSheet
 from bifocal.orthophotos.sheet_margins import SheetMargins
-from bifocal.orthophotos.tuning import CONTOURS, SHEET
+from bifocal.orthophotos.tuning import CONTOURS, SHEET, SPOTS
 from photocore.output import atomic_path
 from photocore.provenance import Provenance, provenance
 
@@ -46,7 +45,7 @@ class LeftOut(NamedTuple):
 
 
 def write_sheet(
-    path: Path, drawing: Drawing, sheet: PrintSheet, reader: RasterReader, *, overwrite: bool
+    path: Path, drawing: Drawing, sheet: PrintSheet, strips: Strips, *, overwrite: bool
 ) -> LeftOut:
     """Write a drawing on a sheet; empty pixels are white; return what was left out.
 
@@ -61,7 +60,7 @@ def write_sheet(
             f"/DecodeParms << /Predictor 15 /Colors 3 /Columns {drawing.grid.width} >>"
         )
         above = np.zeros((1, drawing.grid.width * 3), np.uint8)
-        for colours, valid in colour_strips(reader):
+        for colours, valid in strips:
             paper = np.where(valid[:, :, None] > 0, colours, np.uint8(255))
             pixels = paper.reshape(len(paper), -1)
             pdf.add(predicted(pixels, above))
@@ -223,6 +222,7 @@ class _Page:
             self.canvas.line(line, _CUT_RIM)
             self.canvas.line(line, _CUT)
         parts.append("Q")
+        self._spots()
         self._points()
         self.margins.draw()
         return "\n".join(parts) + "\n"
@@ -245,6 +245,13 @@ class _Page:
             place = self.margins.place(*label.place)
             how = {"size": CONTOURS.label_size, "middle": True, "angle": label.angle}
             self.canvas.label(place, label.words, _INDEX, **how)
+
+    def _spots(self) -> None:
+        """Draw spot heights: a dot and its relief."""
+        for x, y, words in self.drawing.spot_words():
+            px, py = self.margins.place(x, y)
+            self._cross((px, py), 0.8, _INDEX)
+            self._label((px + 1.0, py + 0.5), words, size=SPOTS.size)
 
     def _label(self, place: Place, words: str, *, size: float) -> None:
         """Write on the picture, moved inwards where the frame would cut it."""

@@ -6,6 +6,7 @@ import html
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,8 @@ from bifocal.orthophotos.canvas import (
     scale_bar,
     text_width,
 )
-from bifocal.orthophotos.drawing import TABLES, Section, multiples, round_step, signed
+from bifocal.orthophotos.drawing import TABLES, Drawing, Section, multiples, round_step, signed
+from bifocal.orthophotos.drawing_files import name_layers
 from bifocal.orthophotos.dxf_canvas import DxfCanvas
 from bifocal.orthophotos.tuning import PROFILE
 from photocore.arrays import FloatArray
@@ -35,24 +37,56 @@ _NAME = Pen(layer="BIFOCAL_SECTION_NAME")
 _BAR = Pen(layer="BIFOCAL_SCALEBAR")
 
 
-def write_section_dxf(path: Path, cut: Section, *, scale: float, say: Words) -> None:
+def write_section_dxf(path: Path, cut: Section, *, drawing: Drawing) -> None:
     """Write one section, 1:1 in metres: relief to the right (upright cut) or upwards."""
+    scale, say = drawing.scale, drawing.say
     document, model = new_drawing(
         TABLES["section_layers"], point_style=3, point_size=3 * scale / 1000
     )
-    draw_section(DxfCanvas(model, scale / 1000), cut, scale, _title(cut, scale, say))
+    title = _title(cut, scale, say)
+    draw_section(DxfCanvas(model, scale / 1000), cut, scale, title)
+    _lay_out(document, cut, scale, title)
+    name_layers(document, drawing.layers, drawing.language)
     with atomic_path(path, overwrite=False) as temporary:
         save_drawing(document, temporary)
 
 
-def write_section_svg(path: Path, cut: Section, *, scale: float, say: Words) -> None:
-    """Write one section as SVG that prints at 1:scale."""
+def _lay_out(document: Any, cut: Section, scale: float, title: str) -> None:
+    """Lay the section out on the smallest sheet that holds it, through a viewport at 1:scale."""
+    left, bottom, right, top = _frame(cut, scale, title)
+    wide, high = right - left, top - bottom
+    papers = [size for short, long in TABLES["papers"].values() for size in
+              ((short, long), (long, short))]  # fmt: skip
+    fitting = (size for size in papers if wide + 20 <= size[0] and high + 20 <= size[1])
+    sheet = next(fitting, (wide + 20, high + 20))
+    name = f"{cut.letter}-{cut.letter}"
+    document.layouts.rename("Layout1", name)
+    layout = document.paperspace(name)
+    layout.page_setup(size=sheet, margins=(0, 0, 0, 0), units="mm")
+    layout.add_viewport(
+        center=(sheet[0] / 2, sheet[1] / 2), size=(wide, high), view_height=high * scale / 1000,
+        view_center_point=((left + right) * scale / 2000, (bottom + top) * scale / 2000),
+        dxfattribs={"layer": "BIFOCAL_VIEWPORT"},
+    )  # fmt: skip
+    document.layers.get("BIFOCAL_VIEWPORT").dxf.plot = 0
+
+
+def _frame(cut: Section, scale: float, title: str) -> tuple[float, float, float, float]:
+    """Return left, bottom, right and top of all that is drawn. [mm]"""
     left, bottom, right, top = _extent(cut, scale)
-    canvas, title = _SvgCanvas(left - PROFILE.margin, top + PROFILE.margin), _title(cut, scale, say)
-    draw_section(canvas, cut, scale, title)
     bar = round_step(0.05 * scale) * 1000 / scale
-    width = max(right - left, bar, text_width(title, 3.2)) + 2 * PROFILE.margin
-    height = top - bottom + 2 * PROFILE.margin + PROFILE.foot
+    right = left + max(right - left, bar, text_width(title, 3.2))
+    return (left - PROFILE.margin, bottom - PROFILE.margin - PROFILE.foot,
+            right + PROFILE.margin, top + PROFILE.margin)  # fmt: skip
+
+
+def write_section_svg(path: Path, cut: Section, *, drawing: Drawing) -> None:
+    """Write one section as SVG that prints at 1:scale."""
+    scale, title = drawing.scale, _title(cut, drawing.scale, drawing.say)
+    left, bottom, right, top = _frame(cut, scale, title)
+    canvas = _SvgCanvas(left, top)
+    draw_section(canvas, cut, scale, title)
+    width, height = right - left, top - bottom
     text = (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.3f}mm" height="{height:.3f}mm" '
         f'viewBox="0 0 {width:.3f} {height:.3f}" font-family="Helvetica, Arial, sans-serif">\n'

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from bifocal.orthophotos.canvas import (
@@ -16,6 +18,7 @@ from bifocal.orthophotos.canvas import (
     text_width,
 )
 from bifocal.orthophotos.drawing import Drawing, PrintSheet, Section, multiples
+from bifocal.orthophotos.hatching import DIRECTIONS
 from bifocal.orthophotos.tuning import SHEET
 
 _FRAME = Pen(layer="BIFOCAL_FRAME")
@@ -60,6 +63,7 @@ class SheetMargins:
         self.canvas.text((left + 6, bottom + 3.8), words, _BAR, size=2.2)
         self._level()
         self._legend()
+        self._hatches()
 
     def place(self, x: float, y: float) -> Place:
         """Return where a plane position is on the sheet. [mm]"""
@@ -177,9 +181,24 @@ class SheetMargins:
             self.canvas.text((x + share * wide, y + 3), words, _FRAME, size=2.2, middle=True)
         if not legend.guessed:
             return
-        x += wide + 5
-        box(self.canvas, (x, y), 4, high, _FRAME)
-        for step in range(3):
-            self.canvas.line([(x + 1.4 * step, y), (x + 1.4 * step + 1.2, y + high)], _FRAME)
         words = self.drawing.say("not_measured", share=legend.guessed)
+        self._hatch((x + wide + 5, y), (1,), words)
+
+    def _hatches(self) -> None:
+        """Draw what each hatch of an orthophoto means, and how much of the picture it covers."""
+        left, bottom, _, _ = self.sheet.frame
+        for number, (source, share) in enumerate(self.drawing.hatched):
+            words = self.drawing.say(source.name.lower(), share=100 * share)
+            place = (left + 9, bottom + 21.0 - 3.2 * number)
+            self._hatch(place, DIRECTIONS[source], words)
+
+    def _hatch(self, place: Place, directions: Sequence[int], words: str) -> None:
+        """Draw a box of lines that rise (1) or fall (-1), and words beside it."""
+        (x, y), high = place, 2.2
+        box(self.canvas, place, 4, high, _FRAME)
+        for step in range(3):
+            a, b = x + 1.4 * step, x + 1.4 * step + 1.2
+            for rises in directions:
+                ends = (y, y + high) if rises > 0 else (y + high, y)
+                self.canvas.line([(a, ends[0]), (b, ends[1])], _FRAME)
         self.canvas.text((x + 5, y + 0.3), words, _FRAME, size=2.2)

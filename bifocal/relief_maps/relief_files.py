@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.model.relief_map import Quality, ReliefMap
+from bifocal.model.relief_map import TOLD, ReliefMap
 from photocore.arrays import Float32Array, FloatArray
 from photocore.output import check_ending
 from photocore.reports.figure_file import write_figure
@@ -31,7 +31,7 @@ def write_preview(path: Path | str, relief: ReliefMap, *, overwrite: bool = Fals
     low, high = (float(v) for v in np.percentile(r[known], [0.5, 99.5]))
     scale = ScalarMappable(Normalize(low, max(high, low + 1e-3)), "viridis")
     picture = shaded(scale.to_rgba(r)[..., :3], r, relief.gsd * step)
-    guessed = known & (relief.quality[::step, ::step] != Quality.MEASURED)
+    guessed = known & ~np.isin(relief.quality[::step, ::step], TOLD)
     picture = hatched(picture, guessed)
     picture[~known] = 1.0
     height, width = r.shape
@@ -43,7 +43,7 @@ def write_preview(path: Path | str, relief: ReliefMap, *, overwrite: bool = Fals
     axes.imshow(picture, extent=(x_min, x_max, y_min, y_max), interpolation="antialiased")
     axes.set_xlabel("X [m]")
     axes.set_ylabel("Y [m]")
-    guess = (relief.quality > Quality.MEASURED) & relief.known
+    guess = ~np.isin(relief.quality, TOLD) & relief.known
     if guess.any():
         axes.set_title(
             f"hatched grey: not measured but interpolated or hidden, {guess.mean():.0%} of the map",

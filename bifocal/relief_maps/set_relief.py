@@ -11,6 +11,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from bifocal.faces.faced_surface import faced
+from bifocal.faces.faces import Faces
 from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.model.image import as_grey
 from bifocal.model.pair import Pair
@@ -44,6 +46,7 @@ def dense_relief(
     bounds: Bounds | None = None,
     quality: str = "standard",
     relief_range: tuple[float, float] | None = None,
+    faces: Faces | None = None,
     progress: Progress = no_progress,
 ) -> DenseRelief:
     r"""Measure the relief of everything both photos of a pair, or any two of a set, show.
@@ -67,6 +70,9 @@ def dense_relief(
         also large photos at full resolution.
     relief_range : tuple of float, optional
         Least and greatest relief to expect; by default -36 % to +22 % of d2. [m]
+    faces : Faces, optional
+        Planes, edges and occluders that were drawn: the map obeys them exactly (`Quality.DRAWN`),
+        and nothing else of it changes.
     progress : callable
         Told how far the work is.
 
@@ -108,9 +114,21 @@ def dense_relief(
     ((67, 100), 0.06)
     """
     wishes = _Wishes(gsd, bounds, quality, relief_range)
-    if isinstance(pair, Pair) and not others:
-        return wishes.fulfilled(pair, image1, image2, progress)
-    photos, images = PhotoSet.of(pair), (image1, image2, *others)
+    relief = _measured_relief(pair, (image1, image2, *others), wishes, progress)
+    drawn, surface = faced(relief, faces)
+    if surface is None or not surface.unplaced:
+        return drawn
+    names = ", ".join(surface.unplaced)
+    return replace(drawn, notes=(*drawn.notes, remark("faces.unplaced", names=names)))
+
+
+def _measured_relief(
+    pair: Pair | PhotoSet, images: Sequence[Image], wishes: _Wishes, progress: Progress
+) -> DenseRelief:
+    """Return the relief as it is measured, before anything that was drawn."""
+    if isinstance(pair, Pair) and len(images) == 2:
+        return wishes.fulfilled(pair, images[0], images[1], progress)
+    photos = PhotoSet.of(pair)
     if len(images) != len(photos):
         raise InputError(remark("relief.photos_missing", count=len(photos), given=len(images)))
     if len(photos) > 2:

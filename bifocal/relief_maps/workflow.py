@@ -11,6 +11,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from bifocal.faces.faces import Faces
+from bifocal.faces.faces_files import given_faces
+from bifocal.faces.suggestions import suggest_faces
 from bifocal.files.photos import photo_infos
 from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
@@ -49,6 +52,10 @@ class ReliefJob:
         ``fast``, ``standard`` or ``best``.
     relief_range : tuple of float or None
         Least and greatest relief to expect. [m]
+    faces : Faces or Path, optional
+        Planes, edges and occluders that were drawn, or their file.
+    suggested : Path, optional
+        Where faces go that would mend what is not measured (.geojson).
     overwrite : bool
     """
 
@@ -59,6 +66,8 @@ class ReliefJob:
     bounds: tuple[float, float, float, float] | None = None
     quality: str = "standard"
     relief_range: tuple[float, float] | None = None
+    faces: Faces | Path | None = None
+    suggested: Path | None = None
     overwrite: bool = False
 
 
@@ -83,10 +92,11 @@ def relief_of_pair(
     photos = source if isinstance(source, PhotoSet) else Pair.of(source)
     infos = photo_infos(photos)
     _check_outputs(job, *(info.path for info in infos))
+    faces, told = given_faces(job.faces)
     images = tuple(read_image(info.path) for info in infos)
     result = dense_relief(
         photos, *images, gsd=job.gsd, bounds=job.bounds, quality=job.quality,
-        relief_range=job.relief_range, progress=progress,
+        relief_range=job.relief_range, faces=faces, progress=progress,
     )  # fmt: skip
     if not result.known.any():
         raise GeometryError(remark("relief.none_within_bounds"))
@@ -110,11 +120,14 @@ def relief_of_pair(
             descriptions={"sigma": "sigma of relief, m"}, overwrite=job.overwrite,
         )  # fmt: skip
         written.append(job.cloud)
+    if job.suggested is not None:
+        suggest_faces(result, of_set, images).write(job.suggested, overwrite=job.overwrite)
+        written.append(job.suggested)
     basis = rests_on(
         pair, setup="the pair as given", picks="the photos' own misfit across the radius, measured"
     )
     summary = result.summary() | {"rests_on": basis, "written": [str(path) for path in written]}
-    return summary, (*photos.remarks, *result.notes, *result.registration.remarks)
+    return summary, (*photos.remarks, *told, *result.notes, *result.registration.remarks)
 
 
 def coloured_cloud(
@@ -172,6 +185,7 @@ def _check_outputs(job: ReliefJob, *inputs: Path) -> None:
     check_ending(job.preview, "the preview is written as .png.", ".png")
     rule = "point clouds are written as .ply, .las or .laz."
     check_ending(job.cloud, rule, ".ply", ".las", ".laz")
-    for path in (job.out, job.preview):
-        check_not_input(path, *inputs)
-    check_all_writable(job.out, job.preview, job.cloud, overwrite=job.overwrite)
+    check_ending(job.suggested, "suggested faces are written as .geojson.", ".geojson")
+    for path in (job.out, job.preview, job.suggested):
+        check_not_input(path, *inputs, *((job.faces,) if isinstance(job.faces, Path) else ()))
+    check_all_writable(job.out, job.preview, job.cloud, job.suggested, overwrite=job.overwrite)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import compress
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Protocol
 
 import cv2
 import numpy as np
@@ -19,6 +19,7 @@ from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.model.relief_map import Quality, ReliefMap
 from bifocal.model.surface import MapSurface
+from bifocal.options import defaults_of, typed
 from bifocal.reports.control_survey import is_exchanged, solve_control
 from bifocal.survey.solved_survey import SolvedSurvey
 from bifocal.workbook.workflow import solve
@@ -29,6 +30,52 @@ from photocore.images import read_image, to_eight_bit
 #: Longer side of pictures in a report. [px]
 SIDE = 1000
 _WORKBOOKS = {".xlsx", ".xlsm", ".ods", ".csv"}
+
+
+class Timed(Protocol):
+    """What knows how long a step took, and where."""
+
+    @property
+    def seconds(self) -> float:
+        """That it took."""
+
+    @property
+    def machine(self) -> str:
+        """On which it did."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StepTold:
+    """A step that made something the report shows.
+
+    Attributes
+    ----------
+    name : str
+    settings : tuple of str
+        As a survey file has them.
+    defaults : tuple of str
+        What held where nothing was said, likewise.
+    seconds : float or None
+        None where no time is to be told.
+    machine : str
+    """
+
+    name: str
+    settings: tuple[str, ...]
+    defaults: tuple[str, ...]
+    seconds: float | None
+    machine: str
+
+    @classmethod
+    def of(cls, name: str, options: Mapping[str, Any], timed: Timed | None = None) -> StepTold:
+        """Return it from the options of a survey's step."""
+        return cls(
+            name=name,
+            settings=tuple(typed(options, in_file=True)),
+            defaults=tuple(typed(defaults_of(name, options), in_file=True)),
+            seconds=None if timed is None else timed.seconds,
+            machine="" if timed is None else timed.machine,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +99,14 @@ class ReportTask:
         Relief map and orthophoto.
     view : Path, optional
         Page that shows the relief in three dimensions; the report leads to it.
+    project : mapping of str to str
+        Client, place, surveyor and the like, by the names of `bifocal.options.PROJECT`.
+    steps : tuple of StepTold
+        How what the report shows was made.
     """
+
+    #: What is given as it is typed.
+    PLAIN: ClassVar = ("title", "language", "scale", "unit")
 
     title: str = ""
     language: str = "en"
@@ -64,6 +118,8 @@ class ReportTask:
     relief: Path | None = None
     ortho: Path | None = None
     view: Path | None = None
+    project: Mapping[str, str] = field(default_factory=dict)
+    steps: tuple[StepTold, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

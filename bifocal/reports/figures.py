@@ -9,7 +9,7 @@ import numpy as np
 
 from bifocal.model.grid import Bounds
 from bifocal.model.photo import Photo
-from bifocal.model.relief_map import Quality, ReliefMap
+from bifocal.model.relief_map import TOLD, Quality, ReliefMap
 from bifocal.reports.content import SIDE, PairContent, ReportedPhoto
 from photocore.arrays import FloatArray
 from photocore.reports.words import Words
@@ -158,13 +158,33 @@ def _label(axes: Any, text: str, at: tuple[float, float], *, at_right: bool) -> 
     axes.annotate(text, at, (away, 5), ha=side, path_effects=rim, **_styles()["point_name"])
 
 
+def draw_ties(figure: Any, content: PairContent, say: Words) -> None:
+    """Draw the ties of both photos by cells: how many, and the RMS of their misfits."""
+    cells = content.setup["common_points"]["cells"]
+    most = max(max((row[4] for row in one["rows"]), default=1.0) for one in cells)
+    for k, (one, seen) in enumerate(zip(cells, content.photos, strict=True)):
+        axes = figure.add_axes((0.01 + 0.45 * k, 0.02, 0.435, 0.9))
+        shape = seen.picture.shape
+        axes.imshow(seen.picture, cmap="gray" if seen.picture.ndim == 2 else None, alpha=0.45)
+        axes.set(xlim=(0, shape[1]), ylim=(shape[0], 0))
+        axes.set_axis_off()
+        side = one["side"] / seen.reduction
+        column, row, count, _, rms = np.array(one["rows"], dtype=float).reshape(-1, 5).T
+        places = (column + 0.5) * side, (row + 0.5) * side
+        # The area of a dot grows with the number of its ties, up to the usual one of a full cell.
+        size = np.minimum(count / max(np.percentile(count, 90), 1.0), 1.0)
+        dots = axes.scatter(*places, s=12 + 90 * size, c=rms, vmin=0, vmax=most, **_styles()["tie"])
+        axes.set_title(say("far" if k == 0 else "near"), fontsize=8)
+    colour_bar(figure, dots, say("tie_axis"))
+
+
 def draw_relief(figure: Any, content: PairContent, say: Words) -> None:
     """Draw the relief in diverging colours about the wall, interpolated parts lightly hatched."""
     axes, part, bounds = _map_axes(figure, content)
     extent = extent_of(bounds)
     reach = max(float(np.nanpercentile(np.abs(part.r), 98)), 1e-3)
     image = axes.imshow(part.r, extent=extent, vmin=-reach, vmax=reach, **_styles()["relief"])
-    guessed = (part.quality > Quality.MEASURED) & np.isfinite(part.r)
+    guessed = ~np.isin(part.quality, TOLD) & np.isfinite(part.r)
     if guessed.any() and not guessed.all():
         axes.contourf(guessed.astype(float), extent=extent, **_styles()["guessed"])
     bar = colour_bar(figure, image, say("relief_axis"), extend="both")

@@ -10,15 +10,20 @@ from typing import Any
 import numpy as np
 
 from bifocal.media import media_words
-from bifocal.model.relief_map import Quality
+from bifocal.model.orientation_precision import pinhole
+from bifocal.model.photo import Photo
+from bifocal.model.relief_map import Quality, ReliefMap
 from bifocal.remarks import in_language
 from bifocal.reports import figures
 from bifocal.reports.accuracy import accuracy_blocks, millimetres
 from bifocal.reports.content import PairContent
+from bifocal.reports.lens_section import lens_blocks
+from bifocal.reports.project_section import camera_rows, processing_blocks, project_blocks
 from bifocal.reports.refraction import refraction_blocks
 from bifocal.reports.worked_point import method_blocks
 from bifocal.survey.remarks import refraction_remarks
 from bifocal.survey.tolerances import RULES
+from photocore.camera.rotation import angles_from_rotation
 from photocore.provenance import file_hash, program, provenance, today
 from photocore.reports.document import Block, Document, Heading, Paragraph, Picture, TextTable
 from photocore.reports.words import Words, words_of
@@ -43,6 +48,7 @@ def report_document(contents: Sequence[PairContent], language: str) -> Document:
 
 def pair_blocks(content: PairContent, say: Words) -> Iterator[Block]:
     """Yield the part of one pair: accuracy first."""
+    yield from project_blocks(content, say)
     yield Heading(text=say("accuracy"))
     yield from accuracy_blocks(content, say)
     if content.ortho is not None:
@@ -52,11 +58,14 @@ def pair_blocks(content: PairContent, say: Words) -> Iterator[Block]:
         caption = say("overview_caption", gsd=millimetres(content.ortho_gsd))
         yield Picture(draw=draw, ratio=ratio, caption=caption)
     yield from _geometry(content, say)
+    yield from lens_blocks(content, say)
     yield from _photos(content, say)
+    yield from _ties(content, say)
     yield from _relief(content, say)
     yield from _residuals(content, say)
     yield from _foundations(content, say)
     yield from method_blocks(content, say)
+    yield from processing_blocks(content, say)
     yield from _provenance(content, say)
 
 
@@ -71,9 +80,13 @@ def _geometry(content: PairContent, say: Words) -> Iterator[Block]:
         rows.append([say(key), *cells])
 
     add("file", *(Path(photo.file).name or "-" for photo in photos))
+    rows += camera_rows(content, say)
     spreads = [_spread(deviations.get(f"distance{k}"), 3) for k in (1, 2)]
     add("distance", *(f"{p.distance:.3f}{s} m" for p, s in zip(photos, spreads, strict=True)))
-    add("nadir", *(f"{photo.nadir[0]:.3f}, {photo.nadir[1]:.3f} m" for photo in photos))
+    spreads = [_spread(deviations.get(f"nadir{k}"), 3) for k in (1, 2)]
+    places = zip(photos, spreads, strict=True)
+    add("nadir", *(f"{photo.nadir[0]:.3f}, {photo.nadir[1]:.3f}{s} m" for photo, s in places))
+    add("angles", *map(_angles, photos, [deviations.get(f"tilt{k}_deg") for k in (1, 2)]))
     if focal := content.setup.get("focal_px"):
         pitches = [photo.pixel_size for photo in photos]
         sigmas = [deviations.get(f"focal{k}") for k in (1, 2)]
@@ -99,6 +112,13 @@ def _spread(sigma: float | None, digits: int) -> str:
     return f" ± {sigma:.{digits}f}" if isinstance(sigma, int | float) else ""
 
 
+def _angles(photo: Photo, sigma: float | None) -> str:
+    """Return omega, phi, kappa of a camera, and the standard deviation of the first two."""
+    turn = pinhole(photo).rotation.T @ np.diag([1.0, -1.0, -1.0])  # from a camera that looks back
+    angles = np.rad2deg(angles_from_rotation(turn))
+    return "{:.2f}°, {:.2f}°, {:.2f}°".format(*angles) + _spread(sigma, 2)
+
+
 def _focal(pixels: float, pitch: float | None, sigma: float | None) -> str:
     length = f" ({pixels * pitch:.2f} mm)" if pitch else ""
     return f"{pixels:.1f}{_spread(sigma, 1)} px{length}"
@@ -119,6 +139,25 @@ def _photos(content: PairContent, say: Words) -> Iterator[Block]:
         )
 
 
+def _ties(content: PairContent, say: Words) -> Iterator[Block]:
+    """Yield where the ties lie, how much of the photos they cover, and their residuals."""
+    ties = content.setup.get("common_points", {})
+    cells = ties.get("cells")
+    if not cells or not content.photos:
+        return
+    yield Heading(text=say("ties"))
+    shares = (
+        len(one["rows"]) / float(np.prod(np.ceil(np.divide(seen.size, one["side"]))))
+        for one, seen in zip(cells, content.photos, strict=True)
+    )
+    far, near = (f"{share:.0%}" for share in shares)
+    said = {key: f"{ties[key]:.2f} px" for key in ("rms_px", "largest_px")}
+    yield Paragraph(text=say("ties_said", n=ties["count"], far=far, near=near, **said))
+    ratio = max(seen.size[1] / seen.size[0] for seen in content.photos)
+    draw = partial(figures.draw_ties, content=content, say=say)
+    yield Picture(draw=draw, ratio=min(0.47 * ratio + 0.06, 0.6), caption=say("ties_caption"))
+
+
 def _relief(content: PairContent, say: Words) -> Iterator[Block]:
     if content.relief is None:
         return
@@ -128,6 +167,7 @@ def _relief(content: PairContent, say: Words) -> Iterator[Block]:
     ratio = figures.ratio_of(relief.bounds)
     draw = partial(figures.draw_relief, content=content, say=say)
     yield Picture(draw=draw, ratio=ratio, caption=say("relief_caption", **shares))
+    yield Paragraph(text=_density(relief, say))
     if content.task.view is not None:
         view = content.task.view
         yield Paragraph(text=say("view_link", file=view.name), link=view)
@@ -136,6 +176,17 @@ def _relief(content: PairContent, say: Words) -> Iterator[Block]:
     draw = partial(figures.draw_sigma, content=content, say=say, limit=limit)
     caption = say("sigma_caption", limit=millimetres(limit))
     yield Picture(draw=draw, ratio=ratio, caption=caption)
+
+
+def _density(relief: ReliefMap, say: Words) -> str:
+    """Return in words how large the map is, and how densely it is measured."""
+    pixel = float(np.sqrt(abs(np.linalg.det(relief.plane_from_pixel[:2, :2]))))
+    known = int((relief.quality != Quality.UNKNOWN).sum())
+    measured = float((relief.quality == Quality.MEASURED).sum())
+    return say(
+        "density", pixel=millimetres(pixel), area=f"{known * pixel**2:.1f}",
+        all=f"{pixel**-2:.0f}", measured=f"{measured / max(known, 1) * pixel**-2:.0f}",
+    )  # fmt: skip
 
 
 def _residuals(content: PairContent, say: Words) -> Iterator[Block]:
@@ -157,6 +208,7 @@ def _residuals(content: PairContent, say: Words) -> Iterator[Block]:
         headings = [say("point"), "Δcol1", "Δrow1", "Δcol2", "Δrow2", "test", say("used")]
         rows = [_control_row(row, say) for row in control]
         yield TextTable(headings=headings, rows=rows, caption=say("control_table"))
+    yield from _lengths(content, say)
 
 
 def _control_row(row: Mapping[str, Any], say: Words) -> list[str]:
@@ -164,6 +216,26 @@ def _control_row(row: Mapping[str, Any], say: Words) -> list[str]:
     test = row.get("test")
     shown = f"{test:.1f}" if isinstance(test, int | float) else "-"
     return [str(row["id"]), *residuals, shown, say("holds" if row.get("used") else "fails")]
+
+
+def _lengths(content: PairContent, say: Words) -> Iterator[Block]:
+    """Yield the lengths taped between control points beside what the points measured give."""
+    taped = content.setup.get("lengths", ())
+    if not taped or content.solution is None:
+        return
+    table = content.solution.table
+    places = dict(zip(table.ids, table.xyz, strict=True))
+    rows = []
+    for one in taped:
+        if not {one["from"], one["to"]} <= places.keys():
+            continue
+        found = float(np.linalg.norm(places[one["from"]] - places[one["to"]]))
+        off = 1000 * (found - one["length"])
+        rows.append(
+            [f"{one['from']} - {one['to']}", f"{one['length']:.4f}", f"{found:.4f}", f"{off:.1f}"]
+        )
+    headings = [say("length"), say("taped"), say("found"), say("error_mm")]
+    yield TextTable(headings=headings, rows=rows, caption=say("length_table"))
 
 
 def _foundations(content: PairContent, say: Words) -> Iterator[Block]:

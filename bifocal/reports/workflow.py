@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from bifocal.reports.content import ReportTask, read_content
+from bifocal.options import OF_STEP, PROJECT
+from bifocal.reports.content import ReportTask, StepTold, read_content
 from bifocal.reports.pair_report import report_document
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
@@ -15,7 +16,7 @@ from photocore.jsonfile import read_object
 from photocore.output import check_writable
 from photocore.reports.writing import check_report, write_document
 
-__all__ = ["ReportTask", "report_of", "write_report"]
+__all__ = ["ReportTask", "StepTold", "report_of", "write_report"]
 
 
 def write_report(
@@ -66,7 +67,7 @@ def report_of(
     progress: Progress = no_progress,
 ) -> tuple[str, ...]:
     """Write the report of a workbook, a pair file or a survey's folder; see `write_report`."""
-    sources, tasks = [source], [task]
+    sources, tasks = [source], [replace(task, language=task.language or "en")]
     if source.is_dir():
         if task.control or task.check or task.relief or task.ortho:
             raise InputError(
@@ -105,10 +106,40 @@ def find_pairs(folder: Path, task: ReportTask) -> tuple[list[Path], list[ReportT
             "relief": relief if relief.is_file() else None,
             "ortho": next((path for path in orthos if path.is_file()), None),
             "view": view if view.is_file() else None,
+            **_remembered(home, task),
         }
         found.append(workbook if workbook.is_file() else _pair_file(source, folder))
         tasks.append(replace(task, **given))
     return found, tasks
+
+
+@dataclass(frozen=True, slots=True)
+class _Time:
+    seconds: float
+    machine: str
+
+
+def _remembered(home: Path, task: ReportTask) -> dict[str, Any]:
+    """Return what the records of a pair's steps tell, and the task does not say otherwise."""
+    steps: list[StepTold] = []
+    known: dict[str, Any] = {}
+    for path in (home / name / ".made.json" for name in OF_STEP):
+        if not path.is_file():
+            continue
+        record = read_object(path, what="record of a step")
+        if isinstance(options := record.get("options"), dict):
+            known |= options
+            if (name := str(record.get("step"))) != "report":
+                time = _Time(float(record.get("seconds", 0)), str(record.get("machine", "")))
+                files = {role: Path(file) for role, (file, _) in record["inputs"].items()}
+                steps.append(StepTold.of(name, {**options, **files}, time))
+    scale = task.scale or known.get("scale")
+    return {
+        "steps": tuple(steps),
+        "scale": float(scale) if isinstance(scale, int | float) else None,
+        "language": task.language or known.get("language", "en"),
+        "project": {name: known[name] for name in PROJECT if name in known} | dict(task.project),
+    }
 
 
 def _pair_file(own: Path, folder: Path) -> Path:

@@ -13,10 +13,10 @@ from photocore.camera.distortion import NAMES as DISTORTION
 from photocore.camera.distortion import Brown as Brown
 from photocore.camera.fisheye import Fisheye as Fisheye
 from photocore.camera.rotation import (
+    angle_rates,
     angles_from_rotation,
     checked_rotation,
     rotation_from_vector,
-    rotation_vector_from_angle_rates,
     world_from_camera,
 )
 from photocore.errors import GeometryError, InputError
@@ -320,10 +320,9 @@ class Camera:
 
         A covariance of rotation vectors C becomes one of angles as ``A C A.T``.
         """
-        omega, phi, _ = self.angles
-        if abs(np.cos(phi)) < 1e-9:
+        if np.hypot(*self.rotation[0, :2]) < 1e-9:
             raise GeometryError(
                 f"camera {self.name}: phi is 90 degrees, where omega and kappa turn about the "
                 "same axis and have no precision of their own. Turn the world frame."
             )
-        return np.linalg.inv(rotation_vector_from_angle_rates(omega, phi))
+        return angle_rates(self.rotation)

@@ -37,6 +37,11 @@ class CameraObservations:
     sigma: FloatArray
     what: str
 
+    @property
+    def rounding(self) -> float:
+        """Size of residuals that are nothing but rounding. [mm]"""
+        return 2e-16 * float(np.abs(self.image).max(initial=0.0))
+
     def network(self, names: tuple[str, ...] = EXTERIOR) -> Network:
         """Return the network of a camera with these unknowns, of `Camera.stepped`."""
         columns = {name: column for column, name in enumerate(names)}
@@ -54,10 +59,10 @@ class CameraObservations:
             )
             return bool(np.isfinite(seen.image).all())
 
-        # Residuals that are nothing but rounding.
-        floor = 2e-16 * float(np.abs(self.image).max(initial=0.0))
         own = {"camera": {0: columns}}
-        return Network(labels=names, columns=own, terms=(images,), what=self.what, rounding=floor)
+        return Network(
+            labels=names, columns=own, terms=(images,), what=self.what, rounding=self.rounding
+        )
 
 
 def start_at(camera: Camera) -> NetworkState:

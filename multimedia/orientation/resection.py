@@ -12,7 +12,9 @@ from multimedia.media.camera import ANY_INTERIOR, EXTERIOR, Camera
 from multimedia.media.camera_observations import CameraObservations, camera_of, start_at
 from multimedia.media.projection import Media, as_media, refuse_pixels
 from multimedia.orientation.pose_starts import pose_starts
+from multimedia.orientation.quick_pose import quick_pose
 from photocore.adjustment import OUTLIER_LIMIT, Fit, correlations
+from photocore.adjustment.iteration import refuse_undetermined
 from photocore.adjustment.network import NetworkState
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import ConvergenceError, GeometryError, InputError
@@ -142,8 +144,7 @@ def resect(
     seen = CameraObservations(
         points=control, image=image, media=as_media(media), sigma=sigmas, what=what
     )
-    start = camera_of(_best_start(camera, seen).state)
-    result = seen.network(names).solve(start_at(start))
+    result = _fitted(camera, seen, names)
     adjusted = camera_of(result.state)
     _refuse_mirrored(adjusted, result.sigma0, seen)
     shape = (len(used), 2)
@@ -162,6 +163,17 @@ def resect(
         redundancy=result.redundancy,
         iterations=result.iterations,
     )
+
+
+def _fitted(camera: Camera, seen: CameraObservations, names: tuple[str, ...]) -> Fit[NetworkState]:
+    """Return the camera of the smallest square sum."""
+    pose = quick_pose(camera, seen)
+    if pose is None or not _is_beyond_doubt(seen, pose):
+        pose = _best_start(camera, seen)
+    elif names == EXTERIOR:
+        refuse_undetermined(pose, names, seen.what)
+        return pose
+    return seen.network(names).solve(start_at(camera_of(pose.state)))
 
 
 def _is_beyond_doubt(seen: CameraObservations, pose: Fit[NetworkState]) -> bool:

@@ -228,6 +228,12 @@ def fit(
         If ``most`` steps do not settle it.
     """
     result = minimise(state, equations, advance, what=what, most=most, rounding=rounding)
+    refuse_undetermined(result, names, what)
+    return result
+
+
+def refuse_undetermined(result: Fit[State], names: Sequence[str], what: str) -> None:
+    """Refuse a state that the data do not determine, or that is not settled; see `fit`."""
     open_ = result.linear.undetermined(names)
     if open_:
         raise GeometryError(
@@ -245,4 +251,3 @@ def fit(
             iterations=result.iterations,
             residual=float(np.sqrt(np.mean(result.residuals**2))),
         )
-    return result

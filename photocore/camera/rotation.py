@@ -68,15 +68,21 @@ def angles_from_rotation(rotation: ArrayLike) -> tuple[float, float, float]:
     return float(np.arctan2(-r[1, 2], r[2, 2])), phi, float(np.arctan2(-r[0, 1], r[0, 0]))
 
 
-def rotation_vector_from_angle_rates(omega: float, phi: float) -> FloatArray:
-    """Return B with (rotation vector in the world) = B (d omega, d phi, d kappa), shape (3, 3).
+def angle_rates(rotations: FloatArray) -> FloatArray:
+    """Return d(omega, phi, kappa) / d(rotation vector) of rotations (..., 3, 3), of that shape.
 
-    The columns are the axes the three angles turn about, written in the world. B is singular at
-    phi = +-pi/2: that is the gimbal lock of the angles, not of the camera.
+    The vector is one of the world. The columns of the inverse are the axes that the three angles
+    turn about. Infinite at phi = +-pi/2: that is the gimbal lock of the angles, not of the camera.
     """
-    so, sp = np.sin((omega, phi))
-    co, cp = np.cos((omega, phi))
-    return np.array([[1.0, 0.0, sp], [0.0, co, -so * cp], [0.0, so, co * cp]])
+    omega = np.arctan2(-rotations[..., 1, 2], rotations[..., 2, 2])
+    tan = np.tan(np.arcsin(np.clip(rotations[..., 0, 2], -1.0, 1.0)))
+    so, co = np.sin(omega), np.cos(omega)
+    over = np.hypot(1.0, tan)  # 1 / cos(phi)
+    rates = np.zeros(rotations.shape)
+    rates[..., 0, 0], rates[..., 0, 1], rates[..., 0, 2] = 1.0, so * tan, -co * tan
+    rates[..., 1, 1], rates[..., 1, 2] = co, so
+    rates[..., 2, 1], rates[..., 2, 2] = -so * over, co * over
+    return rates
 
 
 def skew(vectors: ArrayLike) -> FloatArray:

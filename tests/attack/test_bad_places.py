@@ -163,12 +163,16 @@ def test_killed_at_any_moment_nothing_is_half_written(
     start = time.monotonic()
     assert run(words, site)["status"] == 0
     length = time.monotonic() - start
-    new = [size_of(site / name)]
+    new = sizes_of(site / name)
+    is_folder = (site / name).is_dir()
     inputs = state(whole)
     for _ in range(10):
         after = rng.uniform(0, 1.1 * length)
-        (site / name).unlink()
-        (site / name).write_bytes(b"mine")
+        if is_folder:
+            shutil.rmtree(site / name, ignore_errors=True)
+        else:
+            (site / name).unlink()
+            (site / name).write_bytes(b"mine")
         said = run(words, site, signal=int(number), after=after)
         if number == signal.SIGKILL:
             assert said["status"] in (0, -number), said
@@ -180,13 +184,17 @@ def test_killed_at_any_moment_nothing_is_half_written(
             assert "Traceback" not in said["stderr"]
             assert "Error" not in said["stderr"], said
             assert not [*site.rglob(".*")], "left something hidden"
-        size = size_of(site / name)
-        assert size == 4 or abs(size - new[0]) <= 0.02 * new[0] + 64, (size, new)
+        sizes, old = sizes_of(site / name), {} if is_folder else {name: 4}
+        assert sizes == old or all(
+            abs(sizes.get(one, 0) - size) <= 0.02 * size + 64 for one, size in new.items()
+        ), (sizes, new)
     again = run(words, site)
     assert again["status"] == 0, again
     now = state(site)
     assert {path: now[path] for path in inputs} == inputs
 
 
-def size_of(path: Path) -> int:
-    return path.stat().st_size
+def sizes_of(path: Path) -> dict[str, int]:
+    """Return the size of a file, or of all files of a folder, by name."""
+    files = [path, *path.rglob("*")]
+    return {one.name: one.stat().st_size for one in files if one.is_file()}

@@ -66,6 +66,10 @@ class BookUpdate:
     added: tuple[str, ...]
 
 
+#: Columns whose formulas differ where the set-up was corrected.
+_CORRECTED = ("s1_used", "s2_used", "theta_used", "q", "grown", "x_c", "y_c", "dx", "dy")
+
+
 def is_earlier(survey: SurveyInput) -> bool:
     """Tell by its names whether a workbook's sheets were made by an earlier version."""
     names = () if survey.book is None else survey.book.names
@@ -185,7 +189,7 @@ def update_book(
     write_corrections(editor, content)
     rows = [row - points.first for row in survey.table.rows]
     length = max([points.length, *(row + 1 for row in rows)])
-    anew = ("s1_used", "s2_used", "theta_used", "q") if content.corrected else ()
+    anew = _CORRECTED if content.corrected else ()
     _table(editor, built, "tblPoints", rows, length, anew=anew)
     _table(editor, built, "tblResults", rows, length)
     _print_points(editor, max(rows, default=0) + 1, content.language)
@@ -343,11 +347,13 @@ def _fixed_table(editor: WorkbookEditor, built: BookBuilder, name: str, key: str
     if area is None:
         return
     headings, given, grid = area.headings(), content.cells[key], editor.grid(area.sheet).rows
-    if key not in headings or area.length != len(given):
+    # Check points are counted; the table has as many rows as there were when it was made.
+    if key not in headings or (key != "check_row" and area.length != len(given)):
         return
-    stand = [grid.get(area.first + i, {}).get(headings[key]) for i in range(len(given))]
-    if stand == [float(value or 0) for value in given]:
-        _table(editor, built, name, range(len(given)))
+    count = min(area.length, len(given))
+    stand = [grid.get(area.first + i, {}).get(headings[key]) for i in range(count)]
+    if stand == [float(value or 0) for value in given[:count]]:
+        _table(editor, built, name, range(count))
 
 
 def _verdict(

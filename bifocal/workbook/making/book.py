@@ -233,7 +233,7 @@ def _title_block(sheet: SheetBuilder, content: SurveyContent, results: Cells) ->
     sheet.worksheet.row_dimensions[2].height = 42
     words = {key: book.word(key) for key in STATES}
     said, _ = world_state(words, content.georeference)
-    sheet.formula("H1", STATE, said, font=HEAD_FONT)
+    sheet.formula("H1", STATE, said, name="title_world", font=HEAD_FONT)
     colour_where(sheet.worksheet, "H1", "g_alarm=1", WRONG)
     for area in ("E1:G1", "H1:O1"):
         sheet.worksheet.merge_cells(area)

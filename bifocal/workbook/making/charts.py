@@ -161,7 +161,7 @@ def _vector_cells(content: SurveyContent) -> tuple[Cells, float]:
             default=0.0,
         )
         largest = np.nanmax(np.abs(errors), initial=0.0)
-        if largest > 0 and span > 0:
+        if span > 0 and largest > 1e-9 * span:  # less is rounding
             raw = float(0.15 * span / largest)
             scale = round(raw, -math.floor(math.log10(raw)))
         both = ~np.isnan(errors).any(axis=1, keepdims=True)

@@ -202,40 +202,36 @@ class RowFormula:
 
 @dataclass(frozen=True, slots=True)
 class RowText:
-    """A formula of many rows, with a `row_mark` wherever the number of its row belongs.
+    """A formula of many rows, with `ROW_MARK` wherever the number of its row belongs.
 
     Parameters
     ----------
     text : str
         The formula, without the equals sign.
+    shared : bool
+        Whether the file has it once for all rows. Excel takes that only of cells of the same
+        sheet and of names.
 
     Examples
     --------
-    >>> RowText(f"A{row_mark()}*{row_mark(4)}")(7)
+    >>> RowText(f"A{ROW_MARK}*3")(7)
     'A7*3'
     """
 
     text: str
+    shared: bool = False
 
     def __call__(self, row: int) -> str:
         """Return the formula as it stands in a row."""
-        return _MARK.sub(lambda mark: str(row - int(mark[1])), self.text)
+        return self.text.replace(ROW_MARK, str(row))
 
-    def escaped(self) -> RowText:
+    def escaped(self, *, shared: bool = False) -> RowText:
         """Return the formula as `escape` leaves it, its marks as they are."""
-        pieces = _MARK.split(self.text)
-        pieces[::2] = map(escape, pieces[::2])
-        pieces[1::2] = map(row_mark, pieces[1::2])
-        return RowText("".join(pieces))
+        return RowText(ROW_MARK.join(map(escape, self.text.split(ROW_MARK))), shared)
 
 
-def row_mark(head: int | str = 0) -> str:
-    """Return what stands for the number of a row, counted from below another one."""
-    return f"\0{head}\1"
-
-
-#: XML cannot hold the characters around it, so that a mark is never part of a text.
-_MARK = re.compile("\0([0-9]+)\1")
+#: What stands for the number of a row; XML cannot hold it, so that it is never part of a text.
+ROW_MARK = "\0"
 
 
 #: What a new cell may do to what stands in its place. ``typed``: replace a typed value, never a
@@ -320,30 +316,36 @@ class NewRows:
         The rows differ by little but their numbers, which take the places of marks all at once.
         """
         part = slice(rows.start - self.first, rows.stop - self.first)
-        columns = [_column_xml(c, c.values[part], rows, prefix) for c in self.columns]
-        texts = [c.formula.text for c in self.columns if isinstance(c.formula, RowText)]
-        marks = [(row_mark(head), int(head)) for head in {"0", *_MARK.findall("".join(texts))}]
+        own = range(self.first, self.first + self.size)
+        columns = [_column_xml(c, c.values[part], rows, prefix, own) for c in self.columns]
         for row, cells in zip(rows, zip(*columns, strict=True), strict=True):
-            xml = "".join(cells)
-            for mark, head in marks:
-                xml = xml.replace(mark, str(row - head))
-            yield xml
+            yield "".join(cells).replace(ROW_MARK, str(row))
 
 
 def _column_xml(
-    column: NewColumn, values: Sequence[CellValue], rows: range, prefix: str
+    column: NewColumn, values: Sequence[CellValue], rows: range, prefix: str, block: range
 ) -> Iterator[str]:
     """Yield the XML of the cells of a column, with marks for the numbers of their rows."""
-    name, formula = f"{column_letters(column.column)}{row_mark()}", column.formula
+    letters, formula = column_letters(column.column), column.formula
+    name = f"{letters}{ROW_MARK}"
     if callable(formula) and not isinstance(formula, RowText):
         for row, value in zip(rows, values, strict=True):
             yield cell_xml(name, value, formula(row), prefix, column.style)
         return
     text = formula.text if isinstance(formula, RowText) else formula or ""
+    plain = shown = f"<{prefix}f>{text}</{prefix}f>"
+    if isinstance(formula, RowText) and formula.shared:
+        kind = f'<{prefix}f t="shared" si="{column.column}"'
+        shown = f"{kind}/>"
+        if rows.start == block.start and values:
+            first = cell_xml(name, values[0], text, prefix, column.style)
+            area = f"{letters}{block.start}:{letters}{block.stop - 1}"
+            yield first.replace(f"<{prefix}f>", f'{kind} ref="{area}">', 1)
+            values = values[1:]
 
     @lru_cache(typed=True)  # flags and blanks are many, and few of them differ
     def cell(value: CellValue) -> str:
-        return cell_xml(name, value, text, prefix, column.style)
+        return cell_xml(name, value, text, prefix, column.style).replace(plain, shown)
 
     head, _, tail = cell(0.5).rpartition("0.5")
     for value in values:

@@ -14,7 +14,7 @@ from photocore.workbook.changing.cells import CellValue, NewCell, cell_xml, type
 from photocore.workbook.changing.changes import SheetChanges, Spliced, column_edits
 from photocore.workbook.changing.formfill import FormFiller
 from photocore.workbook.changing.formulas import areas_of_arrays
-from photocore.workbook.reading.grid import cell_name, column_number
+from photocore.workbook.reading.grid import cell_name, column_number, split_area
 from photocore.workbook.reading.package import local, new_parser, uncollected, understood
 from photocore.workbook.reading.plainsheet import (
     NotPlain,
@@ -296,7 +296,7 @@ class _Splicer:
             return
         if self.children and new.rule == "filled":
             return
-        if formula and (new.rule != "over" or b" ref=" in self.data[slice(*formula)]):
+        if formula and (new.rule != "over" or self.serves_others(formula)):
             raise InputError(f"{where}: holds a formula, which is not overwritten.")
         if new.rule == "prepared" and self.children:
             raise InputError(f"{where}: is not empty; a new row cannot be put there.")
@@ -309,6 +309,16 @@ class _Splicer:
         edit = self.xml(self.column, new).encode()
         self.edits.append((self.cell_start, self.cell_end, edit))
         self.result.inputs_changed = True
+
+    def serves_others(self, formula: tuple[int, int]) -> bool:
+        """Whether other cells have their formula from here, and do not get one of their own."""
+        tag = self.data[formula[0] : self.tag_end(formula[0])]
+        area = re.search(rb"\sref\s*=\s*[\"'](\w+(?::\w+)?)", tag)
+        if area is None or b"shared" not in tag:
+            return area is not None
+        top, left, bottom, right = split_area(area[1].decode())
+        own = [self.changes.placed.get(row, {}) for row in range(top, bottom + 1)]
+        return not all(column in cells for cells in own for column in range(left, right + 1))
 
     def is_of_array(self) -> bool:
         """Whether this cell holds a result of a formula that stands in another one."""

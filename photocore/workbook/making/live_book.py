@@ -15,7 +15,7 @@ from openpyxl.workbook.defined_name import DefinedName
 from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.worksheet import Worksheet
 
-from photocore.workbook.changing.cells import CellValue, RowText, row_mark
+from photocore.workbook.changing.cells import ROW_MARK, CellValue, RowText
 from photocore.workbook.changing.plain import MARK, PlainFormulas
 from photocore.workbook.making.live_columns import TEXT_KEYS, LiveColumn, row_formula
 from photocore.workbook.making.look import (
@@ -118,7 +118,7 @@ class BookBuilder:
                 if cell.data_type == "f":
                     text, row = str(cell.value)[1:], int(cell.row)
                     if block is not None and row == block.row:
-                        formulas[cell.column - 1] = RowText(plain(text, row_mark()))
+                        formulas[cell.column - 1] = RowText(plain(text, ROW_MARK))
                     cell.value = "=" + plain(text, row)
             if block is not None:
                 self.blocks[sheet.title] = replace(block, formulas=formulas)
@@ -449,5 +449,8 @@ def short_formula(table: str, text: str, letters: Mapping[str, str], head: int) 
     head : int
         Row of the keys.
     """
-    text = text.replace(f"ROW()-ROW({table}[[#Headers],[id]])", row_mark(head))
-    return RowText(re.sub(r"\[@(\w+)\]", lambda key: letters[key[1]] + row_mark(), text))
+    # The same in all rows, it takes no space in the file.
+    heads = rf"{table}\[\[#Headers\],\[(\w+)\]\]"
+    text = re.sub(heads, lambda key: f"${letters[key[1]]}${head}", text)
+    text = re.sub(r"\[@(\w+)\]", lambda key: letters[key[1]] + ROW_MARK, text)
+    return RowText(text)

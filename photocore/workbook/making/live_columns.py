@@ -41,7 +41,7 @@ class LiveColumn:
         In characters.
     folded : bool
         Whether the column is grouped and folded away: a step on the way, not a result.
-    spare : int or None
+    spare : float or None
         What the formula shows in rows that hold no point; None where it shows nothing.
     form : str
         Number format in place of the one that follows from ``places``.
@@ -58,7 +58,7 @@ class LiveColumn:
     places: int | None = None
     width: float = 9.5
     folded: bool = False
-    spare: int | None = None
+    spare: float | None = None
     form: str = ""
     choices: str = ""
     limits: tuple[float, float] = (-_LIMIT, _LIMIT)

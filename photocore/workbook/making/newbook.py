@@ -93,7 +93,9 @@ class RowBlock:
 
     def _formula(self, index: int, text: str) -> str | RowText:
         own = self.formulas.get(index)
-        return own.escaped() if own else escape(text)
+        if own is None:
+            return escape(text)
+        return own.escaped(shared=not re.search(r"[!\[]", own.text))
 
 
 def finish_book(

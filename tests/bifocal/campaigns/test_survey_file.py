@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from bifocal import InputError
 from bifocal.campaigns import photo_pairing
-from bifocal.campaigns.pair_job import refusal, steps_of
+from bifocal.campaigns.pair_steps import refusal, steps_of
 from bifocal.campaigns.survey_file import in_survey_words, read_survey_file
 from bifocal.campaigns.workflow import facade_job
 from bifocal.options import OF_PAIR

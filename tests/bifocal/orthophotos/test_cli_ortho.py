@@ -64,7 +64,8 @@ def test_a_relief_map_survives_its_file(wall: Path) -> None:
 
 
 def test_the_orthophoto_has_colours_source_band_mask_and_place(wall: Path) -> None:
-    done = run(wall, "--relief", "relief.tif", "--out", "o.tif", "--tfw", "--json")
+    measured = ("--relief", "relief.tif", "--measured-only")
+    done = run(wall, *measured, "--out", "o.tif", "--tfw", "--json")
     assert done.exit_code == 0, done.output
     result = json.loads(done.stdout)
     assert result["shares"]["hidden"] > 0.001
@@ -138,6 +139,9 @@ def test_one_to_fifty_at_254_dpi_is_five_millimetres_in_every_file(wall: Path) -
     relief = ezdxf.readfile(folder / f"{name}_relief.dxf")
     levels = {line.dxf.elevation for line in relief.query('LWPOLYLINE[layer=="BIFOCAL_CONTOURS"]')}
     assert any(0.02 < level < 0.3 for level in levels)
+    spots = [text.dxf.text for text in relief.query('TEXT[layer=="BIFOCAL_SPOT_HEIGHTS"]')]
+    assert 2 <= len(spots) <= 12
+    assert all(-0.05 < float(text) < 0.31 for text in spots)
 
 
 def test_the_drawing_has_a_sheet_with_a_viewport_to_scale_and_the_contours(wall: Path) -> None:
@@ -277,14 +281,28 @@ def test_the_sheet_of_a_whole_picture_says_what_was_not_measured(wall: Path) -> 
     r[100:200, 100:200] = np.nan
     replace(relief, r=r).write(wall / "relief.tif", overwrite=True)
     done = run(
-        wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50", "--complete",
+        wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50",
         "--section", "y=-1.2",
     )  # fmt: skip
     assert done.exit_code == 0, done.output
     page = page_of(wall / "d" / "Torre_est.pdf")
-    (told,) = re.findall(r"\(not measured: (.*); last band of the .tif\)", page)
-    assert f"Not measured: {told}\n" in done.stdout
-    assert "on interpolated relief" in told
+    (told,) = re.findall(r"\((\S+ % on interpolated relief)\)", page)
+    assert told in done.stdout
+    (own,) = re.findall(r"\(photo pixel (\S+) mm on the wall;.* in position", page)
+    assert own == "10"
+    assert "(not measured" not in page
+    plain = run(
+        wall, "--relief", "relief.tif", "--deliver", "e", "--scale", "1:50", "--no-hatch",
+    )  # fmt: skip
+    assert f"(not measured: {told}" in page_of(wall / "e" / "Torre_est.pdf")
+    assert "finer than the photo's, 10 mm" in plain.stderr
+    pictures = [np.asarray(Image.open(wall / name / "Torre_est.png")).astype(int) for name in "de"]
+    lined = (pictures[0] != pictures[1]).any(axis=2)
+    with rasterio.open(wall / "d" / "Torre_est.tif") as file:
+        source, image = file.read(4), np.moveaxis(file.read([1, 2, 3]), 0, -1)
+    np.testing.assert_array_equal(image, pictures[1][..., :3])  # the GeoTIFF bears no lines
+    assert 0.05 < lined[source == 5].mean() < 0.4
+    assert not lined[np.isin(source, (1, 2, 3))].any()
     # All notes are there, the last too, though the relief has one more.
     assert "(sections A-A  y=-1.2)" in page_of(wall / "d" / "Torre_est_relief.pdf")
 
@@ -379,6 +397,8 @@ def test_the_sheet_is_true_to_scale(wall: Path) -> None:
 def test_a_level_section_shows_the_relief_where_it_is(wall: Path) -> None:
     run(wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50", "--section", "y=0.5")
     drawing = ezdxf.readfile(wall / "d" / "Torre_est_section1.dxf")
+    window = drawing.paperspace("A-A").query("VIEWPORT")[-1]
+    assert window.dxf.view_height / window.dxf.height == pytest.approx(0.05)  # 1:50 in mm
     points = np.concatenate(
         [
             np.array(line.get_points("xy"))

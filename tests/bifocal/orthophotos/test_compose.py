@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import rasterio
@@ -29,6 +31,7 @@ from tests.bifocal.orthophotos.wall_scene import (
 )
 
 GSD = 0.01
+MEASURED = OrthoOptions(measured_only=True)
 
 
 @pytest.fixture(scope="module")
@@ -92,8 +95,8 @@ def test_hidden_pixels_are_empty_and_counted(
     wall: tuple[Pair, np.ndarray, np.ndarray, ReliefMap],
 ) -> None:
     pair, far, _, relief = wall
-    masked = bifocal.orthophoto(pair, far, relief)
-    ghosts = bifocal.orthophoto(pair, far, relief, options=OrthoOptions(mask_hidden=False))
+    masked = bifocal.orthophoto(pair, far, relief, options=MEASURED)
+    ghosts = bifocal.orthophoto(pair, far, relief, options=replace(MEASURED, mask_hidden=False))
     assert masked.hidden.sum() > 500
     assert (masked.image[masked.hidden] == 0).all()
     assert (masked.source[masked.hidden] == 0).all()
@@ -104,8 +107,8 @@ def test_filling_closes_the_holes_and_says_so(
     wall: tuple[Pair, np.ndarray, np.ndarray, ReliefMap],
 ) -> None:
     pair, far, _, relief = wall
-    masked = bifocal.orthophoto(pair, far, relief)
-    filled = bifocal.orthophoto(pair, far, relief, options=OrthoOptions(fill=True))
+    masked = bifocal.orthophoto(pair, far, relief, options=MEASURED)
+    filled = bifocal.orthophoto(pair, far, relief, options=replace(MEASURED, fill=True))
     assert (filled.source[masked.hidden] == 4).mean() > 0.99
     kept = masked.valid
     np.testing.assert_array_equal(filled.image[kept], masked.image[kept])
@@ -121,8 +124,8 @@ def test_an_offset_near_photo_shows_what_the_far_one_cannot_see() -> None:
     grid = wall_grid(GSD)
     x, y = np.meshgrid(grid.columns_x, grid.rows_y)
     relief = ReliefMap.from_relief(relief_at(x, y), plane_from_pixel=grid.plane_from_pixel)
-    one = bifocal.orthophoto(pair, far, relief)
-    both = bifocal.orthophoto(pair, (far, near), relief, options=OrthoOptions(feather=2))
+    one = bifocal.orthophoto(pair, far, relief, options=MEASURED)
+    both = bifocal.orthophoto(pair, (far, near), relief, options=replace(MEASURED, feather=2))
     gained = one.hidden & both.valid
     assert gained.sum() > 0.5 * one.hidden.sum()
     assert np.isin(both.source[gained], (2, 3)).all()

@@ -12,7 +12,7 @@ import pytest
 import rasterio
 from click.testing import CliRunner
 
-from bifocal import InputError, PhotoSet, orthophoto, write_image
+from bifocal import InputError, OrthoOptions, PhotoSet, orthophoto, write_image
 from bifocal.orthophotos.ortho_image import OF_SET
 from tests.builders.commands import bifocal_command as main
 from tests.scenes import Exposure, bifocal_cameras, facade
@@ -40,6 +40,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
+MEASURED = OrthoOptions(measured_only=True)
+
+
 def run(*arguments: object) -> tuple[int, str, str]:
     result = CliRunner().invoke(main, ["ortho", *(str(a) for a in arguments)])
     assert result.exception is None or isinstance(result.exception, SystemExit)
@@ -48,14 +51,14 @@ def run(*arguments: object) -> tuple[int, str, str]:
 
 def test_each_pixel_is_of_a_photo_that_sees_it_and_hidden_is_seen_by_none():
     taken = shot()
-    picture = orthophoto(taken.photos, taken.images, taken.truth)
+    picture = orthophoto(taken.photos, taken.images, taken.truth, options=MEASURED)
     used = np.unique(picture.source)
     # The near photo sees nothing that the far one, whose rays are steeper, does not see better.
     assert set(used.tolist()) == {0, 3, OF_SET + 1, OF_SET + 3}
     for number in (OF_SET + 1, OF_SET + 3):
         visible = taken.visible[number - OF_SET - 1]
         assert visible[picture.source == number].mean() > 0.97
-    of_pair = orthophoto(taken.photos.pair(0, 1), taken.images[:2], taken.truth)
+    of_pair = orthophoto(taken.photos.pair(0, 1), taken.images[:2], taken.truth, options=MEASURED)
     assert not (picture.hidden & of_pair.valid).any()
     assert picture.hidden.sum() < of_pair.hidden.sum()
     assert picture.valid.mean() > of_pair.valid.mean()
@@ -85,7 +88,7 @@ def test_the_command_matches_exposures_and_tells_each_photos_share(folder, tmp_p
     assert min(shares["1"], shares["3"]) > 0.02
     with rasterio.open(out) as file:
         image, source = np.moveaxis(file.read([1, 2, 3]), 0, -1).astype(float), file.read(4)
-    assert set(np.unique(source)) <= {0, 3, 11, 13}
+    assert set(np.unique(source)) <= {0, 3, 4, 11, 12, 13}
     assert shares["3"] == pytest.approx((source == 13).mean())
     # The dark third photo shows the wall as bright as the first where both see it.
     taken = shot()

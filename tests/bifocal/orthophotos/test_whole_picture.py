@@ -59,8 +59,8 @@ def test_a_complete_orthophoto_has_no_gap_and_lists_what_is_not_measured():
     rng = np.random.default_rng(3)
     photo = rng.integers(1, 255, (400, 400, 3), dtype=np.uint8)
     relief = wall_with_a_gap()
-    plain = orthophoto(PAIR, photo, relief)
-    whole = orthophoto(PAIR, photo, relief, options=OrthoOptions(complete=True))
+    plain = orthophoto(PAIR, photo, relief, options=OrthoOptions(measured_only=True))
+    whole = orthophoto(PAIR, photo, relief, options=OrthoOptions())
     gap = np.zeros(GRID.shape, bool)
     gap[104:126, 104:126] = True
     assert not plain.valid[gap].any()
@@ -75,6 +75,6 @@ def test_a_complete_orthophoto_has_no_gap_and_lists_what_is_not_measured():
 
 def test_what_no_photo_shows_is_not_told_as_estimated():
     photo = np.full((400, 260, 3), 90, np.uint8)
-    whole = orthophoto(PAIR, photo, wall_with_a_gap(), options=OrthoOptions(complete=True))
+    whole = orthophoto(PAIR, photo, wall_with_a_gap(), options=OrthoOptions())
     assert (whole.source[104:126, 104:126] == Source.INTERPOLATED).all()
     assert (whole.source[:, 270:] == Source.NONE).all()

@@ -12,7 +12,11 @@ from PIL import Image as Picture
 from tests.bifocal.workbook.test_cli_solve import POINTS, SETUP, fill, put, rows, run, write_csv
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached, parts
 
-WORLD = [(name, 1000 + x, 2000 - r, 50 + y) for name, x, y, r in POINTS]
+#: Heights a millimetre off: the residuals of exact points are rounding, which has no equal.
+WORLD = [
+    (name, 1000 + x, 2000 - r, 50 + y + (-1) ** i / 1000)
+    for i, (name, x, y, r) in enumerate(POINTS)
+]
 CHECKS = [("P1", 2.012, None, 1.005), ("P2", None, None, 0.497), ("P8", 1, 1, 1)]
 
 

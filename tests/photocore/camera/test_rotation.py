@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from photocore.camera.rotation import (
+    angle_rates,
     angles_from_rotation,
     by_rotation,
     nearest_rotation,
     rotation_from_vector,
-    rotation_vector_from_angle_rates,
     skew,
     world_from_camera,
 )
@@ -46,10 +46,11 @@ def test_gimbal_lock_still_gives_the_same_matrix():
 def test_angle_rates_are_the_axes_of_the_turns():
     angles, h = np.array([0.3, -0.7, 2.1]), 1e-7
     base = world_from_camera(*angles)
+    axes = np.linalg.inv(angle_rates(base))
     for k in range(3):
         turned = world_from_camera(*(angles + h * np.eye(3)[k])) @ base.T
         vector = np.array([turned[2, 1], turned[0, 2], turned[1, 0]]) / h
-        assert vector == pytest.approx(rotation_vector_from_angle_rates(0.3, -0.7)[:, k], abs=1e-6)
+        assert vector == pytest.approx(axes[:, k], abs=1e-6)
 
 
 def test_a_rotation_vector_turns_about_itself():

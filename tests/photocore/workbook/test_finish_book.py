@@ -10,7 +10,7 @@ import openpyxl
 import pytest
 
 from bifocal import InputError
-from photocore.workbook.changing.cells import NewColumn, NewRows, RowText, row_mark
+from photocore.workbook.changing.cells import ROW_MARK, NewColumn, NewRows, RowText
 from photocore.workbook.making.newbook import RowBlock, finish_book
 
 
@@ -43,7 +43,7 @@ def test_rows_carry_values_formulas_and_formats(tmp_path):
 
 
 def test_formulas_may_change_from_row_to_row(tmp_path):
-    double = RowText(f"A{row_mark()}*2")
+    double = RowText(f"A{ROW_MARK}*2")
     block = RowBlock(row=2, columns=[[1.0, 2.0], [2.0, 4.0]], formulas={1: double})
     sheet = openpyxl.load_workbook(finished(tmp_path, block))["T"]
     assert [sheet["B2"].value, sheet["B3"].value] == ["=A2*2", "=A3*2"]
@@ -63,10 +63,10 @@ def test_formulas_with_marks_make_the_rows_that_functions_make():
         "",
         1.0,
     ]
-    text = RowText(f'IF(A{row_mark()}<{row_mark(4)},"&",0)').escaped()
+    text = RowText(f'IF(A{ROW_MARK}<4,"&",0)').escaped()
 
     def function(row):
-        return f'IF(A{row}&lt;{row - 4},"&amp;",0)'
+        return f'IF(A{row}&lt;4,"&amp;",0)'
 
     made = []
     for formula in (text, function):

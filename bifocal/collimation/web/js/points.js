@@ -91,7 +91,8 @@ export class PointsStage {
       this.app.pyramids.both("photo", photoMark(state))]);
     if (this.mark !== mark) return;
     this.tileLayers = Object.fromEntries([1, 2].map((image) => [image,
-      tileLayer(this.view, `layer-${image}`, `/tiles/wall/${image}`, walls[image - 1])]));
+      tileLayer(this.view, `layer-${image}`, `/tiles/wall/${image}`, walls[image - 1], null,
+        this.wall.frameOf(image, state.photos[image - 1]))]));
     photos.forEach((info, index) => this.loupe.source(index + 1, info));
     this.layers.use(this.tileLayers);
     this.#arrange();
@@ -257,7 +258,8 @@ export class PointsStage {
   #look() {
     const { guide } = this.picker;
     for (const image of [1, 2]) {
-      this.loupe.look(image, this.picker.sight(image), guide?.image === image ? guide.line : null);
+      const place = this.picker.sight(image) ?? this.paneOf(image)?.middle(image);
+      this.loupe.look(image, place, guide?.image === image ? guide.line : null);
     }
   }
 

@@ -1,0 +1,1 @@
+"""What a person knows of a wall's relief: faces, break lines, occluders, and relief that obeys."""
