@@ -28,7 +28,7 @@ from bifocal.model.photo_alone import PhotoAlone
 from bifocal.model.photo_set import PhotoSet
 from bifocal.model.photos_of_set import PhotosOfSet
 from bifocal.model.points import SurveyPoints
-from bifocal.model.relief_map import measured_part
+from bifocal.model.relief_map import measured_part, told_pixels
 from bifocal.model.surface import EVERYWHERE, FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.compose import choose_grid, render
 from bifocal.orthophotos.ortho_image import OF_SET, OrthoOptions, Source
@@ -249,7 +249,7 @@ def open_surface(
             reader = stack.enter_context(RasterReader(task.relief))
             check_relief(reader)
             with located(task.relief):
-                surface = MapSurface(reader.grid, reader.read_floats)
+                surface = MapSurface(reader.grid, reader.read_floats, told_pixels(reader))
         elif task.points is not None:
             surface, remarks = _triangles(task.points, task.breaklines)
         if faces:
