@@ -66,7 +66,7 @@ def setup_sheet(builder: BookBuilder, content: SurveyContent) -> None:
     for letter in _COLUMNS[: 1 + content.others]:
         area = f"{letter}5:{letter}{row}"
         colour_words(sheet.worksheet, area, {"OK": GOOD, "CHECK": WRONG}, bold=("CHECK",))
-    sheet.finish(freeze="A5", repeat="4:4")
+    sheet.finish(landscape=content.others > 1, freeze="A5", repeat="4:4")
 
 
 def _setup_cell(

@@ -73,7 +73,7 @@ def what_if_sheet(builder: BookBuilder, content: SurveyContent) -> None:
     dots = scatter(builder.word("chart_changes"), "s' [mm]", "r [m]", x, {"change": y})
     dots.y_axis.number_format, dots.visible_cells_only = "General", False
     for chart, place in ((bars, f"A{CHARTS}"), (dots, f"G{CHARTS}")):
-        chart.height, chart.width = 8.5, 12.5
+        chart.height, chart.width = 8, 12.5
         sheet.worksheet.add_chart(chart, place)
     sheet.finish(landscape=True, repeat=f"{HEAD - 1}:{HEAD}")
 
