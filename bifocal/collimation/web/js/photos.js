@@ -15,7 +15,7 @@ export class PhotosStage {
   constructor(app) {
     this.app = app;
     this.cards = [1, 2].map((image) => this.#card(image));
-    this.input = h("input", { type: "file", accept: "image/*", multiple: true, class: "unseen",
+    this.input = h("input", { type: "file", accept: "image/*,.heic,.heif,.hif,.avif,.dng,.cr2,.cr3,.nef,.arw,.orf,.raf,.rw2,.pef,.srw", multiple: true, class: "unseen",
       id: "photo-files", testid: "photo-files", onchange: () => this.#drop([...this.input.files]) });
     this.lead = h("p", { class: "lead" }, t("photos.drop"));
     this.zone = h("div", { class: "drop-zone" },
