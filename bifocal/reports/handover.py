@@ -106,7 +106,7 @@ def write_handover(
 class _Shown:
     """All that is shown, as large as it is read."""
 
-    photos: list[tuple[str, ByteArray]]
+    photos: list[tuple[str, ByteArray, float]]
     ortho: tuple[ByteArray, Bounds] | None
     relief: ReliefMap | None
     points: SurveyPoints | None
@@ -115,9 +115,12 @@ class _Shown:
     @classmethod
     def read(cls, pair: Pair, task: HandoverTask) -> _Shown:
         paths = pair.photo_files
-        photos = [(path.name, to_eight_bit(read_image(path))) for path in paths]
+        photos = []
+        for path in paths:
+            image = to_eight_bit(read_image(path))
+            photos.append((path.name, _reduced(image, PHOTO), float(image.shape[1])))
         return cls(
-            photos=[(name, _reduced(image, PHOTO)) for name, image in photos],
+            photos=photos,
             ortho=None if task.ortho is None else ortho_thumbnail(task.ortho, side=ORTHO)[0],
             relief=None if task.relief is None else ReliefMap.read(task.relief),
             points=None if task.points is None else read_survey_points(task.points)[0],
@@ -137,10 +140,10 @@ def _page(shown: _Shown, task: HandoverTask, source: Path, factor: float) -> str
     if shown.relief is not None:
         data["relief"], picture = _relief(shown.relief, factor)
         layers.append(_layer(say("relief_map"), picture, data["relief"]["bounds"]))
-    for number, (name, image) in enumerate(shown.photos, start=1):
+    for number, (name, image, width) in enumerate(shown.photos, start=1):
         reduced = _reduced(image, factor * PHOTO)
         layers.append(_layer(f"{say('handover_photo')} {number} · {name}", reduced, None))
-        layers[-1]["scale"] = reduced.shape[1] / shown.pair.photo(number).image_size[0]
+        layers[-1]["scale"] = reduced.shape[1] / width
         layers[-1]["photo"] = number
     texts = {
         key: say(f"handover_{key}")
