@@ -34,7 +34,7 @@ from bifocal.reports.workflow import report_of
 from bifocal.workbook.match_workflow import match_pair_file
 from bifocal.workbook.pair_workflow import read_pair
 from photocore.cli import Progress
-from photocore.errors import PhotogrammetryError
+from photocore.errors import GeometryError, PhotogrammetryError
 from photocore.images import image_info, read_grey
 from photocore.interrupts import end_on_signals
 from photocore.jsonfile import plain
@@ -121,6 +121,15 @@ def _match(task: Task, progress: Progress) -> dict[str, Any]:
             )
         ]
     }  # fmt: skip
+
+
+def _targets(task: Task, progress: Progress) -> dict[str, Any]:
+    """Return the targets that both photos show."""
+    try:
+        found = _match({**task, "count": 5000, "features": False}, progress)
+    except GeometryError:  # too few to check the pair by
+        return {"points": []}
+    return {"points": [one for one in found["points"] if one["code"] != "feature"]}
 
 
 def _relief(task: Task, progress: Progress) -> dict[str, Any]:
@@ -221,6 +230,7 @@ def _path(name: str | None) -> Path | None:
 _WORKS: dict[str, Callable[[Task, Progress], dict[str, Any]]] = {
     "align": _align,
     "match": _match,
+    "targets": _targets,
     "relief": _relief,
     "ortho": _ortho,
     "deliver": _deliver,
