@@ -8,7 +8,7 @@ from openpyxl.styles import Alignment
 
 from bifocal.model.flags import FlagLimits
 from bifocal.survey.tolerances import judge
-from bifocal.workbook.content import SurveyContent, check_cells, setup_cells
+from bifocal.workbook.content import SurveyContent, setup_cells
 from bifocal.workbook.formulas.columns import (
     FORMULAS,
     FRAME_SHARES,
@@ -17,6 +17,7 @@ from bifocal.workbook.formulas.columns import (
     check_columns,
     planning_facts,
 )
+from bifocal.workbook.reference_cells import check_cells
 from bifocal.workbook.words import word
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
@@ -44,7 +45,7 @@ def check(builder: BookBuilder, content: SurveyContent, points: Cells) -> None:
     for letter, axis in zip("BCD", "XYZ", strict=True):
         sheet.text(f"{letter}4", f"d{axis}", HEAD_FONT)
         sheet.worksheet[f"{letter}4"].alignment = Alignment(horizontal="right")
-    for row, (key, (body, attribute)) in enumerate(_STATISTICS.items(), start=5):
+    for row, (key, (body, attribute)) in enumerate(STATISTICS.items(), start=5):
         sheet.word(f"A{row}", key)
         for letter, axis in zip("BCD", "XYZ", strict=True):
             errors = None if content.check is None else content.check.axes[axis]
@@ -84,7 +85,7 @@ def check(builder: BookBuilder, content: SurveyContent, points: Cells) -> None:
 #: Rows that are coloured: not counted, beyond three sigma, beyond two.
 _ROWS = {"{out}=1": DOUBT, "N({sigmas})>3": WRONG, "N({sigmas})>2": ("FFF2CC", "7F6000")}
 #: Statistics of errors: formula of their column and the cell of their number, attribute.
-_STATISTICS = {
+STATISTICS = {
     "n": ("COUNT({0})", "n"),
     "rmse": ('IF({1}=0,"",SQRT(SUMSQ({0})/{1}))', "rmse"),
     "mean": ('IF({1}=0,"",AVERAGE({0}))', "mean"),

@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from openpyxl.styles import Alignment
 
 from bifocal.workbook.content import SurveyContent, setup_cells
-from bifocal.workbook.formulas.columns import adjustment_names
+from bifocal.workbook.formulas.columns import adjustment_names, pair_letter
 from bifocal.workbook.formulas.media_formulas import INDEX_LIMITS
 from bifocal.workbook.formulas.setup_cells import (
     STATES,
+    beside,
     formulas,
     groups,
     is_above_zero,
@@ -23,7 +24,7 @@ from bifocal.workbook.formulas.setup_cells import (
 from bifocal.workbook.words import term, word
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
-from photocore.workbook.making.look import GOOD, HEAD_FONT, WRONG, colour_words
+from photocore.workbook.making.look import GOOD, HEAD_FILL, HEAD_FONT, WRONG, colour_words
 from photocore.workbook.making.words import Wording
 
 #: What a typed number of the set-up may be, where it need not be above zero.
@@ -39,11 +40,19 @@ def setup_sheet(builder: BookBuilder, content: SurveyContent) -> None:
     line = state_formula(words, is_pair=content.is_pair)
     sheet.formula("A3", line, state(cells, words), name="setup_state", font=HEAD_FONT)
     sheet.headings(4, ("name", "description", "value", "unit"), (15, 61, 18, 9))
+    for letter, pair in zip("CEFGH", pair_names(content.others), strict=False):
+        if content.others:
+            sheet.text(f"{letter}4", pair, HEAD_FONT)
+            sheet.worksheet[f"{letter}4"].fill = HEAD_FILL
+            sheet.worksheet[f"{letter}4"].alignment = Alignment(horizontal="right")
+            sheet.worksheet.column_dimensions[letter].width = 18 if letter == "C" else 11
     listed = groups(is_pair=content.is_pair, media=content.media_cells, lens=content.has_lens)
     row = 5
     for group in listed:
         for name in group:
-            _setup_cell(sheet, row, name, cells, content, typed=group is not listed[-1])
+            typed = group is not listed[-1]
+            _setup_cell(sheet, row, name, cells, content, typed=typed)
+            _beside(sheet, row, name, cells, content, typed=typed)
             row += 1
         row += 1
     for image in (1, 2):
@@ -54,7 +63,9 @@ def setup_sheet(builder: BookBuilder, content: SurveyContent) -> None:
             sheet.input(f"C{row}", cells[name], name=name)
             sheet.validate(f"C{row}", title=name, prompt=told, limits=_NUMBERS)
             row += 1
-    colour_words(sheet.worksheet, f"C5:C{row}", {"OK": GOOD, "CHECK": WRONG}, bold=("CHECK",))
+    for letter in "CEFGH"[: 1 + content.others]:
+        area = f"{letter}5:{letter}{row}"
+        colour_words(sheet.worksheet, area, {"OK": GOOD, "CHECK": WRONG}, bold=("CHECK",))
     sheet.finish(freeze="A5", repeat="4:4")
 
 
@@ -90,6 +101,32 @@ def _setup_cell(
         sheet.formula(cell, live[name], value, form=form, name=name, editable=typed)
         return
     sheet.input(cell, value, form=form, name=name)
+
+
+def pair_names(others: int) -> list[str]:
+    """Return what the pairs of photo 1 with each other one are called, by their photos."""
+    return [f"{pair_letter(photo)} (1-{photo})" for photo in range(2, 3 + others)]
+
+
+def _beside(
+    sheet: SheetBuilder,
+    row: int,
+    name: str,
+    cells: Mapping[str, CellValue],
+    content: SurveyContent,
+    *,
+    typed: bool,
+) -> None:
+    """Write the same of further photos beside a value of the second one."""
+    live = formulas(others=content.others)
+    for letter, other in zip("EFGH", beside(name, content.others), strict=False):
+        cell, form, value = f"{letter}{row}", number_format(name), cells.get(other)
+        sheet.worksheet[cell].alignment = Alignment(horizontal="right")
+        if typed:
+            _validate(sheet, cell, name, f"{other}: {sheet.worksheet[f'B{row}'].value}")
+            sheet.input(cell, value, form=form, name=other)
+        else:
+            sheet.formula(cell, live[other], value, form=form, name=other)
 
 
 def _wording(name: str, content: SurveyContent) -> Wording | None:
