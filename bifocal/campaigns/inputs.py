@@ -20,18 +20,19 @@ def check_files(job: PairJob) -> None:
     InputError
         Naming the first of them.
     """
-    for path in (job.far, job.near, *job.files.values()):
+    for path in (*job.photos, *job.files.values()):
         check_name(path)
         check_file(path)
     if "faces" in job.files:
         read_faces(job.files["faces"])
-    for path in (job.far, job.near):
+    for path in job.photos:
         image_info(path)
     for role in sorted({"lens", "lens1", "lens2"} & job.files.keys()):
         Lens.read(job.files[role])
     unit = job.options.get("unit", "")
     tables = tables_of(job)
-    ids = {role: known_points(path, unit=unit).ids for role, path in tables.items()}
+    count = len(job.photos)
+    ids = {role: known_points(p, unit=unit, photos=count).ids for role, p in tables.items()}
     if len(ids) > 1:
         refuse_same_names(tables["control"], tables["check"], ids["control"], ids["check"])
 
@@ -44,7 +45,7 @@ def check_photos(job: PairJob) -> None:
     InputError
         Naming the first of them.
     """
-    for path in (job.far, job.near):
+    for path in job.photos:
         if path.suffix.lower() in (".jpg", ".jpeg"):
             refuse_damaged_jpeg(path)
         else:

@@ -57,6 +57,7 @@ def _moved(job: PairJob, there: Callable[[Path], Path]) -> PairJob:
     """Return a job with its files and folders elsewhere."""
     files = {role: there(path) for role, path in job.files.items()}
     own: dict[str, Any] = {name: there(getattr(job, name)) for name in ("folder", "far", "near")}
+    own["more"] = tuple(map(there, job.more))
     return replace(job, files=files, joint=job.joint and there(job.joint), **own)
 
 
@@ -69,7 +70,7 @@ def packed(job: PairJob) -> Parcel:
         If a file cannot be read, or the files have no folder in common.
     """
     job = found_anywhere(job)
-    needed = [job.far, job.near, *job.files.values()]
+    needed = [*job.photos, *job.files.values()]
     try:
         root = Path(os.path.commonpath([job.folder, *(path.parent for path in needed)]))
     except ValueError:

@@ -385,6 +385,7 @@ def facade_job(
     near: Path,
     out: Path,
     *,
+    more: tuple[Path, ...] = (),
     name: str = "",
     given: Mapping[str, Any] | None = None,
     products: tuple[str, ...] | None = None,
@@ -398,6 +399,8 @@ def facade_job(
         Photos.
     out : Path
         Folder; each step gets one in it.
+    more : tuple of Path
+        Photos that make a set of these.
     name : str
         Title; default that of the folder.
     given : mapping
@@ -424,6 +427,7 @@ def facade_job(
         folder=out,
         far=far,
         near=near,
+        more=more,
         files={role: path for role, path in said.items() if role in FILES},
         options={key: value for key, value in said.items() if key not in FILES},
         way="facade",

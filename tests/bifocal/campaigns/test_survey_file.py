@@ -100,6 +100,26 @@ distance2 = 1.9
 """
 
 
+def test_photos_of_a_pair_may_be_a_list_and_are_a_set(tmp_path):
+    path = tmp_path / "street.toml"
+    path.write_text('[[pair]]\nname = "porch"\nphotos = ["a.jpg", "b.jpg", "c.jpg"]\nauto = true\n'
+                    "distance1 = 9.5\n")  # fmt: skip
+    (job,) = read_survey_file(path, out=tmp_path / "out")
+    assert job.photos == tuple(tmp_path / name for name in ("a.jpg", "b.jpg", "c.jpg"))
+    assert job.pair_path == tmp_path / "out" / "porch" / "align" / "porch.photos.json"
+    assert not refusal(job)
+    assert set(steps_of(job)[1].files) == {"far", "near", "photo 3"}
+    assert "of two photos" in refusal(replace(job, options={**job.options, "as_set_up": True}))
+    for wrong, said in (
+        ('[[pair]]\nphotos = ["a.jpg"]', "list photos"),
+        ('[[pair]]\nfar = "a.jpg"\nphotos = ["a.jpg", "b.jpg"]', "both"),
+        (f"joint = true\n{path.read_text()}", "joint = true adjusts pairs"),
+    ):
+        path.write_text(wrong)
+        with pytest.raises(InputError, match=said):
+            read_survey_file(path)
+
+
 def test_media_are_keys_of_the_file_and_reach_the_set_up(tmp_path):
     """Refused in the words of the file; what `align` knows of media has a key of its name."""
     (tmp_path / "sea.toml").write_text(MEDIA)
