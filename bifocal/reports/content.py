@@ -318,7 +318,7 @@ def _photos(source: Pair | PhotoSet) -> tuple[ReportedPhoto, ...]:
     return tuple(photos)
 
 
-def ortho_thumbnail(path: Path) -> tuple[tuple[ByteArray, Bounds], float]:
+def ortho_thumbnail(path: Path, *, side: int = SIDE) -> tuple[tuple[ByteArray, Bounds], float]:
     """Return an orthophoto made small, empty pixels white, and its pixel. [m]
 
     Raises
@@ -334,7 +334,7 @@ def ortho_thumbnail(path: Path) -> tuple[tuple[ByteArray, Bounds], float]:
             )
         grid = reader.grid
         step = 1
-        while max(grid.width, grid.height) / step > 1.5 * SIDE and step < ROWS:
+        while max(grid.width, grid.height) / step > 1.5 * side and step < ROWS:
             step *= 2
         strips = []
         for colours, valid in colour_strips(reader):
