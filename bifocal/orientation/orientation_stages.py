@@ -387,7 +387,7 @@ def _with_lines(pair: OrientedPair, images: Images) -> OrientedPair:
             words = facade_lines.contradiction_in_words(line, adjusted.cameras, test)
             pair = replace(pair.told(words), lines_off=True)
     kept = tuple(line for line, test in tested if test <= STAGES.wall_limit)
-    for name in ("upright", "level"):
+    for name in ("upright", "level") if old.lines_bend_nothing else ():
         family = [line for line in kept if line.name == name]
         if family and family_test(family, old, adjusted, pair_equations) > STAGES.family_limit:
             kept = tuple(line for line in kept if line.name != name)

@@ -1,7 +1,9 @@
 """What a façade's lines do to an adjusted pair: they turn its reference plane, and nothing else.
 
-Lines that are not quite level or upright would else bend the lenses and the relative orientation,
-which the ties know better, until they lie along the wall.
+Lines that are not quite level or upright would else bend calibrated lenses and the relative
+orientation, which the ties know better, until they lie along the wall. Where nobody measured the
+lens they do tell where its principal point lies, and are observations like others: on church_2
+points are then off by 14 mm after a similarity, instead of 26.
 """
 
 from __future__ import annotations

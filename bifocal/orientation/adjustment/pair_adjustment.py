@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from bifocal.model.orientation_precision import NAMES, rates_of
-from bifocal.orientation.adjustment.frame_turn import turned_by_lines
+from bifocal.orientation.adjustment.frame_turn import line_equations, turned_by_lines
 from bifocal.orientation.adjustment.observed_points import known_points, views_of
 from bifocal.orientation.adjustment.pair_observations import (
     Equations,
@@ -120,7 +120,7 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
     cofactor = np.zeros((len(names), len(names)))
     cofactor[np.ix_(free, free)] = fit.linear.cofactor
     state: PairUnknowns = fit.state.blocks["pair"][0]
-    if observations.lines and not state.media:
+    if observations.lines and observations.lines_bend_nothing:
         turned = turned_by_lines(observations, state, cofactor, pair_equations)
         state, cofactor = turned[0], np.asarray(turned[1])
     covariance = cofactor * max(sigma0, 1.0) ** 2
@@ -180,6 +180,8 @@ def pair_equations(observations: PairObservations, state: PairUnknowns) -> Equat
         parts.append((values / observations.sigma_ties, by / observations.sigma_ties))
     if wall.any() and not state.media:
         parts.append(wall_equations(observations, state))
+    if observations.lines and not observations.lines_bend_nothing:
+        parts.append(line_equations(observations.lines, state))
     if observations.control.ids:
         control = _control(observations, state)
         by = control.by_unknowns
