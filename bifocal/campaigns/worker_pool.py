@@ -13,7 +13,8 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from bifocal.campaigns.pair_job import PairJob, PairOutcome
+from bifocal.campaigns.pair_job import PairOutcome
+from bifocal.campaigns.pair_steps import PairJob
 from photocore.machine import cores, free_memory
 
 #: A pair whose process died is tried so often; memory that ran short may be there again.
@@ -27,6 +28,9 @@ class Listener:
 
     def moved(self, name: str, share: float, step: str) -> None:
         """Hear that a pair has come so far, 0 to 1."""
+
+    def heard(self, text: str) -> None:
+        """Hear what is waited for or done with all pairs."""
 
     def ended(self, outcome: PairOutcome) -> None:
         """Hear that a pair is done or has failed."""
