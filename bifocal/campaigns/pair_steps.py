@@ -350,7 +350,10 @@ def _points_to_draw(job: PairJob, *, solved: bool) -> dict[str, SurveyPoints]:
     from bifocal.orientation.control_points import known_points
 
     unit = str(job.options.get("unit", ""))
-    points = {role: known_points(path, unit=unit) for role, path in tables_of(job).items()}
+    points = {
+        role: known_points(path, unit=unit, photos=len(job.photos))
+        for role, path in tables_of(job).items()
+    }
     if solved:
         (table,) = (job.folder / "points").glob(f"{escape(job.title)}_points.*")
         points["points"] = read_survey_points(table)[0]
