@@ -106,7 +106,7 @@ def _variants(folder: Path, views, tank: Project) -> None:
         made, object_points=ObjectPoints(ids=names, xyz=xyz * size),
         image_points=replace(made.image_points, ids=names * len(reef)),
     ))  # fmt: skip
-    middle, way = control(12, seed=5) + LIFT, np.array([30.0, 20.0, 15.0])
+    middle, way = control(12, seed=5) + LIFT, 40.0 * np.array([0.64, 0.48, 0.6])
     wand = _project(views, tank.media["tank"], np.concatenate([middle - way, middle + way]))
     ends = tuple(f"{k}{end}" for end in "ab" for k in range(12))
     write_project(folder / "wand.toml", replace(

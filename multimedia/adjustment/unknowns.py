@@ -71,7 +71,7 @@ class Unknowns:
         Groups of object points that are rigid plates: their coordinates are in the plate's own
         frame, the pose of each is unknown.
     scale_bars : tuple of ScaleBar
-        ``*a`` to ``*b``: a wand seen in many places, its ends named 1a, 1b, 2a, 2b...
+        ``@a`` to ``@b``: a wand seen in many places, its ends named 1a, 1b, 2a, 2b...
     priors : mapping of str to float
         Label of an unknown to the standard deviation of its start value: a water level read to
         2 mm is ``{"water:offset": 0.002}``; ``c`` alone means that of every camera. Infinite:
@@ -114,7 +114,7 @@ class Unknowns:
 
 
 def bars_of(bars: Sequence[ScaleBar], names: Sequence[str]) -> tuple[ScaleBar, ...]:
-    """Return scale bars with those of a wand, ``*a`` to ``*b``, for each of its places.
+    """Return scale bars with those of a wand, ``@a`` to ``@b``, for each of its places.
 
     Parameters
     ----------
@@ -129,20 +129,20 @@ def bars_of(bars: Sequence[ScaleBar], names: Sequence[str]) -> tuple[ScaleBar, .
 
     Examples
     --------
-    >>> wand = ScaleBar(first="*a", second="*b", length=0.5, sigma=1e-4)
+    >>> wand = ScaleBar(first="@a", second="@b", length=0.5, sigma=1e-4)
     >>> [(bar.first, bar.second) for bar in bars_of([wand], ["1a", "1b", "2a", "7b"])]
     [('1a', '1b')]
     """
     measured, found = dict.fromkeys(names), []
     for bar in bars:
-        if "*" not in bar.first + bar.second:
+        if "@" not in bar.first + bar.second:
             found.append(bar)
             continue
-        heads = (bar.first.split("*"), bar.second.split("*"))
+        heads = (bar.first.split("@"), bar.second.split("@"))
         if not all(len(head) == 2 for head in heads):
             raise InputError(
-                f"scale bar {bar.first}, {bar.second}: one * in both names, where the number of "
-                "the wand's place stands: *a and *b for 1a and 1b."
+                f"scale bar {bar.first}, {bar.second}: one @ in both names, where the number of "
+                "the wand's place stands: @a and @b for 1a and 1b."
             )
         (start, end), (other, last) = heads
         shortest = len(start + end)

@@ -21,7 +21,7 @@ from multimedia import (
 from multimedia.media.camera import EXTERIOR
 from tests.multimedia.tank import LAYERS, cameras
 
-WAND = ScaleBar(first="*a", second="*b", length=80.0, sigma=0.02)
+WAND = ScaleBar(first="@a", second="@b", length=80.0, sigma=0.02)
 WALL = FlatInterface(layers=LAYERS)
 
 
@@ -87,7 +87,7 @@ def test_a_wand_and_particles_give_cameras_and_scale():
 
 def test_a_wand_of_which_no_place_is_measured_is_refused():
     _, given = waved(3, 10)
-    for first, second, text in (("*x", "*y", "no two points"), ("*a", "b", "one \\* in both")):
+    for first, second, text in (("@x", "@y", "no two points"), ("@a", "b", "one @ in both")):
         bar = replace(WAND, first=first, second=second)
         with pytest.raises(InputError, match=text):
             bundle_adjust(given, Unknowns(control="free", scale_bars=(bar,)))
