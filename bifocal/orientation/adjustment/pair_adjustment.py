@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.special import chdtrc, ndtri
 
 from bifocal.model.orientation_precision import NAMES, rates_of
 from bifocal.orientation.adjustment.observed_points import known_points, views_of
@@ -471,8 +471,8 @@ def _control_test(
 
 def as_one(square: float, count: int) -> float:
     """Return how many standard deviations of one value are as unlikely as a square sum of many."""
-    chance = float(chi2.sf(square, count))
-    return float(norm.isf(chance / 2)) if chance > 1e-300 else float(np.sqrt(square))
+    chance = float(chdtrc(count, square))
+    return -float(ndtri(chance / 2)) if chance > 1e-300 else float(np.sqrt(square))
 
 
 #: Where the cameras' `PARAMETERS` and the distortions stand in `NAMES`.
