@@ -37,7 +37,7 @@ def bare(survey: Path, out: Path) -> None:
     """Run the steps of every pair and nothing else."""
     import cv2
 
-    from bifocal.campaigns.pair_job import steps_of
+    from bifocal.campaigns.pair_steps import steps_of
     from bifocal.campaigns.survey_file import read_survey_file
     from photocore.cli import no_progress
     from photocore.errors import PhotogrammetryError

@@ -29,10 +29,9 @@ Cameras
     image_rays                the ray of an image point in the object's medium
     resect, Resection, resect_many, CameraPoses   a camera from control points; many of them
     intersect, IntersectedPoints   points from image points, least squares
-    intersect_rays, intersect_pairs   fast ways without precision
-    PointStatus               why a point is missing or doubtful
+    intersect_rays, intersect_pairs, PointStatus   fast ways; why a point is missing, doubtful
     epipolar_curve, EpipolarCurves, epipolar_candidates, Candidates   a ray in another image
-    correspondences           which targets of several cameras are of one particle
+    correspondences, track_particles, Tracks   targets of one particle; particles over time
     bundle_adjust, Adjustment, Unknowns, ScaleBar    cameras, points and media together
 Bathymetry
     correct_bathymetry, CorrectedPoints   points from above the water

@@ -61,8 +61,7 @@ from .orientation.epipolar_curves import (
     epipolar_curve,
 )
 from .orientation.intersection import IntersectedPoints, intersect, intersect_pairs, intersect_rays
-from .orientation.many_resections import CameraPoses as CameraPoses
-from .orientation.many_resections import resect_many as resect_many
+from .orientation.many_resections import CameraPoses, resect_many
 from .orientation.object_rays import image_rays
 from .orientation.point_status import PointStatus
 from .orientation.resection import Resection, resect
@@ -97,11 +96,20 @@ from .refraction.water import (
     water_index_sigma,
     water_refractive_index,
 )
+from .tracking.tracks import Tracks, track_particles
 
 __version__: str
 
 __all__ = [
     "ACRYLIC",
+    "FLOAT_GLASS",
+    "FUSED_SILICA",
+    "HOEHLE",
+    "N_BK7",
+    "PARRISH",
+    "POLYCARBONATE",
+    "QUAN_FRY",
+    "SAPPHIRE",
     "Adjustment",
     "Approximation",
     "BathymetryStatus",
@@ -109,6 +117,7 @@ __all__ = [
     "Brown",
     "CalibrationCosts",
     "Camera",
+    "CameraPoses",
     "Candidates",
     "CellError",
     "Convention",
@@ -119,12 +128,9 @@ __all__ = [
     "DetectedTargets",
     "EpipolarCurves",
     "Experiment",
-    "FLOAT_GLASS",
-    "FUSED_SILICA",
     "Fisheye",
     "FlatInterface",
     "GeometryError",
-    "HOEHLE",
     "HeightField",
     "ImagePoints",
     "InputError",
@@ -136,11 +142,8 @@ __all__ = [
     "Medium",
     "MeshSurface",
     "MissingExtraError",
-    "N_BK7",
     "ObjectPoints",
     "OpticalMedia",
-    "PARRISH",
-    "POLYCARBONATE",
     "PhotogrammetryError",
     "Placement",
     "Plane",
@@ -148,14 +151,12 @@ __all__ = [
     "PointStatus",
     "Precision",
     "Project",
-    "QUAN_FRY",
     "RasterSurface",
     "RayIntersections",
     "RayPaths",
     "RayStatus",
     "RefractingSurface",
     "Resection",
-    "SAPPHIRE",
     "ScaleBar",
     "Sensor",
     "ShiftDerivatives",
@@ -166,6 +167,7 @@ __all__ = [
     "Study",
     "SurfaceSequence",
     "Term",
+    "Tracks",
     "Unknowns",
     "WaterFormula",
     "WaterIndexDerivatives",
@@ -210,6 +212,7 @@ __all__ = [
     "refracted_angle",
     "refracted_direction",
     "resect",
+    "resect_many",
     "ring_of_cameras",
     "salinity_from_index",
     "seam_width",
@@ -218,6 +221,7 @@ __all__ = [
     "telem",
     "temperature_from_index",
     "trace_rays",
+    "track_particles",
     "water_index_derivatives",
     "water_index_sigma",
     "water_refractive_index",

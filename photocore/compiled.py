@@ -20,6 +20,10 @@ T = TypeVar("T")
 _WORTH_LOADING = 0.25
 
 
+#: Without Python's lock; divided by zero is infinite, as in numpy: no test at every division.
+_HOW = {"nogil": True, "error_model": "numpy"}
+
+
 class Kernel(Generic[P, T]):
     """A function that numba compiles when it is first called; without numba, the function itself.
 
@@ -60,7 +64,11 @@ class Kernel(Generic[P, T]):
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> T:
         """Return what the function returns, from machine code where there is numba."""
-        return self.machine_code()(*args, **kwargs)
+        try:
+            return self.machine_code()(*args, **kwargs)
+        except OSError:  # a full disk does not take the machine code: do without a copy of it
+            self._run = self._uncached()
+            return self._run(*args, **kwargs)
 
     def pays(self, seconds: float) -> bool:
         """Return whether to call this rather than go the road of numpy.
@@ -98,12 +106,14 @@ class Kernel(Generic[P, T]):
         if numba is None:
             return self.plain
         bound = self._bound(lambda kernel: kernel.machine_code())
-        # Divided by zero is infinite, as in numpy: no test at every division.
-        how = {"nogil": True, "error_model": "numpy"}
         try:
-            return numba.njit(cache=True, **how)(bound)
+            return numba.njit(cache=True, **_HOW)(bound)
         except RuntimeError:  # neither the module's folder nor the user's cache may be written
-            return numba.njit(**how)(bound)
+            return self._uncached()
+
+    def _uncached(self) -> Any:
+        numba = _numba()
+        return numba.njit(**_HOW)(self._bound(lambda kernel: kernel._uncached()))
 
     def _bound(self, made: Callable[[Any], Any]) -> Any:
         """Return the function with what is made of the kernels that it calls in their place."""

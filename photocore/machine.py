@@ -20,7 +20,7 @@ LIBRARIES = (
     "matplotlib", "ezdxf", "laspy", "click",
 )  # fmt: skip
 EXTRAS = {
-    "lens": ("lensfunpy",), "fast": ("pyarrow", "numba"),
+    "lens": ("lensfunpy",), "fast": ("pyarrow", "numba"), "hdf": ("h5py",),
     "cluster": ("dask", "distributed"),
 }  # fmt: skip
 OFFICE = ("soffice", "libreoffice")

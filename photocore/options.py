@@ -5,6 +5,7 @@ A row there is at once an option of the command line, a key of files and an argu
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import tomllib
@@ -68,6 +69,41 @@ class Option:
         changes = {"default": None, "show_default": False, "help": said}
         return Option(self.name, self.flags, **(self.attributes | changes))
 
+    @property
+    def fixed_default(self) -> Any:
+        """The value it has where it is not given; None where that depends on other things."""
+        value = self.attributes.get("default")
+        kind = self.attributes.get("type")
+        if value in (None, "", ()):
+            return (
+                False
+                if value is None and {"is_flag", "hidden"} & self.attributes.keys() == {"is_flag"}
+                else None
+            )
+        return kind.convert(value, None, None) if isinstance(value, str) and kind else value
+
+    def typed_as(self, value: Any, *, in_file: bool = False) -> list[str]:
+        """Return a value as words of the command line, or as keys of a file.
+
+        Examples
+        --------
+        >>> Option("relief_gsd", "--relief-gsd").typed_as(0.005)
+        ['--relief-gsd 0.005']
+        >>> Option("mask", "--mask/--no-mask").typed_as(False)
+        ['--no-mask']
+        >>> Option("bounds", "--bounds").typed_as((0.0, 1.5), in_file=True)
+        ['bounds = [0, 1.5]']
+        """
+        if self.attributes.get("multiple") and not in_file:
+            return [f"{self.flag} {_shown(one)}" for one in value]
+        if in_file:
+            return [f"{self.name} = {_in_file(value)}"]
+        if self.is_switch:
+            return [self.flag if value else self.flags.rpartition("/")[2]]
+        if isinstance(self.attributes.get("type"), Scale):
+            return [f"{self.flag} 1:{_shown(value)}"]
+        return [f"{self.flag} {_shown(value)}"]
+
     def is_said(self, value: object) -> bool:
         """Whether a value is more than that of an option left out; zero is a number."""
         by_default = value is False and "/" not in self.flags
@@ -111,6 +147,27 @@ class Option:
         if not isinstance(value, str):
             raise ValueError("a text")
         return value
+
+
+def _shown(value: Any) -> str:
+    """Return a value in one word of the command line."""
+    if isinstance(value, list | tuple):
+        return ",".join(map(_shown, value))
+    if isinstance(value, float):
+        return f"{value:.10g}"
+    text = value.name if isinstance(value, Path) else str(value)
+    return f'"{text}"' if not text or " " in text else text
+
+
+def _in_file(value: Any) -> str:
+    """Return a value as a file of options holds it."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_in_file, value))}]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int | float):
+        return f"{value:.10g}"
+    return json.dumps(value.name if isinstance(value, Path) else str(value), ensure_ascii=False)
 
 
 def _enter_cog(ctx: click.Context, param: click.Parameter, value: bool) -> None:  # noqa: ARG001

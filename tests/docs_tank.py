@@ -79,14 +79,16 @@ def _project(views, media, xyz: np.ndarray, unit: str = "mm") -> Project:
 
 
 def _particles(folder: Path, views, glass: FlatInterface) -> None:
-    """Write the targets of a frame of thirty particles, as frame 1 and frame 10001."""
+    """Write the targets of thirty particles, as frame 1 and as they turn from frame 10001 on."""
     xyz = np.random.default_rng(7).uniform((-60, -50, 150), (60, 50, 250), (30, 3))
     (folder / "experiment" / "img").mkdir()
     (folder / "experiment" / "res").mkdir()
-    for camera in views:
-        pixels = camera.sensor.pixel_from_image(project(camera, xyz, glass))
-        lines = [f"{n} {x:.6f} {y:.6f} 9 3 3 99 -1" for n, (x, y) in enumerate(pixels)]
-        for frame in (1, 10001):
+    for frame in (1, *range(10001, 10007)):
+        turn = np.exp(0.05j * max(frame - 10001, 0)) * (xyz[:, 0] + 1j * xyz[:, 1])
+        moved = np.column_stack([turn.real, turn.imag, xyz[:, 2]])
+        for camera in views:
+            pixels = camera.sensor.pixel_from_image(project(camera, moved, glass))
+            lines = [f"{n} {x:.6f} {y:.6f} 9 3 3 99 -1" for n, (x, y) in enumerate(pixels)]
             path = folder / "experiment" / "img" / f"{camera.name}.{frame}_targets"
             path.write_text("\n".join([f"{len(lines)}", *lines, ""]))
 

@@ -46,6 +46,7 @@ NOT_RUN = {
     "python benchmarks/relief_ablation.py": MINUTES,
     "python benchmarks/relief_tuning.py": MINUTES,
     "python benchmarks/bench_shift.py": MINUTES,
+    "python benchmarks/bench_tracking.py": MINUTES,
     "python -m benchmarks.bench_page 100": MINUTES,
     "python -m benchmarks.peers": MINUTES,
     "python docs/make_page_pictures.py": "wants a browser, and writes into docs",
@@ -60,6 +61,10 @@ NOT_RUN = {
     "bifocal demo": "tutorial-facade.md runs it with --out",
     "bifocal demo --out sample --overwrite": "tutorial-facade.md runs it with another folder",
     "bifocal demo --water --out under-water": "tests/bifocal/demo runs it with another folder",
+    "bifocal align far.jpg mid.jpg near.jpg --control set.csv --out wall.photos.json":
+        "wants three photos; test_photo_sets.py has them",
+    "bifocal facade far.jpg mid.jpg near.jpg --control set.csv --scale 1:50 --out porch":
+        "wants three photos; test_photo_sets.py has them",
     "bifocal adjust a.pair.json b.pair.json c.pair.json --control a.csv --control none --control "
     "c.csv --out joint": "wants a street; test_joint_adjustment.py has one",
     **dict.fromkeys(IN_PART, "names options, is no whole line"),
@@ -113,6 +118,7 @@ FIRST = {
 }  # fmt: skip
 #: Help that goes on where that of another command ends: what it reports on is made there.
 GOES_ON = {f"help of bifocal {name}": "help of bifocal facade" for name in ("report", "verify")}
+GOES_ON |= dict.fromkeys(("reports.md", "delivery.md"), "facade.md")
 #: Lines that want the sample at its full size.
 WHOLE = "--what targets"
 #: Options added so that the line costs seconds: the page's own products are made by other lines.

@@ -12,7 +12,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from bifocal.campaigns.pair_job import PairJob, PairOutcome, run_pair
+from bifocal.campaigns.pair_job import PairOutcome, run_pair
+from bifocal.campaigns.pair_steps import PairJob
 from bifocal.campaigns.shipping import ShippedPair, found_anywhere, packed, run_parcel, unpacked
 from bifocal.campaigns.worker_pool import Listener
 from photocore.errors import InputError

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bifocal.campaigns.pair_job import PairJob, tables_of
+from bifocal.campaigns.pair_steps import PairJob, tables_of
 from bifocal.faces.faces_files import read_faces
 from bifocal.model.lens import Lens
 from bifocal.orientation.control_points import read_control
@@ -18,14 +18,17 @@ def check_files(job: PairJob) -> None:
     InputError
         Naming the first of them.
     """
-    for path in (job.far, job.near, *job.files.values()):
+    for path in (*job.photos, *job.files.values()):
         check_name(path)
         check_file(path)
     if "faces" in job.files:
         read_faces(job.files["faces"])
-    for path in (job.far, job.near):
+    for path in job.photos:
         image_info(path)
     for role in sorted({"lens", "lens1", "lens2"} & job.files.keys()):
         Lens.read(job.files[role])
     for path in tables_of(job).values():
-        read_control(path, sigma=0.003, sigma_plane=0.005, unit=job.options.get("unit", ""))
+        read_control(
+            path, sigma=0.003, sigma_plane=0.005, unit=job.options.get("unit", ""),
+            photos=len(job.photos),
+        )  # fmt: skip

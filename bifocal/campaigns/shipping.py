@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from bifocal.campaigns.pair_job import PairJob, PairOutcome, run_pair
+from bifocal.campaigns.pair_job import PairOutcome, run_pair
+from bifocal.campaigns.pair_steps import PairJob
 from bifocal.campaigns.step_store import receive_step
 from photocore.errors import InputError
 from photocore.provenance import FileHashes
@@ -55,6 +56,7 @@ def _moved(job: PairJob, there: Callable[[Path], Path]) -> PairJob:
     """Return a job with its files and folders elsewhere."""
     files = {role: there(path) for role, path in job.files.items()}
     own: dict[str, Any] = {name: there(getattr(job, name)) for name in ("folder", "far", "near")}
+    own["more"] = tuple(map(there, job.more))
     return replace(job, files=files, joint=job.joint and there(job.joint), **own)
 
 
@@ -67,7 +69,7 @@ def packed(job: PairJob) -> Parcel:
         If a file cannot be read, or the files have no folder in common.
     """
     job = found_anywhere(job)
-    needed = [job.far, job.near, *job.files.values()]
+    needed = [*job.photos, *job.files.values()]
     try:
         root = Path(os.path.commonpath([job.folder, *(path.parent for path in needed)]))
     except ValueError:

@@ -11,15 +11,20 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import platform
 import shutil
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import cache
+from importlib import import_module
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from bifocal.options import defaults_of, typed
 from photocore import interrupts
 from photocore.cli import Progress
 from photocore.errors import InputError
@@ -52,6 +57,8 @@ class Step:
         What else decides the result; plain data.
     make : callable
         Writes into the folder it is given; returns remarks.
+    command : str
+        What was typed for it; empty where nobody could.
     """
 
     name: str
@@ -59,11 +66,14 @@ class Step:
     after: tuple[str, ...] = ()
     options: Mapping[str, Any] = field(default_factory=dict)
     make: Callable[[Path, Progress], tuple[str, ...]]
+    command: str = ""
 
     def described(self) -> str:
-        """Return the step with its options in one line."""
-        said = to_text({key: self.options[key] for key in sorted(self.options)})
-        return f"bifocal survey, step {self.name}, options {said}"
+        """Return what was typed for the step, and what held where nothing was, in one line."""
+        said = self.command or "; ".join(["bifocal survey", *typed(self.options, in_file=True)])
+        unsaid = defaults_of(self.name, {**self.options, **self.files})
+        told = ", ".join(typed(unsaid, in_file=True))
+        return f"{said}; step {self.name}" + (f"; by default {told}" if told else "")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,12 +89,18 @@ class StepRecord:
     remarks : tuple of str
     seconds : float
         That it took.
+    machine : str
+        On which it did.
+    command : str
+        What was typed for it.
     """
 
     key: str
     outputs: Mapping[str, str]
     remarks: tuple[str, ...] = ()
     seconds: float = 0.0
+    machine: str = ""
+    command: str = ""
 
 
 def step_key(step: Step, earlier: Mapping[str, StepRecord], hashes: FileHashes) -> str:
@@ -119,7 +135,8 @@ def read_record(folder: Path) -> StepRecord | None:
         if data["format"] == FORMAT:
             return StepRecord(
                 key=data["key"], outputs=data["outputs"], remarks=tuple(data["remarks"]),
-                seconds=data["seconds"],
+                seconds=data["seconds"], machine=data.get("machine", ""),
+                command=data.get("command", ""),
             )  # fmt: skip
     return None
 
@@ -160,7 +177,8 @@ def run_step(
         outputs = {name.as_posix(): file_hash(place / name) for name in _files(place)}
         record = StepRecord(
             key=key, outputs=outputs, remarks=tuple(remarks),
-            seconds=time.perf_counter() - start,
+            seconds=time.perf_counter() - start, machine=_machine(),
+            command=step.command,
         )  # fmt: skip
         _write_record(place, step, record, hashes)
         _publish(place, folder, old, overwrite=overwrite)
@@ -186,6 +204,16 @@ def receive_step(
             (place / name).parent.mkdir(parents=True, exist_ok=True)
             (place / name).write_bytes(content)
         _publish(place, folder, old, overwrite=overwrite)
+
+
+@cache
+def _machine() -> str:
+    """Return what computes here: system, processor, Python and the libraries that count."""
+    libraries = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy"))
+    return (
+        f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, Python "
+        f"{platform.python_version()}, {libraries}, OpenCV {import_module('cv2').__version__}"
+    )
 
 
 @contextmanager
@@ -287,6 +315,8 @@ def _write_record(place: Path, step: Step, record: StepRecord, hashes: FileHashe
         "outputs": dict(record.outputs),
         "remarks": list(record.remarks),
         "seconds": round(record.seconds, 3),
+        "machine": record.machine,
+        "command": record.command,
     }
     (place / RECORD).write_text(to_text(data, indent=1) + "\n", encoding="utf-8")
 

@@ -14,7 +14,7 @@ from itertools import chain
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from bifocal.campaigns.pair_job import FIRST_STEP, PRODUCTS, PairJob
+from bifocal.campaigns.pair_steps import FIRST_STEP, PRODUCTS, PairJob
 from bifocal.campaigns.step_store import FORMAT, RECORD, read_record, record_key
 from bifocal.campaigns.workflow import facade
 from bifocal.files.point_tables import read_survey_points
@@ -369,6 +369,7 @@ def _job(
         far=files.pop("far"), near=files.pop("near"), date=steps[FIRST_STEP]["date"],
         files={role: path for role, path in files.items() if role in FILES},
         options={key: value for key, value in options.items() if key != "title"},
+        told={step: told for step in steps if (told := read_record(folder / step))},
         products=tuple(product for product in PRODUCTS if product in steps),
     )  # fmt: skip
 

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from bifocal.campaigns.pair_job import PairJob, PairOutcome, plan_of_steps, run_steps, tables_of
+from bifocal.campaigns.pair_job import PairOutcome, plan_of_steps, run_steps
+from bifocal.campaigns.pair_steps import PairJob, tables_of
 from bifocal.campaigns.step_store import Step, clean
 from bifocal.options import JOINT as JOINT_OPTIONS
 from photocore.cli import Progress, no_progress

@@ -13,7 +13,8 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from bifocal.campaigns.pair_job import PairJob, PairOutcome
+from bifocal.campaigns.pair_job import PairOutcome
+from bifocal.campaigns.pair_steps import PairJob
 from photocore.machine import cores, free_memory
 
 #: A pair whose process died is tried so often; memory that ran short may be there again.

@@ -11,13 +11,12 @@ from typing import Any
 
 from bifocal.campaigns.folder_locks import locked
 from bifocal.campaigns.inputs import check_files
-from bifocal.campaigns.pair_job import (
+from bifocal.campaigns.pair_job import PairOutcome, plan_of
+from bifocal.campaigns.pair_steps import (
     FIRST_STEP,
     MOST_PRODUCTS,
     PRODUCTS,
     PairJob,
-    PairOutcome,
-    plan_of,
     refusal,
     steps_of,
 )
@@ -380,6 +379,7 @@ def facade_job(
     near: Path,
     out: Path,
     *,
+    more: tuple[Path, ...] = (),
     name: str = "",
     given: Mapping[str, Any] | None = None,
     products: tuple[str, ...] | None = None,
@@ -393,6 +393,8 @@ def facade_job(
         Photos.
     out : Path
         Folder; each step gets one in it.
+    more : tuple of Path
+        Photos that make a set of these.
     name : str
         Title; default that of the folder.
     given : mapping
@@ -419,8 +421,10 @@ def facade_job(
         folder=out,
         far=far,
         near=near,
+        more=more,
         files={role: path for role, path in said.items() if role in FILES},
         options={key: value for key, value in said.items() if key not in FILES},
+        way="facade",
         products=tuple(p for p in PRODUCTS if p in products) if products else MOST_PRODUCTS,
         overwrite=overwrite,
     )

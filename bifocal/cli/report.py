@@ -18,9 +18,15 @@ def command(source: Path, out: Path, overwrite: bool, **options: Any) -> None:
     scale first, then geometry, photos, relief, residuals, and the method with one point worked
     through for a pocket calculator.
     """
+    from bifocal.options import PROJECT
     from bifocal.reports.workflow import ReportTask, report_of
 
-    task = ReportTask(**options | {"unit": options["unit"] or ""})
+    project = {name: value for name in PROJECT if (value := options.pop(name)) is not None}
+    given: dict[str, Any] = {
+        "unit": options.pop("unit") or "",
+        "language": options.pop("language") or "",
+    }
+    task = ReportTask(**options, **given, project=project)
     with progress_bar("report") as progress:
         for text in report_of(source, out, task, overwrite=overwrite, progress=progress):
             remark(text)

@@ -25,11 +25,14 @@ from bifocal.collimation.records import (
     CODES,
     Change,
     DrawnLine,
+    DrawnShape,
     Known,
     PickedControl,
     PickedPoint,
+    ScaleLength,
     SurveyState,
     TapedLength,
+    WallSpot,
 )
 from bifocal.remarks import remark
 from bifocal.survey.observations import DOUBT_CODES
@@ -37,6 +40,8 @@ from photocore.errors import InputError
 
 #: A larger survey is another one.
 MOST_POINTS = 20_000
+#: So many shapes, of so many corners, a person draws.
+MOST_SHAPES, MOST_CORNERS = 2_000, 500
 
 
 def changes_of(state: SurveyState, command: Fields) -> list[Change]:
@@ -164,6 +169,27 @@ def _line_delete(state: SurveyState, command: Fields) -> list[Change]:
     return [Change("lines", line.name, line, None)]
 
 
+def _shape_set(state: SurveyState, command: Fields) -> list[Change]:
+    kind, number = command["kind"], len(state.shapes) + 1
+    while (free := f"{kind[0].upper()}{number}") in state.shapes:
+        number += 1
+    name = command.get("name") or free
+    least = 2 if kind == "break" else 3
+    if not least <= len(command["corners"]) <= MOST_CORNERS:
+        raise FieldError(remark("page.shape_corners", least=least))
+    before = state.shapes.get(name)
+    if before is None and len(state.shapes) >= MOST_SHAPES:
+        raise InputError(remark("page.most_points", most=MOST_SHAPES))
+    layer = command.get("layer") or ("" if before is None else before.layer)
+    shape = DrawnShape(name=name, kind=kind, corners=tupled(command["corners"]), layer=layer)
+    return [Change("shapes", name, before, shape)]
+
+
+def _shape_delete(state: SurveyState, command: Fields) -> list[Change]:
+    shape = _named("shapes", state, command)
+    return [Change("shapes", shape.name, shape, None)]
+
+
 def _control_name(state: SurveyState, command: Fields) -> str:
     return command.get("name") or state.free_name("C")
 
@@ -220,6 +246,19 @@ def _control_paste(state: SurveyState, command: Fields) -> list[Change]:
     return changes
 
 
+def _control_add(state: SurveyState, command: Fields) -> list[Change]:
+    """Add targets that a job found, to be given their coordinates; taken names get another."""
+    changes, taken = [], set(state.control)
+    for entry in command["control"]:
+        name = entry["name"]
+        while name in taken:
+            name = f"{name}b"
+        taken.add(name)
+        point = PickedControl(name=name, order=state.next_order(), picks=tupled(entry["picks"]))
+        changes.append(Change("control", name, None, point))
+    return changes
+
+
 def _taped(state: SurveyState, tape: TapedLength) -> Change:
     key = "|".join(sorted((tape.start, tape.end)))
     return Change("tapes", key, state.tapes.get(key), tape)
@@ -245,6 +284,33 @@ def _tape_delete(state: SurveyState, command: Fields) -> list[Change]:
     return [Change("tapes", key, state.tapes[key], None)]
 
 
+def _control_use(state: SurveyState, command: Fields) -> list[Change]:
+    before = _named("control", state, command)
+    return [Change("control", before.name, before, replace(before, use=command["use"]))]
+
+
+def _length_set(state: SurveyState, command: Fields) -> list[Change]:
+    a, b = command["ends"]
+    if max(abs(a[0] - b[0]), abs(a[1] - b[1])) < 2:
+        raise FieldError(remark("page.length_ends"))
+    if command["length"] is None:
+        raise FieldError(remark("page.tape_length"))
+    drawn = ScaleLength(
+        image=command["image"], ends=tupled(command["ends"]), length=command["length"],
+        sigma=command.get("sigma"),
+    )  # fmt: skip
+    return [Change("scale", "length", state.scale.get("length"), drawn)]
+
+
+def _length_delete(state: SurveyState, command: Fields) -> list[Change]:  # noqa: ARG001
+    return [Change("scale", "length", state.scale.get("length"), None)]
+
+
+def _wall_set(state: SurveyState, command: Fields) -> list[Change]:
+    spot = None if command.get("column") is None else WallSpot(pixel=pixel_of(command))
+    return [Change("wall", "spot", state.wall.get("spot"), spot)]
+
+
 def _lens_set(state: SurveyState, command: Fields) -> None:
     image = command["image"]
     values = {key: command[key] for key in ("focal_mm", "sensor_width_mm") if key in command}
@@ -267,6 +333,8 @@ def _exchange(state: SurveyState, command: Fields) -> None:
     state.control = {n: _turned(p) for n, p in state.control.items()}
     if not (lens_ratio(state.lenses.get(1, {}), state.lenses.get(2, {})) or 0.0) > 1.0:
         state.lenses = {3 - image: lens for image, lens in state.lenses.items()}
+    state.scale = {k: replace(one, image=3 - one.image) for k, one in state.scale.items()}
+    state.wall, state.shapes = {}, {}
     state.ordered = command.get("found") is not True
     state.forget_orientation()
     state.done, state.undone = (
@@ -279,6 +347,10 @@ def _exchange(state: SurveyState, command: Fields) -> None:
 
 def _turned(record: Any) -> Any:
     """Return a record with the picks of both photos exchanged, where it has some."""
+    if isinstance(record, ScaleLength):
+        return replace(record, image=3 - record.image)
+    if isinstance(record, WallSpot | DrawnShape):  # of the other photo now
+        return None
     if not hasattr(record, "picks"):
         return record
     turned = replace(record, picks=record.picks[::-1])
@@ -329,10 +401,17 @@ _RECORDS: dict[Any, Callable[[SurveyState, Fields], list[Change]]] = {
     "points.add": _points_add,
     "line.set": _line_set,
     "line.delete": _line_delete,
+    "shape.set": _shape_set,
+    "shape.delete": _shape_delete,
     "control.set": _control_set,
     "control.pick": _control_pick,
     "control.rename": _control_rename,
     "control.delete": _control_delete,
+    "control.use": _control_use,
+    "control.add": _control_add,
+    "length.set": _length_set,
+    "length.delete": _length_delete,
+    "wall.set": _wall_set,
     "control.paste": _control_paste,
     "tape.set": _tape_set,
     "tape.delete": _tape_delete,

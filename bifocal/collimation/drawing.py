@@ -9,14 +9,19 @@ import numpy as np
 
 from bifocal.collimation.live_results import LiveResults
 from bifocal.collimation.records import SurveyState
+from bifocal.collimation.shapes import places_of
 from bifocal.files.exports import export_points
+from bifocal.model.pair import Pair
 from bifocal.model.points import PointLine, SurveyPoints
 from bifocal.remarks import remark
 from photocore.errors import InputError
 
+#: Layer of outlines that were given none.
+OUTLINES = "outlines"
+
 
 def drawn_points(
-    state: SurveyState, results: LiveResults | None
+    state: SurveyState, results: LiveResults | None, pair: Pair | None = None
 ) -> tuple[SurveyPoints, tuple[PointLine, ...]]:
     """Return the solved points and the lines of a survey.
 
@@ -28,6 +33,15 @@ def drawn_points(
     lines = tuple(
         PointLine(line.name, line.layer, line.points, line.closed) for line in state.lines.values()
     )
+    if pair is not None:
+        lines += tuple(
+            PointLine(
+                shape.name, shape.layer or OUTLINES, (), closed=True,
+                places=tuple(map(tuple, places_of(pair, shape.corners).tolist())),
+            )
+            for shape in state.shapes.values()
+            if shape.kind == "outline"
+        )  # fmt: skip
     points = [point for point in state.sorted_points() if point.use]
     rows = [] if results is None else [(point, results.row(point)) for point in points]
     solved = [(point, row) for point, row in rows if row is not None]
@@ -49,7 +63,7 @@ def drawn_points(
 
 def write_points_drawing(state: SurveyState, results: LiveResults | None, path: Path) -> None:
     """Write the drawing over what may stand there."""
-    points, lines = drawn_points(state, results)
+    points, lines = drawn_points(state, results, None if results is None else results.pair)
     export_points(path, points, lines=lines, overwrite=True)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from bifocal.collimation.records import CODES, Pixel
+from bifocal.collimation.records import CODES, SHAPES, Pixel
 from bifocal.collimation.stated_media import INDICES, MEDIA
 from bifocal.remarks import remark
 from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX
@@ -152,6 +152,13 @@ COMMANDS: Mapping[str, Mapping[str, Reader]] = {
     "point.delete": _NAME,
     "line.set": {**_NAME, "layer?": text_of, "points?": _TEXTS, "closed?": _FLAG},
     "line.delete": _NAME,
+    "shape.set": {
+        "name?": _if_any(text_of),
+        "kind": _one_of(*SHAPES),
+        "corners": _of([[float, float, float]], "a list of [column, row, relief]"),
+        "layer?": text_of,
+    },
+    "shape.delete": _NAME,
     "control.set": {"name?": _if_any(text_of), **_PLACE},
     "control.pick": {"name?": _if_any(text_of), **_PIXEL},
     "control.rename": {**_NAME, "new": text_of},
@@ -159,6 +166,15 @@ COMMANDS: Mapping[str, Mapping[str, Reader]] = {
     "control.paste": {"text": _TEXT},
     "tape.set": {**_TAPE, "length?": positive_of, "sigma?": positive_of},
     "tape.delete": _TAPE,
+    "control.use": {**_NAME, "use": _FLAG},
+    "length.set": {
+        "image": image_of,
+        "ends": _of([_PICK, _PICK], "two pixels"),
+        "length": positive_of,
+        "sigma?": positive_of,
+    },
+    "length.delete": {},
+    "wall.set": {"column?": number_of, "row?": number_of},
     "photo.set": {"image": image_of, "focal_mm?": positive_of, "sensor_width_mm?": positive_of},
     "setup.set": {f"{key}?": _index if key in INDICES else positive_of for key in SETUP},
     "stage.set": {"stage": _one_of(*STAGES)},
@@ -177,7 +193,8 @@ NOTES: Mapping[str, Mapping[str, Reader]] = {
 }
 #: What the journal holds: also the points, and the order of the photos, that a job found.
 RECORDS = {
-    **COMMANDS, **NOTES, "points.add": {"points": _of([_FOUND], "a list of points")},
+    **COMMANDS, **NOTES, "control.add": {"control": _of([_FOUND], "a list of targets")},
+    "points.add": {"points": _of([_FOUND], "a list of points")},
     "photos.exchange": {"found?": _FLAG},
 }  # fmt: skip
 

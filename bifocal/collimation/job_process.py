@@ -9,10 +9,14 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from bifocal.collimation.proposals import wall_sheet
+from bifocal.collimation.shapes import shapes_from
 from bifocal.collimation.stated_media import media_from_dict
 from bifocal.faces.faces_files import faces_path
+from bifocal.faces.suggestions import suggest_faces
 from bifocal.matching.matching import MatchSettings
 from bifocal.model.geotiff import gsd_at_scale
+from bifocal.model.relief_map import ReliefMap
 from bifocal.orientation.align_workflow import (
     AlignOptions,
     KnownLens,
@@ -23,10 +27,15 @@ from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orthophotos.deliver_workflow import DPI, DeliverTask, default_title, deliver
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
 from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
+from bifocal.reports.content import ReportTask
+from bifocal.reports.handover import HandoverTask, write_handover
+from bifocal.reports.view_workflow import view_relief
+from bifocal.reports.workflow import report_of
 from bifocal.workbook.match_workflow import match_pair_file
 from bifocal.workbook.pair_workflow import read_pair
 from photocore.cli import Progress
-from photocore.errors import PhotogrammetryError
+from photocore.errors import GeometryError, PhotogrammetryError
+from photocore.images import image_info, read_grey
 from photocore.interrupts import end_on_signals
 from photocore.jsonfile import plain
 
@@ -74,6 +83,7 @@ def _align(task: Task, progress: Progress) -> dict[str, Any]:
         lenses=(lenses[0], lenses[1]),
         site=site,
         auto=task["auto"],
+        one_lens=task["auto"],
         as_set_up=task["as_set_up"],
         media=media_from_dict(task["media"]),
         control=_path(task["control"]),
@@ -82,7 +92,15 @@ def _align(task: Task, progress: Progress) -> dict[str, Any]:
     alignment = align_photos(
         Path(task["far"]), Path(task["near"]), Path(task["out"]), options, overwrite=True
     )
-    return alignment_as_dict(alignment)
+    sizes = [image_info(Path(task[which])).size for which in ("far", "near")]
+    if alignment.pair.photo_file(1).name != Path(task["far"]).name:
+        sizes.reverse()
+    sheets = zip((alignment.tie1, alignment.tie2), sizes, strict=True)
+    return alignment_as_dict(alignment) | {
+        "free_scale": task["free_scale"],
+        "planes": alignment.setup["planes"],
+        "wall": [wall_sheet(ties, alignment.wall, size) for ties, size in sheets],
+    }
 
 
 def _match(task: Task, progress: Progress) -> dict[str, Any]:
@@ -103,6 +121,15 @@ def _match(task: Task, progress: Progress) -> dict[str, Any]:
             )
         ]
     }  # fmt: skip
+
+
+def _targets(task: Task, progress: Progress) -> dict[str, Any]:
+    """Return the targets that both photos show."""
+    try:
+        found = _match({**task, "count": 5000, "features": False}, progress)
+    except GeometryError:  # too few to check the pair by
+        return {"points": []}
+    return {"points": [one for one in found["points"] if one["code"] != "feature"]}
 
 
 def _relief(task: Task, progress: Progress) -> dict[str, Any]:
@@ -133,15 +160,67 @@ def _ortho(task: Task, progress: Progress) -> dict[str, Any]:
 
 
 def _deliver(task: Task, progress: Progress) -> dict[str, Any]:
-    path = Path(task["pair"])
+    """Make drawings, report and 3-D view; relief and orthophoto first where they are lacking."""
+    path, out = Path(task["pair"]), Path(task["out"])
+    made: dict[str, list[str]] = {}
+    told: list[str] = []
+    for kind, first, last in (("relief", 0.0, 0.5), ("ortho", 0.5, 0.65)):
+        if before := task.get("before", {}).get(kind):
+            told += _WORKS[kind](before, _within(progress, first, last))["remarks"]
+            made[kind] = [Path(before["out"]).name]
     pair = read_pair(path)
     title = task["title"] or default_title(pair, path)
     wish = DeliverTask(title=title, mark=_path(task["mark"]), **{"scale": 50.0, **task["drawing"]})
-    made = deliver(
-        pair, Path(task["out"]), _ortho_task(task), wish,
-        overwrite=task["overwrite"], progress=progress,
+    done = deliver(
+        pair, out, _ortho_task(task), wish, overwrite=task["overwrite"],
+        progress=_within(progress, 0.65, 0.9),
     )  # fmt: skip
-    return {"files": made.files, "sheet": made.sheet, "remarks": made.ortho.remarks}
+    files = [*done.files, *_documents(task, title, _within(progress, 0.9, 1.0))]
+    told += [text for text in done.ortho.remarks if text not in told]
+    return {"files": files, "made": made, "sheet": done.sheet, "remarks": told}
+
+
+def _documents(task: Task, title: str, progress: Progress) -> list[str]:
+    """Write the file to hand over, the report and a view of the relief; return their names."""
+    out, relief, ortho = Path(task["out"]), _path(task["relief"]), _path(task["ortho"])
+    language = task["drawing"]["language"]
+    names = {key: out / f"{task['stem']}_{key}.html" for key in ("report", "3d", "handover")}
+    shown = HandoverTask(
+        relief=relief, ortho=ortho, points=_path(task["mark"]), title=title, language=language
+    )
+    write_handover(Path(task["pair"]), names["handover"], shown, overwrite=task["overwrite"])
+    progress(0.4, 1.0)
+    if relief is not None:
+        view_relief(relief, names["3d"], ortho=ortho, title=title, language=language,
+                    overwrite=task["overwrite"])  # fmt: skip
+    else:
+        del names["3d"]
+    about = ReportTask(
+        title=title, language=language, scale=task["drawing"].get("scale"), relief=relief,
+        ortho=ortho, view=names.get("3d"),
+    )  # fmt: skip
+    source = _path(task["mark"]) or Path(task["pair"])
+    report_of(source, names["report"], about, overwrite=task["overwrite"])
+    return [path.name for path in names.values()]
+
+
+def _suggest(task: Task, progress: Progress) -> dict[str, Any]:
+    """Return the faces that the program would draw."""
+    progress(0.0, 1.0)
+    pair = read_pair(task["pair"])
+    images = [read_grey(pair.photo_file(number)) for number in (1, 2)]
+    found = suggest_faces(ReliefMap.read(Path(task["relief"])), [pair.image1, pair.image2], images)
+    return {"shapes": shapes_from(found, pair)}
+
+
+def _within(progress: Progress, first: float, last: float) -> Progress:
+    """Return what tells the progress of a part of the whole."""
+
+    def part(done: float, total: float, what: str = "") -> None:
+        share = min(max(done / total, 0.0), 1.0) if total > 0 else 0.0
+        progress(first + (last - first) * share, 1.0, what)
+
+    return part
 
 
 def _path(name: str | None) -> Path | None:
@@ -151,9 +230,11 @@ def _path(name: str | None) -> Path | None:
 _WORKS: dict[str, Callable[[Task, Progress], dict[str, Any]]] = {
     "align": _align,
     "match": _match,
+    "targets": _targets,
     "relief": _relief,
     "ortho": _ortho,
     "deliver": _deliver,
+    "suggest": _suggest,
 }
 
 

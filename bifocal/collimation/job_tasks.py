@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from bifocal.collimation.drawing import write_points_drawing
-from bifocal.collimation.fields import FieldError, positive_of
+from bifocal.collimation.fields import FieldError, positive_of, tupled
 from bifocal.collimation.jobs import PageJob
 from bifocal.collimation.live_orientation import control_of, lenses_of, site_of
+from bifocal.collimation.proposals import NOMINAL
 from bifocal.collimation.session import Session
 from bifocal.collimation.stated_media import lacking, media_as_dict, media_of
 from bifocal.collimation.wording import say, without_options
@@ -25,12 +26,12 @@ from photocore.jsonfile import plain
 from photocore.output import free_path
 from photocore.tables import write_csv
 
-KINDS = ("align", "match", "relief", "ortho", "deliver")
+KINDS = ("align", "match", "targets", "relief", "ortho", "deliver", "suggest")
 Options = Mapping[str, Any]
 
 
-def start_job(session: Session, kind: str, options: Options) -> PageJob:
-    """Start a job of a survey.
+def start_job(session: Session, kind: str, options: Options, *, quiet: bool = False) -> PageJob:
+    """Start a job of a survey; a ``quiet`` one makes way for any that the user starts.
 
     Raises
     ------
@@ -38,7 +39,7 @@ def start_job(session: Session, kind: str, options: Options) -> PageJob:
         If another one runs, the survey is not far enough for it, or an option is impossible.
     """
     return session.jobs.start(
-        kind, partial(task_of, session, kind, options), partial(finish, session)
+        kind, partial(task_of, session, kind, options), partial(finish, session), quiet=quiet
     )
 
 
@@ -54,22 +55,39 @@ def task_of(session: Session, kind: str, options: Options) -> dict[str, Any]:
         raise FieldError(f"kind: one of {', '.join(KINDS)}.")
     if kind == "align":
         return {"kind": kind, **_align_task(session, options)}
+    if kind == "targets":
+        path = session.proposed_path or session.files.pair
+        if path is None:
+            raise InputError(remark("page.align_first"))
+        return {"kind": kind, "pair": str(path.resolve())}
     if session.files.pair is None:
         raise InputError(remark("page.accept_first"))
     pair = {"kind": kind, "pair": str(session.files.pair.resolve())}
     if kind == "match":
         count = positive_of(options, "count") or 500
         return pair | {"count": int(min(count, 5000)), "features": options.get("what") != "targets"}
-    products = session.products
+    if kind == "suggest":
+        relief = session.products.current("relief")
+        if relief is None:
+            raise InputError(remark("page.no_relief"))
+        return pair | {"relief": str(relief.resolve())}
     if kind == "relief":
-        out = products.place("relief", ".relief.tif")
-        said = _said(options, "gsd", "bounds", "quality")
-        return pair | {"out": str(out), "overwrite": products.is_own(out), "options": said}
+        return pair | _relief_task(session, options)
     task = pair | _ortho_options(session, options)
     if kind == "ortho":
-        out = products.place("ortho", ".ortho.tif")
-        return task | {"out": str(out), "overwrite": products.is_own(out)}
-    return task | _deliver_options(session, options)
+        return task | _ortho_task(session)
+    return task | _deliver_options(session, options, pair)
+
+
+def _relief_task(session: Session, options: Options) -> dict[str, Any]:
+    out = session.products.place("relief", ".relief.tif")
+    said = _said(options, "gsd", "bounds", "quality")
+    return {"out": str(out), "overwrite": session.products.is_own(out), "options": said}
+
+
+def _ortho_task(session: Session) -> dict[str, Any]:
+    out = session.products.place("ortho", ".ortho.tif")
+    return {"out": str(out), "overwrite": session.products.is_own(out)}
 
 
 def _said(options: Options, *keys: str) -> dict[str, Any]:
@@ -99,7 +117,8 @@ def _ortho_options(session: Session, options: Options) -> dict[str, Any]:
     }
 
 
-def _deliver_options(session: Session, options: Options) -> dict[str, Any]:
+def _deliver_options(session: Session, options: Options, pair: Options) -> dict[str, Any]:
+    """Return what drawings and documents are told, and what is made before them."""
     products = session.products
     folder = products.folder / f"{products.stem}-delivered"
     own = any(kind == "deliver" for kind in products.made.values())
@@ -108,10 +127,24 @@ def _deliver_options(session: Session, options: Options) -> dict[str, Any]:
     title = options.get("title") or ""
     if not isinstance(title, str) or len(title) > 120:
         raise FieldError(remark("page.title_line"))
+    before: dict[str, Any] = {}
+    surface = _ortho_options(session, options)
+    for kind, task in (("relief", _relief_task(session, options)), ("ortho", _ortho_task(session))):
+        if products.current(kind) is None and (kind == "ortho" or surface["points"] is None):
+            before[kind] = {**pair, **task}
+            if kind == "relief":
+                surface["relief"] = str(Path(task["out"]).resolve())
+    if "ortho" in before:
+        before["ortho"] = {**before["ortho"], **surface}
+    ortho = products.current("ortho") or products.place("ortho", ".ortho.tif")
     return {
         "out": str(folder),
         "overwrite": own,
         "title": title,
+        "stem": products.stem,
+        "before": before,
+        "relief": surface["relief"],
+        "ortho": str(ortho.resolve()),
         "drawing": {
             **_said(options, "scale", "dpi", "sheet", "sections"),
             "language": session.spoken,
@@ -135,8 +168,10 @@ def _align_task(session: Session, options: Options) -> dict[str, Any]:
     given = [site.distance1, site.distance2, site.delta_d]
     way = options.get("way") or ("control" if len(control.ids) else "auto")
     way = _through_media(session, way, given)
-    if way == "auto" and not any(given) and not control.lengths:
-        raise InputError(remark("page.no_size"))
+    # One measure alone multiplies all lengths, whenever it is typed.
+    free = way == "auto" and sum(map(bool, given)) < 2 and not control.lengths
+    if free:
+        site = replace(site, distance1=NOMINAL, distance2=None, delta_d=None)
     tables: dict[str, Path | None] = {"control": None, "lengths": None}
     if way == "control":
         tables = _write_control(session, control)
@@ -149,6 +184,7 @@ def _align_task(session: Session, options: Options) -> dict[str, Any]:
         "lenses": [plain(asdict(lens)) for lens in lenses_of(state)],
         "auto": way not in ("control", "as set up"),
         "as_set_up": way == "as set up",
+        "free_scale": free,
         "media": media_as_dict(media_of(state.setup, session.pictures.pair)),
         **{key: None if path is None else str(path.resolve()) for key, path in tables.items()},
     }
@@ -204,14 +240,27 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
     kind = task["kind"]
     told = " ".join(without_options(said, session.spoken) for said in result.get("remarks", ()))
     if kind == "align":
+        if task["free_scale"] and len(control_of(session.state).ids):
+            return ""  # the user took it in hand meanwhile
         session.propose(Path(task["out"]), result)
         return told
     if kind == "match":
         session.command({"op": "points.add", "points": result["points"]})
         return ""
+    if kind == "targets":
+        known = {point.picks for point in session.state.control.values()}
+        new = [one for one in result["points"] if tupled(one["picks"]) not in known]
+        if new:
+            session.command({"op": "control.add", "control": new})
+        return say("targets", "found" if new else "none", session.spoken, count=len(new))
+    if kind == "suggest":
+        session.suggested = result["shapes"]
+        return "" if result["shapes"] else say("shapes", "none", session.spoken)
     names = [Path(task["out"]).name]
     if kind == "deliver":
         folder = Path(task["out"])
+        for first, paths in result["made"].items():
+            session.note_made(first, paths)
         names = [f"{folder.name}/{name}" for name in result["files"]]
         if any(point.is_complete for point in session.state.points.values()):
             drawing = folder / f"{session.products.stem}_points.dxf"

@@ -37,6 +37,10 @@ class PageJob:
     message : str
     process : Popen or None
         The worker, while it runs.
+    quiet : bool
+        Whether the program began it by itself.
+    ended_at : int
+        Revision of the survey at which it failed: what was changed since may have mended it.
     """
 
     number: str
@@ -45,6 +49,8 @@ class PageJob:
     progress: float = 0.0
     message: str = ""
     process: subprocess.Popen[str] | None = None
+    quiet: bool = False
+    ended_at: int = 0
 
     def as_dict(self) -> dict[str, Any]:
         """Return what the page shows of it."""
@@ -54,6 +60,7 @@ class PageJob:
             "state": self.state,
             "progress": self.progress,
             "message": self.message,
+            "quiet": self.quiet,
         }
 
 
@@ -70,6 +77,8 @@ class JobRunner:
         Called where the survey's state is another.
     language : callable
         Returns that of the page.
+    revision : callable
+        Returns that of the survey.
     """
 
     def __init__(
@@ -78,14 +87,21 @@ class JobRunner:
         tell: Callable[[dict[str, Any]], None],
         changed: Callable[[], None],
         language: Callable[[], str],
+        revision: Callable[[], int] = lambda: 0,
     ) -> None:
         self._lock, self._tell_all, self._changed, self._language = lock, tell, changed, language
+        self._revision = revision
         self.jobs: dict[str, PageJob] = {}
         self._count = 0
         self._threads: list[threading.Thread] = []
 
     def start(
-        self, kind: str, task_of: Callable[[], Task], finish: Callable[[Task, Task], str]
+        self,
+        kind: str,
+        task_of: Callable[[], Task],
+        finish: Callable[[Task, Task], str],
+        *,
+        quiet: bool = False,
     ) -> PageJob:
         """Start a job.
 
@@ -96,6 +112,8 @@ class JobRunner:
             Returns what the worker is told; asked once no other job runs.
         finish : callable
             Takes task and result over; returns what the user should know.
+        quiet : bool
+            Whether the program begins it by itself: it makes way for one that is not.
 
         Raises
         ------
@@ -104,11 +122,13 @@ class JobRunner:
         """
         with self._lock:
             running = [job for job in self.jobs.values() if job.state == "running"]
-            if running:
+            if running and running[0].quiet and not quiet:
+                self.cancel(running[0].number)
+            elif running:
                 raise InputError(remark("page.job_still_runs", kind=running[0].kind))
             task = task_of()
             self._count += 1
-            job = PageJob(str(self._count), kind)
+            job = PageJob(str(self._count), kind, quiet=quiet)
             self.jobs[job.number] = job
             for number in list(self.jobs)[:-MOST_JOBS]:
                 del self.jobs[number]
@@ -201,7 +221,7 @@ class JobRunner:
         self._end(job, "failed", without_options(why, self._language()))
 
     def _end(self, job: PageJob, state: str, message: str) -> None:
-        job.state, job.message = state, message
+        job.state, job.message, job.ended_at = state, message, self._revision()
         self._changed()
         self._tell(job)
 

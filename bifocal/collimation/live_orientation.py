@@ -62,9 +62,10 @@ def site_of(state: SurveyState) -> SiteMeasures:
     setup = state.setup
     sigmas = [setup.get(f"sigma_{name}") for name in ("d", "d1", "d2", "delta_d")]
     given = [sigma for sigma in sigmas if sigma]
+    spot = state.wall.get("spot")
     site = SiteMeasures(
         distance1=setup.get("d1"), distance2=setup.get("d2"), delta_d=setup.get("delta_d"),
-        ordered=state.ordered,
+        ordered=state.ordered, wall=None if spot is None else spot.pixel,
     )  # fmt: skip
     if all((site.distance1, site.distance2, site.delta_d)):
         site = replace(site, delta_d=None)
@@ -82,7 +83,7 @@ def lenses_of(state: SurveyState) -> tuple[KnownLens, KnownLens]:
 
 def control_of(state: SurveyState) -> Control:
     """Return the control points and tapes as `bifocal align` takes them."""
-    points = [point for point in state.sorted_control() if point.picks != (None, None)]
+    points = [p for p in state.sorted_control() if p.use and p.picks != (None, None)]
     site, nowhere = SiteMeasures(), (np.nan, np.nan)
     xyz = np.array([_known(point) for point in points]).reshape(-1, 3)
     sigma = np.full((len(points), 3), site.sigma_control)
@@ -122,7 +123,7 @@ def live_orientation(
     control = control_of(state)
     complete = [
         point for point in state.control.values()
-        if None not in point.picks and None not in point.known[:2]
+        if point.use and None not in point.picks and None not in point.known[:2]
     ]  # fmt: skip
     hints = _to_complete(state, len(complete), language)
     if len(complete) < 4:

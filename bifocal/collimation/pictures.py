@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.collimation.fields import FieldError
 from bifocal.collimation.pyramids import Pyramid, RectifiedPhoto, wall_grid
-from bifocal.collimation.records import Pixel
+from bifocal.collimation.records import Change, Picks, Pixel
 from bifocal.collimation.tile_store import TileStore
+from bifocal.files.strips import colour_strips
 from bifocal.matching.snapping import snap
 from bifocal.matching.suggestions import radial_line, suggest
 from bifocal.model.geotiff import RasterReader
@@ -22,6 +24,9 @@ from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import InputError
 from photocore.images import ImageArray, ImageInfo, image_info, read_image
 from photocore.jsonfile import plain
+
+#: Grey of what an orthophoto does not show.
+EMPTY = np.uint8(190)
 
 
 class Pictures:
@@ -86,7 +91,9 @@ class Pictures:
         """Show an orthophoto."""
         with RasterReader(path) as file:
             size = (file.width, file.height)
-        self.tiles.register("ortho-0", Pyramid(size, lambda: _ortho_pixels(path)), *_facts(path))
+        self.tiles.register(
+            "ortho-0", Pyramid(size, lambda: _ortho_pixels(path)), *_facts(path), int(EMPTY)
+        )
 
     def warm_up(self) -> None:
         """Read both photos, so that the first suggestion does not wait for it."""
@@ -104,6 +111,18 @@ class Pictures:
         if len(self.pyramids) < 2:
             raise InputError(remark("page.give_photos"))
         return self.pyramids[0].halved(0), self.pyramids[1].halved(0)
+
+    def check_picks(self, op: str, changes: Sequence[Change]) -> None:
+        """Refuse picks outside their photos."""
+        sizes = [info.size for info in self.infos]
+        if len(sizes) < 2 and op.endswith(".pick"):
+            raise InputError(remark("page.give_photos"))
+        for change in changes:
+            picks: Picks = getattr(change.after, "picks", (None, None))
+            for image, (pick, size) in enumerate(zip(picks, sizes, strict=False), start=1):
+                if pick and not all(-0.5 <= p <= n - 0.5 for p, n in zip(pick, size, strict=True)):
+                    about = {"name": change.key, "width": size[0], "height": size[1]}
+                    raise FieldError(remark("page.pick_outside", image=image, **about))
 
     def needed_pair(self) -> Pair:
         """Return the pair.
@@ -175,10 +194,12 @@ def _reader(path: Path) -> Any:
 
 
 def _ortho_pixels(path: Path) -> ImageArray:
+    """Return the colours of an orthophoto; what is empty is no black photo."""
     with RasterReader(path) as file:
-        bands = [1, 2, 3] if file.bands >= 3 else [1]
-        pixels = file.read(0, 0, file.width, file.height, bands=bands)
-    return pixels if pixels.shape[2] == 3 else pixels[:, :, 0]
+        strips = [
+            np.where(valid[..., None] > 0, colours, EMPTY) for colours, valid in colour_strips(file)
+        ]
+    return np.concatenate(strips)
 
 
 def _facts(path: Path) -> tuple[str, int, int]:

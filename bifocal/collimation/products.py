@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import io
-import zipfile
-from collections.abc import Sequence
-from hashlib import sha256
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,17 +11,24 @@ import numpy as np
 
 from bifocal.collimation.project import SurveyFiles
 from bifocal.model.geotiff import RasterReader
+from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
-from bifocal.model.relief_map import ReliefMap
+from bifocal.model.relief_map import TOLD, ReliefMap
+from bifocal.model.surface import MapSurface
+from bifocal.orthophotos.shading import shaded, tints
 from bifocal.remarks import remark
+from bifocal.reports.content import ortho_thumbnail
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.jsonfile import read_object, write_object
 from photocore.output import free_path
-from photocore.provenance import SUMS
 
 #: Longer side of the relief's picture. [px]
-OVERLAY_SIDE = 2048
+OVERLAY_SIDE = 1536
+#: Longer side of a product's preview. [px]
+PREVIEW = 480
+#: Bars of the relief's histogram.
+BINS = 96
 #: Points of a profile, at most.
 PROFILE_POINTS = 2000
 
@@ -79,17 +83,33 @@ class Products:
         offered = self.downloads(workbook)
         return [{"name": n, "bytes": p.stat().st_size} for n, p in sorted(offered.items())]
 
-    def zipped(self, workbook: Path) -> bytes:
-        """Return all files offered for download as one archive, with the list of their hashes."""
-        buffer = io.BytesIO()
-        with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-            sums = ""
-            for name, path in sorted(self.downloads(workbook).items()):
-                data = path.read_bytes()
-                sums += f"{sha256(data).hexdigest()}  {name}\n"
-                archive.writestr(zipfile.ZipInfo.from_file(path, name), data, zipfile.ZIP_DEFLATED)
-            archive.writestr(SUMS, sums)
-        return buffer.getvalue()
+    def bundle(self, workbook: Path, more: Mapping[str, Path]) -> dict[str, Path]:
+        """Return all that *Download all* holds by its name there: products, workbook, photos.
+
+        Parameters
+        ----------
+        workbook : Path
+        more : mapping of str to Path
+            Further files: photos and what the pair file names.
+        """
+        return {**more, **self.downloads(workbook)}
+
+    def preview(self, kind: str) -> bytes:
+        """Return a small picture of the relief, the orthophoto or the drawing, PNG.
+
+        Raises
+        ------
+        InputError
+            If there is none yet.
+        """
+        if kind == "relief":
+            data = np.frombuffer(self.overlay(), np.uint8)
+            return _png(_small(cv2.imdecode(data, cv2.IMREAD_UNCHANGED)))
+        path = self.current("ortho")
+        if path is None:
+            raise InputError(remark("page.no_ortho"))
+        picture, _ = ortho_thumbnail(path)
+        return _png(_small(picture[0][..., ::-1]))
 
     def facts(self, kind: str) -> dict[str, Any] | None:
         """Return size and place of the relief or the orthophoto; None where there is none.
@@ -104,6 +124,8 @@ class Products:
             facts = _grid_facts(path)
             if kind == "relief":
                 facts["range"] = relief_limits(self.relief())
+                facts["histogram"] = _histogram(self.relief())
+                facts["colours"] = colours()
             self._facts[kind] = version, facts
         return self._facts[kind][1]
 
@@ -123,16 +145,37 @@ class Products:
             self._relief = version, ReliefMap.read(path)
         return self._relief[1]
 
-    def overlay(self) -> bytes:
-        """Return the relief as a picture with transparent holes, PNG."""
+    def overlay(
+        self, low: float | None = None, high: float | None = None, *, hatched: bool = False
+    ) -> bytes:
+        """Return the relief as a shaded picture with transparent holes, PNG.
+
+        Parameters
+        ----------
+        low, high : float, optional
+            Relief of the first and the last colour; the middle one is the wall's. [m]
+        hatched : bool
+            Whether what was not measured is paler and hatched.
+        """
         relief = self.relief()
-        step = max(1, -(-max(relief.shape) // OVERLAY_SIDE))
+        limits = relief_limits(relief)
+        span = (limits[0] if low is None else low, limits[1] if high is None else high)
+        step = max(1, round(max(relief.shape) / OVERLAY_SIDE))
         r = relief.r[::step, ::step]
-        known = np.isfinite(r)
-        low, high = relief_limits(relief)
-        scaled = np.clip((np.nan_to_num(r) - low) / max(high - low, 1e-6), 0, 1)
-        colours = cv2.applyColorMap((255 * scaled).astype(np.uint8), cv2.COLORMAP_VIRIDIS)
-        return _png(np.dstack([colours, np.where(known, 255, 0).astype(np.uint8)]))
+        fine = relief.grid
+        height, width = r.shape
+        grid = Grid(x0=fine.x0, y0=fine.y0, gsd=fine.gsd * step, width=width, height=height)
+        measured = None
+        if hatched:
+            told = np.isin(relief.quality[::step, ::step], TOLD)
+            if told.any():
+                measured = MapSurface.of_array(np.where(told, r, np.float32("nan")), grid)
+        # Lines as on a sheet on which a pixel is a third of a millimetre.
+        picture, known = shaded(
+            MapSurface.of_array(r, grid), grid, limits=span, measured=measured,
+            scale=grid.gsd * 3000,
+        )  # fmt: skip
+        return _png(np.dstack([picture[..., ::-1], known]))
 
     def value(self, x: float, y: float) -> dict[str, float | None]:
         """Return relief and its standard deviation at a place of the wall. [m]"""
@@ -187,6 +230,23 @@ def relief_limits(relief: ReliefMap) -> tuple[float, float]:
     return float(low), float(high)
 
 
+def colours() -> list[str]:
+    """Return the colours from the farthest back over the wall to what stands out most."""
+    rgb = np.rint(tints(np.linspace(-1, 1, 17), (-1.0, 1.0))).astype(int)
+    return [f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in rgb]
+
+
+def _histogram(relief: ReliefMap) -> dict[str, Any]:
+    """Return how often which relief occurs: ``from``, ``to`` [m] and ``counts``."""
+    known = relief.r[np.isfinite(relief.r)]
+    if not len(known):
+        return {"from": 0.0, "to": 0.0, "counts": []}
+    low, high = (float(value) for value in np.percentile(known, [0.1, 99.9]))
+    low, high = min(low, -0.01), max(high, 0.01)
+    counts, _ = np.histogram(known, bins=BINS, range=(low, high))
+    return {"from": low, "to": high, "counts": counts.tolist()}
+
+
 def accept_pair(proposed: Path, target: Path) -> None:
     """Move a proposed pair file, and the lens files it names, to its final name."""
     data = read_object(proposed, what="pair file")
@@ -215,5 +275,11 @@ def _plain(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
+def _small(picture: Any) -> Any:
+    side = max(picture.shape[:2]) / PREVIEW
+    size = tuple(max(1, round(n / max(side, 1.0))) for n in picture.shape[1::-1])
+    return cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+
+
 def _png(picture: Any) -> bytes:
-    return cv2.imencode(".png", picture)[1].tobytes()
+    return cv2.imencode(".png", picture, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1].tobytes()

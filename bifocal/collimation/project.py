@@ -13,11 +13,11 @@ from bifocal.collimation.fields import NOTES, FieldError, fields_of
 from bifocal.workbook.pair_workflow import is_survey, read_pair
 from bifocal.workbook.reading.reader import read_survey
 from photocore.errors import InputError, PhotogrammetryError
-from photocore.images import image_info
+from photocore.images import READ, image_info
 from photocore.workbook.reading.package import open_package
 
 #: Endings of photos looked for in a folder.
-PHOTOS = frozenset({".jpg", ".jpeg", ".png", ".tif", ".tiff"})
+PHOTOS = READ
 _PAIR, _JOURNAL = ".pair.json", ".journal.jsonl"
 
 

@@ -81,6 +81,7 @@ class PickedControl:
     order: int
     known: Known = (None, None, None)
     picks: Picks = (None, None)
+    use: bool = True
 
     def picked(self, image: int, pixel: Pixel | None) -> PickedControl:
         """Return the point with a pick of photo 1 or 2 set or taken away."""
@@ -98,6 +99,23 @@ class TapedLength:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ScaleLength:
+    """A length drawn on the wall in one photo: what gives a pair its scale. [px, m]"""
+
+    image: int
+    ends: tuple[Pixel, Pixel]
+    length: float
+    sigma: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WallSpot:
+    """A spot of the far photo on the face that is the wall. [px]"""
+
+    pixel: Pixel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DrawnLine:
     """A polyline through points, on a layer of the drawing."""
 
@@ -107,9 +125,34 @@ class DrawnLine:
     closed: bool = False
 
 
+#: A corner of a shape: column and row in photo 1 [px], relief there [m].
+Corner = tuple[float, float, float]
+#: Shapes that relief and orthophoto obey, and outlines that are measured and drawn.
+SHAPES = ("face", "break", "occluder", "outline")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrawnShape:
+    """A polygon or line drawn on the wall: one of `SHAPES`; outlines lie on a layer."""
+
+    name: str
+    kind: str
+    corners: tuple[Corner, ...]
+    layer: str = ""
+
+
 #: An orientation that was accepted: its pair file, and what was reported of it.
 Accepted = dict[str, Any]
-Record = PickedPoint | PickedControl | TapedLength | DrawnLine | Accepted
+Record = (
+    PickedPoint
+    | PickedControl
+    | TapedLength
+    | DrawnLine
+    | DrawnShape
+    | ScaleLength
+    | WallSpot
+    | Accepted
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,8 +176,10 @@ class SurveyState:
 
     Attributes
     ----------
-    points, control, tapes, lines : dict
+    points, control, tapes, lines, shapes : dict
         Records by name; tapes by ``from|to``.
+    scale, wall : dict
+        The length that gives the scale, as ``length``; the spot that names the wall, as ``spot``.
     orientation : dict
         The orientation that was accepted on the page, as ``pair``.
     setup : dict of str to float or None
@@ -155,6 +200,9 @@ class SurveyState:
     control: dict[str, PickedControl] = field(default_factory=dict)
     tapes: dict[str, TapedLength] = field(default_factory=dict)
     lines: dict[str, DrawnLine] = field(default_factory=dict)
+    shapes: dict[str, DrawnShape] = field(default_factory=dict)
+    scale: dict[str, ScaleLength] = field(default_factory=dict)
+    wall: dict[str, WallSpot] = field(default_factory=dict)
     orientation: dict[str, Accepted] = field(default_factory=dict)
     setup: dict[str, float | None] = field(default_factory=dict)
     lenses: dict[int, dict[str, float | None]] = field(default_factory=dict)

@@ -13,19 +13,22 @@ from pathlib import Path
 from typing import Any, cast
 
 from bifocal.collimation.commands import changes_of
-from bifocal.collimation.fields import NOTES, FieldError, fields_of
+from bifocal.collimation.fields import NOTES, fields_of
 from bifocal.collimation.jobs import JobRunner
 from bifocal.collimation.journal import Journal
-from bifocal.collimation.live_orientation import LiveOrientation, live_orientation
+from bifocal.collimation.live_orientation import LiveOrientation
 from bifocal.collimation.live_results import LiveResults
-from bifocal.collimation.measures import measure
 from bifocal.collimation.pictures import Pictures
 from bifocal.collimation.products import Products, accept_pair
 from bifocal.collimation.project import SurveyFiles
-from bifocal.collimation.records import Change, PickedPoint, Picks, SurveyState
+from bifocal.collimation.proposals import measure_of, rescale
+from bifocal.collimation.records import Change, PickedPoint, SurveyState
+from bifocal.collimation.shapes import faces_of, keep_faces, shapes_from
 from bifocal.collimation.workbook.rows import PointRow, row_of
-from bifocal.collimation.workbook.setup import ideal_setup, pair_of
+from bifocal.collimation.workbook.setup import ideal_setup, pair_of, typed_of
 from bifocal.collimation.workbook.sync import WorkbookSync
+from bifocal.faces.faces import Faces
+from bifocal.faces.faces_files import beside
 from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.remarks import remark
@@ -36,6 +39,8 @@ from photocore.output import free_path, relative_name
 MOST_ANSWERS = 10_000
 #: Commands that bring picks of the photos.
 _PICKING = ("point.pick", "points.add", "control.pick", "control.paste")
+#: Commands that name what they make, where they are not told.
+_NAMING = ("point.pick", "control.set", "control.pick", "shape.set")
 
 
 class Session:
@@ -66,6 +71,10 @@ class Session:
         self.results: LiveResults | None = None
         self.orientation: tuple[object, LiveOrientation] | None = None
         self.proposal: dict[str, Any] | None = None
+        self.good: tuple[LiveResults, dict[str, Any] | None] | None = None
+        self._kept: tuple[dict[str, Any], Pair] | None = None
+        #: Faces that the program would draw, for the user to accept.
+        self.suggested: list[dict[str, Any]] = []
         self.state = SurveyState()
         self.journal = Journal(files.journal)
         try:
@@ -74,13 +83,17 @@ class Session:
             self.pictures = Pictures(files.folder / f".{files.stem}.tiles", photos, pair)
             self.results = None if pair is None else self._results(pair)
             self.products = Products(files)
-            self.jobs = JobRunner(self.lock, self.tell, self.changed, lambda: self.spoken)
+            self.jobs = JobRunner(
+                self.lock, self.tell, self.changed, lambda: self.spoken,
+                lambda: self.state.revision,
+            )  # fmt: skip
             self.sync = WorkbookSync(self)
             self._replay_all()
             self.journal.cut()
             self._remember_files()
             self._show_proposal()
             self.show_products()
+            self.take_faces()
             self.sync.step()
         except BaseException:
             self.journal.close()
@@ -121,11 +134,23 @@ class Session:
             first = Pair.read(path).photo_file(1)
             if not first.samefile(self.pictures.infos[0].path):
                 self.command({"op": "photos.exchange", "found": True})
-            record = {"op": "proposed", "pair": path.name, "report": dict(report)}
-            self._write(record)
-            self.proposal = record
-            self._show_proposal()
+            self._note_proposed(path, report)
+            self.follow_scale()
             self.changed()
+
+    def _note_proposed(self, path: Path, report: Mapping[str, Any]) -> None:
+        self.proposal = {"op": "proposed", "pair": path.name, "report": dict(report)}
+        self._write(self.proposal)
+        self._show_proposal()
+
+    def follow_scale(self) -> None:
+        """Bring what the photos alone gave to the scale that is known now."""
+        path, report = self.proposed_path, (self.proposal or {}).get("report", {})
+        if path is None or not report.get("free_scale"):
+            return
+        measure = measure_of(self.state)
+        if report.get("scale") != measure:
+            self._note_proposed(path, rescale(path, report, measure))
 
     def _show_proposal(self) -> None:
         path = self.proposed_path
@@ -170,7 +195,7 @@ class Session:
             return
         pair = pair_of(self.files)
         known = self.pictures.pair
-        if pair is None or (known is not None and _typed(pair) == _typed(known)):
+        if pair is None or (known is not None and typed_of(pair) == typed_of(known)):
             return
         photos = [pair.photo_file(1), pair.photo_file(2)]
         if photos != [info.path for info in self.pictures.infos]:
@@ -182,6 +207,9 @@ class Session:
         path = self.proposed_path
         if path is None:
             raise InputError(remark("page.no_orientation"))
+        report = (self.proposal or {})["report"]
+        if report.get("free_scale") and not report.get("scale"):
+            raise InputError(remark("page.no_size"))
         target = self.products.place("pair", ".pair.json")
         if path != target:
             accept_pair(path, target)
@@ -193,6 +221,14 @@ class Session:
         self._show_pair(Pair.read(target))
         if self.sync.read is not None:
             self.set_precision(self.sync.read.sigma_px, self.sync.read.limits)
+
+    def use_pair(self, path: Path) -> None:
+        """Let a pair file be the survey's orientation."""
+        with self.lock:
+            self.files = replace(self.files, pair=path)
+            self._remember_files()
+            self._show_pair(Pair.read(path))
+            self.changed()
 
     def _note_accepted(self, name: str) -> None:
         """Let the last proposal be the survey's orientation, as a step that can be taken back."""
@@ -252,6 +288,34 @@ class Session:
             self._write(record)
             self.journal.records.append(record)
 
+    def _keep_faces(self) -> None:
+        """Write what was drawn for the relief beside the pair, where it is another now."""
+        pair, file = self.pictures.pair, self.files.pair
+        if pair is None or file is None:
+            return
+        facts = dict(self.state.shapes), pair
+        if self._kept is None or self._kept[0] != facts[0] or self._kept[1] is not pair:
+            if self.state.shapes or self._kept is not None:
+                keep_faces(self.state, pair, file)
+            self._kept = facts
+
+    def take_faces(self) -> None:
+        """Take over what a file beside the pair holds, where it was drawn by others."""
+        pair, file = self.pictures.pair, self.files.pair
+        path = None if file is None else beside(file)
+        if pair is None or path is None or not path.is_file():
+            return
+        found = Faces.read(path)
+        if found.to_dict() != faces_of(self.state, pair).to_dict():
+            outlines = {n: s for n, s in self.state.shapes.items() if s.kind == "outline"}
+            for name in set(self.state.shapes) - set(outlines):
+                self._carry_out({"op": "shape.delete", "name": name}, write=True)
+            for shape in shapes_from(found, pair):
+                fields = {key: shape[key] for key in ("kind", "corners")}
+                named = {"name": shape["name"]} if shape["name"] else {}
+                self._carry_out({"op": "shape.set", **named, **fields}, write=True)
+        self._kept = dict(self.state.shapes), pair
+
     # ---- commands
 
     def command(self, command: Mapping[str, Any]) -> Any:
@@ -269,6 +333,8 @@ class Session:
             if isinstance(known, str) and known in self.answered:
                 return self.answered[known]
             result = self._checked(fields_of(command))
+            self.follow_scale()
+            self._keep_faces()
             if isinstance(known, str):
                 self._remember_answer(known, result)
             self.changed()
@@ -304,11 +370,11 @@ class Session:
         trial.setup = dict(trial.setup)
         trial.lenses = {image: dict(lens) for image, lens in trial.lenses.items()}
         changes = changes_of(trial, command)
-        if op in ("point.pick", "control.set", "control.pick") and not command.get("name"):
+        if op in _NAMING and not command.get("name"):
             command["name"] = changes[0].key
         if write:
             if op in _PICKING:
-                self._check_picks(op, changes)
+                self.pictures.check_picks(op, changes)
             self._write(command)
         self.state = trial
         self._apply(changes)
@@ -414,18 +480,6 @@ class Session:
         stamp = datetime.now(UTC).isoformat(timespec="milliseconds")
         self.journal.append({**record, "time": stamp})
 
-    def _check_picks(self, op: str, changes: Sequence[Change]) -> None:
-        """Refuse picks outside their photos."""
-        sizes = [info.size for info in self.pictures.infos]
-        if len(sizes) < 2 and op.endswith(".pick"):
-            raise InputError(remark("page.give_photos"))
-        for change in changes:
-            picks: Picks = getattr(change.after, "picks", (None, None))
-            for image, (pick, size) in enumerate(zip(picks, sizes, strict=False), start=1):
-                if pick and not all(-0.5 <= p <= n - 0.5 for p, n in zip(pick, size, strict=True)):
-                    about = {"name": change.key, "width": size[0], "height": size[1]}
-                    raise FieldError(remark("page.pick_outside", image=image, **about))
-
     # ---- listeners
 
     def changed(self) -> None:
@@ -452,42 +506,3 @@ class Session:
         self.jobs.stop()
         self.sync.stop()
         self.journal.close()
-
-    # ---- measuring
-
-    def oriented_live(self) -> LiveOrientation | None:
-        """Return what the control points tell by themselves; None without photos."""
-        state, infos = self.state, self.pictures.infos
-        if len(infos) != 2:
-            return None
-        pair, said = self.pictures.pair, self.spoken
-        facts = (dict(state.control), dict(state.tapes), state.setup, state.lenses, said, id(pair))
-        if self.orientation is None or self.orientation[0] != facts:
-            self.orientation = facts, live_orientation(state, infos, said, pair)
-        return self.orientation[1]
-
-    def measure(self, names: Sequence[str]) -> dict[str, float | None]:
-        """Return distances and angles between points."""
-        self.pictures.needed_pair()
-        places = []
-        for name in names:
-            point = self.state.points.get(name)
-            if point is None:
-                raise InputError(remark("page.no_point", name=name))
-            place = None if self.results is None else self.results.place(point)
-            if place is None:
-                raise InputError(remark("page.point_in_one", name=name))
-            places.append(place)
-        return measure(places)
-
-
-def _typed(pair: Pair) -> list[object]:
-    """Return what a workbook says of its pair, for comparison."""
-    return [
-        [
-            *(photo.file, photo.plane_from_pixel.tolist(), list(photo.nadir)),
-            *(photo.distance, photo.principal_distance, photo.sigma_pixel),
-            *(photo.layers, photo.z0),
-        ]
-        for photo in (pair.image1, pair.image2)
-    ]

@@ -9,10 +9,14 @@ import numpy as np
 
 from bifocal.collimation.live_results import LiveResults
 from bifocal.collimation.pictures import Pictures
+from bifocal.survey.tolerances import RULES, SCALES
 from photocore.arrays import FloatArray
 
 #: Longer sides of the computed grid and of the picture. [px]
 COMPUTED, SHOWN = 256, 1024
+#: Longer side of the grid on which it is said in a line how good relief is.
+COARSE = 40
+PRINT = next(rule for rule in RULES if rule.key == "print-0.25")
 #: Contour lines of sigma of r. [mm]
 LEVELS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
 _SHADE = (60, 60, 220, 110)  # BGRA
@@ -20,14 +24,14 @@ _SHADE = (60, 60, 220, 110)  # BGRA
 _SHORTEST = 6
 
 
-def relief_sigma(pictures: Pictures, results: LiveResults) -> FloatArray:
+def relief_sigma(pictures: Pictures, results: LiveResults, computed: int = COMPUTED) -> FloatArray:
     """Return sigma of the relief of points on the wall, shape (h, w), over the wall's grid. [m]
 
     NaN where not both photos show the wall.
     """
     pair, grid = pictures.needed_pair(), pictures.grid
     assert grid is not None
-    step = max(grid.width, grid.height) / COMPUTED
+    step = max(grid.width, grid.height) / computed
     width, height = (max(2, round(side / step)) for side in (grid.width, grid.height))
     xmin, ymin, xmax, ymax = grid.bounds
     x = xmin + (np.arange(width) + 0.5) * (xmax - xmin) / width
@@ -42,6 +46,31 @@ def relief_sigma(pictures: Pictures, results: LiveResults) -> FloatArray:
         solved = pair.intersect(seen[0][inside], seen[1][inside], sigma_px=results.sigma_px)
         sigma[inside] = solved.sigma[:, 2]
     return sigma.reshape(height, width)
+
+
+def how_good(pictures: Pictures, results: LiveResults) -> dict[str, Any] | None:
+    """Return how good relief is: ``middle`` and ``rim`` [m], and the finest ``scale`` that holds.
+
+    The median sigma over the middle ninth of what both photos show of the wall, and over the rest;
+    None where they show nothing together. A scale holds where nine tenths of all are within the
+    tolerance of a print.
+    """
+    sigma = relief_sigma(pictures, results, COARSE)
+    rows, columns = np.nonzero(np.isfinite(sigma))
+    if not len(rows):
+        return None
+    values = sigma[rows, columns]
+    middle = np.ones(len(rows), dtype=bool)
+    for places in (rows, columns):
+        low, high = np.percentile(places, [33, 67])
+        middle &= (places >= low) & (places <= high)
+    tenth = float(np.percentile(values, 90))
+    holds = [scale for scale in SCALES if tenth <= (PRINT.tolerance(scale) or 0.0)]
+    return {
+        "middle": float(np.median(values[middle])) if middle.any() else None,
+        "rim": float(np.median(values[~middle])) if not middle.all() else None,
+        "scale": holds[0] if holds else None,
+    }
 
 
 def uncertainty_picture(pictures: Pictures, results: LiveResults) -> bytes:

@@ -14,10 +14,12 @@ from pathlib import Path
 
 import uvicorn
 
+from bifocal.collimation.first_orientation import FirstOrientation
 from bifocal.collimation.project import find_files
 from bifocal.collimation.server.access import Access
 from bifocal.collimation.server.application import application
 from bifocal.collimation.session import Session
+from bifocal.collimation.starting import remember
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.interrupts import raising
 
@@ -104,6 +106,7 @@ def page_server(
             access.keep(number, url)
             session.sync.start()
             warm.start()
+            FirstOrientation(session).start()
             yield PageServer(
                 url, access.token, session, uvicorn.Server(config), listening, access.page
             )
@@ -142,6 +145,7 @@ def pick(
     """
     with page_server(*sources, workbook=workbook, port=port, language=language) as server:
         if browser:
+            remember(server.session.files)
             server.open_browser()
         server.serve()
 

@@ -14,7 +14,7 @@ from bifocal.faces.faces import BreakLine, Faces, Occluder, inside
 from bifocal.faces.tuning import EDGES
 from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.model.relief_map import Quality, ReliefMap
-from bifocal.model.surface import MapSurface, Surface
+from bifocal.model.surface import MapSurface, Surface, measured_on
 from bifocal.rays import Foot
 from photocore.arrays import BoolArray, Float32Array, FloatArray, IntArray
 
@@ -74,6 +74,10 @@ class FacedSurface:
         relief[self.occluded(wide)] = np.nan
         core = np.s_[margin : margin + grid.height, margin : margin + grid.width]
         return np.ascontiguousarray(relief[core])
+
+    def measured(self, grid: Grid) -> BoolArray | None:
+        """Return which pixels of a grid both photos measured, faces aside."""
+        return measured_on(self.surface, grid)
 
     def extremes(self, bounds: Bounds) -> tuple[float, float]:
         """Return the extremes over a box of the surface and of the faces that touch it."""

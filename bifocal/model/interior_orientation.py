@@ -62,6 +62,8 @@ class Interior:
         Whether it comes from a lens file.
     is_typed : bool
         Whether the focal length was typed for the far or the near photo, and is not the file's own.
+    is_sought : bool
+        Whether the photos themselves are to tell the principal distance, one for both.
     """
 
     focal: float
@@ -77,6 +79,7 @@ class Interior:
     pixel_size: float | None = None
     is_calibrated: bool = False
     is_typed: bool = False
+    is_sought: bool = False
 
     def __post_init__(self) -> None:
         """Refuse what is no principal distance, and a standard deviation of it in pixels."""
@@ -161,6 +164,17 @@ class Interior:
             sigma=0.5,
             source=remark("orientation.normal_lens"),
         )
+
+    @classmethod
+    def sought(cls, image_size: tuple[int, int]) -> Interior:
+        """Return a lens that took both photos, of whose principal distance nothing is known."""
+        lens = cls.from_focal(
+            0.95 * max(image_size),
+            image_size=image_size,
+            sigma=0.14,
+            source=remark("orientation.sought_lens"),
+        )
+        return replace(lens, is_sought=True)
 
     @property
     def is_assumed(self) -> bool:

@@ -18,12 +18,13 @@ _WIDTHS = {
 
 
 class PointLine(NamedTuple):
-    """A polyline through surveyed points, by their names, on a layer of the drawing."""
+    """A polyline on a layer of the drawing: through points by their names, or through places."""
 
     name: str
     layer: str
     ids: tuple[str, ...]
     closed: bool = False
+    places: tuple[tuple[float, ...], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

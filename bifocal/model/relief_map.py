@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bifocal.model.geotiff import RELIEF_BANDS, RasterReader, check_relief, create_raster
 from bifocal.model.grid import Grid, Gridded
-from bifocal.model.surface import MapSurface
+from bifocal.model.surface import Fetch, MapSurface
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray, as_points, read_only
 from photocore.errors import InputError
 from photocore.raster import BLOCK
@@ -198,14 +198,23 @@ class ReliefMap(Gridded):
         return values.reshape(inside.shape), inside
 
 
+def told_pixels(reader: RasterReader) -> Fetch | None:
+    """Return what reads 1 where a relief map is measured or drawn; None where it is silent."""
+    if reader.bands < 3 or not reader.names[2].startswith("quality"):
+        return None
+    return lambda *window: np.isin(reader.read(*window, bands=[3])[:, :, 0], TOLD).astype(
+        np.float32
+    )
+
+
 def measured_part(reader: RasterReader) -> MapSurface | None:
     """Return what of an open relief map was measured or drawn; None where it does not say."""
-    if reader.bands < 3 or not reader.names[2].startswith("quality"):
+    told = told_pixels(reader)
+    if told is None:
         return None
 
     def fetch(*window: int) -> Float32Array:
-        quality = reader.read(*window, bands=[3])[:, :, 0]
-        return np.where(np.isin(quality, TOLD), reader.read_floats(*window), np.float32("nan"))
+        return np.where(told(*window) > 0, reader.read_floats(*window), np.float32("nan"))
 
     with suppress(InputError):  # nothing was
         return MapSurface(reader.grid, fetch)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.model.grid import Bounds, Grid, cut
-from photocore.arrays import Float32Array, FloatArray
+from photocore.arrays import BoolArray, Float32Array, FloatArray
 from photocore.errors import InputError
 
 #: A box without end.
@@ -33,6 +33,12 @@ class Surface(Protocol):
 
     def extremes(self, bounds: Bounds) -> tuple[float, float]:
         """Return the lowest and highest relief over a box; NaN, NaN where nothing is known. [m]"""
+
+
+def measured_on(surface: Surface, grid: Grid) -> BoolArray | None:
+    """Return which pixels of a grid both photos measured; None where the surface cannot tell."""
+    measured = getattr(surface, "measured", None)
+    return None if measured is None else measured(grid)
 
 
 class FlatSurface:
@@ -67,10 +73,12 @@ class MapSurface:
         Where the map's pixels are.
     fetch : callable
         Returns any window of it.
+    fetch_measured : callable, optional
+        Returns 1 for what both photos measured in any window.
     """
 
-    def __init__(self, grid: Grid, fetch: Fetch) -> None:
-        self.grid, self._fetch = grid, fetch
+    def __init__(self, grid: Grid, fetch: Fetch, fetch_measured: Fetch | None = None) -> None:
+        self.grid, self._fetch, self._measured = grid, fetch, fetch_measured
         self._lowest, self._highest = self._scan()
         if np.isnan(self._lowest).all():
             raise InputError(
@@ -79,12 +87,18 @@ class MapSurface:
             )
 
     @classmethod
-    def of_array(cls, r: NDArray[np.floating], grid: Grid) -> MapSurface:
+    def of_array(
+        cls, r: NDArray[np.floating], grid: Grid, measured: BoolArray | None = None
+    ) -> MapSurface:
         """Return the surface of an array in memory, shape (height, width). [m]"""
         if r.shape != grid.shape:
             raise InputError(f"relief: expected shape {grid.shape}, found {r.shape}.")
         relief = r.astype(np.float32, copy=False)
-        return cls(grid, lambda *window: cut(relief, window, np.nan))
+        flags = None if measured is None else measured.astype(np.float32)
+        return cls(
+            grid, lambda *window: cut(relief, window, np.nan),
+            None if flags is None else lambda *window: cut(flags, window, 0),
+        )  # fmt: skip
 
     def window(self, grid: Grid) -> Float32Array:
         """Return relief at the pixel centres of a grid.
@@ -95,6 +109,19 @@ class MapSurface:
         if offset is not None:
             return self._fetch(*offset, grid.width, grid.height)
         return self._resample(grid)
+
+    def measured(self, grid: Grid) -> BoolArray | None:
+        """Return what both photos measured, of the nearest pixels."""
+        if self._measured is None:
+            return None
+        offset = grid.whole_offset_in(self.grid)
+        if offset is not None:
+            return self._measured(*offset, grid.width, grid.height) > 0
+        import cv2
+
+        window, columns, rows = grid.resampling(self.grid, 1)
+        flags = np.ascontiguousarray(self._measured(*window))
+        return np.asarray(cv2.remap(flags, columns, rows, cv2.INTER_NEAREST) > 0)
 
     def extremes(self, bounds: Bounds) -> tuple[float, float]:
         """Return the extremes of the blocks that touch the box."""

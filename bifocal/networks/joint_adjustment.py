@@ -171,8 +171,24 @@ def adjust_jointly(observations: JointObservations, start: JointUnknowns) -> Joi
     return _adjusted(observations, seen, system, fit, sigma0, (tuple(blunders), tuple(found)))
 
 
+def settled_jointly(
+    observations: JointObservations, start: JointUnknowns, rounds: int
+) -> tuple[JointObservations, JointUnknowns, FloatArray]:
+    """Return rays without those far off, what most of them agree on, and misfits (n, 2) [px].
+
+    Control holds the frame loosely; nothing is said of precision. Weights are renewed in some
+    ``rounds``: where it begins near the end one will do.
+    """
+    seen = with_enough_rays(observations)
+    focal = np.array([camera.matrix[0, 0] for camera in start.cameras])
+    start, tests, _ = _coarse(seen, start, focal, rounds)
+    seen = with_rays(seen, tests < FAR_OFF)
+    system = _System(seen, start, focal)
+    return seen, start, system.rays(system.start)[0]
+
+
 def _coarse(
-    seen: JointObservations, start: JointUnknowns, focal: FloatArray
+    seen: JointObservations, start: JointUnknowns, focal: FloatArray, rounds: int = COARSE
 ) -> tuple[JointUnknowns, FloatArray, FloatArray]:
     """Return a state that most agree on, and misfits over the usual: of rays (n,), control (p,).
 
@@ -181,7 +197,7 @@ def _coarse(
     """
     fixed = np.isfinite(seen.known).any(axis=1)
     spread = LOOSE * seen.sigma_known
-    for number in range(COARSE):
+    for number in range(rounds):
         away = _away(_System(seen, start, focal))
         away = np.nan_to_num(away, nan=1e6)
         if number and fixed.any():  # before, the start is no better than any control point

@@ -69,6 +69,9 @@ class AlignOptions:
     auto : bool
     as_set_up : bool
         Whether the distances and focal lengths are taken exactly as they are.
+    one_lens : bool
+        Whether one lens took both photos, whose focal length the photos are to tell where nothing
+        else does.
     columns : str or None
         Which column of the control table is which.
     control, lengths : Path or None
@@ -88,6 +91,7 @@ class AlignOptions:
     site: SiteMeasures = field(default_factory=SiteMeasures)
     auto: bool = False
     as_set_up: bool = False
+    one_lens: bool = False
     columns: str | None = None
     control: Path | None = None
     lengths: Path | None = None
@@ -95,6 +99,11 @@ class AlignOptions:
     line: tuple[tuple[float, ...], bool] | None = None
     unit: str = ""
     media: PairMedia = field(default_factory=PairMedia.none)
+
+    @property
+    def direction(self) -> tuple[FloatArray, bool] | None:
+        """The line's ends in the far photo, shape (2, 2), and whether it is upright."""
+        return self.line and (np.array(self.line[0], np.float64).reshape(2, 2), self.line[1])
 
     @classmethod
     def from_given(cls, given: Mapping[str, Any]) -> AlignOptions:
@@ -120,6 +129,7 @@ class AlignOptions:
             site=SiteMeasures(**measures),
             auto=bool(given.get("auto")),
             as_set_up=bool(given.get("as_set_up")),
+            one_lens=bool(given.get("one_lens")),
             columns=given.get("columns"),
             control=given.get("control"),
             lengths=given.get("lengths"),
@@ -158,11 +168,15 @@ def align_photos(
     check_all_writable(out, picture, overwrite=overwrite)
     infos = image_info(far), image_info(near)
     greys = read_greys(far, near, in_water=bool(options.media))
+    interiors = [
+        interior_of_photo(info, known, number)
+        for number, (info, known) in enumerate(zip(infos, options.lenses, strict=True), start=1)
+    ]
+    if options.one_lens and all(interior.is_assumed for interior in interiors):
+        interiors = [Interior.sought(info.size) for info in infos]
     first, second = (
-        PhotoInput(grey=grey, interior=interior_of_photo(info, known, number), name=info.path.name)
-        for number, (info, known, grey) in enumerate(
-            zip(infos, options.lenses, greys, strict=True), start=1
-        )
+        PhotoInput(grey=grey, interior=interior, name=info.path.name)
+        for info, interior, grey in zip(infos, interiors, greys, strict=True)
     )
     if way == "as set up":
         oriented = pair_as_set_up((first, second), options.site, options.media)
@@ -176,10 +190,7 @@ def align_photos(
     paths, ordered = (far, near), (first, second)
     if oriented.exchanged:
         paths, ordered = (near, far), (second, first)
-    line = None
-    if options.line is not None:
-        line = (np.array(options.line[0], dtype=np.float64).reshape(2, 2), options.line[1])
-    alignment = make_alignment(oriented, ordered, way=way, direction=line)
+    alignment = make_alignment(oriented, ordered, way=way, direction=options.direction)
     if picture is not None:
         images = [photo.grey for photo in ordered if photo.grey is not None]
         write_alignment_picture(picture, alignment, (images[0], images[1]), overwrite=overwrite)

@@ -23,6 +23,7 @@ from bifocal.orientation.facade_lines import facade_rotation
 from bifocal.orientation.media_report import media_in_words
 from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput, Photos
+from bifocal.orientation.tie_coverage import tie_statistics
 from bifocal.orientation.tie_points import (
     tie_positions,
 )
@@ -150,14 +151,27 @@ def make_alignment(
 def _of_pixels(adjusted: AdjustedPair, observations: PairObservations) -> FloatArray:
     """Return the covariance of the cameras as the pair file counts it, shape (24, 24)."""
     unit = np.ones(len(adjusted.covariance))
-    for number, (camera, interior) in enumerate(
-        zip(adjusted.cameras, observations.interiors, strict=True)
-    ):
-        # The distortion's radius counts in principal distances: there of the camera as adjusted.
-        ratio = (camera.matrix[0, 0] / interior.focal) ** 2
+    for number, factors in enumerate(_radial_units(adjusted, observations)):
         first = number * len(CAMERA) + CAMERA.index("k1")
-        unit[first : first + 2] = ratio, ratio**2
+        unit[first : first + 2] = factors
     return adjusted.covariance * np.outer(unit, unit)
+
+
+def _radial_units(adjusted: AdjustedPair, observations: PairObservations) -> FloatArray:
+    """Return what k1 and k2 of either photo are multiplied by for the pair file, shape (2, 2).
+
+    The distortion's radius counts in principal distances: there of the camera as adjusted.
+    """
+    cameras = zip(adjusted.cameras, observations.interiors, strict=True)
+    ratios = np.array([(camera.matrix[0, 0] / given.focal) ** 2 for camera, given in cameras])
+    return np.column_stack([ratios, ratios**2])
+
+
+def _radial(adjusted: AdjustedPair, observations: PairObservations) -> FloatArray | None:
+    """Return k1 and k2 of either photo as the covariance counts them; None where not estimated."""
+    if not any(interior.sigma_radial for interior in observations.interiors):
+        return None
+    return np.asarray(adjusted.radial * _radial_units(adjusted, observations))
 
 
 def facade_axes(
@@ -221,30 +235,35 @@ def photo_of(
 
 def standard_deviations(adjusted: AdjustedPair) -> dict[str, float]:
     """Return standard deviations of what a surveyor asks for."""
+    size = len(NAMES)
+    out = deviations_of(adjusted.cameras, adjusted.covariance[:size, :size], adjusted.media)
+    if adjusted.of_unknowns.size:
+        for row, name in enumerate(adjusted.media.sigmas, start=size):
+            out[name] = float(np.sqrt(adjusted.of_unknowns[row, row]))
+    return out
+
+
+def deviations_of(cameras: Cameras, covariance: FloatArray, media: PairMedia) -> dict[str, float]:
+    """Return standard deviations of what a surveyor asks for, from the covariance (24, 24)."""
     out: dict[str, float] = {}
     # Of the relative scale of the photos on the wall, ln f2 - ln d2 - ln f1 + ln d1, and of
     # 1/d2 - 1/d1, which relief is divided by.
     by_scale, by_relief = np.zeros(len(NAMES)), np.zeros(len(NAMES))
-    for number, (camera, sign) in enumerate(
-        zip(adjusted.cameras, (-1.0, 1.0), strict=True), start=1
-    ):
-        nadir = np.hypot(adjusted.sigma("X", number), adjusted.sigma("Y", number))
-        tilt = np.hypot(adjusted.sigma("turn X", number), adjusted.sigma("turn Y", number))
-        out[f"distance{number}"] = adjusted.sigma("Z", number)
-        out[f"nadir{number}"] = float(nadir / np.sqrt(2))
-        out[f"focal{number}"] = adjusted.sigma("focal length", number) * camera.matrix[0, 0]
-        out[f"tilt{number}_deg"] = float(np.rad2deg(tilt / np.sqrt(2)))
+    sigmas = np.sqrt(np.diag(covariance))
+    for number, (camera, sign) in enumerate(zip(cameras, (-1.0, 1.0), strict=True), start=1):
+        places = [at(name, number) for name in ("X", "Y", "turn X", "turn Y")]
+        out[f"distance{number}"] = float(sigmas[at("Z", number)])
+        out[f"nadir{number}"] = float(np.hypot(*sigmas[places[:2]]) / np.sqrt(2))
+        out[f"focal{number}"] = float(sigmas[at("focal length", number)] * camera.matrix[0, 0])
+        out[f"tilt{number}_deg"] = float(np.rad2deg(np.hypot(*sigmas[places[2:]]) / np.sqrt(2)))
         by_scale[at("focal length", number)] = sign
-        straight, rate = adjusted.media.near_axis(number - 1, camera)
+        straight, rate = media.near_axis(number - 1, camera)
         by_scale[at("Z", number)] = -sign * rate / straight
         by_relief[at("Z", number)] = -sign * rate / straight**2
-    d1, d2 = (adjusted.media.near_axis(k, camera)[0] for k, camera in enumerate(adjusted.cameras))
-    cameras = adjusted.covariance[: len(NAMES), : len(NAMES)]
-    scale, relief = (float(np.sqrt(np.abs(row @ cameras @ row))) for row in (by_scale, by_relief))
-    if adjusted.of_unknowns.size:
-        for row, name in enumerate(adjusted.media.sigmas, start=len(NAMES)):
-            out[name] = float(np.sqrt(adjusted.of_unknowns[row, row]))
-    return out | {"scale": scale, "relief_scale": relief / abs(1 / d2 - 1 / d1)}
+    d1, d2 = (media.near_axis(k, camera)[0] for k, camera in enumerate(cameras))
+    variances = (abs(float(row @ covariance @ row)) for row in (by_scale, by_relief))
+    scale, relief = map(np.sqrt, variances)
+    return out | {"scale": float(scale), "relief_scale": float(relief / abs(1 / d2 - 1 / d1))}
 
 
 def _diagnostics(
@@ -269,7 +288,9 @@ def _diagnostics(
             "count": int(observations.tie_used.sum()),
             "on_wall": int((observations.wall & observations.tie_used).sum()),
             "sigma_px": sigma_tie,
+            **tie_statistics(observations, adjusted),
         },
+        "radial": _radial(adjusted, observations),
         "planes": [
             {"offset": face.offset, "share": face.share, "pixel": list(face.pixel)}
             for face in oriented.faces
@@ -303,6 +324,11 @@ def _diagnostics(
             }
             for index, name in enumerate(control.ids)
         ]
+    spreads = control.sigma_lengths or (None,) * len(control.lengths)
+    out["lengths"] = [
+        {"from": control.ids[a], "to": control.ids[b], "length": length, "sigma": sigma}
+        for (a, b, length), sigma in zip(control.lengths, spreads, strict=True)
+    ]
     return out
 
 

@@ -20,6 +20,7 @@ from bifocal.orientation.starts.relative_orientation import (
     find_ties,
     first_cameras,
     plane_scale,
+    sought_focal,
 )
 from bifocal.orientation.starts.space_resection import resect
 from bifocal.orientation.tie_points import with_ties
@@ -146,6 +147,8 @@ def approximate_cameras(
     if ties is None:
         raise GeometryError("too few control points, and no common points to go with them.")
     interiors = plausible_focals(interiors, ties, given.site)
+    if all(interior.is_sought for interior in interiors):
+        interiors = sought_focal(ties, interiors)
     return _scaled(first_cameras(ties, interiors), given, interiors), agree, interiors
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bifocal.model.points import SurveyPoints
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
@@ -243,6 +244,16 @@ def _names(texts: Sequence[str], before: str) -> list[str]:
     own = [f"{before}{number}" for number in range(1, len(texts) + 1)]
     own = [f"{before}row {k}" if name in taken else name for k, name in enumerate(own, start=1)]
     return [text or name for text, name in zip(texts, own, strict=True)]
+
+
+def known_points(path: Path, *, unit: str = "") -> SurveyPoints:
+    """Return the coordinates of a table of control or check points, NaN where it has none."""
+    control = read_control(path, sigma=0.003, sigma_plane=None, unit=unit)
+    blank = ("",) * len(control.ids)
+    return SurveyPoints(
+        ids=control.ids, xyz=control.xyz, sigma_r=control.sigma[:, 2], flags=blank, notes=blank,
+        name=path.name,
+    )  # fmt: skip
 
 
 def read_lengths(path: Path | str, control: Control) -> Control:

@@ -17,7 +17,7 @@ from bifocal.model.image import ImageArray
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
 from bifocal.model.photos_of_set import PhotosOfSet
-from bifocal.model.relief_map import ReliefMap
+from bifocal.model.relief_map import Quality, ReliefMap
 from bifocal.model.surface import FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.best_view import chosen
 from bifocal.orthophotos.ortho_image import OrthoOptions, Orthophoto, Source
@@ -171,7 +171,9 @@ def as_surface(relief: ReliefMap | Surface | ArrayLike | None) -> Surface:
         return cast(Surface, relief)
     if hasattr(relief, "r") and hasattr(relief, "plane_from_pixel"):
         r = np.asarray(relief.r)
-        return MapSurface.of_array(r, Grid.from_affine(relief.plane_from_pixel, r.shape))
+        quality = getattr(relief, "quality", None)
+        measured = None if quality is None else np.asarray(quality) == Quality.MEASURED
+        return MapSurface.of_array(r, Grid.from_affine(relief.plane_from_pixel, r.shape), measured)
     number = np.asarray(relief)
     if number.ndim != 0 or number.dtype.kind not in "fiu":
         raise InputError(

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -23,6 +23,8 @@ from bifocal.model.geotiff import (
 )
 from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
+from bifocal.model.photo_set import PhotoSet, pair_or_set
+from bifocal.model.photos_of_set import PhotosOfSet
 from bifocal.model.points import SurveyPoints
 from bifocal.model.relief_map import Quality, measured_part
 from bifocal.model.surface import FlatSurface, MapSurface, Surface
@@ -67,7 +69,7 @@ DPI = 254.0
 #: Every picture is written with its world file, for the web, for CAD and on a sheet.
 PICTURE_ENDINGS = ("tif", "tfw", "png", "dxf", "pdf")
 #: What is no part of the name of a pair's file.
-_PAIR_ENDINGS = (".pair.json", ".json", ".xlsx", ".xlsm")
+_PAIR_ENDINGS = (".pair.json", ".photos.json", ".json", ".xlsx", ".xlsm")
 #: Names shorter than this say nothing as a title: the folder's is taken.
 _SHORT = 3
 
@@ -88,6 +90,11 @@ class DeliverTask:
         ``A4`` to ``A0``; None: the smallest that holds the picture.
     mark, control : Path or SurveyPoints, optional
         Points to draw, or their tables.
+    cad : mapping of str to SurveyPoints
+        Of ``points``, ``control`` and ``check``: what the drawing for CAD holds though the sheet
+        does not show it.
+    layers : str
+        How those of drawings are called: ``language``, ``bifocal`` or ``ncs``.
     sections : sequence of str
         ``x=1.5``, ``y=2`` or corners.
     contours : float, optional
@@ -106,6 +113,8 @@ class DeliverTask:
     paper: str | None = None
     mark: Path | None = None
     control: Path | SurveyPoints | None = None
+    cad: Mapping[str, SurveyPoints] = field(default_factory=dict)
+    layers: str = "language"
     sections: Sequence[str] = ()
     contours: float | None = None
     hatch: bool = True
@@ -137,7 +146,7 @@ class _Relief:
 
 
 def deliver(
-    pair_path: Pair | Path,
+    pair_path: Pair | PhotoSet | Path,
     folder: Path,
     task: OrthoTask,
     wish: DeliverTask,
@@ -161,7 +170,7 @@ def deliver(
     scale = positive(wish.scale, "scale")
     gsd = task.gsd or gsd_at_scale(positive(wish.dpi, "dpi"), scale)
     task = replace(task, gsd=gsd, scale=scale, overviews=True)
-    pair = Pair.of(pair_path)
+    pair = PhotosOfSet.of(pair_path)
     title = wish.title or default_title(pair_path)
     name = file_name(title)
     _check_outputs(out, folder, name, (task.relief, *pair.photo_files))
@@ -174,7 +183,8 @@ def deliver(
         grid = planned_grid(pair, surface, task)
         drawing = Drawing(
             title=title, grid=grid, scale=scale, points=points, control=control,
-            notes=_notes(pair, grid, wish, task, reader), language=wish.language,
+            notes=_notes(pair, grid, wish, task, reader), language=wish.language, cad=wish.cad,
+            layers=wish.layers,
         )  # fmt: skip
         sheet = PrintSheet.fitting(drawing, wish.paper)
         measured = _measured(reader, surface)
@@ -209,8 +219,7 @@ def deliver(
                 remarks += (remark("drawing.relief_not_measured", share=share),)
         for number, cut in enumerate(cuts, start=1):
             for writer, ending in ((write_section_dxf, "dxf"), (write_section_svg, "svg")):
-                target = place / f"{name}_section{number}.{ending}"
-                writer(target, cut, scale=scale, say=drawing.say)
+                writer(place / f"{name}_section{number}.{ending}", cut, drawing=drawing)
         if out is not None and extra != (f"{name}.tif",):
             shutil.copyfile(place / f"{name}.tif", place / out.name if inside else copy)
         files = tuple(sorted(item.name for item in place.iterdir()))
@@ -251,19 +260,19 @@ def _check_free(
             check_writable(path, overwrite=overwrite)
 
 
-def default_title(source: Pair | Path, path: Path | None = None) -> str:
+def default_title(source: Pair | PhotoSet | Path, path: Path | None = None) -> str:
     """Return the name of a pair; of a nameless one that of its file, or of the file's folder.
 
     The folder's where there is no file, or one called ``w`` or the like.
 
     Parameters
     ----------
-    source : Pair or Path
+    source : Pair, PhotoSet or Path
     path : Path, optional
         Where a pair was read from.
     """
     path = source if isinstance(source, Path) else path
-    pair = Pair.of(source)
+    pair = pair_or_set(source)
     if pair.extra.get("name"):
         return str(pair.extra["name"])
     stem = path.name if path else ""
@@ -448,11 +457,16 @@ def _notes(
     precise = _accuracy(pair, grid, task, reader)
     known = dict(zip(("own", "place", "relief"), precise, strict=False))
     relief, say = task.relief or task.points, words_of("bifocal.orthophotos", wish.language)
+    if isinstance(pair, PhotosOfSet):
+        distances = ", ".join(f"{photo.distance:.3f} m" for photo in pair.photos)
+        cameras = say("photos_of_set", count=len(pair.photos), distances=distances)
+    else:
+        d1, d2 = pair.image1.distance, pair.image2.distance
+        cameras = say(f"photo_{task.photo_words}", d1=d1, d2=d2)
     return (
         say("pixel", size=grid.gsd * 1000, dpi=dpi_at_scale(grid.gsd, wish.scale)),
         say("accuracy" if len(known) > 1 else "photo_pixel", **known),
-        wish.camera
-        or say(f"photo_{task.photo_words}", d1=pair.image1.distance, d2=pair.image2.distance),
+        wish.camera or cameras,
         *((say("media", media=media_words(pair.layers)),) if pair.layers else ()),
         say("relief_of", name=relief.name) if relief else say("relief_plane", plane=task.plane),
         f"{program()}, {today()}",

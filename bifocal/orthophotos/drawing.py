@@ -80,11 +80,24 @@ class Section:
 
         Each is an array of shape (n, 2); one that was not measured goes on to its neighbours. [m]
         """
-        kind = np.where(np.isfinite(self.relief), np.where(self.measured, 1, 2), 0)
-        bounds = [0, *(np.flatnonzero(np.diff(kind)) + 1).tolist(), len(kind)]
         upright = self.axis == "x"
         columns = (self.relief, self.place) if upright else (self.place, self.relief)
-        line = np.stack(columns, axis=-1)
+        return self._split(np.stack(columns, axis=-1))
+
+    def in_space(self) -> list[tuple[bool, FloatArray]]:
+        """Return the known pieces where they lie on the wall, each X, Y, r, shape (n, 3). [m]"""
+        steps = np.r_[0.0, np.hypot(*np.diff(self.path, axis=0).T).cumsum()]
+        along = self.place
+        if self.axis != "line":  # X or Y itself, not the way from the path's beginning
+            axis = 1 if self.axis == "x" else 0
+            along = np.abs(self.place - self.path[0, axis])
+        corners = (np.interp(along, steps, self.path[:, k]) for k in (0, 1))
+        return self._split(np.stack([*corners, self.relief], axis=-1))
+
+    def _split(self, line: FloatArray) -> list[tuple[bool, FloatArray]]:
+        """Return the known pieces of what has a row for each place, measured or not."""
+        kind = np.where(np.isfinite(self.relief), np.where(self.measured, 1, 2), 0)
+        bounds = [0, *(np.flatnonzero(np.diff(kind)) + 1).tolist(), len(kind)]
         pieces = []
         for a, b in pairwise(bounds):
             if kind[a] == 2:
@@ -154,6 +167,8 @@ class Drawing:
     scale : float
         1:scale.
     points, control : SurveyPoints, optional
+    cad : mapping of str to SurveyPoints
+        Of ``points``, ``control`` and ``check``: what only the drawing for CAD holds.
     contours : tuple of Contour
     sections : tuple of Section
     notes : tuple of str
@@ -165,6 +180,8 @@ class Drawing:
     spots : ndarray, shape (n, 3)
         X, Y and relief of spot heights. [m]
     language : str
+    layers : str
+        How they are called: ``language``, ``bifocal`` or ``ncs``.
     """
 
     title: str
@@ -173,6 +190,7 @@ class Drawing:
     scale: float
     points: SurveyPoints | None = None
     control: SurveyPoints | None = None
+    cad: Mapping[str, SurveyPoints] = field(default_factory=dict)
     contours: tuple[Contour, ...] = ()
     sections: tuple[Section, ...] = ()
     notes: tuple[str, ...] = field(default=())
@@ -180,6 +198,7 @@ class Drawing:
     hatched: tuple[tuple[Source, float], ...] = ()
     spots: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
     language: str = "en"
+    layers: str = "language"
 
     @property
     def say(self) -> Words:

@@ -17,6 +17,9 @@ from bifocal.orthophotos.sheet_margins import SheetMargins
 from bifocal.orthophotos.tuning import CONTOURS, SHEET, SPOTS
 from photocore.output import atomic_path
 
+#: Layers of the points of a drawing, by what they are.
+_POINTS = {"points": "BIFOCAL_POINTS", "control": "BIFOCAL_CONTROL", "check": "BIFOCAL_CHECK"}
+
 
 def write_drawing(
     path: Path, drawing: Drawing, sheet: PrintSheet, image_name: str | None, *, overwrite: bool
@@ -56,8 +59,8 @@ def write_drawing(
         beside = (x + 0.5 * paper, y + 0.5 * paper)
         add_text(model, f"{x:g} / {y:g}", beside, 1.6 * paper, "BIFOCAL_GRID")
     _scale_bar(model, drawing, paper)
-    _points(model, drawing.points, "BIFOCAL_POINTS", 2.0 * paper)
-    _points(model, drawing.control, "BIFOCAL_CONTROL", 2.0 * paper)
+    for role, layer in _POINTS.items():
+        _points(model, getattr(drawing, role, None) or drawing.cad.get(role), layer, 2.0 * paper)
     _contours(model, drawing, paper)
     for x, y, words in drawing.spot_words():
         model.add_point((x, y), dxfattribs={"layer": "BIFOCAL_SPOT_HEIGHTS"})
@@ -67,12 +70,24 @@ def write_drawing(
         style = {"layer": "BIFOCAL_SECTION_LINES", **dashed(model, "DASHDOT", SHEET.cut * paper)}
         model.add_lwpolyline(cut.path.tolist(), dxfattribs=style)
         _section_names(model, drawing, cut, paper)
+        for measured, line in cut.in_space():
+            layer = "BIFOCAL_SECTIONS" if measured else "BIFOCAL_SECTIONS_GUESSED"
+            model.add_polyline3d(line.tolist(), dxfattribs={"layer": layer})
     document.set_modelspace_vport(
         height=1.15 * (ymax - ymin), center=((xmin + xmax) / 2, (ymin + ymax) / 2)
     )
     _lay_out(document, drawing, sheet)
+    name_layers(document, drawing.layers, drawing.language)
     with atomic_path(path, overwrite=overwrite) as temporary:
         save_drawing(document, temporary)
+
+
+def name_layers(document: Any, manner: str, language: str) -> None:
+    """Call the layers of a drawing as a country does: ``language``, ``ncs``; else as they are."""
+    manner = language if manner == "language" else manner
+    for name, names in TABLES["layer_names"].items():
+        if manner in names and name in document.layers:
+            document.layers.get(name).rename(names[manner])
 
 
 def _contours(model: Any, drawing: Drawing, paper: float) -> None:
@@ -139,7 +154,9 @@ def _points(model: Any, points: SurveyPoints | None, layer: str, height: float) 
             continue
         relief = place[2] if np.isfinite(place[2]) else 0.0  # left blank: on the wall
         model.add_point((*place[:2], relief), dxfattribs={"layer": layer})
-        label = (place[0] + height / 2, place[1] + height / 2)
+        # Names of known points stand below: those solved, above, mostly have the same.
+        below = 0.0 if layer == "BIFOCAL_POINTS" else 2.0 * height
+        label = (place[0] + height / 2, place[1] + height / 2 - below)
         add_text(
             model, name, label, height, "BIFOCAL_NAMES" if layer == "BIFOCAL_POINTS" else layer
         )

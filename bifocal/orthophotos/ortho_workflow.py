@@ -28,7 +28,7 @@ from bifocal.model.photo_alone import PhotoAlone
 from bifocal.model.photo_set import PhotoSet
 from bifocal.model.photos_of_set import PhotosOfSet
 from bifocal.model.points import SurveyPoints
-from bifocal.model.relief_map import measured_part
+from bifocal.model.relief_map import measured_part, told_pixels
 from bifocal.model.surface import EVERYWHERE, FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.compose import choose_grid, render
 from bifocal.orthophotos.ortho_image import OF_SET, OrthoOptions, Source
@@ -134,9 +134,7 @@ def make_ortho(
         If an input is missing or does not fit, the size is not plausible, or writing fails.
     """
     check_ending(out, ORTHO_ENDING, ".tif", ".tiff")
-    if isinstance(pair_path, PhotoSet):
-        pair_path = PhotosOfSet.of_set(pair_path)
-    pair = Pair.of(pair_path)
+    pair = PhotosOfSet.of(pair_path)
     check_not_input(out, task.relief, *pair.photo_files)
     check_writable(out, overwrite=overwrite)
     with open_surface(task, pair) as (surface, _, remarks):
@@ -251,7 +249,7 @@ def open_surface(
             reader = stack.enter_context(RasterReader(task.relief))
             check_relief(reader)
             with located(task.relief):
-                surface = MapSurface(reader.grid, reader.read_floats)
+                surface = MapSurface(reader.grid, reader.read_floats, told_pixels(reader))
         elif task.points is not None:
             surface, remarks = _triangles(task.points, task.breaklines)
         if faces:
@@ -358,9 +356,7 @@ def _sources(
             if matched is not photos[place]:
                 break
         photos[place] = matched
-        remarks.append(
-            note if len(photos) == 2 else remark("ortho.of_image", number=place + 1, note=note)
-        )
+        remarks.append(note)
     return photos, remarks
 
 

@@ -21,7 +21,8 @@ from bifocal.orthophotos.canvas import (
     scale_bar,
     text_width,
 )
-from bifocal.orthophotos.drawing import TABLES, Section, multiples, round_step, signed
+from bifocal.orthophotos.drawing import TABLES, Drawing, Section, multiples, round_step, signed
+from bifocal.orthophotos.drawing_files import name_layers
 from bifocal.orthophotos.dxf_canvas import DxfCanvas
 from bifocal.orthophotos.tuning import PROFILE
 from photocore.arrays import FloatArray
@@ -36,14 +37,16 @@ _NAME = Pen(layer="BIFOCAL_SECTION_NAME")
 _BAR = Pen(layer="BIFOCAL_SCALEBAR")
 
 
-def write_section_dxf(path: Path, cut: Section, *, scale: float, say: Words) -> None:
+def write_section_dxf(path: Path, cut: Section, *, drawing: Drawing) -> None:
     """Write one section, 1:1 in metres: relief to the right (upright cut) or upwards."""
+    scale, say = drawing.scale, drawing.say
     document, model = new_drawing(
         TABLES["section_layers"], point_style=3, point_size=3 * scale / 1000
     )
     title = _title(cut, scale, say)
     draw_section(DxfCanvas(model, scale / 1000), cut, scale, title)
     _lay_out(document, cut, scale, title)
+    name_layers(document, drawing.layers, drawing.language)
     with atomic_path(path, overwrite=False) as temporary:
         save_drawing(document, temporary)
 
@@ -77,9 +80,9 @@ def _frame(cut: Section, scale: float, title: str) -> tuple[float, float, float,
             right + PROFILE.margin, top + PROFILE.margin)  # fmt: skip
 
 
-def write_section_svg(path: Path, cut: Section, *, scale: float, say: Words) -> None:
+def write_section_svg(path: Path, cut: Section, *, drawing: Drawing) -> None:
     """Write one section as SVG that prints at 1:scale."""
-    title = _title(cut, scale, say)
+    scale, title = drawing.scale, _title(cut, drawing.scale, drawing.say)
     left, bottom, right, top = _frame(cut, scale, title)
     canvas = _SvgCanvas(left, top)
     draw_section(canvas, cut, scale, title)

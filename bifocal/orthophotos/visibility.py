@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.model.ray_field import RayField
-from bifocal.model.surface import EVERYWHERE, Surface
+from bifocal.model.surface import EVERYWHERE, Surface, measured_on
 from bifocal.orthophotos.tuning import TIDYING, VISIBILITY
 from bifocal.rays import Foot, magnification, object_rays, plane_position, straight
 from photocore.arrays import BoolArray, Float32Array
@@ -61,7 +61,8 @@ def hidden_from(surface: Surface, grid: Grid, camera: Foot, relief: Float32Array
     largest = float(magnification(high, straight(camera).distance))
     if camera.media is not None:
         largest *= VISIBILITY.bent
-    return _hidden(relief_wide, wide, camera, (column, row), grid.shape, largest)
+    measured = measured_on(surface, grid)
+    return _hidden(relief_wide, wide, camera, (column, row), grid.shape, largest, measured)
 
 
 def _reach(surface: Surface, grid: Grid, camera: Foot) -> tuple[Grid, int, int] | None:
@@ -147,6 +148,22 @@ class _Surroundings(NamedTuple):
     core: tuple[slice, slice]  # the window itself
     bent: _RaysOfWindow | None = None  # through media
 
+    @classmethod
+    def of_window(
+        cls, relief: Float32Array, grid: Grid, camera: Foot, core: tuple[slice, slice]
+    ) -> _Surroundings:
+        """Return a window seen from the nadir of a camera."""
+        gsd, foot, bent = grid.gsd, straight(camera), None
+        x = ((grid.columns_x - foot.nadir[0]) / gsd).astype(np.float32)
+        y = ((grid.rows_y - foot.nadir[1]) / gsd).astype(np.float32)
+        if camera.media is None:
+            rho = np.sqrt(x * x + (y * y)[:, None])
+        else:
+            bent = _RaysOfWindow.of_window(relief, grid, camera, (x, y))
+            rho = np.nan_to_num(np.hypot(bent.x, bent.y))
+        distance = np.float32(foot.distance / gsd)
+        return cls(relief * np.float32(1 / gsd), x, y, rho, distance, core, bent)
+
     def seen_at(self, share: np.float32) -> tuple[Float32Array, Float32Array]:
         """Return where the rays to all pixels meet the plane, times a share, y upwards. [px]"""
         if self.bent is not None:
@@ -191,30 +208,56 @@ def _hidden(
     start: tuple[int, int],
     shape: tuple[int, int],
     largest: float,
+    measured: BoolArray | None,
 ) -> BoolArray:
     """Return the hidden pixels of the part of ``grid`` that starts at a column and row."""
     column, row = start
-    gsd, foot, bent = grid.gsd, straight(camera), None
-    x = ((grid.columns_x - foot.nadir[0]) / gsd).astype(np.float32)
-    y = ((grid.rows_y - foot.nadir[1]) / gsd).astype(np.float32)
-    if camera.media is None:
-        rho = np.sqrt(x * x + (y * y)[:, None])
-    else:
-        bent = _RaysOfWindow.of_window(relief, grid, camera, (x, y))
-        rho = np.nan_to_num(np.hypot(bent.x, bent.y))
-    around = _Surroundings(
-        relief=relief * np.float32(1 / gsd),
-        x=x,
-        y=y,
-        rho=rho,
-        distance=np.float32(foot.distance / gsd),
-        bent=bent,
-        core=np.s_[row : row + shape[0], column : column + shape[1]],
+    core = np.s_[row : row + shape[0], column : column + shape[1]]
+    around = _Surroundings.of_window(relief, grid, camera, core)
+    hidden = _behind(around, largest)
+    if measured is None:
+        return hidden
+    ground = _without_thin(around, grid.gsd)
+    thin = around.relief > ground
+    if not thin.any():
+        return hidden
+    relief = np.where(thin, ground * np.float32(grid.gsd), relief)
+    solid = _behind(_Surroundings.of_window(relief, grid, camera, core), largest) & ~thin[core]
+    faces = _Buffer.of_surroundings(around, largest, thin)
+    if faces is not None:
+        solid |= faces.covers(around)
+    return solid | (hidden & ~_seen_past(hidden & ~solid, measured))
+
+
+def _seen_past(doubtful: BoolArray, measured: BoolArray) -> BoolArray:
+    """Return what only the space below thin things hides, around which both photos measured."""
+    side = (VISIBILITY.seen_past, VISIBILITY.seen_past)
+    there, known = (
+        cv2.blur(mask.astype(np.float32), side) for mask in (doubtful, doubtful & measured)
     )
+    return doubtful & (known > np.float32(VISIBILITY.share_seen) * there)
+
+
+def _behind(around: _Surroundings, largest: float) -> BoolArray:
+    """Return what the relief hides, and the faces between it and the wall."""
     buffer = _Buffer.of_surroundings(around, largest)
     if buffer is None:
-        return np.zeros(shape, bool)
+        return np.zeros(around.relief[around.core].shape, bool)
     return _sharpen(around, buffer)
+
+
+def _without_thin(around: _Surroundings, gsd: float) -> Float32Array:
+    """Return relief without what is too narrow for its displacement to reach down to the wall. [px]
+
+    A railing is a surface before another one: rays pass beneath its bars.
+    """
+    side = max(3, int(VISIBILITY.thin / gsd) | 1)
+    known = np.where(np.isnan(around.relief), np.float32(1e9), around.relief)
+    body = cv2.morphologyEx(known, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
+    with np.errstate(invalid="ignore"):
+        displaced = (around.relief - body) * around.rho
+        thin = displaced > np.float32(side) * (around.distance - around.relief)
+    return np.where(thin, body, around.relief)
 
 
 class _Buffer(NamedTuple):
@@ -225,8 +268,13 @@ class _Buffer(NamedTuple):
     columns: int
 
     @classmethod
-    def of_surroundings(cls, around: _Surroundings, largest: float) -> _Buffer | None:
-        """Return the filled buffer; None if nothing of the core is known."""
+    def of_surroundings(
+        cls, around: _Surroundings, largest: float, of: BoolArray | None = None
+    ) -> _Buffer | None:
+        """Return the filled buffer; None if nothing of the core is known.
+
+        Of some pixels only, if given, without the faces between them.
+        """
         core = around.core
         if math.isnan(largest):
             stretch = magnification(around.relief, around.distance)  # Eq. (1)
@@ -243,12 +291,21 @@ class _Buffer(NamedTuple):
         columns, rows = (int(math.floor(b) - math.floor(a)) + 1 for a, b in ((u0, u1), (v0, v1)))
         nearest = np.full(rows * columns + 1, np.inf, np.float32)
         cells = _cells(u, v, rows, columns)
+        if of is not None:
+            np.minimum.at(nearest, cells[of], around.rho[of])
+            nearest[-1] = np.inf
+            return cls(nearest, cells[core], columns)
         np.minimum.at(nearest, cells.ravel(), around.rho.ravel())
         for first, second in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
             ends = [(a[first], a[second]) for a in (u, v, around.rho)]
             _join(nearest, ends, rows, columns)
         nearest[-1] = np.inf
         return cls(nearest, cells[core], columns)
+
+    def covers(self, around: _Surroundings) -> BoolArray:
+        """Return which pixels of the core lie farther out than what their cell holds."""
+        ahead = around.rho[around.core] - self.nearest[self.cells]
+        return np.asarray(ahead > np.float32(VISIBILITY.margin))
 
 
 def _cells(u: Float32Array, v: Float32Array, rows: int, columns: int) -> NDArray[np.int32]:

@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 
 from bifocal.model.grid import Bounds, Grid
-from bifocal.model.surface import Surface
+from bifocal.model.surface import Surface, measured_on
 from bifocal.orthophotos.ortho_image import Source
 from bifocal.orthophotos.pull_push import fill_holes
 from bifocal.orthophotos.tuning import WHOLE
-from photocore.arrays import ByteArray, Float32Array
+from photocore.arrays import BoolArray, ByteArray, Float32Array
 
 
 class CompletedSurface:
@@ -55,6 +55,10 @@ class CompletedSurface:
         relief[deep] = rest[deep]
         relief, _ = fill_holes(relief, ~unknown | deep, unknown & ~deep)
         return np.where(np.isnan(relief), rest, relief)
+
+    def measured(self, grid: Grid) -> BoolArray | None:
+        """Return which pixels of a grid both photos measured."""
+        return measured_on(self.surface, grid)
 
     def extremes(self, bounds: Bounds) -> tuple[float, float]:
         """Return the extremes over a box of what is known and of what is interpolated."""

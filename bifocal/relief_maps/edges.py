@@ -9,13 +9,13 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from bifocal.relief_maps.frame import Frame, offsets, zoom_map
+from bifocal.relief_maps.frame import Frame, offsets, parallax_per_metre, zoom_map
 from bifocal.relief_maps.tuning import EDGES
-from photocore.arrays import Float32Array
+from photocore.arrays import BoolArray, Float32Array
 
 
 def sharpen(
-    frame: Frame, relief: Float32Array, typical: float = 0.0
+    frame: Frame, relief: Float32Array, swept: BoolArray | np.bool, typical: float = 0.0
 ) -> tuple[Float32Array, Float32Array]:
     """Return the relief of photo 1 with ramps at steps replaced by one of the two surfaces.
 
@@ -26,16 +26,17 @@ def sharpen(
     frame : Frame
     relief : ndarray of float32, shape (height, width)
         Measured relief. [m]
+    swept : ndarray of bool
+        Pixels whose relief a sweep found: they are left alone.
     typical : float
         Precision of matching, typical of the frame. [px]
     """
     median = cv2.medianBlur(relief, 5)
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * EDGES.reach + 1, 2 * EDGES.reach + 1))
     upper, lower = cv2.dilate(median, disc), cv2.erode(median, disc)
-    x, y = frame.from_centre()
-    per_relief = np.asarray(np.sqrt(x * x + y * y) / frame.pair.base_factor, dtype=np.float32)
+    per_relief = parallax_per_metre(frame)
     parallax = (upper - lower) * per_relief
-    band = parallax > max(EDGES.least_step, EDGES.noise_steps * typical)
+    band = ~swept & (parallax > max(EDGES.least_step, EDGES.noise_steps * typical))
     result = relief.copy()
     far, near = _features(frame.image1), _features(frame.image2)
     guide = _Guide(far[..., 0])

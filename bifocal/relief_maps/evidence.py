@@ -112,9 +112,12 @@ def with_pardoned(
 
 
 def without_falling(
-    frame: Frame, relief: Float32Array, misfit: Float32Array, typical: float, measured: BoolArray
-) -> BoolArray:
+    frame: Frame, relief: Float32Array, misfit: Float32Array, typical: float, swept: BoolArray,
+    measured: BoolArray,
+) -> BoolArray:  # fmt: skip
     """Return what is measured but where relief falls outwards and the photos do not fit.
+
+    What a sweep found has been asked how it fits.
 
     Camera 2 may see nothing there: half of the wrongly measured pixels lie in strips of two to four
     pixels that the map does not know to be hidden, for flow runs over the step as a slope. It is
@@ -131,7 +134,8 @@ def without_falling(
         x, y = frame.slopes(2, *offsets(frame.grid.shape), relief)
         falls = across * x + down * y
     misfit = cv2.blur(misfit, (3, 3))
-    return np.asarray(measured & ~(falls * misfit * misfit > most_falling(frame, typical)))
+    doubted = falls * misfit * misfit > most_falling(frame, typical)
+    return np.asarray(measured & (swept | ~doubted))
 
 
 def most_falling(frame: Frame, typical: float = 0.0) -> float | Float32Array:

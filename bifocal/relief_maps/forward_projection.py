@@ -52,15 +52,17 @@ def stretch(frame: Frame, relief: Float32Array) -> Float32Array:
     return np.asarray(reduction(relief + across * x + down * y, distance))
 
 
-def side_faces(frame: Frame, relief: Float32Array) -> BoolArray:
+def side_faces(frame: Frame, relief: Float32Array, swept: BoolArray) -> BoolArray:
     """Return which pixels of photo 1 see the side face of a step that rises outwards.
+
+    But for what a sweep found, `swept`: the flanks of thin things are all that is seen of them.
 
     The face is as wide in photo 1 as the step's parallax, and all of it stands on the one line of
     the step: whatever relief flow gives it, measured or not, would land beside that line (façade
     81: 1.39 to 1.18 % beyond 3 cm, orthophoto 1.57 to 1.33 % beyond 1 px; 83, 35/28: 2.75 to 2.49).
     """
     smooth = cv2.blur(cv2.medianBlur(relief, 5), (3, 3))
-    return np.asarray(stretch(frame, smooth) < PROJECTION.side_face)
+    return np.asarray((stretch(frame, smooth) < PROJECTION.side_face) & ~swept)
 
 
 def to_plane(frame: Frame, source: MapBands, usable: BoolArray, grid: Grid) -> MapBands:

@@ -145,6 +145,12 @@ def radial_stretch(frame: Frame) -> Float32Array:
     return np.asarray(cv2.resize(ratio, size, interpolation=cv2.INTER_LINEAR))
 
 
+def parallax_per_metre(frame: Frame) -> Float32Array:
+    """Return the parallax of a metre of relief, s / B. [px/m]"""
+    x, y = frame.from_centre()
+    return np.asarray(np.sqrt(x * x + y * y) / frame.pair.base_factor, dtype=np.float32)
+
+
 def offsets(
     shape: tuple[int, int], centre: Sequence[float] | FloatArray = (0.0, 0.0)
 ) -> tuple[Float32Array, Float32Array]:

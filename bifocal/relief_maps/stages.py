@@ -17,6 +17,7 @@ sigma        its standard deviation [m]
 typical      precision of matching, typical of the frame [px]
 valid        pixels matched there and back, on the radius, precisely enough
 support      pixels to be believed
+swept        pixels whose relief a sweep found, for flow could not
 side_face    pixels that see the side face of a step
 misfit       how badly the photos fit at the relief that was measured [grey levels]
 unpatched    relief before plane patches [m]
@@ -46,6 +47,7 @@ from bifocal.relief_maps import (
     occluded_regions,
     occluding_edges,
     plane_patches,
+    second_hypothesis,
     seed,
     smoothing,
     snapping,
@@ -106,8 +108,8 @@ def relief_map(
     known: dict[str, Any] = {
         "frame": frame, "matched": matched, "grid": grid, "backing": backing, "half": half,
         "distance": distance, "relief_range": relief_range or seed.usual_range(distance),
-        "side_face": np.False_, "behind": np.False_, "misfit": np.zeros_like(matched.r),
-        "unpatched": np.float32(np.nan),
+        "side_face": np.False_, "swept": np.False_, "behind": np.False_,
+        "misfit": np.zeros_like(matched.r), "unpatched": np.float32(np.nan),
     }  # fmt: skip
     for stage in STAGES:
         given = stage.run(**{name: known[name] for name in stage.takes.split()})
@@ -151,6 +153,8 @@ def _to_plane(
 # fmt: off
 STAGES = (
     # In photo 1.
+    Stage("second hypothesis", second_hypothesis.with_swept,
+          "frame matched", "matched swept"),
     Stage("evidence", _believed,
           "frame matched relief_range backing", "relief sigma valid support typical", needed=True),
     Stage("single pixels not believed", evidence.supported,
@@ -160,9 +164,9 @@ STAGES = (
     Stage("occluded regions", occluded_regions.put_behind,
           "frame relief matched support", "relief"),
     Stage("side faces left out", forward_projection.side_faces,
-          "frame relief", "side_face"),
+          "frame relief swept", "side_face"),
     Stage("steps sharpened", edges.sharpen,
-          "frame relief typical", "relief misfit"),
+          "frame relief swept typical", "relief misfit"),
     Stage("noise taken out", smoothing.without_noise,
           "frame relief matched typical half", "relief"),
     Stage("plane patches", plane_patches.on_plain_walls,
@@ -173,7 +177,7 @@ STAGES = (
     Stage("loops pardoned", evidence.with_pardoned,
           "frame matched sigma misfit measured backing", "measured"),
     Stage("falling relief doubted", evidence.without_falling,
-          "frame relief misfit typical measured", "measured"),
+          "frame relief misfit typical swept measured", "measured"),
     Stage("relief off its patch doubted", evidence.without_unpatched,
           "relief unpatched sigma measured", "measured"),
     Stage("pixels of photo 1", _of_photo_1,

@@ -34,6 +34,7 @@ def accuracy_blocks(content: PairContent, say: Words) -> Iterator[Block]:
         return
     yield _banner(content, check, say)
     yield _verdict_table(check, say)
+    yield _totals(content, check, say)
     yield _point_table(content, check, say)
     hidden = int(np.isfinite(check.errors).any(axis=1).sum()) - MOST_POINTS
     if hidden > 0:
@@ -136,6 +137,24 @@ def _verdict_table(check: CheckResult, say: Words) -> TextTable:
     rows = [[f"1:{scale}", *(cell(found.get((scale, key))) for key in names)] for scale in SCALES]
     headings = [say("scale"), *names.values()]
     return TextTable(headings=headings, rows=rows, caption=say("rule_table"))
+
+
+def _totals(content: PairContent, check: CheckResult, say: Words) -> TextTable:
+    """Return the RMSE of control and check points, along the axes and together."""
+    control = np.array([name in content.control_ids for name in check.ids], dtype=bool)
+    rows = []
+    for kind, which in (("kind_control", control), ("kind_check", ~control)):
+        errors = 1000 * check.errors[which & np.isfinite(check.errors).any(axis=1)]
+        if not len(errors):
+            continue
+        with np.errstate(invalid="ignore"):
+            known = np.isfinite(errors).sum(axis=0)
+            mean = np.nansum(errors**2, axis=0) / np.where(known > 0, known, np.nan)
+        x, y, r = mean.tolist()
+        values = np.sqrt([x, y, x + y, r, x + y + r]).tolist()
+        rows.append([say(kind), str(len(errors)), *(_number(v, 2) for v in values)])
+    headings = [say("points"), say("n"), *(f"{axis} [mm]" for axis in ("X", "Y", "XY", "r", "XYr"))]
+    return TextTable(headings=headings, rows=rows, caption=say("totals_table"))
 
 
 def _point_table(content: PairContent, check: CheckResult, say: Words) -> TextTable:

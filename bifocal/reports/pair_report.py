@@ -10,15 +10,20 @@ from typing import Any
 import numpy as np
 
 from bifocal.media import media_words
-from bifocal.model.relief_map import Quality
+from bifocal.model.orientation_precision import pinhole
+from bifocal.model.photo import Photo
+from bifocal.model.relief_map import Quality, ReliefMap
 from bifocal.remarks import in_language
 from bifocal.reports import figures
 from bifocal.reports.accuracy import accuracy_blocks, millimetres
 from bifocal.reports.content import PairContent
+from bifocal.reports.lens_section import lens_blocks
+from bifocal.reports.project_section import camera_rows, processing_blocks, project_blocks
 from bifocal.reports.refraction import refraction_blocks
 from bifocal.reports.worked_point import method_blocks
 from bifocal.survey.remarks import refraction_remarks
 from bifocal.survey.tolerances import RULES
+from photocore.camera.rotation import angles_from_rotation
 from photocore.provenance import file_hash, program, provenance, today
 from photocore.reports.document import Block, Document, Heading, Paragraph, Picture, TextTable
 from photocore.reports.words import Words, words_of
@@ -43,6 +48,7 @@ def report_document(contents: Sequence[PairContent], language: str) -> Document:
 
 def pair_blocks(content: PairContent, say: Words) -> Iterator[Block]:
     """Yield the part of one pair: accuracy first."""
+    yield from project_blocks(content, say)
     yield Heading(text=say("accuracy"))
     yield from accuracy_blocks(content, say)
     if content.ortho is not None:
@@ -52,42 +58,50 @@ def pair_blocks(content: PairContent, say: Words) -> Iterator[Block]:
         caption = say("overview_caption", gsd=millimetres(content.ortho_gsd))
         yield Picture(draw=draw, ratio=ratio, caption=caption)
     yield from _geometry(content, say)
+    yield from lens_blocks(content, say)
     yield from _photos(content, say)
+    yield from _ties(content, say)
     yield from _relief(content, say)
     yield from _residuals(content, say)
     yield from _foundations(content, say)
     yield from method_blocks(content, say)
+    yield from processing_blocks(content, say)
     yield from _provenance(content, say)
 
 
 def _geometry(content: PairContent, say: Words) -> Iterator[Block]:
     yield Heading(text=say("geometry"))
-    photos, language = (content.pair.image1, content.pair.image2), content.task.language
-    deviations = content.setup.get("standard_deviations", {})
+    photos, language = content.cameras, content.task.language
+    deviations = content.deviations
 
     rows: list[list[str]] = []
 
     def add(key: str, *cells: str) -> None:
-        rows.append([say(key), *cells])
+        rows.append([say(key), *cells, *[""] * (len(photos) - len(cells))])
 
     add("file", *(Path(photo.file).name or "-" for photo in photos))
-    spreads = [_spread(deviations.get(f"distance{k}"), 3) for k in (1, 2)]
+    rows += camera_rows(content, say)
+    spreads = [_spread(own.get("distance"), 3) for own in deviations]
     add("distance", *(f"{p.distance:.3f}{s} m" for p, s in zip(photos, spreads, strict=True)))
-    add("nadir", *(f"{photo.nadir[0]:.3f}, {photo.nadir[1]:.3f} m" for photo in photos))
+    spreads = [_spread(own.get("nadir"), 3) for own in deviations]
+    places = zip(photos, spreads, strict=True)
+    add("nadir", *(f"{photo.nadir[0]:.3f}, {photo.nadir[1]:.3f}{s} m" for photo, s in places))
+    add("angles", *map(_angles, photos, [own.get("tilt_deg") for own in deviations]))
     if focal := content.setup.get("focal_px"):
         pitches = [photo.pixel_size for photo in photos]
-        sigmas = [deviations.get(f"focal{k}") for k in (1, 2)]
+        sigmas = [own.get("focal_px") for own in deviations]
         add("focal_found", *map(_focal, map(float, focal), pitches, sigmas))
-        sources = content.setup.get("interior", ("-", "-"))
+        sources = content.setup.get("interior", ("-",) * len(photos))
         add("focal_given", *(in_language(str(source), language) for source in sources))
     if content.photos:
         add("gsd", *(millimetres(seen.photo.gsd(seen.size)) for seen in content.photos))
         add("tilt", *(f"{figures.tilt_of(seen.photo, seen):.2f}°" for seen in content.photos))
     if layers := content.pair.layers:
-        add("media", media_words(layers), "")
+        add("media", media_words(layers))
         add("z0", *(f"{photo.z0 or 0.0:.3f} m" for photo in photos))
-    add("base_media" if layers else "base", f"{content.pair.base_factor:.2f} m", "")
-    yield TextTable(headings=[say("quantity"), say("far"), say("near")], rows=rows)
+    if content.of_set is None:
+        add("base_media" if layers else "base", f"{content.pair.base_factor:.2f} m")
+    yield TextTable(headings=[say("quantity"), *content.names(say)], rows=rows)
     yield from refraction_blocks(content, say)
     for sentence in content.setup.get("words", ()):
         yield Paragraph(text=in_language(str(sentence), language), small=True)
@@ -97,6 +111,13 @@ def _geometry(content: PairContent, say: Words) -> Iterator[Block]:
 
 def _spread(sigma: float | None, digits: int) -> str:
     return f" ± {sigma:.{digits}f}" if isinstance(sigma, int | float) else ""
+
+
+def _angles(photo: Photo, sigma: float | None) -> str:
+    """Return omega, phi, kappa of a camera, and the standard deviation of the first two."""
+    turn = pinhole(photo).rotation.T @ np.diag([1.0, -1.0, -1.0])  # from a camera that looks back
+    angles = np.rad2deg(angles_from_rotation(turn))
+    return "{:.2f}°, {:.2f}°, {:.2f}°".format(*angles) + _spread(sigma, 2)
 
 
 def _focal(pixels: float, pitch: float | None, sigma: float | None) -> str:
@@ -113,10 +134,29 @@ def _photos(content: PairContent, say: Words) -> Iterator[Block]:
             ratio=min(1.2, seen.picture.shape[0] / seen.picture.shape[1]),
             caption=say(
                 "photo_caption",
-                photo=say("far" if number == 1 else "near"),
+                photo=content.names(say)[number - 1],
                 file=Path(seen.photo.file).name,
             ),
         )
+
+
+def _ties(content: PairContent, say: Words) -> Iterator[Block]:
+    """Yield where the ties lie, how much of the photos they cover, and their residuals."""
+    ties = content.setup.get("common_points", {})
+    cells = ties.get("cells")
+    if not cells or not content.photos:
+        return
+    yield Heading(text=say("ties"))
+    shares = (
+        len(one["rows"]) / float(np.prod(np.ceil(np.divide(seen.size, one["side"]))))
+        for one, seen in zip(cells, content.photos, strict=True)
+    )
+    far, near = (f"{share:.0%}" for share in shares)
+    said = {key: f"{ties[key]:.2f} px" for key in ("rms_px", "largest_px")}
+    yield Paragraph(text=say("ties_said", n=ties["count"], far=far, near=near, **said))
+    ratio = max(seen.size[1] / seen.size[0] for seen in content.photos)
+    draw = partial(figures.draw_ties, content=content, say=say)
+    yield Picture(draw=draw, ratio=min(0.47 * ratio + 0.06, 0.6), caption=say("ties_caption"))
 
 
 def _relief(content: PairContent, say: Words) -> Iterator[Block]:
@@ -128,6 +168,7 @@ def _relief(content: PairContent, say: Words) -> Iterator[Block]:
     ratio = figures.ratio_of(relief.bounds)
     draw = partial(figures.draw_relief, content=content, say=say)
     yield Picture(draw=draw, ratio=ratio, caption=say("relief_caption", **shares))
+    yield Paragraph(text=_density(relief, say))
     if content.task.view is not None:
         view = content.task.view
         yield Paragraph(text=say("view_link", file=view.name), link=view)
@@ -136,6 +177,17 @@ def _relief(content: PairContent, say: Words) -> Iterator[Block]:
     draw = partial(figures.draw_sigma, content=content, say=say, limit=limit)
     caption = say("sigma_caption", limit=millimetres(limit))
     yield Picture(draw=draw, ratio=ratio, caption=caption)
+
+
+def _density(relief: ReliefMap, say: Words) -> str:
+    """Return in words how large the map is, and how densely it is measured."""
+    pixel = float(np.sqrt(abs(np.linalg.det(relief.plane_from_pixel[:2, :2]))))
+    known = int((relief.quality != Quality.UNKNOWN).sum())
+    measured = float((relief.quality == Quality.MEASURED).sum())
+    return say(
+        "density", pixel=millimetres(pixel), area=f"{known * pixel**2:.1f}",
+        all=f"{pixel**-2:.0f}", measured=f"{measured / max(known, 1) * pixel**-2:.0f}",
+    )  # fmt: skip
 
 
 def _residuals(content: PairContent, say: Words) -> Iterator[Block]:
@@ -154,16 +206,41 @@ def _residuals(content: PairContent, say: Words) -> Iterator[Block]:
         caption = say("histogram_caption", axes=", ".join(axes))
         yield Picture(draw=draw, ratio=0.3, caption=caption)
     if control:
-        headings = [say("point"), "Δcol1", "Δrow1", "Δcol2", "Δrow2", "test", say("used")]
+        of_set = content.of_set is not None
+        shown = ("ΔX", "ΔY", "Δr") if of_set else ("Δcol1", "Δrow1", "Δcol2", "Δrow2")
+        headings = [say("point"), *shown, "test", say("used")]
         rows = [_control_row(row, say) for row in control]
-        yield TextTable(headings=headings, rows=rows, caption=say("control_table"))
+        caption = say("control_off" if of_set else "control_table")
+        yield TextTable(headings=headings, rows=rows, caption=caption)
+    yield from _lengths(content, say)
 
 
 def _control_row(row: Mapping[str, Any], say: Words) -> list[str]:
-    residuals = [f"{v:.2f}" if isinstance(v, int | float) else "-" for v in row["residual_px"]]
+    values = row.get("residual_px") or [v and 1000 * v for v in row["off"]]
+    residuals = [f"{v:.2f}" if isinstance(v, int | float) else "-" for v in values]
     test = row.get("test")
     shown = f"{test:.1f}" if isinstance(test, int | float) else "-"
     return [str(row["id"]), *residuals, shown, say("holds" if row.get("used") else "fails")]
+
+
+def _lengths(content: PairContent, say: Words) -> Iterator[Block]:
+    """Yield the lengths taped between control points beside what the points measured give."""
+    taped = content.setup.get("lengths", ())
+    if not taped or content.solution is None:
+        return
+    table = content.solution.table
+    places = dict(zip(table.ids, table.xyz, strict=True))
+    rows = []
+    for one in taped:
+        if not {one["from"], one["to"]} <= places.keys():
+            continue
+        found = float(np.linalg.norm(places[one["from"]] - places[one["to"]]))
+        off = 1000 * (found - one["length"])
+        rows.append(
+            [f"{one['from']} - {one['to']}", f"{one['length']:.4f}", f"{found:.4f}", f"{off:.1f}"]
+        )
+    headings = [say("length"), say("taped"), say("found"), say("error_mm")]
+    yield TextTable(headings=headings, rows=rows, caption=say("length_table"))
 
 
 def _foundations(content: PairContent, say: Words) -> Iterator[Block]:
@@ -177,7 +254,7 @@ def _foundations(content: PairContent, say: Words) -> Iterator[Block]:
         shown = "-" if sigma is None else f"{sigma:.2f} px"
         counts = {"control": len(content.control_ids), "ties": ties.get("count", 0)}
         yield Paragraph(text=say("rest_measured", sigma=shown, **counts))
-        found = setup.get("standard_deviations", {})
+        found = {} if content.of_set is not None else setup.get("standard_deviations", {})
 
         def share(key: str) -> str:
             value = found.get(key)
@@ -185,7 +262,8 @@ def _foundations(content: PairContent, say: Words) -> Iterator[Block]:
 
         d1, d2 = (millimetres(found.get(key)) for key in ("distance1", "distance2"))
         scale, relief = share("scale"), share("relief_scale")
-        yield Paragraph(text=say("rest_sigma", d1=d1, d2=d2, scale=scale, relief=relief))
+        if found:
+            yield Paragraph(text=say("rest_sigma", d1=d1, d2=d2, scale=scale, relief=relief))
         assumed = [str(text) for text in setup.get("assumed", ())]
         for text in assumed:
             what = in_language(text, content.task.language)
@@ -204,8 +282,8 @@ def _foundations(content: PairContent, say: Words) -> Iterator[Block]:
 
 def _provenance(content: PairContent, say: Words) -> Iterator[Block]:
     yield Heading(text=say("provenance"))
-    task, pair = content.task, content.pair
-    files = [content.source, *pair.photo_files]
+    task = content.task
+    files = [content.source, *(photo.path for photo in content.cameras if photo.file)]
     files += [path for path in (task.control, task.check, task.relief, task.ortho) if path]
     made = provenance()
     if made.command:

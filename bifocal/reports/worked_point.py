@@ -23,8 +23,12 @@ _NUMBER = r"(-?\d+\.\d+)"
 #: The two pixels of a method page, and what is found of them; the same in every language.
 _PIXELS = re.compile(rf"\({_NUMBER}, {_NUMBER}\)_1   \({_NUMBER}, {_NUMBER}\)_2")
 _FOUND = re.compile(rf"r = .* = {_NUMBER} m.*?X = {_NUMBER} m    Y = {_NUMBER} m", re.DOTALL)
-#: Half of the last digit that is printed of a pixel [px] and of a place [m], and a little more.
-_LAST_PIXEL, _LAST_PLACE = 0.00051, 0.000051
+_PROGRAM = re.compile(rf"r = {_NUMBER} m, X = {_NUMBER} m, Y = {_NUMBER} m")
+#: Half of the last digit that is printed of a place, and a little more. [m]
+_LAST_PLACE = 0.000051
+#: Digits behind the point of a pixel, of a length [m] and of a slope: each line follows from the
+#: digits printed above it.
+_PIXEL, _LENGTH, _SLOPE = 4, 6, 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,34 +78,55 @@ def recomputed(
     text = html.unescape(page)
     pixels = _PIXELS.search(text)
     found = _FOUND.search(text, pixels.end()) if pixels else None
-    if pixels is None or found is None:
+    told = _PROGRAM.search(text, found.end()) if found else None
+    if pixels is None or found is None or told is None:
         return None
-    r, x, y = map(float, found.groups())
-    printed = np.array([x, y, r])
+    # By hand, both photos alike; by the program, which weights them; each X, Y, r.
+    by_hand, by_program = (np.roll(np.array(one.groups(), float), -1) for one in (found, told))
     # The digits printed, then each pixel coordinate moved by what was rounded off.
     picks = np.array([float(number) for number in pixels.groups()])
-    picks = picks + _LAST_PIXEL * np.vstack([np.zeros(4), np.eye(4)])
+    digits = min(len(number.partition(".")[2]) for number in pixels.groups())
+    picks = picks + 0.51 * 10.0**-digits * np.vstack([np.zeros(4), np.eye(4)])
     holds, nearest = False, np.full(3, np.nan)
     for pair in pairs:
         ideal = replace(
             pair, image1=replace(pair.image1, lens=None), image2=replace(pair.image2, lens=None)
         )
-        xyz = ideal.intersect(picks[:, :2], picks[:, 2:]).xyz
-        allowed = np.abs(xyz[1:] - xyz[0]).sum(axis=0) + _LAST_PLACE
-        listed = [(np.abs(table - printed) <= allowed).all(axis=1).any() for table in points]
-        same = bool((np.abs(xyz[0] - printed) <= allowed).all() and all(listed))
-        if same or not holds:
-            holds, nearest = same, xyz[0]
+        rays = [picks[:, :2], picks[:, 2:]]
+        hand, weighted = _by_hand(ideal, rays), ideal.intersect(*rays).xyz
+        same = _agree(by_hand, hand) and _agree(by_program, weighted)
+        listed = [(np.abs(table - by_program) <= _LAST_PLACE).all(axis=1).any() for table in points]
+        if (same and all(listed)) or not holds:
+            holds, nearest = same and all(listed), hand[0]
     return WorkedPoint(
-        report=report, printed=tuple(printed.tolist()), computed=tuple(nearest.tolist()),
+        report=report, printed=tuple(by_hand.tolist()), computed=tuple(nearest.tolist()),
         holds=holds,
     )  # fmt: skip
 
 
+def _agree(printed: FloatArray, xyz: FloatArray) -> bool:
+    """Tell whether the first of some places is the one printed; the others what rounding did."""
+    allowed = np.abs(xyz[1:] - xyz[0]).sum(axis=0) + _LAST_PLACE
+    return bool((np.abs(xyz[0] - printed) <= allowed).all())
+
+
+def _by_hand(pair: Pair, pixels: Sequence[FloatArray]) -> FloatArray:
+    """Return X, Y, r as the method page finds them, both photos of equal weight, (n, 3). [m]"""
+    places, slopes = [], []
+    for photo, seen in zip((pair.image1, pair.image2), pixels, strict=True):
+        rays = object_rays(photo.apparent_from_pixels(seen), photo.foot)
+        places.append(rays.position)
+        slopes.append(-rays.slope)
+    shift, slope = places[0] - places[1], slopes[0] - slopes[1]
+    r = (shift * slope).sum(axis=1) / (slope**2).sum(axis=1)
+    place = np.mean([q - v * r[:, None] for q, v in zip(places, slopes, strict=True)], axis=0)
+    return np.column_stack([place, r])
+
+
 def method_blocks(content: PairContent, say: Words) -> Iterator[Block]:
-    """Yield the method page; nothing where no point was measured in both photos."""
+    """Yield the method page; nothing of a set, or where no point was measured in both photos."""
     solution = content.solution
-    if solution is None or solution.setup is not None:
+    if solution is None or solution.setup is not None or content.of_set is not None:
         return
     points, table = solution.points, solution.table
     good = np.isfinite(np.hstack([points.pixels1, points.pixels2, table.xyz])).all(axis=1)
@@ -114,41 +139,53 @@ def method_blocks(content: PairContent, say: Words) -> Iterator[Block]:
     yield Paragraph(text=say("method_intro", id=table.ids[row]))
     pair = content.pair
     q, v, s = np.zeros((2, 2)), np.zeros((2, 2)), np.zeros(2)
-    pixel_lines, plane_lines, slope_lines = [], [], []
+    pixel_lines, plane_lines, slope_lines, sigma_lines = [], [], [], []
     picks = (points.pixels1[row], points.pixels2[row])
     relief = float(table["Z"][row])
     for k, (photo, raw) in enumerate(zip((pair.image1, pair.image2), picks, strict=True)):
-        ideal = raw if photo.lens is None else photo.lens.undistort(raw)
+        ideal = np.round(raw if photo.lens is None else photo.lens.undistort(raw), _PIXEL)
         matrix = photo.plane_from_pixel / photo.plane_from_pixel[2, 2]
         x, y, w = matrix @ [*ideal, 1.0]
-        q[k] = x / w, y / w
-        pixel_lines.append(f"({ideal[0]:.3f}, {ideal[1]:.3f})_{k + 1}")
+        q[k] = np.round([x / w, y / w], _LENGTH)
+        pixel_lines.append(f"{_vector(ideal, _PIXEL)}_{k + 1}")
         plane_lines += _matrix_lines(f"H{k + 1}", matrix)
         plane_lines.append(
-            f"     x, y, w = {x:.7g}, {y:.7g}, {w:.7g}    q{k + 1} = ({q[k][0]:.5f}, "
-            f"{q[k][1]:.5f}) m"
+            f"     x, y, w = {x:.9g}, {y:.9g}, {w:.9g}    q{k + 1} = {_vector(q[k], _LENGTH)} m"
         )
+        nadir, distance = np.round(photo.nadir, _LENGTH), round(photo.distance, _LENGTH)
         slope_lines.append(
-            f"N{k + 1} = ({photo.nadir[0]:.4f}, {photo.nadir[1]:.4f}) m, d{k + 1} = "
-            f"{photo.distance:.4f} m    "
+            f"N{k + 1} = {_vector(nadir, _LENGTH)} m, d{k + 1} = {distance:.{_LENGTH}f} m    "
         )
+        pixel = _spacing(photo, raw, relief)
         if photo.refracted:
-            tangent = (q[k] - photo.nadir) / photo.distance
-            slope_lines[k] += f"z0 = {photo.z0:.4f} m    t{k + 1} = {_vector(tangent, 7)}    "
+            tangent = (q[k] - nadir) / distance
+            slope_lines[k] += (
+                f"z0 = {photo.z0:.{_LENGTH}f} m    t{k + 1} = {_vector(tangent, _SLOPE)}    "
+            )
             q[k], slope = object_rays(q[k], photo.foot)
-            v[k] = -slope
-            slope_lines[k] += f"a{k + 1} = {_vector(q[k], 5)} m    "
+            q[k], v[k] = np.round(q[k], _LENGTH), np.round(-slope, _SLOPE)
+            slope_lines[k] += f"a{k + 1} = {_vector(q[k], _LENGTH)} m    "
+            sigma_lines.append("")
         else:
-            v[k] = (q[k] - photo.nadir) / photo.distance
-        s[k] = photo.precision(solution.sigma_px) * _spacing(photo, raw, relief)
-        slope_lines[k] += f"v{k + 1} = {_vector(v[k], 7)}"
+            v[k] = np.round((q[k] - nadir) / distance, _SLOPE)
+            sigma_lines.append(
+                f"|det H{k + 1}| = {abs(np.linalg.det(matrix)):.6e}    "
+                f"p{k + 1} = sqrt(|det H{k + 1}| / |w{k + 1}|³) = "
+            )
+        sigma_px = round(photo.precision(solution.sigma_px), 4)
+        s[k] = round(sigma_px * pixel, _LENGTH)
+        sigma_lines[k] = sigma_lines[k] or f"p{k + 1} = "
+        sigma_lines[k] += (
+            f"{1000 * pixel:.4f} mm    s{k + 1} = {sigma_px:.4f} p{k + 1} = {1000 * s[k]:.3f} mm"
+        )
+        slope_lines[k] += f"v{k + 1} = {_vector(v[k], _SLOPE)}"
     bent = pair.refracted
     if pair.layers:
         slope_lines.insert(0, media_words(pair.layers))
     yield Paragraph(text=say("step_pixels"), lines=("   ".join(pixel_lines),))
     yield Paragraph(text=say("step_plane"), lines=tuple(plane_lines))
     yield Paragraph(text=say("step_bent" if bent else "step_slope"), lines=tuple(slope_lines))
-    yield from _solved(content, row, (q, v, s), say)
+    yield from _solved(content, row, (q, v, s), sigma_lines, say)
 
 
 def _vector(values: FloatArray, digits: int) -> str:
@@ -162,7 +199,11 @@ def _spacing(photo: Photo, raw: FloatArray, relief: float) -> float:
 
 
 def _solved(
-    content: PairContent, row: int, rays: tuple[FloatArray, FloatArray, FloatArray], say: Words
+    content: PairContent,
+    row: int,
+    rays: tuple[FloatArray, FloatArray, FloatArray],
+    sigma_lines: Sequence[str],
+    say: Words,
 ) -> Iterator[Block]:
     """Yield relief, place and precision from the rays, and what the program says."""
     assert content.solution is not None
@@ -180,21 +221,21 @@ def _solved(
     yield Paragraph(
         text=named(say("step_relief")),
         lines=(
-            named(f"q1 - q2 = ({shift[0]:.5f}, {shift[1]:.5f}) m")
-            + f"    v1 - v2 = ({slope[0]:.7f}, {slope[1]:.7f})",
-            f"r = {float(shift @ slope):.7e} / {square:.7e} = {r:.4f} m",
+            named(f"q1 - q2 = {_vector(shift, _LENGTH)} m")
+            + f"    v1 - v2 = {_vector(slope, _SLOPE)}",
+            f"r = {float(shift @ slope):.8e} / {square:.8e} = {r:.4f} m",
         ),
     )
     place = (q - v * r).mean(axis=0)
     yield Paragraph(
         text=named(say("step_xy")), lines=(f"X = {place[0]:.4f} m    Y = {place[1]:.4f} m",)
     )
-    parts = s if bent else (1 - r / np.array([pair.d1, pair.d2])) * s
+    parts = s if bent else (1 - round(r, 4) / np.array([pair.d1, pair.d2])) * s
     yield Paragraph(
         text=say("step_sigma_bent" if bent else "step_sigma"),
         lines=(
-            f"s1 = {1000 * s[0]:.3f} mm    s2 = {1000 * s[1]:.3f} mm    |v1 - v2| = "
-            f"{np.sqrt(square):.6f}    sigma_r = "
+            *sigma_lines,
+            f"|v1 - v2| = {np.sqrt(square):.6f}    sigma_r = "
             f"{1000 * np.hypot(*parts) / np.sqrt(square):.2f} mm",
         ),
     )

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from bifocal.reports.content import ReportTask, read_content
+from bifocal.options import OF_STEP, PROJECT
+from bifocal.reports.content import ReportTask, StepTold, read_content
 from bifocal.reports.pair_report import report_document
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
@@ -15,7 +17,10 @@ from photocore.jsonfile import read_object
 from photocore.output import check_writable
 from photocore.reports.writing import check_report, write_document
 
-__all__ = ["ReportTask", "report_of", "write_report"]
+#: How the files of pairs and of sets end.
+_ENDINGS = re.compile(r"\.(pair|photos)\.json$")
+
+__all__ = ["ReportTask", "StepTold", "report_of", "write_report"]
 
 
 def write_report(
@@ -66,7 +71,7 @@ def report_of(
     progress: Progress = no_progress,
 ) -> tuple[str, ...]:
     """Write the report of a workbook, a pair file or a survey's folder; see `write_report`."""
-    sources, tasks = [source], [task]
+    sources, tasks = [source], [replace(task, language=task.language or "en")]
     if source.is_dir():
         if task.control or task.check or task.relief or task.ortho:
             raise InputError(
@@ -87,7 +92,7 @@ def find_pairs(folder: Path, task: ReportTask) -> tuple[list[Path], list[ReportT
     InputError
         If there is none.
     """
-    sources = sorted(folder.glob("align/*.pair.json")) or sorted(folder.glob("*/align/*.pair.json"))
+    sources = _aligned(folder, "") or _aligned(folder, "*/")
     if not sources:
         raise InputError(
             f"{folder}: holds no pair made by `bifocal facade` or `bifocal survey` (align/*.pair."
@@ -95,7 +100,7 @@ def find_pairs(folder: Path, task: ReportTask) -> tuple[list[Path], list[ReportT
         )
     tasks, found = [], []
     for source in sources:
-        home, name = source.parent.parent, source.name.removesuffix(".pair.json")
+        home, name = source.parent.parent, _ENDINGS.sub("", source.name)
         orthos = (home / "drawing" / f"{name}.tif", home / "ortho" / f"{name}_ortho.tif")
         relief = home / "relief" / f"{name}_relief.tif"
         view = home / "view" / f"{name}_view.html"
@@ -105,10 +110,57 @@ def find_pairs(folder: Path, task: ReportTask) -> tuple[list[Path], list[ReportT
             "relief": relief if relief.is_file() else None,
             "ortho": next((path for path in orthos if path.is_file()), None),
             "view": view if view.is_file() else None,
+            **_remembered(home, task),
         }
-        found.append(workbook if workbook.is_file() else _pair_file(source, folder))
+        is_set = source.name.endswith(".photos.json")
+        if is_set:  # its workbook holds values: the points are solved from their tables
+            given |= _tables(home / "points")
+        has_book = workbook.is_file() and not is_set
+        found.append(workbook if has_book else _pair_file(source, folder))
         tasks.append(replace(task, **given))
     return found, tasks
+
+
+def _tables(folder: Path) -> dict[str, Path]:
+    """Return the tables that points of a folder were solved from, by the names of a task."""
+    record = folder / ".made.json"
+    files = read_object(record, what="record of a step")["inputs"] if record.is_file() else {}
+    return {role: Path(files[role][0]) for role in ("control", "check") if role in files}
+
+
+def _aligned(folder: Path, within: str) -> list[Path]:
+    """Return the files of the pairs and sets that were set up."""
+    found = folder.glob(f"{within}align/*.json")
+    return sorted(path for path in found if _ENDINGS.search(path.name))
+
+
+@dataclass(frozen=True, slots=True)
+class _Time:
+    seconds: float
+    machine: str
+
+
+def _remembered(home: Path, task: ReportTask) -> dict[str, Any]:
+    """Return what the records of a pair's steps tell, and the task does not say otherwise."""
+    steps: list[StepTold] = []
+    known: dict[str, Any] = {}
+    for path in (home / name / ".made.json" for name in OF_STEP):
+        if not path.is_file():
+            continue
+        record = read_object(path, what="record of a step")
+        if isinstance(options := record.get("options"), dict):
+            known |= options
+            if (name := str(record.get("step"))) != "report":
+                time = _Time(float(record.get("seconds", 0)), str(record.get("machine", "")))
+                files = {role: Path(file) for role, (file, _) in record["inputs"].items()}
+                steps.append(StepTold.of(name, {**options, **files}, time))
+    scale = task.scale or known.get("scale")
+    return {
+        "steps": tuple(steps),
+        "scale": float(scale) if isinstance(scale, int | float) else None,
+        "language": task.language or known.get("language", "en"),
+        "project": {name: known[name] for name in PROJECT if name in known} | dict(task.project),
+    }
 
 
 def _pair_file(own: Path, folder: Path) -> Path:

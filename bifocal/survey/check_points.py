@@ -40,7 +40,7 @@ def check_points(
     flagged = compared & np.isin(flags, UNCOUNTED)
     errors = np.where((known.used & ~flagged)[:, None], solved - known.xyz, np.nan)
     sigma = np.stack([table[key] for key in SIGMAS], axis=-1) if len(table) else np.zeros((0, 3))
-    axes = {name: _statistics(errors[:, i]) for i, name in enumerate("XYZ")}
+    axes = {name: statistics(errors[:, i]) for i, name in enumerate("XYZ")}
     accuracy = max((axis.rmse for axis in axes.values() if axis.n), default=float("nan"))
     return CheckResult(
         ids=known.ids,
@@ -54,7 +54,7 @@ def check_points(
     )
 
 
-def _statistics(errors: FloatArray) -> AxisErrors:
+def statistics(errors: FloatArray) -> AxisErrors:
     """Return count, RMSE, mean and largest error."""
     kept = errors[~np.isnan(errors)]
     if not len(kept):

@@ -68,6 +68,8 @@ class PointObservations:
         Relief measured on site, to check against. [m]
     others : ndarray, shape (n, k, 2)
         Raw (column, row) in the third photo and more of a set. [px]
+    other_xy : ndarray, shape (n, k, 2)
+        Image coordinates in the third photo and more beside an ideal pair, as ``xy1``. [mm or px]
     """
 
     ids: tuple[str, ...]
@@ -81,6 +83,7 @@ class PointObservations:
     note: tuple[str, ...] = ()
     r_measured: FloatArray = _ABSENT
     others: FloatArray = _ABSENT
+    other_xy: FloatArray = _ABSENT
 
     def __post_init__(self) -> None:
         n, set_ = len(self.ids), object.__setattr__
@@ -92,10 +95,12 @@ class PointObservations:
                 raise InputError(f"{name}: expected shape ({n}, {columns}), found {array.shape}.")
             array.setflags(write=False)
             set_(self, name, array)
-        others = np.empty((n, 0, 2)) if self.others is None else np.array(self.others, float)
-        if others.ndim != 3 or others.shape[::2] != (n, 2):
-            raise InputError(f"others: expected shape ({n}, k, 2), found {others.shape}.")
-        set_(self, "others", others)
+        for name in ("others", "other_xy"):
+            value = getattr(self, name)
+            others = np.empty((n, 0, 2)) if value is None else np.array(value, float)
+            if others.ndim != 3 or others.shape[::2] != (n, 2):
+                raise InputError(f"{name}: expected shape ({n}, k, 2), found {others.shape}.")
+            set_(self, name, others)
         measured = _blank(n, 1)[:, 0] if self.r_measured is None else self.r_measured
         set_(self, "r_measured", np.array(measured, dtype=np.float64))
         set_(self, "use", np.ones(n, bool) if self.use is None else np.array(self.use, dtype=bool))

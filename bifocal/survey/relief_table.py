@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -62,6 +62,11 @@ class ReliefTable:
 
     def __getitem__(self, key: str) -> FloatArray:
         return self.columns[key]
+
+    def completed_by(self, other: ReliefTable) -> ReliefTable:
+        """Return the table with the columns and cells that only another one of its points has."""
+        cells = {**other.formula_cells, **self.formula_cells}
+        return replace(self, columns={**other.columns, **self.columns}, formula_cells=cells)
 
     @property
     def xyz(self) -> FloatArray:

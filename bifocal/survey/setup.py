@@ -15,6 +15,7 @@ from bifocal.model.pair import Pair
 from bifocal.precision import false_relief_of_scale
 from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations
+from bifocal.survey.other_photos import OtherPhoto
 from bifocal.survey.refracted_radii import scale_ratio
 from bifocal.survey.survey_lens import SurveyLens, turns_of
 from bifocal.survey.survey_media import SurveyMedia
@@ -145,6 +146,8 @@ class SurveySetup:
         What the photos look through, where the workbook has cells for it.
     lenses : tuple of SurveyLens or None
         Distortion of both lenses, where the workbook has cells for it.
+    others : tuple of OtherPhoto
+        The third photo and more, where the workbook has columns for them.
     sensor : tuple of float or None
         Width and height. [mm]
     pair_file : str
@@ -170,6 +173,7 @@ class SurveySetup:
     measuring: Measuring = field(default_factory=Measuring)
     media: SurveyMedia | None = None
     lenses: tuple[SurveyLens, SurveyLens] | None = None
+    others: tuple[OtherPhoto, ...] = ()
     sensor: Place | None = None
     pair_file: str = ""
     photo1: str = ""

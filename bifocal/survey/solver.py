@@ -20,6 +20,7 @@ from bifocal.survey.orientation_check import (
     with_zoom_centre,
     zoom_centre_of_points,
 )
+from bifocal.survey.other_photos import contradictions, of_all_photos
 from bifocal.survey.point_survey import solve_points
 from bifocal.survey.reference import Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable
@@ -84,6 +85,7 @@ def solve_survey(
     measured = points if arranged.measured is None else arranged.measured
     table = solve_points(pair, measured, sigma_px=sigma_px, limits=survey.setup.measuring.limits)
     refuse_contradiction(points, table, survey.where)
+    table, other_remarks = _with_others(survey, table, arranged)
     unused = points.unused
     known, control = survey.known.without(unused), survey.control.without(unused)
     check = check_points(table, known, rules)
@@ -94,6 +96,7 @@ def solve_survey(
         *arranged.remarks,
         *refraction_remarks(pair, measured),
         *point_remarks(points, table, arranged.setup),
+        *other_remarks,
         *check.remarks,
         *unused_remarks(unused, Check=survey.known, Georeference=survey.control),
         *opposite_signs_remark(table, known),
@@ -105,6 +108,26 @@ def solve_survey(
         georeference=world, orientation_check=plane, adjusted=adjust,
         corrections=arranged.corrections, remarks=tuple(dict.fromkeys(filter(None, remarks))),
     )  # fmt: skip
+
+
+def _with_others(
+    survey: SurveyInput, table: ReliefTable, arranged: _Arranged
+) -> tuple[ReliefTable, list[str]]:
+    """Return the table with what other photos beside an ideal pair tell, and remarks on it."""
+    setup = survey.setup
+    if arranged.setup is None or not setup.others or not survey.points.other_xy.size:
+        return table, []
+    found = arranged.setup.adjusted
+    setup = replace(setup, adjusted=found[::-1] if arranged.pair.exchanged else found)
+    columns, cells = of_all_photos(setup, survey.points)
+    doubtful = contradictions(table.ids, np.where(survey.points.use, columns["chance"], np.nan))
+    said: list[str] = []
+    if doubtful:
+        said.append(remark("survey.picks_contradict", names=", ".join(doubtful[:10])))
+    table = replace(
+        table, columns={**table.columns, **columns}, formula_cells={**table.formula_cells, **cells}
+    )
+    return table, said
 
 
 def solve_survey_of_set(

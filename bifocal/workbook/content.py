@@ -4,32 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations_with_replacement
 
 import numpy as np
 
 from bifocal.model.flags import DOUBTFUL_SHARE, FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
-from bifocal.survey.georeferencing import residuals
 from bifocal.survey.image_shift import foot_tangents, image_shift, lens_turns
-from bifocal.survey.leave_one_out import leave_one_out
 from bifocal.survey.observations import PointObservations
+from bifocal.survey.other_photos import OF_ALL
 from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
-from bifocal.survey.relief_table import ReliefTable, entries
+from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.setup import SIGMA_RADIAL, SurveySetup
 from bifocal.survey.solved_survey import SolvedSurvey, WorldPoints
 from bifocal.survey.survey_media import SurveyMedia
 from bifocal.survey.tolerances import RULES, ToleranceRule
-from bifocal.survey.weighted_similarity import weights_of
 from bifocal.workbook.formulas.columns import (
     NEAR,
     adjustment_names,
+    compared,
     ideal_points,
+    other_numbers,
     pair_points,
 )
 from bifocal.workbook.formulas.media_formulas import setup_values
-from bifocal.workbook.formulas.setup_cells import MATRICES, NADIRS, PHOTOS, setup_checks
+from bifocal.workbook.formulas.other_values import other_values
+from bifocal.workbook.formulas.setup_cells import (
+    MATRICES,
+    NADIRS,
+    PHOTOS,
+    setup_checks,
+)
 from photocore.arrays import BoolArray, FloatArray
 from photocore.workbook.changing.cells import CellValue, name_cell
 from photocore.workbook.making.live_columns import LiveColumn
@@ -94,6 +99,10 @@ class SurveyContent:
         the pair. An ideal pair's stand in its set-up.
     lens : bool
         Whether an empty template has cells for the distortion of each lens.
+    other_photos : int
+        How many photos an empty template has columns for beside those of the pair.
+    changes : mapping of str to float, or None
+        What is added to values of the set-up on the sheet `WhatIf`; None where there is none.
     """
 
     language: str = "en"
@@ -120,6 +129,8 @@ class SurveyContent:
     plain: bool = False
     media: SurveyMedia | None = None
     lens: bool = False
+    other_photos: int = 0
+    changes: Mapping[str, float] | None = None
 
     @classmethod
     def of(cls, solved: SolvedSurvey) -> SurveyContent:
@@ -153,6 +164,11 @@ class SurveyContent:
         return self.lens if self.setup is None else self.setup.lenses is not None
 
     @property
+    def others(self) -> int:
+        """How many photos there are columns for beside those of the pair."""
+        return self.other_photos if self.setup is None else len(self.setup.others)
+
+    @property
     def is_pair(self) -> bool:
         """Whether the points are raw pixels of a general pair."""
         return self.pair is not None and self.setup is None
@@ -180,8 +196,9 @@ class SurveyContent:
         if self.is_pair:
             return pair_points(undistorted=self.undistorted, media=self.media_cells)
         return ideal_points(
-            **there, adjusted=self.corrected, media=self.media_cells, lens=self.has_lens
-        )
+            **there, adjusted=self.corrected, media=self.media_cells, lens=self.has_lens,
+            others=self.others,
+        )  # fmt: skip
 
     @property
     def placed(self) -> WorldPoints:
@@ -210,7 +227,7 @@ def inputs(values: FloatArray) -> list[CellValue]:
     return [None if value != value else value for value in values.tolist()]
 
 
-def _named(names: Sequence[str], used: BoolArray) -> dict[str, list[CellValue]]:
+def named_rows(names: Sequence[str], used: BoolArray) -> dict[str, list[CellValue]]:
     """Return the columns that every table of points begins with."""
     return {"id": [name_cell(name) for name in names], "use": [int(value) for value in used]}
 
@@ -220,7 +237,7 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     points, table = content.points, content.table
     if points is None:
         return {}
-    cells = _named(points.ids, points.use)
+    cells = named_rows(points.ids, points.use)
     cells |= {"code": list(points.code), "note": list(points.note)}
     groups = [
         (("x1", "y1"), points.xy1),
@@ -228,6 +245,10 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
         (("s1", "s2", "theta"), points.polar),
         (("col1", "row1"), points.pixels1),
         (("col2", "row2"), points.pixels2),
+    ]
+    groups += [
+        ((f"x{k}", f"y{k}"), points.other_xy[:, i])
+        for i, k in enumerate(other_numbers(points.other_xy.shape[1]))
     ]
     if content.undistorted:
         for image, photo, raw in zip(
@@ -247,6 +268,8 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
         placeless[:] = True
     for key, values in table.columns.items():
         blank = placeless if key in _PLACES or key.startswith("cov_") else incomplete
+        if key in OF_ALL or key.startswith(("r_1_", "sigma_1_")):
+            blank = np.isnan(values)
         if key in ("q", "theta_used"):
             blank = np.isnan(values)
         cells[key] = _unless(blank, values)
@@ -272,6 +295,10 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     else:
         cells |= _radial_variances(content, placeless)
     typed = points.has_pixels | points.is_cartesian | points.is_polar
+    if content.others:
+        pairs = [np.isfinite(table.columns[r]) for r, _ in compared(content.others)[:-1]]
+        letters = np.where(pairs, np.array(list("ABCDE")[: len(pairs)])[:, None], "")
+        cells["pair"] = [" ".join(filter(None, own)) or None for own in letters.T]
     cells["flag"] = [
         flag if given else None for flag, given in zip(table.flags, typed, strict=True)
     ]
@@ -332,88 +359,6 @@ def result_cells(
     }
 
 
-def check_cells(
-    content: SurveyContent, points: Mapping[str, Sequence[CellValue]]
-) -> dict[str, list[CellValue]]:
-    """Return every column of `Check` by key, from those of `Points`."""
-    known, check, table = content.known, content.check, content.table
-    cells = _named(known.ids, known.used)
-    for i, axis in enumerate("XYZ"):
-        cells[f"{axis}_ref"] = inputs(known.xyz[:, i])
-        if check is not None:
-            cells[axis] = inputs(check.solved[:, i])
-            cells[f"d{axis}"] = inputs(check.errors[:, i])
-            cells[f"t{axis}"] = inputs(check.standardised[:, i])
-    if check is not None and table is not None:
-        sizes = np.abs(np.nan_to_num(check.standardised)).max(axis=1)
-        tested = ~np.isnan(check.standardised).all(axis=1)
-        cells["sigmas"] = inputs(np.where(tested, sizes, np.nan))
-        cells["out"] = [int(name in check.flagged) for name in known.ids]
-        flags = [*points["flag"], None]
-        cells["flag"] = [flags[row] for row in known.rows_in(table)]
-    return cells
-
-
-def control_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
-    """Return every column of `Georeference` by key."""
-    control, geo = content.control, content.georeference
-    cells = _named(control.ids, control.used)
-    cells |= {axis: inputs(control.xyz[:, i]) for i, axis in enumerate("ENH")}
-    if geo is None:
-        return cells
-    cells["found_bad"] = [0 if name in geo.bad else None for name in geo.ids]
-    used, fit = geo.used, geo.world_from_wall
-    centred = geo.solved - fit.source_centre
-    left = residuals(fit, geo.solved, control.xyz - geo.origin, geo.offset)
-    near = geo.near
-    for i, (axis, world) in enumerate(zip("XYZ", "ENH", strict=True)):
-        cells[axis] = inputs(geo.solved[:, i])
-        cells[f"c{axis}"] = inputs(np.where(used, centred[:, i], 0.0))
-        cells[f"c{world}"] = inputs(np.where(used, near[:, i], 0.0))
-        cells[f"v{world}"] = inputs(left[:, i])
-    cells["w"] = [int(value) for value in used]
-    return cells | _weight_cells(geo) | _left_out_cells(geo)
-
-
-def _left_out_cells(geo: Georeference) -> dict[str, list[CellValue]]:
-    """Return what each control point costs the fit."""
-    found = leave_one_out(geo)
-    cells: dict[str, list[CellValue]] = {}
-    cells |= {key: inputs(getattr(found, key)) for key in ("own", "gain")}
-    cells |= {"v": inputs(found.size), "s0": inputs(found.sigma0)}
-    for (i, a), (j, b) in combinations_with_replacement(enumerate("ENH"), 2):
-        cells[f"d_{a}{b}"] = inputs(found.covariance[:, i, j])
-    fits: list[CellValue] = [
-        None if gain != gain else "CHECK" if row == found.worst else "OK"
-        for row, gain in enumerate(found.gain)
-    ]
-    return cells | {"fit": fits}
-
-
-def _weight_cells(geo: Georeference) -> dict[str, list[CellValue]]:
-    """Return covariances of the control points, their weights, and weights times design."""
-    if geo.covariance is None:
-        return {}
-    cells = {key: inputs(values) for key, values in entries(geo.covariance, "q_").items()}
-    size, used = len(geo.ids), geo.used
-    flat = geo.model == "2D"
-    weights = np.zeros((size, 3, 3))
-    weights[used] = weights_of(geo.covariance[used], flat=flat)
-    centred = np.zeros((size, 3))
-    centred[used] = geo.solved[used] - geo.world_from_wall.source_centre
-    east, north, height = np.where(used[:, None], geo.near, 0.0).T
-    zero, turned = np.zeros(size), 1.0 if flat else 0.0
-    design = [
-        (east, turned * north, -north), (north, -turned * east, east), (zero, height, zero)
-    ]  # fmt: skip
-    cells |= {key: inputs(values) for key, values in entries(weights, "p_").items()}
-    columns = {f"u_{{}}{name}": np.stack(d, axis=-1) for name, d in zip("pqm", design, strict=True)}
-    for key, column in {**columns, "h_{}": centred}.items():
-        weighted = np.einsum("nij,nj->ni", weights, column)
-        cells |= {key.format(axis): inputs(weighted[:, i]) for i, axis in enumerate("XYZ")}
-    return cells
-
-
 def setup_cells(content: SurveyContent) -> dict[str, CellValue]:
     """Return the value of every named cell of `Setup`; what is absent is blank."""
     pair, is_pair, media = content.pair, content.is_pair, content.bent
@@ -430,6 +375,8 @@ def _setup_cells(content: SurveyContent) -> dict[str, CellValue]:
         **{f"off_{axis}{image}": 0 for axis in "xy" for image in "12"},
         **{f"lens_{image}_{axis}": 0 for axis in "uv" for image in "12"},
     }  # fmt: skip
+    for k in other_numbers(content.others):
+        cells |= {f"off_x{k}": 0, f"off_y{k}": 0, f"enlargement_{k}": 1}
     if content.pair is None:
         return cells | {"sigma_s": SIGMA_RADIAL}
     for image, photo in enumerate(content.photos, start=1):
@@ -445,6 +392,7 @@ def _setup_cells(content: SurveyContent) -> dict[str, CellValue]:
     cells["sigma_r_max"] = limits.relief_limit(content.pair.d2)
     if setup is None:
         return cells | _pair_cells(content, first, second)
+    cells |= other_values(setup)
     if first.scale_number is not None and second.scale_number is not None:
         cells["k_12"] = second.scale_number / first.scale_number
     cells |= {"photo_1": setup.photo1 or None, "photo_2": setup.photo2 or None}

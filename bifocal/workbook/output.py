@@ -200,6 +200,7 @@ def as_typed(solution: SolvedSurvey, content: SurveyContent) -> SurveyContent:
             limits=setup.measuring.limits,
             as_given=True,
         )
+        table = table.completed_by(solution.table)
         if world is not None:
             world = georeference(table, control, model=world.model)
     # Relief given beside the points is checked too, but stands not on the sheet Check.

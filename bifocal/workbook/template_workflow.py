@@ -6,6 +6,7 @@ from pathlib import Path
 
 from bifocal.model.pair import Pair
 from bifocal.survey.observations import PointObservations
+from bifocal.survey.other_photos import MOST_PHOTOS
 from bifocal.survey.point_survey import solve_points
 from bifocal.survey.survey_media import SurveyMedia
 from bifocal.workbook.content import POINT_ROWS, SurveyContent
@@ -29,6 +30,8 @@ def write_template(
     rows: int = POINT_ROWS,
     media: int | None = None,
     lens: bool = False,
+    photos: int = 2,
+    what_if: bool = False,
     functions: bool = False,
     plain: bool = False,
     overwrite: bool = False,
@@ -48,6 +51,11 @@ def write_template(
         none by default, for photos in air.
     lens : bool
         Whether `Setup` gets cells for the distortion of each lens, which formulas then take out.
+    photos : int
+        How many photos there are columns for: of more than two, relief by each pair of photo 1 and
+        another stands beside that of all.
+    what_if : bool
+        Add a sheet that shows what changes of distances, lenses and pixel do to every relief.
     functions : bool
         Add the formulas of the method as functions with names, and a sheet that explains them.
     plain : bool
@@ -65,12 +73,19 @@ def write_template(
         raise InputError(f"language: {language!r} is none of {', '.join(LANGUAGES)}.")
     if not 1 <= rows <= MOST_ROWS:
         raise InputError(f"rows: must be 1 to {MOST_ROWS}, got {rows}.")
+    if not 2 <= photos <= MOST_PHOTOS:
+        raise InputError(f"photos: must be 2 to {MOST_PHOTOS}, got {photos}.")
+    if photos > 2 and (media or lens):
+        raise InputError(f"photos: {photos} are for photos in air without lens cells.")
+    if what_if and media:
+        raise InputError("what_if: is for photos in air.")
     cells = None if media is None else SurveyMedia.blank(media)
     check_book_path(path)
     check_new_workbook(path, overwrite=overwrite, other="")
     content = SurveyContent(
-        language=language, rows=rows, media=cells, lens=lens, functions=functions, plain=plain
-    )
+        language=language, rows=rows, media=cells, lens=lens, functions=functions, plain=plain,
+        other_photos=photos - 2, changes={} if what_if else None,
+    )  # fmt: skip
     write_book(path, content, overwrite=overwrite)
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from multimedia.media.camera import Camera, Sensor
 from multimedia.media.projection import Media, project
+from multimedia.openptv.ray_meetings import meeting_rays
 from multimedia.orientation.intersection import intersect_rays
 from multimedia.orientation.object_rays import image_rays, nearest_points
 from photocore.arrays import FloatArray, IntArray
@@ -19,8 +21,6 @@ TOLERANCE = 2.0
 #: Frames of targets that have nothing to do with each other, and how far they are displaced: so
 #: many pixels, or so many tolerances. Risk of calling chance particles.
 DECOYS, _DISPLACED, RISK = 2, (40.0, 10.0), 0.001
-#: Pairs of rays worked on at a time.
-_BLOCK = 200_000
 
 
 def correspondences(
@@ -66,18 +66,16 @@ def correspondences(
         raise InputError(f"correspondences: {len(cameras)} cameras, at least {fewest} to agree.")
     image = [s.image_from_pixel(t.reshape(-1, 2)) for s, t in zip(sensors, targets, strict=True)]
     rays = [image_rays(c, i, m) for c, i, m in zip(cameras, image, media, strict=True)]
-    found: list[IntArray] = [np.empty((0, len(cameras)), dtype=np.int64)]
-    for a, b in combinations(range(len(cameras)), 2):
-        step = max(1, _BLOCK // max(1, len(image[b])))
-        for first in range(0, len(image[a]), step):
-            rows = np.arange(first, min(first + step, len(image[a])))
-            one, two = (m.ravel() for m in np.meshgrid(rows, np.arange(len(image[b]))))
-            pairs = [(rays[a][k][one], rays[b][k][two]) for k in range(2)]
-            with np.errstate(invalid="ignore"):
-                points = nearest_points(pairs[0], pairs[1])
-            found.append(_seen(cameras, targets, media, sensors, points, tolerance))
-            own = (found[-1][:, a] == one) & (found[-1][:, b] == two)
-            found[-1] = found[-1][own & ((found[-1] >= 0).sum(axis=1) >= fewest)]
+    frame = _Frame(cameras, targets, media, sensors, rays, tolerance, fewest)
+    few = proposing_pairs(len(cameras), fewest)
+    found = [np.empty((0, len(cameras)), dtype=np.int64)]
+    found += [frame.proposals(a, b, np.arange(len(targets[a])), np.arange(len(targets[b])))
+              for a, b in few]  # fmt: skip
+    # What they leave is sought from all pairs: rays of a poor calibration miss each other.
+    taken = np.concatenate(found)
+    left = [np.setdiff1d(np.arange(len(t)), taken[:, k]) for k, t in enumerate(targets)]
+    others = combinations(range(len(cameras)), 2)
+    found += [frame.proposals(a, b, left[a], left[b]) for a, b in others if (a, b) not in few]
     numbers = np.unique(np.concatenate(found), axis=0)
     # The row behind the last, -1, is that of no target.
     padded = [np.vstack([i, [np.nan, np.nan]]) for i in image]
@@ -88,6 +86,18 @@ def correspondences(
     xyz, numbers, misfit = xyz[good], numbers[good], misfit[good]
     kept = _each_once(numbers, np.lexsort((misfit, -(numbers >= 0).sum(axis=1))))
     return xyz[kept], numbers[kept], misfit[kept]
+
+
+def proposing_pairs(cameras: int, fewest: int) -> list[tuple[int, int]]:
+    """Return pairs of cameras of which so many cameras, whichever they are, hold at least one.
+
+    Of cameras in one group less than that, two stand in one group.
+
+    >>> proposing_pairs(4, 3)
+    [(0, 2), (1, 3)]
+    """
+    groups = fewest - 1
+    return [(a, b) for a, b in combinations(range(cameras), 2) if a % groups == b % groups]
 
 
 def expected_by_chance(
@@ -138,28 +148,56 @@ def is_chance(found: FloatArray, chance: FloatArray) -> bool:
     return bool((by_chance | (ours == 0)).all() and theirs[-1] > 0)
 
 
-def _seen(
-    cameras: Sequence[Camera],
-    targets: Sequence[FloatArray],
-    media: Sequence[Media],
-    sensors: Sequence[Sensor],
-    points: FloatArray,
-    tolerance: float,
-) -> IntArray:
-    """Return the nearest target of every camera to where it sees each point, -1 where none is."""
-    from scipy.spatial import cKDTree
+@dataclass(frozen=True, slots=True, eq=False)
+class _Frame:
+    """Targets of all cameras, and their rays in the object."""
 
-    numbers = np.full((len(points), len(cameras)), -1, dtype=np.int64)
-    alive = np.flatnonzero(np.isfinite(points).all(axis=1))
-    for k, camera in enumerate(cameras):
-        if not len(targets[k]) or not len(alive):
-            continue
-        places = sensors[k].pixel_from_image(project(camera, points[alive], media[k]))
-        good = np.isfinite(places).all(axis=1)
-        away, nearest = cKDTree(targets[k]).query(places[good], distance_upper_bound=tolerance)
-        hit = np.isfinite(away)
-        numbers[alive[good][hit], k] = nearest[hit]
-    return numbers
+    cameras: Sequence[Camera]
+    targets: Sequence[FloatArray]
+    media: Sequence[Media]
+    sensors: Sequence[Sensor]
+    rays: Sequence[tuple[FloatArray, FloatArray]]
+    tolerance: float
+    fewest: int
+
+    def width(self, camera: int, some: IntArray) -> tuple[FloatArray, float]:
+        """Return how far rays may miss their particle: where they start, and more per length."""
+        # On oblique rays what the tolerance moves at the face counts more than square to it.
+        pitch = float(self.sensors[camera].pixel_size.max())
+        per_length = 2.0 * self.tolerance * pitch / self.cameras[camera].principal_distance
+        away = self.rays[camera][0][some] - self.cameras[camera].centre
+        return per_length * np.sqrt(np.einsum("ni,ni->n", away, away)), per_length
+
+    def proposals(self, a: int, b: int, some: IntArray, others: IntArray) -> IntArray:
+        """Return the targets of all cameras of what some of camera a and of b propose, (p, m)."""
+        (o1, d1), (o2, d2) = self.rays[a], self.rays[b]
+        first, second = (o1[some], d1[some]), (o2[others], d2[others])
+        one, two = meeting_rays(first, second, self.width(a, some), self.width(b, others))
+        one, two = some[one], others[two]
+        points = nearest_points([o1[one], o2[two]], [d1[one], d2[two]])
+        numbers = np.full((len(points), len(self.cameras)), -1, dtype=np.int64)
+        for k in {*range(len(self.cameras))} - {a, b}:
+            numbers[:, k] = self.seen(k, points)
+        enough = (numbers >= 0).sum(axis=1) >= self.fewest - 2
+        one, two, points, numbers = one[enough], two[enough], points[enough], numbers[enough]
+        for k, own in ((a, one), (b, two)):
+            numbers[:, k] = np.where(self.seen(k, points) == own, own, -1)
+        return numbers[(numbers[:, [a, b]] >= 0).all(axis=1)]
+
+    def seen(self, camera: int, points: FloatArray) -> IntArray:
+        """Return the nearest target to where a camera sees each point, -1 where none is, (n,)."""
+        from scipy.spatial import cKDTree
+
+        numbers = np.full(len(points), -1, dtype=np.int64)
+        targets = self.targets[camera]
+        if not len(targets) or not len(points):
+            return numbers
+        image = project(self.cameras[camera], points, self.media[camera])
+        places = self.sensors[camera].pixel_from_image(image)
+        good = np.flatnonzero(np.isfinite(places).all(axis=1))
+        away, nearest = cKDTree(targets).query(places[good], distance_upper_bound=self.tolerance)
+        numbers[good] = np.where(np.isfinite(away), nearest, -1)
+        return numbers
 
 
 def _misfits(

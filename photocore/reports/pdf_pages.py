@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from io import BytesIO
 from pathlib import Path
@@ -31,6 +32,9 @@ _MM, _LINE, _WIDE, _MONO = 0.3528, 1.35, 0.55, 0.61
 _WIDEST = 0.66
 #: Type of the cells of tables. [points]
 _CELL = 8.0
+#: Sizes of figures that are tried, until no page is a third empty; to which part of it a figure may
+#: be made smaller to fit on the page begun; height of its caption. [mm]
+SIZES, SMALLEST, CAPTION = tuple(round(1.0 - 0.04 * k, 2) for k in range(11)), 0.65, 12.0
 #: A grid over the whole page, without gaps.
 _WHOLE: dict[str, Any] = {"left": 0, "right": 1, "bottom": 0, "top": 1, "wspace": 0, "hspace": 0}
 
@@ -38,74 +42,122 @@ _WHOLE: dict[str, Any] = {"left": 0, "right": 1, "bottom": 0, "top": 1, "wspace"
 def write_pdf(
     path: Path, document: Document, *, overwrite: bool = False, progress: Progress = no_progress
 ) -> None:
-    """Write a report as PDF."""
-    from matplotlib.backends.backend_pdf import PdfPages
+    """Write a report as PDF that says what its parts are."""
+    import matplotlib as mpl
+
+    from photocore.reports.tagged_pdf import TaggedPdf
 
     made = datetime.fromisoformat(today()).replace(tzinfo=UTC)
     info: dict[str, Any] = {"Title": document.title, "Creator": document.subject}
     info |= {"Producer": "bifocal", "CreationDate": made, "ModDate": made}
     info["Subject"] = "; ".join(provenance().lines())
+    size = min(SIZES, key=lambda size: (_emptiest(document, size), -size))
     with atomic_path(path, overwrite=overwrite) as temporary:
         # Where the disk is full, matplotlib tries again as it closes the file, and zlib fails.
         written = BytesIO()
-        with PdfPages(written, metadata=info) as file:
-            pages = _Pages(file, document.title)
-            for index, block in enumerate(document.blocks):
-                progress(index, len(document.blocks), "report")
-                pages.add(block, before=document.blocks[index + 1 : index + 2])
-            pages.end()
+        with mpl.rc_context({"pdf.fonttype": 42}):  # whose letters can be read aloud and searched
+            file = TaggedPdf(written, info, document.language)
+            _set(_Pages(file, document.title, size), document, progress)
+            file.finalize()
+            file.close()
         temporary.write_bytes(written.getbuffer())
 
 
-def _height(block: Picture) -> float:
-    """Return the height of a figure on the page: two of them and a heading fit on one. [mm]"""
-    return min(INNER * block.ratio, (PAGE[1] - 2 * MARGIN - 40) / 2)
+def _set(pages: _Pages, document: Document, progress: Progress = no_progress) -> None:
+    """Set all blocks on pages."""
+    for index, block in enumerate(document.blocks):
+        progress(index, len(document.blocks), "report")
+        pages.add(block, before=document.blocks[index + 1 : index + 2])
+    pages.end()
+
+
+def _emptiest(document: Document, size: float) -> float:
+    """Return how much the emptiest page is emptier than a third, were figures of this size. [mm]"""
+    pages = _Pages(None, document.title, size)
+    _set(pages, document)
+    return max(0.0, *(left - (PAGE[1] - 2 * MARGIN) / 3 for left in pages.left))
 
 
 class _Pages:
-    """Pages that fill from the top; lengths in millimetres."""
+    """Pages that fill from the top; lengths in millimetres.
 
-    def __init__(self, file: Any, title: str) -> None:
-        self.file, self.title, self.number = file, title, 0
+    Parameters
+    ----------
+    file : TaggedPdf or None
+        None: nothing is drawn, only how full the pages are is found.
+    title : str
+    size : float
+        Of figures, over that in which two and a heading fit on a page.
+    """
+
+    def __init__(self, file: Any, title: str, size: float) -> None:
+        self.file, self.title, self.size = file, title, size
+        self.left: list[float] = []
+        self.part: Any = None
         self._begin()
 
     def _begin(self) -> None:
+        self.y = PAGE[1] - MARGIN
+        if self.file is None:
+            return
         from matplotlib.backends.backend_pdf import FigureCanvasPdf
         from matplotlib.figure import Figure
 
         self.figure = Figure(figsize=(PAGE[0] / 25.4, PAGE[1] / 25.4), dpi=200)
         FigureCanvasPdf(self.figure)
-        self.number += 1
-        self.y = PAGE[1] - MARGIN
-        foot = f"{self.title}  ·  {self.number}"
+        foot = f"{self.title}  ·  {len(self.left) + 1}"
         self._put(foot, x=PAGE[0] - MARGIN, y=10.0, size=7, ha="right", color="0.3")
 
     def end(self) -> None:
         """Write the last page."""
-        self.file.savefig(self.figure)
+        self.left.append(self.y - MARGIN)
+        if self.file is not None:
+            self.file.add_page(self.figure)
+
+    @contextmanager
+    def _within(self, tag: str, alt: str = "") -> Iterator[None]:
+        """Let what is set within belong to a part of this kind."""
+        outer = self.part
+        if self.file is not None:
+            self.part = (self.file.tree if outer is None else outer).add(tag, alt)
+        yield
+        self.part = outer
 
     def add(self, block: Block, *, before: Sequence[Block] = ()) -> None:
         """Set a block, on a new page where it does not fit; a heading beside what it is before."""
         if isinstance(block, Heading):
-            size = {1: 17, 2: 12.5}.get(block.level, 10)
-            pictures = [_height(item) + 12 for item in before if isinstance(item, Picture)]
-            self._room(size * _MM * 2.2 + max(pictures, default=30.0))
-            self.y -= size * _MM * 0.7
-            self._text(block.text, size=size, weight="bold")
-            if block.level <= 2:
-                self._line(PAGE[0] - MARGIN, y=self.y - 1.4)
-                self.y -= 2.6
+            self._heading(block, before)
         elif isinstance(block, Banner):
-            self._banner(block)
+            with self._within("P"):
+                self._banner(block)
         elif isinstance(block, Paragraph):
-            self._text(block.text, size=7.5 if block.small else 9)
-            for line in block.lines:
-                self._text(line, size=7, mono=True)
+            with self._within("P"):
+                self._text(block.text, size=7.5 if block.small else 9)
+                for line in block.lines:
+                    self._text(line, size=7, mono=True)
             self.y -= 1.0
         elif isinstance(block, TextTable):
-            self._table(block)
+            with self._within("Table"):
+                self._table(block)
         else:
             self._picture(block)
+
+    def _heading(self, block: Heading, before: Sequence[Block]) -> None:
+        size = {1: 17, 2: 12.5}.get(block.level, 10)
+        pictures = [
+            SMALLEST * self._height(item) + CAPTION for item in before if isinstance(item, Picture)
+        ]
+        self._room(size * _MM * 2.2 + max(pictures, default=30.0))
+        self.y -= size * _MM * 0.7
+        with self._within(f"H{block.level}"):
+            self._text(block.text, size=size, weight="bold")
+        if block.level <= 2:
+            self._line(PAGE[0] - MARGIN, y=self.y - 1.4)
+            self.y -= 2.6
+
+    def _height(self, block: Picture) -> float:
+        """Return the height of a figure on the page, were all of it free. [mm]"""
+        return self.size * min(INNER * block.ratio, (PAGE[1] - 2 * MARGIN - 40) / 2)
 
     def _room(self, height: float) -> None:
         """Begin a new page where less than a height is left."""
@@ -114,13 +166,17 @@ class _Pages:
             self._begin()
 
     def _put(self, text: str, *, x: float, y: float, size: float, **more: Any) -> None:
+        if self.file is None or not text.strip():
+            return
+        more["gid"] = None if self.part is None else self.file.mark(self.part)
         # Dollars would begin a formula.
         self.figure.text(
             x / PAGE[0], y / PAGE[1], text.replace("$", r"\$"), fontsize=size, va="baseline", **more
         )
 
     def _text(self, text: str, *, size: float, weight: str = "normal", mono: bool = False) -> None:
-        letter, indent = size * _MM * (_MONO if mono else _WIDE), 4.0 if mono else 0.0
+        wide = _MONO if mono else _WIDE if weight == "normal" else _WIDEST
+        letter, indent = size * _MM * wide, 4.0 if mono else 0.0
         width = int((INNER - indent) / letter)
         family = {"family": "monospace"} if mono else {}
         lines = textwrap.wrap(text, width, drop_whitespace=not mono) or [""]
@@ -130,6 +186,8 @@ class _Pages:
             self._put(line, x=MARGIN + indent, y=self.y, size=size, weight=weight, **family)
 
     def _line(self, right: float, *, y: float, color: str = "black", lw: float = 0.8) -> None:
+        if self.file is None:
+            return
         from matplotlib.lines import Line2D
 
         ends = MARGIN / PAGE[0], right / PAGE[0]
@@ -146,7 +204,7 @@ class _Pages:
         height = sum(size for _, size, _ in lines) * _MM * _LINE + 5
         self._room(height + 4)
         colour = {True: "#1a6e2e", False: "#b00020", None: "black"}[block.good]
-        for wide, fill in ((INNER, False), (4.0, True)):
+        for wide, fill in ((INNER, False), (4.0, True)) if self.file is not None else ():
             corner = MARGIN / PAGE[0], (self.y - height) / PAGE[1]
             sides = wide / PAGE[0], height / PAGE[1]
             box = Rectangle(corner, *sides, fill=fill, lw=1.5, fc=colour, ec=colour)
@@ -161,7 +219,8 @@ class _Pages:
         if block.caption:
             self._room(24)
             self.y -= 1.5
-            self._text(block.caption, size=8.5, weight="bold")
+            with self._within("Caption"):
+                self._text(block.caption, size=8.5, weight="bold")
         columns = zip(block.headings, *block.rows, strict=True)
         lengths = [max(4, *map(len, column)) for column in columns]
         # Columns of a table that is too wide share what there is, and their cells are folded.
@@ -172,7 +231,8 @@ class _Pages:
         for index, row in enumerate([block.headings, *block.rows]):
             cells = (textwrap.wrap(*cell) or [""] for cell in zip(row, lengths, strict=True))
             columns = zip(cells, widths, block.to_the_left, strict=True)
-            self._row(list(columns), heading=index == 0)
+            with self._within("TR"):
+                self._row(list(columns), heading=index == 0)
         self.y -= 2.5
 
     def _row(self, columns: Sequence[tuple[list[str], float, bool]], *, heading: bool) -> None:
@@ -183,22 +243,30 @@ class _Pages:
         self._room(deep)
         left = MARGIN
         for lines, width, to_the_left in columns:
-            x, ha = (left, "left") if to_the_left else (left + width - 1.0, "right")
-            for number, line in enumerate(lines, start=1):
-                y = self.y - number * step + 0.6
-                self._put(line, x=x, y=y, size=_CELL, ha=ha, weight=weight)
+            x, ha = (left + 1.0, "left") if to_the_left else (left + width - 1.0, "right")
+            with self._within("TH" if heading else "TD"):
+                for number, line in enumerate(lines, start=1):
+                    y = self.y - number * step + 0.6
+                    self._put(line, x=x, y=y, size=_CELL, ha=ha, weight=weight)
             left += width
         self.y -= deep
         self._line(left, y=self.y - 0.2, color=color, lw=lw)
 
     def _picture(self, block: Picture) -> None:
-        height = _height(block)
-        wide = height / block.ratio
-        self._room(height + 12)
-        rows, beside = (PAGE[1] - self.y, height, self.y - height), (PAGE[0] - wide) / 2
-        ratios = {"height_ratios": rows, "width_ratios": (beside, wide, beside)}
-        grid = self.figure.add_gridspec(3, 3, **_WHOLE, **ratios)
-        block.draw(self.figure.add_subfigure(grid[1, 1]))
+        height, room = self._height(block), self.y - MARGIN - CAPTION
+        if SMALLEST * height <= room < height:
+            height = room
+        self._room(height + CAPTION)
+        if self.file is not None:
+            wide = height / block.ratio
+            rows, beside = (PAGE[1] - self.y, height, self.y - height), (PAGE[0] - wide) / 2
+            ratios = {"height_ratios": rows, "width_ratios": (beside, wide, beside)}
+            grid = self.figure.add_gridspec(3, 3, **_WHOLE, **ratios)
+            place = self.figure.add_subfigure(grid[1, 1])
+            with self._within("Figure", block.caption):
+                place.set_gid(self.file.mark(self.part))
+            block.draw(place)
         self.y -= height + 1
-        self._text(block.caption, size=7.5)
+        with self._within("P"):
+            self._text(block.caption, size=7.5)
         self.y -= 2.5

@@ -79,3 +79,14 @@ def test_a_kernel_pays_once_the_road_of_numpy_has_taken_long(
     monkeypatch.delitem(sys.modules, "numba")
     kernel: Kernel = compiled(lambda: None)
     assert [kernel.pays(0.1) for _ in range(4)] == [False, False, True, True]
+
+
+def test_a_full_disk_costs_the_copy_and_not_the_result(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("numba")
+    kernel = Kernel(lambda number: number + 1)
+
+    def full(*_: object) -> int:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(kernel, "_run", full)
+    assert kernel(2) == 3

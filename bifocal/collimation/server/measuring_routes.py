@@ -6,6 +6,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
+from bifocal.collimation.asked import measured
 from bifocal.collimation.fields import FieldError, image_of, pixel_of, positive_of
 from bifocal.collimation.server.requests import answer, in_thread, json_body, session_of
 from photocore.arrays import as_points
@@ -34,7 +35,7 @@ async def _measure(request: Request) -> Response:
     names = (await json_body(request)).get("points")
     if not isinstance(names, list) or len(names) > 1000:
         raise FieldError("points: expected a list of names.")
-    return answer(await in_thread(session_of(request).measure, [str(name) for name in names]))
+    return answer(await in_thread(measured, session_of(request), [str(name) for name in names]))
 
 
 async def _convert(request: Request) -> Response:

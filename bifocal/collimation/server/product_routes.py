@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 from starlette.datastructures import UploadFile
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import FileResponse, Response
+from starlette.responses import FileResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from bifocal.collimation.drawing import points_drawing
@@ -18,9 +20,16 @@ from bifocal.collimation.live_results import LiveResults
 from bifocal.collimation.pictures import Pictures
 from bifocal.collimation.server.requests import answer, in_thread, json_body, session_of
 from bifocal.collimation.server.state_view import state_of
+from bifocal.collimation.server.streamed_zip import streamed_zip
 from bifocal.collimation.server.uploads import take_photos
+from bifocal.collimation.session import Session
+from bifocal.collimation.shapes import met, places_of, relief_within
+from bifocal.collimation.starting import open_sample, recent, reopen
 from bifocal.collimation.uncertainty import precision_contours, uncertainty_picture
+from bifocal.faces.faces_files import beside
 from photocore.arrays import FloatArray, as_points
+from photocore.jsonfile import plain
+from photocore.output import relative_name
 
 _FRESH = {"cache-control": "no-store"}
 
@@ -36,10 +45,34 @@ async def _photos(request: Request) -> Response:
 
         def take() -> dict[str, Any]:
             session.check_new_photos()
-            session.give_photos(take_photos(session.files.folder, files))
+            there = [info.path for info in session.pictures.infos]
+            session.give_photos(take_photos(session.files.folder, files, there))
             return state_of(session)
 
         return answer(await in_thread(take))
+
+
+async def _sample(request: Request) -> Response:
+    session = session_of(request)
+    await in_thread(open_sample, session)
+    return answer(await in_thread(state_of, session))
+
+
+async def _recent(request: Request) -> Response:
+    """Name the surveys that were open before: their folders and names, no more."""
+    names = [Path(name) for name in await in_thread(recent)]
+    own = session_of(request).files.workbook.resolve()
+    shown = [
+        {"number": number, "name": path.stem, "folder": path.parent.name}
+        for number, path in enumerate(names)
+        if path != own
+    ]
+    return answer({"surveys": shown})
+
+
+async def _reopen(request: Request) -> Response:
+    number = number_of(await json_body(request), "number")
+    return answer({"url": await in_thread(reopen, -1 if number is None else int(number))})
 
 
 async def _start(request: Request) -> Response:
@@ -59,8 +92,11 @@ async def _cancel(request: Request) -> Response:
 async def _download(request: Request) -> Response:
     session, name = session_of(request), request.path_params["name"]
     if name == "all.zip":
-        data = await in_thread(session.products.zipped, session.files.workbook)
-        return _attached(data, "application/zip", f"{session.files.stem}.zip")
+        files = await in_thread(bundle_of, session)
+        headers = _attachment(f"{session.files.stem}.zip")
+        # How much comes, but for what packing saves: the page shows how far it is.
+        headers["x-bytes"] = str(sum(path.stat().st_size for path in files.values()))
+        return StreamingResponse(streamed_zip(files), media_type="application/zip", headers=headers)
     if name == "points.dxf":
 
         def drawing() -> bytes:
@@ -76,13 +112,50 @@ async def _download(request: Request) -> Response:
 
 
 def _attached(data: bytes, kind: str, name: str) -> Response:
+    return Response(data, media_type=kind, headers=_attachment(name))
+
+
+def _attachment(name: str) -> dict[str, str]:
     letters = "".join(c if c.isascii() and (c.isalnum() or c in "-_.") else "_" for c in name)
-    headers = {**_FRESH, "content-disposition": f'attachment; filename="{letters}"'}
-    return Response(data, media_type=kind, headers=headers)
+    return {**_FRESH, "content-disposition": f'attachment; filename="{letters}"'}
+
+
+def bundle_of(session: Session) -> dict[str, Path]:
+    """Return all that *Download all* holds: products, workbook, photos and lens files by name."""
+    with session.lock:
+        more = {}
+        for info in session.pictures.infos:
+            inside = info.path.resolve().is_relative_to(session.files.folder.resolve())
+            name = relative_name(info.path, session.files.folder) if inside else info.path.name
+            more[name] = info.path
+        pair = session.pictures.pair
+        if pair is not None and session.files.pair is not None:
+            folder = session.files.pair.parent
+            more[session.files.pair.name] = session.files.pair
+            for number in (1, 2):
+                lens = pair.photo(number).extra.get("lens")
+                if isinstance(lens, str) and (folder / lens).is_file():
+                    more[Path(lens).name] = folder / lens
+            faces = beside(session.files.pair)
+            if faces.is_file():
+                more[faces.name] = faces
+        return session.products.bundle(session.files.workbook, more)
 
 
 async def _overlay(request: Request) -> Response:
-    data = await in_thread(session_of(request).products.overlay)
+    query = dict(request.query_params)
+    low, high = number_of(query, "low"), number_of(query, "high")
+    data = await in_thread(
+        lambda: session_of(request).products.overlay(low, high, hatched="hatched" in query)
+    )
+    return Response(data, media_type="image/png", headers=_FRESH)
+
+
+async def _preview(request: Request) -> Response:
+    kind = request.path_params["kind"]
+    if kind not in ("relief", "ortho"):
+        raise HTTPException(404, "there is no such picture.")
+    data = await in_thread(session_of(request).products.preview, kind)
     return Response(data, media_type="image/png", headers=_FRESH)
 
 
@@ -90,7 +163,35 @@ async def _value(request: Request) -> Response:
     x, y = (number_of(dict(request.query_params), key) for key in ("X", "Y"))
     if x is None or y is None:
         raise FieldError("X, Y: a place on the wall, in metres.")
-    return answer(await in_thread(session_of(request).products.value, x, y))
+    session = session_of(request)
+
+    def value() -> dict[str, Any]:
+        found: dict[str, Any] = dict(session.products.value(x, y))
+        if found["r"] is not None:
+            place = np.array([[x, y, found["r"]]])
+            found["picks"] = [one[0] for one in session.pictures.needed_pair().project(place)]
+        return plain(found)
+
+    return answer(await in_thread(value))
+
+
+async def _met(request: Request) -> Response:
+    """Where rays of photo 1 meet the relief, and the relief within what they enclose."""
+    body = await json_body(request)
+    pixels = as_points(body.get("pixels") or [], "pixels", dimension=2).reshape(-1, 2)
+    session = session_of(request)
+
+    def find() -> dict[str, Any]:
+        pair = session.pictures.needed_pair()
+        if session.products.current("relief") is None:
+            places, within = places_of(pair, np.insert(pixels, 2, 0.0, axis=1).tolist()), None
+        else:
+            relief = session.products.relief()
+            places = met(pair, relief, pixels)
+            within = relief_within(pair, relief, pixels) if len(pixels) > 2 else None
+        return plain({"places": places, "within": within})
+
+    return answer(await in_thread(find))
 
 
 async def _profile(request: Request) -> Response:
@@ -123,11 +224,16 @@ async def _contours(request: Request) -> Response:
 
 ROUTES = [
     Route("/api/photos", _photos, methods=["POST"]),
+    Route("/api/sample", _sample, methods=["POST"]),
+    Route("/api/recent", _recent),
+    Route("/api/recent", _reopen, methods=["POST"]),
     Route("/api/jobs", _start, methods=["POST"]),
     Route("/api/jobs/{number}", _cancel, methods=["DELETE"]),
     Route("/download/{name:path}", _download),
     Route("/relief/overlay.png", _overlay),
+    Route("/preview/{kind}", _preview),
     Route("/relief/value", _value),
+    Route("/relief/met", _met, methods=["POST"]),
     Route("/relief/profile", _profile, methods=["POST"]),
     Route("/uncertainty.png", _uncertainty),
     Route("/uncertainty.json", _contours),

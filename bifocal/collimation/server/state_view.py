@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
+from bifocal.collimation.asked import goodness, oriented_live
 from bifocal.collimation.commands import lens_ratio
 from bifocal.collimation.fields import SETUP
-from bifocal.collimation.live_orientation import LiveOrientation
+from bifocal.collimation.live_orientation import LiveOrientation, lenses_of
 from bifocal.collimation.session import Session
+from bifocal.collimation.shapes import measures_of
 from bifocal.collimation.wording import say, without_options
 from bifocal.model.pair import Pair
+from bifocal.orientation.align_workflow import interior_of_photo
+from photocore.errors import PhotogrammetryError
 from photocore.images import ImageInfo
 from photocore.jsonfile import plain
 
@@ -22,7 +27,7 @@ def state_of(session: Session) -> dict[str, Any]:
     with session.lock:
         state, live = session.state, None
         if session.files.pair is None or state.control:
-            live = session.oriented_live()
+            live = oriented_live(session)
         return {
             "serving": session.serving,
             "revision": session.revision,
@@ -42,12 +47,19 @@ def state_of(session: Session) -> dict[str, Any]:
                 for t in state.tapes.values()
             ],
             "live": _live(live),
+            "scale": _drawn_length(session),
+            "looking": any(
+                job.quiet and job.state == "running" for job in session.jobs.jobs.values()
+            ),
+            "good": _how_good(session),
             "advice": _advice(session, live),
             "points": _points(session),
             "lines": [
                 {"name": x.name, "layer": x.layer, "points": list(x.points), "closed": x.closed}
                 for x in state.lines.values()
             ],
+            "shapes": _shapes(session),
+            "suggested": session.suggested,
             "length_unit": _length_unit(session),
             "selection": None,
             "products": {
@@ -55,7 +67,10 @@ def state_of(session: Session) -> dict[str, Any]:
                 "ortho": session.products.facts("ortho"),
                 "files": session.products.listed(session.files.workbook),
             },
-            "jobs": [job.as_dict() for job in session.jobs.jobs.values()],
+            "jobs": [
+                {**job.as_dict(), "cured": job.state == "failed" and job.ended_at < state.revision}
+                for job in session.jobs.jobs.values()
+            ],
             "undo": bool(state.done),
             "redo": bool(state.undone),
         }
@@ -91,6 +106,7 @@ def _photos(session: Session) -> list[dict[str, Any]]:
                 "camera": " ".join(word for word in (info.make, info.model, info.lens) if word),
                 "focal_mm": typed.get("focal_mm") or info.focal_length,
                 "sensor_width_mm": typed.get("sensor_width_mm"),
+                "focal_said": _focal_said(session, number, info),
                 "missing": _missing(info, typed, language),
             }
         )
@@ -105,6 +121,53 @@ def _exchanged(session: Session, shown: list[dict[str, Any]]) -> bool:
     first, second = (session.state.setup.get(key) for key in ("d1", "d2"))
     nearer = first is not None and second is not None and first < second
     return nearer or (lens_ratio(*shown) or 1.0) < 1.0
+
+
+def _focal_said(session: Session, number: int, info: ImageInfo) -> str:
+    """Say where the focal length comes from and how far it is to be trusted."""
+    language, report = session.spoken, (session.proposal or {}).get("report", {})
+    if session.pictures.pair is not None and "focal_px" in report:
+        focal = report["focal_px"][number - 1]
+        share = 100 * report["standard_deviations"].get(f"focal{number}", 0.0) / focal
+        return say("focal", "found", language, focal=focal, share=share)
+    try:
+        known = interior_of_photo(info, lenses_of(session.state)[number - 1], number)
+    except PhotogrammetryError:  # asked for by another question
+        return ""
+    if known.is_assumed:
+        return ""
+    key = "typed" if known.is_typed else "file"
+    return say("focal", key, language, focal=known.focal, share=100 * known.sigma_focal)
+
+
+def _shapes(session: Session) -> list[dict[str, Any]]:
+    pair = session.pictures.pair
+    return [
+        {**asdict(shape), **({} if pair is None else plain(measures_of(shape, pair)))}
+        for shape in session.state.shapes.values()
+    ]
+
+
+def _drawn_length(session: Session) -> dict[str, Any] | None:
+    drawn = session.state.scale.get("length")
+    return None if drawn is None else asdict(drawn)
+
+
+def _unscaled(session: Session) -> bool:
+    """Whether the proposed orientation waits for its scale."""
+    report = (session.proposal or {}).get("report", {})
+    return bool(report.get("free_scale")) and not report.get("scale")
+
+
+def _how_good(session: Session) -> str:
+    """Say in a line how good relief is; nothing where that is not known."""
+    known = None if _unscaled(session) else goodness(session)
+    if known is None or known["middle"] is None or known["rim"] is None:
+        return ""
+    language, scale = session.spoken, known["scale"]
+    verdict = say("good", "holds" if scale else "none", language, scale=scale)
+    middle, rim = (1000 * known[key] for key in ("middle", "rim"))
+    return say("good", "relief", language, middle=middle, rim=rim, verdict=verdict)
 
 
 def _missing(info: ImageInfo, typed: Mapping[str, float | None], language: str) -> list[str]:
@@ -163,6 +226,7 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
             },
             "images": images,
             "accepted": session.proposed_path is None,
+            "scaled": not _unscaled(session),
             "report": session.proposal and session.proposal["report"],
             "remarks": [without_options(said, session.spoken) for said in remarks],
         }
@@ -176,6 +240,7 @@ def _control(session: Session, live: LiveOrientation | None) -> list[dict[str, A
             "name": point.name,
             **dict(zip(("X", "Y", "r"), point.known, strict=True)),
             "picks": picks_as_dict(point.picks),
+            "use": point.use,
             "residual": residuals.get(point.name),
         }
         for point in session.state.sorted_control()
@@ -212,10 +277,17 @@ def _advice(session: Session, live: LiveOrientation | None) -> list[str]:
         return [say("ask", "photos", language)]
     if session.files.pair is not None:
         return [] if session.state.points else [say("advice", "points", language)]
+    if session.proposal is None and live is not None and not session.state.control:
+        running = any(job.quiet and job.state == "running" for job in session.jobs.jobs.values())
+        return [say("advice", "looking", language)] if running else list(live.advice)
     # What was found contradictory or unknown is said first.
     told = "".join((session.proposal or {}).get("report", {}).get("remarks", ())[:1])
     first = without_options(told, language)
-    return [*([first] if first else []), *(live.advice if live else ())]
+    hints = live.advice if live and session.state.control else ()
+    if session.proposal is not None:
+        next_step = "length" if _unscaled(session) else "accept"
+        hints = (say("advice", next_step, language), *hints)
+    return [*([first] if first else []), *hints]
 
 
 def _points(session: Session) -> list[dict[str, Any]]:
@@ -223,6 +295,7 @@ def _points(session: Session) -> list[dict[str, Any]]:
     results = session.results
     if results is not None:
         results.solve(points)
+    rows = [None if results is None else results.row(point) for point in points]
     return [
         {
             "name": point.name,
@@ -234,9 +307,10 @@ def _points(session: Session) -> list[dict[str, Any]]:
             "reference": point.reference
             and dict(zip(("X", "Y", "r"), point.reference, strict=True)),
             "deleted": False,
-            "result": None if results is None else results.row(point),
+            **{key: (row or {}).get(key) for key in ("r", "sigma_r", "flag")},
+            "result": row,
         }
-        for point in points
+        for point, row in zip(points, rows, strict=True)
     ]
 
 

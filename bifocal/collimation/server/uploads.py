@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+import unicodedata
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,22 +22,29 @@ from photocore.output import atomic_path, free_path
 EMPTIEST, FROM = 400, 20_000_000
 
 
-def take_photos(folder: Path, sent: Sequence[tuple[str, BinaryIO]]) -> tuple[Path, ...]:
-    """Put two photos into a folder, far one first, and return where they lie.
+def take_photos(
+    folder: Path, sent: Sequence[tuple[str, BinaryIO]], there: Sequence[Path] = ()
+) -> tuple[Path, ...]:
+    """Put photos into a folder, and return where those of the survey lie, far one first.
 
     Parameters
     ----------
     folder : Path
     sent : sequence of (name, file)
-        As the browser sent them; of the name only letters, digits and its ending are used.
+        One or two, as the browser sent them; of the name all that may stand in a file name is kept.
+    there : sequence of Path
+        The photo that lay on the table alone: it stays, where one more comes.
 
     Raises
     ------
     InputError
-        If they are not two photos; nothing is written then.
+        If they are no photos, or too many; nothing is written then.
     """
-    if len(sent) != 2:
+    kept = there if len(there) == 1 and len(sent) == 1 else ()
+    if not 1 <= len(sent) <= 2:
         raise InputError(remark("page.two_photos", count=len(sent)))
+    if len(there) == 2 and len(sent) == 1:
+        raise InputError(remark("page.third_photo"))
     with tempfile.TemporaryDirectory() as place:
         checked = []
         for number, (name, file) in enumerate(sent):
@@ -45,7 +53,12 @@ def take_photos(folder: Path, sent: Sequence[tuple[str, BinaryIO]]) -> tuple[Pat
             with path.open("wb") as target:
                 shutil.copyfileobj(file, target)
             checked.append(_checked(path))
-        return tuple(_kept(folder, info.path) for info in far_first(checked))
+        infos = [*map(image_info, kept), *checked]
+        if len(infos) == 2:
+            if kept and _same(infos[0].path, infos[1].path):
+                raise InputError(remark("page.same_photo", name=infos[1].path.name))
+            infos = far_first(infos)
+        return tuple(i.path if i.path in kept else _kept(folder, i.path) for i in infos)
 
 
 def safe_name(name: str) -> str:
@@ -53,16 +66,17 @@ def safe_name(name: str) -> str:
 
     Examples
     --------
-    >>> safe_name("../../etc/Façade 1.JPG"), safe_name("C:\\\\x\\\\far.tif")
-    ('Fa_ade_1.jpg', 'far.tif')
+    >>> safe_name("../../etc/Façade 1.JPG"), safe_name("C:\\\\x\\\\far?.tif")
+    ('Façade 1.jpg', 'far_.tif')
     """
     last = name.replace("\\", "/").rpartition("/")[2]
     stem, dot, ending = last.rpartition(".")
     ending = f".{ending.lower()}"
     if not dot or ending not in PHOTOS:
         raise InputError(remark("page.no_photo", name=last[:60]))
-    letters = "".join(c if c.isascii() and (c.isalnum() or c in "-_") else "_" for c in stem)
-    return f"{letters.strip('_')[:80] or 'photo'}{ending}"
+    stem = unicodedata.normalize("NFC", stem)
+    letters = "".join(c if c.isalnum() or c in " -_.,()+&'" else "_" for c in stem)
+    return f"{letters.strip(' _.')[:80].strip() or 'photo'}{ending}"
 
 
 def far_first(infos: Sequence[ImageInfo]) -> list[ImageInfo]:
@@ -109,9 +123,13 @@ def _refuse_bomb(path: Path) -> None:
 def _kept(folder: Path, path: Path) -> Path:
     """Copy a photo into the folder; one that lies there already is not copied again."""
     target = folder / path.name
-    if target.is_file() and target.read_bytes() == path.read_bytes():
+    if target.is_file() and _same(target, path):
         return target
     target = free_path(folder, path.stem, path.suffix)
     with atomic_path(target, overwrite=False) as temporary:
         shutil.copyfile(path, temporary)
     return target
+
+
+def _same(one: Path, other: Path) -> bool:
+    return one.read_bytes() == other.read_bytes()

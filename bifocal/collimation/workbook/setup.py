@@ -73,3 +73,15 @@ def typed_setup(setup: SurveySetup, pair: Pair) -> dict[str, CellValue]:
         if typed is None and nadir is not None:
             cells |= {f"nadir_{number}_col": nadir[0], f"nadir_{number}_row": nadir[1]}
     return cells
+
+
+def typed_of(pair: Pair) -> list[object]:
+    """Return what a workbook says of its pair, for comparison."""
+    return [
+        [
+            *(photo.file, photo.plane_from_pixel.tolist(), list(photo.nadir)),
+            *(photo.distance, photo.principal_distance, photo.sigma_pixel),
+            *(photo.layers, photo.z0),
+        ]
+        for photo in (pair.image1, pair.image2)
+    ]

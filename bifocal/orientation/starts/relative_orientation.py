@@ -305,6 +305,25 @@ def first_cameras(ties: Ties, interiors: Interiors) -> Cameras:
     return min(possible, key=lambda pair: _cost(ties, pair))
 
 
+def sought_focal(ties: Ties, interiors: Interiors) -> Interiors:
+    """Return interiors with the one principal distance that the common points fit best.
+
+    Notes
+    -----
+    What the homography of the wall says of the cameras' movement, points off the wall confirm at
+    the right principal distance alone; the adjustment that follows refines it.
+    """
+    found: list[tuple[float, Interiors]] = []
+    for factor in TIES.focals:
+        focal = factor * max(interiors[0].image_size)
+        tried = replace(interiors[0], focal=focal), replace(interiors[1], focal=focal)
+        try:
+            found.append((_cost(ties, first_cameras(ties, tried)), tried))
+        except GeometryError:
+            continue
+    return min(found, key=lambda one: one[0])[1] if found else interiors
+
+
 def _in_plane_frame(
     matrices: list[FloatArray], turn: FloatArray, shift: FloatArray, normal: FloatArray
 ) -> Cameras | None:

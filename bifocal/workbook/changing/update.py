@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.survey.survey_input import SurveyInput
+from bifocal.survey.what_if import CHANGED
 from bifocal.workbook.changing.setup_update import (
     add_missing_sheets,
     chart_sheet,
@@ -17,7 +18,7 @@ from bifocal.workbook.changing.setup_update import (
     write_options,
 )
 from bifocal.workbook.changing.translate import translate
-from bifocal.workbook.content import STRUCTURED_ROWS, SurveyContent
+from bifocal.workbook.content import CHART_ROWS, STRUCTURED_ROWS, SurveyContent
 from bifocal.workbook.formulas.setup_cells import TYPED_FORMULAS
 from bifocal.workbook.formulas.space_block import BLOCK
 from bifocal.workbook.making.book import build, unprinted_formula
@@ -175,7 +176,9 @@ def update_book(
     """
     names = () if survey.book is None else survey.book.names
     editor = (PlainEditor if MARK in names else WorkbookEditor)(source, survey.book)
-    content = replace(content, functions="RELIEF_SIGMA" in editor.book.names)
+    content = replace(
+        content, functions="RELIEF_SIGMA" in editor.book.names, changes=_changes(editor)
+    )
     built = build(content)
     points = editor.table("tblPoints")
     if points is None:
@@ -192,17 +195,32 @@ def update_book(
     anew = _CORRECTED if content.corrected else ()
     _table(editor, built, "tblPoints", rows, length, anew=anew)
     _table(editor, built, "tblResults", rows, length)
+    if "tblWhatIf" in built.tables:
+        listed = [row for row in rows if row < CHART_ROWS]
+        _table(editor, built, "tblWhatIf", listed)
     _print_points(editor, max(rows, default=0) + 1, content.language)
     for name, sheet_rows in (("tblCheck", survey.known_rows), ("tblGeo", survey.control_rows)):
         own = editor.table(name)
         if own is not None:
-            _table(editor, built, name, [row - own.first for row in sheet_rows])
+            places = [row - own.first for row in sheet_rows]
+            _table(editor, built, name, places)
+            if name == "tblCheck" and "tblCompare" in built.tables:
+                _table(editor, built, "tblCompare", places, own.length)
     for name, key in _FIXED:
         _fixed_table(editor, built, name, key)
     _verdict(editor, built, content, rules="rules" in given, words=other_words)
     _charts(editor, built, rows)
     _log(editor, content)
     return BookUpdate(kept=editor.save(target, overwrite=overwrite), added=tuple(added))
+
+
+def _changes(editor: WorkbookEditor) -> dict[str, float] | None:
+    """Return what is added to the set-up on the sheet `WhatIf`; None where there is none."""
+    places = {name: place_of(editor, f"change_{name}") for name in CHANGED}
+    if None in places.values() or editor.table("tblWhatIf") is None:
+        return None
+    typed = {name: editor.value_at(*place) for name, place in places.items() if place}
+    return {name: v if isinstance(v, int | float) else 0.0 for name, v in typed.items()}
 
 
 def _print_points(editor: WorkbookEditor, count: int, language: str) -> None:

@@ -11,6 +11,7 @@ from bifocal.model.flags import DOUBTFUL_SHARE, UNCOUNTED, FlagLimits
 from bifocal.survey.georeferencing import ALPHA_POINT
 from bifocal.survey.leave_one_out import ROUNDING
 from bifocal.survey.observations import DOUBT_CODES
+from bifocal.survey.other_photos import CHANCE, TURNS
 from bifocal.workbook.formulas.placed_formulas import placed_parts
 from photocore.workbook.making.live_columns import FormulaBook, LiveColumn
 
@@ -38,6 +39,7 @@ def ideal_points(
     adjusted: Collection[int] = (),
     media: int = 0,
     lens: bool = False,
+    others: int = 0,
 ) -> tuple[LiveColumn, ...]:
     """Return the `Points` table of an ideal pair.
 
@@ -52,13 +54,72 @@ def ideal_points(
         How many media `Setup` has cells for; 0 in air.
     lens : bool
         Whether `Setup` has cells for the distortion of each lens: only coordinates are freed of it.
+    others : int
+        How many photos there are columns for beside those of the pair: coordinates in all.
     """
-    polar, theta = polar and not lens, theta and not lens
+    coordinates = lens or others > 0
+    polar, theta = polar and not coordinates, theta and not coordinates
     there = {"xy": xy, "polar": polar, "theta": theta, "code": code, "media": media, "lens": lens}
+    there["others"] = others
     facts = {name for name, has in there.items() if has} | {f"corrected{i}" for i in adjusted}
     codes = (f'LEFT(UPPER(TRIM([@code])),{len(word)})="{word}"' for word in DOUBT_CODES)
     doubt = {"doubt_codes": ",".join(codes), "doubt_share": repr(DOUBTFUL_SHARE)}
-    return FORMULAS.columns("ideal_points", facts, doubt | _layers(media) | placed_parts())
+    parts = doubt | _layers(media) | placed_parts() | _sums(others)
+    return FORMULAS.columns("ideal_points", facts, parts)
+
+
+def other_numbers(others: int) -> range:
+    """Return the numbers of so many photos beside those of a pair."""
+    return range(3, 3 + others)
+
+
+def other_keys(others: int) -> list[str]:
+    """Return the keys of image coordinates of so many photos beside those of a pair."""
+    return [f"{axis}{number}" for number in other_numbers(others) for axis in "xy"]
+
+
+def pair_letter(photo: int) -> str:
+    """Return what the pair of photo 1 and another one is called: A with photo 2.
+
+    >>> pair_letter(2), pair_letter(3)
+    ('A', 'B')
+    """
+    return chr(ord("A") + photo - 2)
+
+
+def compared(others: int) -> tuple[tuple[str, str], ...]:
+    """Return the columns of relief that are compared, and of their sigmas: pair A, B, ..., all."""
+    pairs = [(f"r_1_{k}", f"sigma_1_{k}") for k in other_numbers(others)]
+    return (("r", "sigma_r"), *pairs, ("r_all", "sigma_all"))
+
+
+def compare_columns(others: int) -> tuple[LiveColumn, ...]:
+    """Return the table of check points with relief of every pair beside each other."""
+    kinds = " ".join(f"{r}:{sigma}" for r, sigma in compared(others))
+    return FORMULAS.columns("compare", parts={"kinds": kinds, "contradictory": f"{CHANCE:.9g}"})
+
+
+def _sums(others: int) -> dict[str, str]:
+    """Return the parts of formulas that go through all photos."""
+    photos = range(1, 3 + others)
+    term = 'IF([@weight{0}]="",0,[@weight{0}]*{{{{1}} {0} {{2}}}})'
+    before = (f'IF([@weight{k}]="",TRUE,[@turn_{TURNS}]<d_{k})' for k in photos)
+    return {
+        "sum": f"({'+'.join(term.format(k) for k in photos)})",
+        "before": ",".join(before),
+        "paired": "&".join(
+            f'IF(ISNUMBER([@r_1_{k}])," {pair_letter(k)}","")' for k in other_numbers(others)
+        ) or '""',
+        "seen": ",".join(f"[@wall_x{k}]" for k in photos),
+        "photos": " ".join(map(str, photos)),
+        "others": " ".join(map(str, other_numbers(others))),
+        "other_xy": " ".join(other_keys(others)),
+        "turns": " ".join(f"{turn}:{turn + 1}" for turn in range(TURNS)),
+        "last_r": f"turn_{TURNS}",
+        "last_turn": str(TURNS),
+        **{f"{axis}{k}": f"([@{axis}{k}]-off_{axis}{k})*unit_{axis}"
+           for k in other_numbers(others) for axis in "xy"},
+    }  # fmt: skip
 
 
 def pair_points(*, undistorted: bool, media: int = 0) -> tuple[LiveColumn, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from bifocal.model.flags import SIGMA_PIXEL, UNCERTAIN_SHARE
 from bifocal.survey.setup import SCALE_TOLERANCE, SIGMA_PRINT, SIGMA_RADIAL
 from bifocal.survey.survey_media import HEIGHTS, index_names, media_names, thickness_names
-from bifocal.workbook.formulas.columns import FORMULAS
+from bifocal.workbook.formulas.columns import FORMULAS, other_numbers
 from bifocal.workbook.formulas.media_formulas import calculated_names
 from photocore.option_types import Number
 from photocore.options import options_of
@@ -168,7 +168,26 @@ def groups(*, is_pair: bool, media: int, lens: bool = False) -> Groups:
     return (first, media_names(media), *others, (*last, *calculated_names(media, is_pair=is_pair)))
 
 
-def formulas(*, is_pair: bool = False, media: int = 0) -> Mapping[str, str]:
+#: Cells of photo 2 beside which those of further photos stand: the typed ones and the others.
+_BESIDE = {
+    "c_2": "c_{}", "d_2": "d_{}", "enlargement_2": "enlargement_{}",
+    "nadir_2_col": "nadir_{}_col", "nadir_2_row": "nadir_{}_row",
+    "check_scale": "check_scale_{}", "m_2": "m_{}", "off_x2": "off_x{}", "off_y2": "off_y{}",
+}  # fmt: skip
+
+
+def beside(name: str, others: int) -> tuple[str, ...]:
+    """Return the cells of further photos that stand beside a cell of the second one."""
+    form = _BESIDE.get(name)
+    return tuple(form.format(k) for k in other_numbers(others)) if form else ()
+
+
+def other_cells(photo: int) -> tuple[str, ...]:
+    """Return the cells to be typed for a further photo: c, d, enlargement, column, row."""
+    return tuple(form.format(photo) for form in list(_BESIDE.values())[:5])
+
+
+def formulas(*, is_pair: bool = False, media: int = 0, others: int = 0) -> Mapping[str, str]:
     """Return the formulas of `Setup` by name; there may be more than cells for them."""
     limits = {
         "sigma_print": SIGMA_PRINT,
@@ -181,6 +200,7 @@ def formulas(*, is_pair: bool = False, media: int = 0) -> Mapping[str, str]:
     parts |= {"last": str(media), "stated": ",".join(_stated(media))}
     parts["inner"] = "".join(f"-N({name})" for name in thickness_names(media))
     parts["glass"] = "".join(f"+N(thick_{n})*n_used_1/n_used_{n}" for n in range(2, media))
+    parts["others"] = " ".join(map(str, other_numbers(others)))
     facts = {name for name, holds in (("pair", is_pair), ("media", media)) if holds}
     missing = _missing_formula(_PAIR_NEEDED if is_pair else _IDEAL_NEEDED, _stated(media))
     lines = FORMULAS.columns("setup", facts, parts, rows="lines")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from openpyxl.styles import Alignment, Protection
 
+from bifocal.survey.other_photos import CHANCE
 from bifocal.workbook.content import (
     STRUCTURED_ROWS,
     SurveyContent,
@@ -17,11 +18,13 @@ from bifocal.workbook.content import (
 from bifocal.workbook.formulas.columns import FORMULAS, results_columns
 from bifocal.workbook.formulas.world_state import STATE, STATES, world_state
 from bifocal.workbook.making.charts import charts
+from bifocal.workbook.making.compare_sheet import compare
 from bifocal.workbook.making.functions_sheet import functions_sheet
 from bifocal.workbook.making.georeference_sheet import georeference
 from bifocal.workbook.making.readme_sheet import readme_sheet
 from bifocal.workbook.making.reference_sheets import check, planning
 from bifocal.workbook.making.setup_sheet import setup_sheet
+from bifocal.workbook.making.what_if_sheet import what_if_sheet
 from bifocal.workbook.words import WORDS, word
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
@@ -89,8 +92,12 @@ def build(content: SurveyContent) -> BookBuilder:
     _points(builder, content, cells)
     _results(builder, content, cells)
     check(builder, content, cells)
+    if content.others:
+        compare(builder, content, cells)
     georeference(builder, content)
     planning(builder, content)
+    if content.changes is not None:
+        what_if_sheet(builder, content)
     charts(builder, content, cells)
     _log(builder, content)
     if content.functions:
@@ -107,7 +114,9 @@ def _points(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
     note = "points_pair" if content.is_pair else "points_lens" if content.has_lens else "points_how"
     sheet = _long_sheet(builder, "Points", note, columns, content, cells)
     keys = [column.key for column in columns]
-    first_result = keys.index("note") + 2
+    breaks = [keys.index("note") + 2, keys.index("x_c") + 1]
+    if content.others:
+        breaks.append(keys.index("pair") + 1)
     sheet.worksheet.sheet_properties.outlinePr.summaryRight = True
     # Each page begins with the names: the title would be cut off there, so it heads the page.
     sheet.worksheet.oddHeader.left.text = builder.word("Points")
@@ -116,7 +125,7 @@ def _points(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
         freeze=f"B{HEAD + 1}",
         repeat=f"{HEAD - 1}:{HEAD}",
         scale=_SCALE,
-        breaks=(len(columns), (first_result, keys.index("x_c") + 1)),
+        breaks=(len(columns), breaks),
     )
 
 
@@ -159,6 +168,15 @@ def _long_sheet(
     bold = ("OFF-RADIAL", "NADIR", "CHECK")
     flags = f"{flag}{HEAD + 1}:{flag}{last}"
     colour_words(sheet.worksheet, flags, FLAG_COLOURS, bold=bold, stop=True)
+    if "chance" in keys:
+        chance = column_letters(keys.index("chance") + 1)
+        rows_of = f"{chance}{HEAD + 1}:{chance}{last}"
+        colour_where(
+            sheet.worksheet,
+            rows_of,
+            f"N({chance}{HEAD + 1})<{CHANCE:.9g}*COUNT({chance}{HEAD + 1})",
+            WRONG,
+        )
     _printed(sheet, print_area(name, len(columns), printed_rows(content)), content)
     return sheet
 

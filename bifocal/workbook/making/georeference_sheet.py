@@ -9,11 +9,12 @@ import numpy as np
 from bifocal.survey.remarks import LARGEST_RESIDUAL, SCALE_SHARE
 from bifocal.survey.space_similarity import SpaceSums
 from bifocal.survey.weighted_similarity import TURNS
-from bifocal.workbook.content import SurveyContent, control_cells
+from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.formulas.columns import FORMULAS, georeference_columns
 from bifocal.workbook.formulas.georeference_values import georeference_values
 from bifocal.workbook.formulas.space_block import STEP_FORM, SpaceBlock
 from bifocal.workbook.formulas.world_state import STATE, STATES, world_state, world_state_formula
+from bifocal.workbook.reference_cells import control_cells
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
 from photocore.workbook.making.live_columns import LiveColumn

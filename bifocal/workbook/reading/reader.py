@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,15 @@ from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations, pixel_keys
 from bifocal.survey.reference import KnownPoints
 from bifocal.survey.survey_input import SurveyInput, where_of, with_measured
-from bifocal.workbook.reading.setup_reader import LARGEST, OpenSurvey, is_general, read_setup
+from bifocal.workbook.formulas.columns import other_keys
+from bifocal.workbook.reading.row_checks import PIXELS, POLAR, XY, check_rows
+from bifocal.workbook.reading.setup_reader import (
+    LARGEST,
+    OpenSurvey,
+    is_general,
+    other_count,
+    read_setup,
+)
 from bifocal.workbook.words import LANGUAGES, headings, word
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import (
@@ -30,12 +39,10 @@ from photocore.workbook.making.live_columns import TEXT_KEYS
 from photocore.workbook.reading.grid import SheetFile
 from photocore.workbook.reading.package import uncollected
 
-_XY, _POLAR = ("x1", "y1", "x2", "y2"), ("s1", "s2", "theta")
-_PIXELS = ("col1", "row1", "col2", "row2")
 #: Units expected where neither heading nor cell says one; that of x1..y2 depends on `Setup`.
-_UNITS = {"theta": "deg", "r_measured": "m", "s1": "mm", "s2": "mm"} | dict.fromkeys(_PIXELS, "px")
+_UNITS = {"theta": "deg", "r_measured": "m", "s1": "mm", "s2": "mm"} | dict.fromkeys(PIXELS, "px")
 #: Coordinates of both photos under one heading each, in the order of the photos.
-_SHARED = {key: key.rstrip("12") for key in (*_XY, *_PIXELS)}
+_SHARED = {key: key.rstrip("12") for key in (*XY, *PIXELS)}
 #: Headings of image coordinates in other programs: i counts columns, j rows.
 _OTHER = {"col1": "i", "row1": "j", "col2": "i", "row2": "j"}
 TO_DEGREES = {"deg": 1.0, "gon": 0.9, "rad": float(np.degrees(1.0))}
@@ -96,25 +103,28 @@ def _more_pixels(photos: int) -> list[str]:
     return [key for number in range(3, photos + 1) for key in pixel_keys(number)]
 
 
-def point_columns(*, shared: Sequence[str] = (), photos: int = 2) -> list[Column]:
+def point_columns(*, shared: Sequence[str] = (), photos: int = 2, others: int = 0) -> list[Column]:
     """Return the columns of measured points with every heading that is understood.
 
     Parameters
     ----------
     photos : int
         Photos that they were measured in.
+    others : int
+        Photos beside an ideal pair, of which the workbook has coordinates.
     shared : sequence of str
         Keys that also take the headings "x y x y" or "col row col row" of photos 1 and 2. Tables
         of points often hold X and Y on the wall too, so this is tried where nothing else fits.
     """
     columns = []
-    for key in ("id", *_XY, *_POLAR, *_PIXELS, "use", "code", "note", "r_measured"):
+    for key in ("id", *XY, *POLAR, *PIXELS, "use", "code", "note", "r_measured"):
         more = [_SHARED[key], *([_OTHER[key]] if key in _OTHER else [])] if key in shared else []
         columns.append(_understood(key, more=more, unit=_UNITS.get(key, "")))
+    columns += [Column(key, (key,), kind="number") for key in other_keys(others)]
     for key in _more_pixels(photos):
         names = [name for name in headings("columns", f"{key[:3]}1") if "1" in name]
-        others = (name.replace("1", key[3:]) for name in names)
-        columns.append(Column(key, tuple(others), kind="number", unit="px"))
+        further = (name.replace("1", key[3:]) for name in names)
+        columns.append(Column(key, tuple(further), kind="number", unit="px"))
     return columns
 
 
@@ -254,16 +264,17 @@ def _read_points(survey: OpenSurvey, options: ReadOptions) -> Table:
     book = survey.book
     # In the workbook of a general pair x1..y2 are formulas that follow from the raw pixels.
     general = isinstance(book, SheetFile) and is_general(book)
-    followed = {*_XY, *_POLAR} if general else set()
-    for shared in ((), _PIXELS, _XY):
-        last = shared == _XY
+    others = other_count(book.names) if isinstance(book, SheetFile) else 0
+    followed = {*XY, *POLAR} if general else set()
+    for shared in ((), PIXELS, XY):
+        last = shared == XY
         complaints: list[CellError] = []
         try:
             table = read_table(
                 book,
                 [
                     column
-                    for column in point_columns(shared=shared, photos=options.photos)
+                    for column in point_columns(shared=shared, photos=options.photos, others=others)
                     if column.key not in followed
                 ],
                 name="Points",
@@ -277,7 +288,7 @@ def _read_points(survey: OpenSurvey, options: ReadOptions) -> Table:
             if last:
                 raise
             continue
-        given = table.present & {*_XY, *_PIXELS, "s1", "s2"}
+        given = table.present & {*XY, *PIXELS, "s1", "s2"}
         if last or (given and (not shared or table.present.issuperset(shared))):
             break
     survey.errors.extend(complaints)
@@ -295,7 +306,7 @@ def _require_coordinates(table: Table, book: object, path: Path | str) -> None:
         Naming the missing sheet or columns.
     """
     have = table.present
-    kinds = (_XY, _PIXELS, ("s1", "s2"))
+    kinds = (XY, PIXELS, ("s1", "s2"))
     # A column that is missing beside filled ones matters even where another kind is complete.
     broken = any(
         not have.issuperset(keys)
@@ -314,7 +325,7 @@ def _require_coordinates(table: Table, book: object, path: Path | str) -> None:
             "theta, or col1 row1 col2 row2; say which columns they are with --columns."
         )
     groups = [keys for keys in kinds if have & set(keys) and not have.issuperset(keys)]
-    wanted = groups[0] if groups else _XY
+    wanted = groups[0] if groups else XY
     missing = ", ".join(key for key in wanted if key not in have)
     raise InputError(
         f"{where}: there is no column {missing}. Points need x1 y1 x2 y2 [mm or px], or s1 s2 [mm] "
@@ -359,23 +370,29 @@ def _observations(
         table.remarks.append(remark("survey.angle_as_theta", **about))
     errors += table.repeated("id")
     more = _more_pixels(photos)
-    errors += table.too_large((*_XY, *_POLAR, *_PIXELS, *more, "r_measured"), LARGEST)
+    errors += table.too_large((*XY, *POLAR, *PIXELS, *more, "r_measured"), LARGEST)
     use = table.numbers("use")
     unit, factor = _unit_of_xy(table, errors)
-    units = dict(zip(_POLAR, (TO_MM, TO_MM, TO_DEGREES), strict=True))
-    units |= {key: {"px": 1.0} for key in (*_PIXELS, *more)} | {"r_measured": _TO_M}
+    units = dict(zip(POLAR, (TO_MM, TO_MM, TO_DEGREES), strict=True))
+    units |= {key: {"px": 1.0} for key in (*PIXELS, *more)} | {"r_measured": _TO_M}
     columns = {key: table.in_unit(key, factors, errors) for key, factors in units.items()}
-    columns |= {key: table.numbers(key) * factor for key in _XY}
+    columns |= {key: table.numbers(key) * factor for key in XY}
     texts = {"id": ids, "code": table.texts("code"), "note": table.texts("note")}
     used = np.isnan(use) | (use != 0)
     points = PointObservations.from_columns({**texts, "use": used, **columns})
-    _check_rows(table, points, faulty, errors)
+    others = [int(key[1:]) for key in table.present if re.fullmatch(r"[xy][3-9]", key)]
+    if others:
+        keys = other_keys(max(others) - 2)
+        errors += table.too_large(keys, LARGEST)
+        typed = np.stack([table.numbers(key) * factor for key in keys], axis=-1)
+        points = replace(points, other_xy=typed.reshape(len(table), -1, 2))
+    check_rows(table, points, faulty, errors)
     return points, unit
 
 
 def _unit_of_xy(table: Table, errors: list[CellError]) -> tuple[str, float]:
     """Return ``mm`` or ``px`` as the headings say, and the factor to it."""
-    said = {key: table.units[key] for key in _XY if table.units.get(key)}
+    said = {key: table.units[key] for key in XY if table.units.get(key)}
     kinds = set(said.values())
     if not kinds:
         return "", 1.0
@@ -392,7 +409,7 @@ def _unit_of_xy(table: Table, errors: list[CellError]) -> tuple[str, float]:
         )
         return "", 1.0
     symbol = kinds.pop()
-    bare_keys = [k for k in _XY if k not in said and not np.isnan(table.numbers(k)).all()]
+    bare_keys = [k for k in XY if k not in said and not np.isnan(table.numbers(k)).all()]
     for key in sorted(table.typed_units.intersection(said)) if bare_keys else ():
         row = int(np.flatnonzero(~np.isnan(table.numbers(key)))[0])
         message = (
@@ -406,76 +423,6 @@ def _unit_of_xy(table: Table, errors: list[CellError]) -> tuple[str, float]:
         errors.append(table.unit_error(next(iter(said)), symbol, "mm or px"))
         return "", 1.0
     return "mm", TO_MM[symbol]
-
-
-def _check_rows(
-    table: Table,
-    points: PointObservations,
-    faulty: set[tuple[str, str]],
-    errors: list[CellError],
-) -> None:
-    """Complain about points without a name, measured on one photo only, or with s <= 0."""
-    ids, used, polar = points.ids, points.use, points.polar
-    for row in range(len(table)):
-        if used[row] and not ids[row] and (table.cell(row, "id"), "id") not in faulty:
-            errors.append(table.error(row, "id", "the point has no name; give it one."))
-    xy, pixels = np.hstack([points.xy1, points.xy2]), np.hstack([points.pixels1, points.pixels2])
-    if points.others.size:
-        _check_photos(table, points, errors)
-        return
-    groups = ((_XY, xy), (_PIXELS, pixels), (("s1", "s2"), polar[:, :2]))
-    for keys, values in groups:
-        given = ~np.isnan(values)
-        partly = used & given.any(axis=1) & ~given.all(axis=1)
-        if keys == ("s1", "s2"):
-            # Image coordinates, where both photos have them, make the radial distances idle.
-            partly &= np.isnan(xy).all(axis=1)
-        for row in np.flatnonzero(partly).tolist():
-            lacking = [key for i, key in enumerate(keys) if not given[row, i]]
-            if any((table.cell(row, key), key) in faulty for key in lacking):
-                continue  # its own complaint stands already
-            errors.append(table.error(row, lacking[0], _incomplete(ids[row], keys, lacking)))
-    for i, key in enumerate(("s1", "s2")):
-        for row in np.flatnonzero(used & (polar[:, i] <= 0)).tolist():
-            message = (
-                f"{polar[row, i]:g} mm at point {ids[row]}: a radial distance must be above zero; "
-                "at the nadir itself there is no relief to measure. Set use = 0 or measure it "
-                "again."
-            )
-            errors.append(table.error(row, key, message))
-
-
-def _check_photos(table: Table, points: PointObservations, errors: list[CellError]) -> None:
-    """Complain about used points with half a pick, or picks in fewer than two photos of a set."""
-    given = ~np.isnan(np.stack(points.pixels, axis=1))
-    for row in np.flatnonzero(points.use).tolist():
-        halves = np.argwhere(given[row].any(axis=1)[:, None] & ~given[row])
-        seen = given[row].all(axis=1)
-        if len(halves):
-            photo, axis = halves[0].tolist()
-            keys = pixel_keys(photo + 1)
-            message = _incomplete(points.ids[row], keys, [keys[axis]])
-            errors.append(table.error(row, keys[axis], message))
-        elif seen.sum() < 2:
-            key = pixel_keys(int(np.flatnonzero(~seen)[0]) + 1)[0]
-            where = f"only on image {int(np.flatnonzero(seen)[0]) + 1}" if seen.any() else "on none"
-            message = (
-                f"point {points.ids[row]} is measured {where}; measure it on two photos or more, "
-                "or set use = 0."
-            )
-            errors.append(table.error(row, key, message))
-
-
-def _incomplete(name: str, keys: Sequence[str], lacking: Sequence[str]) -> str:
-    images = {key[-1] for key in lacking}
-    here = {key[-1] for key in keys if key not in lacking}
-    if len(images) == 1 and images.isdisjoint(here):
-        other = "2" if images == {"1"} else "1"
-        return (
-            f"point {name} is measured only on image {other}; measure it on image "
-            f"{images.pop()} too, or set use = 0."
-        )
-    return f"point {name} lacks {', '.join(lacking)}; complete it, or set use = 0."
 
 
 def _language(book: SheetFile) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.survey.other_photos import MOST_PHOTOS, OtherPhoto
 from bifocal.survey.setup import Measuring, SurveySetup, Taking
 from bifocal.survey.survey_lens import SurveyLens
 from bifocal.survey.survey_media import (
@@ -20,7 +21,7 @@ from bifocal.survey.survey_media import (
     media_names,
     thickness_names,
 )
-from bifocal.workbook.formulas.columns import adjustment_names
+from bifocal.workbook.formulas.columns import adjustment_names, other_numbers
 from bifocal.workbook.formulas.media_formulas import INDEX_LIMITS
 from bifocal.workbook.formulas.setup_cells import (
     MATRICES,
@@ -32,6 +33,7 @@ from bifocal.workbook.formulas.setup_cells import (
     formulas,
     lens_cells,
     numbers,
+    other_cells,
 )
 from bifocal.workbook.words import headings, term
 from photocore.arrays import FloatArray
@@ -87,6 +89,9 @@ def read_setup(survey: OpenSurvey) -> SurveySetup:
         # Cells of media are found by name only: no workbook of a user's own has them otherwise.
         named_only = (*media_names(MOST), *lens_cells()[0])
         columns = [c for c in columns if c.key not in named_only]
+    count = other_count(book.names)
+    others = [name for k in other_numbers(count) for name in other_cells(k)]
+    columns += [Column(name, kind="number") for name in others]
     values = read_named_values(
         book, columns, sheet="Setup", decimal=decimal, errors=complaints, several=True, given=given
     )
@@ -96,7 +101,8 @@ def read_setup(survey: OpenSurvey) -> SurveySetup:
     # Cells with the template's own formula are defaults, calculated or not.
     told = [e for e in complaints if e.column not in live]
     number = {key: values.given(key) for key in numbers() if key not in defaults}
-    _check_positive(values, number, told)
+    further = {name: values.given(name) for name in others}
+    _check_positive(values, number | further, told)
     media = _media(book, values, told)
     d1, d2 = _distances(values, number, "d_1" in live, told)
     unit = _unit(values, told)
@@ -124,6 +130,7 @@ def read_setup(survey: OpenSurvey) -> SurveySetup:
         adjusted=_adjusted(book),
         media=media,
         lenses=_lenses(book, values),
+        others=tuple(_other_photo(further, k) for k in other_numbers(count)),
         places=values.places,
         where=where,
         remarks=tuple(values.remarks),
@@ -182,6 +189,17 @@ def _lenses(book: SheetFile, values: NamedValues) -> tuple[SurveyLens, SurveyLen
         SurveyLens(**{key: values.given(f"lens_{image}_{key}") for key in keys}) for image in "12"
     )
     return first, second
+
+
+def other_count(names: Collection[str]) -> int:
+    """Return for how many photos beside those of a pair a workbook has cells."""
+    return sum(f"d_{k}" in names for k in range(3, MOST_PHOTOS + 1))
+
+
+def _other_photo(cells: Mapping[str, float | None], photo: int) -> OtherPhoto:
+    """Return how a photo beside those of the pair was taken."""
+    c, d, enlargement, column, row = (cells[name] for name in other_cells(photo))
+    return OtherPhoto(d=d, c=c, enlargement=enlargement, nadir=_place(column, row))
 
 
 def _bad_indices(media: SurveyMedia) -> dict[str, str]:

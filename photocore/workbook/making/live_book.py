@@ -426,7 +426,10 @@ def _block(
 ) -> RowBlock:
     """Return the rows that `finish_book` makes of the prototype."""
     listed = [list(cells.get(column.key, ())) for column in columns]
-    listed = [values + [None] * (rows - len(values)) for values in listed]
+    listed = [
+        values + [column.spare] * (rows - len(values))
+        for column, values in zip(columns, listed, strict=True)
+    ]
     formulas = {}
     if short:
         for i, column in enumerate(columns):

@@ -42,7 +42,7 @@ class LiveColumn:
     folded : bool
         Whether the column is grouped and folded away: a step on the way, not a result.
     spare : float or None
-        What the formula shows in rows that hold no point; None where it shows nothing.
+        What the formula shows in rows that hold no point; None where it shows nothing, NaN #N/A.
     form : str
         Number format in place of the one that follows from ``places``.
     choices : str
@@ -150,7 +150,7 @@ class _Formulas:
         for row in rows:
             if not holds(row.get("when", ""), self.facts):
                 continue
-            words = self.filled(row["each"]).split() if "each" in row else [None]
+            words = self.filled(row["each"], given).split() if "each" in row else [None]
             for word in words:
                 own = given if word is None else (word, *(word.split(":") if ":" in word else word))
                 if "rows" in row:

@@ -8,6 +8,7 @@ import re
 import shutil
 from pathlib import Path
 
+import ezdxf
 import numpy as np
 import pytest
 import rasterio
@@ -47,12 +48,15 @@ def test_everything_is_delivered_and_a_second_run_makes_only_what_changed(tmp_pa
     assert "data:image/jpeg" in view  # the orthophoto's colours
     assert "http" not in view
     assert len(view) < 1e6
-    # Nothing changed; then one check point: points and report only.
+    drawn = ezdxf.readfile(out / "drawing/wall.dxf").modelspace()
+    layers = {entity.dxf.layer for entity in drawn.query("POINT")}
+    assert {"BIFOCAL_POINTS", "BIFOCAL_CONTROL", "BIFOCAL_CHECK"} <= layers
+    # Nothing changed; then one check point: what holds it, not orientation and relief.
     again = facade(out, "--control", control, "--check", check, "--scale", "1:50")
     assert (again["done"], len(again["kept"])) == ([], 6)
     check.write_text(check.read_text().replace("T30", "T99"))
     again = facade(out, "--control", control, "--check", check, "--scale", "1:50")
-    assert again["done"] == ["points", "report"]
+    assert again["done"] == ["points", "drawing", "view", "report"]
     report = CliRunner().invoke(main, ["report", str(out), "--out", str(tmp_path / "r.html")])
     assert report.exit_code == 0, report.stderr
     page = (tmp_path / "r.html").read_text("utf-8")

@@ -8,7 +8,8 @@ import pytest
 
 from bifocal import InputError
 from bifocal.campaigns.dask_cluster import _look
-from bifocal.campaigns.pair_job import PairJob, run_pair
+from bifocal.campaigns.pair_job import run_pair
+from bifocal.campaigns.pair_steps import PairJob
 from bifocal.campaigns.shipping import packed, run_parcel, unpacked
 from bifocal.campaigns.step_store import Step
 from photocore.provenance import program

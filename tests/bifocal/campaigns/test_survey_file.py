@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from bifocal import InputError
 from bifocal.campaigns import photo_pairing
-from bifocal.campaigns.pair_job import refusal, steps_of
+from bifocal.campaigns.pair_steps import refusal, steps_of
 from bifocal.campaigns.survey_file import in_survey_words, read_survey_file
 from bifocal.campaigns.workflow import facade_job
 from bifocal.options import OF_PAIR
@@ -98,6 +98,26 @@ near = "d.jpg"
 distance1 = 3.5
 distance2 = 1.9
 """
+
+
+def test_photos_of_a_pair_may_be_a_list_and_are_a_set(tmp_path):
+    path = tmp_path / "street.toml"
+    path.write_text('[[pair]]\nname = "porch"\nphotos = ["a.jpg", "b.jpg", "c.jpg"]\nauto = true\n'
+                    "distance1 = 9.5\n")  # fmt: skip
+    (job,) = read_survey_file(path, out=tmp_path / "out")
+    assert job.photos == tuple(tmp_path / name for name in ("a.jpg", "b.jpg", "c.jpg"))
+    assert job.pair_path == tmp_path / "out" / "porch" / "align" / "porch.photos.json"
+    assert not refusal(job)
+    assert set(steps_of(job)[1].files) == {"far", "near", "photo 3"}
+    assert "of two photos" in refusal(replace(job, options={**job.options, "as_set_up": True}))
+    for wrong, said in (
+        ('[[pair]]\nphotos = ["a.jpg"]', "list photos"),
+        ('[[pair]]\nfar = "a.jpg"\nphotos = ["a.jpg", "b.jpg"]', "both"),
+        (f"joint = true\n{path.read_text()}", "joint = true adjusts pairs"),
+    ):
+        path.write_text(wrong)
+        with pytest.raises(InputError, match=said):
+            read_survey_file(path)
 
 
 def test_media_are_keys_of_the_file_and_reach_the_set_up(tmp_path):

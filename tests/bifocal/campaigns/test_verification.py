@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
+import re
 import shutil
 import zipfile
+import zlib
 from pathlib import Path
 
 import pytest
@@ -14,6 +17,7 @@ from click.testing import CliRunner
 from bifocal.campaigns.verification import verify as verified
 from tests.bifocal.campaigns.sample_tables import write_small_photos, write_tables
 from tests.builders.commands import bifocal_command as main
+from tests.web_page import Page
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +27,8 @@ def made(tmp_path_factory) -> Path:
     control, check = write_tables(place, small=True)
     words = ["facade", *write_small_photos(place), "--control", control, "--check",
              check, "--products", "points,report", "--language", "de", "--out", place / "wall",
-             "--date", "2026-11-22"]  # fmt: skip
+             "--date", "2026-11-22", "--client", "Bauamt", "--scale", "1:20",
+             "--survey-date", "3. Mai"]  # fmt: skip
     result = CliRunner().invoke(main, [*map(str, words)])
     assert result.exit_code == 0, result.stderr
     return place
@@ -43,6 +48,44 @@ def verify(*words: object, status: int = 0) -> tuple[dict, str]:
 
 def states(found: dict) -> dict[str, str]:
     return {one["file"]: one["state"] for one in found["files"] if one["state"] != "unchanged"}
+
+
+def test_the_report_tells_project_lenses_ties_and_how_it_was_made_and_is_told_again(made):
+    out = made / "again.html"
+    done = CliRunner().invoke(main, ["report", str(made / "wall"), "--out", str(out)])
+    assert done.exit_code == 0, done.stderr
+    for path in (made / "wall/report/wall_report.html", out):
+        text = Page(path.read_text("utf-8")).text
+        for words in ("Auftraggeber Bauamt", "Gemessen am 3. Mai", "Der verlangte Maßstab 1:20",
+                      "Innere Orientierung", "Ihre Strahlen verfehlen einander", "cores, Python",
+                      'sigma_pick = 0.5', "Gesamtfehler (RMSE)"):  # fmt: skip
+            assert words in " ".join(text.split()), words
+        assert re.search(r'Orientierung\s+control = "\w+.csv"\s+.*?\d\.\d s', text, re.DOTALL)
+    record = json.loads((made / "wall/report/.made.json").read_text("utf-8"))
+    assert record["command"] == (
+        "bifocal facade far.jpg near.jpg --control control.csv --check check.csv --scale 1:20 "
+        '--language de --client Bauamt --survey-date "3. Mai"'
+    )
+
+
+def test_the_pdf_of_a_report_says_what_its_parts_are(made):
+    data = (made / "wall/report/wall_report.pdf").read_bytes()
+    for part in (b"/StructTreeRoot", b"/Marked true", b"/Lang (de)", b"/S /H1", b"/S /TH",
+                 b"/S /Figure", b"/Alt"):  # fmt: skip
+        assert part in data, part
+    streams = re.findall(rb"stream\r?\n(.*?)\r?\nendstream", data, re.DOTALL)
+    pages = []
+    for stream in streams:
+        with contextlib.suppress(zlib.error):
+            text = zlib.decompress(stream)
+            if b" BDC" in text:
+                pages.append(text)
+    numbers = [[int(n) for n in re.findall(rb"/MCID (\d+)", page)] for page in pages]
+    assert len(pages) == data.count(b"/Type /Page ")
+    for page, marked in zip(pages, numbers, strict=True):
+        assert sorted(marked) == list(range(len(marked)))
+        assert page.count(b" BDC") + page.count(b" BMC") == page.count(b"EMC")
+    assert data.count(b"/Type /MCR") == sum(map(len, numbers))
 
 
 def zipped(folder: Path, path: Path) -> Path:

@@ -12,7 +12,8 @@ from click.testing import CliRunner
 
 from bifocal import InputError
 from bifocal.campaigns import workflow
-from bifocal.campaigns.pair_job import PairOutcome, steps_of
+from bifocal.campaigns.pair_job import PairOutcome
+from bifocal.campaigns.pair_steps import steps_of
 from bifocal.campaigns.step_store import Step, run_step, step_key
 from bifocal.campaigns.survey_file import read_survey_file
 from bifocal.campaigns.whole_wall import joint_step, run_whole

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bifocal.campaigns import worker_pool
-from bifocal.campaigns.pair_job import PairJob
+from bifocal.campaigns.pair_steps import PairJob
 from bifocal.campaigns.shipping import found_anywhere
 from bifocal.campaigns.worker_pool import Listener, run_here
 

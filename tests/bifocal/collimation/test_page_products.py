@@ -285,20 +285,29 @@ def test_points_and_lines_become_a_drawing_in_space(tmp_path) -> None:
             pick_both(session, name, picks[name])
         line = {"op": "line.set", "name": "L1", "layer": "win/dow", "points": ["T01", "T16", "T20"]}
         session.command({**line, "closed": True})
+        ring = [[600.0, 400.0, 0.0], [800.0, 400.0, 0.0], [800.0, 700.0, 0.0]]
+        session.command({"op": "shape.set", "kind": "outline", "corners": ring})
         data = client.get("/download/points.dxf").content
         (tmp_path / "x.dxf").write_bytes(data)
         drawn = ezdxf.readfile(tmp_path / "x.dxf").modelspace().query("POLYLINE").first
         assert (drawn.dxf.layer, drawn.is_closed) == ("win_dow", True)
+        outline = ezdxf.readfile(tmp_path / "x.dxf").modelspace().query("POLYLINE").last
+        assert (outline.dxf.layer, outline.is_closed, len(outline.vertices)) == (
+            "outlines",
+            True,
+            3,
+        )
         found = [tuple(vertex.dxf.location) for vertex in drawn.vertices]
         for name, place in zip(line["points"], found, strict=True):
             row = session.results.row(session.state.points[name])
             np.testing.assert_allclose(place, [row["X"], row["Y"], row["r"]], atol=1e-9)
         session.sync.step()
         archive = zipfile.ZipFile(BytesIO(client.get("/download/all.zip").content))
-        assert archive.namelist() == ["facade.xlsx", "SHA256SUMS"]
+        whole = ["facade.pair.json", "facade.xlsx", "far.jpg", "near.jpg", "SHA256SUMS"]
+        assert archive.namelist() == whole  # photos and pair, so that it opens elsewhere
         (tmp_path / "sent.zip").write_bytes(client.get("/download/all.zip").content)
         found = verify(tmp_path / "sent.zip")
-        assert [one.file for one in found.files] == ["SHA256SUMS", "facade.xlsx"]
+        assert [one.file for one in found.files] == sorted(whole)
         assert found.same
 
 

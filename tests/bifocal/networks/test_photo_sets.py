@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import csv
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from bifocal import (
     SAMPLE,
     Control,
     InputError,
     Interior,
+    PhotoSet,
     Pinhole,
+    align_set,
     read_control,
     read_image,
 )
@@ -22,8 +26,8 @@ from bifocal.model.orientation_precision import CAMERA
 from bifocal.networks.camera_knowledge import CameraKnowledge
 from bifocal.networks.joint_adjustment import JointUnknowns, adjust_jointly
 from bifocal.networks.joint_observations import JointObservations
-from bifocal.networks.set_alignment import align_set
 from tests.bifocal.campaigns.sample_tables import write_tables
+from tests.builders.commands import bifocal_command as main
 from tests.builders.pinholes import camera_matrix, project, rotation_from_vector
 from tests.scenes.make_sample import PIXEL
 
@@ -134,18 +138,25 @@ def three(tmp_path_factory):
 
 
 @pytest.mark.acceptance
-def test_three_photos_in_any_order_become_a_set_by_control(three):
-    folder, images = three
-    size = (images[0].shape[1], images[0].shape[0])
-    control = read_control(folder / "set.csv", sigma=0.003, sigma_plane=0.005, photos=3)
-    lenses = [
-        Interior.from_focal(distance / (2 * PIXEL), image_size=size, sigma=0.002, source="known")
-        for distance in (9.5, 17.5, 17.5)
-    ]
-    near, turned, far = align_set(images, interiors=lenses, control=control).photos.photos
+def test_three_photos_in_any_order_become_a_set_its_points_and_report(three, monkeypatch):
+    folder, _ = three
+    monkeypatch.chdir(folder)
+    focal = {place: f"{place / (2 * PIXEL) / 100:.6g}" for place in (9.5, 17.5)}
+    line = ["facade", "near.png", "turned.png", "far.png", "--control", "set.csv", "--focal1",
+            focal[9.5], "--focal", focal[17.5], "--pixel-size", "0.01", "--distance1", "9.5",
+            "--products", "points,report", "--out", "porch"]  # fmt: skip
+    result = CliRunner().invoke(main, line)
+    assert result.exit_code == 0, result.output
+    near, turned, far = PhotoSet.read("porch/align/porch.photos.json").photos
     assert far.distance == pytest.approx(17.5, abs=0.1)
-    assert near.distance == pytest.approx(9.5, abs=0.06)
-    assert turned.distance == pytest.approx(far.distance, abs=0.01)
+    assert near.distance == pytest.approx(9.5, abs=0.03)
+    assert turned.distance == pytest.approx(far.distance, abs=0.02)
+    control = read_control("set.csv", sigma=0.003, sigma_plane=0.005, photos=3)
+    page = Path("porch/report/porch_report.html").read_text(encoding="utf-8")
+    assert f"{len(control.ids)} control points" in page
+    again = CliRunner().invoke(main, line)
+    assert "porch/align (kept)" in again.stdout
+    assert "porch/report (kept)" in again.stdout
 
 
 def test_a_set_is_refused_with_the_reason(three):

@@ -352,7 +352,7 @@ def test_a_ramp_over_a_step_is_made_sharp():
     slab = (x > 0.8) & (x < 2.2) & (-y > 0.6) & (-y < 1.6)
     relief = np.where(slab, 0.3, 0.0).astype(np.float32)
     blurred = cv2.GaussianBlur(relief, (0, 0), 2.0)
-    sharp, misfit = edges.sharpen(frame, blurred)
+    sharp, misfit = edges.sharpen(frame, blurred, np.False_)
     # Photos do not fit at relief that is wrong by more than the noise of the texture.
     wrong = np.abs(blurred - relief) > 0.1
     assert np.median(misfit[wrong]) > 1.5 * np.median(misfit[slab & ~wrong])

@@ -176,5 +176,5 @@ def test_relief_falls_away_by_the_slope_of_the_bent_ray(name):
     for factor, expected in ((1.02, True), (0.98, False)):
         misfit = np.full(grid.shape, factor * limit, np.float32)
         everywhere = np.ones(grid.shape, bool)
-        left = evidence.without_falling(frame, relief, misfit, 0.0, everywhere)
+        left = evidence.without_falling(frame, relief, misfit, 0.0, np.False_, everywhere)
         assert left[row, column] != expected

@@ -163,7 +163,7 @@ def test_the_pixels_of_an_oblique_photo_are_longer_along_its_slant():
 
 def falling(frame: Frame, relief: np.ndarray, misfit: np.ndarray) -> np.ndarray:
     everywhere = np.ones(relief.shape, bool)
-    return ~evidence.without_falling(frame, relief, misfit, 0.0, everywhere)
+    return ~evidence.without_falling(frame, relief, misfit, 0.0, np.False_, everywhere)
 
 
 def test_what_falls_away_from_camera_2_where_the_photos_do_not_fit_is_not_measured():
@@ -277,7 +277,7 @@ def test_the_side_face_of_a_step_is_put_nowhere_and_the_step_stands_on_its_line(
     # inner edge at 60 / (1 - 2 / 17.5) = 67.7 px, and flow runs from the one to the other.
     profile = np.interp(x, [59, 69, 90, 94], [0.0, 2.0, 2.0, 0.0])
     relief = np.broadcast_to(profile, (200, 200)).astype(np.float32)
-    row = forward_projection.side_faces(frame, relief)[99]
+    row = forward_projection.side_faces(frame, relief, np.False_)[99]
     assert row[(x > 60) & (x < 68)].all()
     assert not row[(x < 57) | (x > 71)].any()
     nothing = np.zeros_like(relief)

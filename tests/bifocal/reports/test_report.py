@@ -183,7 +183,8 @@ def test_photos_of_one_name_in_two_folders_have_a_hash_each(tmp_path):
         path.parent.mkdir()
         path.write_text(path.parent.name)
     task = SimpleNamespace(control=None, check=None, relief=None, ortho=files[0])
-    content = SimpleNamespace(source=PAIR, pair=SimpleNamespace(photo_files=files), task=task)
+    cameras = [SimpleNamespace(file=path.name, path=path) for path in files]
+    content = SimpleNamespace(source=PAIR, cameras=cameras, task=task)
     *_, table = _provenance(content, words_of("bifocal.reports", "en"))
     named = [[path.name, sha256(path.read_bytes()).hexdigest()] for path in files]
     assert table.rows[1:] == named
@@ -205,23 +206,41 @@ def numbers(text: str) -> list[float]:
     return [float(value) for value in re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", text)]
 
 
-def test_the_worked_point_comes_out_by_pocket_calculator(page):
+def test_every_line_of_the_worked_point_follows_from_the_digits_above_it(page):
     text = Page(page).text
-    lines = dict.fromkeys("12")
-    for k in lines:
-        q = re.search(rf"q{k} = \((.*?), (.*?)\) m", text)
-        line = re.search(rf"N{k} = \((.*?), (.*?)\) m, d{k} = (.*?) m ", text)
-        q, (*nadir, d) = [float(v) for v in q.groups()], [float(v) for v in line.groups()]
-        lines[k] = (q, [(a - b) / d for a, b in zip(q, nadir, strict=True)])
-    (q1, v1), (q2, v2) = lines["1"], lines["2"]
-    shift = [a - b for a, b in zip(q1, q2, strict=True)]
-    slope = [a - b for a, b in zip(v1, v2, strict=True)]
-    r = sum(a * b for a, b in zip(shift, slope, strict=True)) / sum(a * a for a in slope)
-    printed = float(re.search(r" = (-?\d+\.\d{4}) m\n", text[text.index("r = ") :])[1])
-    assert printed == pytest.approx(r, abs=4e-4)  # q is printed to 0.01 mm
+    text = text[text.index("Method, worked through") :]
+    pixels = re.findall(r"\((-?\d+\.\d+), (-?\d+\.\d+)\)_\d", text)
+    q, v, s, d = [], [], [], []
+    for k, pixel in enumerate(pixels, start=1):
+        rows = re.findall(r"\|(.*?)\|", text[text.index(f"H{k} |") :])[:3]
+        matrix = np.array([numbers(row) for row in rows])
+        x, y, w = matrix @ [*map(float, pixel), 1.0]
+        q.append(numbers(re.search(rf"q{k} = (\(.*?\)) m", text)[1]))
+        assert q[-1] == pytest.approx([x / w, y / w], abs=0.6e-6)
+        line = re.search(rf"N{k} = (\(.*?\)) m, d{k} = (.*?) m .*?v{k} = (\(.*?\))", text)
+        nadir, (distance,), slope = map(numbers, line.groups())
+        v.append(slope)
+        assert slope == pytest.approx(np.subtract(q[-1], nadir) / distance, abs=0.6e-8)
+        line = re.search(
+            rf"\|det H{k}\| = (\S+) .*? = (\S+) mm +s{k} = (\S+) p{k} = (\S+) mm", text
+        )
+        det, place, sigma_px, sigma = map(float, line.groups())
+        assert det == pytest.approx(abs(np.linalg.det(matrix)), rel=1e-5)
+        assert place == pytest.approx(1000 * math.sqrt(det / abs(w) ** 3), rel=1e-4)
+        assert sigma == pytest.approx(sigma_px * place, abs=0.6e-3)
+        s.append(sigma)
+        d.append(distance)
+    shift, slope = np.subtract(*q), np.subtract(*v)
+    over, under, r = numbers(re.search(r"\nr = (.*?) m", text)[1])
+    assert [over, under] == pytest.approx([shift @ slope, slope @ slope], rel=1e-8)
+    assert r == pytest.approx(over / under, abs=0.51e-4)
+    place = numbers(re.search(r"X = \S+ m    Y = \S+ m", text)[0])
+    assert place == pytest.approx(np.mean(np.subtract(q, np.multiply(v, r)), axis=0), abs=1e-4)
+    sigma = math.hypot(*((1 - r / far) * one for far, one in zip(d, s, strict=True)))
+    said = float(re.search(r"sigma_r = (\d+\.\d+) mm", text)[1])
+    assert said == pytest.approx(sigma / math.sqrt(under), abs=0.6e-2)
     program = float(re.search(r"finds r = (-?\d\.\d+) m", text)[1])
-    sigma = float(re.search(r"sigma_r = (\d+\.\d+) mm", text)[1]) / 1000
-    assert abs(program - r) < sigma
+    assert abs(program - r) < said / 1000
 
 
 def test_without_check_points_the_figure_is_called_optimistic(tables, tmp_path):

@@ -26,6 +26,7 @@ from bifocal.survey.check_points import check_points
 from bifocal.survey.point_survey import solve_points
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.formulas.columns import (
+    compare_columns,
     georeference_columns,
     ideal_points,
     pair_points,
@@ -104,11 +105,13 @@ def test_nothing_in_a_workbook_makes_excel_repair_it(language):
 def test_only_functions_of_excel_2007_are_used():
     text = (
         "IF COUNT SQRT AND OR SIN COS RADIANS DEGREES ATAN2 ABS N NA ISERROR ISNUMBER INDEX MATCH "
-        "ROW ROWS IFERROR SUM SUMSQ SUMIF SUMPRODUCT AVERAGE MAX MIN ROUND LEFT TRIM UPPER FDIST"
+        "ROW ROWS IFERROR SUM SUMSQ SUMIF SUMPRODUCT AVERAGE MAX MIN ROUND LEFT TRIM UPPER FDIST "
+        "CHIDIST NOT"
     )
     allowed = set(text.split())
     used = set()
     columns = [*ideal_points(), *pair_points(undistorted=True)]
+    columns += [*ideal_points(others=4), *compare_columns(4)]
     for is_pair in (False, True):
         columns += [*results_columns(is_pair=is_pair), *georeference_columns(is_pair=is_pair)]
     for column in columns:

@@ -169,3 +169,34 @@ function shifts(context, seen) {
   context.lineWidth = 1;
   context.stroke();
 }
+
+/** Outlines filled as one sheet, holes left open. */
+export function sheet(context, pane, outlines, fill, edge) {
+  context.beginPath();
+  for (const outline of outlines) {
+    outline.forEach((pixel, index) => {
+      const place = pane.screen(pane.image, pixel);
+      if (index) context.lineTo(...place);
+      else context.moveTo(...place);
+    });
+    context.closePath();
+  }
+  context.fillStyle = fill;
+  context.fill("evenodd");
+  context.strokeStyle = edge;
+  context.lineWidth = 1.2;
+  context.stroke();
+}
+
+/** How far a point is off, drawn many times as long. */
+export function residual(context, [x, y], [dx, dy], ink) {
+  stroke(context, ink, 1.6, (path) => {
+    path.moveTo(x, y);
+    path.lineTo(x + dx, y + dy);
+    const angle = Math.atan2(dy, dx);
+    for (const turn of [2.6, -2.6]) {
+      path.moveTo(x + dx, y + dy);
+      path.lineTo(x + dx + 6 * Math.cos(angle + turn), y + dy + 6 * Math.sin(angle + turn));
+    }
+  });
+}

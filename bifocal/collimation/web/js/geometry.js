@@ -41,6 +41,18 @@ export class Wall {
     return place;
   }
 
+  /** The frame of a photo on the wall's grid: its border, cut off where it runs away. */
+  frameOf(image, { width, height }) {
+    const steps = 24;
+    const [right, bottom] = [width - 0.5, height - 0.5];
+    const corners = [[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]];
+    const far = 3 * Math.max(this.width, this.height);
+    return corners.flatMap(([x, y], index) => {
+      const [u, v] = corners[(index + 1) % 4];
+      return Array.from({ length: steps }, (_, k) => this.fromPhoto(image, [x + ((u - x) * k) / steps, y + ((v - y) * k) / steps]));
+    }).filter((place) => place.every((value) => Number.isFinite(value) && Math.abs(value) < far));
+  }
+
   /** Wall pixel -> (X, Y) on the reference plane [m]. */
   toPlane([column, row]) {
     return [this.xmin + (column + 0.5) * this.gsd, this.ymax - (row + 0.5) * this.gsd];

@@ -44,7 +44,8 @@ export const KEYS = [
   ["suggest", "S", ["s"], hand, (app) => hand(app).suggest()],
   ["accept", "A", ["a"], hand, (app) => hand(app).accept()],
   ["snap", "C", ["c"], hand, (app) => hand(app).snap()],
-  ["leave", "Esc", ["Escape"], hand, (app) => hand(app).leave()],
+  ["leave", "Esc", ["Escape"], (app) => hand(app) || app.stage.leave,
+    (app) => app.stage.leave?.() || hand(app)?.leave()],
   ["next", "J", ["j", "J"], (app) => app.stage.list, (app, event) => app.stage.list.step(event.shiftKey ? -1 : 1)],
   ["fly", "F", ["f"], hand, (app) => hand(app).selected && app.stage.flyTo(hand(app).selected)],
   ["rename", "F2", ["F2"], (app) => app.stage.rename, (app) => app.stage.rename()],
@@ -76,7 +77,8 @@ export function listen(app) {
     if (event.defaultPrevented || document.querySelector("dialog[open]")) return;
     const key = (event.ctrlKey || event.metaKey ? "Ctrl+" : "") + event.key;
     if (typing(event.target)) {
-      if (event.key === "Escape" || event.key === "Enter") event.target.blur();
+      // Within a form, Enter sends it.
+      if (event.key === "Escape" || (event.key === "Enter" && !event.target.form)) event.target.blur();
       return;
     }
     const focused = event.target.matches?.("button, a, summary, input") && ["Enter", " "].includes(event.key);

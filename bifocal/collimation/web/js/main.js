@@ -7,6 +7,7 @@ import { OrientationStage } from "./orientation.js";
 import { PhotosStage } from "./photos.js";
 import { PointsStage } from "./points.js";
 import { ProductsStage } from "./products.js";
+import { theme, useTheme } from "./theme.js";
 import { Pyramids } from "./tiles.js";
 import { LANGUAGES, load, t } from "./words/words.js";
 
@@ -40,6 +41,10 @@ class App {
     this.undoButton = button("↶", () => this.undo(), { class: "icon", testid: "undo", "aria-label": t("top.undo"), title: `${t("top.undo")} (Ctrl+Z)` });
     this.redoButton = button("↷", () => this.redo(), { class: "icon", testid: "redo", "aria-label": t("top.redo"), title: `${t("top.redo")} (Ctrl+Y)` });
     this.exchangeButton = button("⇄", () => this.exchange(), { class: "icon", testid: "exchange", "aria-label": t("photos.exchange"), title: t("photos.exchange") });
+    this.nextButton = button("", () => this.next(), { class: "primary next-step", testid: "next" });
+    this.themeButton = button("◐", () => { useTheme(theme() === "light" ? "dark" : "light"); this.#tellTheme(); },
+      { class: "icon", testid: "theme" });
+    this.#tellTheme();
     this.link = h("p", { class: "link-state", role: "status", testid: "link" });
     const language = choice({ label: t("top.language"), options: LANGUAGES, value: document.documentElement.lang,
       testid: "language", save: (code) => this.send("language.set", { language: code }) });
@@ -48,12 +53,22 @@ class App {
       h("a", { class: "skip", href: "#stage" }, t("top.skip")),
       h("header", { class: "top" }, this.title,
         h("nav", { role: "tablist", "aria-label": t("top.stages") }, Object.values(this.tabs)),
-        h("div", { class: "tools" }, this.link, this.exchangeButton, this.undoButton, this.redoButton, language,
+        h("div", { class: "tools" }, this.link, this.nextButton, this.exchangeButton, this.undoButton, this.redoButton,
+          this.themeButton, language,
           button("?", () => this.help(), { class: "icon", "aria-label": t("top.help"), testid: "help" }))),
       h("div", { id: "stage", tabindex: "-1" }, Object.values(this.stages).map(({ element }) => element)),
       this.toast);
-    this.open(this.state.stage, false);
+    const wanted = location.hash.slice(1);
+    this.open(wanted in STAGES ? wanted : this.state.stage, false);
+    history.replaceState({ stage: this.current }, "", `/#${this.current}`);
+    window.addEventListener("popstate", ({ state }) => state?.stage && this.open(state.stage, true, false));
     listen(this);
+  }
+
+  #tellTheme() {
+    const words = t(`top.theme.${theme() === "light" ? "dark" : "light"}`);
+    this.themeButton.title = words;
+    this.themeButton.setAttribute("aria-label", words);
   }
 
   #tab(key, index) {
@@ -73,8 +88,12 @@ class App {
     return tab;
   }
 
-  /** Show a stage; `tell` the survey, so that the next start opens there. */
-  open(key, tell = true) {
+  /**
+   * Show a stage; `tell` the survey, so that the next start opens there; `remember` it, so that the
+   * browser's Back leads here.
+   */
+  open(key, tell = true, remember = tell) {
+    if (remember && this.current !== key) history.pushState({ stage: key }, "", `/#${key}`);
     this.current = key;
     for (const [name, stage] of Object.entries(this.stages)) {
       stage.element.hidden = name !== key;
@@ -97,6 +116,26 @@ class App {
     return this.stages[this.current];
   }
 
+  /** The one step that comes next, and whether it can be taken now. */
+  get step() {
+    const { pair, photos, products } = this.state;
+    if (this.current === "photos") return { ready: photos.length === 2, go: () => this.open("orientation") };
+    if (this.current === "orientation") {
+      const accept = pair?.accepted === false;
+      return { key: accept ? "accept" : "orientation", ready: Boolean(pair?.scaled),
+        go: () => (accept ? this.stage.accept() : this.open("points")) };
+    }
+    if (this.current === "points") return { ready: Boolean(pair), go: () => this.open("products") };
+    return products.files.some(({ name }) => name.endsWith(".pdf"))
+      ? { key: "download", ready: true, go: () => this.stage.download.click() }
+      : { ready: Boolean(pair), go: () => this.stage.deliver.click() };
+  }
+
+  next() {
+    const { ready, go } = this.step;
+    if (ready) go();
+  }
+
   update() {
     const { state } = this;
     document.title = `${state.title || t("title.untitled")} · bifocal`;
@@ -109,6 +148,9 @@ class App {
     this.undoButton.disabled = !state.undo;
     this.exchangeButton.hidden = state.photos.length < 2;
     this.redoButton.disabled = !state.redo;
+    const { key = this.current, ready } = this.step;
+    setText(this.nextButton, t(`next.${key}`));
+    this.nextButton.disabled = !ready;
     for (const paint of this.boxes) paint(state);
     this.reach();
     this.stage.update(state);
@@ -145,7 +187,7 @@ class App {
   enter() {
     const { picker } = this.stage;
     const { cursor } = picker;
-    if (cursor) picker.click(cursor.pane, cursor.place);
+    if (cursor) (this.stage.click ? this.stage : picker).click(cursor.pane, cursor.place);
     else if (picker.proposal) picker.accept();
   }
 
@@ -171,8 +213,8 @@ class App {
   }
 
   /** Join a pane with a picker: clicks, the pointer. */
-  follow(pane, picker) {
-    pane.addEventListener("pick", ({ detail }) => picker.click(pane, detail.pixel));
+  follow(pane, picker, taker = picker) {
+    pane.addEventListener("pick", ({ detail }) => taker.click(pane, detail.pixel));
     pane.addEventListener("hover", ({ detail }) => picker.hover(pane, detail.pixel));
   }
 
@@ -197,8 +239,9 @@ class App {
     const box = h("div", { class: "job", hidden: true, testid: `job-${kind}` }, h("div", { class: "row" }, bar, cancel), words, fold);
     this.boxes.push((state) => {
       const job = state.jobs.filter((one) => one.kind === kind).at(-1);
-      box.hidden = !job;
-      if (!job) return;
+      // What the program tries by itself, and failures that were mended, are nobody's concern.
+      box.hidden = !job || job.quiet || job.cured;
+      if (box.hidden) return;
       const running = job.state === "running";
       bar.value = job.state === "done" ? 1 : job.progress ?? 0;
       bar.hidden = cancel.hidden = !running;
@@ -259,11 +302,17 @@ class App {
   }
 }
 
+/** Every pick of a point: `{name, image, column, row}`. */
+function picksOf({ points }) {
+  return points.flatMap(({ name, picks }) => [1, 2].filter((image) => picks[image])
+    .map((image) => ({ name, image, column: picks[image][0], row: picks[image][1] })));
+}
+
 /** What `window.bifocal` offers: image 1 or 2, original photo pixels, CSS pixels of the page. */
 function outside(app) {
   const box = (pane) => pane.ground.getBoundingClientRect();
   return {
-    state: () => app.state,
+    state: () => ({ ...app.state, stage: app.current, picks: picksOf(app.state) }),
     photoFromScreen(image, x, y) {
       const pane = app.stage.paneOf(image);
       const { left, top } = box(pane);
@@ -284,6 +333,7 @@ async function start() {
   await connection.start();
   const { language } = connection.state;
   await load(language);
+  if (location.search) history.replaceState(null, "", `/${location.hash}`);
   const app = new App(connection);
   app.build();
   let waiting = 0;
@@ -298,7 +348,6 @@ async function start() {
   connection.addEventListener("reach", () => app.reach());
   connection.addEventListener("refused", ({ detail }) => app.refuse(detail));
   window.bifocal = outside(app);
-  if (location.search) history.replaceState(null, "", "/");
 }
 
 start();

@@ -9,11 +9,15 @@ import { asTaken } from "./geometry.js";
 import { Loupe } from "./loupe.js";
 import { mediaWords } from "./media.js";
 import { Picker } from "./picker.js";
+import { sketched } from "./sketches.js";
 import { photoMark } from "./tiles.js";
 import { Pane, pixelView, spread, tileLayer } from "./viewer.js";
+import { WallCard } from "./wallcard.js";
 import { t } from "./words/words.js";
 
 const COORDINATES = ["X", "Y", "r"];
+/** Residuals are drawn so many times as long as they are. */
+const STRETCHED = 40;
 
 export class OrientationStage {
   constructor(app) {
@@ -22,7 +26,9 @@ export class OrientationStage {
     this.panes = [];
     this.picker = new Picker({ connection: app.connection, kind: "control", partner: false,
       items: () => app.state.control, panes: () => this.panes });
-    app.listen(this.picker, () => this.#refresh(), () => this.#look());
+    app.listen(this.picker, () => this.refresh(), () => this.#look());
+    this.wallCard = new WallCard(this);
+    this.targets = button(t("control.targets"), () => app.job("targets"), { class: "quiet", testid: "targets" });
     this.photos = h("div", { class: "viewer two" });
     this.body = h("tbody");
     this.tapes = h("tbody");
@@ -30,27 +36,27 @@ export class OrientationStage {
     this.remarks = h("ul", { class: "remarks" });
     this.known = h("dl", { class: "values one", testid: "orientation-values" });
     this.align = button(t("align.run"), () => app.job("align"), { class: "primary", testid: "align" });
-    this.acceptAlign = button(t("align.accept"), () => app.send("align.accept"),
-      { testid: "align-accept" });
-    this.exchange = button(t("photos.exchange"), () => app.exchange(), { class: "quiet" });
+    this.acceptAlign = button(t("align.accept"), () => this.accept(), { testid: "align-accept" });
+    this.good = h("p", { class: "good", role: "status", testid: "how-good" });
     this.target = h("p", { class: "target", role: "status" });
     this.element = h("main", { class: "stage work", id: "stage-orientation" }, this.photos,
-      h("aside", { class: "panel" }, this.#targetBox(), this.loupe.element, this.#controlTable(),
-        this.#tapeTable(), this.#tellResult(), this.#result()));
+      h("aside", { class: "panel" }, this.target, this.wallCard.element, this.loupe.element,
+        this.#controlTable(), this.#tapeTable(), this.#tellResult(), this.#result()));
   }
 
-  #targetBox() {
+  #controlButtons() {
     const { picker } = this;
-    return h("section", { class: "hand" }, this.target, h("div", { class: "row" },
-      button(t("control.new"), () => picker.fresh(1), { class: "quiet", testid: "control-new" }),
+    return h("div", { class: "row" },
+      button(t("control.new"), () => { this.wallCard.dismiss(); picker.fresh(1); }, { class: "quiet", testid: "control-new" }),
       button(t("pick.snap"), () => picker.snap(), { class: "quiet", testid: "control-snap" }),
-      button(t("control.paste"), () => this.#paste(), { class: "quiet", testid: "control-paste" })));
+      button(t("control.paste"), () => this.#paste(), { class: "quiet", testid: "control-paste" }),
+      this.targets);
   }
 
   #controlTable() {
     const heads = ["control.name", "control.X", "control.Y", "control.r", "control.seen", "control.residual"];
     return h("section", { class: "card" }, h("h2", {}, t("control.title")),
-      h("p", { class: "hint" }, t("control.hint")),
+      this.#controlButtons(), this.app.jobBox("targets"), h("p", { class: "hint" }, t("control.hint")),
       h("table", { class: "grid", testid: "control-table", onpaste: (event) => this.#pasted(event) },
         h("thead", {}, h("tr", {}, heads.map((key) => h("th", { scope: "col" }, t(key))),
           h("th", {}, h("span", { class: "unseen" }, t("list.delete"))))), this.body));
@@ -87,8 +93,28 @@ export class OrientationStage {
 
   /** What is to be done next stays in sight, however long the table. */
   #result() {
-    return h("section", { class: "card next" }, h("h2", {}, t("align.title")), this.advice,
-      h("div", { class: "row" }, this.align, this.acceptAlign, this.exchange), this.app.jobBox("align"));
+    return h("section", { class: "card next" }, h("h2", {}, t("align.title")), this.good, this.advice,
+      h("div", { class: "row" }, this.align, this.acceptAlign), this.app.jobBox("align"));
+  }
+
+  /** What is accepted is done: the points come next. */
+  async accept() {
+    const accepted = await this.app.send("align.accept");
+    if (accepted && this.app.current === "orientation") this.app.open("points");
+    return accepted;
+  }
+
+  /** Let go of the tool in hand. */
+  leave() {
+    return this.wallCard.dismiss();
+  }
+
+  /** A click in a photo: for the tool in hand, else a control point. */
+  click(pane, pixel) {
+    const photo = pane.photo(pane.image, pixel);
+    if (!this.wallCard.click(pane.image, photo)) return this.picker.click(pane, pixel);
+    this.picker.cursor = null;
+    return undefined;
   }
 
   #pasted(event) {
@@ -134,7 +160,7 @@ export class OrientationStage {
     const pane = new Pane({ label: t("pane.photo", { image, role }), view, frame: asTaken,
       painter: (context, self) => this.#draw(context, self) });
     Object.assign(pane, { image, images: [image] });
-    this.app.follow(pane, this.picker);
+    this.app.follow(pane, this.picker, this);
     pane.element.append(h("span", { class: `badge ink-${image}` }, `${image} · ${role}`));
     return pane;
   }
@@ -145,16 +171,23 @@ export class OrientationStage {
     if (pair?.nadir?.[image - 1]) {
       drawing.centre(context, pane.screen(image, pair.nadir[image - 1]), t("draw.nadir"));
     }
-    drawing.picks(context, pane, { items: control, images: [image],
+    this.wallCard.draw(context, pane);
+    drawing.picks(context, pane, { items: control.filter(({ use }) => use), images: [image],
       pick: (item, one) => this.picker.pick(item, one), selected: this.picker.selected });
+    for (const item of control) {
+      const [pixel, off] = [this.picker.pick(item, image), item.residual?.[image]];
+      if (pixel && off) drawing.residual(context, pane.screen(image, pixel), off.map((one) => one * STRETCHED), "#ff6b6b");
+    }
     const { cursor } = this.picker;
     if (cursor?.pane === pane) drawing.cursor(context, pane, cursor.place, image);
   }
 
   status(state) {
     if (state.photos.length < 2) return { text: t("status.orientation.photos") };
+    if (state.pair && !state.pair.scaled) return { text: t("status.orientation.length") };
     if (state.pair && state.pair.accepted === false) return { text: t("status.orientation.accept") };
     if (state.pair) return { done: true, text: t("status.done") };
+    if (state.looking && !state.control.length) return { text: t("status.orientation.looking") };
     const seen = state.control.filter(({ picks }) => picks[1] && picks[2]).length;
     if (seen < 4) return { text: t("status.orientation.control", { seen }) };
     return { text: state.advice[0] ?? t("status.orientation.align") };
@@ -162,6 +195,11 @@ export class OrientationStage {
 
   update(state) {
     this.prepare(state).catch((error) => this.app.refuse(error));
+    this.picker.settle();
+    this.wallCard.update(state);
+    this.targets.disabled = !state.pair;
+    setText(this.good, state.good ?? "");
+    this.good.hidden = !state.good;
     keyedRows(this.body, state.control, { key: ({ name }) => name,
       signature: (item) => JSON.stringify([item, item.name === this.picker.selected]),
       build: (item) => this.#controlRow(item) });
@@ -176,21 +214,26 @@ export class OrientationStage {
     setText(this.remarkCount, t("known.remarks", { count: remarks }));
     this.#tellKnown(state);
     this.tell.hidden = !remarks && !this.known.children.length;
-    this.acceptAlign.disabled = !state.pair || state.pair.accepted !== false;
+    this.acceptAlign.disabled = !state.pair || state.pair.accepted !== false || !state.pair.scaled;
+    setText(this.align, t(state.pair?.report?.free_scale ? "align.refine" : "align.run"));
+    this.align.classList.toggle("primary", !state.pair);
     // The next step stands out.
     this.acceptAlign.classList.toggle("primary", !this.acceptAlign.disabled);
-    this.#refresh();
+    this.refresh();
   }
 
   /** Distances and nadirs with their sigmas: of the proposal, else of the control points alone. */
   #tellKnown({ pair, live }) {
+    const facts = JSON.stringify([pair?.images.map(({ distance, media }) => [distance, media]), pair?.report?.standard_deviations, live]);
+    if (facts === this.facts) return;
+    this.facts = facts;
     const distances = pair?.images.map(({ distance }) => distance) ?? live?.distances ?? [];
     const sigmas = pair?.report?.standard_deviations ?? live?.deviations ?? {};
     const rows = distances.flatMap((distance, index) => [
       [t("known.distance", { image: index + 1 }), distance, sigmas[`distance${index + 1}`]],
       [t("known.nadir", { image: index + 1 }), null, sigmas[`nadir${index + 1}`]]]);
     this.known.replaceChildren(...rows.filter(([, value, sigma]) => value !== null || Number.isFinite(sigma))
-      .map(([name, value, sigma]) => h("div", {}, h("dt", {}, name), h("dd", {},
+      .map(([name, value, sigma]) => h("div", {}, value === null ? sketched(h("dt", {}, name), "nadir") : h("dt", {}, name), h("dd", {},
         `${value === null ? "" : number(value, 3)}${Number.isFinite(sigma) ? ` ± ${number(sigma, 3)}` : ""} m`.trim()))));
     this.#tellMedia(pair?.images.map(({ media }) => media) ?? [], sigmas);
   }
@@ -217,15 +260,17 @@ export class OrientationStage {
     const seen = [1, 2].map((image) => h("button", { type: "button",
       class: `chip ink-${image}${item.picks[image] ? " on" : ""}`,
       "aria-label": t(item.picks[image] ? "control.again" : "control.pickIn", { name, image }),
-      onclick: () => { this.picker.select(name); this.picker.aim(image); this.#fly(item, image); } },
+      onclick: () => { this.wallCard.dismiss(); this.picker.select(name); this.picker.aim(image); this.#fly(item, image); } },
     item.picks[image] ? `${image} ✓` : `${image}`));
     const worst = Math.max(...[1, 2].map((image) => Math.hypot(...(item.residual?.[image] ?? [NaN]))).filter(Number.isFinite), -1);
+    const use = h("input", { type: "checkbox", checked: item.use, "aria-label": t("control.use", { name }),
+      title: t("control.use", { name }), onchange: () => this.app.send("control.use", { name, use: use.checked }) });
     const remove = button("×", () => this.app.send("control.delete", { name }),
       { class: "icon", "aria-label": t("list.deleteOf", { name }) });
     const row = h("tr", { "aria-selected": String(name === this.picker.selected),
       onfocusin: () => { if (this.picker.selected !== name) this.picker.select(name); } },
     h("td", {}, label), inputs, h("td", { class: "seen" }, seen),
-    h("td", { class: "number" }, worst < 0 ? "–" : number(worst, 2)), h("td", {}, remove));
+    h("td", { class: "number" }, worst < 0 ? "–" : number(worst, 2)), h("td", { class: "seen" }, use, remove));
     return row;
   }
 
@@ -256,10 +301,11 @@ export class OrientationStage {
       this.panes[this.picker.target.image - 1];
   }
 
-  #refresh() {
+  refresh() {
     const { target, picking } = this.picker;
     const words = { name: target.name ?? t("control.newName"), image: target.image };
-    setText(this.target, picking ? t("pick.next", words) : t("pick.off"));
+    setText(this.target, this.wallCard.asks || (picking ? t("pick.next", words) : t("pick.off")));
+    this.target.classList.toggle("asked", Boolean(this.wallCard.asks));
     for (const row of this.body.children) {
       row.setAttribute("aria-selected", String(row.dataset.key === this.picker.selected));
     }
@@ -268,7 +314,7 @@ export class OrientationStage {
   }
 
   #look() {
-    for (const image of [1, 2]) this.loupe.look(image, this.picker.sight(image));
+    for (const image of [1, 2]) this.loupe.look(image, this.picker.sight(image) ?? this.panes[image - 1]?.middle(image));
   }
 
   /** Page coordinates of a photo pixel and back, for those who drive the page from outside. */

@@ -15,13 +15,14 @@ export class PhotosStage {
   constructor(app) {
     this.app = app;
     this.cards = [1, 2].map((image) => this.#card(image));
-    this.input = h("input", { type: "file", accept: "image/*", multiple: true, class: "unseen",
+    this.input = h("input", { type: "file", accept: "image/*,.heic,.heif,.hif,.avif,.dng,.cr2,.cr3,.nef,.arw,.orf,.raf,.rw2,.pef,.srw", multiple: true, class: "unseen",
       id: "photo-files", testid: "photo-files", onchange: () => this.#drop([...this.input.files]) });
+    this.lead = h("p", { class: "lead" }, t("photos.drop"));
     this.zone = h("div", { class: "drop-zone" },
       h("div", { class: "drop-icon", "aria-hidden": "true" }),
-      h("p", { class: "lead" }, t("photos.drop")),
+      this.lead,
       h("p", { class: "hint" }, t("photos.dropHint")),
-      h("label", { for: "photo-files", class: "button" }, t("photos.choose")), this.input);
+      h("label", { for: "photo-files", class: "button primary" }, t("photos.choose")), this.input);
     this.site = Object.fromEntries([...SITE, ...MEDIA].map(([key]) => [key, numberInput({
       label: t(`setup.${key}`), save: (value) => app.send("setup.set", { [key]: value }) })]));
     const fields = (names) => h("div", { class: "fields" },
@@ -33,17 +34,22 @@ export class PhotosStage {
     this.media = h("details", { class: "card site", testid: "media" },
       h("summary", {}, h("h2", {}, t("photos.media"))), this.through,
       h("p", { class: "hint" }, t("photos.mediaHint")), fields(MEDIA));
-    this.exchange = button(t("photos.exchange"), () => app.exchange(), { class: "quiet" });
-    this.next = button(t("photos.next"), () => app.open("orientation"), { class: "primary" });
-    this.element = h("main", { class: "stage photos", id: "stage-photos" }, this.zone,
-      h("div", { class: "cards" }, this.cards.map(({ element }) => element)), this.form, this.media,
-      h("div", { class: "row end" }, this.exchange, this.next));
+    this.recent = h("ul", { class: "recent" });
+    this.beginning = h("section", { class: "beginning" },
+      h("div", { class: "card" }, h("h2", {}, t("start.sample")), h("p", { class: "hint" }, t("start.sampleHint")),
+        h("div", { class: "row" }, button(t("start.try"), () => this.#sample(), { testid: "sample" }))),
+      h("div", { class: "card checklist" }, h("h2", {}, t("start.bring")),
+        h("ul", {}, [1, 2, 3, 4, 5, 6].map((number) => h("li", {}, t(`start.bring.${number}`)))),
+        h("div", { class: "row" }, button(t("start.print"), () => window.print(), { class: "quiet", testid: "print" }))),
+      h("div", { class: "card" }, h("h2", {}, t("start.recent")), this.recent));
+    this.element = h("main", { class: "stage photos", id: "stage-photos" }, this.zone, this.beginning,
+      h("div", { class: "cards" }, this.cards.map(({ element }) => element)), this.form, this.media);
     this.#listen();
   }
 
   #card(image) {
     const role = t(image === 1 ? "photo.far" : "photo.near");
-    const card = { image, name: h("p", { class: "file" }), facts: h("p", { class: "hint" }),
+    const card = { image, name: h("p", { class: "file" }), facts: h("p", { class: "hint" }), trust: h("p", { class: "hint", testid: `focal-said-${image}` }),
       thumb: h("img", { alt: t("photo.alt", { role }) }), questions: h("ul", { class: "questions" }) };
     const save = (key) => (value) => this.app.send("photo.set", { image, [key]: value });
     card.focal_mm = numberInput({ label: t("photo.focal"), save: save("focal_mm") });
@@ -52,7 +58,7 @@ export class PhotosStage {
       h("h2", { class: `ink-${image}` }, `${image} · ${role}`), card.thumb,
       h("div", { class: "card-body" }, card.name, card.facts, h("div", { class: "fields" },
         labelled(t("photo.focal"), card.focal_mm, "mm"),
-        labelled(t("photo.sensor"), card.sensor_width_mm, "mm")), card.questions));
+        labelled(t("photo.sensor"), card.sensor_width_mm, "mm")), card.trust, card.questions));
     return card;
   }
 
@@ -67,15 +73,45 @@ export class PhotosStage {
       this.zone.classList.remove("over");
       if (dataTransfer.files.length) this.#drop([...dataTransfer.files]);
     });
+    window.addEventListener("paste", ({ clipboardData }) => {
+      if (clipboardData?.files.length) this.#drop([...clipboardData.files]);
+    });
+  }
+
+  async #sample() {
+    try {
+      await this.app.connection.ask("/api/sample", {});
+      await this.app.connection.refresh();
+      this.app.open("points");
+    } catch (error) {
+      this.app.refuse(error);
+    }
+  }
+
+  /** Surveys that were open before; another page opens beside this one. */
+  async #tellRecent() {
+    const { surveys } = await this.app.connection.get("/api/recent").catch(() => ({ surveys: [] }));
+    const open = async (number) => {
+      try {
+        const { url } = await this.app.connection.ask("/api/recent", { number });
+        window.location.assign(url);
+      } catch (error) {
+        this.app.refuse(error);
+      }
+    };
+    this.recent.replaceChildren(...(surveys.length ? surveys.map(({ number, name, folder }) => h("li", {},
+      button(`${folder} / ${name}`, () => open(number), { class: "link" })))
+      : [h("li", { class: "hint" }, t("start.none"))]));
   }
 
   async #drop(files) {
-    if (files.length !== 2) return this.app.say(t("photos.two"), "warning");
+    if (files.length > 2) return this.app.say(t("photos.two"), "warning");
+    this.app.open("photos");
     this.zone.classList.add("busy");
     this.app.say(t("photos.reading"));
     try {
       await this.app.connection.upload(files);
-      this.app.say(t("photos.read"));
+      this.app.say(t(this.app.state.photos.length < 2 ? "photos.one" : "photos.read"));
     } catch (error) {
       this.app.refuse(error);
     }
@@ -85,15 +121,21 @@ export class PhotosStage {
   }
 
   status(state) {
-    if (state.photos.length < 2) return { text: t("status.photos.drop") };
+    if (state.photos.length < 2) return { text: t(state.photos.length ? "status.photos.second" : "status.photos.drop") };
     const open = state.photos.flatMap(({ missing }) => missing).length;
     return open && !state.pair ? { text: t("status.photos.missing", { open }) } : { done: true, text: t("status.done") };
   }
 
   update(state) {
     const ready = state.photos.length === 2;
-    this.zone.classList.toggle("small", ready);
-    this.form.hidden = this.media.hidden = this.exchange.hidden = this.next.hidden = !ready;
+    this.beginning.hidden = state.photos.length > 0;
+    if (!this.beginning.hidden && !this.asked) {
+      this.asked = true;
+      this.#tellRecent();
+    }
+    this.zone.classList.toggle("small", state.photos.length > 0);
+    setText(this.lead, t(state.photos.length === 1 ? "photos.dropSecond" : "photos.drop"));
+    this.form.hidden = this.media.hidden = !ready;
     for (const card of this.cards) this.#fillCard(card, state);
     for (const [key] of [...SITE, ...MEDIA]) fill(this.site[key], state.setup?.[key]);
     this.#tellMedia(state);
@@ -119,6 +161,7 @@ export class PhotosStage {
     setText(card.name, photo.name);
     const size = `${photo.width} × ${photo.height} px`;
     setText(card.facts, [size, photo.camera].filter(Boolean).join(" · "));
+    setText(card.trust, photo.focal_said ?? "");
     fill(card.focal_mm, photo.focal_mm);
     fill(card.sensor_width_mm, photo.sensor_width_mm);
     // An oriented pair knows its cameras.

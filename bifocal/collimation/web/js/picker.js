@@ -76,6 +76,14 @@ export class Picker extends EventTarget {
     return this.changed();
   }
 
+  /** The survey changed under the hand: what was to be picked next may be gone, or picked. */
+  settle() {
+    const { name, image } = this.target;
+    const item = this.items().find((one) => one.name === name);
+    const stale = name ? !item || (name !== this.selected && this.pick(item, image)) : this.kind === "control";
+    if (stale) this.target = this.#fresh();
+  }
+
   forget() {
     this.proposal = null;
     this.guide = null;
@@ -155,7 +163,11 @@ export class Picker extends EventTarget {
     else if (this.partner) await this.#guide(item, null);
   }
 
+  /** A new point; of control points that are listed already, the next that lacks a pick. */
   #fresh() {
+    const next = this.kind === "control" && this.items().find((item) => item.use !== false
+      && [1, 2].some((image) => !this.pick(item, image)));
+    if (next) return { name: next.name, image: [1, 2].find((image) => !this.pick(next, image)) };
     return { name: null, image: this.target.image === 2 && this.kind === "control" ? 2 : 1 };
   }
 
@@ -253,13 +265,13 @@ export class Picker extends EventTarget {
   }
 
   /** How far off a click may have fallen: farther where the photo is shown small. [photo pixels] */
-  get #reach() {
+  get reach() {
     const zoom = Math.min(...this.panes().map((pane) => pane.zoom), 1);
     return Math.min(Math.max(REACH, (REACH / 2) / zoom), FARTHEST);
   }
 
   /** Centre the pick in hand on the corner or target that lies there. */
-  snap(radius = this.#reach) {
+  snap(radius = this.reach) {
     return this.#next(async () => {
       const { item, image } = this;
       const from = item && this.pick(item, image);

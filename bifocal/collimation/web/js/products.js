@@ -3,8 +3,11 @@ import { h, keyedRows, number, parseNumber, setText } from "./dom.js";
 import * as drawing from "./drawing.js";
 import { button, choice, labelled, numberInput } from "./fields.js";
 import { Wall } from "./geometry.js";
+import { Loupe } from "./loupe.js";
 import { Profile } from "./profile.js";
-import { wallMark } from "./tiles.js";
+import { Range } from "./range.js";
+import { Shapes } from "./shapes.js";
+import { photoMark, wallMark } from "./tiles.js";
 import { Pane, pictureLayer, pixelView, tileLayer } from "./viewer.js";
 import { t } from "./words/words.js";
 
@@ -22,17 +25,17 @@ export class ProductsStage {
     this.swipe = 1;
     this.photos = h("div", { class: "viewer" });
     this.value = h("p", { class: "value", role: "status", testid: "relief-value" });
-    this.low = h("span", {});
-    this.high = h("span", {});
-    this.legend = h("div", { class: "legend", role: "img", hidden: true, testid: "relief-legend" },
-      this.low, h("span", { class: "colours" }), this.high);
+    this.range = new Range((low, high) => { this.limits = [low, high]; this.#showRelief(); });
+    this.shapes = new Shapes(app, this);
+    this.loupe = new Loupe();
     this.profile = new Profile(app, () => this.pane?.paint(), () => {
       this.pane?.mounted();
       this.pane?.fit();
     });
     this.element = h("main", { class: "stage work", id: "stage-products" },
       h("div", { class: "table-top" }, this.#bar(), this.photos, this.profile.element),
-      h("aside", { class: "panel" }, this.#reliefBox(), this.#orthoBox(), this.#deliverBox()));
+      h("aside", { class: "panel" }, this.#deliverBox(), this.#reliefBox(), this.#orthoBox(),
+        this.shapes.element, this.loupe.element));
   }
 
   #bar() {
@@ -42,21 +45,40 @@ export class ProductsStage {
       return h("span", { class: "slider" }, h("label", { for: id }, t(`products.${id}`)), input);
     };
     this.opacity = 0.6;
+    const toggle = (key, testid, changed) => {
+      const made = button(t(key), () => {
+        const on = made.getAttribute("aria-pressed") !== "true";
+        made.setAttribute("aria-pressed", String(on));
+        changed(on);
+      }, { class: "quiet", testid, "aria-pressed": "false" });
+      return made;
+    };
     return h("div", { class: "layer-bar", role: "toolbar", "aria-label": t("layer.bar") },
       range("relief-opacity", "60", (value) => { this.opacity = value; this.#apply(); }),
       range("ortho-swipe", "100", (value) => { this.swipe = value; this.#apply(); }),
+      toggle("relief.hatch", "relief-hatch", (on) => { this.hatched = on; this.#showRelief(); }),
+      toggle("relief.points", "relief-points", (on) => { this.picks = on; }),
       button(t("profile.draw"), () => this.profile.begin(), { class: "quiet", testid: "profile" }),
       this.value);
+  }
+
+  /** A product: its picture, what it is good for, its size, what makes it. */
+  #product(kind, ...rest) {
+    const picture = h("img", { class: "preview", alt: "", hidden: true });
+    const state = h("p", { class: "hint" });
+    this[`${kind}Picture`] = picture;
+    this[`${kind}State`] = state;
+    return h("section", { class: "card product" }, h("h2", {}, t(`${kind}.title`)),
+      h("div", { class: "product-body" }, picture, h("div", {}, h("p", { class: "hint" }, t(`${kind}.hint`)), state)),
+      ...rest, this.app.jobBox(kind));
   }
 
   #reliefBox() {
     this.grade = choice({ label: t("relief.quality"), value: "standard", testid: "relief-quality",
       options: Object.fromEntries(GRADES.map((grade) => [grade, t(`relief.${grade}`)])), save: () => {} });
     this.runRelief = button(t("relief.run"), () => this.app.job("relief", { quality: this.grade.value }),
-      { class: "primary", testid: "run-relief" });
-    this.reliefState = h("p", { class: "hint" });
-    return h("section", { class: "card" }, h("h2", {}, t("relief.title")), this.reliefState,
-      h("div", { class: "row" }, this.grade, this.runRelief), this.app.jobBox("relief"));
+      { testid: "run-relief" });
+    return this.#product("relief", h("div", { class: "row" }, this.grade, this.runRelief));
   }
 
   #orthoBox() {
@@ -69,12 +91,9 @@ export class ProductsStage {
       if (Number.isNaN(gsd)) return this.gsd.reportValidity();
       return this.app.job("ortho", { gsd: gsd === null ? null : gsd / 1000, image: this.source.value });
     };
-    this.runOrtho = button(t("ortho.run"), run, { class: "primary", testid: "run-ortho" });
-    this.orthoState = h("p", { class: "hint" });
-    return h("section", { class: "card" }, h("h2", {}, t("ortho.title")), this.orthoState,
-      h("div", { class: "fields" }, labelled(t("ortho.gsd"), this.gsd, "mm"),
-        labelled(t("ortho.source"), this.source)),
-      h("div", { class: "row" }, this.runOrtho), this.app.jobBox("ortho"));
+    this.runOrtho = button(t("ortho.run"), run, { testid: "run-ortho" });
+    return this.#product("ortho", h("div", { class: "fields" }, labelled(t("ortho.gsd"), this.gsd, "mm"),
+      labelled(t("ortho.source"), this.source)), h("div", { class: "row" }, this.runOrtho));
   }
 
   #deliverBox() {
@@ -83,15 +102,17 @@ export class ProductsStage {
       save: () => {}, testid: "deliver-scale" });
     this.sheet = choice({ label: t("deliver.sheet"), options: { auto: t("deliver.auto"), ...same(SHEETS) },
       save: () => {}, testid: "deliver-sheet" });
-    this.deliver = button(t("deliver.run"), () => this.app.job("deliver", { scale: this.scale.value,
+    this.deliver = button(t("deliver.run"), () => this.app.job("deliver", { scale: this.scale.value, quality: this.grade.value,
       image: this.source.value, sheet: this.sheet.value === "auto" ? null : this.sheet.value }), { class: "primary", testid: "deliver" });
     this.files = h("ul", { class: "files" });
+    this.count = h("summary", {});
     this.download = h("a", { class: "button", href: "/download/all.zip", download: "", testid: "download" },
       t("deliver.download"));
     return h("section", { class: "card" }, h("h2", {}, t("deliver.title")),
       h("p", { class: "hint" }, t("deliver.hint")), h("div", { class: "fields" },
         labelled(t("deliver.scale"), this.scale), labelled(t("deliver.sheet"), this.sheet)),
-      h("div", { class: "row" }, this.deliver, this.download), this.app.jobBox("deliver"), this.files);
+      h("div", { class: "row" }, this.deliver, this.download), this.app.jobBox("deliver"),
+      h("details", { testid: "files" }, this.count, this.files));
   }
 
   status(state) {
@@ -117,18 +138,31 @@ export class ProductsStage {
     const surface = JSON.stringify([this.wallMark, relief, runs.map(({ id }) => id)]);
     if (this.surface !== surface) this.profile.forget();
     this.surface = surface;
-    const [walls, image] = await Promise.all([
-      this.app.pyramids.info("wall", 1, this.wallMark),
+    const [walls, photos, image] = await Promise.all([
+      this.app.pyramids.info("wall", 1, this.wallMark), this.app.pyramids.both("photo", photoMark(state)),
       ortho ? this.app.pyramids.info("ortho", 0, mark).catch(() => null) : null]);
     if (this.mark !== mark) return;
-    const layers = [tileLayer(this.view, "layer-1", "/tiles/wall/1", walls)];
+    photos.forEach((info, index) => this.loupe.source(index + 1, info));
+    this.wallLayer = tileLayer(this.view, "layer-1", "/tiles/wall/1", walls, null, this.wall.frameOf(1, state.photos[0]));
     this.ortho = image && this.#orthoLayer(ortho, image);
-    if (this.ortho) layers.push(this.ortho);
-    this.relief = relief && pictureLayer(this.view, "layer-relief", `/relief/overlay.png?v=${done.length}-${state.revision}`,
-      this.#edges(relief.bounds));
-    if (this.relief) layers.push(this.relief);
-    this.pane.setLayers(layers);
+    this.reliefMark = `${done.length}-${state.revision}`;
+    this.#showRelief();
+  }
+
+  /** The relief in the colours that were chosen, above photo and orthophoto. */
+  #showRelief() {
+    const { relief } = this.app.state.products;
+    if (!this.wallLayer) return;
+    const wanted = [`v=${this.reliefMark}`, ...(this.limits ? [`low=${this.limits[0]}`, `high=${this.limits[1]}`] : []),
+      ...(this.hatched ? ["hatched"] : [])].join("&");
+    this.relief = relief && pictureLayer(this.view, "layer-relief", `/relief/overlay.png?${wanted}`, this.#edges(relief.bounds));
+    this.pane.setLayers([this.wallLayer, this.ortho, this.relief].filter(Boolean));
     this.#apply();
+  }
+
+  /** Whether what lies under the pointer is the orthophoto, where X and Y are true. */
+  get onOrtho() {
+    return Boolean(this.ortho) && this.swipe > 0.5;
   }
 
   #makePane(state) {
@@ -137,12 +171,39 @@ export class ProductsStage {
     this.view = pixelView(this.wall.width, this.wall.height);
     this.pane = new Pane({ label: t("pane.products"), view: this.view, frame: this.wall,
       painter: (context, pane) => this.#draw(context, pane) });
+    this.pane.frameTo(this.wall.frameOf(1, state.photos[0]));
     this.pane.addEventListener("hover", ({ detail }) => this.#ask(detail.pixel));
-    this.pane.addEventListener("pick", ({ detail }) => {
-      this.profile.click(this.wall.toPlane(this.pane.unplace(detail.pixel)));
-    });
-    this.photos.replaceChildren(this.pane.element, this.legend);
+    this.pane.addEventListener("pick", ({ detail }) => this.#click(this.pane.unplace(detail.pixel)));
+    this.photos.replaceChildren(this.pane.element, this.range.element);
     this.pane.mounted();
+  }
+
+  /** A click: a corner, an end of the profile, or a point where relief is known. */
+  #click(spot) {
+    if (this.shapes.corners) return this.shapes.click(spot);
+    const [X, Y] = this.wall.toPlane(spot);
+    if (this.profile.drawing) return this.profile.click([X, Y]);
+    return this.picks ? this.#point(X, Y) : undefined;
+  }
+
+  /** The relief under the pointer becomes a point, picked in both photos. */
+  async #point(X, Y) {
+    const { connection } = this.app;
+    try {
+      const { picks, r } = await connection.get(`/relief/value?X=${X}&Y=${Y}`);
+      if (!picks) return this.app.say(t("relief.unknown"), "warning");
+      const pick = (image, name) => connection.send("point.pick", { name, image, column: picks[image - 1][0], row: picks[image - 1][1] });
+      const { name } = await pick(1, null);
+      await pick(2, name);
+      return this.app.say(t("relief.point", { name, r: number(r, 3) }));
+    } catch (error) {
+      return this.app.refuse(error);
+    }
+  }
+
+  /** Leave what is half done. */
+  leave() {
+    return this.shapes.leave();
   }
 
   /** Outer edges on the plane [m] -> outer edges on the wall's grid, in columns and rows. */
@@ -162,6 +223,7 @@ export class ProductsStage {
   }
 
   #draw(context, pane) {
+    this.shapes.draw(context, pane);
     const places = this.profile.ends.map((end) => pane.place(this.wall.fromPlane(end)));
     drawing.polyline(context, "#ffffff", places, { width: 2 });
     for (const place of places) drawing.marker(context, 2, place);
@@ -177,8 +239,9 @@ export class ProductsStage {
       const wanted = this.wanted;
       if (wanted) {
         const [X, Y] = this.wall.toPlane(this.pane.unplace(wanted));
-        const { r, sigma } = await this.app.connection.get(`/relief/value?X=${X}&Y=${Y}`).catch(() => ({}));
+        const { r, sigma, picks } = await this.app.connection.get(`/relief/value?X=${X}&Y=${Y}`).catch(() => ({}));
         const relief = Number.isFinite(r) ? `r ${number(r, 3)} ± ${number(sigma, 3)} m` : t("relief.unknown");
+        for (const image of [1, 2]) this.loupe.look(image, picks?.[image - 1] ?? (image === 1 ? this.wall.toPhoto(1, this.pane.unplace(wanted)) : null));
         setText(this.value, `X ${number(X, 3)} · Y ${number(Y, 3)} · ${relief}`);
       }
       this.asking = null;
@@ -189,28 +252,28 @@ export class ProductsStage {
   update(state) {
     this.prepare(state).catch((error) => this.app.refuse(error));
     const { relief, ortho, files } = state.products;
+    this.picks &&= Boolean(relief);
     const pixels = (product) => (product.cols ? `${product.cols} × ${product.rows} px` : "");
-    this.#name(relief?.range);
-    setText(this.reliefState, relief ? t("relief.ready", { size: pixels(relief) }) : t("relief.hint"));
-    setText(this.orthoState, ortho ? t("ortho.ready", { size: pixels(ortho) }) : t("ortho.hint"));
-    this.runRelief.disabled = !state.pair;
-    this.runOrtho.disabled = !state.pair;
-    this.deliver.disabled = !ortho;
-    this.deliver.title = ortho ? "" : t("status.products.ortho");
+    this.range.show(relief);
+    for (const [kind, product] of [["relief", relief], ["ortho", ortho]]) {
+      const size = product && t(`${kind}.ready`, { size: `${pixels(product)}, ${number(1000 * product.gsd, 1)} mm` });
+      setText(this[`${kind}State`], size ?? "");
+      const picture = this[`${kind}Picture`];
+      const mark = product && JSON.stringify(product).length + state.jobs.filter((job) => job.state === "done").length;
+      picture.hidden = !product;
+      if (product && picture.dataset.mark !== String(mark)) {
+        picture.dataset.mark = String(mark);
+        picture.src = `/preview/${kind}?v=${mark}-${state.revision}`;
+      }
+    }
+    this.shapes.update(state);
+    for (const one of [this.runRelief, this.runOrtho, this.deliver]) one.disabled = !state.pair;
     this.download.hidden = !files.length;
+    const bytes = files.reduce((sum, file) => sum + file.bytes, 0);
+    setText(this.count, t("deliver.files", { count: files.length, size: size(bytes) }));
     keyedRows(this.files, files, { key: ({ name }) => name, signature: JSON.stringify,
-      build: ({ name, bytes }) => h("li", {}, h("a", { href: `/download/${encodeURIComponent(name)}`, download: "" }, name),
-        h("span", { class: "hint" }, ` ${size(bytes)}`)) });
-  }
-
-  /** Say what the colours of the relief mean. */
-  #name(range) {
-    this.legend.hidden = !range;
-    if (!range) return;
-    const [low, high] = range.map((value) => number(value, 2));
-    setText(this.low, low);
-    setText(this.high, `${high} m`);
-    this.legend.setAttribute("aria-label", t("relief.legend", { low, high }));
+      build: ({ name, bytes: own }) => h("li", {}, h("a", { href: `/download/${encodeURIComponent(name)}`, download: "" }, name),
+        h("span", { class: "hint" }, ` ${size(own)}`)) });
   }
 
   get activePane() {

@@ -49,8 +49,28 @@ async function loadTile(tile, address) {
   return tile.setImage(whole);
 }
 
+/** Place on the map -> CSS pixel of a frame. */
+const onScreen = ({ coordinateToPixelTransform: [a, b, c, d, e, f] }, [x, y]) => [a * x + c * y + e, b * x + d * y + f];
+
+/** Show of a layer what lies within a frame alone: outside there is no photo, and no black. */
+function clipped(layer, frame) {
+  layer.on("prerender", (event) => {
+    const { context } = event;
+    context.save();
+    context.beginPath();
+    frame.forEach((pixel, index) => {
+      const place = ol.render.getRenderPixel(event, onScreen(event.frameState, toMap(pixel)));
+      if (index) context.lineTo(...place);
+      else context.moveTo(...place);
+    });
+    context.closePath();
+    context.clip();
+  });
+  layer.on("postrender", ({ context }) => context.restore());
+}
+
 /** Layer of one tile pyramid; `info` is what the server says of it. `place`: where its grid lies. */
-export function tileLayer(view, className, address, info, place = null) {
+export function tileLayer(view, className, address, info, place = null, frame = null) {
   const [left, top, scale] = place ?? [0, 0, 1];
   const extent = [left, top - info.height * scale, left + info.width * scale, top];
   const resolutions = [];
@@ -72,7 +92,9 @@ export function tileLayer(view, className, address, info, place = null) {
   });
   // No `preload`: its timers outlive a layer's move to another map and end in an error. The coarse
   // tiles of the whole picture, loaded at the start, stand in for what is not there yet.
-  return new ol.layer.Tile({ className, extent, source });
+  const layer = new ol.layer.Tile({ className, extent, source });
+  if (frame?.length > 2) clipped(layer, frame);
+  return layer;
 }
 
 /** Layer of one picture that covers `extent` of the grid (columns and rows of its outer edges). */
@@ -169,6 +191,13 @@ export class Pane extends EventTarget {
     return this.frame.toPhoto(image, this.unplace(pixel));
   }
 
+  /** The photo pixel in the middle of what is shown, within a photo of the survey; null before. */
+  middle(image) {
+    if (!this.width) return null;
+    const pixel = this.photo(image, [this.width / 2, this.height / 2]);
+    return pixel.every(Number.isFinite) ? pixel : null;
+  }
+
   setLayers(layers) {
     this.map.setLayers(layers);
   }
@@ -184,9 +213,16 @@ export class Pane extends EventTarget {
     this.map.dispose();
   }
 
+  /** Show these pixels of the grid where all is to be shown: the rest is empty. */
+  frameTo(frame) {
+    const places = frame.map(toMap);
+    const [x, y] = [0, 1].map((axis) => places.map((place) => place[axis]));
+    this.extent = [Math.min(...x), Math.min(...y), Math.max(...x), Math.max(...y)];
+  }
+
   /** Show the whole grid. */
   fit() {
-    const [left, bottom, right, top] = this.view.getProjection().getExtent();
+    const [left, bottom, right, top] = this.extent ?? this.view.getProjection().getExtent();
     const [width, height] = [this.width || 800, this.height || 600];
     this.view.setCenter([(left + right) / 2, (bottom + top) / 2]);
     this.view.setResolution(1.04 * Math.max((right - left) / width, (top - bottom) / height));

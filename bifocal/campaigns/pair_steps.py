@@ -1,0 +1,407 @@
+"""A pair of a survey, and the steps that its options ask for.
+
+A step imports the workflow it calls when it is made: a run that keeps everything loads none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from glob import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bifocal.campaigns.step_store import Step, StepRecord, read_record
+from bifocal.faces.faces_files import faces_path
+from bifocal.options import DRAWING, FILES, MAP, OF_PAIR, OF_STEP, PICTURE, PROJECT, SET_UP, typed
+from photocore.cli import Progress
+from photocore.errors import InputError
+from photocore.textfile import file_name
+
+if TYPE_CHECKING:
+    from bifocal.model.points import SurveyPoints
+    from bifocal.orthophotos.ortho_workflow import OrthoTask
+
+#: What may be wanted of a pair, in the order of work.
+PRODUCTS = ("relief", "points", "ortho", "drawing", "view", "report")
+#: What is made where nothing else is said: the drawing has the orthophoto.
+MOST_PRODUCTS = ("relief", "points", "drawing", "view", "report")
+#: The first step of every pair.
+FIRST_STEP = "align"
+#: Of drawings where none is asked for, 1:50.
+SCALE = 50.0
+#: How the file of a set of photos ends.
+SET_ENDING = ".photos.json"
+#: How the file is called that a step makes before all others, behind the pair's name.
+MADE = {
+    "align": ".pair.json",
+    "relief": "_relief.tif",
+    "ortho": "_ortho.tif",
+    "drawing": ".tif",
+    "view": "_view.html",
+}
+#: Memory of a pair in work: of the program, and for each pixel of its larger photo; 6.3 MP took
+#: 1.55 GB on church_2, 2.04 GB on a church with more relief. [bytes]
+BASE_MEMORY, MEMORY_PER_PIXEL = 300 << 20, 290
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairJob:
+    """A pair to be surveyed: plain data that can be sent to another machine.
+
+    Attributes
+    ----------
+    name : str
+        In the survey; its files are called by it.
+    folder : Path
+        Where the folders of its steps lie.
+    far, near : Path
+        Photos.
+    more : tuple of Path
+        The others of a set.
+    files : mapping of str to Path
+        By the names of `bifocal.options.FILES`, where given.
+    options : mapping
+        By the names of `bifocal.options.OF_PAIR`; absent: default.
+    products : tuple of str
+        Of `PRODUCTS`.
+    overwrite : bool
+        Replace files that were changed after they were made.
+    date : str
+        That its files bear, wherever and whenever they are made; empty: the day they are made.
+    joint : Path or None
+        Folder with the pair files of all pairs adjusted in one frame; None: this pair's own.
+    way : str
+        What the user began it with: ``facade`` or ``survey``.
+    told : mapping of str to StepRecord
+        By step, that files state in place of what is typed and timed now.
+    """
+
+    name: str
+    folder: Path
+    far: Path
+    near: Path
+    more: tuple[Path, ...] = ()
+    files: Mapping[str, Path] = field(default_factory=dict)
+    options: Mapping[str, Any] = field(default_factory=dict)
+    products: tuple[str, ...] = MOST_PRODUCTS
+    overwrite: bool = False
+    date: str = ""
+    joint: Path | None = None
+    way: str = "survey"
+    told: Mapping[str, StepRecord] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Take the faces kept beside the pair, where none are given and they are not refused."""
+        given = self.files.get("faces")
+        beside = self.folder / FIRST_STEP / f"{self.title}{MADE[FIRST_STEP]}"
+        faces = faces_path(given, beside, self.pair_path)
+        if faces != given:
+            rest = {role: path for role, path in self.files.items() if role != "faces"}
+            object.__setattr__(self, "files", rest | ({"faces": faces} if faces else {}))
+
+    @property
+    def photos(self) -> tuple[Path, ...]:
+        """All photos, as they were named."""
+        return (self.far, self.near, *self.more)
+
+    @property
+    def title(self) -> str:
+        """The name as file name."""
+        return file_name(self.name)
+
+    @property
+    def pair_path(self) -> Path:
+        """The pair file that relief and drawings are made with."""
+        own = self.product("align")
+        return own if self.joint is None else self.joint / own.name
+
+    def product(self, step: str) -> Path:
+        """Return the file that a step makes before all others."""
+        made = SET_ENDING if self.more and step == FIRST_STEP else MADE[step]
+        return self.folder / step / f"{self.title}{made}"
+
+    def ortho_path(self, steps: Sequence[str]) -> Path | None:
+        """Return the orthophoto that these steps make, that of the drawing first."""
+        made = (step for step in ("drawing", "ortho") if step in steps)
+        return next(map(self.product, made), None)
+
+    def memory(self) -> int:
+        """Return the memory it needs at most; that of small photos where they cannot be read.
+
+        In bytes.
+        """
+        from photocore.images import image_info
+
+        pixels = 0
+        for path in self.photos:
+            try:
+                width, height = image_info(path).size
+            except InputError:
+                continue
+            pixels = max(pixels, width * height)
+        return BASE_MEMORY + MEMORY_PER_PIXEL * pixels
+
+
+def steps_of(job: PairJob) -> list[Step]:
+    """Return the steps that make the products of a pair, in order."""
+    wanted = set(job.products)
+    steps = [_align_step(job)]
+    if wanted & {"relief", "ortho", "drawing", "view"}:
+        steps.append(_relief_step(job))
+    if "points" in wanted and {"control", "check"} & set(job.files):
+        steps.append(_points_step(job))
+    if "ortho" in wanted:
+        steps.append(_ortho_step(job))
+    if "drawing" in wanted:
+        steps.append(_drawing_step(job, tuple(step.name for step in steps)))
+    if "view" in wanted:
+        steps.append(_view_step(job, tuple(step.name for step in steps)))
+    steps = [replace(step, command=_command(job, step)) for step in steps]
+    if "report" in wanted:
+        report = _report_step(job, tuple(steps))
+        steps.append(replace(report, command=_command(job, report)))
+    return steps
+
+
+def _command(job: PairJob, step: Step) -> str:
+    """Return what the user typed of which a step knows, without where its files lie.
+
+    Not more: a file would else tell of options that were changed after it was made.
+    """
+    if step.name in job.told:
+        return job.told[step.name].command
+    photos = _named(job)
+    wanted = OF_STEP[step.name]
+    everything = {**job.files, **job.options}
+    said = {key: everything[key] for key in OF_PAIR if key in wanted and key in everything}
+    if job.way == "facade":
+        return " ".join(["bifocal facade", *(p.name for p in photos.values()), *typed(said)])
+    keys = [f'{role} = "{path.name}"' for role, path in photos.items()]
+    if job.more:
+        keys = [f"photos = {[path.name for path in job.photos]}"]
+    keys += [*typed(said, in_file=True), *(["joint = true"] if job.joint else [])]
+    return f"bifocal survey, pair {job.name}: {', '.join(keys)}"
+
+
+def _some(job: PairJob, *names: str) -> dict[str, Any]:
+    return {name: job.options[name] for name in names if name in job.options}
+
+
+def refusal(job: PairJob) -> str:
+    """Return why a pair cannot be aligned as it is described; empty where nothing is missing."""
+    from bifocal.networks.set_workflow import way_of_set
+    from bifocal.orientation.align_workflow import AlignOptions, check_way
+
+    step, check = _align_step(job), way_of_set if job.more else check_way
+    try:
+        check(AlignOptions.from_given({**step.options, **_align_files(job)}))
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+def _align_files(job: PairJob) -> dict[str, Path]:
+    return {role: path for role, path in job.files.items() if role in ("control", *SET_UP)}
+
+
+def _align_step(job: PairJob) -> Step:
+    files = _align_files(job)
+    options = _some(job, *SET_UP)
+
+    def make(place: Path, progress: Progress) -> tuple[str, ...]:
+        from bifocal.orientation.align_workflow import AlignOptions, align_photos
+
+        out = place / job.product("align").name
+        told = AlignOptions.from_given({**options, **files})
+        if job.more:
+            from bifocal.networks.set_workflow import align_photo_set
+
+            return align_photo_set(job.photos, out, told, progress=progress).remarks
+        picture = out.with_suffix("").with_suffix(".pair.png")
+        made = align_photos(job.far, job.near, out, told, picture=picture)
+        return tuple(dict.fromkeys((*made.pair.remarks, *made.remarks)))
+
+    return Step(name=FIRST_STEP, files={**_named(job), **files}, options=options, make=make)
+
+
+def _named(job: PairJob) -> dict[str, Path]:
+    """Return the photos by their part in it."""
+    others = {f"photo {number}": path for number, path in enumerate(job.more, start=3)}
+    return {"far": job.far, "near": job.near, **others}
+
+
+def _photos(job: PairJob) -> dict[str, Path]:
+    """Return what a step after the alignment looks at: the photos, the pair file of all pairs."""
+    joint = {} if job.joint is None else {"pair": job.pair_path}
+    return {**_named(job), **joint}
+
+
+def _faces(job: PairJob) -> dict[str, Path]:
+    return {"faces": job.files["faces"]} if "faces" in job.files else {}
+
+
+def _relief_step(job: PairJob) -> Step:
+    options = _some(job, *MAP, "cog")
+
+    def make(place: Path, progress: Progress) -> tuple[str, ...]:
+        from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
+
+        out = place / job.product("relief").name
+        task = ReliefJob(
+            out=out, preview=out.with_suffix(".png"), gsd=options.get("relief_gsd"),
+            faces=job.files.get("faces"),
+            **_some(job, *MAP[1:]),
+        )  # fmt: skip
+        _, remarks = relief_of_pair(job.pair_path, task, progress=progress)
+        return remarks
+
+    files = {**_photos(job), **_faces(job)}
+    return Step(name="relief", files=files, after=("align",), options=options, make=make)
+
+
+def tables_of(job: PairJob) -> dict[str, Path]:
+    """Return the tables of known points of a pair."""
+    return {role: job.files[role] for role in ("control", "check") if role in job.files}
+
+
+def _points_step(job: PairJob) -> Step:
+    options = _some(job, "language", "unit")
+
+    def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
+        from bifocal.model.photo_set import pair_or_set
+        from bifocal.reports.control_survey import is_exchanged, solve_control
+        from bifocal.workbook.output import write_result
+
+        pair = pair_or_set(job.pair_path)
+        tables = {"control": None, **tables_of(job)}
+        solution = solve_control(
+            job.pair_path, **tables, exchanged=is_exchanged(pair, job.far), photos=len(job.photos),
+            language=options.get("language", "en"), unit=options.get("unit", ""),
+        )  # fmt: skip
+        if solution.pair.leans:
+            write_result(place / f"{job.title}_points.csv", solution)
+            told = (
+                "ports that lean have no formulas in a survey workbook: the points are a text "
+                "table (.csv)."
+            )
+            return (*solution.remarks, told)
+        write_result(place / f"{job.title}_points.xlsx", solution)
+        return solution.remarks
+
+    joint = {} if job.joint is None else {"pair": job.pair_path}
+    return Step(
+        name="points",
+        files={**tables_of(job), **joint},
+        after=("align",),
+        options=options,
+        make=make,
+    )
+
+
+def _ortho_task(job: PairJob, options: Mapping[str, Any]) -> OrthoTask:
+    from bifocal.orthophotos.ortho_workflow import OrthoTask
+
+    return OrthoTask.from_given(
+        {key: options[key] for key in (*PICTURE, "gsd") if key in options},
+        relief=job.product("relief"), faces=job.files.get("faces"),
+    )  # fmt: skip
+
+
+def _ortho_step(job: PairJob) -> Step:
+    options = _some(job, *PICTURE, "gsd", "cog")
+
+    def make(place: Path, progress: Progress) -> tuple[str, ...]:
+        from bifocal.orthophotos.ortho_workflow import make_ortho
+
+        out = place / job.product("ortho").name
+        task = _ortho_task(job, options)
+        return make_ortho(job.pair_path, out, task, progress=progress).remarks
+
+    files = {**_photos(job), **_faces(job)}
+    return Step(name="ortho", files=files, after=("align", "relief"), options=options, make=make)
+
+
+def _drawing_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
+    options = {"scale": SCALE} | _some(job, *DRAWING, *PICTURE, "language", "cog")
+    tables = {role: job.files[role] for role in ("control", "check", "mark") if role in job.files}
+
+    def make(place: Path, progress: Progress) -> tuple[str, ...]:
+        from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver
+
+        drawing = {key: options[key] for key in (*DRAWING, "language") if key in options}
+        wish = DeliverTask(
+            title=job.name, **drawing, mark=job.files.get("mark"),
+            cad=_points_to_draw(job, solved="points" in earlier),
+        )  # fmt: skip
+        task = _ortho_task(job, options)
+        return deliver(job.pair_path, place, task, wish, progress=progress).ortho.remarks
+
+    return Step(
+        name="drawing", files={**_photos(job), **_faces(job), **tables},
+        after=tuple(name for name in ("align", "relief", "points") if name in earlier),
+        options=options, make=make,
+    )  # fmt: skip
+
+
+def _points_to_draw(job: PairJob, *, solved: bool) -> dict[str, SurveyPoints]:
+    """Return what a drawing for CAD holds: known points where they are, and as they were solved."""
+    from bifocal.files.point_tables import read_survey_points
+    from bifocal.orientation.control_points import known_points
+
+    unit = str(job.options.get("unit", ""))
+    points = {role: known_points(path, unit=unit) for role, path in tables_of(job).items()}
+    if solved:
+        (table,) = (job.folder / "points").glob(f"{escape(job.title)}_points.*")
+        points["points"] = read_survey_points(table)[0]
+    return points
+
+
+def _view_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
+    options = {"title": job.name} | _some(job, "language")
+    ortho = job.ortho_path(earlier)
+
+    def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
+        from bifocal.reports.view_workflow import view_relief
+
+        view_relief(job.product("relief"), place / job.product("view").name, ortho=ortho, **options)
+        return ()
+
+    after = ("relief",) if ortho is None else ("relief", ortho.parent.name)
+    return Step(name="view", files={}, after=after, options=options, make=make)
+
+
+def _report_step(job: PairJob, before: tuple[Step, ...]) -> Step:
+    earlier = tuple(step.name for step in before)
+    options: dict[str, Any] = {"title": job.name, "times": job.way == "facade"}
+    options |= _some(job, "language", "unit", "scale", *PROJECT)
+    if "drawing" in earlier:
+        options.setdefault("scale", SCALE)
+
+    def make(place: Path, progress: Progress) -> tuple[str, ...]:
+        from bifocal.reports.workflow import ReportTask, StepTold, write_report
+
+        records = {name: job.told.get(name) or read_record(job.folder / name) for name in earlier}
+        if not options["times"]:
+            records = {}
+        told = tuple(
+            StepTold.of(step.name, {**step.options, **_tables(step)}, records.get(step.name))
+            for step in before
+        )
+        said = {key: options[key] for key in ReportTask.PLAIN if key in options} | tables_of(job)
+        task = ReportTask(
+            **said, far=job.far, steps=told,
+            project={name: options[name] for name in PROJECT if name in options},
+            relief=job.product("relief") if "relief" in earlier else None,
+            ortho=job.ortho_path(earlier), view=job.product("view") if "view" in earlier else None,
+        )  # fmt: skip
+        outs = (place / f"{job.title}_report.html", place / f"{job.title}_report.pdf")
+        return write_report([job.pair_path], outs, [task], progress=progress)
+
+    files = {**_photos(job), **tables_of(job)}
+    return Step(name="report", files=files, after=earlier, options=options, make=make)
+
+
+def _tables(step: Step) -> dict[str, Path]:
+    """Return the files of a step besides photos and pair files."""
+    return {role: path for role, path in step.files.items() if role in FILES}

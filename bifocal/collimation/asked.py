@@ -1,0 +1,49 @@
+"""What the page asks of a survey beside its state: precision, distances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from bifocal.collimation.live_orientation import LiveOrientation, live_orientation
+from bifocal.collimation.measures import measure
+from bifocal.collimation.session import Session
+from bifocal.collimation.uncertainty import how_good
+from bifocal.remarks import remark
+from photocore.errors import InputError
+
+
+def oriented_live(session: Session) -> LiveOrientation | None:
+    """Return what the control points tell by themselves; None without photos."""
+    state, infos = session.state, session.pictures.infos
+    if len(infos) != 2:
+        return None
+    pair, said = session.pictures.pair, session.spoken
+    facts = (dict(state.control), dict(state.tapes), state.setup, state.lenses, said, id(pair))
+    if session.orientation is None or session.orientation[0] != facts:
+        session.orientation = facts, live_orientation(state, infos, said, pair)
+    return session.orientation[1]
+
+
+def goodness(session: Session) -> dict[str, Any] | None:
+    """Return how good relief is; None before the photos are oriented."""
+    if session.results is None:
+        return None
+    if session.good is None or session.good[0] is not session.results:
+        session.good = session.results, how_good(session.pictures, session.results)
+    return session.good[1]
+
+
+def measured(session: Session, names: Sequence[str]) -> dict[str, float | None]:
+    """Return distances and angles between points."""
+    session.pictures.needed_pair()
+    places = []
+    for name in names:
+        point = session.state.points.get(name)
+        if point is None:
+            raise InputError(remark("page.no_point", name=name))
+        place = None if session.results is None else session.results.place(point)
+        if place is None:
+            raise InputError(remark("page.point_in_one", name=name))
+        places.append(place)
+    return measure(places)

@@ -1,0 +1,80 @@
+"""The orientation without a click: begun in the background as soon as two photos lie there."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+from bifocal.collimation.job_tasks import start_job
+from bifocal.collimation.live_orientation import control_of, lenses_of
+from bifocal.collimation.session import Session
+from bifocal.collimation.stated_media import lacking, media_of
+from photocore.errors import PhotogrammetryError
+
+#: What is typed in one go is waited for. [s]
+PAUSE = 0.6
+
+
+class FirstOrientation:
+    """Watches a survey, and orients its photos by themselves where nobody did.
+
+    Parameters
+    ----------
+    session : Session
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._tried: Any = None
+        self._leave: Callable[[], None] | None = None
+
+    def start(self) -> None:
+        """Watch from now on, until the session ends."""
+        events, self._leave = self._session.listen()
+        threading.Thread(target=self._watch, args=(events,), daemon=True).start()
+
+    def _watch(self, events: queue.SimpleQueue[dict[str, Any] | None]) -> None:
+        while True:
+            self.look()
+            event: dict[str, Any] | None = events.get()
+            while event is not None:
+                try:
+                    event = events.get(timeout=PAUSE)
+                except queue.Empty:
+                    break
+            if event is None:
+                if self._leave is not None:
+                    self._leave()
+                return
+
+    def look(self) -> None:
+        """Begin to orient the photos, unless that is done, runs, or was tried with all this."""
+        session = self._session
+        with session.lock:
+            facts = self._facts()
+            if facts is None or facts == self._tried:
+                return
+            if any(job.state == "running" for job in session.jobs.jobs.values()):
+                return
+            self._tried = facts
+            with suppress(PhotogrammetryError):  # what is lacking is asked by the page
+                start_job(session, "align", {"way": "auto"}, quiet=True)
+
+    def _facts(self) -> Any:
+        """Return what a first orientation would rest on; None where it is not for the program."""
+        session, state = self._session, self._session.state
+        if len(session.pictures.infos) != 2 or session.files.pair is not None:
+            return None
+        proposal, setup = session.proposal, state.setup
+        if proposal is not None and not proposal["report"].get("free_scale"):
+            return None
+        if len(control_of(state).ids) or lacking(setup) or media_of(setup, session.pictures.pair):
+            return None
+        photos = tuple(sorted(info.path.name for info in session.pictures.infos))
+        facts = photos, lenses_of(state), state.wall.get("spot"), state.ordered
+        if proposal is not None and self._tried is None:  # taken up again: it stands
+            self._tried = facts
+        return facts

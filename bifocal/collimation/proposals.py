@@ -1,0 +1,101 @@
+"""The orientation that the program proposes by itself: its scale, and where its wall is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from bifocal.collimation.records import SurveyState
+from bifocal.model.pair import Pair
+from bifocal.orientation.control_points import SiteMeasures
+from bifocal.orientation.rescaling import scaled_by_distance, scaled_by_length
+from photocore.arrays import BoolArray, Float32Array, FloatArray
+
+#: Far distance of a pair whose scale is still to be given. [m]
+NOMINAL = 10.0
+#: Longer side of the picture in which the wall's outline is drawn, and how far a tie speaks. [px]
+SHEET, REACH = 256, 7
+#: Outlines of less than this share of the sheet are specks.
+SPECK = 0.02
+#: Where fewer points than this speak, by that picture's cell, nothing is known.
+FAINT = 0.004
+
+
+def measure_of(state: SurveyState) -> list[Any] | None:
+    """Return what gives the scale of a pair that has none: a drawn length or one distance."""
+    drawn, setup = state.scale.get("length"), state.setup
+    if drawn is not None:
+        sigma = drawn.sigma or SiteMeasures().sigma_control
+        return ["length", drawn.image, [list(end) for end in drawn.ends], drawn.length, sigma]
+    for number in (1, 2):
+        if distance := setup.get(f"d{number}"):
+            sigma = setup.get(f"sigma_d{number}") or SiteMeasures().sigma
+            return ["distance", number, distance, sigma]
+    return None
+
+
+def rescale(path: Path, report: Mapping[str, Any], measure: list[Any] | None) -> dict[str, Any]:
+    """Bring a proposed pair file to the scale of a measure and return the report of it."""
+    if measure is None:
+        return {**report, "scale": None}
+    kind, number, *rest = measure
+    pair = Pair.read(path)
+    if kind == "length":
+        ends, length, sigma = rest
+        scaled = scaled_by_length(pair, number, np.array(ends), length, sigma=sigma)
+    else:
+        scaled = scaled_by_distance(pair, number, rest[0], sigma=rest[1])
+    scaled.write(path, overwrite=True)
+    setup = scaled.extra["setup"]
+    return {
+        **report,
+        "scale": measure,
+        "distance1": scaled.image1.distance,
+        "distance2": scaled.image2.distance,
+        "standard_deviations": setup["standard_deviations"],
+        "words": setup["words"],
+        "planes": setup["planes"],
+        "remarks": [
+            next((new for new in setup["doubts"] if new[:14] == old[:14]), old)
+            for old in report.get("remarks", ())
+        ],
+    }
+
+
+def wall_sheet(pixels: FloatArray, wall: BoolArray, size: tuple[int, int]) -> list[Any]:
+    """Return outlines of where a photo shows the wall: closed polygons. [px]
+
+    Parameters
+    ----------
+    pixels : ndarray, shape (n, 2)
+        Common points. [px]
+    wall : ndarray of bool, shape (n,)
+        Which of them lie on the wall.
+    size : tuple of int
+        Of the photo. [px]
+    """
+    step = max(size) / SHEET
+    shape = (round(size[1] / step), round(size[0] / step))
+    for_wall, against = (_votes(pixels[which] / step, shape) for which in (wall, ~wall))
+    sheet = (for_wall > against).astype(np.uint8)
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (REACH, REACH))
+    sheet = cv2.morphologyEx(sheet, cv2.MORPH_OPEN, kernel)
+    outlines, _ = cv2.findContours(sheet, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_TC89_L1)
+    return [
+        (step * (outline[:, 0] + 0.5) - 0.5).round(1).tolist()
+        for outline in outlines
+        if cv2.contourArea(outline) > SPECK * sheet.sum()
+    ]
+
+
+def _votes(places: FloatArray, shape: tuple[int, int]) -> Float32Array:
+    """Return how much speaks for each cell: every point for its neighbourhood."""
+    votes = np.zeros(shape, dtype=np.float32)
+    column, row = np.clip(places.astype(int), 0, np.array(shape)[::-1] - 1).T
+    np.add.at(votes, (row, column), 1.0)
+    around = cv2.GaussianBlur(votes, (0, 0), REACH / 2)
+    return np.where(around > FAINT, around, 0.0).astype(np.float32)

@@ -1,0 +1,136 @@
+/**
+ * What is drawn on the wall in the last stage: faces, break lines and occluders that relief and
+ * orthophoto obey, outlines that are measured. Corners snap, and are kept as pixels of photo 1.
+ */
+import { h, keyedRows, number, setText } from "./dom.js";
+import * as drawing from "./drawing.js";
+import { button, choice, fill, numberInput } from "./fields.js";
+import { t } from "./words/words.js";
+
+const KINDS = ["face", "break", "occluder", "outline"];
+const INK = { face: "#ffd84d", break: "#ff8f5e", occluder: "#d69bff", outline: "#b9f27c" };
+const CLOSE = 10;
+
+export class Shapes {
+  /** `stage`: the products, whose pane and wall it draws on. */
+  constructor(app, stage) {
+    Object.assign(this, { app, stage, corners: null, hot: null });
+    this.kind = choice({ label: t("shape.kind"), testid: "face-kind", save: () => {},
+      options: Object.fromEntries(KINDS.map((kind) => [kind, t(`shape.${kind}`)])) });
+    this.begin = button(t("shape.draw"), () => this.arm(), { class: "quiet", testid: "face", "aria-pressed": "false" });
+    this.close = button(t("shape.close"), () => this.finish(), { class: "quiet", testid: "face-close", hidden: true });
+    this.suggest = button(t("shape.suggest"), () => app.job("suggest"), { class: "quiet", testid: "face-suggest" });
+    this.hint = h("p", { class: "hint", role: "status" });
+    this.body = h("tbody");
+    this.offers = h("ul", { class: "offers" });
+    this.element = h("section", { class: "card" }, h("h2", {}, t("shape.title")),
+      h("div", { class: "row" }, this.kind, this.begin, this.close, this.suggest), app.jobBox("suggest"), this.hint,
+      this.offers, h("table", { class: "grid", testid: "shape-table" }, this.body));
+  }
+
+  /** The next clicks are corners. */
+  arm() {
+    this.corners = this.corners ? null : [];
+    this.update(this.app.state);
+    this.stage.pane?.paint();
+  }
+
+  leave() {
+    if (!this.corners) return false;
+    this.arm();
+    return true;
+  }
+
+  /** A click at a pixel of the wall's grid, while a shape is in hand. */
+  async click(spot) {
+    const { corners } = this;
+    const place = this.stage.pane.place(spot);
+    const first = corners[0] && this.stage.pane.place(this.#shown(corners[0]));
+    if (corners.length > 2 && Math.hypot(first[0] - place[0], first[1] - place[1]) < CLOSE) return this.finish();
+    const corner = await this.#corner(spot).catch((error) => this.app.refuse(error));
+    if (!corner || this.corners !== corners) return undefined;
+    corners.push(corner);
+    this.update(this.app.state);
+    return this.stage.pane.paint();
+  }
+
+  /** The photo's pixel under a place, on the corner there, with its relief. */
+  async #corner(spot) {
+    const { connection } = this.app;
+    let pixel = this.stage.wall.toPhoto(1, spot);
+    if (this.stage.onOrtho) {
+      const [X, Y] = this.stage.wall.toPlane(spot);
+      const { picks } = await connection.get(`/relief/value?X=${X}&Y=${Y}`).catch(() => ({}));
+      if (picks) [pixel] = picks;
+    }
+    const [column, row] = pixel;
+    const radius = Math.min(Math.max(4 / this.stage.pane.zoom, 4), 14);
+    const found = await connection.ask("/api/snap", { image: 1, column, row, radius }).catch(() => null);
+    if (found && found.kind !== "none") pixel = [found.column, found.row];
+    const { places } = await connection.ask("/relief/met", { pixels: [pixel] });
+    return [...pixel, places[0][2] ?? 0];
+  }
+
+  /** Corners -> a shape of the survey: a face has one relief, that which lies most within. */
+  async finish() {
+    const { corners } = this;
+    const kind = this.kind.value;
+    if (!corners || corners.length < (kind === "break" ? 2 : 3)) return this.app.say(t("shape.few"), "warning");
+    this.corners = null;
+    let shape = corners;
+    if (kind === "face" || kind === "occluder") {
+      const { within } = await this.app.connection.ask("/relief/met", { pixels: corners.map(([c, r]) => [c, r]) }).catch(() => ({}));
+      shape = corners.map(([column, row]) => [column, row, kind === "face" ? within ?? 0 : 0]);
+    }
+    if (await this.app.send("shape.set", { kind, corners: shape })) this.app.say(t(`shape.made.${kind}`));
+    return undefined;
+  }
+
+  /** Where on the wall's grid a corner is shown: in the photo, or in its true place. */
+  #shown([column, row, relief], place = null) {
+    const { wall, onOrtho } = this.stage;
+    return onOrtho && place ? wall.fromPlane(place) : wall.fromPhoto(1, [column, row, relief]);
+  }
+
+  draw(context, pane) {
+    const { shapes, suggested } = this.app.state;
+    const line = (corners, places, ink, more) => drawing.polyline(context, ink,
+      corners.map((corner, index) => pane.place(this.#shown(corner, places?.[index]))), more);
+    for (const { name, kind, corners, places } of shapes) {
+      line(corners, places, INK[kind], { closed: kind !== "break", width: name === this.hot ? 3.5 : 2, dash: kind === "occluder" ? [6, 4] : [] });
+    }
+    for (const { corners } of suggested) line(corners, null, "#ffffff", { closed: true, width: 1.5, dash: [5, 5] });
+    if (!this.corners?.length) return;
+    line(this.corners, null, INK[this.kind.value], { width: 2.5 });
+    for (const corner of this.corners) drawing.marker(context, 1, pane.place(this.#shown(corner)));
+  }
+
+  update(state) {
+    this.begin.setAttribute("aria-pressed", String(Boolean(this.corners)));
+    this.begin.disabled = !state.pair;
+    this.close.hidden = !this.corners?.length;
+    this.suggest.disabled = !state.products.relief;
+    setText(this.hint, this.corners ? t("shape.corners", { count: this.corners.length }) : t(state.shapes.length ? "shape.again" : "shape.hint"));
+    keyedRows(this.offers, state.suggested.filter(({ corners }) => !state.shapes.some((one) => String(one.corners) === String(corners))),
+      { key: ({ name }) => name, signature: JSON.stringify, build: (offer) => this.#offer(offer) });
+    keyedRows(this.body, state.shapes, { key: ({ name }) => name, signature: JSON.stringify, build: (shape) => this.#row(shape) });
+  }
+
+  #offer({ name, kind, corners, mends }) {
+    const words = t("shape.offer", { name, relief: number(corners[0][2], 2), share: number(100 * (mends ?? 0), 1) });
+    return h("li", { class: "row between" }, words, button(t("shape.accept"),
+      () => this.app.send("shape.set", { kind, corners }), { testid: "face-accept" }));
+  }
+
+  #row({ name, kind, corners, relief, width, height, area, length }) {
+    const level = numberInput({ label: t("shape.relief", { name }), size: "6", save: (r) =>
+      this.app.send("shape.set", { name, kind, corners: corners.map(([c, row]) => [c, row, r ?? 0]) }) });
+    fill(level, relief === undefined ? null : +number(relief, 3));
+    const size = [width && `${number(width, 3)} × ${number(height, 3)} m`, area && `${number(area, 3)} m²`,
+      kind === "break" && length && `${number(length, 3)} m`].filter(Boolean).join(" · ");
+    return h("tr", { onpointerenter: () => { this.hot = name; this.stage.pane?.paint(); }, onpointerleave: () => { this.hot = null; this.stage.pane?.paint(); } },
+      h("th", { scope: "row" }, h("span", { class: `swatch ${kind}` }), name), h("td", {}, t(`shape.${kind}`)),
+      h("td", {}, h("span", { class: "with-unit" }, level, h("span", { class: "unit" }, "m"))), h("td", { class: "number" }, size),
+      h("td", {}, button("×", () => this.app.send("shape.delete", { name }), { class: "icon", "aria-label": t("list.deleteOf", { name }) })));
+  }
+}

@@ -1,0 +1,141 @@
+/**
+ * The orientation that the program found by itself: the wall as a sheet in both photos, the one
+ * length that gives its scale, and another face where the wall is none.
+ */
+import { h, keyedRows, number, parseNumber, setText } from "./dom.js";
+import * as drawing from "./drawing.js";
+import { button } from "./fields.js";
+import { t } from "./words/words.js";
+
+const SHEET = "rgba(60, 220, 130, 0.3)";
+const SHEET_EDGE = "rgba(60, 220, 130, 0.9)";
+const LENGTH_INK = "#ffe14d";
+
+export class WallCard {
+  /** `stage`: the orientation, whose panes and picker it shares. */
+  constructor(stage) {
+    Object.assign(this, { stage, app: stage.app, tool: null, ends: [], image: 1, dismissed: false });
+    this.state = h("p", { class: "wall-state", role: "status", testid: "wall-state" });
+    this.length = h("input", { type: "text", inputmode: "decimal", autocomplete: "off", id: "wall-length",
+      testid: "length-value", size: "7" });
+    this.drawButton = button(t("wall.draw"), () => this.arm("length"), { class: "quiet", testid: "length-draw" });
+    this.faceButton = button(t("wall.other"), () => this.arm("wall"), { class: "quiet", testid: "wall-pick" });
+    this.faces = h("ul", { class: "faces" });
+    this.form = h("form", { class: "row", onsubmit: (event) => { event.preventDefault(); this.#send(); } },
+      this.drawButton, h("label", { for: "wall-length" }, t("wall.length")),
+      h("span", { class: "with-unit short" }, this.length, h("span", { class: "unit" }, "m")),
+      h("button", { type: "submit", class: "quiet", testid: "length-set" }, t("wall.set")));
+    this.element = h("section", { class: "card wall-card", hidden: true }, h("h2", {}, t("wall.title")), this.state,
+      this.form, h("div", { class: "row" }, this.faceButton, this.faces));
+  }
+
+  /** The next clicks are the ends of the length, or a spot on the wall. */
+  arm(tool) {
+    Object.assign(this, { tool, ends: [], dismissed: false });
+    this.stage.refresh();
+  }
+
+  dismiss() {
+    if (!this.tool) return false;
+    Object.assign(this, { tool: null, ends: [], dismissed: true });
+    this.stage.refresh();
+    return true;
+  }
+
+  /** What the next click is for, or nothing where it picks control points. */
+  get asks() {
+    if (!this.tool) return "";
+    if (this.tool === "wall") return t("wall.askSpot");
+    return t(this.ends.length === 1 ? "wall.askSecond" : "wall.askFirst");
+  }
+
+  /** Whether a click at a pixel of a photo was meant for it. */
+  click(image, pixel) {
+    if (!this.tool || (this.tool === "wall" && image !== 1)) return Boolean(this.tool);
+    if (this.tool === "wall") {
+      this.tool = null;
+      this.app.send("wall.set", { column: pixel[0], row: pixel[1] });
+      this.stage.refresh();
+      return true;
+    }
+    if (this.ends.length === 1 && image !== this.image) this.ends = [];
+    this.image = image;
+    this.#end(image, pixel);
+    return true;
+  }
+
+  /** An end of the length, on the corner that lies there. */
+  async #end(image, [column, row]) {
+    const ends = [...this.ends, [column, row]];
+    this.ends = ends;
+    if (ends.length === 2) {
+      // What is typed next is the length.
+      this.tool = null;
+      this.length.value = "";
+      this.length.focus();
+    }
+    this.stage.refresh();
+    const radius = this.stage.picker.reach;
+    const found = await this.app.connection.ask("/api/snap", { image, column, row, radius }).catch(() => null);
+    if (this.ends === ends && found && found.kind !== "none") {
+      this.ends = [...ends.slice(0, -1), [found.column, found.row]];
+    }
+    this.stage.refresh();
+  }
+
+  async #send() {
+    const length = parseNumber(this.length.value);
+    const drawn = this.app.state.scale;
+    const ends = this.ends.length === 2 ? this.ends : drawn?.ends;
+    if (!ends) return this.arm("length");
+    if (!(length > 0)) return this.app.say(t("wall.number"), "warning");
+    const image = this.ends.length === 2 ? this.image : drawn.image;
+    if (await this.app.send("length.set", { image, ends, length })) {
+      this.ends = [];
+      this.length.blur();
+      this.app.say(t("wall.scaled"));
+    }
+    return undefined;
+  }
+
+  update(state) {
+    const { pair, scale, looking } = state;
+    const found = pair && pair.accepted === false && pair.report?.free_scale;
+    const failed = state.jobs.filter(({ kind }) => kind === "align").at(-1);
+    const refused = !pair && failed?.quiet && failed.state === "failed" && !failed.cured ? failed.message : "";
+    this.element.hidden = !found && !looking && !refused;
+    const ties = pair?.report?.common_points;
+    const words = found ? t("wall.found", { share: Math.round((100 * ties.on_wall) / ties.count), count: ties.count })
+      : looking ? t("wall.looking") : t("wall.refused", { why: refused });
+    setText(this.state, words);
+    this.state.dataset.level = found ? "good" : looking ? "busy" : "fair";
+    this.form.hidden = this.faceButton.hidden = this.faces.hidden = !found;
+    if (scale && document.activeElement !== this.length && this.ends.length < 2) this.length.value = number(scale.length, 3);
+    // The one thing that is asked is asked at once.
+    if (found && !pair.scaled && !state.control.length && !this.tool && !this.ends.length && !this.dismissed) this.tool = "length";
+    if (!found) Object.assign(this, { tool: null, ends: [] });
+    const others = found ? pair.report.planes.slice(1, 4) : [];
+    keyedRows(this.faces, others, { key: ({ pixel }) => String(pixel), signature: JSON.stringify,
+      build: ({ offset, share, pixel: [column, row] }) => h("li", {}, button(
+        t("wall.face", { offset: `${offset > 0 ? "+" : ""}${number(1000 * offset, 0)}`, share: Math.round(100 * share) }),
+        () => this.app.send("wall.set", { column, row }), { class: "quiet",
+          onpointerenter: () => { this.spot = [column, row]; this.stage.refresh(); },
+          onpointerleave: () => { this.spot = null; this.stage.refresh(); } })) });
+  }
+
+  draw(context, pane) {
+    const { pair, scale } = this.app.state;
+    const sheet = pair?.accepted === false ? pair.report?.wall?.[pane.image - 1] : null;
+    if (sheet) drawing.sheet(context, pane, sheet, SHEET, SHEET_EDGE);
+    const drawn = this.ends.length ? { image: this.image, ends: this.ends } : scale;
+    if (drawn?.image === pane.image) {
+      const places = drawn.ends.map((end) => pane.screen(pane.image, end));
+      drawing.polyline(context, LENGTH_INK, places, { width: 2.5 });
+      for (const place of places) drawing.marker(context, pane.image, place);
+      const [a, b] = places;
+      const text = drawn.length ? `${number(drawn.length, 3)} m` : t("wall.howLong");
+      if (b) drawing.label(context, text, [(a[0] + b[0]) / 2 + 8, (a[1] + b[1]) / 2 - 8], LENGTH_INK);
+    }
+    if (this.spot && pane.image === 1) drawing.centre(context, pane.screen(1, this.spot), t("wall.here"));
+  }
+}

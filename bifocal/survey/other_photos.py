@@ -1,0 +1,189 @@
+"""A third photo and more beside an ideal pair: relief of every pair, and of all photos together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from bifocal.equations import relief
+from bifocal.model.flags import FlagLimits
+from bifocal.precision import sigma_relief
+from photocore.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from bifocal.survey.observations import PointObservations
+    from bifocal.survey.setup import SurveySetup
+
+#: Most photos of one workbook.
+MOST_PHOTOS = 6
+#: Turns of Gauss-Newton, as `bifocal.model.set_intersection` makes.
+TURNS = 4
+#: Columns that all photos together give.
+OF_ALL = ("r_all", "sigma_all", "X_all", "Y_all", "chance")
+#: Misfits that fewer honest points in all have, both sides, are a wrong pick.
+CHANCE = math.erfc(FlagLimits().redundant / math.sqrt(2.0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OtherPhoto:
+    """How a photo beside an ideal pair was taken; its image coordinates are those of the pair.
+
+    Attributes
+    ----------
+    d, c : float or None
+        Distance to the reference plane [m] and principal distance [mm]; None while not typed.
+    enlargement : float or None
+        Of the print that was measured; None or 1 = on the sensor.
+    nadir : tuple of float or None
+        (column, row) of the nadir point, for coordinates in pixels. [px]
+    """
+
+    d: float | None = None
+    c: float | None = None
+    enlargement: float | None = None
+    nadir: tuple[float, float] | None = None
+
+    @property
+    def scale(self) -> float:
+        """Metres on the wall for a millimetre; NaN while a distance is not typed."""
+        return (self.d or math.nan) / ((self.c or math.nan) * (self.enlargement or 1.0))
+
+
+class _Seen(NamedTuple):
+    """Where photos see points on the wall [m], what each place weighs; shape (n, photos)."""
+
+    x: FloatArray
+    y: FloatArray
+    weight: FloatArray
+    distances: FloatArray
+    scales: FloatArray
+
+
+def of_all_photos(
+    setup: SurveySetup, points: PointObservations
+) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    """Solve points that were measured in the pair of a set-up and in other photos.
+
+    Parameters
+    ----------
+    setup : SurveySetup
+    points : PointObservations
+        As typed, ``other_xy`` in the photos of ``setup.others``.
+
+    Returns
+    -------
+    columns : dict of str to ndarray, shape (n,)
+        ``r_1_3 sigma_1_3`` ... of photo 1 with each other one, ``r_all sigma_all X_all Y_all`` of
+        three rays and more [m], and ``chance``: the share of honest points that miss as much.
+    cells : dict of str to ndarray, shape (n,)
+        The steps to these, as the workbook's formulas make them.
+
+    Notes
+    -----
+    Of photos 1 and k relief is that of Eq. (6), of the radii on the wall. Of all, the point
+    ``(X, Y, r)`` is that of `bifocal.PhotoSet.intersect`: least squares of where the rays meet the
+    wall, ``(X, Y) t`` with ``t = d / (d - r)``, weighted by the precision of the picks there. A
+    photo counts once, in however many pairs. With X, Y eliminated a turn of Gauss-Newton is a
+    quotient of sums over the photos, which a cell can hold.
+    """
+    seen = _seen(setup, points)
+    columns: dict[str, FloatArray] = {}
+    cells: dict[str, FloatArray] = {}
+    for k, (x, y, weight) in enumerate(zip(seen.x.T, seen.y.T, seen.weight.T, strict=True), 1):
+        cells |= {f"wall_x{k}": x, f"wall_y{k}": y, f"weight{k}": weight}
+        if k > 2:
+            own, cells[f"den_1_{k}"] = _of_pair(seen, k - 1, setup.precision)
+            columns |= dict(zip((f"r_1_{k}", f"sigma_1_{k}"), own, strict=True))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        together, turns = _together(seen, setup.precision)
+    return columns | together, cells | turns
+
+
+def _seen(setup: SurveySetup, points: PointObservations) -> _Seen:
+    """Return where all photos see the points on the wall."""
+    taking, measured = setup.taking, setup.in_millimetres(points)
+    unit, _ = setup.typed_frame(1)
+    enlargement1, enlargement2 = taking.enlargements
+    pair = (
+        OtherPhoto(d=taking.d1, c=taking.c1, enlargement=enlargement1),
+        OtherPhoto(d=taking.d2, c=taking.c2, enlargement=enlargement2),
+    )
+    photos = (*pair, *setup.others)
+    picks = [measured.xy1, measured.xy2]
+    for photo, typed in zip(setup.others, points.other_xy.transpose(1, 0, 2), strict=True):
+        nadir = photo.nadir if setup.unit == "px" else None
+        picks.append((typed - (nadir or (0.0, 0.0))) * unit)
+    scales = np.array([photo.scale for photo in photos])
+    wall = np.stack(picks, axis=1) * scales[:, None]
+    wall[np.isnan(wall).any(axis=2)] = np.nan
+    weight = np.where(np.isnan(wall[..., 0]), np.nan, scales**-2.0)
+    distances = np.array([photo.d or np.nan for photo in photos])
+    return _Seen(wall[..., 0], wall[..., 1], weight, distances, scales)
+
+
+def _of_pair(
+    seen: _Seen, photo: int, precision: float
+) -> tuple[tuple[FloatArray, FloatArray], FloatArray]:
+    """Return relief by the first photo and another with its sigma, and what is divided by."""
+    d, radii = seen.distances, np.hypot(seen.x, seen.y)
+    rate = radii[:, photo] / d[photo] - radii[:, 0] / d[0]
+    far, near = (0, photo) if d[0] > d[photo] else (photo, 0)
+    if not d[far] > d[near]:
+        blank = np.full(len(radii), np.nan)
+        return (blank, blank), rate
+    s1, s2, d1, d2 = radii[:, far], radii[:, near], d[far], d[near]
+    sigma_1, sigma_2 = precision * seen.scales[far], precision * seen.scales[near]
+    sigma = sigma_relief(s1, s2, d1=d1, d2=d2, sigma_1=sigma_1, sigma_2=sigma_2)
+    return (relief(s1, s2, d1=d1, d2=d2), sigma), rate
+
+
+def _together(seen: _Seen, precision: float) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    """Return the points by all rays, and the turns that lead there."""
+    x, y, w, d, _ = seen
+
+    def total(values: FloatArray) -> FloatArray:
+        return np.asarray(np.nansum(w * values, axis=1))
+
+    count = (~np.isnan(w)).sum(axis=1)
+    squares, weight = x**2 + y**2, total(np.ones_like(x))
+    lean_x, lean_y = total(x / d), total(y / d)
+    r = (total(squares / d) - (total(x) * lean_x + total(y) * lean_y) / weight) / (
+        total(squares / d**2) - (lean_x**2 + lean_y**2) / weight
+    )
+    r = np.where((count > 2) & np.isfinite(r), r, np.nan)
+    cells = {"turn_0": r}
+    for turn in range(TURNS + 1):
+        t = d / (d - r[:, None])
+        rate, own = t**2 / d, total(t**2)
+        at_x, at_y = total(t * x) / own, total(t * y) / own
+        lever = (at_x**2 + at_y**2) * (total(rate**2) - total(t * rate) ** 2 / own)
+        miss_x, miss_y = x - at_x[:, None] * t, y - at_y[:, None] * t
+        cells |= {f"at_x{turn}": at_x, f"at_y{turn}": at_y}
+        if turn < TURNS:
+            r = r + (at_x * total(rate * miss_x) + at_y * total(rate * miss_y)) / lever
+            cells[f"turn_{turn + 1}"] = r
+    # NaN of distances, of photos that did not see the point, tells nothing.
+    behind = ~np.isnan(w) & ~(r[:, None] < d)
+    kept = np.isfinite(r) & ~behind.any(axis=1)
+    chance = _chance(total(miss_x**2 + miss_y**2) / precision**2, 2 * count - 3)
+    found = (r, precision / np.sqrt(lever), at_x, at_y, chance)
+    columns = dict(zip(OF_ALL, found, strict=True))
+    return {key: np.where(kept, values, np.nan) for key, values in columns.items()}, {
+        key: np.where(np.isfinite(r), values, np.nan) for key, values in cells.items()
+    }
+
+
+def _chance(squares: FloatArray, redundant: FloatArray) -> FloatArray:
+    """Return how likely such misfits are by chance alone."""
+    from scipy.stats import chi2  # late: a survey of pairs does without scipy
+
+    return np.asarray(chi2.sf(squares, np.maximum(redundant, 1)))
+
+
+def contradictions(ids: Sequence[str], chance: FloatArray) -> list[str]:
+    """Return the points whose picks contradict each other, least likely first."""
+    return [ids[i] for i in np.argsort(chance) if chance[i] < CHANCE]

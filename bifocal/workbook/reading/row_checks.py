@@ -1,0 +1,88 @@
+"""Rows of measured points that lack something, each complaint with its cell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bifocal.survey.observations import PointObservations, pixel_keys
+from photocore.errors import CellError
+from photocore.tables import Table
+
+XY, POLAR = ("x1", "y1", "x2", "y2"), ("s1", "s2", "theta")
+PIXELS = ("col1", "row1", "col2", "row2")
+
+
+def check_rows(
+    table: Table,
+    points: PointObservations,
+    faulty: set[tuple[str, str]],
+    errors: list[CellError],
+) -> None:
+    """Complain about points without a name, measured on one photo only, or with s <= 0."""
+    ids, used, polar = points.ids, points.use, points.polar
+    for row in range(len(table)):
+        if used[row] and not ids[row] and (table.cell(row, "id"), "id") not in faulty:
+            errors.append(table.error(row, "id", "the point has no name; give it one."))
+    xy, pixels = np.hstack([points.xy1, points.xy2]), np.hstack([points.pixels1, points.pixels2])
+    if points.others.size:
+        _check_photos(table, points, errors)
+        return
+    others = points.other_xy.transpose(1, 0, 2)
+    groups = [
+        (XY, xy), (PIXELS, pixels), (("s1", "s2"), polar[:, :2]),
+        *(((f"x{k}", f"y{k}"), own) for k, own in enumerate(others, start=3)),
+    ]  # fmt: skip
+    for keys, values in groups:
+        given = ~np.isnan(values)
+        partly = used & given.any(axis=1) & ~given.all(axis=1)
+        if keys == ("s1", "s2"):
+            # Image coordinates, where both photos have them, make the radial distances idle.
+            partly &= np.isnan(xy).all(axis=1)
+        for row in np.flatnonzero(partly).tolist():
+            lacking = [key for i, key in enumerate(keys) if not given[row, i]]
+            if any((table.cell(row, key), key) in faulty for key in lacking):
+                continue  # its own complaint stands already
+            errors.append(table.error(row, lacking[0], _incomplete(ids[row], keys, lacking)))
+    for i, key in enumerate(("s1", "s2")):
+        for row in np.flatnonzero(used & (polar[:, i] <= 0)).tolist():
+            message = (
+                f"{polar[row, i]:g} mm at point {ids[row]}: a radial distance must be above zero; "
+                "at the nadir itself there is no relief to measure. Set use = 0 or measure it "
+                "again."
+            )
+            errors.append(table.error(row, key, message))
+
+
+def _check_photos(table: Table, points: PointObservations, errors: list[CellError]) -> None:
+    """Complain about used points with half a pick, or picks in fewer than two photos of a set."""
+    given = ~np.isnan(np.stack(points.pixels, axis=1))
+    for row in np.flatnonzero(points.use).tolist():
+        halves = np.argwhere(given[row].any(axis=1)[:, None] & ~given[row])
+        seen = given[row].all(axis=1)
+        if len(halves):
+            photo, axis = halves[0].tolist()
+            keys = pixel_keys(photo + 1)
+            message = _incomplete(points.ids[row], keys, [keys[axis]])
+            errors.append(table.error(row, keys[axis], message))
+        elif seen.sum() < 2:
+            key = pixel_keys(int(np.flatnonzero(~seen)[0]) + 1)[0]
+            where = f"only on image {int(np.flatnonzero(seen)[0]) + 1}" if seen.any() else "on none"
+            message = (
+                f"point {points.ids[row]} is measured {where}; measure it on two photos or more, "
+                "or set use = 0."
+            )
+            errors.append(table.error(row, key, message))
+
+
+def _incomplete(name: str, keys: Sequence[str], lacking: Sequence[str]) -> str:
+    images = {key[-1] for key in lacking}
+    here = {key[-1] for key in keys if key not in lacking}
+    if len(images) == 1 and images.isdisjoint(here):
+        other = "2" if images == {"1"} else "1"
+        return (
+            f"point {name} is measured only on image {other}; measure it on image "
+            f"{images.pop()} too, or set use = 0."
+        )
+    return f"point {name} lacks {', '.join(lacking)}; complete it, or set use = 0."

@@ -1,0 +1,1 @@
+"""Particles over time: which are one, where they go, and how fast."""

@@ -1,0 +1,174 @@
+"""Tracks of particles: positions of many frames in, who is who and how fast out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from multimedia.tracking.linking import LinkRules, adapted, linked, usual_step
+from multimedia.tracking.velocities import differs_from_neighbours, track_velocities
+from photocore.arrays import BoolArray, FloatArray, IntArray, as_points, positive
+from photocore.errors import InputError
+
+#: Frames for which a particle may be missing, and points of the shortest track.
+GAP, SHORTEST = 2, 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Tracks:
+    """Particles that were followed, track by track, each in time.
+
+    Attributes
+    ----------
+    track : ndarray of int, shape (n,)
+        Number of the track, from 0, of each point.
+    frame, number : ndarray of int, shape (n,)
+        Frame of each point, and which of the particles of that frame it is, from 0.
+    xyz : ndarray, shape (n, 3)
+        [object unit]
+    covariance : ndarray, shape (n, 3, 3)
+        Of the positions; NaN if none were given.
+    velocity : ndarray, shape (n, 3)
+        [object unit per second, or per frame]
+    velocity_covariance : ndarray, shape (n, 3, 3)
+    outlier : ndarray of bool, shape (n,)
+        Whether the velocity differs from those of the particles around.
+    step, change : float
+        Largest displacement of a particle of unknown velocity, and largest distance from where
+        its velocity predicts one of known. [object unit]
+    particles : int
+        Of all frames, in tracks or not.
+    """
+
+    track: IntArray
+    frame: IntArray
+    number: IntArray
+    xyz: FloatArray
+    covariance: FloatArray
+    velocity: FloatArray
+    velocity_covariance: FloatArray
+    outlier: BoolArray
+    step: float
+    change: float
+    particles: int
+
+    @property
+    def count(self) -> int:
+        """Number of tracks."""
+        return int(self.track.max(initial=-1)) + 1
+
+    @property
+    def sigma(self) -> FloatArray:
+        """Standard deviations of X, Y, Z, shape (n, 3). [object unit]"""
+        return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+
+    @property
+    def velocity_sigma(self) -> FloatArray:
+        """Standard deviations of the velocities, shape (n, 3)."""
+        return np.sqrt(np.diagonal(self.velocity_covariance, axis1=1, axis2=2))
+
+
+def track_particles(
+    places: Sequence[ArrayLike],
+    *,
+    frames: Sequence[int] | None = None,
+    rate: float = 1.0,
+    covariances: Sequence[FloatArray] | None = None,
+    step: float | None = None,
+    change: float | None = None,
+    gap: int = GAP,
+    shortest: int = SHORTEST,
+) -> Tracks:
+    """Follow particles through frames.
+
+    Parameters
+    ----------
+    places : sequence of array_like, shape (n_t, 3)
+        Particles of each frame, in any order. [object unit]
+    frames : sequence of int, optional
+        Numbers of the frames, by default from 0, without a hole.
+    rate : float
+        Frames per second; with 1 velocities are per frame.
+    covariances : sequence of ndarray, shape (n_t, 3, 3), optional
+        Of the positions.
+    step : float, optional
+        Largest displacement from frame to frame of a particle of which nothing is known; by
+        default half the mean distance between particles. [object unit]
+    change : float, optional
+        Largest distance from where its velocity predicts a particle; by default 3.5 times the
+        median of those in the data. [object unit]
+    gap : int
+        Frames for which a particle may be missing.
+    shortest : int
+        Points that a track must have; of three many are by chance.
+
+    Returns
+    -------
+    Tracks
+
+    Raises
+    ------
+    InputError
+        If there are fewer than three frames, or the options are impossible.
+
+    Examples
+    --------
+    Two particles that pass each other:
+
+    >>> frames = [[(t, 0.0, 0.0), (3.0 - t, 1.0, 0.0)] for t in range(4)]
+    >>> tracks = track_particles(frames, step=1.5)
+    >>> tracks.count, tracks.velocity[0].round(9).tolist()
+    (2, [1.0, 0.0, 0.0])
+    """
+    clouds = [as_points(xyz, "places", dimension=3).reshape(-1, 3) for xyz in places]
+    names = np.arange(len(clouds)) if frames is None else np.asarray(frames, dtype=np.int64)
+    if len(clouds) < 3 or len(names) != len(clouds) or (np.diff(names) != 1).any():
+        raise InputError(
+            f"frames: {len(clouds)} frames, numbered {names.tolist()[:5]}...; three or more in a "
+            "row are needed. Give an empty list for a frame in which nothing was found."
+        )
+    if not all(np.isfinite(xyz).all() for xyz in clouds):
+        raise InputError("places: every coordinate must be a finite number.")
+    if gap < 0 or shortest < 3:
+        raise InputError(f"gap {gap}, shortest {shortest}: no less than 0, and no less than 3.")
+    positive(rate, "rate", unit="frames per second")
+    widest = usual_step(clouds) if step is None else positive(step, "step")
+    rules = LinkRules(step=widest, change=widest, gap=gap)
+    if change is None:
+        rules = adapted(clouds, rules)
+    else:
+        rules = LinkRules(step=widest, change=positive(change, "change"), gap=gap)
+    previous = linked(clouds, rules)
+    sizes = [len(xyz) for xyz in clouds]
+    order, track = _in_tracks(previous, shortest)
+    frame = np.repeat(names, sizes)[order]
+    number = np.concatenate([np.arange(size) for size in sizes])[order]
+    xyz = np.concatenate(clouds)[order]
+    unknown = np.full((len(previous), 3, 3), np.nan)
+    covariance = (unknown if covariances is None else np.concatenate(list(covariances)))[order]
+    velocity, own = track_velocities(xyz, covariance, frame / rate, track)
+    outlier: BoolArray = np.zeros(len(xyz), dtype=bool)
+    for name in np.unique(frame):
+        now = np.flatnonzero(frame == name)
+        outlier[now] = differs_from_neighbours(xyz[now], velocity[now], np.nan_to_num(own[now]))
+    return Tracks(
+        track=track, frame=frame, number=number, xyz=xyz, covariance=covariance,
+        velocity=velocity, velocity_covariance=own, outlier=outlier, step=rules.step,
+        change=rules.change, particles=len(previous),
+    )  # fmt: skip
+
+
+def _in_tracks(previous: IntArray, shortest: int) -> tuple[IntArray, IntArray]:
+    """Return the points that are in tracks, track by track in time, and the number of the track."""
+    track = np.full(len(previous), -1, dtype=np.int64)
+    starts = np.flatnonzero(previous < 0)
+    track[starts] = np.arange(len(starts))
+    for point in np.flatnonzero(previous >= 0).tolist():  # points follow earlier ones
+        track[point] = track[previous[point]]
+    order = np.argsort(track, kind="stable")
+    long = np.bincount(track, minlength=1)[track[order]] >= shortest
+    order = order[long]
+    return order, np.unique(track[order], return_inverse=True)[1].astype(np.int64)

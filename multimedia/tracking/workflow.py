@@ -1,0 +1,269 @@
+"""Targets of all cameras and frames in, tracks of particles out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import chi2
+
+from multimedia.openptv.correspondences import (
+    TOLERANCE,
+    correspondences,
+    expected_by_chance,
+    is_chance,
+)
+from multimedia.openptv.openptv_files import read_targets
+from multimedia.orientation.intersection import intersect
+from multimedia.projects.model import SIGMA_PIXEL, Project
+from multimedia.projects.point_tables import METRES
+from multimedia.projects.project_file import read_project
+from multimedia.tracking.track_files import check_tracks_path, openptv_files, write_tracks
+from multimedia.tracking.tracks import GAP, SHORTEST, Tracks, track_particles
+from photocore.arrays import FloatArray, IntArray
+from photocore.errors import InputError
+from photocore.machine import cores
+from photocore.output import all_or_none, atomic_folder, check_all_writable, check_not_input
+
+#: What OpenPTV calls the targets of a frame: base, number of the frame, this.
+ENDING = "_targets"
+#: Frames whose correspondences are held against chance: the first, the middle, the last.
+TESTED = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackedParticles:
+    """What was found of a sequence.
+
+    Attributes
+    ----------
+    project : Project
+    tracks : Tracks
+    targets : ndarray of int, shape (n, cameras)
+        Rows of the targets of each point of the tracks, -1 where a camera did not see it.
+    units : tuple of str
+        Of lengths and of velocities.
+    frames : tuple of int
+    sigma_px : float
+        A-posteriori standard deviation of an image coordinate. [px]
+    found, chance : float
+        Particles of the frames that were held against chance, and how many come by it at most.
+    """
+
+    project: Project
+    tracks: Tracks
+    targets: IntArray
+    units: tuple[str, str]
+    frames: tuple[int, ...]
+    sigma_px: float
+    found: float
+    chance: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Particles:
+    """Particles of one frame, with the a-posteriori variance factor of each."""
+
+    xyz: FloatArray
+    covariance: FloatArray
+    targets: IntArray
+    factor: FloatArray
+
+
+def find_tracks(
+    project: Path,
+    targets: Sequence[Path],
+    *,
+    first: int | None = None,
+    last: int | None = None,
+    rate: float | None = None,
+    tolerance: float = TOLERANCE,
+    fewest: int = 3,
+    step: float | None = None,
+    change: float | None = None,
+    gap: int = GAP,
+    shortest: int = SHORTEST,
+    out: Path | None = None,
+    folder: Path | None = None,
+    overwrite: bool = False,
+) -> TrackedParticles:
+    """Find the particles of a sequence and follow them.
+
+    Parameters
+    ----------
+    project : path
+        Project file with oriented cameras.
+    targets : sequence of path
+        Of each camera, in the order of the project: what its target files begin with, as in
+        OpenPTV's sequence: ``img/cam1.`` for ``img/cam1.10001_targets`` and so on.
+    first, last : int, optional
+        Frames; by default all that every camera has.
+    rate : float, optional
+        Frames per second; without it velocities are per frame.
+    tolerance, fewest
+        As for `multimedia.openptv.correspondences.correspondences`.
+    step, change, gap, shortest
+        As for `track_particles`; lengths in the unit of the project.
+    out : path, optional
+        Table of all points of all tracks, .csv or .xlsx, or HDF5 (.h5).
+    folder : path, optional
+        Where to write rt_is and ptv_is of every frame, as OpenPTV does. [mm]
+    overwrite : bool
+        Whether existing files may be replaced.
+
+    Raises
+    ------
+    InputError
+        If files are missing, what is found cannot be told from chance, or nothing can be tracked.
+    """
+    if out is not None:
+        check_tracks_path(out)
+    check_all_writable(out, overwrite=overwrite)
+    content = read_project(project)
+    names = content.camera_names
+    if len(targets) != len(names):
+        raise InputError(
+            f"{len(targets)} sequence(s) of targets for {len(names)} cameras: give --targets once "
+            f"per camera, in the order {', '.join(names)}."
+        )
+    frames = _frames(targets, first, last)
+    files = {frame: [_file(base, frame) for base in targets] for frame in frames}
+    check_not_input(out, project, *(path for paths in files.values() for path in paths))
+    if folder is not None and folder.is_dir():
+        written = [folder / f"{kind}.{frame}" for frame in frames for kind in ("rt_is", "ptv_is")]
+        check_all_writable(*written, overwrite=overwrite)
+    places = {frame: [read_targets(path).pixels for path in files[frame]] for frame in frames}
+    found, chance = _beyond_chance(project, content, places, tolerance, fewest)
+    with ThreadPoolExecutor(cores()) as pool:
+        particles = list(
+            pool.map(lambda frame: _particles(content, places[frame], tolerance, fewest), frames)
+        )
+    factor = _median_factor([one.factor for one in particles])
+    tracks = track_particles(
+        [one.xyz for one in particles], frames=frames, rate=rate or 1.0,
+        covariances=[one.covariance * factor for one in particles],
+        step=step, change=change, gap=gap, shortest=shortest,
+    )  # fmt: skip
+    if not tracks.count:
+        raise InputError(
+            f"{project}: {tracks.particles} particles in {len(frames)} frames, and no track of "
+            f"{shortest} points. Do the frames follow each other? Particles of unknown velocity "
+            f"were sought within {tracks.step:.3g} {content.unit}: give --step."
+        )
+    at = tracks.frame - frames[0]
+    rows = np.array([particles[t].targets[n] for t, n in zip(at, tracks.number, strict=True)])
+    result = TrackedParticles(
+        content, tracks, rows, (content.unit, f"{content.unit}/{'s' if rate else 'frame'}"),
+        tuple(frames), SIGMA_PIXEL * float(np.sqrt(factor)), found, chance,
+    )  # fmt: skip
+    _write(result, particles, out, folder, overwrite=overwrite)
+    return result
+
+
+def _frames(targets: Sequence[Path], first: int | None, last: int | None) -> range:
+    """Return the frames that all cameras have, in a row."""
+    seen: list[set[int]] = []
+    for base in targets:
+        names = [path.name for path in base.parent.glob(f"{base.name}*{ENDING}")]
+        words = [name[len(base.name) : -len(ENDING)] for name in names]
+        seen.append({int(word) for word in words if word.isdecimal()})
+        if not seen[-1]:
+            raise InputError(
+                f"{base}: no files {base.name}NUMBER{ENDING} there. Give what they begin with, the "
+                "point too: --targets img/cam1. for img/cam1.10001_targets."
+            )
+    common = sorted(set.intersection(*seen))
+    chosen = [n for n in common if (first is None or n >= first) and (last is None or n <= last)]
+    begin = first if first is not None else (chosen or [0])[0]
+    end = last if last is not None else (chosen or [0])[-1]
+    missing = sorted(set(range(begin, end + 1)) - set(chosen))
+    if missing or len(chosen) < 3:
+        lack = f"frame {missing[0]} is not there of every camera" if missing else "too few"
+        raise InputError(
+            f"{targets[0]}: {len(chosen)} frames from {begin} to {end}, {lack}. Three or more in a "
+            "row are needed, of every camera; choose them by --first and --last."
+        )
+    return range(begin, end + 1)
+
+
+def _file(base: Path, frame: int) -> Path:
+    """Return the target file of a frame; numbers may have zeros before them."""
+    plain = base.with_name(f"{base.name}{frame}{ENDING}")
+    if plain.exists():
+        return plain
+    found = base.parent.glob(f"{base.name}0*{frame}{ENDING}")
+    return next(p for p in found if int(p.name[len(base.name) : -len(ENDING)]) == frame)
+
+
+def _beyond_chance(
+    project: Path, content: Project, places: dict[int, list[FloatArray]], tolerance: float,
+    fewest: int,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the particles of some frames and how many come by chance; refuse what is chance."""
+    frames, count = sorted(places), len(content.cameras) + 1
+    found, chance = np.zeros(count), np.zeros(count)
+    for frame in {frames[k] for k in np.linspace(0, len(frames) - 1, TESTED).astype(int)}:
+        seen = (content.cameras, places[frame], content.interfaces)
+        _, numbers, _ = correspondences(*seen, tolerance=tolerance, fewest=fewest)
+        found += np.bincount((numbers >= 0).sum(axis=1), minlength=count)
+        chance += expected_by_chance(*seen, tolerance=tolerance, fewest=fewest)
+    if is_chance(found, chance):
+        raise InputError(
+            f"{project}: {found.sum():.0f} particles would be found in {TESTED} frames, and "
+            f"{chance.sum():.0f} where the targets of the cameras have nothing to do with each "
+            "other: these are chance. Are the targets in the order of the cameras "
+            f"{', '.join(content.camera_names)}? Do the cameras fit them (`multimedia adjust`)? "
+            "Fewer come by chance with a smaller --tolerance."
+        )
+    return float(found.sum()), float(chance.sum())
+
+
+def _particles(
+    content: Project, places: list[FloatArray], tolerance: float, fewest: int
+) -> _Particles:
+    """Return the particles of a frame, intersected rigorously."""
+    cameras, media = content.cameras, content.interfaces
+    _, numbers, _ = correspondences(cameras, places, media, tolerance=tolerance, fewest=fewest)
+    image = np.full((len(cameras), len(numbers), 2), np.nan)
+    for k, (camera, seen) in enumerate(zip(cameras, places, strict=True)):
+        own = numbers[:, k] >= 0
+        image[k, own] = camera.described_sensor().image_from_pixel(seen[numbers[own, k]])
+    points = intersect(cameras, image, list(media))
+    good = np.isfinite(points.xyz).all(axis=1)
+    rays = points.rays[good]
+    # Of each point's own variance factor, that which is the median of an honest one's.
+    share = chi2.ppf(0.5, 2 * rays - 3) / (2 * rays - 3)
+    return _Particles(
+        points.xyz[good], points.covariance[good], numbers[good], points.sigma0[good] ** 2 / share
+    )
+
+
+def _median_factor(factors: Sequence[FloatArray]) -> float:
+    """Return the variance factor of all points; 1 where there is none."""
+    values = np.concatenate(list(factors)) if factors else np.empty(0)
+    return float(np.median(values)) if len(values) else 1.0
+
+
+def _write(
+    result: TrackedParticles, particles: Sequence[_Particles], out: Path | None,
+    folder: Path | None, *, overwrite: bool,
+) -> None:  # fmt: skip
+    content = result.project
+    with all_or_none():
+        if out is not None:
+            write_tracks(
+                out, result.tracks, result.targets, content.camera_names, result.units,
+                overwrite=overwrite,
+            )  # fmt: skip
+        if folder is not None:
+            factor = METRES[content.unit] / METRES["mm"]
+            texts = openptv_files(
+                result.tracks, result.frames, [one.xyz * factor for one in particles],
+                [one.targets for one in particles],
+            )  # fmt: skip
+            with atomic_folder(folder, overwrite=overwrite) as temporary:
+                for name, text in texts.items():
+                    (temporary / name).write_text(text, encoding="utf-8")

@@ -1,0 +1,89 @@
+"""Changes of the set-up typed into the sheet `WhatIf`: what becomes of every relief."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import openpyxl
+import pytest
+
+from bifocal import InputError, Taking, solve
+from bifocal.survey.what_if import CHANGED, what_if
+from bifocal.workbook.making.book import write_book
+from bifocal.workbook.template_workflow import write_template
+from tests.bifocal.workbook.test_cli_solve import put, run
+from tests.bifocal.workbook.test_survey_workbook import (
+    assert_recalculated_equals_cached,
+    ideal_content,
+)
+
+PICKS = {"id": ["a", "b"], "s1": [4.2, 9.0], "s2": [4.5, 8.9], "theta": [90, 30]}
+TAKING = Taking(d1=17.5, d2=9.5, c1=35.0, c2=19.0)
+
+
+def test_a_change_gives_the_relief_that_the_changed_set_up_gives():
+    changes = {"d_1": 0.03, "d_2": -0.02, "c_1": 0.1, "c_2": 0.05, "pitch": 0.0}
+    found = what_if(TAKING, solve(PICKS, taking=TAKING).table, changes)
+    for name in CHANGED[:4]:
+        key = name.replace("_", "")
+        taking = replace(TAKING, **{key: getattr(TAKING, key) + changes[name]})
+        expected = solve(PICKS, taking=taking).table["r"]
+        np.testing.assert_allclose(found[f"r_{name}"], expected, rtol=1e-10)
+    whole = Taking(d1=17.53, d2=9.48, c1=35.1, c2=19.05)
+    solved = solve(PICKS, taking=whole).table
+    np.testing.assert_allclose(found["r_new"], solved["r"], rtol=1e-10)
+    before = solve(PICKS, taking=TAKING).table
+    moved = np.hypot(solved["X"], solved["Y"]) - np.hypot(before["X"], before["Y"])
+    np.testing.assert_allclose(found["moved"], moved, atol=1e-12)
+
+
+def test_the_size_of_a_pixel_moves_points_and_leaves_their_relief():
+    taking = replace(TAKING, pitch=0.004)
+    table = solve(PICKS, taking=TAKING).table
+    found = what_if(taking, table, {"pitch": 0.00004})
+    np.testing.assert_allclose(found["by_pitch"], 0, atol=1e-15)
+    np.testing.assert_allclose(found["moved"], 0.01 * np.hypot(table["X"], table["Y"]), rtol=1e-9)
+
+
+def named(book, name):
+    sheet, _, cell = book.defined_names[name].attr_text.partition("!")
+    return book[sheet.strip("'")][cell.replace("$", "")].value
+
+
+def test_changes_that_were_typed_are_solved_in_place(tmp_path):
+    path = tmp_path / "trial.xlsx"
+    write_template(path, rows=8, what_if=True)
+    book = openpyxl.load_workbook(path)
+    for name, value in {"c_1": 35, "c_2": 19, "d_2": 9.5, "delta_d": 8}.items():
+        put(book, name, value)
+    book["WhatIf"]["C6"] = 0.1
+    for row, point in enumerate(zip(*PICKS.values(), strict=True), start=5):
+        for letter, value in zip("AFGH", point, strict=True):
+            book["Points"][f"{letter}{row}"] = value
+    book.save(path)
+    result = run("solve", path, "--out", path, "--overwrite")
+    assert result.exit_code == 0, result.stderr
+    book = openpyxl.load_workbook(path, data_only=True)
+    table = solve(PICKS, taking=TAKING).table
+    found = what_if(TAKING, table, {"d_1": 0.01, "d_2": 0.1, "c_1": 0.05, "c_2": 0.05})
+    assert named(book, "new_d_2") == pytest.approx(9.6)
+    largest = np.abs(found["by_d_2"]).max()
+    assert named(book, "effect_max_by_d_2") == pytest.approx(largest, rel=1e-9)
+    assert named(book, "effect_rms_change") == pytest.approx(
+        np.sqrt(np.mean(found["change"] ** 2)), rel=1e-9
+    )
+
+
+@pytest.mark.acceptance
+@pytest.mark.office
+def test_the_formulas_recalculated_by_libreoffice_equal_the_library(tmp_path):
+    changes = {"d_1": 0.02, "c_2": 0.1, "pitch": 0.0001}
+    content = replace(ideal_content(), changes=changes, language="it")
+    write_book(tmp_path / "trial.xlsx", content)
+    assert assert_recalculated_equals_cached(tmp_path / "trial.xlsx", tmp_path) > 3000
+
+
+def test_it_is_for_photos_in_air(tmp_path):
+    with pytest.raises(InputError, match="what_if"):
+        write_template(tmp_path / "no.xlsx", what_if=True, media=3)

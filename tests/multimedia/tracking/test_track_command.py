@@ -1,0 +1,140 @@
+"""``multimedia track``: targets of four cameras through water in, tracks in every format out."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from multimedia import Brown, FlatInterface, Layers, Project, write_project
+from multimedia.openptv.openptv_files import read_correspondences
+from tests.builders.commands import multimedia_command as main
+from tests.multimedia.tank import SENSOR, cameras
+from tests.multimedia.tracking.flows import seen_through_water
+
+COUNT, FRAMES, FIRST = 60, 8, 10001
+WATER = FlatInterface(layers=Layers(indices=(1.0, 1.337)))
+
+
+def place(t: int) -> np.ndarray:
+    """Return where the particles are in a frame: they turn and rise. [mm]"""
+    x, y, z = np.random.default_rng(5).uniform((-60, -50, -150), (60, 50, -60), (COUNT, 3)).T
+    turn = np.exp(0.06j * t) * (x + 1j * y)
+    return np.column_stack([turn.real, turn.imag, z + 1.5 * t])
+
+
+@pytest.fixture(scope="module")
+def sequence(tmp_path_factory):
+    """Return a folder with a project and targets, and whose each target is, by frame and camera."""
+    folder, rng = tmp_path_factory.mktemp("sequence"), np.random.default_rng(9)
+    views = [replace(c, principal_point=np.zeros(2), sensor=SENSOR) for c in cameras(Brown())]
+    tank = Project(cameras=tuple(views), media={"w": WATER}, media_of=("w",) * 4, unit="mm")
+    write_project(folder / "tank.toml", tank)
+    owners = {}
+    for t in range(FRAMES):
+        for k, camera in enumerate(views):
+            seen = SENSOR.pixel_from_image(seen_through_water(camera, place(t), 1.337, 0.0))
+            seen = seen + 0.1 * rng.standard_normal(seen.shape)
+            order = rng.permutation(COUNT)
+            lines = [f"{n} {x:.4f} {y:.4f} 9 3 3 99 -1\n" for n, (x, y) in enumerate(seen[order])]
+            path = folder / f"{camera.name}.{FIRST + t}_targets"
+            path.write_text(f"{COUNT}\n" + "".join(lines))
+            owners[t, k] = order
+    return folder, owners
+
+
+def run(folder: Path, *words: str, bases: tuple[str, ...] = ("cam1", "cam2", "cam3", "cam4")):
+    targets = [word for base in bases for word in ("--targets", str(folder / f"{base}."))]
+    return CliRunner().invoke(main, ["track", str(folder / "tank.toml"), *targets, *words])
+
+
+def test_tracks_are_those_of_the_particles_in_every_format(sequence, tmp_path):
+    h5py = pytest.importorskip("h5py")
+    folder, owners = sequence
+    out, files = tmp_path / "tracks.csv", tmp_path / "res"
+    got = run(folder, "--rate", "50", "--out", str(out), "--folder", str(files), "--json")
+    assert got.exit_code == 0, got.output
+    said = json.loads(got.stdout)
+    assert said["tracks"] == COUNT
+    assert said["frames"] == [FIRST, FIRST + FRAMES - 1]
+    assert said["sigma_px"] == pytest.approx(0.1, rel=0.1)
+    assert said["by_chance_at_most"] < 0.1 * said["particles_tested"]
+    with out.open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == COUNT * FRAMES
+    whose = {}
+    miss, speeds = [], []
+    for row in rows:
+        t = int(row["frame"]) - FIRST
+        names = {int(owners[t, k][int(row[f"cam{k + 1} target"])]) for k in range(4)
+                 if row[f"cam{k + 1} target"]}  # fmt: skip
+        assert len(names) == 1
+        name = names.pop()
+        assert whose.setdefault(row["track"], name) == name
+        xyz = np.array([float(row[f"{a} [mm]"]) for a in "XYZ"])
+        sigma = np.array([float(row[f"sigma_{a} [mm]"]) for a in "XYZ"])
+        miss.append((xyz - place(t)[name]) / sigma)
+        x, y, _ = place(t)[name]
+        true = 50 * np.array([-0.06 * y, 0.06 * x, 1.5])
+        v = np.array([float(row[f"v{a} [mm/s]"]) for a in "XYZ"])
+        speeds.append((v - true) / [float(row[f"sigma_v{a} [mm/s]"]) for a in "XYZ"])
+    assert np.sqrt(np.mean(np.square(miss))) == pytest.approx(1.0, abs=0.1)
+    assert np.sqrt(np.mean(np.square(speeds))) == pytest.approx(1.0, abs=0.15)
+
+    for t in range(FRAMES):
+        xyz, numbers = read_correspondences(files / f"rt_is.{FIRST + t}")
+        links = np.loadtxt(files / f"ptv_is.{FIRST + t}", skiprows=1)
+        assert np.abs(links[:, 2:] - xyz).max() == 0.0
+        names = owners[t, 0][numbers[:, 0]]
+        assert np.abs(xyz - place(t)[names]).max() < 0.5
+        assert ((links[:, 0] == -1).all()) == (t == 0)
+        assert ((links[:, 1] == -2).all()) == (t == FRAMES - 1)
+        if t:
+            before = read_correspondences(files / f"rt_is.{FIRST + t - 1}")[1]
+            assert (owners[t - 1, 0][before[links[:, 0].astype(int), 0]] == names).all()
+
+    again = run(folder, "--rate", "50", "--out", str(tmp_path / "tracks.h5"))
+    assert again.exit_code == 0, again.output
+    assert "480 of 480" not in again.output
+    with h5py.File(tmp_path / "tracks.h5") as file:
+        assert file["xyz"].attrs["unit"] == "mm"
+        assert file["velocity"].attrs["unit"] == "mm/s"
+        assert list(file.attrs["cameras"]) == ["cam1", "cam2", "cam3", "cam4"]
+        assert file["track"][:].tolist() == [int(row["track"]) for row in rows]
+        table = [[float(row[f"{a} [mm]"]) for a in "XYZ"] for row in rows]
+        assert np.abs(file["xyz"][:] - table).max() < 1e-5
+        assert file["targets"].shape == (COUNT * FRAMES, 4)
+
+
+def test_tracks_of_cameras_in_the_wrong_order_are_chance(sequence, tmp_path):
+    got = run(sequence[0], "--out", str(tmp_path / "t.csv"), bases=("cam2", "cam1", "cam4", "cam3"))
+    assert got.exit_code == 1
+    assert "order of the cameras cam1, cam2, cam3, cam4" in got.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_bad_input_is_one_message(sequence, tmp_path, monkeypatch):
+    folder, _ = sequence
+    for words, text in (
+        (["--first", "9999"], "frame 9999 is not there of every camera"),
+        (["--last", "10002"], "Three or more in a row are needed"),
+        (["--out", str(tmp_path / "t.txt")], ".csv, .xlsx or .h5"),
+        (["--change", "1e-9"], "no track of 4 points"),
+    ):
+        got = run(folder, *words)
+        assert got.exit_code == 1
+        assert text in got.stderr
+    got = run(folder, bases=("cam1", "cam2"))
+    assert "once per camera, in the order cam1, cam2, cam3, cam4" in got.stderr
+    got = run(folder, bases=("cam1", "cam2", "cam3", "other"))
+    assert "no files other.NUMBER_targets there" in got.stderr
+    monkeypatch.setitem(__import__("sys").modules, "h5py", None)
+    got = run(folder, "--out", str(tmp_path / "t.h5"))
+    assert got.exit_code == 1
+    assert "[hdf]" in got.stderr
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,131 @@
+"""Tracks against simulated truth: links, velocities with their precision, odd vectors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from multimedia import InputError, track_particles
+from multimedia.tracking.linking import LinkRules, adapted, linked, usual_step
+from multimedia.tracking.velocities import differs_from_neighbours, track_velocities
+from tests.multimedia.tracking.flows import links_of, simulated, vortices
+
+HALF = 0.5  # of the mean distance
+
+
+def shares(places, whose) -> tuple[float, float]:
+    """Return which share of tracks of four frames and more is whole, and of links is wrong."""
+    step = usual_step(places)
+    previous = linked(places, adapted(places, LinkRules(step=step, change=step, gap=2)))
+    names, true = np.concatenate(whose), links_of(whose)
+    has = previous >= 0
+    wrong = (names[has] != names[previous[has]]).mean()
+    numbers = np.unique(names, return_inverse=True)[1]
+    broken = np.bincount(numbers[previous != true], minlength=numbers.max() + 1) > 0
+    return float((~broken[np.bincount(numbers) >= 4]).mean()), float(wrong)
+
+
+@pytest.mark.parametrize("seed", [11, 12])
+@pytest.mark.parametrize("kind", ["vortices", "each its own way"])
+def test_a_thousand_particles_with_steps_to_half_their_distance_are_followed(kind, seed):
+    flow = vortices(HALF) if kind == "vortices" else None
+    whole, wrong = shares(*simulated(flow, speed=HALF, seed=seed))
+    assert whole > 0.965
+    assert wrong < 0.001
+
+
+def test_particles_that_are_missing_in_some_frames_are_found_again():
+    places, whose = simulated(vortices(0.3), speed=0.3, missing=0.03, frames=20, seed=13)
+    whole, wrong = shares(places, whose)
+    assert whole > 0.93
+    assert wrong < 0.002
+    tracks = track_particles(places, gap=2)
+    assert (np.diff(tracks.frame)[np.diff(tracks.track) == 0] == 2).sum() > 300
+    none = track_particles(places, gap=0)
+    assert (np.diff(none.frame)[np.diff(none.track) == 0] == 1).all()
+
+
+def test_the_mean_distance_comes_from_nearest_neighbours():
+    places, _ = simulated(None, speed=0.1, frames=2, count=1000)
+    assert usual_step(places) == pytest.approx(0.5, rel=0.05)
+
+
+def test_velocities_have_the_errors_that_their_sigmas_say():
+    rng = np.random.default_rng(5)
+    count, points = 400, 12
+    track, times = np.repeat(np.arange(count), points), np.tile(np.arange(points) / 50.0, count)
+    true = np.repeat(rng.uniform(-3, 3, (count, 3)), points, axis=0)
+    root = 0.01 * np.array([[1.0, 0.0, 0.0], [0.3, 1.0, 0.0], [0.5, -0.2, 3.0]])
+    xyz = true * times[:, None] + rng.standard_normal((len(track), 3)) @ root.T
+    covariance = np.broadcast_to(root @ root.T, (len(track), 3, 3))
+    velocity, own = track_velocities(xyz, covariance, times, track)
+    sigma = np.sqrt(np.diagonal(own, axis1=1, axis2=2))
+    ratio = np.sqrt((((velocity - true) / sigma) ** 2).mean(axis=0))
+    assert np.abs(ratio - 1).max() < 0.08
+    # The middle of five points: sigma over sqrt(10) frames of 1/50 s.
+    assert np.median(sigma[5::points, 0]) == pytest.approx(0.01 / np.sqrt(10) * 50, rel=0.02)
+
+
+def test_what_a_parabola_leaves_out_of_a_turning_motion_is_in_the_sigma():
+    rng = np.random.default_rng(6)
+    count, points, omega = 200, 16, 0.25
+    track, times = np.repeat(np.arange(count), points), np.tile(np.arange(points) * 1.0, count)
+    angle = omega * times + np.repeat(rng.uniform(0, 6, count), points)
+    circle = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    true = omega * np.column_stack([-np.sin(angle), np.cos(angle), 0 * angle])
+    for noise in (0.002, 0.02):
+        xyz = circle + noise * rng.standard_normal(circle.shape)
+        covariance = np.broadcast_to(noise**2 * np.eye(3), (len(xyz), 3, 3))
+        velocity, own = track_velocities(xyz, covariance, times, track)
+        sigma = np.sqrt(np.diagonal(own, axis1=1, axis2=2))
+        ratio = np.sqrt((((velocity - true) / sigma)[:, :2] ** 2).mean())
+        assert 0.7 < ratio < 1.4
+
+
+def test_a_short_track_has_a_line_and_one_point_has_none():
+    xyz = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [5, 5, 5]])
+    velocity, _ = track_velocities(
+        xyz, np.tile(np.eye(3), (4, 1, 1)), np.array([0.0, 1, 3, 0]), np.array([0, 0, 0, 1])
+    )
+    slope = np.polyfit([0.0, 1, 3], [0.0, 1, 2], 1)[0]
+    assert velocity[:3, 0] == pytest.approx([slope] * 3)
+    assert np.isnan(velocity[3]).all()
+
+
+def test_vectors_that_differ_from_those_around_are_marked():
+    rng = np.random.default_rng(8)
+    xyz = rng.uniform(0, 10, (500, 3))
+    velocity = vortices(0.3)(xyz) + 0.005 * rng.standard_normal(xyz.shape)
+    odd = rng.choice(500, 12, replace=False)
+    velocity[odd] += rng.choice([-0.5, 0.5], (12, 3))
+    covariance = np.tile(0.005**2 * np.eye(3), (500, 1, 1))
+    marked = differs_from_neighbours(xyz, velocity, covariance)
+    assert marked[odd].all()
+    assert marked.sum() - 12 <= 5
+
+
+def test_tracks_are_in_time_and_long_enough():
+    places, whose = simulated(vortices(0.2), speed=0.2, frames=8, count=200, seed=3)
+    tracks = track_particles(places, frames=range(101, 109), rate=10.0)
+    same = np.diff(tracks.track) == 0
+    assert (np.diff(tracks.frame)[same] > 0).all()
+    assert np.bincount(tracks.track).min() >= 4
+    assert tracks.count == tracks.track.max() + 1
+    names = [whose[f - 101][n] for f, n in zip(tracks.frame, tracks.number, strict=True)]
+    true = vortices(0.2)(np.stack([places[f - 101][n] for f, n in
+                                   zip(tracks.frame, tracks.number, strict=True)]))  # fmt: skip
+    assert len(set(names)) >= 190
+    assert np.median(np.linalg.norm(tracks.velocity - 10.0 * true, axis=1)) < 0.06
+
+
+def test_what_cannot_be_followed_is_refused():
+    some = [np.zeros((1, 3))] * 4
+    with pytest.raises(InputError, match="three or more in a row"):
+        track_particles(some[:2])
+    with pytest.raises(InputError, match="three or more in a row"):
+        track_particles(some, frames=[1, 2, 4, 5])
+    with pytest.raises(InputError, match="finite"):
+        track_particles([np.full((1, 3), np.nan)] * 3)
+    with pytest.raises(InputError, match="shortest 2"):
+        track_particles(some, shortest=2)
+    assert track_particles([np.empty((0, 3))] * 4).count == 0
