@@ -106,7 +106,7 @@ def test_versions_are_read_from_the_names_of_folders(tmp_path, monkeypatch):
     assert installation.too_old()[0].startswith("scikit-image 0.9.3 is too old, 0.23 is needed")
 
 
-def test_a_library_that_was_left_out_is_named_with_the_extra_that_brings_it(monkeypatch, tmp_path):
+def test_a_library_that_was_left_out_is_named_with_the_extra_that_brings_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "starlette", None)
     monkeypatch.setitem(sys.modules, "uvicorn", None)
     for name in [name for name in sys.modules if name.startswith("bifocal.collimation.server")]:
