@@ -6,7 +6,7 @@ a railing; a comparison of 5 x 5 px at every relief that may be can.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -16,7 +16,7 @@ from bifocal import rays
 from bifocal.relief_maps import semi_global
 from bifocal.relief_maps.frame import Frame, offsets, shown_at, zoom_map
 from bifocal.relief_maps.tuning import SWEEP
-from photocore.arrays import ByteArray, Float32Array
+from photocore.arrays import ByteArray, Float32Array, IntArray
 from photocore.compiled import compiled
 
 #: Half width of the window of the census. [px]
@@ -31,6 +31,9 @@ _PLACES = tuple(
 _NUMPY = 20e-9
 
 
+Box = tuple[slice, slice]
+
+
 class Swept(NamedTuple):
     """What a sweep found in a box of photo 1: relief [m], and its cost in the sum of all paths."""
 
@@ -38,47 +41,86 @@ class Swept(NamedTuple):
     cost: Float32Array
 
 
-def swept(frame: Frame, rows: slice, columns: slice, low: float, high: float) -> Swept | None:
-    """Return the relief that fits best in a box of photo 1, or None where there is no parallax.
+class Hypotheses(NamedTuple):
+    """Reliefs to try, on a lattice that is uniform in parallax: zooms by 1 + step number.
 
-    Parameters
+    Attributes
     ----------
-    frame : Frame
-    rows, columns : slice
-        The box.
-    low, high : float
-        Least and greatest relief tried. [m]
+    step : float
+    numbers : ndarray of int, shape (n,)
+        Rising; relief may jump between two that are not neighbours, at one price.
+    """
+
+    step: float
+    numbers: IntArray
+
+    @classmethod
+    def between(cls, frame: Frame, box: Box, low: float, high: float) -> Hypotheses:
+        """Return all hypotheses between two reliefs. [m]"""
+        step = _step(frame, box)
+        first, last = ((_zoom(frame, relief) - 1) / step for relief in (low, high))
+        return cls(step, np.arange(np.floor(first), np.ceil(last) + 1).astype(np.int64))
+
+    @classmethod
+    def near(cls, frame: Frame, box: Box, relief: Float32Array) -> Hypotheses:
+        """Return the hypotheses that enough values of relief [m] are near to."""
+        step = _step(frame, box)
+        number = np.rint((_zoom(frame, relief) - 1) / step).astype(np.int64)
+        if not len(number):
+            return cls(step, number)
+        start = int(number.min()) - SWEEP.near
+        votes = np.bincount(number - start, minlength=int(number.max()) - start + SWEEP.near + 1)
+        chosen = (votes >= SWEEP.votes).astype(np.uint8)
+        chosen = cv2.dilate(chosen[None], np.ones((1, 2 * SWEEP.near + 1), np.uint8))[0]
+        return cls(step, np.flatnonzero(chosen) + start)
+
+    @property
+    def slots(self) -> IntArray:
+        """Places of the hypotheses among costs, an empty one where numbers are left out."""
+        return np.arange(len(self.numbers)) + np.cumsum(np.diff(self.numbers, prepend=0) > 1)
+
+
+def _step(frame: Frame, box: Box) -> float:
+    """Return the difference of zoom that shifts the far end of a box by `SWEEP.step`."""
+    ends = np.array([[box[1].start, box[1].stop], [box[0].start, box[0].stop]])
+    reach = float(np.linalg.norm(np.abs(ends - frame.centre[:, None]).max(1)))
+    return float(SWEEP.step) / reach
+
+
+def _zoom(frame: Frame, relief: Any) -> Any:
+    d1, d2 = frame.distances
+    return rays.zoom_factor(relief, d1=d1, d2=d2)
+
+
+def swept(frame: Frame, box: Box, tried: Hypotheses) -> Swept:
+    """Return the relief that fits best in a box of photo 1; NaN where it may be none of those tried.
 
     Notes
     -----
     The cost is AD-census (Mei et al. 2011): of the 24 pixels around how many are darker than the
-    middle in one photo only, and the difference of grey values, cut. Hypotheses are uniform in
-    parallax, `SWEEP.step` apart where that is greatest.
+    middle in one photo only, and the difference of grey values, cut.
     """
-    d1, d2 = frame.distances
-    box = np.array([[columns.start, columns.stop], [rows.start, rows.stop]])
-    reach = float(np.linalg.norm(np.abs(box - frame.centre[:, None]).max(1)))
-    ends = rays.zoom_factor(np.array([low, high]), d1=d1, d2=d2)
-    count = int((ends[1] - ends[0]) * reach / SWEEP.step) + 1
-    if count < SWEEP.fewest:
-        return None
-    zooms = np.linspace(ends[0], ends[1], count)
-    first = _bordered(frame.image1, rows, columns)
-    cost = _costs(first, _moved(frame, frame.image2, (rows, columns), zooms, cv2.INTER_LINEAR))
+    slots, zooms = tried.slots, 1 + tried.step * tried.numbers
+    moved = _moved(frame, frame.image2, box, zooms, cv2.INTER_LINEAR)
+    cost = _costs(_bordered(frame.image1, box), moved, slots)
     seen = frame.seen2.view(np.uint8)
-    if not _moved(frame, seen, (rows, columns), zooms[[0, -1]], cv2.INTER_NEAREST).all():
-        content = _moved(frame, seen, (rows, columns), zooms, cv2.INTER_NEAREST)
-        cost[np.moveaxis(content[:, HALF:-HALF, HALF:-HALF], 0, -1) == 0] = SWEEP.outside
+    if not _moved(frame, seen, box, zooms[[0, -1]], cv2.INTER_NEAREST).all():
+        content = _moved(frame, seen, box, zooms, cv2.INTER_NEAREST)[:, HALF:-HALF, HALF:-HALF]
+        for slot, inside in zip(slots, content, strict=True):
+            cost[..., slot][inside == 0] = SWEEP.outside
     total = semi_global.aggregated(
-        cost, frame.image1[rows, columns], one_step=SWEEP.one_step, jump=SWEEP.jump,
-        softness=SWEEP.softness,
-    )  # fmt: skip
+        cost, frame.image1[box], one_step=SWEEP.one_step, jump=SWEEP.jump, softness=SWEEP.softness
+    )
     best = total.argmin(-1)
     least, shift = _lowest(total, best)
-    relief = rays.relief_from_zoom(ends[0] + (best + shift) * (zooms[1] - zooms[0]), d1=d1, d2=d2)
-    # At either end the best may lie beyond.
-    end = (best == 0) | (best == count - 1)
-    return Swept(np.where(end, np.nan, relief).astype(np.float32), least)
+    number = np.full(cost.shape[-1], np.nan)
+    number[slots] = tried.numbers
+    # At the ends of what was tried the best may lie beyond.
+    padded = np.pad(number, 1, constant_values=np.nan)
+    number[np.isnan(padded[:-2] + padded[2:])] = np.nan
+    d1, d2 = frame.distances
+    relief = rays.relief_from_zoom(1 + tried.step * (number[best] + shift), d1=d1, d2=d2)
+    return Swept(relief.astype(np.float32), least)
 
 
 def misfit(frame: Frame, relief: Float32Array) -> Float32Array:
@@ -86,9 +128,10 @@ def misfit(frame: Frame, relief: Float32Array) -> Float32Array:
     moved = cv2.remap(
         frame.image2, *zoom_map(frame, relief), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
     )
-    rows, columns = (slice(0, length) for length in frame.grid.shape)
-    first, second = (_bordered(image, rows, columns) for image in (frame.image1, moved))
-    return _costs(first, second[None])[..., 0].astype(np.float32)
+    height, width = frame.grid.shape
+    whole = slice(0, height), slice(0, width)
+    first, second = (_bordered(image, whole) for image in (frame.image1, moved))
+    return _costs(first, second[None], np.zeros(1, np.int64))[..., 0].astype(np.float32)
 
 
 def _lowest(total: semi_global.Costs, best: NDArray[np.intp]) -> tuple[Float32Array, Float32Array]:
@@ -103,8 +146,9 @@ def _lowest(total: semi_global.Costs, best: NDArray[np.intp]) -> tuple[Float32Ar
     return np.take_along_axis(total, best[..., None], -1)[..., 0].astype(np.float32), shift
 
 
-def _bordered(image: ByteArray, rows: slice, columns: slice) -> ByteArray:
+def _bordered(image: ByteArray, box: Box) -> ByteArray:
     """Return a box of an image with what the census needs around it."""
+    rows, columns = box
     sides = rows.start, image.shape[0] - rows.stop, columns.start, image.shape[1] - columns.stop
     top, bottom, left, right = (min(side, HALF) for side in sides)
     part = image[rows.start - top : rows.stop + bottom, columns.start - left : columns.stop + right]
@@ -113,7 +157,7 @@ def _bordered(image: ByteArray, rows: slice, columns: slice) -> ByteArray:
 
 
 def _moved(
-    frame: Frame, image: ByteArray, box: tuple[slice, slice], zooms: NDArray[np.float64], how: int
+    frame: Frame, image: ByteArray, box: Box, zooms: NDArray[np.float64], how: int
 ) -> ByteArray:
     """Return what photo 2 shows of a bordered box at every zoom, shape (n, height, width)."""
     rows, columns = box
@@ -136,29 +180,29 @@ def _moved(
     return stack
 
 
-def _costs(first: ByteArray, second: ByteArray) -> semi_global.Costs:
-    """Return how badly bordered boxes fit one of photo 1, shape (height, width, n)."""
+def _costs(first: ByteArray, second: ByteArray, slots: IntArray) -> semi_global.Costs:
+    """Return how badly bordered boxes fit one of photo 1 at their slots, (height, width, n)."""
     inner = np.s_[HALF:-HALF, HALF:-HALF]
     grey = np.ascontiguousarray(first[inner])
     height, width = grey.shape
     darker = np.stack([first[y : y + height, x : x + width] < grey for y, x in _PLACES])
-    cost = np.empty((height, width, len(second)), np.int16)
+    cost = np.full((height, width, slots[-1] + 1), SWEEP.between, np.int16)
     weights = (SWEEP.census, SWEEP.grey, SWEEP.most_grey)
     if _compare.pays(cost.size * _NUMPY):
-        _compare(grey, darker.view(np.uint8), second, cost, *weights)
+        _compare(grey, darker.view(np.uint8), second, slots, cost, *weights)
         return cost
-    for number, moved in enumerate(second):
+    for slot, moved in zip(slots, second, strict=True):
         middle = moved[inner]
         differ = np.zeros((height, width), np.uint8)
         for own, (y, x) in zip(darker, _PLACES, strict=True):
             differ += (moved[y : y + height, x : x + width] < middle) ^ own
         off = np.minimum(cv2.absdiff(grey, np.ascontiguousarray(middle)), np.uint8(weights[2]))
-        cost[..., number] = weights[0] * differ.astype(np.int16) + weights[1] * off.astype(np.int16)
+        cost[..., slot] = weights[0] * differ.astype(np.int16) + weights[1] * off.astype(np.int16)
     return cost
 
 
 @compiled
-def _compare(grey, darker, second, cost, census, share, most):  # type: ignore[no-untyped-def]
+def _compare(grey, darker, second, slots, cost, census, share, most):  # type: ignore[no-untyped-def]
     """Fill in `_costs`."""
     height, width = grey.shape
     differ = np.empty(width, np.uint8)
@@ -178,4 +222,4 @@ def _compare(grey, darker, second, cost, census, share, most):  # type: ignore[n
             for column in range(width):
                 a, b = np.int16(line[column]), np.int16(middle[column])
                 off = min(abs(a - b), most)
-                cost[row, column, number] = census * differ[column] + share * off
+                cost[row, column, slots[number]] = census * differ[column] + share * off

@@ -6,7 +6,7 @@ what is behind them. Where the sweep fits better, and fits nothing else in photo
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -14,10 +14,10 @@ import cv2
 import numpy as np
 
 from bifocal.model.image import QUIET_BLUR
-from bifocal.relief_maps import evidence, forward_projection, plane_sweep
+from bifocal.relief_maps import coarse_level, evidence, forward_projection, plane_sweep
 from bifocal.relief_maps.flow import Measurement, is_inside, sigma_of_relief
 from bifocal.relief_maps.frame import Frame, parallax_per_metre, zoom_map
-from bifocal.relief_maps.plane_sweep import Swept
+from bifocal.relief_maps.plane_sweep import Box, Hypotheses, Swept
 from bifocal.relief_maps.tuning import HYPOTHESIS
 from photocore.arrays import BoolArray, Float32Array
 
@@ -95,45 +95,81 @@ def _alone_in_second(
 
 
 def _swept(frame: Frame, relief: Float32Array, valid: BoolArray) -> Swept:
-    """Return what a sweep finds in the tiles that are not sure; NaN and infinite cost elsewhere."""
-    nothing = np.full(frame.grid.shape, np.nan, np.float32)
-    found = Swept(nothing, np.full_like(nothing, np.inf))
-    margin = HYPOTHESIS.margin
-    for rows, columns, low, high in _unsure_tiles(frame, relief, valid):
-        wide = [
-            slice(max(part.start - margin, 0), min(part.stop + margin, length))
-            for part, length in zip((rows, columns), frame.grid.shape, strict=True)
-        ]
-        tile = plane_sweep.swept(frame, wide[0], wide[1], low, high)
-        if tile is not None:
-            top, left = rows.start - wide[0].start, columns.start - wide[1].start
-            inner = np.s_[
-                top : top + rows.stop - rows.start, left : left + columns.stop - columns.start
-            ]
-            found.relief[rows, columns], found.cost[rows, columns] = (b[inner] for b in tile)
+    """Return what a sweep finds in the tiles that are not sure; NaN and infinite cost elsewhere.
+
+    First at half the resolution, of all reliefs around a tile; then of what that, or flow, found.
+    """
+    support, unsure = evidence.supported(valid), frame.seen1 & ~valid
+    half = coarse_level.halved(frame)
+    height, width = half.grid.shape
+    small = np.s_[: 2 * height : 2, : 2 * width : 2]
+    guess = _nothing(half)
+    ranges = _ranges(relief[small], support[small])
+    for box, (low, high) in zip(*_tiles(unsure[small], ranges), strict=True):
+        _sweep(guess, half, box, lambda wide: Hypotheses.between(half, wide, low, high))  # noqa: B023
+    found = _nothing(frame)
+
+    def near(wide: Box) -> Hypotheses:
+        halves = tuple(slice(part.start // 2, part.stop // 2) for part in wide)
+        values = guess.relief[halves]
+        values = np.concatenate([values[np.isfinite(values)], relief[wide][support[wide]][::4]])
+        return Hypotheses.near(frame, wide, values)
+
+    for box in _tiles(unsure)[0]:
+        _sweep(found, frame, box, near)
     return found
 
 
-def _unsure_tiles(
-    frame: Frame, relief: Float32Array, valid: BoolArray
-) -> Iterator[tuple[slice, slice, float, float]]:
-    """Yield tiles that flow does not validate throughout, and the reliefs around each. [m]"""
-    support = evidence.supported(valid)
-    (height, width), side = valid.shape, HYPOTHESIS.tile
+def _nothing(frame: Frame) -> Swept:
+    nothing = np.full(frame.grid.shape, np.nan, np.float32)
+    return Swept(nothing, np.full_like(nothing, np.inf))
+
+
+def _sweep(
+    found: Swept, frame: Frame, box: Box, hypotheses: Callable[[Box], Hypotheses]
+) -> None:  # fmt: skip
+    """Sweep a tile, with what is around it (in place)."""
+    margin = HYPOTHESIS.margin
+    wide: Any = tuple(
+        slice(max(part.start - margin, 0), min(part.stop + margin, length))
+        for part, length in zip(box, frame.grid.shape, strict=True)
+    )
+    tried = hypotheses(wide)
+    if len(tried.numbers) > HYPOTHESIS.flat:
+        inner = tuple(
+            slice(part.start - around.start, part.stop - around.start)
+            for part, around in zip(box, wide, strict=True)
+        )
+        tile = plane_sweep.swept(frame, wide, tried)
+        found.relief[box], found.cost[box] = (band[inner] for band in tile)
+
+
+def _tiles(
+    unsure: BoolArray, ranges: tuple[Float32Array, Float32Array] | None = None
+) -> tuple[list[Box], list[tuple[float, float]]]:
+    """Return the tiles of which enough is unsure, and the ranges of relief around them. [m]"""
+    side, boxes, limits = HYPOTHESIS.tile, [], []
+    height, width = unsure.shape
+    for i, j in np.ndindex(-(-height // side), -(-width // side)):
+        low, high = (0.0, 1.0) if ranges is None else (float(band[i, j]) for band in ranges)
+        box = np.s_[i * side : min((i + 1) * side, height), j * side : min((j + 1) * side, width)]
+        if low < high and unsure[box].mean() > HYPOTHESIS.unsure:
+            boxes.append(box)
+            limits.append((low, high))
+    return boxes, limits
+
+
+def _ranges(relief: Float32Array, support: BoolArray) -> tuple[Float32Array, Float32Array]:
+    """Return the least and greatest relief around every tile, and beyond. [m]"""
+    height, width = relief.shape
+    side = HYPOTHESIS.tile
     size = (-(-height // side), -(-width // side))
     low, high = np.full(size, np.inf, np.float32), np.full(size, -np.inf, np.float32)
-    unsure = np.zeros(size, bool)
-    for tile in np.ndindex(size):
-        part = tuple(slice(i * side, (i + 1) * side) for i in tile)
-        unsure[tile] = (frame.seen1[part] & ~valid[part]).mean() > HYPOTHESIS.unsure
+    for i, j in np.ndindex(size):
+        part = np.s_[i * side : (i + 1) * side, j * side : (j + 1) * side]
         values = relief[part][support[part]]
         if len(values) > HYPOTHESIS.fewest:
-            low[tile], high[tile] = np.percentile(values, HYPOTHESIS.outliers)
+            low[i, j], high[i, j] = np.percentile(values, HYPOTHESIS.outliers)
     around = np.ones((HYPOTHESIS.around, HYPOTHESIS.around), np.uint8)
-    low = cv2.erode(low, around) - np.float32(HYPOTHESIS.beyond)
-    high = cv2.dilate(high, around) + np.float32(HYPOTHESIS.beyond)
-    for i, j in zip(*np.nonzero(unsure & (low < high)), strict=True):
-        rows, columns = (
-            slice(n * side, min((n + 1) * side, length)) for n, length in ((i, height), (j, width))
-        )
-        yield rows, columns, float(low[i, j]), float(high[i, j])
+    beyond = np.float32(HYPOTHESIS.beyond)
+    return cv2.erode(low, around) - beyond, cv2.dilate(high, around) + beyond
