@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from bifocal import rays
 from bifocal.relief_maps import semi_global
-from bifocal.relief_maps.frame import Frame, offsets, shown_at, zoom_map
+from bifocal.relief_maps.frame import Frame, offsets, shown_at
 from bifocal.relief_maps.tuning import SWEEP
-from photocore.arrays import ByteArray, Float32Array, IntArray
+from photocore.arrays import ByteArray, Float32Array, FloatArray, IntArray
 from photocore.compiled import compiled
 
 #: Half width of the window of the census. [px]
@@ -93,27 +93,27 @@ def _zoom(frame: Frame, relief: Any) -> Any:
 
 
 def swept(frame: Frame, box: Box, tried: Hypotheses) -> Swept:
-    """Return the relief that fits best in a box of photo 1; NaN where it may be none of those tried.
+    """Return the relief that fits best in a box of photo 1; NaN where none of those tried may.
 
     Notes
     -----
     The cost is AD-census (Mei et al. 2011): of the 24 pixels around how many are darker than the
     middle in one photo only, and the difference of grey values, cut.
     """
-    slots, zooms = tried.slots, 1 + tried.step * tried.numbers
+    slots, zooms = tried.slots, np.asarray(1 + tried.step * tried.numbers, np.float64)
     moved = _moved(frame, frame.image2, box, zooms, cv2.INTER_LINEAR)
     cost = _costs(_bordered(frame.image1, box), moved, slots)
     seen = frame.seen2.view(np.uint8)
     if not _moved(frame, seen, box, zooms[[0, -1]], cv2.INTER_NEAREST).all():
         content = _moved(frame, seen, box, zooms, cv2.INTER_NEAREST)[:, HALF:-HALF, HALF:-HALF]
         for slot, inside in zip(slots, content, strict=True):
-            cost[..., slot][inside == 0] = SWEEP.outside
+            cost[:, slot][inside == 0] = SWEEP.outside
     total = semi_global.aggregated(
         cost, frame.image1[box], one_step=SWEEP.one_step, jump=SWEEP.jump, softness=SWEEP.softness
     )
-    best = total.argmin(-1)
+    best = total.argmin(1)
     least, shift = _lowest(total, best)
-    number = np.full(cost.shape[-1], np.nan)
+    number = np.full(cost.shape[1], np.nan)
     number[slots] = tried.numbers
     # At the ends of what was tried the best may lie beyond.
     padded = np.pad(number, 1, constant_values=np.nan)
@@ -123,27 +123,26 @@ def swept(frame: Frame, box: Box, tried: Hypotheses) -> Swept:
     return Swept(relief.astype(np.float32), least)
 
 
-def misfit(frame: Frame, relief: Float32Array) -> Float32Array:
-    """Return the cost of a sweep at given relief, shape (height, width)."""
-    moved = cv2.remap(
-        frame.image2, *zoom_map(frame, relief), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-    )
-    height, width = frame.grid.shape
-    whole = slice(0, height), slice(0, width)
-    first, second = (_bordered(image, whole) for image in (frame.image1, moved))
-    return _costs(first, second[None], np.zeros(1, np.int64))[..., 0].astype(np.float32)
+def misfit(frame: Frame, box: Box, relief: Float32Array) -> Float32Array:
+    """Return the cost of a sweep of a box at given relief, mean of 3 x 3 px, (height, width)."""
+    corner = box[1].start - HALF, box[0].start - HALF
+    bordered = cv2.copyMakeBorder(relief, HALF, HALF, HALF, HALF, cv2.BORDER_REPLICATE)
+    maps = _shown(frame, corner, bordered)
+    moved = cv2.remap(frame.image2, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    cost = _costs(_bordered(frame.image1, box), moved[None], np.zeros(1, np.int64))
+    return cv2.blur(cost[:, 0].astype(np.float32), (3, 3))
 
 
 def _lowest(total: semi_global.Costs, best: NDArray[np.intp]) -> tuple[Float32Array, Float32Array]:
     """Return the least cost, and where the parabola through it and both beside has its vertex."""
-    inner = np.clip(best, 1, total.shape[-1] - 2)
+    inner = np.clip(best, 1, total.shape[1] - 2)
     left, middle, right = (
-        np.take_along_axis(total, (inner + i)[..., None], -1)[..., 0].astype(np.float32)
+        np.take_along_axis(total, (inner + i)[:, None], 1)[:, 0].astype(np.float32)
         for i in (-1, 0, 1)
     )
     bend = np.maximum(left + right - 2 * middle, 1)
-    shift = np.where(inner == best, np.clip((left - right) / (2 * bend), -0.5, 0.5), np.float32(0))
-    return np.take_along_axis(total, best[..., None], -1)[..., 0].astype(np.float32), shift
+    shift = np.clip((left - right) / (2 * bend), -0.5, 0.5)
+    return middle, shift
 
 
 def _bordered(image: ByteArray, box: Box) -> ByteArray:
@@ -156,9 +155,7 @@ def _bordered(image: ByteArray, box: Box) -> ByteArray:
     return cv2.copyMakeBorder(part, top, bottom, left, right, cv2.BORDER_REPLICATE)
 
 
-def _moved(
-    frame: Frame, image: ByteArray, box: Box, zooms: NDArray[np.float64], how: int
-) -> ByteArray:
+def _moved(frame: Frame, image: ByteArray, box: Box, zooms: FloatArray, how: int) -> ByteArray:
     """Return what photo 2 shows of a bordered box at every zoom, shape (n, height, width)."""
     rows, columns = box
     size = (columns.stop - columns.start + 2 * HALF, rows.stop - rows.start + 2 * HALF)
@@ -166,27 +163,55 @@ def _moved(
     stack = np.empty((len(zooms), size[1], size[0]), np.uint8)
     flags = how | cv2.WARP_INVERSE_MAP
     border = cv2.BORDER_REPLICATE if how == cv2.INTER_LINEAR else cv2.BORDER_CONSTANT
-    if frame.pair.refracted:
-        d1, d2 = frame.distances
-        x, y = offsets((size[1], size[0]), -corner)
-        for zoom, moved in zip(zooms, stack, strict=True):
-            relief = np.float32(rays.relief_from_zoom(zoom, d1=d1, d2=d2))
-            moved[:] = cv2.remap(image, *shown_at(frame, x, y, relief), how, borderMode=border)
-        return stack
+    d1, d2 = frame.distances
+    centre = frame.centre
     for zoom, moved in zip(zooms, stack, strict=True):
-        start = frame.centre + zoom * (corner - frame.centre)
+        if frame.pair.refracted:
+            relief = np.full(stack.shape[1:], rays.relief_from_zoom(zoom, d1=d1, d2=d2), np.float32)
+            maps = _shown(frame, (columns.start - HALF, rows.start - HALF), relief)
+            cv2.remap(image, *maps, how, dst=moved, borderMode=border)
+            continue
+        start = centre + zoom * (corner - centre)
         matrix = np.array([[zoom, 0, start[0]], [0, zoom, start[1]]])
-        moved[:] = cv2.warpAffine(image, matrix, size, flags=flags, borderMode=border)
+        cv2.warpAffine(image, matrix, size, dst=moved, flags=flags, borderMode=border)
     return stack
 
 
+def _shown(
+    frame: Frame, corner: tuple[int, int], relief: Float32Array
+) -> tuple[Float32Array, Float32Array]:
+    """Return where photo 2 shows the pixels of a box of photo 1 that starts at a corner. [px]"""
+    x, y = offsets(relief.shape, (-corner[0], -corner[1]))
+    return shown_at(frame, x, y, relief)
+
+
+def places(
+    frame: Frame, at: tuple[NDArray[np.intp], NDArray[np.intp]], relief: Float32Array
+) -> tuple[IntArray, IntArray, Float32Array]:
+    """Return columns and rows at which photo 2 shows pixels of photo 1, and their parallax [px/m].
+
+    Parameters
+    ----------
+    frame : Frame
+    at : tuple of ndarray of int, shape (n,)
+        Rows and columns of the pixels.
+    relief : ndarray of float32, shape (n,)
+        [m]
+    """
+    column, row = (axis.astype(np.float32) for axis in at[::-1])
+    places = shown_at(frame, column, row, relief)
+    to_column, to_row = (np.rint(np.nan_to_num(axis, nan=-1)).astype(np.int64) for axis in places)
+    reach = np.hypot(column - np.float32(frame.centre[0]), row - np.float32(frame.centre[1]))
+    return to_column, to_row, np.asarray(reach / frame.pair.base_factor, np.float32)
+
+
 def _costs(first: ByteArray, second: ByteArray, slots: IntArray) -> semi_global.Costs:
-    """Return how badly bordered boxes fit one of photo 1 at their slots, (height, width, n)."""
+    """Return how badly bordered boxes fit one of photo 1 at their slots, (height, n, width)."""
     inner = np.s_[HALF:-HALF, HALF:-HALF]
     grey = np.ascontiguousarray(first[inner])
     height, width = grey.shape
     darker = np.stack([first[y : y + height, x : x + width] < grey for y, x in _PLACES])
-    cost = np.full((height, width, slots[-1] + 1), SWEEP.between, np.int16)
+    cost = np.full((height, slots[-1] + 1, width), SWEEP.between, np.int16)
     weights = (SWEEP.census, SWEEP.grey, SWEEP.most_grey)
     if _compare.pays(cost.size * _NUMPY):
         _compare(grey, darker.view(np.uint8), second, slots, cost, *weights)
@@ -197,7 +222,7 @@ def _costs(first: ByteArray, second: ByteArray, slots: IntArray) -> semi_global.
         for own, (y, x) in zip(darker, _PLACES, strict=True):
             differ += (moved[y : y + height, x : x + width] < middle) ^ own
         off = np.minimum(cv2.absdiff(grey, np.ascontiguousarray(middle)), np.uint8(weights[2]))
-        cost[..., slot] = weights[0] * differ.astype(np.int16) + weights[1] * off.astype(np.int16)
+        cost[:, slot] = weights[0] * differ.astype(np.int16) + weights[1] * off.astype(np.int16)
     return cost
 
 
@@ -218,8 +243,8 @@ def _compare(grey, darker, second, slots, cost, census, share, most):  # type: i
                 own = darker[place, row]
                 for column in range(width):
                     differ[column] += np.uint8(other[column] < middle[column]) ^ own[column]
-            line = grey[row]
+            line, out = grey[row], cost[row, slots[number]]
             for column in range(width):
                 a, b = np.int16(line[column]), np.int16(middle[column])
                 off = min(abs(a - b), most)
-                cost[row, column, slots[number]] = census * differ[column] + share * off
+                out[column] = census * differ[column] + share * off
