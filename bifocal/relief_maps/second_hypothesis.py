@@ -167,7 +167,7 @@ def _taken(level: _Level, found: _Found) -> BoolArray:
         return taken
     relief = found.relief[at]
     column, row, parallax = plane_sweep.places(level.frame, (at[0], at[1]), relief)
-    height, width = taken.shape
+    height, width = level.valid.shape
     inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
     index = np.where(inside, row * width + column, 0)
     inside &= level.frame.seen2.ravel()[index]

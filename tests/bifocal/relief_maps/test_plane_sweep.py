@@ -12,7 +12,9 @@ from bifocal import Foot, Grid, MapSurface, dense_relief
 from bifocal.model.image import as_grey
 from bifocal.orthophotos.visibility import hidden_from
 from bifocal.relief_maps import plane_sweep
+from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import make_frame
+from bifocal.relief_maps.smoothing import straightened
 from tests.scenes import RICH, CameraPair, Rendering, Scene, bifocal_cameras, render
 from tests.scenes.balconies import balconies
 
@@ -63,6 +65,14 @@ def test_numpy_and_machine_code_give_the_same_bits(monkeypatch):
         found.append(plane_sweep.swept(frame, box, tried))
     for one, other in zip(*found, strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_straightening_keeps_a_bar_and_leaves_unknown_what_is():
+    r = np.full((60, 60), -0.5, np.float32)
+    r[:, 20:25] = 0.5
+    r[:, 40:44] = np.nan
+    straight = straightened(MapBands(r, np.full_like(r, 0.01), np.ones(r.shape, np.uint8))).r
+    np.testing.assert_array_equal(straight[5:-5], r[5:-5])
 
 
 def test_a_rail_hides_by_its_face_where_the_wall_behind_it_is_measured():
