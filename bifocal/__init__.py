@@ -15,7 +15,7 @@ The pair
     read_image, write_image   photos as arrays, upright as seen
     Lens                      principal distance, principal point and distortion of a lens
     calibrate, Calibration    a lens from photos of a board
-    align, Alignment          a pair from two photos and what was measured on site
+    align, align_set          a pair, or a set of photos, from them and what was measured on site
     Control, Interior, SiteMeasures, PairMedia, read_control   what `align` is told
 Points
     solve, SolvedSurvey       relief, coordinates, precision, check of measured points
@@ -35,13 +35,13 @@ The page
     recording                 what the outputs written within it say made them
 Sample pairs                  SAMPLE, WATER_SAMPLE: folders of photos with exact truth
 
-What they take and give: Bounds, BreakLine, ChangedRegion, CheckResult, Comparison, Face, Faces,
-FlagLimits, FlatSurface, Foot, Grid, Intersection, KnownPoints, Layers, MapSurface, MediaPath,
-NamedPoints, Occluder, OrientationCheck, Pinhole, PlanePicks, PointObservations, Progress,
-ProjectedPoints, ProjectOptions, ProjectPhotos, RadialDivision, RankedPair, Rectification,
-Registration, ReliefTable, SetIntersection, Similarity, SpaceSums, suggest_faces, Surface,
-SurveyInput, SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision, WeightedSums, Window,
-WorldPoints.
+What they take and give: Alignment, Bounds, BreakLine, ChangedRegion, CheckResult, Comparison, Face,
+Faces, FlagLimits, FlatSurface, Foot, Grid, Intersection, KnownPoints, Layers, MapSurface,
+MediaPath, NamedPoints, Occluder, OrientationCheck, Pinhole, PlanePicks, PointObservations,
+Progress, ProjectedPoints, ProjectOptions, ProjectPhotos, RadialDivision, RankedPair, Rectification,
+Registration, ReliefTable, SetAlignment, SetIntersection, Similarity, SpaceSums, suggest_faces,
+Surface, SurveyInput, SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision,
+WeightedSums, Window, WorldPoints.
 
 Errors are one family with one message each that says what is wrong, where, and how to mend it:
 PhotogrammetryError > InputError (a ValueError) > CellError, WorkbookError, MissingExtraError;

@@ -47,6 +47,7 @@ from .model.photo_set import PhotoSet, RankedPair
 from .model.relief_map import Quality, ReliefMap
 from .model.set_intersection import SetIntersection
 from .model.surface import FlatSurface, MapSurface, Surface
+from .networks.set_alignment import SetAlignment, align_set
 from .orientation.alignment import Alignment
 from .orientation.control_points import Control, SiteMeasures, read_control
 from .orientation.photo_alignment import align
@@ -141,6 +142,7 @@ __all__ = [
     "ReliefTable",
     "SAMPLE",
     "Session",
+    "SetAlignment",
     "SetIntersection",
     "Similarity",
     "SiteMeasures",
@@ -160,6 +162,7 @@ __all__ = [
     "WorkbookError",
     "WorldPoints",
     "align",
+    "align_set",
     "calibrate",
     "compare",
     "dense_relief",

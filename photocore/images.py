@@ -20,6 +20,15 @@ from numpy.typing import NDArray
 from photocore.arrays import ByteArray
 from photocore.decoding import decoded, decoders_words, refuse_damaged_jpeg
 from photocore.errors import InputError
+from photocore.optional_photos import (
+    AVIF_ENDINGS,
+    HEIF_ENDINGS,
+    RAW_ENDINGS,
+    open_heif,
+    pillow_pixels,
+    raw_info,
+    raw_pixels,
+)
 from photocore.output import atomic_path, check_ending
 from photocore.png_text import with_provenance
 from photocore.provenance import note
@@ -34,12 +43,9 @@ MAX_PIXELS = 400_000_000
 _BY_STRIPS = 60_000_000
 #: Endings of the images that are written.
 WRITTEN = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
-_RAW = (
-    ".3fr .arw .cr2 .cr3 .crw .dcr .dng .erf .fff .iiq .kdc .mef .mos .mrw .nef .nrw .orf .pef "
-    ".raf .raw .rw2 .rwl .sr2 .srf .srw .x3f"
-)
-RAW_ENDINGS = frozenset(_RAW.split())
-_KNOWN = frozenset({"JPEG", "PNG", "TIFF", "MPO", "BMP", "WEBP"})
+_KNOWN = frozenset({"JPEG", "PNG", "TIFF", "MPO", "BMP", "WEBP", "HEIF", "AVIF"})
+#: Endings of photos that are read.
+READ = frozenset({*WRITTEN, ".webp", *HEIF_ENDINGS, *AVIF_ENDINGS, *RAW_ENDINGS})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,13 +101,19 @@ def image_info(path: Path | str) -> ImageInfo:
     Raises
     ------
     InputError
-        If it is missing, camera raw, CMYK, not an image, or larger than `MAX_PIXELS`.
+        If it is missing, CMYK, not an image, or larger than `MAX_PIXELS`; of HEIC and camera raw,
+        if their libraries (extra ``photos``) are not installed.
     """
     path = Path(path)
     _refuse_early(path)
     note(path)
     if path.suffix.lower() in {".tif", ".tiff"}:
         return _tiff_info(path)
+    if path.suffix.lower() in RAW_ENDINGS:
+        size, exif = raw_info(path)
+        return _info_from_exif(path, size, 16, exif)
+    if path.suffix.lower() in HEIF_ENDINGS:
+        open_heif(path)
     from PIL import Image, UnidentifiedImageError
 
     try:
@@ -128,7 +140,7 @@ def read_image(path: Path | str, *, grey: bool = False) -> ImageArray:
     Parameters
     ----------
     path : path
-        JPEG, PNG or TIFF.
+        JPEG, PNG, TIFF, WebP or AVIF; HEIC and camera raw with the extra ``photos``.
     grey : bool
         Convert colour to grey.
 
@@ -143,6 +155,11 @@ def read_image(path: Path | str, *, grey: bool = False) -> ImageArray:
         As `image_info`, and if the pixels cannot be decoded or are cut off.
     """
     info = image_info(path)
+    ending = info.path.suffix.lower()
+    if ending in RAW_ENDINGS | HEIF_ENDINGS | AVIF_ENDINGS:
+        stored = raw_pixels(info.path) if ending in RAW_ENDINGS else pillow_pixels(info.path)
+        image = cv2.cvtColor(stored, cv2.COLOR_RGB2GRAY) if grey and stored.ndim == 3 else stored
+        return turn_upright(image, info.orientation)
     if info.size[0] * info.size[1] > _BY_STRIPS and not grey:
         refuse_damaged_jpeg(info.path)
         large = _read_by_strips(info)
@@ -238,11 +255,6 @@ def _refuse_early(path: Path) -> None:
     check_file(path, "image", folder=", expected a photo.")
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; save or copy it again.")
-    if path.suffix.lower() in RAW_ENDINGS:
-        raise InputError(
-            f"{path}: camera raw is not read. Develop it to a 16-bit TIFF (or JPEG) without any "
-            "lens correction, crop or straightening, the same way for both photos."
-        )
 
 
 def _check_mode(path: Path, mode: str) -> None:

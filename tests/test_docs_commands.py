@@ -61,6 +61,10 @@ NOT_RUN = {
     "bifocal demo": "tutorial-facade.md runs it with --out",
     "bifocal demo --out sample --overwrite": "tutorial-facade.md runs it with another folder",
     "bifocal demo --water --out under-water": "tests/bifocal/demo runs it with another folder",
+    "bifocal align far.jpg mid.jpg near.jpg --control set.csv --out wall.photos.json":
+        "wants three photos; test_photo_sets.py has them",
+    "bifocal facade far.jpg mid.jpg near.jpg --control set.csv --scale 1:50 --out porch":
+        "wants three photos; test_photo_sets.py has them",
     "bifocal adjust a.pair.json b.pair.json c.pair.json --control a.csv --control none --control "
     "c.csv --out joint": "wants a street; test_joint_adjustment.py has one",
     **dict.fromkeys(IN_PART, "names options, is no whole line"),

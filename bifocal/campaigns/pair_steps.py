@@ -30,6 +30,8 @@ MOST_PRODUCTS = ("relief", "points", "drawing", "view", "report")
 FIRST_STEP = "align"
 #: Of drawings where none is asked for, 1:50.
 SCALE = 50.0
+#: How the file of a set of photos ends.
+SET_ENDING = ".photos.json"
 #: How the file is called that a step makes before all others, behind the pair's name.
 MADE = {
     "align": ".pair.json",
@@ -55,6 +57,8 @@ class PairJob:
         Where the folders of its steps lie.
     far, near : Path
         Photos.
+    more : tuple of Path
+        The others of a set.
     files : mapping of str to Path
         By the names of `bifocal.options.FILES`, where given.
     options : mapping
@@ -77,6 +81,7 @@ class PairJob:
     folder: Path
     far: Path
     near: Path
+    more: tuple[Path, ...] = ()
     files: Mapping[str, Path] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
     products: tuple[str, ...] = MOST_PRODUCTS
@@ -96,6 +101,11 @@ class PairJob:
             object.__setattr__(self, "files", rest | ({"faces": faces} if faces else {}))
 
     @property
+    def photos(self) -> tuple[Path, ...]:
+        """All photos, as they were named."""
+        return (self.far, self.near, *self.more)
+
+    @property
     def title(self) -> str:
         """The name as file name."""
         return file_name(self.name)
@@ -108,7 +118,8 @@ class PairJob:
 
     def product(self, step: str) -> Path:
         """Return the file that a step makes before all others."""
-        return self.folder / step / f"{self.title}{MADE[step]}"
+        made = SET_ENDING if self.more and step == FIRST_STEP else MADE[step]
+        return self.folder / step / f"{self.title}{made}"
 
     def ortho_path(self, steps: Sequence[str]) -> Path | None:
         """Return the orthophoto that these steps make, that of the drawing first."""
@@ -123,7 +134,7 @@ class PairJob:
         from photocore.images import image_info
 
         pixels = 0
-        for path in (self.far, self.near):
+        for path in self.photos:
             try:
                 width, height = image_info(path).size
             except InputError:
@@ -160,13 +171,15 @@ def _command(job: PairJob, step: Step) -> str:
     """
     if step.name in job.told:
         return job.told[step.name].command
-    photos = {"far": job.far, "near": job.near}
+    photos = _named(job)
     wanted = OF_STEP[step.name]
     everything = {**job.files, **job.options}
     said = {key: everything[key] for key in OF_PAIR if key in wanted and key in everything}
     if job.way == "facade":
         return " ".join(["bifocal facade", *(p.name for p in photos.values()), *typed(said)])
     keys = [f'{role} = "{path.name}"' for role, path in photos.items()]
+    if job.more:
+        keys = [f"photos = {[path.name for path in job.photos]}"]
     keys += [*typed(said, in_file=True), *(["joint = true"] if job.joint else [])]
     return f"bifocal survey, pair {job.name}: {', '.join(keys)}"
 
@@ -177,11 +190,12 @@ def _some(job: PairJob, *names: str) -> dict[str, Any]:
 
 def refusal(job: PairJob) -> str:
     """Return why a pair cannot be aligned as it is described; empty where nothing is missing."""
+    from bifocal.networks.set_workflow import way_of_set
     from bifocal.orientation.align_workflow import AlignOptions, check_way
 
-    step = _align_step(job)
+    step, check = _align_step(job), way_of_set if job.more else check_way
     try:
-        check_way(AlignOptions.from_given({**step.options, **_align_files(job)}))
+        check(AlignOptions.from_given({**step.options, **_align_files(job)}))
     except InputError as error:
         return str(error)
     return ""
@@ -195,24 +209,32 @@ def _align_step(job: PairJob) -> Step:
     files = _align_files(job)
     options = _some(job, *SET_UP)
 
-    def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
+    def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.orientation.align_workflow import AlignOptions, align_photos
 
         out = place / job.product("align").name
-        made = align_photos(
-            job.far, job.near, out, AlignOptions.from_given({**options, **files}),
-            picture=out.with_suffix("").with_suffix(".pair.png"),
-        )  # fmt: skip
+        told = AlignOptions.from_given({**options, **files})
+        if job.more:
+            from bifocal.networks.set_workflow import align_photo_set
+
+            return align_photo_set(job.photos, out, told, progress=progress).remarks
+        picture = out.with_suffix("").with_suffix(".pair.png")
+        made = align_photos(job.far, job.near, out, told, picture=picture)
         return tuple(dict.fromkeys((*made.pair.remarks, *made.remarks)))
 
-    photos = {"far": job.far, "near": job.near}
-    return Step(name=FIRST_STEP, files={**photos, **files}, options=options, make=make)
+    return Step(name=FIRST_STEP, files={**_named(job), **files}, options=options, make=make)
+
+
+def _named(job: PairJob) -> dict[str, Path]:
+    """Return the photos by their part in it."""
+    others = {f"photo {number}": path for number, path in enumerate(job.more, start=3)}
+    return {"far": job.far, "near": job.near, **others}
 
 
 def _photos(job: PairJob) -> dict[str, Path]:
     """Return what a step after the alignment looks at: the photos, the pair file of all pairs."""
     joint = {} if job.joint is None else {"pair": job.pair_path}
-    return {"far": job.far, "near": job.near, **joint}
+    return {**_named(job), **joint}
 
 
 def _faces(job: PairJob) -> dict[str, Path]:
@@ -247,17 +269,17 @@ def _points_step(job: PairJob) -> Step:
     options = _some(job, "language", "unit")
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
-        from bifocal.model.pair import Pair
+        from bifocal.model.photo_set import pair_or_set
         from bifocal.reports.control_survey import is_exchanged, solve_control
         from bifocal.workbook.output import write_result
 
-        pair = Pair.read(job.pair_path)
+        pair = pair_or_set(job.pair_path)
         tables = {"control": None, **tables_of(job)}
         solution = solve_control(
-            job.pair_path, **tables, exchanged=is_exchanged(pair, job.far),
+            job.pair_path, **tables, exchanged=is_exchanged(pair, job.far), photos=len(job.photos),
             language=options.get("language", "en"), unit=options.get("unit", ""),
         )  # fmt: skip
-        if pair.leans:
+        if solution.pair.leans:
             write_result(place / f"{job.title}_points.csv", solution)
             told = (
                 "ports that lean have no formulas in a survey workbook: the points are a text "
@@ -328,7 +350,10 @@ def _points_to_draw(job: PairJob, *, solved: bool) -> dict[str, SurveyPoints]:
     from bifocal.orientation.control_points import known_points
 
     unit = str(job.options.get("unit", ""))
-    points = {role: known_points(path, unit=unit) for role, path in tables_of(job).items()}
+    points = {
+        role: known_points(path, unit=unit, photos=len(job.photos))
+        for role, path in tables_of(job).items()
+    }
     if solved:
         (table,) = (job.folder / "points").glob(f"{escape(job.title)}_points.*")
         points["points"] = read_survey_points(table)[0]

@@ -16,6 +16,7 @@ from typing import Any
 from bifocal.campaigns.pair_job import PairOutcome, run_pair
 from bifocal.campaigns.pair_steps import PairJob
 from bifocal.campaigns.step_store import receive_step
+from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.provenance import FileHashes
 
@@ -56,6 +57,7 @@ def _moved(job: PairJob, there: Callable[[Path], Path]) -> PairJob:
     """Return a job with its files and folders elsewhere."""
     files = {role: there(path) for role, path in job.files.items()}
     own: dict[str, Any] = {name: there(getattr(job, name)) for name in ("folder", "far", "near")}
+    own["more"] = tuple(map(there, job.more))
     return replace(job, files=files, joint=job.joint and there(job.joint), **own)
 
 
@@ -68,7 +70,7 @@ def packed(job: PairJob) -> Parcel:
         If a file cannot be read, or the files have no folder in common.
     """
     job = found_anywhere(job)
-    needed = [job.far, job.near, *job.files.values()]
+    needed = [*job.photos, *job.files.values()]
     try:
         root = Path(os.path.commonpath([job.folder, *(path.parent for path in needed)]))
     except ValueError:
@@ -85,7 +87,7 @@ def packed(job: PairJob) -> Parcel:
     return Parcel(job=job, root=root, files=files)
 
 
-def run_parcel(parcel: Parcel) -> ShippedPair:
+def run_parcel(parcel: Parcel, progress: Progress = no_progress) -> ShippedPair:
     """Run a pair in a folder of its own and return what was made; the folder is removed."""
     with tempfile.TemporaryDirectory(prefix="bifocal-") as place:
         root = Path(place).resolve()
@@ -93,7 +95,7 @@ def run_parcel(parcel: Parcel) -> ShippedPair:
             (root / name).parent.mkdir(parents=True, exist_ok=True)
             (root / name).write_bytes(content)
         job = _moved(parcel.job, lambda path: root / path.relative_to(parcel.root))
-        outcome = run_pair(job)
+        outcome = run_pair(job, progress)
         steps = {
             step: {
                 path.relative_to(job.folder / step).as_posix(): path.read_bytes()

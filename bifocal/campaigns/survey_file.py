@@ -20,6 +20,8 @@ FORMAT = "bifocal-survey/1"
 #: An option of the command line with its value.
 _VALUE = r"(?:[a-z]+\d?=[\d.e+-]*\d|[A-Z]+|\d[\d.]*\d|\d)"
 _OPTION = re.compile(rf"(?<![\w-])--([a-z][a-z0-9-]*)(?: ({_VALUE}(?:,{_VALUE})*)\b)?")
+#: What names a pair and its photos.
+OF_PHOTOS = ("name", "far", "near", "photos")
 #: What is made of all pairs together, each in a folder of its own: keys above the pairs.
 WHOLE = ("joint", "mosaic")
 
@@ -125,6 +127,11 @@ def _faults_of_whole(jobs: Sequence[PairJob], whole: Mapping[str, Any]) -> list[
         for job in jobs
         if job.folder.name.casefold() in WHOLE
     ]
+    faults += [
+        f"pair {job.name}: is a set, and joint = true adjusts pairs; leave one of them out."
+        for job in jobs
+        if job.more and whole["joint"]
+    ]
     for key in JOINT if whole["joint"] else ():
         if len({job.options.get(key) for job in jobs if tables_of(job)}) > 1:
             faults.append(
@@ -185,19 +192,21 @@ def _job(
     faults: list[str],
 ) -> PairJob | None:
     base, out = folders
-    rest = {key: value for key, value in entry.items() if key not in ("name", "far", "near")}
+    rest = {key: value for key, value in entry.items() if key not in OF_PHOTOS}
     own = _entries(rest, base, where, faults)
-    photos = [entry.get(key) for key in ("far", "near")]
-    if not all(map(_is_name, photos)):
-        faults.append(f"{where}: far and near must name its two photos.")
+    photos = entry.get("photos", [entry.get(key) for key in ("far", "near")])
+    if not isinstance(photos, list) or len(photos) < 2 or not all(map(_is_name, photos)):
+        faults.append(f"{where}: far and near, or a list photos, must name its photos.")
         return None
+    if "photos" in entry and {"far", "near"} & entry.keys():
+        faults.append(f"{where}: name its photos by far and near or by a list photos, not both.")
     name = str(entry.get("name") or f"pair {number}")
     if not name.strip() or not name.isprintable():
         faults.append(f"{where}: name = {name!r}: expected a name that can be read.")
-    far, near = (base / str(photo) for photo in photos)
+    far, near, *more = (base / str(photo) for photo in photos)
     products = own["products"].get("products") or common["products"].get("products")
     return PairJob(
-        name=name, folder=out / file_name(name), far=far, near=near,
+        name=name, folder=out / file_name(name), far=far, near=near, more=tuple(more),
         files={**common["files"], **own["files"]},
         options={**common["options"], **own["options"]},
         **({"products": products} if products else {}),

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.campaigns.folder_locks import locked
-from bifocal.campaigns.inputs import check_files
+from bifocal.campaigns.inputs import check_files, check_photos
 from bifocal.campaigns.pair_job import PairOutcome, plan_of
 from bifocal.campaigns.pair_steps import (
     FIRST_STEP,
@@ -193,6 +193,7 @@ def plan_survey(jobs: Sequence[PairJob], *, mosaic: bool = False) -> list[tuple[
 def _unreadable(job: PairJob) -> str:
     try:
         check_files(job)
+        check_photos(job)
     except PhotogrammetryError as error:
         return str(error)
     return ""
@@ -355,6 +356,11 @@ class _Count(Listener):
         self.shares[name] = share
         self.progress(sum(self.shares.values()), len(self.shares), f"{name}: {step}")
 
+    def heard(self, text: str) -> None:
+        """Tell of it."""
+        if self.tell is not None:
+            self.tell(text)
+
     def ended(self, outcome: PairOutcome) -> None:
         """Keep it, and tell of it with the time that is left."""
         self.shares[outcome.name] = 1.0
@@ -379,6 +385,7 @@ def facade_job(
     near: Path,
     out: Path,
     *,
+    more: tuple[Path, ...] = (),
     name: str = "",
     given: Mapping[str, Any] | None = None,
     products: tuple[str, ...] | None = None,
@@ -392,6 +399,8 @@ def facade_job(
         Photos.
     out : Path
         Folder; each step gets one in it.
+    more : tuple of Path
+        Photos that make a set of these.
     name : str
         Title; default that of the folder.
     given : mapping
@@ -418,6 +427,7 @@ def facade_job(
         folder=out,
         far=far,
         near=near,
+        more=more,
         files={role: path for role, path in said.items() if role in FILES},
         options={key: value for key, value in said.items() if key not in FILES},
         way="facade",

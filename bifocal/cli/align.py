@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from photocore.cli import print_result, remark
+from photocore.cli import print_result, progress_bar, remark
 from photocore.options import declared
 
 if TYPE_CHECKING:
@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 
 @declared
 def command(
-    far: Path, near: Path | None, out: Path, overwrite: bool, as_json: bool, **given: Any
-) -> None:
+    far: Path, near: Path | None, more: tuple[Path, ...], out: Path, overwrite: bool,
+    as_json: bool, **given: Any,
+) -> None:  # fmt: skip
     """Set up a pair: where both cameras stood, how they looked, at which scale.
 
     FAR is the photo taken from afar with the long lens, NEAR the other one. Four ways: control
@@ -28,6 +29,11 @@ def command(
     alone (--auto) and one distance or length. Photos taken through glass or water are set up by
     control points or as they are, with --indices and --port or --depth. FAR alone may be a survey
     workbook that states distances, focal lengths and nadirs: they are taken as they are.
+
+    With MORE photos, or --out *.photos.json, all are set up together as a set. Their order is
+    free: --distance1 is that of the first photo, --distance2 of the second; --lens and EXIF tell
+    the others' lenses; the control table has columns col1, row1 to coln, rown, blank where a photo
+    does not show the point.
     """
     from bifocal.workbook.pair_workflow import is_workbook
 
@@ -38,6 +44,9 @@ def command(
         raise click.UsageError("Give two photos, FAR and NEAR, or a survey workbook as FAR.")
     from bifocal.orientation.align_workflow import AlignOptions, align_photos, alignment_as_dict
 
+    if more or out.name.lower().endswith(".photos.json"):
+        _align_set((far, near, *more), out, given, overwrite, as_json)
+        return
     picture = given.pop("picture")
     if given.pop("no_picture"):
         picture = None
@@ -49,6 +58,24 @@ def command(
     print_result(alignment_as_dict(alignment), _lines(alignment), as_json=as_json, remarks=notes)
     if not as_json:
         remark(f"Pair written to {out}" + (f", picture to {picture}" if picture else ""))
+
+
+def _align_set(
+    photos: tuple[Path, ...], out: Path, given: dict[str, Any], overwrite: bool, as_json: bool
+) -> None:
+    """Set photos up together."""
+    from bifocal.networks.set_workflow import align_photo_set, set_as_dict
+    from bifocal.orientation.align_workflow import AlignOptions
+
+    if given["picture"] is not None:
+        raise click.UsageError("--picture: is drawn of pairs; leave it out with a set of photos.")
+    options = AlignOptions.from_given(given)
+    with progress_bar("align", quiet=as_json) as progress:
+        made = align_photo_set(photos, out, options, overwrite=overwrite, progress=progress)
+    lines = (*made.words, *(f"Assumed: {text}." for text in made.setup["assumed"]))
+    print_result(set_as_dict(made), lines, as_json=as_json, remarks=made.remarks)
+    if not as_json:
+        remark(f"Set of {len(photos)} photos written to {out}")
 
 
 #: Options that a workbook leaves room for.

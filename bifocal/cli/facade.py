@@ -17,18 +17,20 @@ _TO_OPEN = ("report/*.html", "drawing/*.pdf", "points/*.xlsx", "relief/*.png", "
 
 
 @declared
-def command(far: Path, near: Path, out: Path, as_json: bool, **given: Any) -> None:
-    """Make everything a façade needs from two photos and one table of control points.
+def command(
+    far: Path, near: Path, more: tuple[Path, ...], out: Path, as_json: bool, **given: Any
+) -> None:
+    """Make everything a façade needs from its photos and one table of control points.
 
     The pair is set up, the relief measured, the points solved, orthophoto and drawings made to
     scale, the relief shown in three dimensions, and a report written; each step into a folder of
     its own within DIR. Run it again, and only what changed is made anew; stopped, it goes on where
-    it was.
+    it was. Three photos and more are a set: see `bifocal align`.
     """
     from bifocal.campaigns.workflow import facade, facade_job
 
     own = {name: given.pop(name) for name in ("name", "products", "overwrite")}
-    job = facade_job(far, near, out, given=given, **own)
+    job = facade_job(far, near, out, more=more, given=given, **own)
     with progress_bar("facade", quiet=as_json) as progress:
         outcome = facade(job, progress=progress)
     print_result(outcome.to_dict(), _lines(job, outcome), as_json=as_json, remarks=outcome.remarks)

@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bifocal.options import DRAWING, OF_PAIR
-from bifocal.remarks import remark as remark_of
 from photocore.cli import print_result, progress_bar, remark
-from photocore.errors import InputError
 from photocore.options import declared
 
 if TYPE_CHECKING:
@@ -32,7 +30,6 @@ def command(
     the photo that sees it best: 11 is its first photo, 12 the second, 3 a transition.
     """
     from bifocal.faces.faces_files import faces_path, keep_faces
-    from bifocal.model.photo_set import PhotoSet
     from bifocal.orthophotos.deliver_workflow import DeliverTask, default_title, deliver
     from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho, not_measured
     from bifocal.workbook.pair_workflow import is_workbook, points_of, read_photos
@@ -46,8 +43,6 @@ def command(
     if sum(choice is not None for choice in (relief, points, plane)) > 1:
         raise click.UsageError("Give one of --relief, --points and --plane.")
     source = read_photos(pair)
-    if isinstance(source, PhotoSet) and folder is not None:
-        raise InputError(remark_of("ortho.set_not_delivered"))
     drawn = given["faces"]
     given["faces"] = faces_path(drawn, pair)
     own: Path | SurveyPoints | None = points
@@ -57,7 +52,8 @@ def command(
     if breaklines and own is None:
         raise click.UsageError("--breakline joins measured points; give their table by --points.")
     for name in (*DRAWING[4:], "control"):
-        if drawing[name] and folder is None:
+        by_default = drawing[name] == OF_PAIR[name].attributes.get("default")
+        if drawing[name] and not by_default and folder is None:
             flag = OF_PAIR[name].flag
             raise click.UsageError(f"{flag} is drawn into a folder; give --deliver DIR.")
     if relief is None and own is None and plane is None:
@@ -67,7 +63,7 @@ def command(
     )
     files: dict[str, object] = {}
     with progress_bar("orthophoto", quiet=as_json) as progress:
-        if folder is not None and scale is not None and not isinstance(source, PhotoSet):
+        if folder is not None and scale is not None:
             wish = DeliverTask(title=title or default_title(source, pair), **drawing)
             done = deliver(
                 source, folder, task, wish, out=out, overwrite=overwrite, progress=progress

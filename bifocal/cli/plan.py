@@ -79,6 +79,12 @@ def _lines(plan: Plan) -> Iterator[str]:
     yield plan.basis
     best = plan.best
     yield f"\nBest: {best.c1:g} mm from {best.d1:.2f} m and {best.c2:g} mm from {best.d2:.2f} m."
+    third = plan.third_photo(best)
+    yield (
+        f"A third photo, {third.c:g} mm from {third.d:.2f} m and {third.step:.2f} m aside: sigma "
+        f"of r {third.at_nadir * 1000:.1f} mm at the nadir, where the pair tells nothing; at the "
+        f"RMS radius {third.at_rms * 1000:.1f} mm instead of {best.sigma_r_rms * 1000:.1f}."
+    )
     x, y, sigma = plan.sigma_grid(best, columns=7, rows=5)
     yield f"\nsigma of r [mm] over its photo, picks of {plan.sigma_px:g} px:"
     grid = [

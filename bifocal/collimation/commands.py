@@ -246,6 +246,19 @@ def _control_paste(state: SurveyState, command: Fields) -> list[Change]:
     return changes
 
 
+def _control_add(state: SurveyState, command: Fields) -> list[Change]:
+    """Add targets that a job found, to be given their coordinates; taken names get another."""
+    changes, taken = [], set(state.control)
+    for entry in command["control"]:
+        name = entry["name"]
+        while name in taken:
+            name = f"{name}b"
+        taken.add(name)
+        point = PickedControl(name=name, order=state.next_order(), picks=tupled(entry["picks"]))
+        changes.append(Change("control", name, None, point))
+    return changes
+
+
 def _taped(state: SurveyState, tape: TapedLength) -> Change:
     key = "|".join(sorted((tape.start, tape.end)))
     return Change("tapes", key, state.tapes.get(key), tape)
@@ -395,6 +408,7 @@ _RECORDS: dict[Any, Callable[[SurveyState, Fields], list[Change]]] = {
     "control.rename": _control_rename,
     "control.delete": _control_delete,
     "control.use": _control_use,
+    "control.add": _control_add,
     "length.set": _length_set,
     "length.delete": _length_delete,
     "wall.set": _wall_set,

@@ -193,7 +193,8 @@ NOTES: Mapping[str, Mapping[str, Reader]] = {
 }
 #: What the journal holds: also the points, and the order of the photos, that a job found.
 RECORDS = {
-    **COMMANDS, **NOTES, "points.add": {"points": _of([_FOUND], "a list of points")},
+    **COMMANDS, **NOTES, "control.add": {"control": _of([_FOUND], "a list of targets")},
+    "points.add": {"points": _of([_FOUND], "a list of points")},
     "photos.exchange": {"found?": _FLAG},
 }  # fmt: skip
 

@@ -28,12 +28,13 @@ from bifocal.orthophotos.deliver_workflow import DPI, DeliverTask, default_title
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
 from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
 from bifocal.reports.content import ReportTask
+from bifocal.reports.handover import HandoverTask, write_handover
 from bifocal.reports.view_workflow import view_relief
 from bifocal.reports.workflow import report_of
 from bifocal.workbook.match_workflow import match_pair_file
 from bifocal.workbook.pair_workflow import read_pair
 from photocore.cli import Progress
-from photocore.errors import PhotogrammetryError
+from photocore.errors import GeometryError, PhotogrammetryError
 from photocore.images import image_info, read_grey
 from photocore.interrupts import end_on_signals
 from photocore.jsonfile import plain
@@ -122,6 +123,15 @@ def _match(task: Task, progress: Progress) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _targets(task: Task, progress: Progress) -> dict[str, Any]:
+    """Return the targets that both photos show."""
+    try:
+        found = _match({**task, "count": 5000, "features": False}, progress)
+    except GeometryError:  # too few to check the pair by
+        return {"points": []}
+    return {"points": [one for one in found["points"] if one["code"] != "feature"]}
+
+
 def _relief(task: Task, progress: Progress) -> dict[str, Any]:
     job = ReliefJob(
         out=Path(task["out"]), overwrite=task["overwrite"], faces=faces_path(None, task["pair"]),
@@ -171,11 +181,15 @@ def _deliver(task: Task, progress: Progress) -> dict[str, Any]:
 
 
 def _documents(task: Task, title: str, progress: Progress) -> list[str]:
-    """Write the report and, of a relief map, the page that turns it; return their names."""
+    """Write the file to hand over, the report and a view of the relief; return their names."""
     out, relief, ortho = Path(task["out"]), _path(task["relief"]), _path(task["ortho"])
     language = task["drawing"]["language"]
-    names = {key: out / f"{task['stem']}_{key}.html" for key in ("report", "3d")}
-    progress(0.2, 1.0)
+    names = {key: out / f"{task['stem']}_{key}.html" for key in ("report", "3d", "handover")}
+    shown = HandoverTask(
+        relief=relief, ortho=ortho, points=_path(task["mark"]), title=title, language=language
+    )
+    write_handover(Path(task["pair"]), names["handover"], shown, overwrite=task["overwrite"])
+    progress(0.4, 1.0)
     if relief is not None:
         view_relief(relief, names["3d"], ortho=ortho, title=title, language=language,
                     overwrite=task["overwrite"])  # fmt: skip
@@ -216,6 +230,7 @@ def _path(name: str | None) -> Path | None:
 _WORKS: dict[str, Callable[[Task, Progress], dict[str, Any]]] = {
     "align": _align,
     "match": _match,
+    "targets": _targets,
     "relief": _relief,
     "ortho": _ortho,
     "deliver": _deliver,

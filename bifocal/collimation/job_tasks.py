@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.collimation.drawing import write_points_drawing
-from bifocal.collimation.fields import FieldError, positive_of
+from bifocal.collimation.fields import FieldError, positive_of, tupled
 from bifocal.collimation.jobs import PageJob
 from bifocal.collimation.live_orientation import control_of, lenses_of, site_of
 from bifocal.collimation.proposals import NOMINAL
@@ -26,7 +26,7 @@ from photocore.jsonfile import plain
 from photocore.output import free_path
 from photocore.tables import write_csv
 
-KINDS = ("align", "match", "relief", "ortho", "deliver", "suggest")
+KINDS = ("align", "match", "targets", "relief", "ortho", "deliver", "suggest")
 Options = Mapping[str, Any]
 
 
@@ -55,6 +55,11 @@ def task_of(session: Session, kind: str, options: Options) -> dict[str, Any]:
         raise FieldError(f"kind: one of {', '.join(KINDS)}.")
     if kind == "align":
         return {"kind": kind, **_align_task(session, options)}
+    if kind == "targets":
+        path = session.proposed_path or session.files.pair
+        if path is None:
+            raise InputError(remark("page.align_first"))
+        return {"kind": kind, "pair": str(path.resolve())}
     if session.files.pair is None:
         raise InputError(remark("page.accept_first"))
     pair = {"kind": kind, "pair": str(session.files.pair.resolve())}
@@ -242,6 +247,12 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
     if kind == "match":
         session.command({"op": "points.add", "points": result["points"]})
         return ""
+    if kind == "targets":
+        known = {point.picks for point in session.state.control.values()}
+        new = [one for one in result["points"] if tupled(one["picks"]) not in known]
+        if new:
+            session.command({"op": "control.add", "control": new})
+        return say("targets", "found" if new else "none", session.spoken, count=len(new))
     if kind == "suggest":
         session.suggested = result["shapes"]
         return "" if result["shapes"] else say("shapes", "none", session.spoken)

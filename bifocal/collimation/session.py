@@ -222,6 +222,14 @@ class Session:
         if self.sync.read is not None:
             self.set_precision(self.sync.read.sigma_px, self.sync.read.limits)
 
+    def use_pair(self, path: Path) -> None:
+        """Let a pair file be the survey's orientation."""
+        with self.lock:
+            self.files = replace(self.files, pair=path)
+            self._remember_files()
+            self._show_pair(Pair.read(path))
+            self.changed()
+
     def _note_accepted(self, name: str) -> None:
         """Let the last proposal be the survey's orientation, as a step that can be taken back."""
         after = {"report": {}, **(self.proposal or {}), "pair": name}

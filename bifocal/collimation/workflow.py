@@ -19,6 +19,7 @@ from bifocal.collimation.project import find_files
 from bifocal.collimation.server.access import Access
 from bifocal.collimation.server.application import application
 from bifocal.collimation.session import Session
+from bifocal.collimation.starting import remember
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.interrupts import raising
 
@@ -144,6 +145,7 @@ def pick(
     """
     with page_server(*sources, workbook=workbook, port=port, language=language) as server:
         if browser:
+            remember(server.session.files)
             server.open_browser()
         server.serve()
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +15,16 @@ from bifocal.files.dxf import add_ellipse, add_text, layer_name, new_drawing, sa
 from bifocal.model.points import PointLine, SurveyPoints
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, not_negative
+from photocore.camera.similarity import Similarity, fit_similarity
 from photocore.cloud import write_cloud
-from photocore.errors import InputError
+from photocore.errors import GeometryError, InputError
 from photocore.output import atomic_path
 from photocore.tables import write_csv
-from photocore.workbook.making.newbook import new_workbook, plain_cell, save_book
+from photocore.workbook.changing.cells import CellValue
+from photocore.workbook.making.newbook import finish_book, new_workbook, plain_cell
+
+if TYPE_CHECKING:
+    from openpyxl import Workbook
 
 #: Point lists as surveyors name them: P point, N north, E east, Z height, D description.
 ORDERS = ("PNEZD", "PENZD")
@@ -260,17 +267,58 @@ def _write_geojson(
 _ELLIPSE = ("ellipse_a", "ellipse_b", "ellipse_azimuth")
 
 
+#: World coordinates follow from those of the wall where they do to this. [m]
+_EXACT = 1e-6
+#: A world coordinate by the cells of the sheet `World`.
+_PLACED = "=w_{axis}+w_k*(w_{i}1*(B{row}-w_X)+w_{i}2*(C{row}-w_Y)+w_{i}3*(D{row}-w_Z))"
+
+
 def _write_xlsx(path: Path, points: SurveyPoints, coordinates: FloatArray) -> None:  # noqa: ARG001
-    """Write all coordinates as a plain table of values."""
+    """Write all coordinates as a plain table, world coordinates as formulas where they can be."""
     from openpyxl import Workbook
 
     book = Workbook(write_only=True)
-    sheet = book.create_sheet("Results")
-    sigmas = _sigmas(points)
+    sheet, results = book.create_sheet("Results"), dict[str, CellValue]()
+    sigmas, fit = _sigmas(points), _to_world(points)
     sheet.append(["id", "X", "Y", "Z", "E", "N", "H", *sigmas, "flag", "note"])
     world = points.world if points.world is not None else np.full((len(points), 3), np.nan)
-    for i, name in enumerate(points.ids):
+    for row, name in enumerate(points.ids, start=2):
+        i = row - 2
         numbers = [*points.xyz[i], *world[i], *(values[i] for values in sigmas.values())]
-        row = (name, *numbers, points.flags[i], points.notes[i])
-        sheet.append([plain_cell(sheet, value) for value in row])
-    save_book(book, path)
+        values = (name, *numbers, points.flags[i], points.notes[i])
+        cells = [plain_cell(sheet, value) for value in values]
+        if fit is not None:
+            cells[4:7] = [_PLACED.format(axis=a, i=k, row=row) for k, a in enumerate("ENH", 1)]
+            results |= {f"{a}{row}": float(v) for a, v in zip("EFG", world[i], strict=True)}
+        sheet.append(cells)
+    if fit is not None:
+        _add_world(book, fit)
+    package = io.BytesIO()
+    book.properties.creator = "bifocal"
+    book.save(package)
+    finish_book(package, path, results={"Results": results})
+
+
+def _to_world(points: SurveyPoints) -> Similarity | None:
+    """Return what all world coordinates follow from; None where no similarity gives them."""
+    if points.world is None or not np.isfinite(points.world).all():
+        return None
+    try:
+        fit = fit_similarity(points.xyz, points.world)
+    except GeometryError:
+        return None
+    return fit if np.abs(fit(points.xyz) - points.world).max() < _EXACT else None
+
+
+def _add_world(book: Workbook, fit: Similarity) -> None:
+    """Add the sheet whose named cells place the points in the world."""
+    from openpyxl.workbook.defined_name import DefinedName
+
+    cells = {"k": fit.scale, **dict(zip("XYZ", fit.source_centre.tolist(), strict=True))}
+    cells |= dict(zip("ENH", fit.target_centre.tolist(), strict=True))
+    cells |= {f"{i}{j}": float(fit.rotation[i - 1, j - 1]) for i in (1, 2, 3) for j in (1, 2, 3)}
+    sheet = book.create_sheet("World")
+    for row, (name, value) in enumerate(cells.items(), start=1):
+        sheet.append([f"w_{name}", value])
+        place = f"World!$B${row}"
+        book.defined_names[f"w_{name}"] = DefinedName(f"w_{name}", attr_text=place)

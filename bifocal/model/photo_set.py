@@ -363,6 +363,14 @@ class PhotoSet:
         return np.column_stack([plane, np.zeros(len(plane))])
 
 
+def pair_or_set(source: PhotoSet | Pair | Path | str) -> PhotoSet | Pair:
+    """Return a set of three photos and more or a pair, as it is or of its file; two are a pair."""
+    if isinstance(source, Path | str):
+        is_set = read_object(source, what="pair file").get("format") == SET_FORMAT
+        source = PhotoSet.read(source) if is_set else Pair.read(source)
+    return source.pair(0, 1) if isinstance(source, PhotoSet) and len(source) == 2 else source
+
+
 def _names(photos: tuple[Photo, ...]) -> tuple[str, ...]:
     """Return a name for each photo: its own, else that of its file.
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
-from bifocal.model.photo_set import PhotoSet
+from bifocal.model.photo_set import PhotoSet, pair_or_set
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,6 +35,12 @@ class PhotosOfSet(Pair):
             image1=by_distance[0], image2=by_distance[-1], folder=photos.folder,
             extra=photos.extra, remarks=photos.remarks, photos=photos.photos,
         )  # fmt: skip
+
+    @classmethod
+    def of(cls, source: PhotoSet | Pair | Path | str) -> Pair:
+        """Return all photos of a set of three and more, else a pair; as it is or of its file."""
+        photos = pair_or_set(source)
+        return cls.of_set(photos) if isinstance(photos, PhotoSet) else photos
 
     def photo(self, number: int) -> Photo:
         """Return a photo by its number, from 1."""

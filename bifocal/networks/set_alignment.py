@@ -147,6 +147,7 @@ def set_alignment(
         "way": oriented.way, "sigma0": adjusted.sigma0, "assumed": list(assumed),
         "focal_px": [float(camera.matrix[0, 0]) for camera in cameras],
         "principal_point_px": [camera.matrix[:2, 2] for camera in cameras],
+        "radial": radial * unit[:, -2:] if radial.any() else None,
         "interior": [interior.source for interior in first.interiors],
         "standard_deviations": [
             {"distance": s[9], "nadir": float(np.hypot(*s[7:9]) / np.sqrt(2)),

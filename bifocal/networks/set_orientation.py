@@ -7,9 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bifocal.matching.features import Features, find_features
+from bifocal.matching.features import Features, find_features, spread_evenly
 from bifocal.networks.camera_knowledge import CameraKnowledge
-from bifocal.networks.joint_adjustment import JointAdjustment, JointUnknowns, adjust_jointly
+from bifocal.networks.joint_adjustment import (
+    JointAdjustment,
+    JointUnknowns,
+    adjust_jointly,
+    settled_jointly,
+)
 from bifocal.networks.joint_observations import JointObservations, with_rays
 from bifocal.networks.joint_ties import SharedPoints, common_features
 from bifocal.networks.set_start import FirstCameras, first_cameras_of, meeting
@@ -31,10 +36,11 @@ from photocore.camera.pinhole import project_with_jacobian
 from photocore.cli import Progress, no_progress
 from photocore.errors import GeometryError
 
-#: Features of a photo, and pixels in which they are looked for.
-FEATURES, PIXELS = 8000, 6e6
-#: Common points of two photos that are kept.
-MATCHES = 600
+#: Features of so many photos, of more fewer each: matching all with all takes time in proportion to
+#: the photos. And pixels in which they are looked for.
+FEATURES, PHOTOS, PIXELS = 8000, 3, 6e6
+#: Common points of two photos that are looked at, and rays of a photo that are kept.
+MATCHES, RAYS = 600, 300
 #: Precision of features as found, of the searched photo, and of patches before they tell it. [px]
 FOUND, REFINED = 0.5, 0.2
 #: Chance from which a point tells of the wall's plane.
@@ -93,12 +99,12 @@ def orient_set(
     GeometryError
         If a photo is blurred or shares too little with the others, or no two make a pair.
     """
-    features = []
+    features, most = [], int(FEATURES * min(1.0, PHOTOS / len(photos)) ** 0.5)
     for k, photo in enumerate(photos):
         progress(k, len(photos) + 2, photo.name)
         assert photo.grey is not None
         validation.check_sharp(photo.name, photo.grey)
-        found = find_features(photo.grey, limit=FEATURES, budget=PIXELS)
+        found = find_features(photo.grey, limit=most, budget=PIXELS)
         features.append(replace(found, pixels=photo.interior.ideal(found.pixels)))
     progress(len(photos), len(photos) + 2, "matches")
     seen = _seen(photos, features, control)
@@ -110,7 +116,7 @@ def orient_set(
     observed = replace(
         observed, sigma=np.where(is_tie, FOUND * reduction[observed.camera], site.sigma_pick)
     )
-    start = JointUnknowns(cameras=first.cameras, xyz=first.xyz, radial=first.radial)
+    state = JointUnknowns(cameras=first.cameras, xyz=first.xyz, radial=first.radial)
     before = [
         (first.xyz[observed.point] - camera.centre) @ camera.rotation[2] > 0
         for camera in first.cameras
@@ -118,43 +124,43 @@ def orient_set(
     there = np.array(before)[observed.camera, np.arange(len(is_tie))]
     # A tie whose rays run along each other would wander on them.
     observed = with_rays(observed, there & (~is_tie | first.met[observed.point]))
-    state = adjust_jointly(observed, start)
-    for _ in range(2):  # the second pass searches around better places
-        observed = _refined(photos, observed, state, first, len(control.ids))
-        state = _readjusted(observed, state, first, len(control.ids))
+    count = len(control.ids)
+    for rounds in (3, 1):  # the second pass searches around better places
+        observed, state, _ = settled_jointly(observed, state, rounds)
+        observed = _refined(photos, observed, state, first, count)
+        observed, state = _met(observed, state, count)
     for _ in range(2):  # a few wrong patches hide each other
-        observed, sigma = _without_gross(state, len(control.ids))
-        state = _readjusted(observed, state, first, len(control.ids))
+        observed, state, misfit = settled_jointly(observed, state, 1)
+        observed, sigma = _without_gross(observed, misfit, count)
+        observed, state = _met(observed, state, count)
     return _adjusted(observed, state, first, control, site, sigma)
 
 
-def _readjusted(
-    observed: JointObservations, state: JointAdjustment, first: FirstCameras, control: int
-) -> JointAdjustment:
-    """Return everything adjusted from where it was, without ties that wander along their rays."""
+def _met(
+    observed: JointObservations, state: JointUnknowns, control: int
+) -> tuple[JointObservations, JointUnknowns]:
+    """Return the rays without ties that wander along them, and ties where their rays meet."""
     seen = SharedPoints(
         photo=observed.camera, point=observed.point, pixels=observed.pixels, count=len(observed.ids)
     )
     places = meeting(dict(enumerate(state.cameras)), seen, seen.pixels)
     met = np.asarray(np.isfinite(places).all(axis=1))
+    met[:control] = False
+    xyz = np.where(met[:, None], places, state.xyz)
     met[:control] = True
-    observed = with_rays(observed, met[observed.point])
-    start = JointUnknowns(
-        cameras=state.cameras, radial=state.radial,
-        xyz=np.where(np.isfinite(state.xyz), state.xyz, first.xyz),
-    )  # fmt: skip
-    return adjust_jointly(observed, start)
+    return with_rays(observed, met[observed.point]), replace(state, xyz=xyz)
 
 
-def _without_gross(state: JointAdjustment, control: int) -> tuple[JointObservations, float]:
+def _without_gross(
+    observed: JointObservations, misfit: FloatArray, control: int
+) -> tuple[JointObservations, float]:
     """Return the rays without those that most ties contradict, and the precision of these. [px]"""
-    seen = state.observations
-    ties = seen.point >= control
-    free = max(state.redundancy / (2 * len(seen.point)), 0.05)
-    sigma = max(robust_sigma(state.residuals[ties].ravel()) / float(np.sqrt(free)), TIES.best)
-    off = np.abs(state.residuals).max(axis=1)
-    kept = ~ties | (off < OUTLIER_LIMIT * sigma)
-    return with_rays(replace(seen, sigma=np.where(ties, sigma, seen.sigma)), kept), sigma
+    ties = observed.point >= control
+    free = max(1.0 - 1.5 * len(np.unique(observed.point[ties])) / max(ties.sum(), 1), 0.05)
+    sigma = max(robust_sigma(misfit[ties].ravel()) / float(np.sqrt(free)), TIES.best)
+    kept = ~ties | (np.abs(misfit).max(axis=1) < OUTLIER_LIMIT * sigma)
+    stated = np.where(ties, sigma, observed.sigma)
+    return with_rays(replace(observed, sigma=stated), kept), sigma
 
 
 def _seen(
@@ -162,7 +168,8 @@ def _seen(
 ) -> SharedPoints:
     """Return where control points and then ties are seen, free of the lens files' distortion."""
     shapes = [photo.interior.image_size[::-1] for photo in photos]
-    ties = common_features(features, shapes, ~np.eye(len(photos), dtype=bool), most=MATCHES)
+    every = common_features(features, shapes, ~np.eye(len(photos), dtype=bool), most=MATCHES)
+    ties = _spread(every, shapes)
     count, picks = len(control.ids), control.picks if control.ids else ()
     picked = [np.flatnonzero(np.isfinite(own).all(axis=1)) for own in picks]
     parts = [photos[k].interior.ideal(picks[k][rows]) for k, rows in enumerate(picked)]
@@ -172,6 +179,22 @@ def _seen(
         point=np.concatenate([*picked, ties.point + count]),
         pixels=np.concatenate([*parts, ties.pixels]),
         count=count + ties.count,
+    )  # fmt: skip
+
+
+def _spread(ties: SharedPoints, shapes: Sequence[tuple[int, int]]) -> SharedPoints:
+    """Return some hundred rays of each photo, of points that most photos show, evenly spread."""
+    count = np.bincount(ties.point, minlength=ties.count)
+    keep = np.zeros(len(ties.photo), dtype=bool)
+    for k, shape in enumerate(shapes):
+        own = np.flatnonzero(ties.photo == k)
+        few = 1.0 / count[ties.point[own]]
+        keep[own[spread_evenly(ties.pixels[own], few, shape, RAYS)]] = True
+    keep &= (np.bincount(ties.point[keep], minlength=ties.count) >= 2)[ties.point]
+    number = np.cumsum(np.bincount(ties.point[keep], minlength=ties.count) > 0) - 1
+    return SharedPoints(
+        photo=ties.photo[keep], point=number[ties.point[keep]], pixels=ties.pixels[keep],
+        count=int(number[-1]) + 1 if len(number) else 0,
     )  # fmt: skip
 
 
@@ -247,7 +270,7 @@ def _refined(
 
 
 def _adjusted(
-    observed: JointObservations, state: JointAdjustment, first: FirstCameras, control: Control,
+    observed: JointObservations, state: JointUnknowns, first: FirstCameras, control: Control,
     site: SiteMeasures, sigma_tie: float,
 ) -> OrientedSet:  # fmt: skip
     """Return everything adjusted once, with control, tapes, lines and the wall.
@@ -267,7 +290,7 @@ def _adjusted(
     if knowledge.by_wall:
         count = len(control.ids)
         known[:count], spread[:count] = control.xyz, control.sigma
-        on_wall, rough = _wall(state, count, sigma_tie)
+        on_wall, rough = _wall(observed, state, count, sigma_tie)
         known[on_wall, 2], spread[on_wall, 2] = 0.0, rough[on_wall]
         held = {first.far: ("turn Z", "X", "Y")} if free_frame else {}
         cameras = {1: first.far, 2: first.near}
@@ -292,13 +315,15 @@ def _adjusted(
     )  # fmt: skip
     observed = replace(observed, sigma=sigma, known=known, sigma_known=spread, cameras=knowledge)
     return OrientedSet(
-        first=first, adjusted=_readjusted(observed, state, first, len(control.ids)),
-        control=control, sigma_tie=sigma_tie, on_wall=int(on_wall.sum()),
+        first=first, adjusted=adjust_jointly(observed, state), control=control,
+        sigma_tie=sigma_tie, on_wall=int(on_wall.sum()),
         free_frame=bool(free_frame), way="auto" if knowledge.by_wall else "control",
     )  # fmt: skip
 
 
-def _wall(state: JointAdjustment, control: int, sigma_tie: float) -> tuple[BoolArray, FloatArray]:
+def _wall(
+    seen: JointObservations, state: JointUnknowns, control: int, sigma_tie: float
+) -> tuple[BoolArray, FloatArray]:
     """Return which ties tell of the wall's plane, and by what sigma they lie on it, (p,). [m]
 
     Roughness is common to stretches of the wall, as in `bifocal.orientation.tie_points.with_wall`.
@@ -308,7 +333,7 @@ def _wall(state: JointAdjustment, control: int, sigma_tie: float) -> tuple[BoolA
     GeometryError
         If there is no wall.
     """
-    seen, xyz = state.observations, state.xyz
+    xyz = state.xyz
     camera = max(state.cameras, key=lambda one: float(one.centre[2]))
     normal = np.zeros((len(xyz), 3, 3))
     for k, own in enumerate(state.cameras):

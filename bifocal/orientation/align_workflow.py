@@ -100,6 +100,11 @@ class AlignOptions:
     unit: str = ""
     media: PairMedia = field(default_factory=PairMedia.none)
 
+    @property
+    def direction(self) -> tuple[FloatArray, bool] | None:
+        """The line's ends in the far photo, shape (2, 2), and whether it is upright."""
+        return self.line and (np.array(self.line[0], np.float64).reshape(2, 2), self.line[1])
+
     @classmethod
     def from_given(cls, given: Mapping[str, Any]) -> AlignOptions:
         """Return the options of a mapping with the names of the command's; absent ones unknown."""
@@ -185,10 +190,7 @@ def align_photos(
     paths, ordered = (far, near), (first, second)
     if oriented.exchanged:
         paths, ordered = (near, far), (second, first)
-    line = None
-    if options.line is not None:
-        line = (np.array(options.line[0], dtype=np.float64).reshape(2, 2), options.line[1])
-    alignment = make_alignment(oriented, ordered, way=way, direction=line)
+    alignment = make_alignment(oriented, ordered, way=way, direction=options.direction)
     if picture is not None:
         images = [photo.grey for photo in ordered if photo.grey is not None]
         write_alignment_picture(picture, alignment, (images[0], images[1]), overwrite=overwrite)

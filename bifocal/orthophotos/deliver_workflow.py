@@ -23,6 +23,8 @@ from bifocal.model.geotiff import (
 )
 from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
+from bifocal.model.photo_set import PhotoSet, pair_or_set
+from bifocal.model.photos_of_set import PhotosOfSet
 from bifocal.model.points import SurveyPoints
 from bifocal.model.relief_map import Quality, measured_part
 from bifocal.model.surface import FlatSurface, MapSurface, Surface
@@ -67,7 +69,7 @@ DPI = 254.0
 #: Every picture is written with its world file, for the web, for CAD and on a sheet.
 PICTURE_ENDINGS = ("tif", "tfw", "png", "dxf", "pdf")
 #: What is no part of the name of a pair's file.
-_PAIR_ENDINGS = (".pair.json", ".json", ".xlsx", ".xlsm")
+_PAIR_ENDINGS = (".pair.json", ".photos.json", ".json", ".xlsx", ".xlsm")
 #: Names shorter than this say nothing as a title: the folder's is taken.
 _SHORT = 3
 
@@ -144,7 +146,7 @@ class _Relief:
 
 
 def deliver(
-    pair_path: Pair | Path,
+    pair_path: Pair | PhotoSet | Path,
     folder: Path,
     task: OrthoTask,
     wish: DeliverTask,
@@ -168,7 +170,7 @@ def deliver(
     scale = positive(wish.scale, "scale")
     gsd = task.gsd or gsd_at_scale(positive(wish.dpi, "dpi"), scale)
     task = replace(task, gsd=gsd, scale=scale, overviews=True)
-    pair = Pair.of(pair_path)
+    pair = PhotosOfSet.of(pair_path)
     title = wish.title or default_title(pair_path)
     name = file_name(title)
     _check_outputs(out, folder, name, (task.relief, *pair.photo_files))
@@ -258,19 +260,19 @@ def _check_free(
             check_writable(path, overwrite=overwrite)
 
 
-def default_title(source: Pair | Path, path: Path | None = None) -> str:
+def default_title(source: Pair | PhotoSet | Path, path: Path | None = None) -> str:
     """Return the name of a pair; of a nameless one that of its file, or of the file's folder.
 
     The folder's where there is no file, or one called ``w`` or the like.
 
     Parameters
     ----------
-    source : Pair or Path
+    source : Pair, PhotoSet or Path
     path : Path, optional
         Where a pair was read from.
     """
     path = source if isinstance(source, Path) else path
-    pair = Pair.of(source)
+    pair = pair_or_set(source)
     if pair.extra.get("name"):
         return str(pair.extra["name"])
     stem = path.name if path else ""
@@ -455,11 +457,16 @@ def _notes(
     precise = _accuracy(pair, grid, task, reader)
     known = dict(zip(("own", "place", "relief"), precise, strict=False))
     relief, say = task.relief or task.points, words_of("bifocal.orthophotos", wish.language)
+    if isinstance(pair, PhotosOfSet):
+        distances = ", ".join(f"{photo.distance:.3f} m" for photo in pair.photos)
+        cameras = say("photos_of_set", count=len(pair.photos), distances=distances)
+    else:
+        d1, d2 = pair.image1.distance, pair.image2.distance
+        cameras = say(f"photo_{task.photo_words}", d1=d1, d2=d2)
     return (
         say("pixel", size=grid.gsd * 1000, dpi=dpi_at_scale(grid.gsd, wish.scale)),
         say("accuracy" if len(known) > 1 else "photo_pixel", **known),
-        wish.camera
-        or say(f"photo_{task.photo_words}", d1=pair.image1.distance, d2=pair.image2.distance),
+        wish.camera or cameras,
         *((say("media", media=media_words(pair.layers)),) if pair.layers else ()),
         say("relief_of", name=relief.name) if relief else say("relief_plane", plane=task.plane),
         f"{program()}, {today()}",

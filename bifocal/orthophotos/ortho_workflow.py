@@ -134,9 +134,7 @@ def make_ortho(
         If an input is missing or does not fit, the size is not plausible, or writing fails.
     """
     check_ending(out, ORTHO_ENDING, ".tif", ".tiff")
-    if isinstance(pair_path, PhotoSet):
-        pair_path = PhotosOfSet.of_set(pair_path)
-    pair = Pair.of(pair_path)
+    pair = PhotosOfSet.of(pair_path)
     check_not_input(out, task.relief, *pair.photo_files)
     check_writable(out, overwrite=overwrite)
     with open_surface(task, pair) as (surface, _, remarks):
@@ -358,9 +356,7 @@ def _sources(
             if matched is not photos[place]:
                 break
         photos[place] = matched
-        remarks.append(
-            note if len(photos) == 2 else remark("ortho.of_image", number=place + 1, note=note)
-        )
+        remarks.append(note)
     return photos, remarks
 
 

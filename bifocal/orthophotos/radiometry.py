@@ -166,7 +166,9 @@ def match_exposure(
     ]
     image = _recoloured(second.image, fits, limit)
     gains = ", ".join(f"{math.exp(fit[0]):.2f}" for fit in fits)
-    return replace(second, image=image), remark("ortho.matched", gains=gains)
+    return replace(second, image=image), remark(
+        "ortho.matched", second=second.number, first=first.number, gains=gains
+    )
 
 
 def _fit(log1: FloatArray, log2: FloatArray, square: FloatArray) -> FloatArray:

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
 from bifocal.model.pair_media import PairMedia
+from bifocal.model.photo_set import PhotoSet
 from photocore.arrays import FloatArray, positive
 from photocore.camera.pinhole import Pinhole
 from photocore.errors import InputError
 
 #: Of the frame of 36 x 24 mm, by which makers state equivalents. [mm]
 FILM_DIAGONAL = float(np.hypot(36.0, 24.0))
+
+#: Step aside of a third photo, as a share of the near distance: its rays then meet at 10 degrees.
+STEP = 1 / 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,6 +123,26 @@ class Station:
     straight: tuple[float, float] = (0.0, 0.0)
 
 
+class ThirdPhoto(NamedTuple):
+    """What a third photo adds: as the near one, a step aside along the wall.
+
+    Attributes
+    ----------
+    c, d, step : float
+        Principal distance [mm], distance from the wall and step aside [m].
+    at_nadir : float
+        Expected sigma of the relief at the nadir of the pair, which alone tells nothing there. [m]
+    at_rms : float
+        That at the RMS radius of the frame, on all sides. [m]
+    """
+
+    c: float
+    d: float
+    step: float
+    at_nadir: float
+    at_rms: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Plan:
     """Stations for every pair of lenses, best first.
@@ -160,6 +185,30 @@ class Plan:
             pair, setup="stations and focal lengths exactly as planned",
             picks=f"picks of {self.sigma_px:g} px assumed in both photos",
         )  # fmt: skip
+
+    def third_photo(self, station: Station, step: float | None = None) -> ThirdPhoto:
+        """Return what a third photo adds to a pair, by default a sixth of its distance aside. [m]
+
+        All rays of a point are intersected (`bifocal.PhotoSet.intersect`); the third camera is
+        square to the wall, or turned back by some degrees, which changes next to nothing.
+        """
+        step = station.d2 * STEP if step is None else step
+        d, c = (station.d1, station.d2), (station.c1, station.c2)
+        pair = planned_pair(self.media, d, c, pitch=self.sensor.pitch, sigma_px=self.sigma_px)
+        along = np.array([[1.0, 0.0, step], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        aside = replace(
+            pair.image2, plane_from_pixel=along @ pair.image2.plane_from_pixel,
+            nadir=pair.image2.nadir + np.array([step, 0.0]),
+        )  # fmt: skip
+        named = (replace(p, name=str(k)) for k, p in enumerate((pair.image1, pair.image2, aside)))
+        photos = PhotoSet(photos=tuple(named))
+        angle = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+        rms = float(np.hypot(*station.footprint)) / np.sqrt(12.0)
+        xyz = rms * np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
+        xyz = np.vstack([np.zeros((1, 3)), xyz])
+        sigma = photos.intersect(photos.project(xyz)).sigma[:, 2]
+        spread = float(np.sqrt(np.mean(sigma[1:] ** 2)))
+        return ThirdPhoto(station.c2, station.d2, step, float(sigma[0]), spread)
 
     def sigma_grid(
         self, station: Station, *, columns: int = 9, rows: int = 7

@@ -44,5 +44,6 @@ def plan_as_dict(plan: Plan) -> dict[str, Any]:
         "sigma_px": plan.sigma_px,
         "rests_on": plan.basis,
         "sigma_r_max": plan.sigma_r_max,
+        "third_photo": plan.third_photo(plan.best)._asdict(),
         "sigma_r_over_frame": {"x": x, "y": y, "sigma_r": sigma},
     }

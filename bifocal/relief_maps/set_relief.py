@@ -208,9 +208,11 @@ def _of_set(
     progress(1.0, 1.0)
     names = photos.names
     worst = max(made.values(), key=lambda one: one.registration.systematic)
+    judged = [one.registration.false_relief_per_scale for one in made.values()]
+    registration = replace(worst.registration, false_relief_per_scale=min(judged))
     return DenseRelief(
         r=bands.r, sigma=bands.sigma, quality=bands.quality, plane_from_pixel=grid.plane_from_pixel,
-        registration=worst.registration, working_gsd=worst.working_gsd,
+        registration=registration, working_gsd=worst.working_gsd,
         used=tuple((names[far], names[near]) for far, near in made),
         notes=tuple(
             remark("relief.pair_left_out", far=names[far], near=names[near], why=str(error))

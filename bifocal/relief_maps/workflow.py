@@ -18,7 +18,7 @@ from bifocal.files.photos import photo_infos
 from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
-from bifocal.model.photo_set import PhotoSet
+from bifocal.model.photo_set import PhotoSet, pair_or_set
 from bifocal.model.relief_map import ReliefMap
 from bifocal.relief_maps import dense_relief
 from bifocal.relief_maps.frame import values_at
@@ -89,7 +89,7 @@ def relief_of_pair(
     InputError, GeometryError
         If a file or an option is unusable, or the photos do not fit; nothing is then written.
     """
-    photos = source if isinstance(source, PhotoSet) else Pair.of(source)
+    photos = pair_or_set(source)
     infos = photo_infos(photos)
     _check_outputs(job, *(info.path for info in infos))
     faces, told = given_faces(job.faces)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import compress
 from pathlib import Path
@@ -11,21 +11,24 @@ from typing import Any, ClassVar, Protocol
 import cv2
 import numpy as np
 
-from bifocal.files.photos import photo_info
+from bifocal.files.photos import photo_infos
 from bifocal.files.strips import ROWS, colour_strips
 from bifocal.model.geotiff import RasterReader
 from bifocal.model.grid import Bounds
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
+from bifocal.model.photo_set import PhotoSet, pair_or_set
 from bifocal.model.relief_map import Quality, ReliefMap
 from bifocal.model.surface import MapSurface
 from bifocal.options import defaults_of, typed
 from bifocal.reports.control_survey import is_exchanged, solve_control
+from bifocal.survey.set_survey import best_pair
 from bifocal.survey.solved_survey import SolvedSurvey
 from bifocal.workbook.workflow import solve
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.errors import InputError, located
 from photocore.images import read_image, to_eight_bit
+from photocore.reports.words import Words
 
 #: Longer side of pictures in a report. [px]
 SIDE = 1000
@@ -134,12 +137,15 @@ class ReportedPhoto:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PairContent:
-    """What is known of a pair.
+    """What is known of a pair, or of a set of photos.
 
     Attributes
     ----------
     task : ReportTask
     pair : Pair
+        Of a set its best.
+    of_set : PhotoSet or None
+        The set of three photos and more.
     source : Path
         Pair file or workbook.
     setup : mapping
@@ -147,7 +153,7 @@ class PairContent:
     solution : SolvedSurvey or None
         Points measured, and what they were compared with.
     photos : tuple of ReportedPhoto
-        Far and near one; empty where there are no files.
+        Far and near one, or all of a set; empty where there are no files.
     relief : ReliefMap or None
     ortho : (picture, bounds) or None
     ortho_gsd : float
@@ -163,6 +169,31 @@ class PairContent:
     relief: ReliefMap | None
     ortho: tuple[ByteArray, Bounds] | None
     ortho_gsd: float
+    of_set: PhotoSet | None = None
+
+    @property
+    def cameras(self) -> tuple[Photo, ...]:
+        """The photos as their file has them: far and near one, or all of a set."""
+        return (self.pair.image1, self.pair.image2) if self.of_set is None else self.of_set.photos
+
+    @property
+    def orientation(self) -> FloatArray | None:
+        """Covariance of all of them."""
+        return self.pair.orientation if self.of_set is None else self.of_set.orientation
+
+    @property
+    def deviations(self) -> Sequence[Mapping[str, float]]:
+        """Standard deviations of each camera by the keys of a set's file, where known."""
+        found = self.setup.get("standard_deviations", {})
+        if self.of_set is not None:
+            return found or [{}] * len(self.of_set)
+        keys = {"distance": "distance{}", "nadir": "nadir{}", "tilt_deg": "tilt{}_deg",
+                "focal_px": "focal{}"}  # fmt: skip
+        return [{key: found.get(own.format(n)) for key, own in keys.items()} for n in (1, 2)]
+
+    def names(self, say: Words) -> tuple[str, ...]:
+        """Return what the photos are called."""
+        return (say("far"), say("near")) if self.of_set is None else self.of_set.names
 
     @property
     def title(self) -> str:
@@ -212,6 +243,7 @@ def read_content(source: Path, task: ReportTask) -> PairContent:
         If a file is missing or is not what it should be.
     """
     solution: SolvedSurvey | None = None
+    of_set: PhotoSet | None = None
     if source.suffix.lower() in _WORKBOOKS:
         if task.control or task.check:
             raise InputError(
@@ -225,13 +257,15 @@ def read_content(source: Path, task: ReportTask) -> PairContent:
             setup = Pair.read(solution.pair_path).extra.get("setup")
             pair = _with_photos(pair, solution.pair_path)
     else:
-        pair = Pair.read(source)
-        setup = pair.extra.get("setup")
+        named = pair_or_set(source)
+        setup = named.extra.get("setup")
+        of_set = named if isinstance(named, PhotoSet) else None
+        pair = best_pair(named) if isinstance(named, PhotoSet) else named
         if task.control or task.check:
-            exchanged = task.far is not None and is_exchanged(pair, task.far)
+            exchanged = task.far is not None and is_exchanged(named, task.far)
             solution = solve_control(
                 source, control=task.control, check=task.check, exchanged=exchanged,
-                language=task.language, unit=task.unit,
+                photos=2 if of_set is None else len(of_set), language=task.language, unit=task.unit,
             )  # fmt: skip
     ortho, gsd = (None, 0.0) if task.ortho is None else ortho_thumbnail(task.ortho)
     return PairContent(
@@ -240,7 +274,8 @@ def read_content(source: Path, task: ReportTask) -> PairContent:
         source=source,
         setup=setup if isinstance(setup, dict) else {},
         solution=solution,
-        photos=_photos(pair),
+        of_set=of_set,
+        photos=_photos(of_set or pair),
         relief=None if task.relief is None else _relief(task.relief),
         ortho=ortho,
         ortho_gsd=gsd,
@@ -265,14 +300,14 @@ def _with_photos(pair: Pair, path: Path) -> Pair:
     return replace(pair, folder=named.folder, **images)
 
 
-def _photos(pair: Pair) -> tuple[ReportedPhoto, ...]:
-    """Return both photos made small; none where a file is not named or not there."""
+def _photos(source: Pair | PhotoSet) -> tuple[ReportedPhoto, ...]:
+    """Return all photos made small; none where a file is not named or not there."""
     photos = []
-    for number in (1, 2):
-        photo = pair.photo(number)
-        if not photo.file or not pair.photo_file(number).is_file():
-            return ()
-        image = to_eight_bit(read_image(photo_info(pair, number).path))
+    own = (source.image1, source.image2) if isinstance(source, Pair) else source.photos
+    if not all(photo.file and photo.path.is_file() for photo in own):
+        return ()
+    for photo, info in zip(own, photo_infos(source), strict=True):
+        image = to_eight_bit(read_image(info.path))
         height, width = image.shape[:2]
         reduction = max(1.0, max(width, height) / SIDE)
         size = (round(width / reduction), round(height / reduction))
@@ -283,7 +318,7 @@ def _photos(pair: Pair) -> tuple[ReportedPhoto, ...]:
     return tuple(photos)
 
 
-def ortho_thumbnail(path: Path) -> tuple[tuple[ByteArray, Bounds], float]:
+def ortho_thumbnail(path: Path, *, side: int = SIDE) -> tuple[tuple[ByteArray, Bounds], float]:
     """Return an orthophoto made small, empty pixels white, and its pixel. [m]
 
     Raises
@@ -299,7 +334,7 @@ def ortho_thumbnail(path: Path) -> tuple[tuple[ByteArray, Bounds], float]:
             )
         grid = reader.grid
         step = 1
-        while max(grid.width, grid.height) / step > 1.5 * SIDE and step < ROWS:
+        while max(grid.width, grid.height) / step > 1.5 * side and step < ROWS:
             step *= 2
         strips = []
         for colours, valid in colour_strips(reader):

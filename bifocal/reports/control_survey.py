@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import compress
 from pathlib import Path
@@ -9,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.model.pair import Pair
+from bifocal.model.photo_set import PhotoSet
 from bifocal.orientation.control_points import Control, read_control
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import KnownPoints
@@ -21,12 +24,29 @@ from photocore.errors import InputError
 CONTROL, CHECK = "CONTROL", "CHECK"
 
 
+def refuse_same_names(
+    control: Path, check: Path, first: Sequence[str], second: Sequence[str]
+) -> None:
+    """Refuse points of one name in the tables of control and of check points.
+
+    Raises
+    ------
+    InputError
+        Naming some of them.
+    """
+    counts = Counter([*first, *second])
+    twice = sorted(name for name, count in counts.items() if count > 1)
+    if twice:
+        raise InputError(f"{check}: {', '.join(twice[:5])} is in {control} too; give other names.")
+
+
 def solve_control(
     pair_path: Path,
     *,
     control: Path | None,
     check: Path | None = None,
     exchanged: bool = False,
+    photos: int = 2,
     language: str = "en",
     unit: str = "",
 ) -> SolvedSurvey:
@@ -35,12 +55,14 @@ def solve_control(
     Parameters
     ----------
     pair_path : Path
-        Pair file.
+        File of a pair or a set.
     control, check : Path, optional
         Tables: id, X, Y, r and pixels in both photos. Those of ``check`` took no part in the
         orientation: where there are any, they alone are compared.
     exchanged : bool
         Whether the tables name the photos the other way round than the pair file.
+    photos : int
+        How many there are, in the order of tables and file.
     language : str
         Of the workbook that may be made of it.
     unit : str
@@ -49,29 +71,30 @@ def solve_control(
     Raises
     ------
     InputError
-        If a table is unusable, a name is in both, or none has a point seen in both photos.
+        If a table is unusable, a name is in both, or none has a point seen in two photos.
     """
     tables = [(path, code) for path, code in ((control, CONTROL), (check, CHECK)) if path]
-    parts = [_read(path, exchanged, unit) for path, _ in tables]
+    parts = [_read(path, exchanged, unit, photos) for path, _ in tables]
     counts = np.array([len(part.ids) for part in parts], dtype=int)
     codes = np.repeat([code for _, code in tables], counts)
     ids = [name for part in parts for name in part.ids]
-    twice = sorted({name for name in ids if ids.count(name) > 1}) if check else []
-    if twice:
-        raise InputError(f"{check}: {', '.join(twice[:5])} is in {control} too; give other names.")
-    pixels1, pixels2, xyz = (
-        np.concatenate([getattr(part, name) for part in parts] or [np.zeros((0, size))])
-        for name, size in (("pixels1", 2), ("pixels2", 2), ("xyz", 3))
-    )
-    seen = np.isfinite(np.hstack([pixels1, pixels2])).all(axis=1)
+    if control and check:
+        refuse_same_names(control, check, parts[0].ids, parts[1].ids)
+    xyz = np.concatenate([part.xyz for part in parts] or [np.zeros((0, 3))])
+    picks = [
+        np.concatenate([part.picks[k] for part in parts] or [np.zeros((0, 2))])
+        for k in range(photos)
+    ]
+    seen = np.sum([np.isfinite(own).all(axis=1) for own in picks], axis=0) >= 2
     if not seen.any():
         raise InputError(
-            f"{control or check}: no point was picked in both photos; nothing to measure."
+            f"{control or check}: no point was picked in two photos; nothing to measure."
         )
     points = PointObservations(
         ids=tuple(compress(ids, seen)),
-        pixels1=pixels1[seen],
-        pixels2=pixels2[seen],
+        pixels1=picks[0][seen],
+        pixels2=picks[1][seen],
+        others=np.stack(picks, axis=1)[seen, 2:],
         code=tuple(codes[seen].tolist()),
     )
     compared = codes[seen] == CHECK
@@ -82,12 +105,12 @@ def solve_control(
     return solve(survey, pair=pair_path)
 
 
-def is_exchanged(pair: Pair, far: Path) -> bool:
-    """Tell whether the photo given as far became the near one of a pair file."""
-    return pair.photo_file(2).resolve() == far.resolve()
+def is_exchanged(pair: Pair | PhotoSet, far: Path) -> bool:
+    """Tell whether the photo given as far became the near one of a pair file; never in a set."""
+    return isinstance(pair, Pair) and pair.photo_file(2).resolve() == far.resolve()
 
 
-def _read(path: Path, exchanged: bool, unit: str) -> Control:
+def _read(path: Path, exchanged: bool, unit: str, photos: int) -> Control:
     # The standard deviations are those of the orientation; here they play no part.
-    control = read_control(path, sigma=0.003, sigma_plane=0.005, unit=unit)
+    control = read_control(path, sigma=0.003, sigma_plane=0.005, unit=unit, photos=photos)
     return control.exchanged() if exchanged else control

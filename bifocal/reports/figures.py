@@ -47,18 +47,19 @@ def draw_plan(figure: Any, content: PairContent, say: Words) -> None:
     axes = figure.add_axes(_WIDE)
     pair = content.pair
     ends = []
-    for number, (photo, style) in enumerate(
-        ((pair.image1, "-"), (pair.image2, (0, (5, 2)))), start=1
+    for number, (photo, name) in enumerate(
+        zip(content.cameras, content.names(say), strict=True), start=1
     ):
+        style = "-" if number == 1 else (0, (5, 2))
         x, d = float(photo.nadir[0]), photo.distance
         left, right = _footprint(content, number)
         for end in (left, right):
             axes.plot(*_way_to(photo, end), color="black", lw=0.9, ls=style)
         _draw_media(axes, photo, (left, right))
         ends += [left, right, x]
-        name = say("far") if number == 1 else say("near")
         axes.plot([x], [d], marker="^", color="black", ms=9)
-        axes.annotate(f"{name}\nd{number} = {d:.3f} m", (x, d), **_styles()["station"])
+        label = _styles()["station"] | ({"va": "top", "xytext": [10, -14]} if number > 2 else {})
+        axes.annotate(f"{name}\nd{number} = {d:.3f} m", (x, d), **label)
     first = (float(pair.image1.nadir[0]), pair.image1.distance)
     zoom = float(pair.zoom_centre[0])
     low, high = min(ends), max(ends)
@@ -105,14 +106,14 @@ def _draw_media(axes: Any, photo: Photo, ends: tuple[float, float]) -> None:
 
 def plan_ratio(content: PairContent) -> float:
     """Return the height over the width of the plan of the stations."""
-    ends = [*_footprint(content, 1), *_footprint(content, 2)]
+    ends = [end for k in range(len(content.cameras)) for end in _footprint(content, k + 1)]
     width = 1.24 * (max(ends) - min(ends))
     return float(np.clip(0.9 * 1.15 * content.pair.image1.distance / width + 0.1, 0.35, 1.1))
 
 
 def _footprint(content: PairContent, number: int) -> tuple[float, float]:
     """Return X at which the middle row of a photo begins and ends on the wall, kept finite. [m]"""
-    photo = content.pair.photo(number)
+    photo = content.cameras[number - 1]
     reach = 3 * photo.distance
     if not content.photos:
         return float(photo.nadir[0]) - reach / 6, float(photo.nadir[0]) + reach / 6
@@ -133,7 +134,7 @@ def draw_photo(figure: Any, content: PairContent, seen: ReportedPhoto, number: i
     solution = content.solution
     if solution is None:
         return
-    pixels = solution.points.pixels1 if number == 1 else solution.points.pixels2
+    pixels = solution.points.pixels[number - 1]
     missing = np.asarray(np.isnan(pixels).any(axis=1))
     if missing.any():
         pixels = np.where(missing[:, None], seen.photo.project(solution.table.xyz), pixels)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.model.orientation_precision import CAMERA, NAMES, pinhole
+from bifocal.model.orientation_precision import CAMERA, pinhole
 from bifocal.model.photo import Photo
 from bifocal.reports.content import PairContent
 from photocore.arrays import FloatArray
@@ -32,19 +32,20 @@ _MOST = 6
 
 def lens_blocks(content: PairContent, say: Words) -> Iterator[Block]:
     """Yield the section of the lenses; nothing where no lens was estimated with the pair."""
-    covariance = content.pair.orientation
+    covariance, cameras = content.orientation, content.cameras
     estimated = content.setup.get("focal_px") and covariance is not None
-    if not estimated and not any(content.pair.photo(k).lens for k in (1, 2)):
+    if not estimated and not any(photo.lens for photo in cameras):
         return
     yield Heading(text=say("lens"))
     if covariance is not None and estimated:
-        matrix = np.asarray(covariance)[: len(NAMES), : len(NAMES)]
-        for number in (1, 2):
+        count = len(CAMERA) * len(cameras)
+        matrix = np.asarray(covariance)[:count, :count]
+        for number in range(1, len(cameras) + 1):
             yield from _coefficients(content, number, matrix, say)
         strong = _strong(matrix)
         if strong:
             yield Paragraph(text=say("lens_strong", names="; ".join(strong)), small=True)
-    if any(content.pair.photo(k).lens for k in (1, 2)):
+    if any(photo.lens for photo in cameras):
         draw = partial(draw_distortion, content=content, say=say)
         yield Picture(draw=draw, ratio=0.38, caption=say("lens_curve_caption"))
 
@@ -53,8 +54,8 @@ def _coefficients(
     content: PairContent, number: int, covariance: FloatArray, say: Words
 ) -> Iterator[TextTable]:
     """Yield values, standard deviations and correlations of what was estimated of a lens."""
-    camera = pinhole(content.pair.photo(number)).matrix
-    radial = content.setup.get("radial") or [[np.nan] * 2] * 2
+    camera = pinhole(content.cameras[number - 1]).matrix
+    radial = content.setup.get("radial") or [[np.nan] * 2] * number
     focal = float(camera[0, 0])
     values = dict(
         zip(_LENS, (focal, camera[1, 1] / focal, *camera[:2, 2], *radial[number - 1]), strict=True)
@@ -74,7 +75,7 @@ def _coefficients(
         rows.append([_LENS[names[k]], *shown, *beside, *[""] * (len(free) - place - 1)])
     if rows:
         signs = [_LENS[names[k]].partition(" ")[0] for k in free]
-        photo = say("far" if number == 1 else "near")
+        photo = content.names(say)[number - 1]
         yield TextTable(
             headings=[photo, say("value"), "σ", *signs], rows=rows, caption=say("lens_table")
         )
@@ -88,7 +89,8 @@ def _strong(covariance: FloatArray) -> list[str]:
     upper = np.triu(np.abs(correlation), 1)
     places = np.argwhere(upper > STRONG)
     order = np.argsort(-upper[tuple(places.T)])[:_MOST]
-    signs = [_sign(NAMES[k]) for k in free]
+    names = [f"{name} {k + 1}" for k in range(len(covariance) // len(CAMERA)) for name in CAMERA]
+    signs = [_sign(names[k]) for k in free]
     return [f"{signs[a]} ~ {signs[b]} {correlation[a, b]:.2f}" for a, b in places[order].tolist()]
 
 
@@ -116,14 +118,15 @@ def radial_distortion(photo: Photo, radii: FloatArray) -> FloatArray:
 def draw_distortion(figure: Any, content: PairContent, say: Words) -> None:
     """Draw the distortion of either lens by the distance from its centre, with its sigma."""
     axes = figure.add_axes((0.09, 0.17, 0.88, 0.78))
-    covariance = content.pair.orientation
-    for number, style, grey in ((1, "-", "0.6"), (2, (0, (5, 2)), "0.8")):
-        photo = content.pair.photo(number)
+    covariance = content.orientation
+    for number, (photo, label) in enumerate(
+        zip(content.cameras, content.names(say), strict=True), start=1
+    ):
+        style, grey = ("-", "0.6") if number == 1 else ((0, (5, 2)), "0.8")
         if photo.lens is None or photo.image_size is None:
             continue
         radii = np.linspace(1.0, float(np.hypot(*photo.image_size)) / 2, 100)
         moved = radial_distortion(photo, radii)
-        label = say("far" if number == 1 else "near")
         axes.plot(radii, moved, color="black", lw=1.2, ls=style, label=label)
         if covariance is not None and content.setup.get("radial"):
             square = (radii / pinhole(photo).matrix[0, 0]) ** 2

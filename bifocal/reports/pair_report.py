@@ -71,36 +71,37 @@ def pair_blocks(content: PairContent, say: Words) -> Iterator[Block]:
 
 def _geometry(content: PairContent, say: Words) -> Iterator[Block]:
     yield Heading(text=say("geometry"))
-    photos, language = (content.pair.image1, content.pair.image2), content.task.language
-    deviations = content.setup.get("standard_deviations", {})
+    photos, language = content.cameras, content.task.language
+    deviations = content.deviations
 
     rows: list[list[str]] = []
 
     def add(key: str, *cells: str) -> None:
-        rows.append([say(key), *cells])
+        rows.append([say(key), *cells, *[""] * (len(photos) - len(cells))])
 
     add("file", *(Path(photo.file).name or "-" for photo in photos))
     rows += camera_rows(content, say)
-    spreads = [_spread(deviations.get(f"distance{k}"), 3) for k in (1, 2)]
+    spreads = [_spread(own.get("distance"), 3) for own in deviations]
     add("distance", *(f"{p.distance:.3f}{s} m" for p, s in zip(photos, spreads, strict=True)))
-    spreads = [_spread(deviations.get(f"nadir{k}"), 3) for k in (1, 2)]
+    spreads = [_spread(own.get("nadir"), 3) for own in deviations]
     places = zip(photos, spreads, strict=True)
     add("nadir", *(f"{photo.nadir[0]:.3f}, {photo.nadir[1]:.3f}{s} m" for photo, s in places))
-    add("angles", *map(_angles, photos, [deviations.get(f"tilt{k}_deg") for k in (1, 2)]))
+    add("angles", *map(_angles, photos, [own.get("tilt_deg") for own in deviations]))
     if focal := content.setup.get("focal_px"):
         pitches = [photo.pixel_size for photo in photos]
-        sigmas = [deviations.get(f"focal{k}") for k in (1, 2)]
+        sigmas = [own.get("focal_px") for own in deviations]
         add("focal_found", *map(_focal, map(float, focal), pitches, sigmas))
-        sources = content.setup.get("interior", ("-", "-"))
+        sources = content.setup.get("interior", ("-",) * len(photos))
         add("focal_given", *(in_language(str(source), language) for source in sources))
     if content.photos:
         add("gsd", *(millimetres(seen.photo.gsd(seen.size)) for seen in content.photos))
         add("tilt", *(f"{figures.tilt_of(seen.photo, seen):.2f}°" for seen in content.photos))
     if layers := content.pair.layers:
-        add("media", media_words(layers), "")
+        add("media", media_words(layers))
         add("z0", *(f"{photo.z0 or 0.0:.3f} m" for photo in photos))
-    add("base_media" if layers else "base", f"{content.pair.base_factor:.2f} m", "")
-    yield TextTable(headings=[say("quantity"), say("far"), say("near")], rows=rows)
+    if content.of_set is None:
+        add("base_media" if layers else "base", f"{content.pair.base_factor:.2f} m")
+    yield TextTable(headings=[say("quantity"), *content.names(say)], rows=rows)
     yield from refraction_blocks(content, say)
     for sentence in content.setup.get("words", ()):
         yield Paragraph(text=in_language(str(sentence), language), small=True)
@@ -133,7 +134,7 @@ def _photos(content: PairContent, say: Words) -> Iterator[Block]:
             ratio=min(1.2, seen.picture.shape[0] / seen.picture.shape[1]),
             caption=say(
                 "photo_caption",
-                photo=say("far" if number == 1 else "near"),
+                photo=content.names(say)[number - 1],
                 file=Path(seen.photo.file).name,
             ),
         )
@@ -205,14 +206,18 @@ def _residuals(content: PairContent, say: Words) -> Iterator[Block]:
         caption = say("histogram_caption", axes=", ".join(axes))
         yield Picture(draw=draw, ratio=0.3, caption=caption)
     if control:
-        headings = [say("point"), "Δcol1", "Δrow1", "Δcol2", "Δrow2", "test", say("used")]
+        of_set = content.of_set is not None
+        shown = ("ΔX", "ΔY", "Δr") if of_set else ("Δcol1", "Δrow1", "Δcol2", "Δrow2")
+        headings = [say("point"), *shown, "test", say("used")]
         rows = [_control_row(row, say) for row in control]
-        yield TextTable(headings=headings, rows=rows, caption=say("control_table"))
+        caption = say("control_off" if of_set else "control_table")
+        yield TextTable(headings=headings, rows=rows, caption=caption)
     yield from _lengths(content, say)
 
 
 def _control_row(row: Mapping[str, Any], say: Words) -> list[str]:
-    residuals = [f"{v:.2f}" if isinstance(v, int | float) else "-" for v in row["residual_px"]]
+    values = row.get("residual_px") or [v and 1000 * v for v in row["off"]]
+    residuals = [f"{v:.2f}" if isinstance(v, int | float) else "-" for v in values]
     test = row.get("test")
     shown = f"{test:.1f}" if isinstance(test, int | float) else "-"
     return [str(row["id"]), *residuals, shown, say("holds" if row.get("used") else "fails")]
@@ -249,7 +254,7 @@ def _foundations(content: PairContent, say: Words) -> Iterator[Block]:
         shown = "-" if sigma is None else f"{sigma:.2f} px"
         counts = {"control": len(content.control_ids), "ties": ties.get("count", 0)}
         yield Paragraph(text=say("rest_measured", sigma=shown, **counts))
-        found = setup.get("standard_deviations", {})
+        found = {} if content.of_set is not None else setup.get("standard_deviations", {})
 
         def share(key: str) -> str:
             value = found.get(key)
@@ -257,7 +262,8 @@ def _foundations(content: PairContent, say: Words) -> Iterator[Block]:
 
         d1, d2 = (millimetres(found.get(key)) for key in ("distance1", "distance2"))
         scale, relief = share("scale"), share("relief_scale")
-        yield Paragraph(text=say("rest_sigma", d1=d1, d2=d2, scale=scale, relief=relief))
+        if found:
+            yield Paragraph(text=say("rest_sigma", d1=d1, d2=d2, scale=scale, relief=relief))
         assumed = [str(text) for text in setup.get("assumed", ())]
         for text in assumed:
             what = in_language(text, content.task.language)
@@ -276,8 +282,8 @@ def _foundations(content: PairContent, say: Words) -> Iterator[Block]:
 
 def _provenance(content: PairContent, say: Words) -> Iterator[Block]:
     yield Heading(text=say("provenance"))
-    task, pair = content.task, content.pair
-    files = [content.source, *pair.photo_files]
+    task = content.task
+    files = [content.source, *(photo.path for photo in content.cameras if photo.file)]
     files += [path for path in (task.control, task.check, task.relief, task.ortho) if path]
     made = provenance()
     if made.command:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from bifocal.files.photos import photo_info
+from bifocal.files.photos import photo_infos
 from bifocal.options import PROJECT
 from bifocal.reports.content import PairContent
 from photocore.reports.document import Block, Heading, Paragraph, TextTable
@@ -23,7 +23,7 @@ def camera_rows(content: PairContent, say: Words) -> Iterator[list[str]]:
     """Yield what the photos say of the cameras that took them."""
     if not content.photos:
         return
-    infos = [photo_info(content.pair, number) for number in (1, 2)]
+    infos = photo_infos(content.of_set or content.pair)
     yield [say("image_size"), *("{} × {} px".format(*info.size) for info in infos)]
     cameras = [f"{info.make} {info.model}".strip() for info in infos]
     if any(cameras):

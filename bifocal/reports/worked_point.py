@@ -124,9 +124,9 @@ def _by_hand(pair: Pair, pixels: Sequence[FloatArray]) -> FloatArray:
 
 
 def method_blocks(content: PairContent, say: Words) -> Iterator[Block]:
-    """Yield the method page; nothing where no point was measured in both photos."""
+    """Yield the method page; nothing of a set, or where no point was measured in both photos."""
     solution = content.solution
-    if solution is None or solution.setup is not None:
+    if solution is None or solution.setup is not None or content.of_set is not None:
         return
     points, table = solution.points, solution.table
     good = np.isfinite(np.hstack([points.pixels1, points.pixels2, table.xyz])).all(axis=1)

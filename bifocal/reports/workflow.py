@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +16,9 @@ from photocore.errors import InputError
 from photocore.jsonfile import read_object
 from photocore.output import check_writable
 from photocore.reports.writing import check_report, write_document
+
+#: How the files of pairs and of sets end.
+_ENDINGS = re.compile(r"\.(pair|photos)\.json$")
 
 __all__ = ["ReportTask", "StepTold", "report_of", "write_report"]
 
@@ -88,7 +92,7 @@ def find_pairs(folder: Path, task: ReportTask) -> tuple[list[Path], list[ReportT
     InputError
         If there is none.
     """
-    sources = sorted(folder.glob("align/*.pair.json")) or sorted(folder.glob("*/align/*.pair.json"))
+    sources = _aligned(folder, "") or _aligned(folder, "*/")
     if not sources:
         raise InputError(
             f"{folder}: holds no pair made by `bifocal facade` or `bifocal survey` (align/*.pair."
@@ -96,7 +100,7 @@ def find_pairs(folder: Path, task: ReportTask) -> tuple[list[Path], list[ReportT
         )
     tasks, found = [], []
     for source in sources:
-        home, name = source.parent.parent, source.name.removesuffix(".pair.json")
+        home, name = source.parent.parent, _ENDINGS.sub("", source.name)
         orthos = (home / "drawing" / f"{name}.tif", home / "ortho" / f"{name}_ortho.tif")
         relief = home / "relief" / f"{name}_relief.tif"
         view = home / "view" / f"{name}_view.html"
@@ -108,9 +112,26 @@ def find_pairs(folder: Path, task: ReportTask) -> tuple[list[Path], list[ReportT
             "view": view if view.is_file() else None,
             **_remembered(home, task),
         }
-        found.append(workbook if workbook.is_file() else _pair_file(source, folder))
+        is_set = source.name.endswith(".photos.json")
+        if is_set:  # its workbook holds values: the points are solved from their tables
+            given |= _tables(home / "points")
+        has_book = workbook.is_file() and not is_set
+        found.append(workbook if has_book else _pair_file(source, folder))
         tasks.append(replace(task, **given))
     return found, tasks
+
+
+def _tables(folder: Path) -> dict[str, Path]:
+    """Return the tables that points of a folder were solved from, by the names of a task."""
+    record = folder / ".made.json"
+    files = read_object(record, what="record of a step")["inputs"] if record.is_file() else {}
+    return {role: Path(files[role][0]) for role in ("control", "check") if role in files}
+
+
+def _aligned(folder: Path, within: str) -> list[Path]:
+    """Return the files of the pairs and sets that were set up."""
+    found = folder.glob(f"{within}align/*.json")
+    return sorted(path for path in found if _ENDINGS.search(path.name))
 
 
 @dataclass(frozen=True, slots=True)

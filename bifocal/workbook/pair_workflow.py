@@ -11,8 +11,7 @@ from bifocal.model.lens import Lens
 from bifocal.model.orientation_precision import of_distances
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
-from bifocal.model.photo_entries import SET_FORMAT
-from bifocal.model.photo_set import PhotoSet
+from bifocal.model.photo_set import PhotoSet, pair_or_set
 from bifocal.model.points import SurveyPoints
 from bifocal.remarks import remark
 from bifocal.survey.setup import SurveySetup
@@ -23,7 +22,6 @@ from bifocal.workbook.workflow import solve
 from photocore.arrays import FloatArray, not_negative
 from photocore.errors import InputError, located
 from photocore.images import image_info
-from photocore.jsonfile import read_object
 from photocore.output import all_or_none, check_all_writable, check_ending, relative_name
 
 #: Standard deviation of a distance by tape: it ends at the lens, the ray in its entrance pupil. [m]
@@ -72,10 +70,7 @@ def read_photos(path: Path | str) -> Pair | PhotoSet:
     InputError, GeometryError
         If the file cannot be used.
     """
-    if is_workbook(path) or read_object(path, what="pair file").get("format") != SET_FORMAT:
-        return read_pair(path)
-    photos = PhotoSet.read(path)
-    return photos if len(photos) > 2 else photos.pair(0, 1)
+    return read_pair(path) if is_workbook(path) else pair_or_set(path)
 
 
 @all_or_none()

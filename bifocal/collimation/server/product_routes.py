@@ -24,6 +24,7 @@ from bifocal.collimation.server.streamed_zip import streamed_zip
 from bifocal.collimation.server.uploads import take_photos
 from bifocal.collimation.session import Session
 from bifocal.collimation.shapes import met, places_of, relief_within
+from bifocal.collimation.starting import open_sample, recent, reopen
 from bifocal.collimation.uncertainty import precision_contours, uncertainty_picture
 from bifocal.faces.faces_files import beside
 from photocore.arrays import FloatArray, as_points
@@ -49,6 +50,29 @@ async def _photos(request: Request) -> Response:
             return state_of(session)
 
         return answer(await in_thread(take))
+
+
+async def _sample(request: Request) -> Response:
+    session = session_of(request)
+    await in_thread(open_sample, session)
+    return answer(await in_thread(state_of, session))
+
+
+async def _recent(request: Request) -> Response:
+    """Name the surveys that were open before: their folders and names, no more."""
+    names = [Path(name) for name in await in_thread(recent)]
+    own = session_of(request).files.workbook.resolve()
+    shown = [
+        {"number": number, "name": path.stem, "folder": path.parent.name}
+        for number, path in enumerate(names)
+        if path != own
+    ]
+    return answer({"surveys": shown})
+
+
+async def _reopen(request: Request) -> Response:
+    number = number_of(await json_body(request), "number")
+    return answer({"url": await in_thread(reopen, -1 if number is None else int(number))})
 
 
 async def _start(request: Request) -> Response:
@@ -200,6 +224,9 @@ async def _contours(request: Request) -> Response:
 
 ROUTES = [
     Route("/api/photos", _photos, methods=["POST"]),
+    Route("/api/sample", _sample, methods=["POST"]),
+    Route("/api/recent", _recent),
+    Route("/api/recent", _reopen, methods=["POST"]),
     Route("/api/jobs", _start, methods=["POST"]),
     Route("/api/jobs/{number}", _cancel, methods=["DELETE"]),
     Route("/download/{name:path}", _download),

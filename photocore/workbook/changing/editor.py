@@ -35,6 +35,7 @@ from photocore.workbook.reading.package import (
     read_part,
     rewrite_package,
 )
+from photocore.workbook.reading.references import refuse_lost
 from photocore.workbook.reading.xlsx import (
     SheetPart,
     Workbook,
@@ -386,11 +387,13 @@ class WorkbookEditor:
             parts = self.changed_parts()
             with new_workbook(target, overwrite=overwrite) as temporary:
                 rewrite_package(self.path, temporary, parts)
+                refuse_lost(temporary, self.path)
             return None
         check_writable(target, overwrite=True)
         parts = self.changed_parts()
         with atomic_path(target, overwrite=True) as temporary:
             rewrite_package(self.path, temporary, parts)
+            refuse_lost(temporary, self.path)
             return kept_copy(self.path)
 
     def changed_parts(self) -> dict[str, bytes | None]:

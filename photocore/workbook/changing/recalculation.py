@@ -20,6 +20,7 @@ from photocore.workbook.reading.package import (
     read_part,
     rewrite_package,
 )
+from photocore.workbook.reading.references import lost_references
 from photocore.workbook.reading.xlsx import open_xlsx, read_directory
 
 _FORMULA = re.compile(r'<(?:\w+:)?c r="([A-Z]+\d+)"[^>]*>\s*<(?:\w+:)?f\b[^>]*>([^<]*)')
@@ -50,7 +51,8 @@ def examine(path: Path, program: str | None) -> dict[str, Any]:
     InputError
         If it is not a workbook, or LibreOffice makes nothing of it.
     """
-    stored, faults = open_xlsx(path, max_rows=_ROWS), package_faults(path)
+    stored, broken = open_xlsx(path, max_rows=_ROWS), package_faults(path)
+    faults = broken or sorted(lost_references(path))
     cells = [(t, *found) for t in stored.titles for found in _FORMULA.findall(stored.text(t))]
     differ: dict[str, tuple[str, str]] = {}
     unknown: list[str] = []
@@ -61,7 +63,7 @@ def examine(path: Path, program: str | None) -> dict[str, Any]:
     called = re.compile(rf"\b(?:{lambdas or '(?!)'})\(")
     with tempfile.TemporaryDirectory() as folder:
         fresh = stored
-        if program and not faults:
+        if program and not broken:
             fresh = open_xlsx(_converted(path, Path(folder), program), max_rows=_ROWS)
         for title, cell, text in cells:
             row, column = split_cell(cell)

@@ -40,6 +40,7 @@ from photocore.workbook.changing.formulas import ModelCell, model_cells
 from photocore.workbook.changing.splice import splice_sheet
 from photocore.workbook.reading.grid import split_cell
 from photocore.workbook.reading.package import read_part, rewrite_package
+from photocore.workbook.reading.references import refuse_lost
 from photocore.workbook.reading.xlsx import read_directory
 
 if TYPE_CHECKING:
@@ -125,6 +126,7 @@ def finish_book(
     parts = _finished_parts(source, target, results=results, blocks=blocks)
     _add_drawings(source, target, parts, drawings or {})
     rewrite_package(source, target, parts, date=PART_TIME)
+    refuse_lost(target)
 
 
 def finished_parts(

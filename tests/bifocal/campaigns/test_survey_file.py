@@ -100,6 +100,26 @@ distance2 = 1.9
 """
 
 
+def test_photos_of_a_pair_may_be_a_list_and_are_a_set(tmp_path):
+    path = tmp_path / "street.toml"
+    path.write_text('[[pair]]\nname = "porch"\nphotos = ["a.jpg", "b.jpg", "c.jpg"]\nauto = true\n'
+                    "distance1 = 9.5\n")  # fmt: skip
+    (job,) = read_survey_file(path, out=tmp_path / "out")
+    assert job.photos == tuple(tmp_path / name for name in ("a.jpg", "b.jpg", "c.jpg"))
+    assert job.pair_path == tmp_path / "out" / "porch" / "align" / "porch.photos.json"
+    assert not refusal(job)
+    assert set(steps_of(job)[1].files) == {"far", "near", "photo 3"}
+    assert "of two photos" in refusal(replace(job, options={**job.options, "as_set_up": True}))
+    for wrong, said in (
+        ('[[pair]]\nphotos = ["a.jpg"]', "list photos"),
+        ('[[pair]]\nfar = "a.jpg"\nphotos = ["a.jpg", "b.jpg"]', "both"),
+        (f"joint = true\n{path.read_text()}", "joint = true adjusts pairs"),
+    ):
+        path.write_text(wrong)
+        with pytest.raises(InputError, match=said):
+            read_survey_file(path)
+
+
 def test_media_are_keys_of_the_file_and_reach_the_set_up(tmp_path):
     """Refused in the words of the file; what `align` knows of media has a key of its name."""
     (tmp_path / "sea.toml").write_text(MEDIA)
@@ -209,6 +229,24 @@ def test_a_plan_with_a_file_that_cannot_be_read_ends_as_the_work_would(tmp_path)
         planned = CliRunner().invoke(main, ["survey", str(survey), "--dry-run", *more])
         assert planned.exit_code == 1
         assert "near.jpg" in planned.output or "far.jpg" in planned.output
+
+
+def test_a_plan_opens_photos_and_compares_the_names_of_both_tables(tmp_path):
+    (tmp_path / "cut.jpg").write_bytes(FAR.read_bytes()[:60_000])
+    lines = "id,X,Y,r,col1,row1,col2,row2\nC1,0,0,0,1,1,1,1\n"
+    (tmp_path / "points.csv").write_text(lines)
+    survey = tmp_path / "survey.toml"
+    pair = (
+        f'[[pair]]\nname = "a"\nfar = "{FAR.as_posix()}"\nnear = "{{}}"\ncontrol = "points.csv"\n'
+    )
+    for near, more, said in (
+        ("cut.jpg", "", "cut.jpg: the photo is cut off"),
+        (NEAR.as_posix(), 'check = "points.csv"\n', "points.csv: C1 is in"),
+    ):
+        survey.write_text(pair.format(near) + more)
+        planned = CliRunner().invoke(main, ["survey", str(survey), "--dry-run"])
+        assert planned.exit_code == 1
+        assert said in planned.output
 
 
 def test_an_equivalent_and_a_true_focal_length_do_not_tell_which_photo_is_far():

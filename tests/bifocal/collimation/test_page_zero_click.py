@@ -13,9 +13,11 @@ import pytest
 from bifocal import SAMPLE, InputError, Pair, ReliefMap
 from bifocal.collimation import first_orientation
 from bifocal.collimation.first_orientation import FirstOrientation
+from bifocal.collimation.job_tasks import finish
 from bifocal.collimation.proposals import wall_sheet
 from bifocal.collimation.server.uploads import take_photos
 from bifocal.collimation.shapes import met, places_of
+from bifocal.collimation.starting import RECENT, recent, remember, reopen
 from bifocal.faces.faces import Face, Faces
 from photocore.jsonfile import read_object, write_object
 from tests.page_session import client_of, opened, sample_folder
@@ -185,3 +187,33 @@ def test_a_ray_meets_the_relief_where_the_photo_shows_it(tmp_path) -> None:
         assert int(answer.headers["x-bytes"]) > 0
         names = zipfile.ZipFile(io.BytesIO(answer.content)).namelist()
         assert {"far.jpg", "near.jpg", "facade.pair.json", "facade.relief.tif"} <= set(names)
+
+
+def test_the_sample_opens_oriented_and_surveys_are_remembered(tmp_path) -> None:
+    with opened(tmp_path) as session:
+        client = client_of(session)
+        state = client.post("/api/sample", json={}).json()
+        assert [photo["name"] for photo in state["photos"]] == ["far.jpg", "near.jpg"]
+        assert state["pair"]["accepted"]
+        session.command({"op": "point.pick", "image": 1, "column": 9.0, "row": 9.0})
+        assert client.post("/api/sample", json={}).status_code == 422
+        remember(session.files, tmp_path)
+        remember(session.files, tmp_path)
+    assert recent(tmp_path) == [str(tmp_path / "survey.xlsx")]
+    with opened(tmp_path) as session:  # it is there again
+        assert session.pictures.pair is not None
+    (tmp_path / RECENT).write_text("no list")
+    assert recent(tmp_path) == []
+    with pytest.raises(InputError, match="not there"):
+        reopen(0, tmp_path)
+
+
+def test_targets_that_were_found_become_control_points_once(tmp_path) -> None:
+    found = {"name": "T001", "picks": [[9.0, 8.0], [7.0, 6.0]], "code": "disc", "note": ""}
+    with opened(sample_folder(tmp_path)) as session:
+        session.command({"op": "control.pick", "name": "T001", "image": 1, "column": 1, "row": 1})
+        for count in ("1", "No targets"):
+            assert count in finish(session, {"kind": "targets"}, {"points": [found]})
+        assert sorted(session.state.control) == ["T001", "T001b"]
+        session.command({"op": "undo"})
+        assert sorted(session.state.control) == ["T001"]

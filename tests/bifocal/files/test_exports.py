@@ -15,6 +15,7 @@ from click.testing import CliRunner
 
 from bifocal import InputError
 from bifocal.files.exports import export_points
+from bifocal.files.point_tables import read_survey_points
 from bifocal.model.points import SurveyPoints
 from tests.builders.commands import bifocal_command as main
 
@@ -204,3 +205,28 @@ def test_a_dxf_is_the_same_in_whatever_order_ezdxf_counts_its_classes(tmp_path, 
         )
         export_points(tmp_path / name, POINTS)
     assert (tmp_path / "a.dxf").read_bytes() == (tmp_path / "b.dxf").read_bytes()
+
+
+def test_world_coordinates_of_a_workbook_follow_those_of_the_wall(tmp_path):
+    xyz = np.random.default_rng(3).uniform(-5, 5, (6, 3))
+    turn = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
+    world = 1.0002 * xyz @ turn.T + [351234.0, 4123456.0, 33.0]
+    points = SurveyPoints(
+        ids=tuple("abcdef"), xyz=xyz, world=world, sigma_r=np.full(6, 0.01), flags=("OK",) * 6,
+        notes=("",) * 6,
+    )  # fmt: skip
+    export_points(tmp_path / "p.xlsx", points)
+    book = openpyxl.load_workbook(tmp_path / "p.xlsx")
+    cells = {row[0].value: row[1].value for row in book["World"].iter_rows()}
+    for row, own in enumerate(xyz, start=2):
+        text = book["Results"].cell(row, 5).value.lstrip("=").replace("^", "**")
+        for letter, value in zip("BCD", own, strict=True):
+            text = text.replace(f"{letter}{row}", repr(float(value)))
+        placed = eval(text, {name: float(value) for name, value in cells.items()})
+        assert placed == pytest.approx(world[row - 2, 0], abs=1e-8)
+    again, _ = read_survey_points(tmp_path / "p.xlsx")
+    np.testing.assert_allclose(again.world, world, rtol=0, atol=1e-9)
+    # Without heights there is nothing to follow: values.
+    flat = world * [1, 1, np.nan]
+    export_points(tmp_path / "flat.xlsx", replace(points, world=flat))
+    assert openpyxl.load_workbook(tmp_path / "flat.xlsx").sheetnames == ["Results"]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import sys
+import types
 from pathlib import Path
 
 import cv2
@@ -94,6 +97,48 @@ def test_what_is_not_a_photo_is_named(tmp_path, name, content, message):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=message):
         read_image(tmp_path / name)
+
+
+def test_formats_of_phones_and_the_web_are_read_upright(tmp_path):
+    smooth = cv2.GaussianBlur(cv2.resize(PICTURE, (64, 48)), (0, 0), 4)
+    exif = Image.Exif()
+    exif[274] = 6
+    for name, format_ in (("a.webp", "WEBP"), ("a.avif", "AVIF")):
+        Image.fromarray(smooth).save(tmp_path / name, format_, quality=95, exif=exif)
+        assert image_info(tmp_path / name).size == (48, 64)
+        found = read_image(tmp_path / name).astype(int)
+        assert np.abs(found - np.rot90(smooth, -1)).mean() < 6
+        assert read_image(tmp_path / name, grey=True).shape == (64, 48)
+
+
+def test_heic_and_raw_are_read_where_their_libraries_are(tmp_path, monkeypatch):
+    heic, raw = tmp_path / "IMG 1.HEIC", tmp_path / "p.nef"
+    heic.write_bytes(b"x")
+    raw.write_bytes(b"x")
+    for name in ("pillow_heif", "rawpy"):
+        monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(InputError, match=r"saved as JPEG.*photos"):
+        read_image(heic)
+    with pytest.raises(InputError, match=r"16-bit TIFF.*photos"):
+        read_image(raw)
+    developed = np.full((4, 6, 3), 700, np.uint16)
+    sizes = types.SimpleNamespace(width=4, height=6, flip=5)
+
+    def imread(path):  # what rawpy offers of a file, and of one that it does not know
+        if path.endswith("p.nef"):
+            held = types.SimpleNamespace(
+                sizes=sizes, postprocess=lambda **_: developed, extract_thumb=lambda: None
+            )
+            return contextlib.nullcontext(held)
+        raise OSError("unknown")
+
+    fake = types.SimpleNamespace(imread=imread, LibRawError=OSError)
+    monkeypatch.setitem(sys.modules, "rawpy", fake)
+    assert (image_info(raw).size, image_info(raw).bits) == ((6, 4), 16)
+    np.testing.assert_array_equal(read_image(raw), developed)
+    (tmp_path / "q.dng").write_bytes(b"x")
+    with pytest.raises(InputError, match=r"camera raw cannot be read \(unknown\)"):
+        read_image(tmp_path / "q.dng")
 
 
 def test_missing_photo_and_folder_are_named(tmp_path):

@@ -101,6 +101,31 @@ def test_the_command_matches_exposures_and_tells_each_photos_share(folder, tmp_p
 def test_what_a_set_cannot_is_refused(folder, tmp_path):
     whole = (folder / "wall.photos.json", "--plane", "--out", tmp_path / "o.tif")
     assert "leave it out" in run(*whole, "--image", "2")[2]
-    deliver = ("--deliver", tmp_path / "d", "--scale", "1:50")
-    assert "sheet of a pair" in run(*whole, *deliver)[2]
     assert not list(tmp_path.iterdir())
+
+
+def test_a_set_is_drawn_to_scale_and_reported(folder, tmp_path):
+    relief = ("--relief", folder / "relief.tif")
+    deliver = ("--deliver", tmp_path, "--scale", "1:200", "--dpi", "100", "--title", "porch")
+    code, text, _ = run(folder / "wall.photos.json", *relief, *deliver)
+    assert code == 0, text
+    drawn = (tmp_path / "porch_relief.dxf").read_text()
+    assert "3 photos, camera distances 17.500 m, 9.500 m, 9.500 m" in drawn
+    taken = shot()
+    xyz = np.array([[x, y, 0.0] for x in (-4.0, 0.2, 4.2) for y in (-2.0, 0.8, 2.4)])
+    pixels = np.hstack([photo.project(xyz) for photo in taken.photos.photos])
+    pixels[0, :2] = np.nan  # seen by two photos, which no far one is of
+    heads = [f"{axis}{k} [px]" for k in (1, 2, 3) for axis in ("col", "row")]
+    rows = [
+        ",".join([f"P{k}", *map(str, place), *("" if np.isnan(v) else f"{v:.3f}" for v in own)])
+        for k, (place, own) in enumerate(zip(xyz.tolist(), pixels.tolist(), strict=True))
+    ]
+    table = tmp_path / "check.csv"
+    table.write_text("\n".join([",".join(["id", "X [m]", "Y [m]", "r [m]", *heads]), *rows]))
+    page = tmp_path / "report.html"
+    asked = (folder / "wall.photos.json", "--check", table, "--out", page)
+    told = CliRunner().invoke(main, ["report", *map(str, asked)])
+    assert told.exit_code == 0, told.output
+    html = page.read_text(encoding="utf-8")
+    assert "9 independent check points" in html
+    assert all(f"<td>{file}</td>" in html for file in ("1.png", "2.png", "3.png"))

@@ -49,6 +49,17 @@ def test_sigma_over_the_frame_has_its_maximum_near_the_nadir_and_none_on_it():
     assert grid[0, 0] == pytest.approx(plan.best.sigma_r_corner, rel=1e-9)
 
 
+def test_a_third_photo_a_step_aside_measures_the_nadir():
+    plan = plan_stations([35, 19], CANON, scale_number=500)
+    best, third = plan.best, plan.third_photo(plan.best)
+    # Both rays of the pair go straight to the nadir, the third comes in by step / d.
+    ray = 0.5 * best.gsd * best.d2 / third.step
+    assert third.step == pytest.approx(best.d2 / 6)
+    assert third.at_nadir == pytest.approx(np.sqrt(1 + 1 / 2) * ray, rel=1e-9)
+    assert third.at_rms < best.sigma_r_rms
+    assert plan.third_photo(best, step=3.0).at_nadir == pytest.approx(third.at_nadir * 9.5 / 18)
+
+
 def test_the_area_of_uncertainty_is_where_sigma_reaches_the_bound():
     plan = plan_stations([35, 19], CANON, scale_number=500, sigma_r_max=0.05)
     best = plan.best

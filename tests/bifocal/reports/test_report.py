@@ -183,7 +183,8 @@ def test_photos_of_one_name_in_two_folders_have_a_hash_each(tmp_path):
         path.parent.mkdir()
         path.write_text(path.parent.name)
     task = SimpleNamespace(control=None, check=None, relief=None, ortho=files[0])
-    content = SimpleNamespace(source=PAIR, pair=SimpleNamespace(photo_files=files), task=task)
+    cameras = [SimpleNamespace(file=path.name, path=path) for path in files]
+    content = SimpleNamespace(source=PAIR, cameras=cameras, task=task)
     *_, table = _provenance(content, words_of("bifocal.reports", "en"))
     named = [[path.name, sha256(path.read_bytes()).hexdigest()] for path in files]
     assert table.rows[1:] == named

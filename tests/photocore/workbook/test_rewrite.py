@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 from bifocal import InputError
 from photocore.workbook.reading.package import rewrite_package
+from photocore.workbook.reading.references import lost_references, refuse_lost
 from photocore.workbook.reading.xlsx import open_xlsx
 from tests.builders.commands import bifocal_command as bifocal
 from tests.builders.commands import multimedia_command as multimedia
@@ -101,3 +102,35 @@ def test_what_was_wrong_with_a_workbook_before_is_no_reason_to_refuse_it(tmp_pat
     rewrite_package(source, tmp_path / "out.xlsx", {name: data + b"<!-- changed -->"})
     with zipfile.ZipFile(tmp_path / "out.xlsx") as package:
         assert package.read(name).endswith(b"<!-- changed -->")
+
+
+LOST = {
+    "=SUM(Gone!A1:A3)": 'with the sheet "Gone"',
+    "='My wall'!A1+'My wall 2'!B1": 'with the sheet "My wall 2"',
+    "=SUM(tbl[r])+SUM(tbl[s])": "with tbl[s]",
+    "=tbl[[#This Row],[t]]*2": "with tbl[t]",
+    "=d_1+d_3": 'with the name "d_3"',
+    '=IF(A1="d_9",R1C1,TRUE)&"Gone!A1"&1E-3+A$1+$B2': "",
+    "=ROW()-ROW(tbl[[#Headers],[r]])": "",
+}
+
+
+@pytest.mark.parametrize("formula", LOST)
+def test_formulas_that_name_what_is_not_there_are_found(tmp_path, formula):
+    book = openpyxl.Workbook()
+    sheet = book.active
+    sheet.title = "My wall"
+    sheet["A1"], sheet["A2"], sheet["D1"] = "r", 1.5, formula
+    sheet.add_table(openpyxl.worksheet.table.Table(displayName="tbl", ref="A1:A2"))
+    book.defined_names["d_1"] = openpyxl.workbook.defined_name.DefinedName(
+        "d_1", attr_text="'My wall'!$A$2"
+    )
+    book.save(tmp_path / "own.xlsx")
+    found = lost_references(tmp_path / "own.xlsx")
+    assert len(found) == bool(LOST[formula])
+    assert all(LOST[formula] in fault for fault in found)
+    # What the user's own formulas lack does not keep anybody from changing the workbook.
+    refuse_lost(tmp_path / "own.xlsx", tmp_path / "own.xlsx")
+    if found:
+        with pytest.raises(InputError, match="nothing was written"):
+            refuse_lost(tmp_path / "own.xlsx")

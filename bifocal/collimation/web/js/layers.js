@@ -5,6 +5,8 @@ import { t } from "./words/words.js";
 
 export const MODES = ["overlay", "blink", "swipe", "split"];
 const BLINK_MS = 400;
+/** How much the opacity leans towards the photo that is picked next; at both ends not at all. */
+const LEAN = 0.28;
 
 export class Superposition extends EventTarget {
   /** `stage`: the element that holds the panes; `layers(image)`: the layer of an image. */
@@ -107,9 +109,18 @@ export class Superposition extends EventTarget {
     this.#visibility();
   }
 
+  /** The photo that the next click belongs to comes forward, the other is a ghost. */
+  lean(image) {
+    if (this.leaning === image) return;
+    this.leaning = image;
+    this.#visibility();
+  }
+
   #visibility() {
     if (!this.layers[1]) return;
-    this.layers[2].setOpacity(this.mode === "overlay" ? this.opacity : 1);
+    const room = this.leaning ? 4 * this.opacity * (1 - this.opacity) : 0;
+    const opacity = this.opacity + LEAN * room * (this.leaning === 2 ? 1 : -1);
+    this.layers[2].setOpacity(this.mode === "overlay" ? opacity : 1);
     for (const image of [1, 2]) this.layers[image].setVisible(this.shown.includes(image));
   }
 

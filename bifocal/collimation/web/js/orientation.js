@@ -9,6 +9,7 @@ import { asTaken } from "./geometry.js";
 import { Loupe } from "./loupe.js";
 import { mediaWords } from "./media.js";
 import { Picker } from "./picker.js";
+import { sketched } from "./sketches.js";
 import { photoMark } from "./tiles.js";
 import { Pane, pixelView, spread, tileLayer } from "./viewer.js";
 import { WallCard } from "./wallcard.js";
@@ -27,6 +28,7 @@ export class OrientationStage {
       items: () => app.state.control, panes: () => this.panes });
     app.listen(this.picker, () => this.refresh(), () => this.#look());
     this.wallCard = new WallCard(this);
+    this.targets = button(t("control.targets"), () => app.job("targets"), { class: "quiet", testid: "targets" });
     this.photos = h("div", { class: "viewer two" });
     this.body = h("tbody");
     this.tapes = h("tbody");
@@ -47,13 +49,14 @@ export class OrientationStage {
     return h("div", { class: "row" },
       button(t("control.new"), () => { this.wallCard.dismiss(); picker.fresh(1); }, { class: "quiet", testid: "control-new" }),
       button(t("pick.snap"), () => picker.snap(), { class: "quiet", testid: "control-snap" }),
-      button(t("control.paste"), () => this.#paste(), { class: "quiet", testid: "control-paste" }));
+      button(t("control.paste"), () => this.#paste(), { class: "quiet", testid: "control-paste" }),
+      this.targets);
   }
 
   #controlTable() {
     const heads = ["control.name", "control.X", "control.Y", "control.r", "control.seen", "control.residual"];
     return h("section", { class: "card" }, h("h2", {}, t("control.title")),
-      this.#controlButtons(), h("p", { class: "hint" }, t("control.hint")),
+      this.#controlButtons(), this.app.jobBox("targets"), h("p", { class: "hint" }, t("control.hint")),
       h("table", { class: "grid", testid: "control-table", onpaste: (event) => this.#pasted(event) },
         h("thead", {}, h("tr", {}, heads.map((key) => h("th", { scope: "col" }, t(key))),
           h("th", {}, h("span", { class: "unseen" }, t("list.delete"))))), this.body));
@@ -194,6 +197,7 @@ export class OrientationStage {
     this.prepare(state).catch((error) => this.app.refuse(error));
     this.picker.settle();
     this.wallCard.update(state);
+    this.targets.disabled = !state.pair;
     setText(this.good, state.good ?? "");
     this.good.hidden = !state.good;
     keyedRows(this.body, state.control, { key: ({ name }) => name,
@@ -220,13 +224,16 @@ export class OrientationStage {
 
   /** Distances and nadirs with their sigmas: of the proposal, else of the control points alone. */
   #tellKnown({ pair, live }) {
+    const facts = JSON.stringify([pair?.images.map(({ distance, media }) => [distance, media]), pair?.report?.standard_deviations, live]);
+    if (facts === this.facts) return;
+    this.facts = facts;
     const distances = pair?.images.map(({ distance }) => distance) ?? live?.distances ?? [];
     const sigmas = pair?.report?.standard_deviations ?? live?.deviations ?? {};
     const rows = distances.flatMap((distance, index) => [
       [t("known.distance", { image: index + 1 }), distance, sigmas[`distance${index + 1}`]],
       [t("known.nadir", { image: index + 1 }), null, sigmas[`nadir${index + 1}`]]]);
     this.known.replaceChildren(...rows.filter(([, value, sigma]) => value !== null || Number.isFinite(sigma))
-      .map(([name, value, sigma]) => h("div", {}, h("dt", {}, name), h("dd", {},
+      .map(([name, value, sigma]) => h("div", {}, value === null ? sketched(h("dt", {}, name), "nadir") : h("dt", {}, name), h("dd", {},
         `${value === null ? "" : number(value, 3)}${Number.isFinite(sigma) ? ` ± ${number(sigma, 3)}` : ""} m`.trim()))));
     this.#tellMedia(pair?.images.map(({ media }) => media) ?? [], sigmas);
   }

@@ -15,7 +15,7 @@ export class PhotosStage {
   constructor(app) {
     this.app = app;
     this.cards = [1, 2].map((image) => this.#card(image));
-    this.input = h("input", { type: "file", accept: "image/*", multiple: true, class: "unseen",
+    this.input = h("input", { type: "file", accept: "image/*,.heic,.heif,.hif,.avif,.dng,.cr2,.cr3,.nef,.arw,.orf,.raf,.rw2,.pef,.srw", multiple: true, class: "unseen",
       id: "photo-files", testid: "photo-files", onchange: () => this.#drop([...this.input.files]) });
     this.lead = h("p", { class: "lead" }, t("photos.drop"));
     this.zone = h("div", { class: "drop-zone" },
@@ -34,7 +34,15 @@ export class PhotosStage {
     this.media = h("details", { class: "card site", testid: "media" },
       h("summary", {}, h("h2", {}, t("photos.media"))), this.through,
       h("p", { class: "hint" }, t("photos.mediaHint")), fields(MEDIA));
-    this.element = h("main", { class: "stage photos", id: "stage-photos" }, this.zone,
+    this.recent = h("ul", { class: "recent" });
+    this.beginning = h("section", { class: "beginning" },
+      h("div", { class: "card" }, h("h2", {}, t("start.sample")), h("p", { class: "hint" }, t("start.sampleHint")),
+        h("div", { class: "row" }, button(t("start.try"), () => this.#sample(), { testid: "sample" }))),
+      h("div", { class: "card checklist" }, h("h2", {}, t("start.bring")),
+        h("ul", {}, [1, 2, 3, 4, 5, 6].map((number) => h("li", {}, t(`start.bring.${number}`)))),
+        h("div", { class: "row" }, button(t("start.print"), () => window.print(), { class: "quiet", testid: "print" }))),
+      h("div", { class: "card" }, h("h2", {}, t("start.recent")), this.recent));
+    this.element = h("main", { class: "stage photos", id: "stage-photos" }, this.zone, this.beginning,
       h("div", { class: "cards" }, this.cards.map(({ element }) => element)), this.form, this.media);
     this.#listen();
   }
@@ -70,6 +78,32 @@ export class PhotosStage {
     });
   }
 
+  async #sample() {
+    try {
+      await this.app.connection.ask("/api/sample", {});
+      await this.app.connection.refresh();
+      this.app.open("points");
+    } catch (error) {
+      this.app.refuse(error);
+    }
+  }
+
+  /** Surveys that were open before; another page opens beside this one. */
+  async #tellRecent() {
+    const { surveys } = await this.app.connection.get("/api/recent").catch(() => ({ surveys: [] }));
+    const open = async (number) => {
+      try {
+        const { url } = await this.app.connection.ask("/api/recent", { number });
+        window.location.assign(url);
+      } catch (error) {
+        this.app.refuse(error);
+      }
+    };
+    this.recent.replaceChildren(...(surveys.length ? surveys.map(({ number, name, folder }) => h("li", {},
+      button(`${folder} / ${name}`, () => open(number), { class: "link" })))
+      : [h("li", { class: "hint" }, t("start.none"))]));
+  }
+
   async #drop(files) {
     if (files.length > 2) return this.app.say(t("photos.two"), "warning");
     this.app.open("photos");
@@ -94,6 +128,11 @@ export class PhotosStage {
 
   update(state) {
     const ready = state.photos.length === 2;
+    this.beginning.hidden = state.photos.length > 0;
+    if (!this.beginning.hidden && !this.asked) {
+      this.asked = true;
+      this.#tellRecent();
+    }
     this.zone.classList.toggle("small", state.photos.length > 0);
     setText(this.lead, t(state.photos.length === 1 ? "photos.dropSecond" : "photos.drop"));
     this.form.hidden = this.media.hidden = !ready;

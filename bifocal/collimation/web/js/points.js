@@ -9,6 +9,7 @@ import { Loupe } from "./loupe.js";
 import { Picker, trust } from "./picker.js";
 import { PointList } from "./pointlist.js";
 import { Readout, TYPES } from "./readout.js";
+import { sketched } from "./sketches.js";
 import { photoMark, wallMark } from "./tiles.js";
 import { Pane, pictureLayer, pixelView, spread, tileLayer } from "./viewer.js";
 import { t } from "./words/words.js";
@@ -40,6 +41,7 @@ export class PointsStage {
     this.quality = h("p", { class: "quality", testid: "quality" });
     this.areaButton = button(t("pick.area"), () => this.toggleArea(), { class: "quiet",
       testid: "uncertainty", "aria-pressed": "false" });
+    sketched(this.areaButton, "sigma");
     this.contours = [];
     this.fitButton = button(h("span", { class: "whole", "aria-hidden": "true" }), () => this.activePane?.fit(), { class: "icon", testid: "fit",
       "aria-label": t("key.fit"), title: `${t("key.fit")} (0)` });
@@ -236,6 +238,8 @@ export class PointsStage {
     const next = { name: target.name ?? t("point.newName"), image: target.image };
     setText(this.target, picking ? t("pick.next", next) : t("pick.off"));
     this.target.dataset.image = target.image;
+    this.layers.lean(picking ? target.image : null);
+    this.#tellPhoto(picking ? target.image : null);
     this.buttons.pick.setAttribute("aria-pressed", String(picking));
     for (const key of ["suggest", "snap"]) this.buttons[key].disabled = !selected;
     this.buttons.accept.disabled = !proposal && !this.picker.lacking;
@@ -249,6 +253,16 @@ export class PointsStage {
     this.list.mark();
     this.#paint();
     this.#look();
+  }
+
+  /** Over the picture stands which photo the next click belongs to. */
+  #tellPhoto(image) {
+    if (!this.main) return;
+    this.whose ??= h("span", { testid: "whose" });
+    if (this.whose.parentElement !== this.main.element) this.main.element.append(this.whose);
+    this.whose.hidden = !image || this.layers.mode === "split";
+    this.whose.className = `badge ink-${image ?? 1}`;
+    setText(this.whose, image ? t("pane.whose", { image, role: t(image === 1 ? "photo.far" : "photo.near") }) : "");
   }
 
   #paint() {

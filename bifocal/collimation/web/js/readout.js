@@ -1,12 +1,13 @@
 /** The point in hand: its name, type, reference and everything that follows from its picks. */
 import { h, number, setText } from "./dom.js";
 import { afresh, button, choice, fill, labelled, numberInput, textInput } from "./fields.js";
+import { sketched } from "./sketches.js";
 import { t } from "./words/words.js";
 
 export const TYPES = ["plain", "wall", "check", "control"];
 const VALUES = [
-  ["s1", "mm", 4], ["s2", "mm", 4], ["delta_s", "mm", 4], ["e1", "mm", 4],
-  ["r", "m", 4, "sigma_r"], ["X", "m", 4, "sigma_X"], ["Y", "m", 4, "sigma_Y"], ["misfit_px", "px", 2],
+  ["r", "m", 4, "sigma_r"], ["X", "m", 4, "sigma_X"], ["Y", "m", 4, "sigma_Y"],
+  ["s1", "mm", 4], ["s2", "mm", 4], ["delta_s", "mm", 4], ["e1", "mm", 4], ["misfit_px", "px", 2],
 ];
 
 export class Readout {
@@ -28,7 +29,7 @@ export class Readout {
     this.references = h("div", { class: "fields three" }, Object.entries(this.reference)
       .map(([key, input]) => labelled(t("point.reference", { key }), input, "m")));
     this.values = h("dl", { class: "values" }, VALUES.map(([key]) =>
-      h("div", { class: key === "r" ? "main" : "" }, h("dt", {}, t(`value.${key}`)), this.cells[key])));
+      h("div", { class: key === "r" ? "main" : "" }, sketched(h("dt", {}, t(`value.${key}`)), key), this.cells[key])));
     this.empty = h("p", { class: "hint" }, t("point.none"));
     this.remove = button(t("pick.delete"), () => app.stages.points.remove(), { class: "quiet", testid: "point-delete" });
     this.foot = h("div", { class: "row between" }, this.flag, this.remove);
