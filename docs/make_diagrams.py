@@ -177,7 +177,7 @@ def pixels(figure: Figure) -> None:
 
 
 def refracted(figure: Figure) -> None:
-    """A ray through glass into water, and where the point seems to be to a camera in air."""
+    """Draw a ray through glass into water, and where the point seems to be from the air."""
     axes = plain(figure, (0, 0, 1, 1), (-6.5, 6.5, -5.2, 3.6))
     axes.axhspan(-5.2, -0.5, color="#dbe9f4")
     axes.axhspan(-0.5, 0.0, color="#b9c4cc")
