@@ -182,7 +182,9 @@ def settled_jointly(
     seen = with_enough_rays(observations)
     focal = np.array([camera.matrix[0, 0] for camera in start.cameras])
     start, tests, _ = _coarse(seen, start, focal, rounds)
-    seen = with_rays(seen, tests < FAR_OFF)
+    # Picks of control are judged at the end, when it holds the frame closely.
+    picked = np.asarray(np.isfinite(seen.known).any(axis=1))[seen.point]
+    seen = with_rays(seen, picked | (tests < FAR_OFF))
     system = _System(seen, start, focal)
     return seen, start, system.rays(system.start)[0]
 
