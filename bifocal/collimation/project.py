@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.collimation.fields import NOTES, FieldError, fields_of
+from bifocal.files.photos import photo_infos
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import pair_or_set
 from bifocal.survey.set_survey import best_pair
@@ -123,6 +124,7 @@ def _pair_of(source: Path) -> Path:
     if isinstance(photos, Pair):
         return source
     best = best_pair(photos)
+    photo_infos(best)  # what is not there, or another photo, is refused before a file is written
     stem = source.name.removesuffix(".json").removesuffix(".photos")
     named = file_name(f"{stem}-{best.image1.name}-{best.image2.name}")
     pair = source.with_name(f"{named}{_PAIR}")

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.special import chdtrc, ndtri
 
 from bifocal.model.orientation_precision import NAMES, rates_of
 from bifocal.orientation.adjustment.frame_turn import line_equations, turned_by_lines
@@ -456,8 +456,8 @@ def _control_test(
 
 def as_one(square: float, count: int) -> float:
     """Return how many standard deviations of one value are as unlikely as a square sum of many."""
-    chance = float(chi2.sf(square, count))
-    return float(norm.isf(chance / 2)) if chance > 1e-300 else float(np.sqrt(square))
+    chance = float(chdtrc(count, square))
+    return -float(ndtri(chance / 2)) if chance > 1e-300 else float(np.sqrt(square))
 
 
 #: Where the cameras' `PARAMETERS` and the distortions stand in `NAMES`.

@@ -11,6 +11,7 @@ from io import BytesIO
 import ezdxf
 import numpy as np
 import pytest
+from PIL import Image
 
 from bifocal import SAMPLE, InputError, Pair, Photo, PhotoSet, ReliefMap
 from bifocal.campaigns.verification import verify
@@ -364,6 +365,11 @@ def test_of_a_set_the_best_pair_is_opened_and_kept(tmp_path) -> None:
         for name, d in (("mid", 14.0), ("far", 17.5), ("near", 9.5))
     ]
     PhotoSet(photos=tuple(photos)).write(tmp_path / "wall.photos.json")
+    with pytest.raises(InputError, match="no such image"):
+        find_files([tmp_path / "wall.photos.json"])
+    assert [path.name for path in tmp_path.iterdir()] == ["wall.photos.json"]
+    for name in ("far", "near"):
+        Image.new("L", (80, 60)).save(tmp_path / f"{name}.jpg")
     files = find_files([tmp_path / "wall.photos.json"])
     assert files.pair == tmp_path / "wall-far-near.pair.json"
     assert Pair.read(files.pair).d1 == 17.5
