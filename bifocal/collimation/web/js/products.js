@@ -32,7 +32,7 @@ export class ProductsStage {
       this.pane?.mounted();
       this.pane?.fit();
     });
-    this.element = h("main", { class: "stage work", id: "stage-products" },
+    this.element = h("div", { class: "stage work", id: "stage-products" },
       h("div", { class: "table-top" }, this.#bar(), this.photos, this.profile.element),
       h("aside", { class: "panel" }, this.#deliverBox(), this.#reliefBox(), this.#orthoBox(),
         this.shapes.element, this.loupe.element));
