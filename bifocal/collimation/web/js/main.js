@@ -219,9 +219,10 @@ class App {
   }
 
   async job(kind, options = {}) {
+    // The server may have the workbook to write first: what was asked for is answered at once.
+    this.say(t("job.started", { kind: t(`job.${kind}`) }));
     try {
       await this.connection.ask("/api/jobs", { kind, options });
-      this.say(t("job.started", { kind: t(`job.${kind}`) }));
     } catch (error) {
       this.refuse(error);
     }

@@ -69,7 +69,7 @@ export class PointsStage {
   }
 
   status(state) {
-    if (!state.pair) return { text: t("status.points.pair") };
+    if (!state.pair || (!state.pair.accepted && !state.points.length)) return { text: t("status.points.pair") };
     const points = this.app.points();
     const half = points.filter(({ picks }) => !picks[1] || !picks[2]).length;
     if (half) return { text: t("status.points.half", { half }) };

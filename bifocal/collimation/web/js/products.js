@@ -116,7 +116,7 @@ export class ProductsStage {
   }
 
   status(state) {
-    if (!state.pair) return { text: t("status.points.pair") };
+    if (!state.pair?.accepted) return { text: t("status.points.pair") };
     if (!state.products.relief) return { text: t("status.products.relief") };
     if (!state.products.ortho) return { text: t("status.products.ortho") };
     if (!state.products.files.some(({ name }) => name.endsWith(".pdf"))) {
