@@ -109,6 +109,7 @@ def main() -> None:
             served(folder / "survey") as server,
             tab_of(browser, server, viewport=VIEW) as page,
         ):
+            page.tab.set_default_timeout(120_000)
             orient(page, [str(photo) for photo in photos])
             collimate(page)
             make_relief(page)
