@@ -19,16 +19,13 @@ if TYPE_CHECKING:
 
 _WORDS = "bifocal.planning"
 #: Cells of the first station.
-_FIRST = {
-    "pair": "Planning!$A$5", "width": "Planning!$I$5", "height": "Planning!$J$5",
-    "sigma_1m": "Planning!$L$5",
-}  # fmt: skip
+_FIRST = {"pair": "$A$5", "width": "$I$5", "height": "$J$5", "sigma_1m": "$L$5"}
 
 
 def write_plan(
     path: Path | str, plan: Plan, *, language: str = "en", overwrite: bool = False
 ) -> None:
-    """Write a plan as .xlsx: sheets ``Planning`` and ``Sigma r``, formulas unless through media.
+    """Write a plan as .xlsx: stations, and sigma of r over the frame; live unless through media.
 
     Raises
     ------
@@ -38,10 +35,11 @@ def write_plan(
     from openpyxl import Workbook
 
     book, package = Workbook(), io.BytesIO()
-    results: dict[str, dict[str, Any]] = {"Planning": {}, "Sigma r": {}}
-    _stations_sheet(book.active, plan, language, results["Planning"])
     say = words_of(_WORDS, language)
-    _grid_sheet(book.create_sheet("Sigma r"), plan, say, results["Sigma r"])
+    first, second = say("tab"), say("tab_grid")
+    results: dict[str, dict[str, Any]] = {first: {}, second: {}}
+    _stations_sheet(book.active, plan, language, results[first])
+    _grid_sheet(book.create_sheet(second), plan, say, results[second])
     if not plan.media:
         _inputs(book, plan, say)
     book.properties.creator = "bifocal"
@@ -55,7 +53,7 @@ def _inputs(book: Any, plan: Plan, say: Words) -> None:
     """Fill the named cells below the table that the formulas speak of."""
     from openpyxl.workbook.defined_name import DefinedName
 
-    sheet, sensor, first = book["Planning"], plan.sensor, 6 + len(plan.stations)
+    sheet, sensor, first = book.worksheets[0], plan.sensor, 6 + len(plan.stations)
     values = (
         sensor.pitch, sensor.columns, sensor.rows, plan.sigma_px, plan.sigma_r_max * 1000,
         *(plan.object_size or (None, None)), plan.free_space,
@@ -65,7 +63,7 @@ def _inputs(book: Any, plan: Plan, say: Words) -> None:
         sheet.cell(row, 1, say(key))
         cell = sheet.cell(row, 6, value)
         cell.number_format, cell.fill, cell.border = form, INPUT_FILL, INPUT_EDGE
-        book.defined_names[key] = DefinedName(key, attr_text=f"Planning!$F${row}")
+        book.defined_names[key] = DefinedName(key, attr_text=f"{sheet.title}!$F${row}")
 
 
 def _stations_sheet(sheet: Any, plan: Plan, language: str, results: dict[str, Any]) -> None:
@@ -81,7 +79,7 @@ def _stations_sheet(sheet: Any, plan: Plan, language: str, results: dict[str, An
         for key, text in texts_of(_WORDS).items()
         if "format" in text and text.get("only", kind) == kind
     }
-    sheet.title, sheet["A1"] = "Planning", say("title")
+    sheet.title, sheet["A1"] = say("tab"), say("title")
     sheet["A1"].font = Font(bold=True, size=14)
     sheet["A2"] = say("change")
     if media:
@@ -156,13 +154,14 @@ def _grid_sheet(sheet: Any, plan: Plan, say: Words, results: dict[str, Any]) -> 
     x, y, sigma = plan.sigma_grid(best, columns=15, rows=11)
     title = say("grid", c1=best.c1, c2=best.c2)
     parts = title.replace(f"{best.c1:g}/{best.c2:g} mm", '"&{pair}&"')
+    station = {key: f"{say('tab')}!{cell}" for key, cell in _FIRST.items()}
 
     def fill(row: int, column: int, value: Any, form: str, formula: str) -> None:
         """Write a value, in air as the formula of the first station that gives it."""
         cell = sheet.cell(row, column, value)
         cell.number_format = form
         if not plan.media and value != "nadir":
-            cell.value, results[cell.coordinate] = "=" + formula.format(**_FIRST), value
+            cell.value, results[cell.coordinate] = "=" + formula.format(**station), value
 
     fill(1, 1, title, "General", f'"{parts}"')
     sheet["A1"].font = Font(bold=True)

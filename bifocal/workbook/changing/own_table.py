@@ -26,7 +26,7 @@ from bifocal.workbook.formulas.placed_formulas import added_covariance
 from bifocal.workbook.formulas.setup_cells import TITLE_BLOCK, cells_of
 from bifocal.workbook.making.book import build
 from bifocal.workbook.reading.reader import TO_DEGREES, TO_MM
-from bifocal.workbook.words import term
+from bifocal.workbook.words import term, word
 from photocore.errors import InputError
 from photocore.tables import Table
 from photocore.workbook.changing.cells import CellValue
@@ -97,7 +97,7 @@ def add_results(
         if defined.attr_text.startswith("'Setup'!") and name not in TITLE_BLOCK
     ]
     if any(place_of(editor, name) is None for name in needed if not name.startswith("a")):
-        add_sheets(editor, built, ["Setup"])
+        add_sheets(editor, built, {"Setup": word("own_setup", content.language)})
     store_named_cells(editor, built, content)
     write_options(editor, content, given)
     write_corrections(editor, content)

@@ -39,7 +39,7 @@ def add_missing_sheets(editor: WorkbookEditor, built: BookBuilder) -> list[str]:
     if chart_sheet(editor) is None and (check is None or check.sheet == "Check"):
         missing.append("Charts")
     if missing:
-        add_sheets(editor, built, missing)
+        add_sheets(editor, built, {title: title for title in missing})
     return missing
 
 
@@ -53,9 +53,10 @@ def chart_sheet(editor: WorkbookEditor) -> str | None:
     return None
 
 
-def add_sheets(editor: WorkbookEditor, built: BookBuilder, titles: list[str]) -> None:
-    """Add sheets of a survey workbook behind all others."""
-    editor.add_sheets(built.parts(), {title: editor.free_title(title) for title in titles})
+def add_sheets(editor: WorkbookEditor, built: BookBuilder, titles: Mapping[str, str]) -> None:
+    """Add sheets of a survey workbook behind all others; by their titles, what to call them."""
+    called = {title: editor.free_title(wanted) for title, wanted in titles.items()}
+    editor.add_sheets(built.parts(), called)
 
 
 def write_options(editor: WorkbookEditor, content: SurveyContent, given: Mapping[str, Any]) -> None:

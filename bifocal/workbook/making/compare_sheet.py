@@ -8,7 +8,7 @@ from openpyxl.styles import Alignment
 from bifocal.survey.check_points import statistics
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.formulas.columns import compare_columns, compared
-from bifocal.workbook.making.reference_sheets import STATISTICS
+from bifocal.workbook.making.reference_sheets import statistics_of
 from bifocal.workbook.making.setup_sheet import pair_names
 from bifocal.workbook.reference_cells import compare_cells
 from photocore.arrays import FloatArray
@@ -23,22 +23,16 @@ HEAD = 11
 def compare(builder: BookBuilder, content: SurveyContent, points: Cells) -> None:
     """Write errors of relief of every pair, and of all photos together, with their statistics."""
     sheet, cells = builder.sheet("Compare", "compare_how"), compare_cells(content, points)
-    kinds = compared(content.others)
-    for row, key in enumerate((*STATISTICS, "expected_sigma"), start=5):
-        sheet.word(f"A{row}", key)
-    titles = (*pair_names(content.others), builder.word("all_photos"))
-    columns = compare_columns(content.others)
+    columns, kinds = compare_columns(content.others), compared(content.others)
     keys = [column.key for column in columns]
+    sheet.word("A9", "expected_sigma")
+    titles = (*pair_names(content.others), builder.word("all_photos"))
     for title, (r, sigma) in zip(titles, kinds, strict=True):
         letter = column_letters(keys.index(f"e_{r}") + 1)
         sheet.text(f"{letter}4", title, HEAD_FONT)
         sheet.worksheet[f"{letter}4"].alignment = Alignment(horizontal="right")
         found = statistics(_numbers(cells, f"e_{r}"))
-        for row, (key, (body, attribute)) in enumerate(STATISTICS.items(), start=5):
-            text = body.format(f"tblCompare[e_{r}]", f"{letter}5")
-            value = getattr(found, attribute) if found.n else 0 if key == "n" else None
-            form = "0" if key == "n" else "0.0000"
-            sheet.formula(f"{letter}{row}", text, value, form=form, name=f"compare_{key}_{r}")
+        statistics_of(sheet, letter, f"tblCompare[e_{r}]", f"compare_{{}}_{r}", found)
         sigmas = _numbers(cells, sigma)
         known = sigmas[~np.isnan(sigmas)]
         text = f'IF({letter}5=0,"",SQRT(SUMSQ(tblCompare[{sigma}])/{letter}5))'

@@ -7,6 +7,7 @@ import math
 from openpyxl.styles import Alignment
 
 from bifocal.model.flags import FlagLimits
+from bifocal.survey.reference import AxisErrors
 from bifocal.survey.tolerances import judge
 from bifocal.workbook.content import SurveyContent, setup_cells
 from bifocal.workbook.formulas.columns import (
@@ -45,16 +46,9 @@ def check(builder: BookBuilder, content: SurveyContent, points: Cells) -> None:
     for letter, axis in zip("BCD", "XYZ", strict=True):
         sheet.text(f"{letter}4", f"d{axis}", HEAD_FONT)
         sheet.worksheet[f"{letter}4"].alignment = Alignment(horizontal="right")
-    for row, (key, (body, attribute)) in enumerate(STATISTICS.items(), start=5):
-        sheet.word(f"A{row}", key)
-        for letter, axis in zip("BCD", "XYZ", strict=True):
-            errors = None if content.check is None else content.check.axes[axis]
-            value: CellValue = 0 if key == "n" else None
-            if errors is not None and errors.n:
-                value = getattr(errors, attribute)
-            text = body.format(f"tblCheck[d{axis}]", f"{letter}5")
-            form, name = "0" if key == "n" else "0.0000", f"check_{key}_{axis}"
-            sheet.formula(f"{letter}{row}", text, value, form=form, name=name)
+    for letter, axis in zip("BCD", "XYZ", strict=True):
+        found = None if content.check is None else content.check.axes[axis]
+        statistics_of(sheet, letter, f"tblCheck[d{axis}]", f"check_{{}}_{axis}", found)
     sheet.word("A9", "worst")
     accuracy = content.check.accuracy if content.check is not None else math.nan
     worst = None if math.isnan(accuracy) else accuracy
@@ -82,10 +76,35 @@ def check(builder: BookBuilder, content: SurveyContent, points: Cells) -> None:
     sheet.finish(landscape=True, freeze=f"B{CHECK_HEAD + 1}", repeat=repeat)
 
 
+def statistics_of(
+    sheet: SheetBuilder, letter: str, column: str, name: str, found: AxisErrors | None
+) -> None:
+    """Write number, RMSE, mean and largest of a column of errors, from row 5 on.
+
+    Parameters
+    ----------
+    sheet, letter
+        Where to.
+    column : str
+        The errors, as formulas call them.
+    name : str
+        Of the cells, with the statistic in braces.
+    found : AxisErrors or None
+        What they show.
+    """
+    for row, (key, (body, attribute)) in enumerate(_STATISTICS.items(), start=5):
+        sheet.word(f"A{row}", key)
+        value: CellValue = 0 if key == "n" else None
+        if found is not None and found.n:
+            value = getattr(found, attribute)
+        form, text = "0" if key == "n" else "0.0000", body.format(column, f"{letter}5")
+        sheet.formula(f"{letter}{row}", text, value, form=form, name=name.format(key))
+
+
 #: Rows that are coloured: not counted, beyond three sigma, beyond two.
 _ROWS = {"{out}=1": DOUBT, "N({sigmas})>3": WRONG, "N({sigmas})>2": ("FFF2CC", "7F6000")}
 #: Statistics of errors: formula of their column and the cell of their number, attribute.
-STATISTICS = {
+_STATISTICS = {
     "n": ("COUNT({0})", "n"),
     "rmse": ('IF({1}=0,"",SQRT(SUMSQ({0})/{1}))', "rmse"),
     "mean": ('IF({1}=0,"",AVERAGE({0}))', "mean"),

@@ -29,6 +29,8 @@ from photocore.workbook.making.words import Wording
 
 #: What a typed number of the set-up may be, where it need not be above zero.
 _NUMBERS = (-1e7, 1e7)
+#: Columns of the values: of the pair, then of further photos.
+_COLUMNS = "CEFGH"
 
 
 def setup_sheet(builder: BookBuilder, content: SurveyContent) -> None:
@@ -40,7 +42,7 @@ def setup_sheet(builder: BookBuilder, content: SurveyContent) -> None:
     line = state_formula(words, is_pair=content.is_pair)
     sheet.formula("A3", line, state(cells, words), name="setup_state", font=HEAD_FONT)
     sheet.headings(4, ("name", "description", "value", "unit"), (15, 61, 18, 9))
-    for letter, pair in zip("CEFGH", pair_names(content.others), strict=False):
+    for letter, pair in zip(_COLUMNS, pair_names(content.others), strict=False):
         if content.others:
             sheet.text(f"{letter}4", pair, HEAD_FONT)
             sheet.worksheet[f"{letter}4"].fill = HEAD_FILL
@@ -50,9 +52,7 @@ def setup_sheet(builder: BookBuilder, content: SurveyContent) -> None:
     row = 5
     for group in listed:
         for name in group:
-            typed = group is not listed[-1]
-            _setup_cell(sheet, row, name, cells, content, typed=typed)
-            _beside(sheet, row, name, cells, content, typed=typed)
+            _setup_cell(sheet, row, name, cells, content, typed=group is not listed[-1])
             row += 1
         row += 1
     for image in (1, 2):
@@ -63,10 +63,10 @@ def setup_sheet(builder: BookBuilder, content: SurveyContent) -> None:
             sheet.input(f"C{row}", cells[name], name=name)
             sheet.validate(f"C{row}", title=name, prompt=told, limits=_NUMBERS)
             row += 1
-    for letter in "CEFGH"[: 1 + content.others]:
+    for letter in _COLUMNS[: 1 + content.others]:
         area = f"{letter}5:{letter}{row}"
         colour_words(sheet.worksheet, area, {"OK": GOOD, "CHECK": WRONG}, bold=("CHECK",))
-    sheet.finish(freeze="A5", repeat="4:4")
+    sheet.finish(landscape=content.others > 1, freeze="A5", repeat="4:4")
 
 
 def _setup_cell(
@@ -84,49 +84,31 @@ def _setup_cell(
     told = known.in_language(sheet.book.language).format(n=name[-1]) if known else matrix
     unit = known.unit if known else ""
     sheet.describe(row, (name, told), unit)
-    cell, form, value = f"C{row}", number_format(name), cells.get(name)
-    sheet.worksheet[cell].alignment = Alignment(horizontal="right")
-    if typed:
-        _validate(sheet, cell, name, f"{told} [{unit}]" if unit else told)
-    if name in content.links:
-        sheet.formula(cell, content.links[name], value, form=form, name=name, editable=True)
-        return
-    live = formulas(is_pair=content.is_pair, media=content.media_cells)
+    live = formulas(is_pair=content.is_pair, media=content.media_cells, others=content.others)
     is_default = {
         "d_1": content.pair is None,
         "sigma_s": content.setup is None or content.setup.measuring.sigma_s is None,
         "sigma_r_max": content.limits.sigma_r_max is None,
     }
-    if not typed or (name in live and is_default.get(name, False)):
-        sheet.formula(cell, live[name], value, form=form, name=name, editable=typed)
-        return
-    sheet.input(cell, value, form=form, name=name)
+    # Those of further photos stand beside a value of the second one.
+    names, form = (name, *beside(name, content.others)), number_format(name)
+    for letter, own in zip(_COLUMNS, names, strict=False):
+        cell, value = f"{letter}{row}", cells.get(own)
+        sheet.worksheet[cell].alignment = Alignment(horizontal="right")
+        if typed:
+            prompt = told if own == name else f"{own}: {told}"
+            _validate(sheet, cell, name, f"{prompt} [{unit}]" if unit else prompt)
+        if own in content.links:
+            sheet.formula(cell, content.links[own], value, form=form, name=own, editable=True)
+        elif not typed or (own in live and is_default.get(own, False)):
+            sheet.formula(cell, live[own], value, form=form, name=own, editable=typed)
+        else:
+            sheet.input(cell, value, form=form, name=own)
 
 
 def pair_names(others: int) -> list[str]:
     """Return what the pairs of photo 1 with each other one are called, by their photos."""
     return [f"{pair_letter(photo)} (1-{photo})" for photo in range(2, 3 + others)]
-
-
-def _beside(
-    sheet: SheetBuilder,
-    row: int,
-    name: str,
-    cells: Mapping[str, CellValue],
-    content: SurveyContent,
-    *,
-    typed: bool,
-) -> None:
-    """Write the same of further photos beside a value of the second one."""
-    live = formulas(others=content.others)
-    for letter, other in zip("EFGH", beside(name, content.others), strict=False):
-        cell, form, value = f"{letter}{row}", number_format(name), cells.get(other)
-        sheet.worksheet[cell].alignment = Alignment(horizontal="right")
-        if typed:
-            _validate(sheet, cell, name, f"{other}: {sheet.worksheet[f'B{row}'].value}")
-            sheet.input(cell, value, form=form, name=other)
-        else:
-            sheet.formula(cell, live[other], value, form=form, name=other)
 
 
 def _wording(name: str, content: SurveyContent) -> Wording | None:

@@ -73,7 +73,7 @@ def what_if_sheet(builder: BookBuilder, content: SurveyContent) -> None:
     dots = scatter(builder.word("chart_changes"), "s' [mm]", "r [m]", x, {"change": y})
     dots.y_axis.number_format, dots.visible_cells_only = "General", False
     for chart, place in ((bars, f"A{CHARTS}"), (dots, f"G{CHARTS}")):
-        chart.height, chart.width = 8.5, 12.5
+        chart.height, chart.width = 8, 12.5
         sheet.worksheet.add_chart(chart, place)
     sheet.finish(landscape=True, repeat=f"{HEAD - 1}:{HEAD}")
 
@@ -83,7 +83,8 @@ def _changed(sheet: SheetBuilder, row: int, name: str, value: CellValue, change:
     known = sheet.book.words.term("setup", name)
     form, prompt = number_format(name), sheet.book.word("what_if_how")
     sheet.text(f"A{row}", f"{name} [{known.unit if known else ''}]")
-    sheet.formula(f"B{row}", f'IF(COUNT({name})=1,{name},"")', value, form=form)
+    text = f'IF(COUNT({name})=1,{name},"")'
+    sheet.formula(f"B{row}", text, value, form=form, name=f"now_{name}")
     sheet.input(f"C{row}", change, form="0.0000", name=f"change_{name}")
     sheet.validate(f"C{row}", title=name, prompt=prompt, limits=(-1e4, 1e4))
     new = value + change if isinstance(value, int | float) else None

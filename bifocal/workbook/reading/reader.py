@@ -380,9 +380,9 @@ def _observations(
     texts = {"id": ids, "code": table.texts("code"), "note": table.texts("note")}
     used = np.isnan(use) | (use != 0)
     points = PointObservations.from_columns({**texts, "use": used, **columns})
-    keys = [key for key in table.present if re.fullmatch(r"[xy][3-9]", key)]
-    if keys:
-        keys = other_keys(len(keys) // 2)
+    others = [int(key[1:]) for key in table.present if re.fullmatch(r"[xy][3-9]", key)]
+    if others:
+        keys = other_keys(max(others) - 2)
         errors += table.too_large(keys, LARGEST)
         typed = np.stack([table.numbers(key) * factor for key in keys], axis=-1)
         points = replace(points, other_xy=typed.reshape(len(table), -1, 2))

@@ -63,6 +63,8 @@ def test_the_workbook_follows_what_is_changed_on_site(tmp_path, language):
             if value != "":
                 wanted = value if isinstance(value, str) else pytest.approx(value, rel=1e-9)
                 assert found[title][cell] == wanted, (title, cell)
+    tabs = {"en": "Planning", "it": "Pianificazione", "de": "Planung"}
+    assert list(shown) == [tabs[language], "Sigma r"]
     if language != "en":
         return
     book = openpyxl.load_workbook(out)

@@ -74,9 +74,9 @@ def test_every_pair_with_the_first_photo_is_midullas_formula():
         np.testing.assert_allclose(columns[f"r_1_{k}"], expected, rtol=1e-12)
 
 
-def form(path, seen, xyz, language="en", **cells):
+def form(path, seen, xyz, language="en", what_if=False, **cells):
     """Fill a form for four photos in: points, and relief measured on site."""
-    write_template(path, photos=4, rows=20, language=language)
+    write_template(path, photos=4, rows=20, language=language, what_if=what_if)
     book = openpyxl.load_workbook(path)
     values = {"c_1": 35, "c_2": 19, "d_2": 9.5, "delta_d": 8, "c_3": 28, "d_3": 14, "c_4": 24}
     for name, value in {**values, "d_4": 12.02, **cells}.items():
@@ -95,17 +95,19 @@ def form(path, seen, xyz, language="en", **cells):
 
 @pytest.mark.acceptance
 @pytest.mark.office
-@pytest.mark.parametrize("language", ["en", "it", "de"])
+@pytest.mark.parametrize("language", ["it", "de"])
 def test_the_formulas_recalculated_by_libreoffice_equal_the_library(tmp_path, language):
     xyz, seen = picks()
-    path = form(tmp_path / "four.xlsx", seen, xyz, language)
+    # The form in German was an English one.
+    path = form(tmp_path / "four.xlsx", seen, xyz, what_if=True)
     if language == "it":  # pixels of a print's scan, y down
         path = form(
             tmp_path / "px.xlsx", seen * [250, -250] + [3000, 2000], xyz, language,
             input_unit="px", pitch=0.004,
             **{f"nadir_{k}_{a}": v for k in "1234" for a, v in (("col", 3000), ("row", 2000))},
         )  # fmt: skip
-    assert run("solve", path, "--out", path, "--overwrite").exit_code == 0
+    line = ("solve", path, "--lang", language, "--out", path, "--overwrite")
+    assert run(*line).exit_code == 0
     assert assert_recalculated_equals_cached(path, tmp_path) > 4000
 
 

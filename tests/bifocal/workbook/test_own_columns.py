@@ -29,7 +29,7 @@ def solved(tmp_path):
     sheet.print_area = "A1:E3"
     path = tmp_path / "own.xlsx"
     book.save(path)
-    given = ["--d1", "17.5", "--d2", "9.5", "--c1", "35", "--c2", "19"]
+    given = ["--d1", "17.5", "--d2", "9.5", "--c1", "35", "--c2", "19", "--lang", "it"]
     done = CliRunner().invoke(main, ["solve", str(path), *given, "--out", str(path), "--overwrite"])
     assert done.exit_code == 0, done.stderr
     return path
@@ -53,7 +53,7 @@ def test_results_come_first_and_the_steps_are_folded(solved):
         width, hidden, level = known[number]
         assert width >= len(head) + 1
         assert (hidden, level) == ((False, 0) if head in FIRST else (True, 1))
-    assert "s1_used [mm]" in heads
+    assert any(head.startswith("s1_used") for head in heads)
     assert sheet.sheet_format.outlineLevelCol == 1
 
 
@@ -89,3 +89,14 @@ def test_formulas_of_reordered_columns_recalculate_to_the_same(solved, tmp_path)
             assert fresh.cell(row, column).value == (
                 pytest.approx(value, rel=1e-12) if isinstance(value, float) else value
             )
+
+
+def test_the_sheet_that_is_added_is_called_in_the_language_and_found_again(solved):
+    assert openpyxl.load_workbook(solved).sheetnames == ["Sheet", "Assetto"]
+    line = ["solve", str(solved), "--d2", "9.6", "--out", str(solved), "--overwrite"]
+    done = CliRunner().invoke(main, line)
+    assert done.exit_code == 0, done.stderr
+    book = openpyxl.load_workbook(solved, data_only=True)
+    assert book.sheetnames == ["Sheet", "Assetto"]
+    assert book.defined_names["d_2"].attr_text == "'Assetto'!$C$7"
+    assert book["Assetto"]["C7"].value == 9.6

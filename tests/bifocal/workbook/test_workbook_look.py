@@ -15,6 +15,7 @@ from bifocal import SurveySetup, Taking
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.making.book import write_book
 from bifocal.workbook.template_workflow import write_template
+from bifocal.workbook.words import WORDS
 from tests.bifocal.workbook.test_survey_workbook import ideal_content, named, pair_content
 from tests.builders.commands import bifocal_command as main
 from tests.recalculate import recalculated
@@ -355,3 +356,12 @@ def test_rows_added_in_place_widen_what_the_sheet_says(solved):
     for title in ("Points", "Results"):
         assert light[title].max_row >= 44
         assert light[title].cell(44, 1).value == "Q44"
+
+
+def test_the_first_sheet_says_the_same_line_by_line_in_every_language():
+    """Another language takes the place of each line where it stands."""
+    for section in ("readme", "readme_hand", "readme_media"):
+        texts = [str(text).splitlines() for text in WORDS.content[section].values()]
+        kinds = [[line[:1] if line[:1] in ("#", "{") else "" for line in lines] for lines in texts]
+        assert len(texts) == 3
+        assert kinds[0] == kinds[1] == kinds[2]
