@@ -39,9 +39,11 @@ def start_job(session: Session, kind: str, options: Options, *, quiet: bool = Fa
     InputError
         If another one runs, the survey is not far enough for it, or an option is impossible.
     """
-    return session.jobs.start(
-        kind, partial(task_of, session, kind, options), partial(finish, session), quiet=quiet
-    )
+
+    def task() -> dict[str, Any]:
+        return task_of(session, kind, options) | {"quiet": quiet}
+
+    return session.jobs.start(kind, task, partial(finish, session), quiet=quiet)
 
 
 def task_of(session: Session, kind: str, options: Options) -> dict[str, Any]:
@@ -261,7 +263,7 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
     kind = task["kind"]
     told = " ".join(without_options(said, session.spoken) for said in result.get("remarks", ()))
     if kind == "align":
-        if task["free_scale"] and len(control_of(session.state).ids):
+        if task.get("quiet") and len(control_of(session.state).ids):
             return ""  # the user took it in hand meanwhile
         session.propose(Path(task["out"]), result)
         return told
