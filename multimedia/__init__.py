@@ -32,7 +32,7 @@ Cameras
     intersect_rays, intersect_pairs, PointStatus   fast ways; why a point is missing, doubtful
     epipolar_curve, EpipolarCurves, epipolar_candidates, Candidates   a ray in another image
     correspondences, track_particles, Tracks   targets of one particle; particles over time
-    bundle_adjust, Adjustment, Unknowns, ScaleBar    cameras, points and media together
+    bundle_adjust, Adjustment, Unknowns, ScaleBar, diagnose, Extension    all of these together
 Bathymetry
     correct_bathymetry, CorrectedPoints   points from above the water
     correct_lidar_beams; intersect_refracted_rays, RayIntersections   laser echoes; measured rays

@@ -10,6 +10,7 @@ from photocore.errors import (
 )
 
 from .adjustment.bundle import bundle_adjust
+from .adjustment.extensions import Extension, diagnose
 from .adjustment.unknowns import Adjustment, ScaleBar, Unknowns
 from .bathymetry.corrected_points import BathymetryStatus, CorrectedPoints, Precision
 from .bathymetry.mean_water_level import WaterLevel, mean_water_level
@@ -128,6 +129,7 @@ __all__ = [
     "DetectedTargets",
     "EpipolarCurves",
     "Experiment",
+    "Extension",
     "Fisheye",
     "FlatInterface",
     "GeometryError",
@@ -190,6 +192,7 @@ __all__ = [
     "correct_lidar_beams",
     "correspondences",
     "critical_angle",
+    "diagnose",
     "epipolar_candidates",
     "epipolar_curve",
     "image_rays",

@@ -17,7 +17,7 @@ from typing import Any, Protocol
 import click
 
 from photocore.errors import PhotogrammetryError
-from photocore.installation import too_old
+from photocore.installation import left_out, too_old
 from photocore.interrupts import STOPPED
 from photocore.log import COMMAND_LINE, DATE, is_quiet, log_options
 from photocore.option_types import STREAMS
@@ -167,8 +167,8 @@ class LazyGroup(click.Group):
             _show_details(ctx)
             program = self.commands_package.partition(".")[0]
             task = f"{program} {ctx.invoked_subcommand or ''}".rstrip()
-            if old := too_old():
-                _tell_error(f"Error: {task} cannot be done with what is installed: {old[0]}.")
+            if lacks := left_out(error) or next(iter(too_old()), ""):
+                _tell_error(f"Error: {task} cannot be done with what is installed: {lacks}.")
                 ctx.exit(1)
             _tell_error(f"Error: {unforeseen_message(task, error)}")
             ctx.exit(UNFORESEEN)

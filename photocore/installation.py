@@ -21,6 +21,21 @@ def how_to_install(extra: str) -> str:
     return f'pip install ".[{extra}]" in the program\'s folder, or its wheel: "NAME.whl[{extra}]"'
 
 
+#: What is asked for late, and the extra that brings it to those who left dependencies out.
+_LATE = {
+    "laspy": "cloud", "lazrs": "cloud", "starlette": "page", "uvicorn": "page",
+    "python_multipart": "page", "matplotlib": "plots", "contourpy": "plots",
+}  # fmt: skip
+
+
+def left_out(error: Exception) -> str:
+    """Return which library is not installed and what brings it; empty where that is no matter."""
+    name = (getattr(error, "name", None) or "").partition(".")[0]
+    if not isinstance(error, ModuleNotFoundError) or name not in _LATE:
+        return ""
+    return f"{name} was left out: {how_to_install(_LATE[name])}"
+
+
 def installed() -> dict[str, str]:
     """Return what is installed and its version; names of folders alone, for every start asks."""
     found: dict[str, str] = {}

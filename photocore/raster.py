@@ -26,6 +26,7 @@ from photocore.raster_places import (
     gdal_name,
     is_cloud_optimised,
     raster_place,
+    why_unreadable,
 )
 from photocore.textfile import check_file, check_name
 
@@ -102,9 +103,9 @@ class RasterFile(ExitStack):
         self.enter_context(rasterio.Env(GDAL_CACHEMAX=CACHE))
         try:
             file = self._file = self.enter_context(_opened(self.path))
-        except RasterioError:
+        except RasterioError as error:
             self.close()
-            raise InputError(f"{self.path}: is not a raster file GDAL can read.") from None
+            raise InputError(f"{self.path}: {why_unreadable(self.path, error)}") from None
         note(self.path)
         self.width, self.height, self.bands = int(file.width), int(file.height), int(file.count)
         self.dtype = np.dtype(file.dtypes[0])

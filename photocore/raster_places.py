@@ -64,10 +64,21 @@ def raster_place(path: Path, *, overwrite: bool) -> Iterator[Path]:
         try:
             rasterio.shutil.copyfiles(str(temporary), gdal_name(path))
         except (RasterioError, CPLE_BaseError, OSError) as error:
-            raise InputError(
-                f"{path}: could not be written ({error}). Check the address and GDAL's "
-                "credentials for it, e.g. AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY."
-            ) from error
+            raise InputError(f"{path}: could not be written ({error}). {_CHECK}") from error
+
+
+#: What to look at where a file of object storage cannot be read or written.
+_CHECK = (
+    "Check the address and GDAL's credentials for it, e.g. AWS_ACCESS_KEY_ID and "
+    "AWS_SECRET_ACCESS_KEY."
+)
+
+
+def why_unreadable(path: Path, error: Exception) -> str:
+    """Return why GDAL cannot open a raster: of object storage what the network or its owner say."""
+    if not is_virtual(path):
+        return "is not a raster file GDAL can read."
+    return f"could not be read ({error}). {_CHECK}"
 
 
 def check_virtual(path: Path, *, overwrite: bool) -> None:

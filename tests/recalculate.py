@@ -9,7 +9,7 @@ from typing import Any
 
 import openpyxl
 
-from tests.office import convert
+from tests.office import calculated
 
 
 def strip_cached_values(source: Path, target: Path) -> None:
@@ -30,7 +30,7 @@ def recalculated(path: Path, folder: Path) -> openpyxl.Workbook:
     """Return the workbook as LibreOffice calculates it, values only."""
     bare = folder / f"bare-{path.stem}.xlsx"
     strip_cached_values(path, bare)
-    return openpyxl.load_workbook(convert(bare, folder), data_only=True)
+    return calculated(bare, folder)
 
 
 def rows_of(book: openpyxl.Workbook, sheet: str, head: int) -> list[dict[str, Any]]:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from bifocal import MissingExtraError
+from bifocal import SAMPLE, MissingExtraError
 from photocore import installation, machine
 from tests.builders.commands import bifocal_command as main
 from tests.builders.commands import multimedia_command as multimedia
@@ -104,3 +104,13 @@ def test_versions_are_read_from_the_names_of_folders(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", [str(tmp_path), str(tmp_path / "none"), *sys.path])
     assert installation.installed()["scikit-image"] == "0.9.3"
     assert installation.too_old()[0].startswith("scikit-image 0.9.3 is too old, 0.23 is needed")
+
+
+def test_a_library_that_was_left_out_is_named_with_the_extra_that_brings_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "starlette", None)
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    for name in [name for name in sys.modules if name.startswith("bifocal.collimation.server")]:
+        monkeypatch.delitem(sys.modules, name)
+    done = CliRunner().invoke(main, ["pick", str(SAMPLE / "facade.pair.json"), "--no-browser"])
+    assert done.exit_code == 1
+    assert re.search(r"(starlette|uvicorn) was left out: pip install .*\[page\]", done.output)

@@ -1,6 +1,7 @@
 """Remarks: every key is used and has its words in three languages, with the same blanks."""
 
 import re
+from functools import cache
 from pathlib import Path
 from string import Formatter
 
@@ -29,6 +30,13 @@ def sample(text):
     }
 
 
+@cache
+def said_of(section):
+    """Return what the code names of a section of the remarks."""
+    stem = rf"[\"']{re.escape(section)}\."
+    return {one for text in CODE.values() for one in re.findall(rf"{stem}([\w{{}}' .]*)", text)}
+
+
 @pytest.mark.parametrize("key", KEYS)
 def test_a_remark_has_its_words_in_three_languages_with_the_same_blanks(key):
     texts = remark.texts[key]
@@ -50,9 +58,7 @@ def test_a_remark_is_known_by_its_words_wherever_it_stands(key):
 @pytest.mark.parametrize("key", [key for key in KEYS if not key.startswith("word.")])
 def test_a_remark_is_used(key):
     section, name = key.split(".")
-    stem = rf"[\"']{re.escape(section)}\."
-    said = {found for text in CODE.values() for found in re.findall(rf"{stem}([\w{{}}' .]*)", text)}
-    assert any(name.startswith(re.split("[{']", one)[0]) for one in said)
+    assert any(name.startswith(re.split("[{']", one)[0]) for one in said_of(section))
 
 
 def test_every_remark_that_code_names_has_words():

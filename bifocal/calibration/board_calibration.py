@@ -9,7 +9,7 @@ from typing import Any
 
 import cv2
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtri
 
 from bifocal.model.lens import Lens
 from photocore.arrays import FloatArray, IntArray
@@ -161,7 +161,7 @@ def _solve(views: Sequence[BoardView], size: tuple[int, int], wanted: str) -> _L
         if freedom < 1:
             break
         gain = (best.rms**2 / fits[name].rms ** 2 - 1.0) * freedom / more
-        if gain > f_distribution.ppf(1 - SIGNIFICANCE, more, freedom):
+        if gain > fdtri(more, freedom, 1 - SIGNIFICANCE):
             best = fits[name]
     tried = tuple((name, each.rms) for name, each in fits.items())
     if wanted == "auto" and _field_of_view(best.lens.camera_matrix, size) > 100:

@@ -22,8 +22,10 @@ from photocore.provenance import program
 
 #: Name of the resource by which workers tell their memory: ``dask worker --resources memory=8e9``.
 RESOURCE = "memory"
-#: To wait for the scheduler. [s]
-TIMEOUT = 10
+#: To wait for the scheduler, and for its first worker. [s]
+TIMEOUT, PATIENCE = 10, 1800
+#: A pair tells how far it is by such steps.
+SHARE = 0.02
 #: Pairs sent for each thread of the workers: one at work, the next already there.
 AHEAD = 2
 
@@ -46,14 +48,15 @@ def run_on_cluster(
     Raises
     ------
     InputError
-        If Dask is not installed, the scheduler does not answer, it has no worker, or one with
-        another version of this program.
+        If Dask is not installed, the scheduler does not answer, no worker comes within `PATIENCE`,
+        or there is one with another version of this program.
 
     Notes
     -----
     A pair whose worker dies is given to another by Dask. On shared storage finished steps are not
     done again; of files that are sent, products come back when their pair has ended, and no more
-    pairs than `AHEAD` for each thread are on their way at a time.
+    pairs than `AHEAD` for each thread are on their way at a time. Workers that come later are
+    given pairs like the first.
     """
     try:
         cluster: Any = import_module("distributed")
@@ -69,23 +72,21 @@ def run_on_cluster(
             "and workers with `dask worker ADDRESS --nthreads 1`."
         ) from None
     with client:
-        workers = client.scheduler_info(n_workers=-1)["workers"]
-        if not workers:
-            raise InputError(
-                f"--scheduler {address}: has no worker; start some with `dask worker {address} "
-                "--nthreads 1`."
-            )
-        counted = any(RESOURCE in (info.get("resources") or {}) for info in workers.values())
-        ship = ship or not _see_folder(client, address, jobs[0].folder)
-        threads = sum(int(info.get("nthreads", 1)) for info in workers.values())
-        most = AHEAD * threads if ship else len(jobs)
+        crew = _Crew(client, address, jobs[0].folder, listener, ship=ship)
+        topic = f"bifocal-{secrets.token_hex(8)}"
+        client.subscribe_topic(topic, lambda event: listener.moved(*event[1]))
+        counted = any(RESOURCE in (info.get("resources") or {}) for info in crew.workers.values())
         waiting = iter(jobs)
         running: dict[Any, PairJob] = {}
         ended = cluster.as_completed(loop=client.loop)
         while True:
+            crew.look()
+            most = AHEAD * crew.threads if crew.ship else len(jobs)
             while len(running) < most and (job := next(waiting, None)) is not None:
                 try:
-                    task = (run_parcel, packed(job)) if ship else (run_pair, found_anywhere(job))
+                    task = (
+                        (run_parcel, packed(job)) if crew.ship else (run_pair, found_anywhere(job))
+                    )
                 except InputError as error:
                     yield _told(listener, PairOutcome(
                         name=job.name, failed_step="send", message=str(error)
@@ -93,7 +94,9 @@ def run_on_cluster(
                     continue
                 resources = {RESOURCE: job.memory()} if counted else None
                 key = f"pair-{job.folder}-{job.name}"
-                future = client.submit(*task, key=key, pure=False, resources=resources)
+                future = client.submit(
+                    _reporting, *task, job.name, topic, key=key, pure=False, resources=resources
+                )
                 del task  # photos are kept by the scheduler alone
                 running[future] = job
                 ended.add(future)
@@ -104,13 +107,74 @@ def run_on_cluster(
             del future  # its products with it
 
 
+class _Crew:
+    """The workers of a cluster: who is there, and whether all of them see a folder.
+
+    Raises
+    ------
+    InputError
+        If none comes within `PATIENCE`, or one has another version of the program, or none.
+    """
+
+    def __init__(
+        self, client: Any, address: str, folder: Path, listener: Listener, *, ship: bool
+    ) -> None:
+        self.client, self.address, self.folder = client, address, folder
+        self.listener, self.ship = listener, ship
+        self.workers: dict[str, Any] = {}
+        if not client.scheduler_info(n_workers=-1)["workers"]:
+            start = f"`dask worker {address} --nthreads 1`"
+            listener.heard(f"--scheduler {address}: waiting for workers; start some with {start}")
+            try:
+                client.wait_for_workers(1, timeout=PATIENCE)
+            except TimeoutError:
+                raise InputError(
+                    f"--scheduler {address}: no worker came in {PATIENCE / 60:g} minutes; start "
+                    f"some with {start}."
+                ) from None
+        self.look()
+
+    @property
+    def threads(self) -> int:
+        """How many pairs are computed at once."""
+        return sum(int(info.get("nthreads", 1)) for info in self.workers.values())
+
+    def look(self) -> None:
+        """See who is there; what is new is looked at and told of."""
+        before = set(self.workers)
+        self.workers = self.client.scheduler_info(n_workers=-1)["workers"]
+        if not (new := set(self.workers) - before):
+            return
+        self.ship = (
+            not _see_folder(self.client, self.address, self.folder, sorted(new)) or self.ship
+        )
+        way = "photos are sent to them" if self.ship else "they see the survey's folder"
+        told = f"workers {len(self.workers)}, pairs at once {self.threads}; {way}"
+        self.listener.heard(f"--scheduler {self.address}: {told}")
+
+
+def _reporting(work: Any, given: Any, name: str, topic: str) -> Any:
+    """Do a pair's work on a worker, and tell the machine that sent it how far it is."""
+    worker: Any = import_module("distributed").get_worker()
+    last: tuple[float, str] = -1.0, ""
+
+    def progress(done: float, total: float, what: str = "") -> None:
+        nonlocal last
+        share = done / max(total, 1e-9)
+        if what != last[1] or share >= last[0] + SHARE:
+            last = share, what
+            worker.log_event(topic, (name, share, what))
+
+    return work(given, progress)
+
+
 def _told(listener: Listener, outcome: PairOutcome) -> PairOutcome:
     listener.ended(outcome)
     return outcome
 
 
-def _see_folder(client: Any, address: str, folder: Path) -> bool:
-    """Tell whether every worker sees what lies in a folder here.
+def _see_folder(client: Any, address: str, folder: Path, workers: Sequence[str]) -> bool:
+    """Tell whether each of some workers sees what lies in a folder here.
 
     Raises
     ------
@@ -121,7 +185,7 @@ def _see_folder(client: Any, address: str, folder: Path) -> bool:
     probe = folder / f".seen-by-all-{mark[:8]}"
     try:
         probe.write_text(mark, encoding="utf-8")
-        found = client.run(_look, str(probe.absolute()))
+        found = client.run(_look, str(probe.absolute()), workers=list(workers))
     except ImportError as error:
         raise InputError(
             f"--scheduler {address}: a worker lacks bifocal ({error}); install it there."

@@ -5,8 +5,10 @@ from __future__ import annotations
 from bifocal.campaigns.pair_steps import PairJob, tables_of
 from bifocal.faces.faces_files import read_faces
 from bifocal.model.lens import Lens
-from bifocal.orientation.control_points import read_control
-from photocore.images import image_info
+from bifocal.orientation.control_points import known_points
+from bifocal.reports.control_survey import refuse_same_names
+from photocore.decoding import refuse_damaged_jpeg
+from photocore.images import image_info, read_image
 from photocore.textfile import check_file, check_name
 
 
@@ -27,8 +29,24 @@ def check_files(job: PairJob) -> None:
         image_info(path)
     for role in sorted({"lens", "lens1", "lens2"} & job.files.keys()):
         Lens.read(job.files[role])
-    for path in tables_of(job).values():
-        read_control(
-            path, sigma=0.003, sigma_plane=0.005, unit=job.options.get("unit", ""),
-            photos=len(job.photos),
-        )  # fmt: skip
+    unit = job.options.get("unit", "")
+    tables = tables_of(job)
+    count = len(job.photos)
+    ids = {role: known_points(p, unit=unit, photos=count).ids for role, p in tables.items()}
+    if len(ids) > 1:
+        refuse_same_names(tables["control"], tables["check"], ids["control"], ids["check"])
+
+
+def check_photos(job: PairJob) -> None:
+    """Refuse photos of which a part is missing or damaged: all of them are decoded.
+
+    Raises
+    ------
+    InputError
+        Naming the first of them.
+    """
+    for path in job.photos:
+        if path.suffix.lower() in (".jpg", ".jpeg"):
+            refuse_damaged_jpeg(path)
+        else:
+            read_image(path, grey=True)

@@ -40,9 +40,10 @@ MADE = {
     "drawing": ".tif",
     "view": "_view.html",
 }
-#: Memory of a pair in work: of the program, and for each pixel of its larger photo; 6.3 MP took
-#: 1.55 GB on church_2, 2.04 GB on a church with more relief. [bytes]
-BASE_MEMORY, MEMORY_PER_PIXEL = 300 << 20, 290
+#: Memory of a pair in work: of the program, and for each pixel of its larger photo. Measured at
+#: 6.3 MP: 1.63 GB on church_2, 2.30 GB on church_1, whose map reaches far beyond the photo; at 8 MP
+#: 1.20 GB on berlin_1. [bytes]
+BASE_MEMORY, MEMORY_PER_PIXEL = 300 << 20, 380
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -350,7 +351,10 @@ def _points_to_draw(job: PairJob, *, solved: bool) -> dict[str, SurveyPoints]:
     from bifocal.orientation.control_points import known_points
 
     unit = str(job.options.get("unit", ""))
-    points = {role: known_points(path, unit=unit) for role, path in tables_of(job).items()}
+    points = {
+        role: known_points(path, unit=unit, photos=len(job.photos))
+        for role, path in tables_of(job).items()
+    }
     if solved:
         (table,) = (job.folder / "points").glob(f"{escape(job.title)}_points.*")
         points["points"] = read_survey_points(table)[0]

@@ -16,6 +16,7 @@ from typing import Any
 from bifocal.campaigns.pair_job import PairOutcome, run_pair
 from bifocal.campaigns.pair_steps import PairJob
 from bifocal.campaigns.step_store import receive_step
+from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.provenance import FileHashes
 
@@ -86,7 +87,7 @@ def packed(job: PairJob) -> Parcel:
     return Parcel(job=job, root=root, files=files)
 
 
-def run_parcel(parcel: Parcel) -> ShippedPair:
+def run_parcel(parcel: Parcel, progress: Progress = no_progress) -> ShippedPair:
     """Run a pair in a folder of its own and return what was made; the folder is removed."""
     with tempfile.TemporaryDirectory(prefix="bifocal-") as place:
         root = Path(place).resolve()
@@ -94,7 +95,7 @@ def run_parcel(parcel: Parcel) -> ShippedPair:
             (root / name).parent.mkdir(parents=True, exist_ok=True)
             (root / name).write_bytes(content)
         job = _moved(parcel.job, lambda path: root / path.relative_to(parcel.root))
-        outcome = run_pair(job)
+        outcome = run_pair(job, progress)
         steps = {
             step: {
                 path.relative_to(job.folder / step).as_posix(): path.read_bytes()

@@ -29,6 +29,9 @@ class Listener:
     def moved(self, name: str, share: float, step: str) -> None:
         """Hear that a pair has come so far, 0 to 1."""
 
+    def heard(self, text: str) -> None:
+        """Hear what is waited for or done with all pairs."""
+
     def ended(self, outcome: PairOutcome) -> None:
         """Hear that a pair is done or has failed."""
 

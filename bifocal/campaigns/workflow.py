@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.campaigns.folder_locks import locked
-from bifocal.campaigns.inputs import check_files
+from bifocal.campaigns.inputs import check_files, check_photos
 from bifocal.campaigns.pair_job import PairOutcome, plan_of
 from bifocal.campaigns.pair_steps import (
     FIRST_STEP,
@@ -193,6 +193,7 @@ def plan_survey(jobs: Sequence[PairJob], *, mosaic: bool = False) -> list[tuple[
 def _unreadable(job: PairJob) -> str:
     try:
         check_files(job)
+        check_photos(job)
     except PhotogrammetryError as error:
         return str(error)
     return ""
@@ -354,6 +355,11 @@ class _Count(Listener):
         """Add up."""
         self.shares[name] = share
         self.progress(sum(self.shares.values()), len(self.shares), f"{name}: {step}")
+
+    def heard(self, text: str) -> None:
+        """Tell of it."""
+        if self.tell is not None:
+            self.tell(text)
 
     def ended(self, outcome: PairOutcome) -> None:
         """Keep it, and tell of it with the time that is left."""

@@ -22,6 +22,9 @@ def command(sources: tuple[Path, ...], no_browser: bool, as_json: bool, **option
     from bifocal.collimation.workflow import page_server
 
     with page_server(*sources, **options) as server:
+        pair = server.session.files.pair
+        if pair is not None and pair not in sources and sources[0].name.endswith(".photos.json"):
+            remark(f"Of the set its best pair is opened: {pair.name}.")
         if as_json:
             print_json({"url": server.url, "token": server.token})
         else:

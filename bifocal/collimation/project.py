@@ -10,10 +10,15 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.collimation.fields import NOTES, FieldError, fields_of
+from bifocal.files.photos import photo_infos
+from bifocal.model.pair import Pair
+from bifocal.model.photo_set import pair_or_set
+from bifocal.survey.set_survey import best_pair
 from bifocal.workbook.pair_workflow import is_survey, read_pair
 from bifocal.workbook.reading.reader import read_survey
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.images import READ, image_info
+from photocore.textfile import file_name
 from photocore.workbook.reading.package import open_package
 
 #: Endings of photos looked for in a folder.
@@ -106,10 +111,26 @@ def find_files(sources: Sequence[Path], workbook: Path | None = None) -> SurveyF
     )
 
 
-def _of_pair(pair: Path, workbook: Path | None) -> SurveyFiles:
+def _of_pair(source: Path, workbook: Path | None) -> SurveyFiles:
+    pair = _pair_of(source)
     stem = pair.name.removesuffix(".json").removesuffix(".pair")
     book = _workbook(workbook or pair.parent / f"{stem}.xlsx")
     return SurveyFiles(folder=book.parent, stem=stem, workbook=book, pair=pair)
+
+
+def _pair_of(source: Path) -> Path:
+    """Return the file of a pair; of a set that of its best pair, written beside it once."""
+    photos = pair_or_set(source)
+    if isinstance(photos, Pair):
+        return source
+    best = best_pair(photos)
+    photo_infos(best)  # what is not there, or another photo, is refused before a file is written
+    stem = source.name.removesuffix(".json").removesuffix(".photos")
+    named = file_name(f"{stem}-{best.image1.name}-{best.image2.name}")
+    pair = source.with_name(f"{named}{_PAIR}")
+    if not pair.exists():
+        best.write(pair)
+    return pair
 
 
 def _of_photos(photos: tuple[Path, Path], workbook: Path | None) -> SurveyFiles:

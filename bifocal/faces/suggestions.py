@@ -15,7 +15,7 @@ from bifocal.model.grid import Grid
 from bifocal.model.image import as_grey
 from bifocal.model.photo import Photo
 from bifocal.model.relief_map import TOLD, Quality, ReliefMap
-from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
+from photocore.arrays import BoolArray, ByteArray, Float32Array
 
 #: Left, top, right, bottom in pixels of the map, right and bottom excluded.
 Box = tuple[int, int, int, int]
@@ -133,7 +133,7 @@ def _drawn_to_edges(box: Box, relief: ReliefMap, photo: Photo, grey: ByteArray) 
     )
     inner = relief.r[top:bottom, left:right]
     level = float(np.nanmedian(inner)) if np.isfinite(inner).any() else 0.0
-    seen = _seen(photo, grey, grid, np.array([level, 0.0, 0.0]))
+    seen = _seen(photo, grey, grid, level)
     if not np.isfinite(seen).all():
         return box
     sides = []
@@ -166,30 +166,38 @@ def _face_of(
         return None
     middle = float(np.nanmedian(around))
     levels = middle + np.arange(-SUGGESTIONS.behind, SUGGESTIONS.before, SUGGESTIONS.step)
-    planes = [np.array([level, 0.0, 0.0]) for level in levels]
-    spread = SUGGESTIONS.step
-    if len(row) >= SUGGESTIONS.told:
-        xyr = np.column_stack([column * grid.gsd, -row * grid.gsd, measured[row, column]])
+    coarse = Grid.from_bounds((x0, y0, x1, y1), gsd=max(grid.gsd, (x1 - x0) / SUGGESTIONS.places))
+    scores = np.array([_agreement(photos, greys, coarse, level) for level in levels])
+    best = int(scores.argmax())
+    score, known = float(scores[best]), measured[row, column]
+    # The photos alone tell the level where no other is as good.
+    level, spread = float(levels[best]), SUGGESTIONS.step
+    rivals = scores[np.abs(levels - level) > SUGGESTIONS.apart]
+    certain = (
+        score > max(rivals.max(), SUGGESTIONS.alone - SUGGESTIONS.clearly) + SUGGESTIONS.clearly
+    )
+    certain &= 0 < best < len(levels) - 1
+    if not certain and len(known) >= SUGGESTIONS.told:  # else what was measured, if they agree
+        xyr = np.column_stack([column * grid.gsd, -row * grid.gsd, known])
         plane, _ = robust_plane(xyr, grid.gsd)
         level = float(plane @ [1, (right - left) * grid.gsd / 2, (top - bottom) * grid.gsd / 2])
-        planes.append(np.array([level, 0.0, 0.0]))
-        away = np.abs(measured[row, column] - level)
+        away = np.abs(known - level)
         spread = max(float(np.quantile(away, 0.3)), 0.001)
-    coarse = Grid.from_bounds((x0, y0, x1, y1), gsd=max(grid.gsd, (x1 - x0) / SUGGESTIONS.places))
-    scores = [_agreement(photos, greys, coarse, plane) for plane in planes]
-    best = int(np.argmax(scores))
-    if scores[best] < SUGGESTIONS.agreement:
+        certain = (away < 2 * SUGGESTIONS.step).mean() > SUGGESTIONS.supported
+        least = max(score - SUGGESTIONS.clearly, SUGGESTIONS.agreement)
+        certain &= _agreement(photos, greys, coarse, level) > least
+    if not certain:
         return None
-    return Face(rings=(ring,), plane=planes[best].round(4), sigma=round(spread, 4))
+    return Face(rings=(ring,), plane=np.array([level, 0.0, 0.0]).round(4), sigma=round(spread, 4))
 
 
 def _agreement(
-    photos: Sequence[Photo], greys: Sequence[ByteArray], grid: Grid, plane: FloatArray
+    photos: Sequence[Photo], greys: Sequence[ByteArray], grid: Grid, level: float
 ) -> float:
-    """Return the correlation of what the first two photos that see a plane show of it; -1: none."""
+    """Return the correlation of what the first two photos that see a level show of it; -1: none."""
     seen = []
     for photo, grey in zip(photos, greys, strict=True):
-        picture = _seen(photo, grey, grid, plane)
+        picture = _seen(photo, grey, grid, level)
         if np.isfinite(picture).mean() > SUGGESTIONS.framed:
             seen.append(picture)
     if len(seen) < 2:
@@ -201,10 +209,10 @@ def _agreement(
     return float(one @ other) / size if size > 0 else -1.0
 
 
-def _seen(photo: Photo, grey: ByteArray, grid: Grid, plane: FloatArray) -> Float32Array:
-    """Return the plane as a photo shows it, on a grid; NaN beyond its frame."""
+def _seen(photo: Photo, grey: ByteArray, grid: Grid, level: float) -> Float32Array:
+    """Return a level plane as a photo shows it, on a grid; NaN beyond its frame."""
     x, y = np.meshgrid(grid.columns_x, grid.rows_y)
-    xyz = np.stack([x, y, plane[0] + plane[1] * x + plane[2] * y], axis=-1)
+    xyz = np.stack([x, y, np.full(x.shape, level)], axis=-1)
     pixels = photo.project(xyz.reshape(-1, 3)).reshape(*grid.shape, 2).astype(np.float32)
     size = np.array(grey.shape[::-1])
     with np.errstate(invalid="ignore"):

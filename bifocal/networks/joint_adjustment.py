@@ -17,7 +17,7 @@ from bifocal.model.orientation_precision import CAMERA
 from bifocal.model.pair_media import PairMedia
 from bifocal.networks.camera_knowledge import SHARED
 from bifocal.networks.joint_observations import JointObservations, with_enough_rays, with_rays
-from photocore.adjustment import OUTLIER_LIMIT, Fit, huber_weights, standardised
+from photocore.adjustment import Fit, huber_weights, outlier_limit, standardised
 from photocore.adjustment.blocks import BlockEquations
 from photocore.adjustment.network import Network, NetworkState, Rows
 from photocore.adjustment.sparse import SparseEquations
@@ -182,7 +182,9 @@ def settled_jointly(
     seen = with_enough_rays(observations)
     focal = np.array([camera.matrix[0, 0] for camera in start.cameras])
     start, tests, _ = _coarse(seen, start, focal, rounds)
-    seen = with_rays(seen, tests < FAR_OFF)
+    # Picks of control are judged at the end, when it holds the frame closely.
+    picked = np.asarray(np.isfinite(seen.known).any(axis=1))[seen.point]
+    seen = with_rays(seen, picked | (tests < FAR_OFF))
     system = _System(seen, start, focal)
     return seen, start, system.rays(system.start)[0]
 
@@ -411,7 +413,8 @@ def _gross(
 ) -> tuple[BoolArray, FloatArray, list[Blunder]]:
     """Return which rays stay, the coordinates that stay known, and what goes: the worst of each.
 
-    A ray is judged by the larger of its two coordinates, and by the rays of its own precision.
+    A ray is judged by the larger of its two coordinates, by the rays of its own precision, and by
+    how many there are: of 350 000 honest ones 160 would pass a limit of 3.5.
     """
     count = 2 * len(seen.camera)
     tests = standardised(fit.residuals, fit.linear.redundancy_numbers)
@@ -424,9 +427,9 @@ def _gross(
     worst = np.zeros(len(seen.ids))
     np.maximum.at(worst, seen.point, rays)
     np.maximum.at(worst, system.fixed[:, 0], coordinates)
-    limit = np.maximum(worst, OUTLIER_LIMIT)
-    bad = (rays >= limit[seen.point]) & (rays > OUTLIER_LIMIT)
-    wrong = (coordinates >= limit[system.fixed[:, 0]]) & (coordinates > OUTLIER_LIMIT)
+    bad = (rays >= worst[seen.point]) & (rays > outlier_limit(count))
+    wrong = coordinates >= worst[system.fixed[:, 0]]
+    wrong &= coordinates > outlier_limit(len(coordinates))
     # A wrong control point bends its neighbours: only the worst of them goes at a time.
     wrong &= coordinates >= coordinates.max(initial=0.0)
     # It bends rays of other points too, which are judged again without it.

@@ -127,23 +127,28 @@ def orient_set(
     count = len(control.ids)
     for rounds in (3, 1):  # the second pass searches around better places
         observed, state, _ = settled_jointly(observed, state, rounds)
-        observed = _met(_refined(photos, observed, state, first, count), state, count)
+        observed = _refined(photos, observed, state, first, count)
+        observed, state = _met(observed, state, count)
     for _ in range(2):  # a few wrong patches hide each other
         observed, state, misfit = settled_jointly(observed, state, 1)
         observed, sigma = _without_gross(observed, misfit, count)
-        observed = _met(observed, state, count)
+        observed, state = _met(observed, state, count)
     return _adjusted(observed, state, first, control, site, sigma)
 
 
-def _met(observed: JointObservations, state: JointUnknowns, control: int) -> JointObservations:
-    """Return the rays without ties that wander along them."""
+def _met(
+    observed: JointObservations, state: JointUnknowns, control: int
+) -> tuple[JointObservations, JointUnknowns]:
+    """Return the rays without ties that wander along them, and ties where their rays meet."""
     seen = SharedPoints(
         photo=observed.camera, point=observed.point, pixels=observed.pixels, count=len(observed.ids)
     )
     places = meeting(dict(enumerate(state.cameras)), seen, seen.pixels)
     met = np.asarray(np.isfinite(places).all(axis=1))
+    met[:control] = False
+    xyz = np.where(met[:, None], places, state.xyz)
     met[:control] = True
-    return with_rays(observed, met[observed.point])
+    return with_rays(observed, met[observed.point]), replace(state, xyz=xyz)
 
 
 def _without_gross(

@@ -69,18 +69,23 @@ def align_photo_set(
     check_metres(options)
     check_not_input(out, *paths, *(path for path in (options.control, options.lengths) if path))
     check_all_writable(out, overwrite=overwrite)
+    names = [path.name for path in paths]
+    if alike := len({path.stem for path in paths}) < len(paths):  # as cameras count in each folder
+        names = [f"{path.resolve().parent.name}/{path.name}" for path in paths]
     infos = [image_info(path) for path in paths]
     lenses = [*options.lenses, *[options.other_lenses] * (len(paths) - 2)]
     photos = [
-        PhotoInput(grey=read_grey(path), interior=interior_of_photo(info, known, k), name=path.name)
-        for k, (path, info, known) in enumerate(zip(paths, infos, lenses, strict=True), start=1)
+        PhotoInput(grey=read_grey(path), interior=interior_of_photo(info, known, k), name=name)
+        for k, (path, name, info, known) in enumerate(
+            zip(paths, names, infos, lenses, strict=True), start=1
+        )
     ]
     control = control_of(options, [photo.interior.image_size for photo in photos])
     oriented = orient_set(photos, control=control, site=options.site, progress=progress)
     made = set_alignment(replace(oriented, way=way), photos, options.direction)
     stem = out.name[: -len(ENDING)]
     entries = []
-    for k, (path, photo) in enumerate(zip(paths, made.photos.photos, strict=True)):
+    for k, (path, name, photo) in enumerate(zip(paths, names, made.photos.photos, strict=True)):
         extra = dict(photo.extra)
         if photo.lens is not None:
             shared = oriented.first.lens[k]
@@ -88,7 +93,7 @@ def align_photo_set(
             if shared == k:
                 photo.lens.write(out.parent / extra["lens"], overwrite=overwrite)
         file = relative_name(path, out.parent)
-        entries.append(replace(photo, file=file, name="", extra=extra))
+        entries.append(replace(photo, file=file, name=name if alike else "", extra=extra))
     photo_set = PhotoSet(
         photos=tuple(entries), orientation=made.photos.orientation, extra={"setup": made.setup}
     )

@@ -89,6 +89,12 @@ def _grid(alignment: Alignment, images: Images) -> tuple[FloatArray, float]:
         seen = far.plane_from_pixels(corners)
         seen = seen[np.isfinite(seen).all(axis=1)]
     low, high = np.percentile(seen, [1, 99], axis=0)
+    # All that was compared is in it: a wall found in a corner shows as one.
+    every = far.plane_from_pixels(alignment.tie1)
+    every = every[np.isfinite(every).all(axis=1)]
+    if len(every):
+        some = np.percentile(every, [5, 95], axis=0)
+        low, high = np.minimum(low, some[0]), np.maximum(high, some[1])
     margin = 0.15 * float((high - low).max())
     low, high = low - margin, high + margin
     gsd = float((high - low).max()) / WIDTH

@@ -175,6 +175,13 @@ def contradiction_in_words(line: FacadeDirection, cameras: Cameras, test: float)
     return remark("orientation.lines_contradict", angle=away, sigmas=test, **about)
 
 
+def family_in_words(lines: Sequence[FacadeDirection], cameras: Cameras) -> str:
+    """Return what to say of lines of one direction that are not used: the ties know better."""
+    away = [abs(line.in_frame(cameras[line.camera - 1])[2]) for line in lines]
+    angle = np.rad2deg(np.arcsin(np.mean(away)))
+    return remark("orientation.lines_dropped", lines=lines[0].name, angle=angle)
+
+
 def facade_directions(
     ends: FloatArray,
     camera: Pinhole,

@@ -13,11 +13,12 @@ import numpy as np
 from bifocal.model.interior_orientation import SIGMA_RADIAL, Cameras, Images, Interior
 from bifocal.model.orientation_precision import NAMES
 from bifocal.orientation import facade_lines, validation
+from bifocal.orientation.adjustment.frame_turn import family_test, line_test
 from bifocal.orientation.adjustment.pair_adjustment import (
     AdjustedPair,
     adjust,
     evaluated,
-    line_test,
+    pair_equations,
 )
 from bifocal.orientation.adjustment.pair_observations import PairObservations, PairUnknowns, at
 from bifocal.orientation.area_points import even_points
@@ -371,11 +372,11 @@ def lines_tested(
     ties, adjusted = pair.observations, pair.adjusted
     bent = ties.radial_models(adjusted.radial)
     lines = facade_lines.lines_of_photos(images, adjusted.cameras, ties.interiors, bent)
-    return [(line, line_test(line, adjusted)) for line in lines]
+    return [(line, line_test(line, adjusted, adjusted.covariance)) for line in lines]
 
 
 def _with_lines(pair: OrientedPair, images: Images) -> OrientedPair:
-    """Return the pair with the façade's uprights and levels lying along the wall.
+    """Return the pair with its plane turned by the façade's uprights and levels.
 
     Those that contradict the wall found by the ties are told of and not used.
     """
@@ -386,6 +387,11 @@ def _with_lines(pair: OrientedPair, images: Images) -> OrientedPair:
             words = facade_lines.contradiction_in_words(line, adjusted.cameras, test)
             pair = replace(pair.told(words), lines_off=True)
     kept = tuple(line for line, test in tested if test <= STAGES.wall_limit)
+    for name in ("upright", "level") if old.lines_bend_nothing else ():
+        family = [line for line in kept if line.name == name]
+        if family and family_test(family, old, adjusted, pair_equations) > STAGES.family_limit:
+            kept = tuple(line for line in kept if line.name != name)
+            pair = pair.told(facade_lines.family_in_words(family, adjusted.cameras))
     try:
         turned = pair.readjusted(lines=kept).settled() if kept else pair
     except GeometryError:  # no tie was left on the wall

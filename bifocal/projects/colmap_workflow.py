@@ -62,8 +62,9 @@ def export_photos(source: Path, folder: Path, *, overwrite: bool = False) -> Non
         If the file is none of them, or as `write_colmap`.
     """
     check_not_input(folder, source)
+    photos = PhotoSet.read(source)
     with located(source):
-        write_colmap(PhotoSet.read(source), folder, overwrite=overwrite)
+        write_colmap(photos, folder, overwrite=overwrite)
 
 
 def _in_words(photo: Photo) -> tuple[str, FloatArray, FloatArray]:

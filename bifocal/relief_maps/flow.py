@@ -76,7 +76,8 @@ def seeded_flow(
     flow.setVariationalRefinementAlpha(alpha)
     flow.setVariationalRefinementDelta(FLOW.delta)
     flow.setPatchStride(stride)
-    flow.setCoarsestScale(max(FLOW.coarsest, finest))
+    if hasattr(flow, "setCoarsestScale"):  # OpenCV below 4.13 begins where a quarter fits
+        flow.setCoarsestScale(max(FLOW.coarsest, finest))
     return np.asarray(flow.calc(first, second, np.ascontiguousarray(seed)), dtype=np.float32)
 
 

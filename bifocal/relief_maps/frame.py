@@ -330,22 +330,21 @@ def zoom_map(frame: Frame, relief: Float32Array) -> tuple[Float32Array, Float32A
 
     Eq. (6) read the other way round, about the zoom centre: q2 - e = k(r) (q1 - e).
     """
-    if frame.pair.refracted:
-        return shown_at(frame, *offsets(frame.grid.shape), relief)
-    d1, d2 = frame.distances
-    factor = rays.zoom_factor(relief, d1=d1, d2=d2).astype(np.float32)
-    x, y = frame.from_centre()
-    column, row = (np.float32(value) for value in frame.centre)
-    return factor * x + column, factor * y + row
+    return shown_at(frame, *offsets(frame.grid.shape), relief)
 
 
 def shown_at(
     frame: Frame, column: Float32Array, row: Float32Array, relief: Any
 ) -> tuple[Float32Array, Float32Array]:
-    """Return where photo 2 shows pixels of photo 1 seen through media at given relief. [px]
+    """Return where photo 2 shows pixels of photo 1 at given relief. [px]
 
-    Along the ray of photo 1 to the point, back to the plane along that of photo 2.
+    Through media along the ray of photo 1 to the point, back to the plane along that of photo 2.
     """
+    if not frame.pair.refracted:
+        d1, d2 = frame.distances
+        factor = rays.zoom_factor(relief, d1=d1, d2=d2).astype(np.float32)
+        x0, y0 = (np.float32(value) for value in frame.centre)
+        return factor * (column - x0) + x0, factor * (row - y0) + y0
     across, down = frame.slopes(1, column, row)
     return frame.shown(2, column + relief * across, row + relief * down, relief)
 

@@ -8,18 +8,35 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 
 from bifocal.model.image import QUIET_BLUR
-from bifocal.relief_maps import evidence, forward_projection, plane_sweep
-from bifocal.relief_maps.flow import Measurement, is_inside, sigma_of_relief
-from bifocal.relief_maps.frame import Frame, parallax_per_metre, zoom_map
-from bifocal.relief_maps.plane_sweep import Swept
+from bifocal.relief_maps import coarse_level, evidence, forward_projection, plane_sweep
+from bifocal.relief_maps.flow import Measurement, sigma_of_relief
+from bifocal.relief_maps.frame import Frame
+from bifocal.relief_maps.plane_sweep import Box, Hypotheses
 from bifocal.relief_maps.tuning import HYPOTHESIS
 from photocore.arrays import BoolArray, Float32Array
+
+
+class _Level(NamedTuple):
+    """Photos at one resolution, and what flow found between them."""
+
+    frame: Frame
+    relief: Float32Array
+    valid: BoolArray
+    support: BoolArray
+
+
+class _Found(NamedTuple):
+    """What a sweep found where it looked: relief [m], its cost, and how much better it fits."""
+
+    relief: Float32Array
+    cost: Float32Array
+    better: Float32Array
 
 
 def with_swept(frame: Frame, matched: Measurement) -> tuple[Measurement, BoolArray]:
@@ -27,31 +44,25 @@ def with_swept(frame: Frame, matched: Measurement) -> tuple[Measurement, BoolArr
 
     Notes
     -----
-    Of two pixels that a relief shows at one place of photo 2 the one that fits worse is hidden
-    there. Plain walls are swept in photos blurred like those of their flow.
+    At half the resolution tiles where flow is not sure are swept through all reliefs around them;
+    where that finds what flow does not, through what either found at full resolution. Plain walls
+    are swept in photos blurred like those of their flow.
     """
-    valid = _valid(frame, matched)
-    photos = frame
+    sigma = sigma_of_relief(frame, matched.r, matched.sigma_px)
+    valid = evidence.validated(matched.across, matched.loop, sigma, frame.distances[1])
     if matched.plain:
         first, second = (
             cv2.GaussianBlur(image, (0, 0), QUIET_BLUR) for image in (frame.image1, frame.image2)
         )
-        photos = replace(frame, image1=first, image2=second)
-    found = _swept(photos, matched.r, valid)
-    known = np.isfinite(found.relief)
-    if not known.any():
-        return matched, known
-    relief = np.where(known, found.relief, matched.r)
-    parallax = parallax_per_metre(frame)
-    other = known & (np.abs(relief - matched.r) * parallax > HYPOTHESIS.differs)
-    other &= _alone_in_second(frame, relief, found.cost, parallax) & is_inside(frame, relief)
-    own, new = (
-        cv2.blur(plane_sweep.misfit(photos, np.nan_to_num(values)), (3, 3))
-        for values in (matched.r, relief)
-    )
-    better = np.where(valid, np.float32(HYPOTHESIS.better), np.float32(HYPOTHESIS.better_invalid))
-    taken = _large(other & (new + better < own))
-    swept = {"r": relief, "loop": 0, "across": 0, "sigma_px": HYPOTHESIS.sigma}
+        frame = replace(frame, image1=first, image2=second)
+    fine = _Level(frame, np.nan_to_num(matched.r), valid, evidence.supported(valid))
+    half = coarse_level.halved(frame)
+    every = np.s_[: 2 * half.grid.height : 2, : 2 * half.grid.width : 2]
+    coarse = _Level(half, fine.relief[every], fine.valid[every], fine.support[every])
+    guess = _guessed(coarse)
+    found = _refined(fine, guess, _taken(coarse, guess))
+    taken = _large(_taken(fine, found))
+    swept = {"r": found.relief, "loop": 0, "across": 0, "sigma_px": HYPOTHESIS.sigma}
     bands: dict[str, Any] = {
         name: np.where(taken, np.float32(new), getattr(matched, name))
         for name, new in swept.items()
@@ -59,10 +70,119 @@ def with_swept(frame: Frame, matched: Measurement) -> tuple[Measurement, BoolArr
     return replace(matched, **bands), taken
 
 
-def _valid(frame: Frame, matched: Measurement) -> BoolArray:
-    """Return which pixels flow validates."""
-    sigma = sigma_of_relief(frame, matched.r, matched.sigma_px)
-    return evidence.validated(matched.across, matched.loop, sigma, frame.distances[1])
+def _guessed(level: _Level) -> _Found:
+    """Return what a sweep through all reliefs around each tile finds where flow is not sure."""
+    found, shape = _nothing(level), level.valid.shape
+    unsure = level.frame.seen1 & ~level.valid
+    low, high = _ranges(level)
+    for tile, box in _tiles(shape):
+        if low[tile] < high[tile] and unsure[box].mean() > HYPOTHESIS.unsure:
+            wide = _widened(box, shape)
+            tried = Hypotheses.between(level.frame, wide, float(low[tile]), float(high[tile]))
+            _sweep(found, level, box, wide, tried)
+    return found
+
+
+def _refined(level: _Level, guess: _Found, taken: BoolArray) -> _Found:
+    """Return what a sweep through the reliefs at hand finds where a guess differs from flow."""
+    found, shape = _nothing(level), level.valid.shape
+    for _, box in _tiles(shape):
+        if taken[_halves(box)].sum() > HYPOTHESIS.wanted:
+            wide = _widened(box, shape)
+            values = guess.relief[_halves(wide)]
+            own = level.relief[wide][level.support[wide]][::4]
+            values = np.concatenate([values[np.isfinite(values)], own])
+            _sweep(found, level, box, wide, Hypotheses.near(level.frame, wide, values))
+    return found
+
+
+def _nothing(level: _Level) -> _Found:
+    """Return a result without any."""
+    empty = np.full(level.valid.shape, np.nan, np.float32)
+    return _Found(empty, empty.copy(), empty.copy())
+
+
+def _sweep(found: _Found, level: _Level, box: Box, wide: Box, tried: Hypotheses) -> None:
+    """Sweep a tile with what is around it (in place)."""
+    if len(tried.numbers) < HYPOTHESIS.fewest_tried:
+        return
+    relief, cost = plane_sweep.swept(level.frame, wide, tried)
+    known = np.where(np.isnan(relief), level.relief[wide], relief)
+    own, new = (
+        plane_sweep.misfit(level.frame, wide, values) for values in (level.relief[wide], known)
+    )
+    inner = tuple(
+        slice(part.start - around.start, part.stop - around.start)
+        for part, around in zip(box, wide, strict=True)
+    )
+    for band, values in zip(found, (relief, cost, own - new), strict=True):
+        band[box] = values[inner]
+
+
+def _tiles(shape: tuple[int, int]) -> Iterator[tuple[tuple[int, int], Box]]:
+    """Yield the tiles of an image, with row and column of each among them."""
+    side = HYPOTHESIS.tile
+    for i, j in np.ndindex(-(-shape[0] // side), -(-shape[1] // side)):
+        rows, columns = (
+            slice(n * side, min((n + 1) * side, length))
+            for n, length in zip((i, j), shape, strict=True)
+        )
+        yield (i, j), (rows, columns)
+
+
+def _widened(box: Box, shape: tuple[int, int]) -> Box:
+    """Return a tile with its margin, as far as the image reaches."""
+    rows, columns = (
+        slice(max(part.start - HYPOTHESIS.margin, 0), min(part.stop + HYPOTHESIS.margin, length))
+        for part, length in zip(box, shape, strict=True)
+    )
+    return rows, columns
+
+
+def _halves(box: Box) -> Box:
+    """Return a box at half the resolution."""
+    rows, columns = (slice(part.start // 2, part.stop // 2) for part in box)
+    return rows, columns
+
+
+def _ranges(level: _Level) -> tuple[Float32Array, Float32Array]:
+    """Return the least and greatest relief around every tile, and beyond. [m]"""
+    height, width = level.valid.shape
+    size = (-(-height // HYPOTHESIS.tile), -(-width // HYPOTHESIS.tile))
+    low, high = np.full(size, np.inf, np.float32), np.full(size, -np.inf, np.float32)
+    for tile, box in _tiles(level.valid.shape):
+        values = level.relief[box][level.support[box]]
+        if len(values) > HYPOTHESIS.fewest:
+            low[tile], high[tile] = np.percentile(values, HYPOTHESIS.outliers)
+    around = np.ones((HYPOTHESIS.around, HYPOTHESIS.around), np.uint8)
+    beyond = np.float32(HYPOTHESIS.beyond)
+    return cv2.erode(low, around) - beyond, cv2.dilate(high, around) + beyond
+
+
+def _taken(level: _Level, found: _Found) -> BoolArray:
+    """Return where a sweep fits better than flow, and best of all at its place of photo 2."""
+    taken = np.zeros(level.valid.shape, bool)
+    at = np.nonzero(np.isfinite(found.relief))
+    if not len(at[0]):
+        return taken
+    relief = found.relief[at]
+    column, row, parallax = plane_sweep.places(level.frame, (at[0], at[1]), relief)
+    height, width = level.valid.shape
+    inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+    index = np.where(inside, row * width + column, 0)
+    inside &= level.frame.seen2.ravel()[index]
+    # Of two pixels at one place of photo 2 the one that fits worse is hidden there.
+    fit = np.where(inside, -found.cost[at], -np.inf).astype(np.float32)
+    best = np.full(taken.size, -np.inf, np.float32)
+    forward_projection.highest(fit, index, best)
+    there = np.full(taken.size, np.nan, np.float32)
+    first = inside & (best[index] == fit)
+    there[index[first]] = relief[first]
+    alone = np.abs(there[index] - relief) * parallax < HYPOTHESIS.alone
+    other = np.abs(relief - level.relief[at]) * parallax > HYPOTHESIS.differs
+    margin = np.where(level.valid[at], HYPOTHESIS.better, HYPOTHESIS.better_invalid)
+    taken[at] = inside & alone & other & (found.better[at] > margin)
+    return taken
 
 
 def _large(mask: BoolArray) -> BoolArray:
@@ -71,69 +191,3 @@ def _large(mask: BoolArray) -> BoolArray:
     keep = stats[:, cv2.CC_STAT_AREA] >= HYPOTHESIS.least_area
     keep[0] = False
     return np.asarray(keep[label])
-
-
-def _alone_in_second(
-    frame: Frame, relief: Float32Array, cost: Float32Array, parallax: Float32Array
-) -> BoolArray:
-    """Return which pixels fit best of all that their relief shows at their place of photo 2."""
-    columns, rows = zoom_map(frame, relief)
-    height, width = relief.shape
-    with np.errstate(invalid="ignore"):
-        column, row = np.rint(columns), np.rint(rows)
-        inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
-        inside &= np.isfinite(cost)
-    index = (row[inside] * width + column[inside]).astype(np.int64)
-    best = np.full(relief.size, -np.inf, np.float32)
-    forward_projection.highest(-cost[inside], index, best)
-    first = best[index] == -cost[inside]
-    there = np.full(relief.size, np.nan, np.float32)
-    there[index[first]] = relief[inside][first]
-    alone = np.zeros(relief.shape, bool)
-    alone[inside] = np.abs(there[index] - relief[inside]) * parallax[inside] < HYPOTHESIS.alone
-    return alone
-
-
-def _swept(frame: Frame, relief: Float32Array, valid: BoolArray) -> Swept:
-    """Return what a sweep finds in the tiles that are not sure; NaN and infinite cost elsewhere."""
-    nothing = np.full(frame.grid.shape, np.nan, np.float32)
-    found = Swept(nothing, np.full_like(nothing, np.inf))
-    margin = HYPOTHESIS.margin
-    for rows, columns, low, high in _unsure_tiles(frame, relief, valid):
-        wide = [
-            slice(max(part.start - margin, 0), min(part.stop + margin, length))
-            for part, length in zip((rows, columns), frame.grid.shape, strict=True)
-        ]
-        tile = plane_sweep.swept(frame, wide[0], wide[1], low, high)
-        if tile is not None:
-            top, left = rows.start - wide[0].start, columns.start - wide[1].start
-            inner = np.s_[
-                top : top + rows.stop - rows.start, left : left + columns.stop - columns.start
-            ]
-            found.relief[rows, columns], found.cost[rows, columns] = (b[inner] for b in tile)
-    return found
-
-
-def _unsure_tiles(
-    frame: Frame, relief: Float32Array, valid: BoolArray
-) -> Iterator[tuple[slice, slice, float, float]]:
-    """Yield tiles that flow does not validate throughout, and the reliefs around each. [m]"""
-    support = evidence.supported(valid)
-    (height, width), side = valid.shape, HYPOTHESIS.tile
-    size = (-(-height // side), -(-width // side))
-    low, high = np.full(size, np.inf, np.float32), np.full(size, -np.inf, np.float32)
-    unsure = np.zeros(size, bool)
-    for tile in np.ndindex(size):
-        part = tuple(slice(i * side, (i + 1) * side) for i in tile)
-        unsure[tile] = (frame.seen1[part] & ~valid[part]).mean() > HYPOTHESIS.unsure
-        values = relief[part][support[part]]
-        if len(values) > HYPOTHESIS.fewest:
-            low[tile], high[tile] = np.percentile(values, HYPOTHESIS.outliers)
-    around = np.ones((HYPOTHESIS.around, HYPOTHESIS.around), np.uint8)
-    low = cv2.erode(low, around) - np.float32(HYPOTHESIS.beyond)
-    high = cv2.dilate(high, around) + np.float32(HYPOTHESIS.beyond)
-    for i, j in zip(*np.nonzero(unsure & (low < high)), strict=True):
-        rows, columns = (
-            slice(n * side, min((n + 1) * side, length)) for n, length in ((i, height), (j, width))
-        )
-        yield rows, columns, float(low[i, j]), float(high[i, j])

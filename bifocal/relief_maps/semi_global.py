@@ -15,16 +15,14 @@ Costs = NDArray[np.int16]
 
 #: What numpy takes for a cost along all paths, roughly. [s]
 _NUMPY = 15e-9
-#: Rows and columns from a pixel to the next along each path.
-_PATHS = ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (-1, -1), (1, -1), (-1, 1))
 
 
 def aggregated(cost: Costs, image: ByteArray, *, one_step: int, jump: int, softness: int) -> Costs:
-    """Return the costs of labels summed over eight paths, shape (height, width, labels).
+    """Return the costs of labels summed over eight paths, shape (height, labels, width).
 
     Parameters
     ----------
-    cost : ndarray of int16, shape (height, width, labels)
+    cost : ndarray of int16, shape (height, labels, width)
         Below 3000 less ``jump``, so that the sum has room.
     image : ndarray of uint8, shape (height, width)
         At its edges labels jump more readily.
@@ -35,80 +33,82 @@ def aggregated(cost: Costs, image: ByteArray, *, one_step: int, jump: int, softn
     softness : int
         [grey levels]
     """
-    cost = np.ascontiguousarray(cost)
-    if _all_paths.pays(cost.size * _NUMPY):
-        return _all_paths(cost, image, one_step, jump, softness)
+    jumps = (jump * softness // (softness + np.arange(256))).astype(np.int16)
+    step = np.int16(one_step)
+    across = np.ascontiguousarray(cost.transpose(2, 1, 0))
+    rows = _paths(cost, image, jumps, step, (-1, 0, 1))
+    columns = _paths(across, np.ascontiguousarray(image.T), jumps, step, (0,))
+    rows += columns.transpose(2, 1, 0)
+    return rows
+
+
+def _paths(
+    cost: Costs, image: ByteArray, jumps: Costs, one_step: np.int16, shifts: tuple[int, ...]
+) -> Costs:
+    """Return the sum along paths down and up that shift by so many columns a row."""
     total = np.zeros_like(cost)
-    for down, across in _PATHS:
-        _add_path(cost, image.astype(np.int16), total, (down, across), (one_step, jump, softness))
+    ways = [(down, shift) for down in (1, -1) for shift in shifts]
+    if _add_path.pays(cost.size * len(ways) * _NUMPY / 8):
+        for down, shift in ways:
+            _add_path(cost, image, total, jumps, one_step, down, shift)
+        return total
+    height, labels, width = cost.shape
+    grey = image.astype(np.int16)
+    for down, shift in ways:
+        order = range(height) if down > 0 else range(height - 1, -1, -1)
+        # Beyond the rims all is 0; beyond the first and the last label, out of reach.
+        before = np.zeros((labels + 2, width + 2), np.int16)
+        before[[0, -1]] = 32000 - one_step
+        inner, there = np.s_[1:-1, 1:-1], slice(1 - shift, width + 1 - shift)
+        for row in order:
+            least = before[1:-1, there].min(0)
+            start = row == order[0]
+            edge = np.zeros(width, np.int16) if start else np.abs(
+                grey[row] - np.roll(grey[row - down], shift)
+            )  # fmt: skip
+            best = np.minimum(before[:-2, there], before[2:, there]) + one_step
+            np.minimum(best, before[1:-1, there], out=best)
+            np.minimum(best, least + jumps[edge], out=best)
+            before[inner] = cost[row] + best - least
+            total[row] += before[inner]
     return total
-
-
-def _add_path(
-    cost: Costs, image: Costs, total: Costs, way: tuple[int, int], penalties: tuple[int, int, int]
-) -> None:  # fmt: skip
-    """Add the costs smoothed along one path to the total, a row of pixels at a time."""
-    one_step, jump, softness = penalties
-    down, across = way
-    if down == 0:  # along rows: the same as along columns of the transposed volume
-        cost, image, total = (values.swapaxes(0, 1) for values in (cost, image, total))
-        down, across = across, 0
-    order = range(len(cost)) if down > 0 else range(len(cost) - 1, -1, -1)
-    before = np.empty(0, np.int16)
-    for row in order:
-        if not len(before):
-            before = cost[row].copy()
-            total[row] += before
-            continue
-        shifted, neighbour = before, image[row - down]
-        if across:
-            shifted, neighbour = np.roll(before, across, axis=0), np.roll(neighbour, across)
-        least = shifted.min(1, keepdims=True)
-        step = np.abs(image[row] - neighbour)[:, None]
-        best = np.minimum(shifted, least + (jump * softness // (softness + step)).astype(np.int16))
-        np.minimum(best[:, 1:], shifted[:, :-1] + np.int16(one_step), out=best[:, 1:])
-        np.minimum(best[:, :-1], shifted[:, 1:] + np.int16(one_step), out=best[:, :-1])
-        before = cost[row] + best - least
-        if across:
-            edge = 0 if across > 0 else -1
-            before[edge] = cost[row, edge]
-        total[row] += before
 
 
 @compiled
-def _all_paths(cost, image, one_step, jump, softness):  # type: ignore[no-untyped-def]
-    """Return `aggregated`."""
-    height, width, labels = cost.shape
-    total = np.zeros_like(cost)
-    before, now = np.zeros((width, labels), np.int16), np.zeros((width, labels), np.int16)
-    padded = np.full(labels + 2, np.int16(32000 - one_step))
-    lower, same, upper = padded[:-2], padded[1:-1], padded[2:]
-    step = np.int16(one_step)
-    for way in range(8):
-        down, across = _PATHS[way]
-        for i in range(height):
-            row = i if down >= 0 else height - 1 - i
-            for j in range(width):
-                column = j if across >= 0 else width - 1 - j
-                own, smooth, sums = cost[row, column], now[column], total[row, column]
-                above, beside = row - down, column - across
-                if above < 0 or above >= height or beside < 0 or beside >= width:
-                    for n in range(labels):
-                        smooth[n] = own[n]
-                        sums[n] += own[n]
-                    continue
-                other = before[beside] if down != 0 else now[beside]
-                least = np.int16(32000)
-                for n in range(labels):
-                    same[n] = other[n]
-                    least = min(least, other[n])
-                edge = abs(np.int32(image[row, column]) - np.int32(image[above, beside]))
-                most = np.int16(least + jump * softness // (softness + edge))
-                for n in range(labels):
-                    best = min(min(same[n], most), np.int16(min(lower[n], upper[n]) + step))
-                    value = np.int16(own[n] + best - least)
-                    smooth[n] = value
-                    sums[n] += value
-            if down != 0:
-                before, now = now, before
-    return total
+def _add_path(cost, image, total, jumps, one_step, down, shift):  # type: ignore[no-untyped-def]
+    """Add the costs smoothed along one path to the total, all columns of a row at a time."""
+    height, labels, width = cost.shape
+    before = np.zeros((labels + 2, width + 2), np.int16)
+    now = np.zeros((labels + 2, width + 2), np.int16)
+    for rim in (before, now):
+        rim[0] = 32000 - one_step
+        rim[-1] = 32000 - one_step
+    least, most = np.zeros(width, np.int16), np.zeros(width, np.int16)
+    start = 1 - shift
+    for i in range(height):
+        row = i if down > 0 else height - 1 - i
+        least[:] = before[1, start : start + width]
+        for label in range(2, labels + 1):
+            same = before[label, start : start + width]
+            for x in range(width):
+                least[x] = min(least[x], same[x])
+        for x in range(width):
+            edge = np.int32(0)
+            if i > 0:
+                edge = abs(
+                    np.int32(image[row, x]) - np.int32(image[row - down, (x - shift) % width])
+                )
+            most[x] = np.int16(least[x] + jumps[edge])
+        for label in range(1, labels + 1):
+            lower = before[label - 1, start : start + width]
+            same = before[label, start : start + width]
+            upper = before[label + 1, start : start + width]
+            own, sums = cost[row, label - 1], total[row, label - 1]
+            smooth = now[label, 1 : 1 + width]
+            for x in range(width):
+                best = np.int16(min(lower[x], upper[x]) + one_step)
+                best = min(min(best, same[x]), most[x])
+                value = np.int16(own[x] + best - least[x])
+                smooth[x] = value
+                sums[x] += value
+        before, now = now, before

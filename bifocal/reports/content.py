@@ -260,6 +260,10 @@ def read_content(source: Path, task: ReportTask) -> PairContent:
         named = pair_or_set(source)
         setup = named.extra.get("setup")
         of_set = named if isinstance(named, PhotoSet) else None
+        if of_set is not None and isinstance(setup, dict):
+            told = setup.get("focal_px"), setup.get("standard_deviations")
+            if not all(isinstance(own, list) and len(own) == len(of_set) for own in told):
+                setup = None  # that of other photos, or of the project of another program
         pair = best_pair(named) if isinstance(named, PhotoSet) else named
         if task.control or task.check:
             exchanged = task.far is not None and is_exchanged(named, task.far)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import compress
 from pathlib import Path
@@ -20,6 +22,22 @@ from photocore.errors import InputError
 
 #: Code of points that the orientation rests on, and of independent ones.
 CONTROL, CHECK = "CONTROL", "CHECK"
+
+
+def refuse_same_names(
+    control: Path, check: Path, first: Sequence[str], second: Sequence[str]
+) -> None:
+    """Refuse points of one name in the tables of control and of check points.
+
+    Raises
+    ------
+    InputError
+        Naming some of them.
+    """
+    counts = Counter([*first, *second])
+    twice = sorted(name for name, count in counts.items() if count > 1)
+    if twice:
+        raise InputError(f"{check}: {', '.join(twice[:5])} is in {control} too; give other names.")
 
 
 def solve_control(
@@ -60,9 +78,8 @@ def solve_control(
     counts = np.array([len(part.ids) for part in parts], dtype=int)
     codes = np.repeat([code for _, code in tables], counts)
     ids = [name for part in parts for name in part.ids]
-    twice = sorted({name for name in ids if ids.count(name) > 1}) if check else []
-    if twice:
-        raise InputError(f"{check}: {', '.join(twice[:5])} is in {control} too; give other names.")
+    if control and check:
+        refuse_same_names(control, check, parts[0].ids, parts[1].ids)
     xyz = np.concatenate([part.xyz for part in parts] or [np.zeros((0, 3))])
     picks = [
         np.concatenate([part.picks[k] for part in parts] or [np.zeros((0, 2))])

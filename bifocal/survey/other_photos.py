@@ -28,6 +28,11 @@ OF_ALL = ("r_all", "sigma_all", "X_all", "Y_all", "chance")
 CHANCE = math.erfc(FlagLimits().redundant / math.sqrt(2.0))
 
 
+def is_of_others(key: str) -> bool:
+    """Tell whether a column is one that `of_all_photos` returns."""
+    return key in OF_ALL or key.startswith(("r_1_", "sigma_1_"))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OtherPhoto:
     """How a photo beside an ideal pair was taken; its image coordinates are those of the pair.

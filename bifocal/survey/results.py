@@ -11,6 +11,7 @@ import numpy as np
 
 from bifocal.survey.basis import basis
 from bifocal.survey.image_shift import image_shift
+from bifocal.survey.other_photos import is_of_others
 from bifocal.survey.solved_survey import SolvedSurvey
 from bifocal.survey.tolerances import sentence
 from photocore.arrays import FloatArray
@@ -39,6 +40,8 @@ def csv_columns(solution: SolvedSurvey) -> dict[str, Any]:
         sigma = solution.world_sigma
         columns |= {f"sigma_{key} [m]": sigma[:, i] for i, key in enumerate("ENH")}
     columns |= {f"{key} [{length_unit(solution)}]": table[key] for key in _more(solution)}
+    for key in _of_others(solution):
+        columns[key if key == "chance" else f"{key} [m]"] = table[key]
     columns["flag"] = list(table.flags)
     if any(solution.points.note):
         columns["note"] = list(solution.points.note)
@@ -49,6 +52,11 @@ def _more(solution: SolvedSurvey) -> list[str]:
     """Return the displacements on the third photo and more of a set."""
     count = 2 if solution.photos is None else len(solution.photos)
     return [f"e{number}" for number in range(3, count + 1)]
+
+
+def _of_others(solution: SolvedSurvey) -> list[str]:
+    """Return the columns of photos beside an ideal pair, and of all together."""
+    return [key for key in solution.table.columns if is_of_others(key)]
 
 
 def solution_json(solution: SolvedSurvey) -> str:
@@ -62,7 +70,8 @@ def solution_json(solution: SolvedSurvey) -> str:
 def _records(solution: SolvedSurvey) -> list[str]:
     table = solution.table
     shift = shift_of(solution)
-    shown = {key: table[key] for key in (*_NUMBERS, *_more(solution))} | shift
+    shown = {key: table[key] for key in (*_NUMBERS, *_more(solution), *_of_others(solution))}
+    shown |= shift
     columns, world = [values.tolist() for values in shown.values()], []
     keys = list(shown)
     if solution.georeference is not None:

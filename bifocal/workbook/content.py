@@ -12,7 +12,7 @@ from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.survey.image_shift import foot_tangents, image_shift, lens_turns
 from bifocal.survey.observations import PointObservations
-from bifocal.survey.other_photos import OF_ALL
+from bifocal.survey.other_photos import is_of_others
 from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.setup import SIGMA_RADIAL, SurveySetup
@@ -268,7 +268,7 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
         placeless[:] = True
     for key, values in table.columns.items():
         blank = placeless if key in _PLACES or key.startswith("cov_") else incomplete
-        if key in OF_ALL or key.startswith(("r_1_", "sigma_1_")):
+        if is_of_others(key):
             blank = np.isnan(values)
         if key in ("q", "theta_used"):
             blank = np.isnan(values)

@@ -12,7 +12,7 @@ from multimedia.adjustment.unknowns import Unknowns
 from multimedia.media.camera import EXTERIOR
 from multimedia.media.projection import project_with_jacobian
 from multimedia.projects.model import Project
-from photocore.adjustment import BlockEquations
+from photocore.adjustment import BlockEquations, Fit
 from photocore.adjustment.network import LARGEST, Network, NetworkState, Rows
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.camera.rotation import by_rotation, skew
@@ -21,6 +21,9 @@ from photocore.errors import GeometryError
 #: A motion of everything is a datum defect if it moves image points by less than this share of
 #: what its parts would move them on their own.
 _DEFECT = 1e-9
+#: Residuals that no adjustment is right with, once they fall no more: so many of their standard
+#: deviations, and such a share of the principal distance.
+HOPELESS = (20.0, 1e-3)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -97,6 +100,8 @@ class Bundle:
         """
         frees, place = np.argwhere(self.free).tolist(), self.columns
         size = float(np.abs(self.observations.image).max(initial=0.0))
+        finest = float(self.observations.sigma.min(initial=1.0))
+        nearest = min(camera.principal_distance for camera in self.project.cameras)
         cameras, plates = (dict(enumerate(some)) for some in (place.cameras, place.plates))
         return Network(
             labels=place.labels, free=self.free, kept=place.points,
@@ -104,8 +109,22 @@ class Bundle:
             names=[f"point {self.ids[j]}:{'XYZ'[k]}" for j, k in frees],
             terms=(self._images, self._known, self._scale_bars, self._datum), moved=self._carried,
             # Projecting rounds a few times: ten units in the last place of the largest coordinate.
-            rounding=2e-15 * size / float(self.observations.sigma.min(initial=1.0)),
+            rounding=2e-15 * size / finest,
+            hopeless=max(HOPELESS[0], HOPELESS[1] * nearest / finest), blame=self._worst,
         )  # fmt: skip
+
+    def _worst(self, fitted: Fit[NetworkState]) -> str:
+        """Return the camera, and the plate if any, whose image points fit worst."""
+        seen = self.observations
+        misses = fitted.residuals[: seen.image.size].reshape(-1, 2) * seen.sigma
+        camera = np.repeat(np.arange(len(seen.rows)), [len(own) for own in seen.rows])
+        camera = camera[np.argsort(np.concatenate(seen.rows), kind="stable")]
+        plate = self.plate_of[seen.point]
+        groups = np.unique(np.column_stack([camera, plate]), axis=0).tolist()
+        sizes = [np.sqrt(np.mean(misses[(camera == k) & (plate == p)] ** 2)) for k, p in groups]
+        k, p = groups[int(np.argmax(sizes))]
+        on = f", plate {self.unknowns.plates[p]}" if p >= 0 else ""
+        return f"camera {self.project.camera_names[k]}{on} ({max(sizes):.2g} mm)"
 
     def _carried(self, state: NetworkState) -> NetworkState:
         """Return a state with the points on plates where their poses put them."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.special import chdtrc, chdtri, ndtr
 
 from multimedia.adjustment.bundle_columns import BundleColumns
 from multimedia.adjustment.media_unknowns import media_unknowns
@@ -119,12 +119,12 @@ def with_model_error(
         if len(cells) < _FEWEST_CELLS or free.sum() <= 0:
             break
         ratio = float(squares.sum() / free.sum())
-        if ratio > chi2.isf(RISK_WHITE / len(NEIGHBOURS), count) / count:
+        if ratio > chdtri(count, RISK_WHITE / len(NEIGHBOURS)) / count:
             effect = max(effect, ratio)
     for groups in _groups(result, order):
         squares, free = _sums(result, [rows for _, _, rows in groups])
         ratios = np.divide(squares, free, out=np.zeros_like(free), where=free > 0.5)
-        if ratios.max(initial=0.0) > chi2.isf(RISK_WHITE / max(len(groups), 1), 2) / 2:
+        if ratios.max(initial=0.0) > chdtri(2, RISK_WHITE / max(len(groups), 1)) / 2:
             effect = max(effect, float(squares.sum() / free.sum()))
             remarks.append(_worst_group(result, groups, ratios, plates))
     if effect == 1.0:
@@ -298,5 +298,5 @@ def significance(
     off = result.values[rows] - np.asarray(neutral)
     covariance = result.covariance[np.ix_(rows, rows)]
     if len(rows) == 1:
-        return float(2 * norm.sf(abs(off[0]) / np.sqrt(covariance[0, 0])))
-    return float(chi2.sf(off @ np.linalg.solve(covariance, off), len(rows)))
+        return float(2 * ndtr(-abs(off[0]) / np.sqrt(covariance[0, 0])))
+    return float(chdtrc(len(rows), off @ np.linalg.solve(covariance, off)))

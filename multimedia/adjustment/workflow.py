@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from multimedia.adjustment.bundle import bundle_adjust
+from multimedia.adjustment.extensions import Extension, diagnose
 from multimedia.adjustment.report import write_adjustment_report
 from multimedia.adjustment.unknowns import Adjustment, ScaleBar, Unknowns
+from multimedia.projects.model import Project
 from multimedia.projects.project_file import read_project, write_project
 from multimedia.refraction.water import salinity_from_index, water_index_derivatives
 from photocore.errors import InputError
@@ -45,15 +47,7 @@ def adjust_project(
     check_ending(out, "a project is written as .toml.", ".toml")
     check_report(report)
     project = read_project(source)
-    groups = dict.fromkeys(group for group in project.object_points.groups if group)
-    if unknowns.plates == ALL and ALL[0] not in groups:
-        if not groups:
-            raise InputError(
-                f"{source}: --plate all: no object point belongs to a group; name the plate of "
-                "each in the column group of its object points, or leave --plate out."
-            )
-        unknowns = replace(unknowns, plates=tuple(groups))
-    result = bundle_adjust(project, unknowns)
+    result = bundle_adjust(project, _with_all_plates(source, project, unknowns))
     if out is not None:
         write_project(out, result.project, overwrite=overwrite)
     if report is not None:
@@ -65,6 +59,25 @@ def adjust_project(
             overwrite=overwrite,
         )  # fmt: skip
     return result, (*project.remarks, *result.remarks)
+
+
+def diagnose_project(source: Path, unknowns: Unknowns) -> tuple[float, list[Extension]]:
+    """Return sigma0 of a project file and what would lower it most; see `diagnose`."""
+    project = read_project(source)
+    return diagnose(project, _with_all_plates(source, project, unknowns))
+
+
+def _with_all_plates(source: Path, project: Project, unknowns: Unknowns) -> Unknowns:
+    """Return the unknowns with all groups of object points in the place of `ALL`."""
+    groups = dict.fromkeys(group for group in project.object_points.groups if group)
+    if unknowns.plates != ALL or ALL[0] in groups:
+        return unknowns
+    if not groups:
+        raise InputError(
+            f"{source}: --plate all: no object point belongs to a group; name the plate of "
+            "each in the column group of its object points, or leave --plate out."
+        )
+    return replace(unknowns, plates=tuple(groups))
 
 
 def parse_scale_bar(text: str) -> ScaleBar:

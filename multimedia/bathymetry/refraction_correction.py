@@ -184,6 +184,7 @@ class _Task(NamedTuple):
     surface: WaterSurface
     n_water: float
     origin: FloatArray  # (3,), to be added again
+    heading: FloatArray  # (k, 3), in air, of the rays last found; NaN before
 
     @classmethod
     def near(
@@ -200,16 +201,19 @@ class _Task(NamedTuple):
         row, camera = _of_rows(pairs, rows, len(apparent))
         local, at = apparent[rows] - origin, centres - origin
         weight = 1 / ((local[row] - at[camera]) ** 2).sum(-1)
-        return cls(local, at, row, camera, weight, surface.shifted(-origin), index, origin)
+        return cls(local, at, row, camera, weight, surface.shifted(-origin), index, origin,
+                   np.full((len(row), 3), np.nan))  # fmt: skip
 
     def take(self, rows: IntArray) -> _Task:
         """Return the task for some of the points, ascending."""
         if len(rows) == len(self.apparent):
             return self
-        row, camera, weight = _of_rows(
-            (self.row, self.camera, self.weight), rows, len(self.apparent)
+        row, camera, weight, heading = _of_rows(
+            (self.row, self.camera, self.weight, self.heading), rows, len(self.apparent)
         )
-        return self._replace(apparent=self.apparent[rows], row=row, camera=camera, weight=weight)
+        return self._replace(
+            apparent=self.apparent[rows], row=row, camera=camera, weight=weight, heading=heading
+        )
 
     @property
     def starts(self) -> IntArray:
@@ -237,6 +241,7 @@ def _solve(task: _Task, start: FloatArray) -> tuple[FloatArray, BoolArray, BoolA
     for step_number in range(MOST_STEPS):
         part = task.take(rows)
         balance, normal, change = _balance(part, point[rows])
+        task.heading[np.isin(task.row, rows)] = part.heading
         if step_number == 0:
             # Smallest over largest eigenvalue of the normal matrix: the square of the ray angle.
             values = np.linalg.eigvalsh(np.nan_to_num(normal))
@@ -289,7 +294,10 @@ def _pointing(task: _Task, point: FloatArray) -> tuple[FloatArray, FloatArray]:
     row, camera = task.row, task.camera
     if not isinstance(task.surface, Plane):
         water = SurfaceSequence(surfaces=(task.surface,), indices=(1.0, task.n_water))
-        path = aim_rays(task.centres[camera], point[row], water, jacobian=True)
+        path = aim_rays(
+            task.centres[camera], point[row], water, jacobian=True, headings=task.heading
+        )
+        task.heading[:] = path.directions[:, 0]
         return path.directions[:, 0], np.asarray(path.jacobian)
     up = task.surface.normal
     height = task.surface.side(task.centres)[camera]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,13 +12,14 @@ from photocore.cli import print_result, tell_written, text_table
 from photocore.options import declared
 
 if TYPE_CHECKING:
+    from multimedia.adjustment.extensions import Extension
     from multimedia.adjustment.unknowns import Adjustment
 
 
 @declared
 def command(
     project: Path, wavelength: float | None, temperature: float | None, depth: float,
-    out: Path | None, report: Path | None, as_json: bool, **choices: Any,
+    out: Path | None, report: Path | None, diagnose: bool, as_json: bool, **choices: Any,
 ) -> None:  # fmt: skip
     """Adjust cameras, object points and the media of a project together."""
     from multimedia.adjustment import workflow as adjust
@@ -40,8 +42,22 @@ def command(
     if salinity:
         data["salinity_percent"] = {"value": salinity[0], "sigma": salinity[1]}
         lines.append(f"Salinity {salinity[0]:.3f} % (sigma {salinity[1]:.3f} %)")
+    if diagnose:
+        _, extensions = adjust.diagnose_project(project, unknowns)
+        data["extensions"] = [asdict(extension) for extension in extensions]
+        lines += ["\nWhat one step more would bring, each alone (score test):", _ranked(extensions)]
     print_result(data, lines, as_json=as_json, remarks=notes)
     tell_written(out, report)
+
+
+def _ranked(extensions: list[Extension]) -> str:
+    """Return the extensions as a table, those that chance does not explain first of all."""
+    rows = [
+        (e.what, e.unknowns, f"{e.sigma0 * 1000:.3f}",
+         "-" if e.chance < 1e-3 else f"{e.chance:.2g}", e.option)
+        for e in extensions
+    ]  # fmt: skip
+    return text_table(("extension", "unknowns", "sigma0 [um]", "by chance", "option"), rows)
 
 
 def _lines(result: Adjustment) -> list[str]:

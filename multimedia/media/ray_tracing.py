@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from multimedia.media.height_field import HeightField
 from multimedia.media.least_time import least_time_path
 from multimedia.media.ray_march import March, PathChanges, drift_at, march_rays, miss_of
 from multimedia.media.ray_paths import RayPaths, RayStatus
@@ -81,17 +82,18 @@ def trace_rays(origins: ArrayLike, directions: ArrayLike, interfaces: SurfaceSeq
     ([[1.0, 0.0, 0.0]], np.float64(32.03))
     """
     return _blockwise(
-        as_points(origins, "origins", dimension=3),
-        as_points(directions, "directions", dimension=3),
         lambda start, heading: (
             march_rays(start, _unit(heading), interfaces, derivatives=False).paths
         ),
+        as_points(origins, "origins", dimension=3),
+        as_points(directions, "directions", dimension=3),
     )
 
 
 def aim_rays(
-    centres: ArrayLike, points: ArrayLike, interfaces: SurfaceSequence, *, jacobian: bool = False
-) -> RayPaths:
+    centres: ArrayLike, points: ArrayLike, interfaces: SurfaceSequence, *, jacobian: bool = False,
+    headings: FloatArray | None = None,
+) -> RayPaths:  # fmt: skip
     """Find the ray from each projection centre that reaches each object point.
 
     Parameters
@@ -104,6 +106,8 @@ def aim_rays(
         Surfaces and indices, all in the frame of the points (see `Interfaces.seen_from`).
     jacobian : bool
         Also return how the direction at the camera changes with the point.
+    headings : ndarray, shape (..., 3), optional
+        Unit directions at the centres of rays to points nearby, tried first; NaN where unknown.
 
     Returns
     -------
@@ -131,28 +135,28 @@ def aim_rays(
     [[1.0, 0.0, 0.0]]
     """
 
-    def aim(centre: FloatArray, target: FloatArray) -> RayPaths:
-        paths = _aim_block(centre, target, interfaces)
+    def aim(centre: FloatArray, target: FloatArray, known: FloatArray) -> RayPaths:
+        paths = _aim_block(centre, target, interfaces, known)
         if not jacobian:
             return paths
         derivative, _ = pointing_changes(centre, target, paths.directions[:, 0], interfaces)
         return replace(paths, jacobian=derivative)
 
+    known = np.full(3, np.nan) if headings is None else headings
     return _blockwise(
-        as_points(centres, "centres", dimension=3), as_points(points, "points", dimension=3), aim
-    )
+        aim, as_points(centres, "centres", dimension=3), as_points(points, "points", dimension=3),
+        known,
+    )  # fmt: skip
 
 
-def _blockwise(
-    first: FloatArray, second: FloatArray, work: Callable[[FloatArray, FloatArray], RayPaths]
-) -> RayPaths:
-    """Return what ``work`` makes of two vectors per ray, block by block, in their common shape."""
-    first, second = np.broadcast_arrays(first, second)
-    shape = first.shape[:-1]
-    first, second = first.reshape(-1, 3), second.reshape(-1, 3)
+def _blockwise(work: Callable[..., RayPaths], *vectors: FloatArray) -> RayPaths:
+    """Return what ``work`` makes of vectors per ray, block by block, in their common shape."""
+    whole = np.broadcast_arrays(*vectors)
+    shape = whole[0].shape[:-1]
+    flat = [each.reshape(-1, 3) for each in whole]
     parts = [
-        work(first[start : start + BLOCK], second[start : start + BLOCK])
-        for start in range(0, max(len(first), 1), BLOCK)
+        work(*(each[start : start + BLOCK] for each in flat))
+        for start in range(0, max(len(flat[0]), 1), BLOCK)
     ]
 
     def joined(arrays: list[Any]) -> Any:
@@ -167,8 +171,10 @@ def _blockwise(
     )
 
 
-def _aim_block(centre: FloatArray, target: FloatArray, interfaces: SurfaceSequence) -> RayPaths:
-    """Return the rays from centre to target."""
+def _aim_block(
+    centre: FloatArray, target: FloatArray, interfaces: SurfaceSequence, known: FloatArray
+) -> RayPaths:
+    """Return the rays from centre to target; known headings are tried first."""
     count = len(interfaces.surfaces)
     vertices = np.full((len(target), count, 3), np.nan)
     directions = np.full((len(target), count + 1, 3), np.nan)
@@ -180,6 +186,13 @@ def _aim_block(centre: FloatArray, target: FloatArray, interfaces: SurfaceSequen
     path = interfaces.reversed() if backwards else interfaces
     start, end = (target, centre) if backwards else (centre, target)
     rows = np.flatnonzero(status == RayStatus.NOT_CONVERGED)
+    if not backwards:
+        near = rows[np.isfinite(known[rows, 0])]
+        _, march, _, reached = _newton(start[near], end[near], known[near], path)
+        done = near[reached]
+        vertices[done], directions[done] = march.vertices[reached], march.directions[reached]
+        status[done] = RayStatus.OK
+        rows = np.flatnonzero(status == RayStatus.NOT_CONVERGED)
     for attempt in _attempts(path):
         if not rows.size:
             break
@@ -201,15 +214,16 @@ def _attempts(path: SurfaceSequence) -> Iterator[Callable[[FloatArray, FloatArra
     flat = all(isinstance(surface, Plane) for surface in path.surfaces) and not path.is_graded
     if flat:
         yield partial(_by_least_time, path=path)
-    for stages in STAGES:
+    first, *finer = STAGES
+    yield partial(_by_stages, path=path, stages=first)
+    if not flat:
+        # Waves leave points whose straight start lies across a crest.
+        for ring in RINGS:
+            yield partial(_from_ring, path=path, ring=ring)
+        if all(isinstance(surface, HeightField) for surface in path.surfaces):
+            return  # finer stages found no ray more in 3000 pairs of cameras and waves
+    for stages in finer:
         yield partial(_by_stages, path=path, stages=stages)
-    if flat:
-        return
-    # Waves leave a few points whose straight start lies across a crest.
-    for ring in RINGS:
-        for bearing in range(RING_STARTS):
-            angle = 2 * np.pi * bearing / RING_STARTS
-            yield partial(_from_ring, path=path, ring=ring, angle=angle)
 
 
 def _by_stages(
@@ -240,14 +254,20 @@ def _by_least_time(start: FloatArray, end: FloatArray, *, path: SurfaceSequence)
 
 
 def _from_ring(
-    start: FloatArray, end: FloatArray, *, path: SurfaceSequence, ring: float, angle: float
+    start: FloatArray, end: FloatArray, *, path: SurfaceSequence, ring: float
 ) -> _Reached:
-    """Start beside the best direction that the straight start leads to."""
+    """Start beside the best direction that the straight start leads to, on all bearings at once."""
     best, _, size, _ = _newton(start, end, _unit(end - start), path)
     width = ring * size / np.linalg.norm(end - start, axis=-1)
-    aside = np.cos(angle) * _across(best)[:, 0] + np.sin(angle) * _across(best)[:, 1]
-    _, march, _, reached = _newton(start, end, _unit(best + width[:, None] * aside), path)
-    return march, reached
+    bearings = 2 * np.pi * np.arange(RING_STARTS) / RING_STARTS
+    across = np.stack([np.cos(bearings), np.sin(bearings)], axis=1) @ _across(best)
+    tried = _unit(best[:, None] + width[:, None, None] * across).reshape(-1, 3)
+    starts, ends = (np.repeat(each, RING_STARTS, axis=0) for each in (start, end))
+    _, march, _, reached = _newton(starts, ends, tried, path)
+    # Of the bearings that lead there, the first.
+    first = reached.reshape(-1, RING_STARTS).argmax(axis=1)
+    chosen = np.arange(len(start)) * RING_STARTS + first
+    return march.take(chosen), reached[chosen]
 
 
 def _newton(

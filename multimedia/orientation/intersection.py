@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from multimedia.media.camera import Camera
 from multimedia.media.optical_media import OpticalMedia
@@ -341,7 +341,7 @@ def _assembled(
     spread = 1.0 - np.einsum("mnki,mnki->mnk", slopes @ covariance, slopes)
     good = status == PointStatus.OK
     status[good & (angle < WEAK_ANGLE)] = PointStatus.WEAK
-    limits = chi2.ppf(1.0 - RISK, np.maximum(2 * np.arange(len(cameras) + 1) - 3, 1))
+    limits = chdtri(np.maximum(2 * np.arange(len(cameras) + 1) - 3, 1), RISK)
     status[good & (square > limits[rays])] = PointStatus.GROSS_ERROR
     return IntersectedPoints(
         xyz=xyz,

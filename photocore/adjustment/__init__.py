@@ -7,6 +7,7 @@ from photocore.adjustment.outliers import (
     OUTLIER_DISTANCE,
     OUTLIER_LIMIT,
     huber_weights,
+    outlier_limit,
     standardised,
 )
 
@@ -20,5 +21,6 @@ __all__ = [
     "fit",
     "huber_weights",
     "minimise",
+    "outlier_limit",
     "standardised",
 ]

@@ -26,6 +26,8 @@ SETTLE_BLOCKS = 1e-6
 #: Share of the square sum that is its own rounding. A step that drops it by less is taken without
 #: seeing it fall: 20 control points need 7 evaluations in place of 14 to 18.
 ROUNDED = 1e-13
+#: Steps in which a square sum that is hopeless must fall to this share of itself.
+_PATIENCE, _FALLS = 10, 0.7
 #: Where a step brings this share of the drop foretold, the valley is straight enough.
 STRAIGHT = 0.9
 
@@ -96,6 +98,7 @@ def minimise(
     most: int = 200,
     settle: float = SETTLE,
     rounding: float = 0.0,
+    hopeless: float = np.inf,
 ) -> Fit[State]:
     """Go from a start to the least square sum.
 
@@ -117,6 +120,8 @@ def minimise(
     rounding : float
         Rounding error of a residual: ends when the residuals, or what a step changes of them,
         are nothing else.
+    hopeless : float
+        Root mean square of the weighted residuals above which it gives up once they fall no more.
 
     Raises
     ------
@@ -139,7 +144,7 @@ def minimise(
         # A block of 50 images (bench_bundle) settles in 4 steps from here, in 5 from 1e-4.
         damping, settle = 1e-6, max(settle, SETTLE_BLOCKS)
     count, cost = len(linear.residuals), float(linear.residuals @ linear.residuals)
-    settled, number = cost <= count * rounding**2, 0
+    settled, number, seen = cost <= count * rounding**2, 0, cost
     for number in range(1, most + 1):
         while True:
             step = linear.step(damping)
@@ -175,6 +180,10 @@ def minimise(
         settled = (settled and damping < 1e-3) or cost <= count * rounding**2
         if settled:
             break
+        if number % _PATIENCE == 0:
+            if cost > count * hopeless**2 and cost > _FALLS * seen:
+                break
+            seen = cost
     return Fit(state=state, linear=linear, iterations=number, settled=settled)
 
 
@@ -208,13 +217,17 @@ def fit(
     what: str,
     most: int = 200,
     rounding: float = 0.0,
+    hopeless: float = np.inf,
+    blame: Callable[[Fit[State]], str] | None = None,
 ) -> Fit[State]:
     """Adjust; refuse to return unknowns the data cannot determine.
 
     Parameters
     ----------
-    state, equations, advance, most, rounding
+    state, equations, advance, most, rounding, hopeless
         As for `minimise`.
+    blame : callable, optional
+        Where in a fit the contradictions lie, in words.
     names : sequence of str
         Of the unknowns, for messages; free coordinates of points behind the others.
     what : str
@@ -227,7 +240,19 @@ def fit(
     ConvergenceError
         If ``most`` steps do not settle it.
     """
-    result = minimise(state, equations, advance, what=what, most=most, rounding=rounding)
+    result = minimise(
+        state, equations, advance, what=what, most=most, rounding=rounding, hopeless=hopeless
+    )
+    rest = float(np.sqrt(np.mean(result.residuals**2)))
+    if not result.settled and rest > hopeless:
+        where = f" Most of it lies in {blame(result)}." if blame else ""
+        raise ConvergenceError(
+            f"{what}: the observations contradict each other: residuals of {rest:.0f} times their "
+            f"standard deviation remain and fall no more.{where} Do these image points belong to "
+            "these object points, the units and media to the file?",
+            iterations=result.iterations,
+            residual=rest,
+        )
     refuse_undetermined(result, names, what)
     return result
 

@@ -80,7 +80,8 @@ class Rows:
         parts = [[np.zeros(0)] * 3]
         for entry in self.entries:
             some = [part.ravel() for part in np.broadcast_arrays(*entry)]
-            parts.append([part[some[1] >= 0] for part in some])
+            # What stands there as zero would fill whole blocks of the normal equations.
+            parts.append([part[(some[1] >= 0) & (some[2] != 0)] for part in some])
         rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
         return csr_matrix((values, (rows, columns)), shape=(self.count, width))
 
@@ -111,6 +112,9 @@ class Network:
     what : str
         What is adjusted, for messages.
     rounding : float
+    hopeless : float
+    blame : callable, optional
+        As for `photocore.adjustment.fit`.
     kind : type
         Of the equations, where points are eliminated.
     largest : int
@@ -127,6 +131,8 @@ class Network:
     names: Sequence[str] = ()
     what: str = "adjustment"
     rounding: float = 0.0
+    hopeless: float = np.inf
+    blame: Callable[[Fit[Any]], str] | None = None
     kind: type[BlockEquations] = BlockEquations
     largest: int = LARGEST
 
@@ -182,5 +188,6 @@ class Network:
         """Return the state of the least square sum; see `photocore.adjustment.fit`."""
         names = [*self.labels, *self.names]
         return fit(
-            start, self.equations, self.advance, names=names, what=self.what, rounding=self.rounding
-        )
+            start, self.equations, self.advance, names=names, what=self.what,
+            rounding=self.rounding, hopeless=self.hopeless, blame=self.blame,
+        )  # fmt: skip

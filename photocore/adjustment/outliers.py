@@ -11,6 +11,8 @@ OUTLIER_LIMIT = 3.5
 #: The same chance for the length of a residual in the plane, of unit variance either way:
 #: sqrt(-2 ln 0.000465).
 OUTLIER_DISTANCE = 3.917
+#: Chance that of all honest residuals that are tested together one is called a gross error.
+FALSE_ALARM = 0.05
 #: Observations with a smaller redundancy number are not controlled: their residual says nothing.
 CONTROLLED = 1e-9
 
@@ -40,6 +42,22 @@ def standardised(
     with np.errstate(invalid="ignore", divide="ignore"):
         controlled = np.where(redundancy_numbers > CONTROLLED, redundancy_numbers, np.nan)
         return residuals / (sigma0 * np.sqrt(controlled))
+
+
+def outlier_limit(count: int) -> float:
+    """Return the limit for the largest of so many standardised residuals, `OUTLIER_LIMIT` at least.
+
+    Among many honest ones some pass any fixed limit: a hundred of 350 000 are beyond 3.5. With
+    this one all of them together raise a false alarm in one of twenty adjustments (Bonferroni).
+
+    Examples
+    --------
+    >>> outlier_limit(50), round(outlier_limit(350_000), 2)
+    (3.5, 5.26)
+    """
+    from scipy.special import ndtri
+
+    return max(OUTLIER_LIMIT, -float(ndtri(FALSE_ALARM / 2 / max(count, 1))))
 
 
 def huber_weights(residuals: FloatArray, bound: float) -> FloatArray:

@@ -6,6 +6,7 @@ from tests.attack.lines import ALIGN, CANON, CURVE, RING, SITE, SOLVE, WATER
 
 DELIVER = "bifocal ortho wall.pair.json --relief relief.tif --deliver d --any-size"
 ORTHO = "bifocal ortho wall.pair.json --out o.tif"
+THREE = "bifocal align far.jpg near.jpg cam1_1.png --out"
 RECTIFY = "bifocal rectify far.jpg --out o.tif"
 ADJUST = "multimedia adjust tank.toml"
 BOARDS = "multimedia boards tank.toml far.jpg --board 9x6"
@@ -168,6 +169,16 @@ WORDS: list[tuple[str, str]] = [
         "--out o.json",
         "--focal1",
     ),
+    (f"{THREE} o.pair.json --auto --distance1 17.5", "photos.json"),
+    (f"{THREE} o.photos.json", "--control|--auto"),
+    (f"{THREE} o.photos.json --control control.csv", "col3, row3"),
+    (f"{THREE} o.photos.json --control control.csv --picture p.png", "--picture"),
+    (f"{THREE} o.photos.json --as-set-up --distance1 17.5 --distance2 9.5", "--as-set-up"),
+    (f"{THREE} o.photos.json --control control.csv --indices 1,1.337 --port 0", "--indices"),
+    (f"{THREE} o.photos.json --auto --distance1 17500", "17500"),
+    (f"{THREE.replace('cam1_1.png', 'far.jpg')} o.photos.json --auto --distance1 17.5", "far.jpg"),
+    ("bifocal facade far.jpg near.jpg far.jpg --out o --auto --distance1 17.5", "far.jpg.*twice"),
+    ("bifocal facade far.jpg near.jpg nothing.jpg --out o --auto --distance1 17.5", "nothing.jpg"),
     ("bifocal facade far.jpg near.jpg --out o --control control.csv --port 0.1", "--indices"),
     ("bifocal facade far.jpg near.jpg --out o --indices 1,x --port 0", "--indices"),
     ("bifocal facade far.jpg near.jpg --out o --indices 1,1.337 --port -1", "--port"),
@@ -214,7 +225,6 @@ WORDS: list[tuple[str, str]] = [
     ("bifocal solve survey.csv --pair wall.photos.json --json", "col1"),
     ("bifocal solve picks3.csv --pair wall.photos.json --out o.xlsm", "o.xlsm"),
     ("bifocal match wall.photos.json --out o.xlsx", "o.csv"),
-    ("bifocal pick wall.photos.json --no-browser", "set of 3 photos"),
     ("bifocal solve lens.json --json", "lens.json"),
     ("bifocal solve far.jpg --json", "far.jpg"),
     ("bifocal relief wall.pair.json", "--out"),
@@ -233,7 +243,6 @@ WORDS: list[tuple[str, str]] = [
     ("bifocal relief wall.pair.json --out o.tif --cloud o.xyz", "o.xyz"),
     ("bifocal ortho wall.pair.json --plane", "--out|--deliver"),
     ("bifocal ortho wall.photos.json --plane --out o.tif --image 2", "--image"),
-    ("bifocal ortho wall.photos.json --plane --deliver d --scale 1:50", "--deliver"),
     (f"{ORTHO} --plane --relief relief.tif", "--plane|--relief|one"),
     (f"{ORTHO} --plane 1e10", "plane|camera"),
     (f"{ORTHO} --plane 20", "plane|camera"),

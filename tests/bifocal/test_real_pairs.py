@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from benchmarks.bench_orientation import RealPair
-from bifocal import MatchSettings, Pair, SiteMeasures, align
+from bifocal import Lens, MatchSettings, Pair, SiteMeasures, align
 from bifocal.matching.matching import match_pair, precision
 from bifocal.model.orientation_precision import pinhole
 from bifocal.orientation.align_workflow import (
@@ -129,6 +129,51 @@ def test_a_35_mm_equivalent_is_seen_through_without_control(data_dir, tmp_path, 
     made = align_photos(folder / "far.jpg", folder / "near.jpg", out, options)
     assert made.remarks[0].startswith("32.4 mm is probably the 35-mm equivalent: 20.4 mm")
     assert made.setup["focal_px"] == pytest.approx([geometry["far"]["K"][0][0]] * 2, rel=0.005)
+
+
+#: Median errors left by COLMAP's two-view geometry (pycolmap 4.2.1, 8000 SIFT features, exact
+#: camera matrix) after the best robust similarity, at the reference points: relief, place. [mm]
+COLMAP = {"church_1": (4.0, 6.5), "church_2": (10.1, 12.4)}
+
+
+@pytest.mark.parametrize("name", COLMAP)
+def test_with_a_known_lens_and_no_control_a_pair_is_as_good_as_colmaps(
+    data_dir, tmp_path, name
+) -> None:
+    folder = data_dir / "facade_pairs" / name
+    geometry, xyz, far, near = reference(folder)
+    lens = Lens(
+        camera_matrix=np.array(geometry["far"]["K"]), coefficients=np.zeros(5),
+        image_size=(3072, 2048),
+    )  # fmt: skip
+    lens.write(tmp_path / "lens.json")
+    d1, d2 = (geometry[key]["height_over_plane_m"] for key in ("far", "near"))
+    options = AlignOptions(
+        auto=True, lenses=(KnownLens(lens=tmp_path / "lens.json"),) * 2,
+        site=SiteMeasures(distance1=d1, distance2=d2),
+    )  # fmt: skip
+    out = tmp_path / "wall.pair.json"
+    pair = align_photos(folder / "far.jpg", folder / "near.jpg", out, options).pair
+    error = after_similarity(pair.intersect(far, near).xyz, xyz)
+    relief, place = COLMAP[name]
+    assert 1e3 * np.median(np.abs(error[:, 2])) < 1.08 * relief
+    assert 1e3 * np.median(np.linalg.norm(error, axis=1)) < 1.05 * place
+
+
+def after_similarity(found: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """Return what the best robust similarity leaves of errors, by biweighted Procrustes."""
+    known = np.isfinite(found).all(axis=1)
+    found, truth, weight = found[known], truth[known], np.ones(known.sum())
+    for _ in range(20):
+        middles = [np.average(points, axis=0, weights=weight) for points in (found, truth)]
+        a, b = found - middles[0], truth - middles[1]
+        u, size, vt = np.linalg.svd((b * weight[:, None]).T @ a)
+        flip = np.array([1.0, 1.0, np.linalg.det(u @ vt)])
+        scale = (size * flip).sum() / (weight[:, None] * a**2).sum()
+        error = scale * a @ (u * flip @ vt).T - b
+        away = np.linalg.norm(error, axis=1)
+        weight = 1 / (1 + (away / (2 * np.median(away))) ** 2) ** 2
+    return error
 
 
 def test_random_control_without_a_lens_is_hardly_worse_than_the_published_pair(data_dir) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bifocal import GeometryError
-from photocore.adjustment.network import Network, NetworkState
+from photocore.adjustment.network import Network, NetworkState, Rows
 
 
 @dataclass(frozen=True)
@@ -103,3 +103,12 @@ def test_rows_are_assembled_alike_whether_few_or_many_dense_or_sparse(count):
     assert (model.equations(start).jacobian == wanted).all()
     sparse = replace(model, largest=0).equations(start)
     assert (sparse.design.toarray() == wanted[:, :3]).all()
+
+
+def test_zeros_are_not_kept_where_points_are_eliminated() -> None:
+    # The rows of a datum touch every point, most with zero: kept, they fill the normal equations.
+    rows = Rows(np.arange(300).reshape(100, 3))
+    values = np.zeros(300)
+    values[7] = 2.0
+    rows.by_label(rows.add(np.zeros(1))[:, None], np.arange(300), values)
+    assert rows.sparse(300).nnz == 1

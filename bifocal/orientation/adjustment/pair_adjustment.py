@@ -7,13 +7,13 @@ prior, and the covariance says so.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.special import chdtrc, ndtri
 
 from bifocal.model.orientation_precision import NAMES, rates_of
+from bifocal.orientation.adjustment.frame_turn import line_equations, turned_by_lines
 from bifocal.orientation.adjustment.observed_points import known_points, views_of
 from bifocal.orientation.adjustment.pair_observations import (
     Equations,
@@ -22,7 +22,6 @@ from bifocal.orientation.adjustment.pair_observations import (
     at,
 )
 from bifocal.orientation.adjustment.refracted_ties import meeting_equations
-from bifocal.orientation.facade_lines import FacadeDirection
 from photocore.adjustment.network import Network, NetworkState, Rows
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import (
@@ -121,6 +120,9 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
     cofactor = np.zeros((len(names), len(names)))
     cofactor[np.ix_(free, free)] = fit.linear.cofactor
     state: PairUnknowns = fit.state.blocks["pair"][0]
+    if observations.lines and observations.lines_bend_nothing:
+        turned = turned_by_lines(observations, state, cofactor, pair_equations)
+        state, cofactor = turned[0], np.asarray(turned[1])
     covariance = cofactor * max(sigma0, 1.0) ** 2
     by = state.media.by_unknowns()
     return AdjustedPair(
@@ -178,7 +180,7 @@ def pair_equations(observations: PairObservations, state: PairUnknowns) -> Equat
         parts.append((values / observations.sigma_ties, by / observations.sigma_ties))
     if wall.any() and not state.media:
         parts.append(wall_equations(observations, state))
-    if observations.lines:
+    if observations.lines and not observations.lines_bend_nothing:
         parts.append(line_equations(observations.lines, state))
     if observations.control.ids:
         control = _control(observations, state)
@@ -198,23 +200,6 @@ def wall_equations(observations: PairObservations, state: PairUnknowns) -> Equat
     values, by = _transfer(observations, state, asked)
     rows = observations.wall_rows[:, asked]
     return rows @ values, rows @ by
-
-
-def line_equations(lines: Sequence[FacadeDirection], state: PairUnknowns) -> Equations:
-    """Return how far the façade's lines come out of the wall, in sigma; adjusted: nothing."""
-    values, by = np.zeros(len(lines)), np.zeros((len(lines), len(NAMES)))
-    for row, line in enumerate(lines):
-        seen = line.in_frame(state.cameras[line.camera - 1])
-        turn = at("turn X", line.camera)
-        values[row] = seen[2] / line.sigma
-        by[row, turn : turn + 3] = skew(seen)[2] / line.sigma
-    return values, by
-
-
-def line_test(line: FacadeDirection, adjusted: AdjustedPair) -> float:
-    """Return how far a direction of lines comes out of the wall adjusted without it, in sigma."""
-    values, by = line_equations([line], adjusted)
-    return float(abs(values[0]) / np.sqrt(1.0 + by[0] @ adjusted.covariance @ by[0]))
 
 
 def _priors(observations: PairObservations, state: PairUnknowns) -> Equations:
@@ -471,8 +456,8 @@ def _control_test(
 
 def as_one(square: float, count: int) -> float:
     """Return how many standard deviations of one value are as unlikely as a square sum of many."""
-    chance = float(chi2.sf(square, count))
-    return float(norm.isf(chance / 2)) if chance > 1e-300 else float(np.sqrt(square))
+    chance = float(chdtrc(count, square))
+    return -float(ndtri(chance / 2)) if chance > 1e-300 else float(np.sqrt(square))
 
 
 #: Where the cameras' `PARAMETERS` and the distortions stand in `NAMES`.

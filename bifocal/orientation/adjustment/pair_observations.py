@@ -103,6 +103,11 @@ class PairObservations:
         return free
 
     @property
+    def lines_bend_nothing(self) -> bool:
+        """Whether lines turn the frame alone: ties know calibrated lenses better than lines do."""
+        return not self.media and all(interior.is_calibrated for interior in self.interiors)
+
+    @property
     def sigma_ties(self) -> float:
         """Standard deviation with which every tie counts, were they independent. [px]"""
         return self.sigma_tie * float(np.sqrt(max(self.tie_used.sum() / INDEPENDENT, 1.0)))

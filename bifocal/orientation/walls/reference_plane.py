@@ -302,10 +302,36 @@ def narrow_face(xyz: FloatArray, sigma: FloatArray, *, band: float) -> NarrowFac
             _core(some, height, spread, reach, start, least * band, shallow=shallow)
             for shallow in (0, 1, 2)
         ]
-    _, plane, roughness, chance = max(cores, key=lambda core: core[0])
+    # But not one that is confined to a corner, where another lies spread over the picture.
+    spreads = [_extent(some[:, 1:], core[3]) for core in cores]
+    wide = [core for core, spread in zip(cores, spreads, strict=True) if spread > WALLS.confined]
+    _, plane, roughness, chance = max(wide or cores, key=lambda core: core[0])
     everywhere = np.zeros(len(xyz))
     everywhere[near] = chance
     return NarrowFace(plane, roughness, everywhere)
+
+
+def _extent(places: FloatArray, chance: FloatArray) -> float:
+    """Return the area over which a face lies spread, as a share of that of all points.
+
+    Square root of the determinant of the covariance of the cells of the wall that have the face.
+    How much of it each has is estimated anew (expectation-maximisation of its share): what
+    crosses a narrow face by chance looks as likely of it as its own points.
+    """
+    cell = np.floor((places - places.min(axis=0)) / np.ptp(places, axis=0).max() * WALLS.cells)
+    cells, which, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+    which, whole = which.ravel(), float(np.clip(chance.mean(), 1e-6, 1 - 1e-6))
+    # How much likelier a point is of the face than of all else, before any share of it.
+    likelier = np.minimum(chance, 1 - 1e-9) / np.maximum(1 - chance, 1e-9) * (1 - whole) / whole
+    share = np.full(len(cells), 0.5)
+    for _ in range(30):
+        own = share[which] * likelier / (share[which] * likelier + 1 - share[which])
+        share = np.bincount(which, own, len(cells)) / count
+    full = share > 0.5 * np.quantile(share, 0.9)
+    if full.sum() < 3:
+        return 0.0
+    spread, widest = (float(np.linalg.det(np.cov(part.T))) for part in (cells[full], cells))
+    return float(np.sqrt(max(spread, 0.0) / max(widest, 1e-12)))
 
 
 def _core(

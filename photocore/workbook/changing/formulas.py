@@ -17,6 +17,7 @@ from photocore.workbook.reading.package import (
     understood,
     xml_elements,
 )
+from photocore.workbook.reading.references import FORMULA
 from photocore.workbook.reading.xlsx import SheetPart, Workbook, part_of_kind, row_cells
 from photocore.workbook.reading.xmltext import escaped, unescaped
 
@@ -27,7 +28,6 @@ _RANGE = re.compile(
 _AREA = re.compile(r"[A-Z]{1,3}\d{1,7}(:[A-Z]{1,3}\d{1,7})?")
 #: A cell without its sheet; all are alike when only sheets, tables and names matter.
 _ANY_CELL = re.compile(r"(?<![\w.'$])\$?[A-Z]{1,3}\$?\d+(?![\w.!'(])")
-_FORMULA = re.compile(rb"<(?:\w+:)?f(?:\s[^>]*)?>([^<]+)</")
 #: Functions whose result may depend on any cell, whatever their text names.
 _FAR_REACHING = re.compile(r"\b(INDIRECT|OFFSET|CELL|INFO)\s*\(", re.IGNORECASE)
 
@@ -119,7 +119,7 @@ class References:
     def _formulas(self, sheet: SheetPart) -> str:
         """Return the formulas of a sheet as one text, those that differ only in cells once."""
         data = read_part(self.path, self.package, sheet.part)
-        texts = {match.decode("utf-8", "replace") for match in _FORMULA.findall(data)}
+        texts = {match.decode("utf-8", "replace") for match in FORMULA.findall(data)}
         shapes = {_ANY_CELL.sub("#", unescaped(text)) for text in texts}
         return "\n".join(sorted(shapes))
 

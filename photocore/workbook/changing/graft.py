@@ -82,7 +82,10 @@ class Graft:
             written, _, place = reference.rpartition("!")
             title = plain_title(written)
             if title in titles:
-                self.define(name, f"{quoted_title(titles[title])}!{place}")
+                own = plain_title(self.book.names.get(name, "").rpartition("!")[0])
+                # Where another sheet has the title by now, the name led to what was ours there.
+                define = self.redefine if own == title != titles[title] else self.define
+                define(name, f"{quoted_title(titles[title])}!{place}")
 
     def define(self, name: str, reference: str) -> None:
         """Define a name, unless one that leads anywhere is there already."""

@@ -14,9 +14,10 @@ from photocore.workbook.reading.xmltext import unescaped
 
 #: Formulas are looked at so far into a part: rows further down repeat them. [bytes]
 _FORMS = 2**19
-_FORMULA = re.compile(rb"<(?:\w+:)?f(?:\s[^>]*)?>([^<]+)</")
+FORMULA = re.compile(rb"<(?:\w+:)?f(?:\s[^>]*)?>([^<]+)</")
 _DEFINED = re.compile(rb"<(?:\w+:)?definedName\s[^>]*?\bname\s*=\s*[\"']([^\"']+)")
-_TEXT = re.compile(r'"(?:[^"]|"")*"')
+#: Texts and errors, which name nothing.
+_TEXT = re.compile(r'"(?:[^"]|"")*"|#(?:N/A|REF!|DIV/0!|NAME\?|NULL!|NUM!|VALUE!|SPILL!|CALC!)')
 _SHEET = re.compile(r"(?<![\]\w.])(?:'((?:[^'\[\]]|'')+)'|([^\W\d][\w.]*))!")
 _COLUMN = re.compile(r"(?<![\w.!'])([^\W\d]\w*)\[(?:(?:\[#[^\]]+\],)*\[)?([^\W\d]\w*)\]")
 _BRACKETS = re.compile(r"\[(?:[^\[\]]|\[[^\[\]]*\])*\]")
@@ -64,7 +65,7 @@ def _lost(path: Path, package: zipfile.ZipFile) -> Iterator[str]:
     names = {unescaped(own.decode()).casefold() for own in _DEFINED.findall(whole)}
     for sheet in book.sheets:
         with package.open(sheet.part) as part:
-            formulas = set(_FORMULA.findall(part.read(_FORMS)))
+            formulas = set(FORMULA.findall(part.read(_FORMS)))
         for data in formulas:
             text = _TEXT.sub('""', unescaped(data.decode("utf-8", "replace")))
             if "_xl" in text or "LET(" in text:  # with names of their own

@@ -1,9 +1,11 @@
-"""The demo's sample pair with tables of control and check points; truth is its scene's."""
+"""The demo's sample pair, and at half its size, with tables of points; truth is its scene's."""
 
 from __future__ import annotations
 
 import csv
 from pathlib import Path
+
+from PIL import Image
 
 from bifocal import SAMPLE
 from tests.scenes import demo_scene
@@ -13,7 +15,17 @@ CONTROL = frozenset(f"T{number:02}" for number in (1, 4, 5, 7, 10, 13, 16, 19, 2
 _HEADINGS = ["id", "X [m]", "Y [m]", "r [m]", "col1 [px]", "row1 [px]", "col2 [px]", "row2 [px]"]
 
 
-def write_tables(folder: Path) -> tuple[Path, Path]:
+def write_small_photos(folder: Path) -> tuple[Path, Path]:
+    """Write both photos at half their size, which take a quarter of the time."""
+    for photo in (FAR, NEAR):
+        with Image.open(photo) as image:
+            half = (image.width // 2, image.height // 2)
+            small = image.resize(half, Image.Resampling.BOX)
+            small.save(folder / photo.name, quality=95, exif=image.getexif())
+    return folder / FAR.name, folder / NEAR.name
+
+
+def write_tables(folder: Path, *, small: bool = False) -> tuple[Path, Path]:
     """Write ``control.csv`` and ``check.csv``: places from the scene, pixels as picked."""
     places = {target.name: target.position for target in demo_scene().targets}
     with (SAMPLE / "targets.csv").open(encoding="utf-8") as file:
@@ -26,6 +38,8 @@ def write_tables(folder: Path) -> tuple[Path, Path]:
             for pick in picks:
                 if (pick["id"] in CONTROL) == is_control:
                     place = (*places[pick["id"]], pick["r measured [m]"])
-                    pixels = (float(pick[name]) for name in _HEADINGS[4:])
+                    pixels = [float(pick[name]) for name in _HEADINGS[4:]]
+                    if small:
+                        pixels = [v / 2 - 0.25 for v in pixels]
                     writer.writerow([pick["id"], *place, *(f"{v:.3f}" for v in pixels)])
     return paths

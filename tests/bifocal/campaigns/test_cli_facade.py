@@ -18,7 +18,7 @@ import bifocal
 from bifocal import WATER_SAMPLE, Pair
 from bifocal.cli.facade import command
 from bifocal.options import OF_PAIR
-from tests.bifocal.campaigns.sample_tables import FAR, NEAR, write_tables
+from tests.bifocal.campaigns.sample_tables import FAR, NEAR, write_small_photos, write_tables
 from tests.builders.commands import bifocal_command as main
 
 
@@ -89,8 +89,9 @@ def test_every_option_that_its_steps_advise_is_one_of_its_own_and_a_key_of_surve
 
 
 def test_it_ends_with_where_the_results_are_and_what_to_open(tmp_path):
-    control, _ = write_tables(tmp_path)
-    words = ["facade", FAR, NEAR, "--control", control, "--products", "points", "--out", "wall"]
+    control, _ = write_tables(tmp_path, small=True)
+    photos = write_small_photos(tmp_path)
+    words = ["facade", *photos, "--control", control, "--products", "points", "--out", "wall"]
     with contextlib.chdir(tmp_path):
         done = CliRunner().invoke(main, [str(word) for word in words])
     assert done.exit_code == 0, done.stderr

@@ -231,6 +231,24 @@ def test_a_plan_with_a_file_that_cannot_be_read_ends_as_the_work_would(tmp_path)
         assert "near.jpg" in planned.output or "far.jpg" in planned.output
 
 
+def test_a_plan_opens_photos_and_compares_the_names_of_both_tables(tmp_path):
+    (tmp_path / "cut.jpg").write_bytes(FAR.read_bytes()[:60_000])
+    lines = "id,X,Y,r,col1,row1,col2,row2\nC1,0,0,0,1,1,1,1\n"
+    (tmp_path / "points.csv").write_text(lines)
+    survey = tmp_path / "survey.toml"
+    pair = (
+        f'[[pair]]\nname = "a"\nfar = "{FAR.as_posix()}"\nnear = "{{}}"\ncontrol = "points.csv"\n'
+    )
+    for near, more, said in (
+        ("cut.jpg", "", "cut.jpg: the photo is cut off"),
+        (NEAR.as_posix(), 'check = "points.csv"\n', "points.csv: C1 is in"),
+    ):
+        survey.write_text(pair.format(near) + more)
+        planned = CliRunner().invoke(main, ["survey", str(survey), "--dry-run"])
+        assert planned.exit_code == 1
+        assert said in planned.output
+
+
 def test_an_equivalent_and_a_true_focal_length_do_not_tell_which_photo_is_far():
     phone = ImageInfo(path=Path("p.jpg"), size=(40, 30), focal_length=4.2, focal_length_35=28.0)
     camera = ImageInfo(path=Path("c.jpg"), size=(40, 30), focal_length=24.0)  # 36 mm on APS-C

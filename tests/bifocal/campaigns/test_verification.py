@@ -15,7 +15,7 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal.campaigns.verification import verify as verified
-from tests.bifocal.campaigns.sample_tables import FAR, NEAR, write_tables
+from tests.bifocal.campaigns.sample_tables import write_small_photos, write_tables
 from tests.builders.commands import bifocal_command as main
 from tests.web_page import Page
 
@@ -24,10 +24,8 @@ from tests.web_page import Page
 def made(tmp_path_factory) -> Path:
     """A folder with photos, tables, and a delivery without relief beside them."""
     place = tmp_path_factory.mktemp("made")
-    control, check = write_tables(place)
-    for photo in (FAR, NEAR):
-        shutil.copyfile(photo, place / photo.name)
-    words = ["facade", place / "far.jpg", place / "near.jpg", "--control", control, "--check",
+    control, check = write_tables(place, small=True)
+    words = ["facade", *write_small_photos(place), "--control", control, "--check",
              check, "--products", "points,report", "--language", "de", "--out", place / "wall",
              "--date", "2026-11-22", "--client", "Bauamt", "--scale", "1:20",
              "--survey-date", "3. Mai"]  # fmt: skip

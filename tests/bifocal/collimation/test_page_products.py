@@ -11,8 +11,9 @@ from io import BytesIO
 import ezdxf
 import numpy as np
 import pytest
+from PIL import Image
 
-from bifocal import SAMPLE, InputError, Pair, ReliefMap
+from bifocal import SAMPLE, InputError, Pair, Photo, PhotoSet, ReliefMap
 from bifocal.campaigns.verification import verify
 from bifocal.collimation import job_process, job_tasks
 from bifocal.collimation.live_orientation import control_of, live_orientation
@@ -355,6 +356,26 @@ def test_what_is_no_survey_says_so(tmp_path, names, said) -> None:
     (folder / "other.pair.json").touch()
     with pytest.raises(InputError, match="2 pair files"):
         find_files([folder])
+
+
+def test_of_a_set_the_best_pair_is_opened_and_kept(tmp_path) -> None:
+    metres = [[0.01, 0, -4], [0, -0.01, 3], [0, 0, 1]]
+    photos = [
+        Photo(name=name, file=f"{name}.jpg", plane_from_pixel=metres, nadir=(0, 0), distance=d)
+        for name, d in (("mid", 14.0), ("far", 17.5), ("near", 9.5))
+    ]
+    PhotoSet(photos=tuple(photos)).write(tmp_path / "wall.photos.json")
+    with pytest.raises(InputError, match="no such image"):
+        find_files([tmp_path / "wall.photos.json"])
+    assert [path.name for path in tmp_path.iterdir()] == ["wall.photos.json"]
+    for name in ("far", "near"):
+        Image.new("L", (80, 60)).save(tmp_path / f"{name}.jpg")
+    files = find_files([tmp_path / "wall.photos.json"])
+    assert files.pair == tmp_path / "wall-far-near.pair.json"
+    assert Pair.read(files.pair).d1 == 17.5
+    assert files.workbook == tmp_path / "wall-far-near.xlsx"
+    files.pair.write_text(files.pair.read_text() + "\n")  # what was changed since stays
+    assert find_files([tmp_path / "wall.photos.json"]).pair.read_text().endswith("\n\n")
 
 
 def test_precision_contours_lie_where_picks_are_that_precise(tmp_path) -> None:

@@ -68,6 +68,12 @@ def test_gross_errors_of_rays_and_of_control_are_named_and_do_no_harm():
     assert np.nanmedian(error) < 0.02
 
 
+def test_of_many_honest_rays_none_is_called_a_gross_error():
+    case = many_pairs(30, np.random.default_rng(3), columns=6, ties=60)
+    assert len(case.observations.camera) > 7000  # of which six or seven lie beyond 3.5 sigma
+    assert adjust_jointly(case.observations, case.start).blunders == ()
+
+
 def test_a_photo_that_two_pairs_use_is_one_camera():
     """Taken for two cameras its rays would count twice, and sigmas come out too small."""
     case = many_pairs(3, np.random.default_rng(4), control=8)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from bifocal import (
     Control,
     InputError,
     Interior,
+    Lens,
     PhotoSet,
     Pinhole,
     align_set,
@@ -166,3 +168,58 @@ def test_a_set_is_refused_with_the_reason(three):
     with pytest.raises(InputError, match="col4, row4 are missing"):
         read_control(folder / "set.csv", sigma=0.003, sigma_plane=None, photos=4)
     assert Control().of(0, 3).pixels2.shape == (0, 2)
+
+
+@pytest.mark.acceptance
+def test_four_photos_of_a_church_are_no_worse_than_its_best_pair(data_dir, tmp_path):
+    """Both pairs show one church in one frame; photos a third as large, with their lens."""
+    folders = [data_dir / "facade_pairs" / f"church_{k}" for k in (2, 1)]
+    whole = json.loads((folders[0] / "geometry.json").read_text())["far"]["K"]
+    small = np.diag([1 / 3, 1 / 3, 1]) @ whole + [[0, 0, -1 / 3], [0, 0, -1 / 3], [0, 0, 0]]
+    Lens(camera_matrix=small, coefficients=np.zeros(5), image_size=(1024, 683)).write(
+        tmp_path / "k.lens.json"
+    )
+    photos, seen = [], []
+    for folder in folders:
+        with (folder / "points.csv").open(encoding="utf-8") as file:
+            rows = {row["id"]: row for row in csv.DictReader(file)}
+        for side in ("far", "near"):
+            photos.append(tmp_path / folder.name / f"{side}.png")
+            photos[-1].parent.mkdir(exist_ok=True)
+            image = cv2.imread(str(folder / f"{side}.jpg"))
+            cv2.imwrite(
+                str(photos[-1]), cv2.resize(image, (1024, 683), interpolation=cv2.INTER_AREA)
+            )
+            seen.append({k: (float(row[f"x_{side}_px"]), float(row[f"y_{side}_px"]))
+                         for k, row in rows.items()})  # fmt: skip
+    names = sorted(set.intersection(*map(set, seen)) & rows.keys())
+    xyz = np.array([[float(rows[k][key]) for key in ("X_m", "Y_m", "relief_m")] for k in names])
+    picks = [(np.array([own[k] for k in names]) - 1) / 3 for own in seen]
+    control = np.random.default_rng(1).choice(len(names), 16, replace=False)
+    heads = [f"{axis}{k}" for k in (1, 2, 3, 4) for axis in ("col", "row")]
+    table = [",".join(["id,X [m],Y [m],r [m]", *heads])]
+    for k in control:
+        numbers = [*xyz[k], *(value for own in picks for value in own[k])]
+        table.append(",".join([names[k], *(f"{value:.4f}" for value in numbers)]))
+    (tmp_path / "control.csv").write_text("\n".join(table))
+    line = ["align", *map(str, photos), "--control", str(tmp_path / "control.csv"), "--sigma-pick",
+            "0.2", "--lens", str(tmp_path / "k.lens.json"), "--out",
+            str(tmp_path / "church.photos.json")]  # fmt: skip
+    result = CliRunner().invoke(main, line)
+    assert result.exit_code == 0, result.output
+    made = PhotoSet.read(tmp_path / "church.photos.json")
+    assert made.names == ("church_2/far.png", "church_2/near.png", "church_1/far.png",
+                          "church_1/near.png")  # fmt: skip
+    left = np.setdiff1d(np.arange(len(names)), control)
+
+    def errors(*used: int) -> tuple[np.ndarray, np.ndarray]:
+        own = [np.where(k in used, pixels[left], np.nan) for k, pixels in enumerate(picks)]
+        got = made.intersect(own, sigma_px=0.2)
+        good = np.array([flag != "OFF-RADIAL" for flag in got.flags])
+        return (got.xyz - xyz[left])[good], got.sigma[good]
+
+    off, sigma = errors(0, 1, 2, 3)
+    best = min(np.sqrt(np.nanmean(errors(p.far, p.near)[0][:, 2] ** 2)) for p in made.pairs())
+    assert np.sqrt(np.mean(off[:, 2] ** 2)) < best
+    held = (np.abs(off) < 2 * sigma).mean(axis=0)
+    assert (held > 0.88).all(), held

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from bifocal import Control, GeometryError, InputError, Interior, SiteMeasures
-from bifocal.orientation.adjustment.pair_adjustment import adjust, line_test, pair_equations
+from bifocal.orientation.adjustment.frame_turn import family_test, line_test
+from bifocal.orientation.adjustment.pair_adjustment import adjust, pair_equations
 from bifocal.orientation.adjustment.pair_observations import (
     NAMES,
     PairObservations,
@@ -20,6 +21,7 @@ from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.starts.space_resection import resect
 from bifocal.orientation.tie_points import with_wall
 from bifocal.orientation.walls.reference_plane import NarrowFace
+from photocore.camera.pinhole import Pinhole
 from tests.bifocal.orientation.layered_wall import SIZE, camera
 from tests.builders.orientation import PhotoInput, orient_pair
 from tests.builders.pinholes import project
@@ -404,12 +406,50 @@ def test_lines_feed_the_tilt_by_their_precision_and_contradictions_are_named() -
         assert after.sigma("turn X", number) < 0.8 * before.sigma("turn X", number)
         out = [(c.rotation.T @ cam.rotation @ [0.0, 1.0, 0.0])[2] for c in (old, new)]
         assert abs(out[1]) <= abs(out[0])
-    assert line_test(lines(0.0)[0], before) < 3
-    test = line_test(lines(6.0)[0], before)
+    assert line_test(lines(0.0)[0], before, before.covariance) < 3
+    test = line_test(lines(6.0)[0], before, before.covariance)
     assert test > 3
     said = contradiction_in_words(lines(6.0)[0], before.cameras, test)
     assert "upright lines of the far photo" in said
     assert "°" in said
+
+
+def test_lines_turn_the_plane_of_calibrated_photos_and_nothing_else() -> None:
+    calibrated = tuple(
+        replace(interior(focal=cam.matrix[0, 0]), sigma_focal=5e-4, is_calibrated=True)
+        for cam in (FAR, NEAR)
+    )
+    points = control(sigma_px=0.3)
+    wide = replace(points, sigma=np.full(points.sigma.shape, 0.05))
+    problem = PairObservations(
+        interiors=calibrated, control=wide, pick_used=np.ones(len(POINTS), bool)
+    )
+    start = PairUnknowns(cameras=(FAR, NEAR))
+    before = adjust(problem, start)
+    way = np.array([0.0, np.cos(0.01), np.sin(0.01)])
+    lines = tuple(
+        FacadeDirection(
+            camera=n, name="upright", direction=cam.rotation @ way, sigma=0.003, count=50
+        )
+        for n, cam in ((1, FAR), (2, NEAR))
+    )
+    after = adjust(replace(problem, lines=lines), start)
+    for old, new in zip(before.cameras, after.cameras, strict=True):
+        np.testing.assert_allclose(new.matrix, old.matrix, rtol=0, atol=1e-6)
+
+    def relative(cameras: tuple[Pinhole, Pinhole]) -> np.ndarray:
+        far, near = cameras
+        base = far.rotation @ (near.centre - far.centre)
+        return np.column_stack([near.rotation @ far.rotation.T, base / np.linalg.norm(base)])
+
+    np.testing.assert_allclose(relative(after.cameras), relative(before.cameras), atol=1e-12)
+    out = [lines[0].in_frame(pair.cameras[0])[2] for pair in (before, after)]
+    assert abs(out[1]) < 0.8 * abs(out[0])
+    assert after.sigma("turn X", 1) < before.sigma("turn X", 1)
+    assert after.sigma("column", 1) == pytest.approx(before.sigma("column", 1), rel=1e-6)
+    test = family_test(lines, problem, before, pair_equations)
+    level = (replace(lines[0], direction=FAR.rotation @ [0.0, np.cos(0.2), np.sin(0.2)]),)
+    assert family_test(level, problem, before, pair_equations) > 3 * test
 
 
 def test_points_measured_in_part_tell_less_than_measured_whole() -> None:

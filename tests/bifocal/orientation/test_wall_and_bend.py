@@ -227,6 +227,25 @@ def test_joints_and_mouldings_do_not_thicken_lift_or_turn_the_wall() -> None:
     assert face.roughness == pytest.approx(0.003, abs=0.0015)
 
 
+def test_a_smooth_face_in_a_corner_is_not_the_wall() -> None:
+    """A castle's wall of 16 mm, and 550 points of a smooth face in its left fifth, 11 mm before."""
+    rng = np.random.default_rng(1)
+    wall, corner, rest = (
+        np.column_stack([rng.uniform(-6, right, n), rng.uniform(-3, 4, n), rng.normal(*height, n)])
+        for right, n, height in (
+            (6, 3800, (0.0, 0.016)), (-3.5, 550, (0.011, 0.0011)), (6, 1500, (0.0, 0.2)),
+        )
+    )  # fmt: skip
+    xyz = np.concatenate([wall, corner, rest])
+    sigma = rng.uniform(0.5, 2, len(xyz)) * 0.001
+    xyz[:, 2] += rng.normal(0, 1, len(xyz)) * sigma
+    face = narrow_face(xyz, sigma, band=0.1)
+    assert face.roughness == pytest.approx(0.0155, abs=0.002)
+    ends = face.plane @ [[1, 1, 1], [-6, 0, 6], [0, 0, 0]]
+    assert np.abs(ends).max() < 0.005  # 11 mm and more, were the corner taken for it
+    assert np.ptp(xyz[face.members, 0]) > 11
+
+
 def test_one_detail_in_two_orientations_is_no_rival_of_itself() -> None:
     rng = np.random.default_rng(7)
     codes = np.abs(rng.normal(size=(40, 128))).astype(np.float32)

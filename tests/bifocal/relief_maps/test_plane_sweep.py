@@ -11,8 +11,10 @@ import numpy as np
 from bifocal import Foot, Grid, MapSurface, dense_relief
 from bifocal.model.image import as_grey
 from bifocal.orthophotos.visibility import hidden_from
-from bifocal.relief_maps import plane_sweep, semi_global
+from bifocal.relief_maps import plane_sweep
+from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import make_frame
+from bifocal.relief_maps.smoothing import straightened
 from tests.scenes import RICH, CameraPair, Rendering, Scene, bifocal_cameras, render
 from tests.scenes.balconies import balconies
 
@@ -54,13 +56,23 @@ def test_numpy_and_machine_code_give_the_same_bits(monkeypatch):
     shot, _ = railing()
     greys = (as_grey(image, "photo") for image in (shot.image1, shot.image2))
     frame = make_frame(shot.pair, *greys, shot.truth.grid)
+    box = slice(60, 100), slice(20, 75)
+    tried = plane_sweep.Hypotheses.near(frame, box, np.repeat(np.float32([-0.2, 0, 1.0]), 20))
+    assert (np.diff(tried.numbers) > 1).any()  # relief jumps over what is left out
     found = []
     for compiled in (True, False):
-        for kernel in (plane_sweep._compare, semi_global._all_paths):
-            monkeypatch.setattr(type(kernel), "pays", lambda *_, way=compiled: way)
-        found.append(plane_sweep.swept(frame, slice(60, 100), slice(20, 75), -0.3, 1.2))
+        monkeypatch.setattr(type(plane_sweep._compare), "pays", lambda *_, way=compiled: way)
+        found.append(plane_sweep.swept(frame, box, tried))
     for one, other in zip(*found, strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_straightening_keeps_a_bar_and_leaves_unknown_what_is():
+    r = np.full((60, 60), -0.5, np.float32)
+    r[:, 20:25] = 0.5
+    r[:, 40:44] = np.nan
+    straight = straightened(MapBands(r, np.full_like(r, 0.01), np.ones(r.shape, np.uint8))).r
+    np.testing.assert_array_equal(straight[5:-5], r[5:-5])
 
 
 def test_a_rail_hides_by_its_face_where_the_wall_behind_it_is_measured():

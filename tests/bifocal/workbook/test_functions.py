@@ -25,7 +25,7 @@ NAMES = tuple(FUNCTIONS.content["functions"])
 @pytest.fixture(scope="module")
 def book(tmp_path_factory):
     path = tmp_path_factory.mktemp("functions") / "functions.xlsx"
-    write_template(path, functions=True, media=3)
+    write_template(path, functions=True, media=3, rows=5)
     return path
 
 
@@ -138,7 +138,7 @@ def test_names_hold_what_the_file_format_wants(book):
 @pytest.mark.parametrize("language", ["en", "it", "de"])
 def test_sheet_is_sound_and_in_its_language(language, tmp_path):
     path = tmp_path / "book.xlsx"
-    write_template(path, functions=True, language=language)
+    write_template(path, functions=True, language=language, rows=3)
     assert lint(path) == []
     told = {"en": "far camera", "it": "camera lontana", "de": "fernen Kamera"}[language]
     assert told in openpyxl.load_workbook(path)["Functions"]["B7"].value
@@ -146,7 +146,10 @@ def test_sheet_is_sound_and_in_its_language(language, tmp_path):
 
 def test_a_workbook_with_functions_is_solved_in_place_and_translated(tmp_path):
     path, out = tmp_path / "book.xlsx", tmp_path / "out.xlsx"
-    assert CliRunner().invoke(main, ["template", str(path), "--functions"]).exit_code == 0
+    assert (
+        CliRunner().invoke(main, ["template", str(path), "--functions", "--rows", "5"]).exit_code
+        == 0
+    )
     book = openpyxl.load_workbook(path)
     for name, value in {"c_1": 35, "c_2": 19, "d_2": 9.5, "delta_d": 8}.items():
         book["Setup"][book.defined_names[name].attr_text.partition("!")[2].replace("$", "")] = value

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import openpyxl
 import pytest
@@ -119,6 +121,13 @@ def test_pairs_stand_beside_each_other_with_their_errors_at_check_points(tmp_pat
     assert "P3: the picks in three photos and more contradict" in result.stderr
     book = openpyxl.load_workbook(path, data_only=True)
     columns = solve(path).table.columns
+    told = json.loads(run("solve", path, "--json").stdout)["points"][0]
+    assert [told[key] for key in ("r_1_3", "r_all", "sigma_all", "chance")] == pytest.approx(
+        [columns[key][0] for key in ("r_1_3", "r_all", "sigma_all", "chance")]
+    )
+    assert run("solve", path, "--out", tmp_path / "four.csv").exit_code == 0
+    head = (tmp_path / "four.csv").read_text().splitlines()[0]
+    assert "r_1_4 [m],sigma_1_4 [m],r_all [m],sigma_all [m],X_all [m],Y_all [m],chance" in head
 
     def shown(name):
         sheet, _, cell = book.defined_names[name].attr_text.partition("!")

@@ -111,6 +111,7 @@ LOST = {
     "=tbl[[#This Row],[t]]*2": "with tbl[t]",
     "=d_1+d_3": 'with the name "d_3"',
     '=IF(A1="d_9",R1C1,TRUE)&"Gone!A1"&1E-3+A$1+$B2': "",
+    "=IF(ISNA(A1),#N/A,#REF!+[1]Other!A1)": "",
     "=ROW()-ROW(tbl[[#Headers],[r]])": "",
 }
 
