@@ -41,7 +41,10 @@ def start_job(session: Session, kind: str, options: Options, *, quiet: bool = Fa
     """
 
     def task() -> dict[str, Any]:
-        return task_of(session, kind, options) | {"quiet": quiet}
+        told = task_of(session, kind, options) | {"quiet": quiet}
+        if quiet:  # what makes way may still be writing its own
+            told["out"] = told["out"].replace(".proposed.", ".found.")
+        return told
 
     return session.jobs.start(kind, task, partial(finish, session), quiet=quiet)
 

@@ -288,6 +288,16 @@ def _plain(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
+def discard_pair(proposed: Path) -> None:
+    """Take away a proposed pair file that another one follows, with the lens files it names."""
+    data = read_object(proposed, what="pair file")
+    for number in (1, 2):
+        photo = data.get(f"image{number}")
+        if isinstance(photo, dict) and isinstance(photo.get("lens"), str):
+            (proposed.parent / photo["lens"]).unlink(missing_ok=True)
+    proposed.unlink(missing_ok=True)
+
+
 def _small(picture: Any) -> Any:
     side = max(picture.shape[:2]) / PREVIEW
     size = tuple(max(1, round(n / max(side, 1.0))) for n in picture.shape[1::-1])
