@@ -37,7 +37,7 @@ Bathymetry
     correct_bathymetry, CorrectedPoints   points from above the water
     correct_lidar_beams; intersect_refracted_rays, RayIntersections   laser echoes; measured rays
     mean_water_level, WaterLevel      the level from tie points
-    wave_effect, WaveEffect   what waves do to points taken for flat water's
+    wave_effect, WaveEffect, wave_statistics, WaveCase   what waves do to points; frames
     Precision, BathymetryStatus       what goes in, what became of a point
 Colours
     shift_per_colour, layers_per_colour, colour_positions, seam_width, correct_dispersion

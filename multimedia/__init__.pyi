@@ -20,6 +20,7 @@ from .bathymetry.refracted_rays import (
     intersect_refracted_rays,
 )
 from .bathymetry.refraction_correction import correct_bathymetry
+from .bathymetry.wave_statistics import WaveCase, wave_statistics
 from .bathymetry.waves import WaveEffect, wave_effect
 from .design.accuracy import (
     calibration_costs,
@@ -175,6 +176,7 @@ __all__ = [
     "WaterIndexDerivatives",
     "WaterLevel",
     "WaterSurface",
+    "WaveCase",
     "WaveEffect",
     "WaveSurface",
     "WorkbookError",
@@ -229,6 +231,7 @@ __all__ = [
     "water_index_sigma",
     "water_refractive_index",
     "wave_effect",
+    "wave_statistics",
     "write_experiment",
     "write_project",
 ]

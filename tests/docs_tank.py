@@ -106,6 +106,13 @@ def _variants(folder: Path, views, tank: Project) -> None:
         made, object_points=ObjectPoints(ids=names, xyz=xyz * size),
         image_points=replace(made.image_points, ids=names * len(reef)),
     ))  # fmt: skip
+    middle, way = control(12, seed=5) + LIFT, 40.0 * np.array([0.64, 0.48, 0.6])
+    wand = _project(views, tank.media["tank"], np.concatenate([middle - way, middle + way]))
+    ends = tuple(f"{k}{end}" for end in "ab" for k in range(12))
+    write_project(folder / "wand.toml", replace(
+        wand, object_points=ObjectPoints(ids=(), xyz=np.empty((0, 3))),
+        image_points=replace(wand.image_points, ids=ends * len(views)),
+    ))  # fmt: skip
     brown = [replace(camera, distortion=Brown(k1=2e-5)) for camera in reef]
     write_project(folder / "rig.toml", _project(brown, water, xyz * size, unit="m"))
     for words in (

@@ -118,7 +118,7 @@ FIRST = {
 }  # fmt: skip
 #: Help that goes on where that of another command ends: what it reports on is made there.
 GOES_ON = {f"help of bifocal {name}": "help of bifocal facade" for name in ("report", "verify")}
-GOES_ON |= dict.fromkeys(("reports.md", "delivery.md"), "facade.md")
+GOES_ON |= dict.fromkeys(("reports.md", "verify.md"), "facade.md")
 #: Lines that want the sample at its full size.
 WHOLE = "--what targets"
 #: Options added so that the line costs seconds: the page's own products are made by other lines.

@@ -124,9 +124,14 @@ class RayField:
         share = np.float32(1 / self.grid.gsd)
         maps = x * share + np.float32(column), np.float32(row) - y * share
         columns, rows = (np.nan_to_num(m, nan=-1e4, posinf=1e4, neginf=-1e4) for m in maps)
+        count = columns.size if columns.ndim == 1 else None
+        if count is not None:  # OpenCV takes no side of 32768 pixels
+            columns, rows = _folded(columns), _folded(rows)
         excess = cv2.remap(
             self.excess, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
         )
+        if count is not None:
+            excess = excess.reshape(-1, *excess.shape[2:])[:count]
         return np.asarray(excess, dtype=np.float32)
 
 

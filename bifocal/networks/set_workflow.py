@@ -74,11 +74,14 @@ def align_photo_set(
         names = [f"{path.resolve().parent.name}/{path.name}" for path in paths]
     infos = [image_info(path) for path in paths]
     lenses = [*options.lenses, *[options.other_lenses] * (len(paths) - 2)]
+    numbers: tuple[int | str, ...] = (
+        1,
+        2,
+        *[""] * (len(paths) - 2),
+    )  # as the options of their lenses are called
     photos = [
         PhotoInput(grey=read_grey(path), interior=interior_of_photo(info, known, k), name=name)
-        for k, (path, name, info, known) in enumerate(
-            zip(paths, names, infos, lenses, strict=True), start=1
-        )
+        for k, path, name, info, known in zip(numbers, paths, names, infos, lenses, strict=True)
     ]
     control = control_of(options, [photo.interior.image_size for photo in photos])
     oriented = orient_set(photos, control=control, site=options.site, progress=progress)

@@ -171,8 +171,10 @@ def as_surface(relief: ReliefMap | Surface | ArrayLike | None) -> Surface:
         return cast(Surface, relief)
     if hasattr(relief, "r") and hasattr(relief, "plane_from_pixel"):
         r = np.asarray(relief.r)
-        quality = getattr(relief, "quality", None)
-        measured = None if quality is None else np.asarray(quality) == Quality.MEASURED
+        # A map without sigma is taken as exact: it does not tell what the photos saw.
+        measured = None
+        if isinstance(relief, ReliefMap) and np.any(relief.sigma > 0):
+            measured = relief.quality == Quality.MEASURED
         return MapSurface.of_array(r, Grid.from_affine(relief.plane_from_pixel, r.shape), measured)
     number = np.asarray(relief)
     if number.ndim != 0 or number.dtype.kind not in "fiu":
@@ -234,7 +236,7 @@ def render_window(
     if options.fill and unknown.any():
         # Where relief is unknown that of the surroundings shows the photo itself, slightly off.
         relief, _ = fill_holes(relief, ~unknown, unknown)
-    looks = [_look(view, surface, wide, relief, options) for view in views]
+    looks = _looks(views, surface, wide, relief, options)
     looks = _past_occluders(views, looks, surface, wide)
     image, source = _choose(views, looks, wide, options)
     hidden: BoolArray = (source == Source.NONE) & np.logical_or.reduce([o.hidden for o in looks])
@@ -251,6 +253,41 @@ def render_window(
         core = np.s_[margin : margin + window.height, margin : margin + window.width]
         image, source, hidden = image[core], source[core], hidden[core]
     return Tile(image, source, hidden)
+
+
+def _looks(
+    views: Sequence[SourcePhoto], surface: Surface, grid: Grid, relief: Float32Array,
+    options: OrthoOptions,
+) -> list[_Look]:  # fmt: skip
+    """Return how photos see a window; of a pair the second only around what the first does not."""
+    first = _look(views[0], surface, grid, relief, options)
+    under = surface.surface if isinstance(surface, CompletedSurface) else surface
+    drawn = isinstance(under, FacedSurface) and under.faces.occluders
+    if len(views) != 2 or drawn or _second_is_finer(views, grid):
+        return [first, *(_look(view, surface, grid, relief, options) for view in views[1:])]
+    none = np.zeros(grid.shape, bool)
+    second = _Look(np.zeros_like(first.image), none, none.copy())
+    row, column = np.nonzero(~first.inside | first.hidden)
+    if len(row):
+        margin = TIDYING.margin + math.ceil(2 * options.feather)
+        top, left = max(int(row.min()) - margin, 0), max(int(column.min()) - margin, 0)
+        bottom, right = int(row.max()) + margin + 1, int(column.max()) + margin + 1
+        cut = np.s_[top:bottom, left:right]
+        height, width = relief[cut].shape
+        part = grid.window(left, top, width, height)
+        seen = _look(views[1], surface, part, np.ascontiguousarray(relief[cut]), options)
+        second.image[cut], second.inside[cut], second.hidden[cut] = seen
+    return [first, second]
+
+
+def _second_is_finer(views: Sequence[SourcePhoto], grid: Grid) -> bool:
+    """Return whether the second of two photos shows a window so much finer that it goes first."""
+    middle = np.array([[grid.x0 + grid.gsd * grid.width / 2, grid.y0 - grid.gsd * grid.height / 2]])
+    sizes = []
+    for view in views:
+        pixel = view.photo.pixels_from_plane(middle)
+        sizes.append(math.sqrt(abs(float(np.linalg.det(view.photo.metres_per_pixel(pixel)[0])))))
+    return sizes[1] < COMPOSE.finer * sizes[0]
 
 
 def _look(
@@ -315,12 +352,7 @@ def _share_of_first(
 ) -> Float32Array:
     """Return the weight of the first view, 0..1."""
     first, second = usable
-    middle = np.array([[grid.x0 + grid.gsd * grid.width / 2, grid.y0 - grid.gsd * grid.height / 2]])
-    sizes = []
-    for view in views:
-        pixel = view.photo.pixels_from_plane(middle)
-        sizes.append(math.sqrt(abs(float(np.linalg.det(view.photo.metres_per_pixel(pixel)[0])))))
-    if sizes[1] < COMPOSE.finer * sizes[0]:
+    if _second_is_finer(views, grid):
         return np.where(second, np.float32(0), np.float32(1))
     if feather == 0:
         return first.astype(np.float32)

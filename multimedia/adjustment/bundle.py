@@ -18,7 +18,7 @@ from multimedia.adjustment.plausibility import (
     remarks_on_unknowns,
     with_model_error,
 )
-from multimedia.adjustment.unknowns import AUTO, Adjustment, Unknowns
+from multimedia.adjustment.unknowns import AUTO, Adjustment, Unknowns, bars_of
 from multimedia.media.camera import EXTERIOR, Camera
 from multimedia.orientation.calibration_covariance import with_covariance
 from multimedia.orientation.intersection import intersect
@@ -136,6 +136,8 @@ def _balanced(
 def prepare(project: Project, unknowns: Unknowns) -> tuple[Bundle, tuple[str, ...]]:
     """Return the equations of a project, and remarks about what was left out."""
     project = with_common_values(project, unknowns)
+    bars = bars_of(unknowns.scale_bars, project.image_points.names)
+    unknowns = replace(unknowns, scale_bars=bars)
     ids, rows, remarks = _used_points(project, unknowns)
     place = {name: row for row, name in enumerate(ids)}
     control = project.object_points

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -71,6 +71,7 @@ class Unknowns:
         Groups of object points that are rigid plates: their coordinates are in the plate's own
         frame, the pose of each is unknown.
     scale_bars : tuple of ScaleBar
+        ``@a`` to ``@b``: a wand seen in many places, its ends named 1a, 1b, 2a, 2b...
     priors : mapping of str to float
         Label of an unknown to the standard deviation of its start value: a water level read to
         2 mm is ``{"water:offset": 0.002}``; ``c`` alone means that of every camera. Infinite:
@@ -110,6 +111,51 @@ class Unknowns:
         for label, sigma in self.priors.items():
             if sigma != np.inf:
                 positive(sigma, f"prior of {label}")
+
+
+def bars_of(bars: Sequence[ScaleBar], names: Sequence[str]) -> tuple[ScaleBar, ...]:
+    """Return scale bars with those of a wand, ``@a`` to ``@b``, for each of its places.
+
+    Parameters
+    ----------
+    bars : sequence of ScaleBar
+    names : sequence of str
+        Points that were measured.
+
+    Raises
+    ------
+    InputError
+        If no place of a wand has both ends, or only one end of a bar says where its names differ.
+
+    Examples
+    --------
+    >>> wand = ScaleBar(first="@a", second="@b", length=0.5, sigma=1e-4)
+    >>> [(bar.first, bar.second) for bar in bars_of([wand], ["1a", "1b", "2a", "7b"])]
+    [('1a', '1b')]
+    """
+    measured, found = dict.fromkeys(names), []
+    for bar in bars:
+        if "@" not in bar.first + bar.second:
+            found.append(bar)
+            continue
+        heads = (bar.first.split("@"), bar.second.split("@"))
+        if not all(len(head) == 2 for head in heads):
+            raise InputError(
+                f"scale bar {bar.first}, {bar.second}: one @ in both names, where the number of "
+                "the wand's place stands: @a and @b for 1a and 1b."
+            )
+        (start, end), (other, last) = heads
+        shortest = len(start + end)
+        places = [
+            name[len(start) : len(name) - len(end)] for name in measured
+            if name.startswith(start) and name.endswith(end) and len(name) > shortest
+        ]  # fmt: skip
+        pairs = [(start + place + end, other + place + last) for place in places]
+        both = [pair for pair in pairs if pair[1] in measured]
+        if not both:
+            raise InputError(f"scale bar {bar.first}, {bar.second}: no two points have such names.")
+        found += [replace(bar, first=one, second=two) for one, two in both]
+    return tuple(found)
 
 
 #: Beginnings of the names of lengths among the parameters of media.

@@ -13,6 +13,7 @@ from photocore.cli import print_result, tell_written, text_table
 from photocore.options import declared, options_of
 
 if TYPE_CHECKING:
+    from multimedia.bathymetry.wave_statistics import WaveCase
     from multimedia.design.studies import Design
 
 
@@ -29,6 +30,7 @@ def command(
 
     overwrite = ring.pop("overwrite")
     study = {name: ring.pop(name) for name in ("seed", "flatness")}
+    waves = ring.pop("waves")
     design.check_outputs(out, plot, overwrite=overwrite)
     if project is not None:
         context = click.get_current_context()
@@ -45,8 +47,34 @@ def command(
             raise click.UsageError(f"give a PROJECT file, or {', '.join(missing)} as well.")
         result = design.design_ring(**study, **ring)
     design.write_design(result, out=out, plot=plot, overwrite=overwrite)
-    print_result(design.as_dict(result), _lines(result), as_json=as_json, remarks=result.remarks)
+    data, lines = design.as_dict(result), list(_lines(result))
+    if waves is not None:
+        from multimedia.bathymetry.wave_statistics import waves_over
+
+        cases = waves_over(result.media, result.centres, result.study, waves, unit=result.unit)
+        data["waves"] = [
+            {"wavelength": c.wavelength, "period_s": c.period, "from_base_deg": c.from_base,
+             "rms": c.rms.tolist(), "mean": c.mean.tolist(),
+             "frames": c.frames if c.frames < float("inf") else None}
+            for c in cases
+        ]  # fmt: skip
+        lines += _wave_lines(result, cases)
+    print_result(data, lines, as_json=as_json, remarks=result.remarks)
     tell_written(out, plot)
+
+
+def _wave_lines(result: Design, cases: tuple[WaveCase, ...]) -> Iterator[str]:
+    """Yield what waves cost, and the frames whose mean is as good as the set-up itself."""
+    unit, goal = result.unit, sum(v * v for v in result.study.rms_sigma) ** 0.5
+    yield f"\nWaves taken for flat water, RMS [{unit}], and frames whose mean is within {goal:.2g}"
+    rows = [
+        (f"{c.wavelength:g}", f"{c.period:.1f}", f"{c.from_base:.0f}",
+         *(f"{v:.2g}" for v in c.rms), f"{float(c.mean @ c.mean) ** 0.5:.2g}",
+         f"{c.frames:.0f}" if c.frames < float("inf") else "no number")
+        for c in cases
+    ]  # fmt: skip
+    yield text_table(("length", "period s", "from base", "dX", "dY", "dZ", "stays", "frames"), rows)
+    yield "Spread the frames over several periods, not in step with the wave."
 
 
 def _lines(result: Design) -> Iterator[str]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from multimedia.design.planarity import Deviation
+from multimedia.media.optical_media import OpticalMedia
 from photocore.arrays import FloatArray
 
 
@@ -114,6 +115,9 @@ class Design:
     remarks : tuple of str
     planarity : tuple of Deviation
         What bent, wedged or wavy faces cost, where asked for.
+    centres : ndarray, shape (cameras, 3)
+    media : OpticalMedia or None
+        What all cameras look through; None where it is not the same. [unit]
     """
 
     study: Study
@@ -126,3 +130,5 @@ class Design:
     unit: str
     remarks: tuple[str, ...]
     planarity: tuple[Deviation, ...] = ()
+    centres: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    media: OpticalMedia | None = None

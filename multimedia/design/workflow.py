@@ -147,6 +147,8 @@ def _design(
         study=study, by_depth=_by_depth(study), sensitivities=sensitivities,
         placements=placements, costs=costs, models=models, seam=seam, unit=unit,
         remarks=tuple(notes), planarity=planarity,
+        centres=np.array([camera.centre for camera in cameras]),
+        media=interface if all(item is interface for item in media) else None,
     )  # fmt: skip
 
 

@@ -35,7 +35,7 @@ solid #111}h3{font-size:1rem}
 table{border-collapse:collapse;margin:.6rem 0;font-size:.86rem;font-variant-numeric:tabular-nums}
 caption{text-align:left;font-weight:600;padding:.3rem 0}
 th,td{padding:.15rem .6rem;border-bottom:1px solid #bbb;text-align:right;overflow-wrap:anywhere}
-th{border-bottom:2px solid #111;overflow-wrap:break-word}
+th{border-bottom:2px solid #111}th,td:first-child{overflow-wrap:break-word}
 figure{margin:1rem 0}
 figure img{width:100%;height:auto}
 figcaption,.small{font-size:.85rem;color:#333}

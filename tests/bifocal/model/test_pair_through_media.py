@@ -286,6 +286,14 @@ def test_tabulated_rays_are_the_bent_rays(name):
     np.testing.assert_allclose(at_x + field.foot.nadir[0], rays.position[..., 0], atol=2e-5)
     np.testing.assert_allclose(at_y + field.foot.nadir[1], rays.position[..., 1], atol=2e-5)
     np.testing.assert_allclose(np.dstack([along_x, along_y]), rays.slope, atol=5e-5)
+    # A long list of places, which OpenCV takes in no single row.
+    once = field.slopes(x.ravel(), y.ravel())
+    many = field.slopes(
+        np.tile(x.ravel(), 40_000 // x.size + 1), np.tile(y.ravel(), 40_000 // x.size + 1)
+    )
+    for few, long in zip(once, many, strict=True):
+        assert few.shape == (x.size,)
+        np.testing.assert_array_equal(long[: x.size], few)
     np.testing.assert_allclose(np.dstack(field.slopes(at_x, at_y)), rays.slope, atol=5e-5)
     flat = field.through(x.ravel(), y.ravel(), relief.ravel())
     np.testing.assert_array_equal(flat[0], at_x.ravel())
