@@ -27,39 +27,49 @@ from tests.browser import (  # noqa: E402
 )
 
 VIEW = {"width": 1360, "height": 800}
-WIDTH, QUALITY = 1100, 78
+WIDTH, QUALITY = 1000, 70
 
 
 def picture(page: Driver, name: str) -> None:
-    """Write docs/images/page-NAME.jpg."""
-    page.tab.wait_for_timeout(1200)
-    shot = Image.open(io.BytesIO(page.tab.screenshot())).convert("RGB")
-    shot = shot.resize((WIDTH, round(shot.height * WIDTH / shot.width)), Image.LANCZOS)
-    shot.save(HERE / "images" / f"page-{name}.jpg", quality=QUALITY, optimize=True)
+    """Write docs/images/page-NAME.jpg, and the same in light colours."""
+    for ending in ("", "-light"):
+        page.tab.wait_for_timeout(1200)
+        shot = Image.open(io.BytesIO(page.tab.screenshot())).convert("RGB")
+        shot = shot.resize((WIDTH, round(shot.height * WIDTH / shot.width)), Image.LANCZOS)
+        path = HERE / "images" / f"page-{name}{ending}.jpg"
+        shot.save(path, quality=QUALITY, optimize=True)
+        page.click("theme")
 
 
 def orient(page: Driver, photos: list[str]) -> None:
-    """Photos, distances, control points, alignment."""
+    """Photos and their lenses; the wall found by itself, one length, accepted."""
+    picture(page, "start")
     page.tab.get_by_test_id("photo-files").set_input_files(photos)
     page.settled("state.photos.length === 2")
-    for label, value in (("Far distance d1", "17.5"), ("Near distance d2", "9.5")):
-        page.tab.get_by_label(label).fill(value)
-        page.keys("Enter")
-    page.settled("state.setup.d2 === 9.5")
+    # The sample's photos have no EXIF data.
+    for image, focal in ((1, 35), (2, 19)):
+        page.command("photo.set", image=image, focal_mm=focal, sensor_width_mm=22.7)
+    page.settled("state.photos.every((photo) => photo.focal_mm)")
     picture(page, "photos")
-    page.click("mode-orientation")
-    page.pick_control(TARGETS)
-    page.tab.evaluate("() => bifocal.flyTo('T28')")
+    page.click("next")
+    page.tab.wait_for_function(
+        "() => bifocal.state().pair && !bifocal.state().looking", timeout=4e5
+    )
+    page.tab.wait_for_timeout(800)
+    for name in ("T08", "T09"):
+        page.pick(1, true_pixel(1, TARGETS[name]))
+        page.tab.wait_for_timeout(800)
     picture(page, "orientation")
-    page.click("align")
-    page.finished("align")
-    page.click("align-accept")
+    page.tab.get_by_test_id("length-value").fill("8.80")
+    page.keys("Enter")
+    page.settled("state.pair.scaled")
+    page.click("next")
     page.settled("state.pair.accepted")
 
 
 def collimate(page: Driver) -> None:
     """Points, the last one with its suggestion still open."""
-    page.click("mode-points")
+    page.tab.wait_for_timeout(1500)
     for name in ("T08", "T20", "T15", "T28", "T19"):
         page.keys("n")
         page.pick(1, true_pixel(1, TARGETS[name]))
@@ -74,10 +84,10 @@ def collimate(page: Driver) -> None:
 
 def make_relief(page: Driver) -> None:
     """Relief map and a profile across the door."""
-    page.click("mode-products")
-    page.click("run-relief")
-    page.finished("relief")
-    page.tab.wait_for_timeout(800)
+    page.click("next")
+    page.click("deliver")
+    page.finished("deliver")
+    page.tab.wait_for_timeout(3000)
     page.click("profile")
     for x in (-5.2, 5.2):
         page.tab.mouse.click(*page.screen(1, true_pixel(1, (x, -1.2, 0.0))))
@@ -99,6 +109,7 @@ def main() -> None:
             served(folder / "survey") as server,
             tab_of(browser, server, viewport=VIEW) as page,
         ):
+            page.tab.set_default_timeout(120_000)
             orient(page, [str(photo) for photo in photos])
             collimate(page)
             make_relief(page)

@@ -43,6 +43,7 @@ def _lines(summary: dict[str, Any]) -> Iterator[str]:
     yield (
         f"Pixels    {shares['measured']:.0%} measured, {shares['interpolated']:.0%} interpolated, "
         f"{shares['hidden']:.0%} hidden, {shares['unknown']:.0%} unknown"
+        + (f", {shares['drawn']:.0%} drawn" if shares["drawn"] else "")
     )
     if summary["sigma_median"] is not None:
         yield f"Sigma     {1000 * summary['sigma_median']:.1f} mm (median of the measured)"

@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.collimation.drawing import write_points_drawing
+from bifocal.collimation.drawing import OUTLINES, write_points_drawing
 from bifocal.collimation.fields import FieldError, positive_of, tupled
 from bifocal.collimation.jobs import PageJob
 from bifocal.collimation.live_orientation import control_of, lenses_of, site_of
 from bifocal.collimation.proposals import NOMINAL
 from bifocal.collimation.session import Session
+from bifocal.collimation.shapes import measures_of
 from bifocal.collimation.stated_media import lacking, media_as_dict, media_of
 from bifocal.collimation.wording import say, without_options
 from bifocal.options import OF_PAIR
@@ -38,9 +39,14 @@ def start_job(session: Session, kind: str, options: Options, *, quiet: bool = Fa
     InputError
         If another one runs, the survey is not far enough for it, or an option is impossible.
     """
-    return session.jobs.start(
-        kind, partial(task_of, session, kind, options), partial(finish, session), quiet=quiet
-    )
+
+    def task() -> dict[str, Any]:
+        told = task_of(session, kind, options) | {"quiet": quiet}
+        if quiet:  # what makes way may still be writing its own
+            told["out"] = told["out"].replace(".proposed.", ".found.")
+        return told
+
+    return session.jobs.start(kind, task, partial(finish, session), quiet=quiet)
 
 
 def task_of(session: Session, kind: str, options: Options) -> dict[str, Any]:
@@ -235,12 +241,32 @@ def _write_control(session: Session, control: Control) -> dict[str, Path | None]
     return tables
 
 
+def _write_outlines(session: Session, folder: Path) -> list[str]:
+    """Write what was drawn to be measured as a table; return its name, if there is any."""
+    pair = session.pictures.pair
+    with session.lock:
+        drawn = [shape for shape in session.state.shapes.values() if shape.kind == "outline"]
+    if pair is None or not drawn:
+        return []
+    measures = [measures_of(shape, pair) for shape in drawn]
+    columns: dict[str, Any] = {
+        "id": [shape.name for shape in drawn],
+        "layer": [shape.layer or OUTLINES for shape in drawn],
+    }
+    units = {"width": "m", "height": "m", "area": "m2", "length": "m", "relief": "m"}
+    for key, unit in units.items():
+        columns[f"{key} [{unit}]"] = np.array([one[key] for one in measures])
+    path = folder / f"{session.products.stem}_outlines.csv"
+    write_csv(path, columns, overwrite=path.is_file())
+    return [path.name]
+
+
 def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any]) -> str:
     """Take over what a job made; return what the user should know."""
     kind = task["kind"]
     told = " ".join(without_options(said, session.spoken) for said in result.get("remarks", ()))
     if kind == "align":
-        if task["free_scale"] and len(control_of(session.state).ids):
+        if task.get("quiet") and len(control_of(session.state).ids):
             return ""  # the user took it in hand meanwhile
         session.propose(Path(task["out"]), result)
         return told
@@ -267,6 +293,7 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
             with session.lock:
                 write_points_drawing(session.state, session.results, drawing)
             names.append(f"{folder.name}/{drawing.name}")
+        names += [f"{folder.name}/{name}" for name in _write_outlines(session, folder)]
     session.note_made(kind, names)
     session.show_products()
     return told

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -45,6 +46,8 @@ class Products:
         self.folder, self.stem = files.folder, files.stem
         self.made: dict[str, str] = {}
         self._relief: tuple[tuple[str, int], ReliefMap] | None = None
+        self._overlay: tuple[object, bytes] | None = None
+        self._reading, self._shading = threading.Lock(), threading.Lock()
         self._facts: dict[str, tuple[tuple[str, int], dict[str, Any]]] = {}
 
     def note(self, kind: str, names: Sequence[str]) -> None:
@@ -140,10 +143,11 @@ class Products:
         path = self.current("relief")
         if path is None:
             raise InputError(remark("page.no_relief"))
-        version = _version(path)
-        if self._relief is None or self._relief[0] != version:
-            self._relief = version, ReliefMap.read(path)
-        return self._relief[1]
+        with self._reading:  # the page asks for it from many sides at once
+            version = _version(path)
+            if self._relief is None or self._relief[0] != version:
+                self._relief = version, ReliefMap.read(path)
+            return self._relief[1]
 
     def overlay(
         self, low: float | None = None, high: float | None = None, *, hatched: bool = False
@@ -158,24 +162,11 @@ class Products:
             Whether what was not measured is paler and hatched.
         """
         relief = self.relief()
-        limits = relief_limits(relief)
-        span = (limits[0] if low is None else low, limits[1] if high is None else high)
-        step = max(1, round(max(relief.shape) / OVERLAY_SIDE))
-        r = relief.r[::step, ::step]
-        fine = relief.grid
-        height, width = r.shape
-        grid = Grid(x0=fine.x0, y0=fine.y0, gsd=fine.gsd * step, width=width, height=height)
-        measured = None
-        if hatched:
-            told = np.isin(relief.quality[::step, ::step], TOLD)
-            if told.any():
-                measured = MapSurface.of_array(np.where(told, r, np.float32("nan")), grid)
-        # Lines as on a sheet on which a pixel is a third of a millimetre.
-        picture, known = shaded(
-            MapSurface.of_array(r, grid), grid, limits=span, measured=measured,
-            scale=grid.gsd * 3000,
-        )  # fmt: skip
-        return _png(np.dstack([picture[..., ::-1], known]))
+        with self._shading:
+            asked = id(relief), low, high, hatched
+            if self._overlay is None or self._overlay[0] != asked:
+                self._overlay = asked, _shaded(relief, low, high, hatched=hatched)
+            return self._overlay[1]
 
     def value(self, x: float, y: float) -> dict[str, float | None]:
         """Return relief and its standard deviation at a place of the wall. [m]"""
@@ -230,6 +221,28 @@ def relief_limits(relief: ReliefMap) -> tuple[float, float]:
     return float(low), float(high)
 
 
+def _shaded(relief: ReliefMap, low: float | None, high: float | None, *, hatched: bool) -> bytes:
+    """Return the picture of a relief map, see `Products.overlay`."""
+    limits = relief_limits(relief)
+    span = (limits[0] if low is None else low, limits[1] if high is None else high)
+    step = max(1, round(max(relief.shape) / OVERLAY_SIDE))
+    r = relief.r[::step, ::step]
+    fine = relief.grid
+    height, width = r.shape
+    grid = Grid(x0=fine.x0, y0=fine.y0, gsd=fine.gsd * step, width=width, height=height)
+    measured = None
+    if hatched:
+        told = np.isin(relief.quality[::step, ::step], TOLD)
+        if told.any():
+            measured = MapSurface.of_array(np.where(told, r, np.float32("nan")), grid)
+    # Lines as on a sheet on which a pixel is a third of a millimetre.
+    picture, known = shaded(
+        MapSurface.of_array(r, grid), grid, limits=span, measured=measured,
+        scale=grid.gsd * 3000,
+    )  # fmt: skip
+    return _png(np.dstack([picture[..., ::-1], known]))
+
+
 def colours() -> list[str]:
     """Return the colours from the farthest back over the wall to what stands out most."""
     rgb = np.rint(tints(np.linspace(-1, 1, 17), (-1.0, 1.0))).astype(int)
@@ -273,6 +286,16 @@ def _nearest(relief: ReliefMap, places: FloatArray) -> FloatArray:
 
 def _plain(value: float) -> float | None:
     return value if np.isfinite(value) else None
+
+
+def discard_pair(proposed: Path) -> None:
+    """Take away a proposed pair file that another one follows, with the lens files it names."""
+    data = read_object(proposed, what="pair file")
+    for number in (1, 2):
+        photo = data.get(f"image{number}")
+        if isinstance(photo, dict) and isinstance(photo.get("lens"), str):
+            (proposed.parent / photo["lens"]).unlink(missing_ok=True)
+    proposed.unlink(missing_ok=True)
 
 
 def _small(picture: Any) -> Any:

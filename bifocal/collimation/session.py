@@ -19,11 +19,11 @@ from bifocal.collimation.journal import Journal
 from bifocal.collimation.live_orientation import LiveOrientation
 from bifocal.collimation.live_results import LiveResults
 from bifocal.collimation.pictures import Pictures
-from bifocal.collimation.products import Products, accept_pair
+from bifocal.collimation.products import Products, accept_pair, discard_pair
 from bifocal.collimation.project import SurveyFiles
 from bifocal.collimation.proposals import measure_of, rescale
 from bifocal.collimation.records import Change, PickedPoint, SurveyState
-from bifocal.collimation.shapes import faces_of, keep_faces, shapes_from
+from bifocal.collimation.shapes import commands_for, keep_faces
 from bifocal.collimation.workbook.rows import PointRow, row_of
 from bifocal.collimation.workbook.setup import ideal_setup, pair_of, typed_of
 from bifocal.collimation.workbook.sync import WorkbookSync
@@ -73,7 +73,7 @@ class Session:
         self.proposal: dict[str, Any] | None = None
         self.good: tuple[LiveResults, dict[str, Any] | None] | None = None
         self._kept: tuple[dict[str, Any], Pair] | None = None
-        #: Faces that the program would draw, for the user to accept.
+        #: Faces that the program would draw.
         self.suggested: list[dict[str, Any]] = []
         self.state = SurveyState()
         self.journal = Journal(files.journal)
@@ -139,6 +139,8 @@ class Session:
             self.changed()
 
     def _note_proposed(self, path: Path, report: Mapping[str, Any]) -> None:
+        if (before := self.proposed_path) not in (None, path):
+            discard_pair(before)
         self.proposal = {"op": "proposed", "pair": path.name, "report": dict(report)}
         self._write(self.proposal)
         self._show_proposal()
@@ -213,22 +215,18 @@ class Session:
         target = self.products.place("pair", ".pair.json")
         if path != target:
             accept_pair(path, target)
-        self.files = replace(self.files, pair=target)
         self.note_made("pair", [target.name])
         self._write({"op": "accepted", "pair": target.name})
         self._note_accepted(target.name)
-        self._remember_files()
-        self._show_pair(Pair.read(target))
+        self.use_pair(target)
         if self.sync.read is not None:
             self.set_precision(self.sync.read.sigma_px, self.sync.read.limits)
 
     def use_pair(self, path: Path) -> None:
         """Let a pair file be the survey's orientation."""
-        with self.lock:
-            self.files = replace(self.files, pair=path)
-            self._remember_files()
-            self._show_pair(Pair.read(path))
-            self.changed()
+        self.files = replace(self.files, pair=path)
+        self._remember_files()
+        self._show_pair(Pair.read(path))
 
     def _note_accepted(self, name: str) -> None:
         """Let the last proposal be the survey's orientation, as a step that can be taken back."""
@@ -305,15 +303,8 @@ class Session:
         path = None if file is None else beside(file)
         if pair is None or path is None or not path.is_file():
             return
-        found = Faces.read(path)
-        if found.to_dict() != faces_of(self.state, pair).to_dict():
-            outlines = {n: s for n, s in self.state.shapes.items() if s.kind == "outline"}
-            for name in set(self.state.shapes) - set(outlines):
-                self._carry_out({"op": "shape.delete", "name": name}, write=True)
-            for shape in shapes_from(found, pair):
-                fields = {key: shape[key] for key in ("kind", "corners")}
-                named = {"name": shape["name"]} if shape["name"] else {}
-                self._carry_out({"op": "shape.set", **named, **fields}, write=True)
+        for command in commands_for(Faces.read(path), self.state, pair):
+            self._carry_out(command, write=True)
         self._kept = dict(self.state.shapes), pair
 
     # ---- commands

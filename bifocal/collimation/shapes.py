@@ -119,6 +119,21 @@ def shapes_from(faces: Faces, pair: Pair) -> list[dict[str, Any]]:
     return found
 
 
+def commands_for(faces: Faces, state: SurveyState, pair: Pair) -> list[dict[str, Any]]:
+    """Return the commands that make the survey's faces those of a file; none if they are."""
+    if faces.to_dict() == faces_of(state, pair).to_dict():
+        return []
+    gone = [shape.name for shape in state.shapes.values() if shape.kind != "outline"]
+    return [
+        *({"op": "shape.delete", "name": name} for name in gone),
+        *(
+            {"op": "shape.set", "kind": shape["kind"], "corners": shape["corners"]}
+            | ({"name": shape["name"]} if shape["name"] else {})
+            for shape in shapes_from(faces, pair)
+        ),
+    ]
+
+
 def _drawn(pair: Pair, places: FloatArray) -> dict[str, Any]:
     return {"corners": corners_of(pair, places).round(3).tolist()}
 

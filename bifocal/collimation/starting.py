@@ -46,6 +46,7 @@ def open_sample(session: Session) -> None:
         session.give_photos(copies)
         session.note_made("pair", [pair.name])
         session.use_pair(pair)
+        session.changed()
 
 
 def remember(files: SurveyFiles, home: Path | None = None) -> None:

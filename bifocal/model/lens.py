@@ -153,8 +153,12 @@ class Lens:
             return points.copy()
         criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
         matrix, terms = np.array(self.camera_matrix), np.array(self.coefficients)
-        undistort = cv2.fisheye.undistortPoints if self.model == "fisheye" else cv2.undistortPoints
-        ideal = undistort(flat, matrix, terms, P=matrix, criteria=criteria)
+        if self.model != "fisheye" and hasattr(cv2, "undistortPointsIter"):  # OpenCV 4
+            ideal = cv2.undistortPointsIter(flat, matrix, terms, None, matrix, criteria)
+        else:
+            fisheye = self.model == "fisheye"
+            undistort = cv2.fisheye.undistortPoints if fisheye else cv2.undistortPoints
+            ideal = undistort(flat, matrix, terms, P=matrix, criteria=criteria)
         return np.asarray(ideal, dtype=np.float64).reshape(points.shape)
 
     def distort(self, pixels: ArrayLike) -> FloatArray:

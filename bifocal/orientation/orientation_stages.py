@@ -35,7 +35,12 @@ from bifocal.orientation.tie_points import (
     without_gross_ties,
 )
 from bifocal.orientation.tuning import BEND, LINES, STAGES, WALLS
-from bifocal.orientation.walls.reference_plane import Face, choose_wall, onto_plane, rivals_in_words
+from bifocal.orientation.walls.reference_plane import (
+    WallFace,
+    choose_wall,
+    onto_plane,
+    rivals_in_words,
+)
 from bifocal.orientation.walls.wall_planes import (
     likely_wall,
     planes_of_any_direction,
@@ -85,7 +90,7 @@ class OrientedPair:
     assumed : tuple of str
         What nothing but an assumption determines.
     remarks : tuple of str
-    faces : tuple of Face
+    faces : tuple of WallFace
         Where no control points define the plane: the wall, and the planes parallel to it.
     wall_named : bool
         Whether the user said which of them is the wall.
@@ -102,7 +107,7 @@ class OrientedPair:
     exchanged: bool = False
     assumed: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
-    faces: tuple[Face, ...] = ()
+    faces: tuple[WallFace, ...] = ()
     wall_named: bool = False
     tolerance: tuple[float, float] = STAGES.free
     shape: WallShape = field(default_factory=WallShape)

@@ -20,7 +20,7 @@ from bifocal.model.pair_media import PairMedia
 from bifocal.orientation.alignment import deviations_of
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.orientation_report import orientation_in_words
-from bifocal.orientation.walls.reference_plane import Face, rivals_in_words, zero_sigma
+from bifocal.orientation.walls.reference_plane import WallFace, rivals_in_words, zero_sigma
 from photocore.arrays import FloatArray, positive
 from photocore.errors import GeometryError
 
@@ -139,7 +139,7 @@ def _setup(pair: Pair, factor: float) -> dict[str, Any]:
     old = pair.extra.get("setup")
     setup: dict[str, Any] = dict(old) if isinstance(old, Mapping) else {}
     planes = [{**plane, "offset": factor * plane["offset"]} for plane in setup.get("planes", [])]
-    faces = [Face(plane["offset"], plane["share"], tuple(plane["pixel"])) for plane in planes]
+    faces = [WallFace(plane["offset"], plane["share"], tuple(plane["pixel"])) for plane in planes]
     zones = [
         {**zone, "median": factor * zone["median"], "spread": factor * zone["spread"]}
         for zone in setup.get("wall_relief_mm", [])

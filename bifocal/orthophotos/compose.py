@@ -171,8 +171,10 @@ def as_surface(relief: ReliefMap | Surface | ArrayLike | None) -> Surface:
         return cast(Surface, relief)
     if hasattr(relief, "r") and hasattr(relief, "plane_from_pixel"):
         r = np.asarray(relief.r)
-        quality = getattr(relief, "quality", None)
-        measured = None if quality is None else np.asarray(quality) == Quality.MEASURED
+        # A map without sigma is taken as exact: it does not tell what the photos saw.
+        measured = None
+        if isinstance(relief, ReliefMap) and np.any(relief.sigma > 0):
+            measured = relief.quality == Quality.MEASURED
         return MapSurface.of_array(r, Grid.from_affine(relief.plane_from_pixel, r.shape), measured)
     number = np.asarray(relief)
     if number.ndim != 0 or number.dtype.kind not in "fiu":

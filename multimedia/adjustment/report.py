@@ -11,6 +11,7 @@ import numpy as np
 from multimedia.adjustment import report_figures as figures
 from multimedia.adjustment.plausibility import alike_pairs, alike_remarks, remedy_of
 from multimedia.adjustment.unknowns import Adjustment, decimals
+from multimedia.media.camera import EXTERIOR
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.interfaces import Interfaces
 from multimedia.media.surfaces import Cylinder, Plane, RefractingSurface, Sphere
@@ -99,6 +100,7 @@ def _precision(result: Adjustment, say: Words) -> Iterator[Block]:
         details.insert(0, say("points_fixed"))
     if result.model_error > 1:
         details.append(say("model_error", factor=f"{result.model_error:.2f}"))
+    yield Paragraph(text=_model(result, say, len(free)))
     yield Heading(text=say("accuracy"))
     yield Banner(
         text=say("sigma0", sigma0=f"{result.sigma0 * 1000:.3f}"), details=tuple(details),
@@ -111,6 +113,33 @@ def _precision(result: Adjustment, say: Words) -> Iterator[Block]:
             redundancy=result.redundancy, iterations=result.iterations,
         )
     )  # fmt: skip
+
+
+def _model(result: Adjustment, say: Words, points: int) -> str:
+    """Return in one sentence what was estimated and what was taken for granted."""
+    poses = [name.removesuffix(":X0") for name in result.names if name.endswith(":X0")]
+    plates = sum(name.startswith("plate ") for name in poses)
+    terms = (name.rpartition(":")[2] for name in result.names if not name.startswith("point "))
+    own = dict.fromkeys(term for term in terms if term not in EXTERIOR)
+    counted = (("orientations", len(poses) - plates), ("plate_poses", plates),
+               ("free_points", points))  # fmt: skip
+    estimated = [*(say(key, count=count) for key, count in counted if count), *own]
+    project, assumed = result.project, dict[str, None]()
+    for camera in project.cameras:
+        ideal = type(camera.distortion)()
+        assumed |= dict.fromkeys(
+            name for name in camera.interior_names
+            if not hasattr(ideal, name) or camera.value(name) != getattr(ideal, name)
+        )  # fmt: skip
+    for media in project.media.values():
+        names = media.parameter_names if media is not None else ()
+        kept = [n for n in names if n.startswith(("index", "thickness", "radius", "gradient"))]
+        assumed |= dict.fromkeys(name for name in kept if name != "index1")
+    left = [name for name in assumed if name not in own]
+    nothing = say("nothing")
+    return say(
+        "estimated", estimated=", ".join(estimated) or nothing, assumed=", ".join(left) or nothing
+    )
 
 
 def _remarks(remarks: tuple[str, ...], say: Words) -> Iterator[Block]:

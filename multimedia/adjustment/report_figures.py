@@ -10,11 +10,15 @@ import numpy as np
 
 from multimedia.adjustment.unknowns import Adjustment
 from multimedia.media.camera import Camera, Sensor
-from photocore.arrays import FloatArray, IntArray
+from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.reports.words import Words
 
 #: Cameras drawn beside one another.
 COLUMNS = 2
+#: Vectors that are all drawn; of more about so many, one of each plate in each cell.
+MOST_ARROWS = 400
+#: Colours of plates.
+PLATES = ["#1f4e79", "#2e7d32", "#b8860b", "#6a3d9a", "#00838f", "#5d4037"]
 #: Residuals this many times the median are drawn in another line.
 _LARGE = 4.0
 #: Classes of depth whose mean residual is drawn.
@@ -58,8 +62,14 @@ def draw_vectors(figure: Any, result: Adjustment, cameras: Sequence[Camera], say
         axes = figure.add_subplot(grid[number // COLUMNS, number % COLUMNS])
         rows, reach = measured_rows(result, camera), _reach(result, camera)
         place, miss = result.project.image_points.image[rows], result.residuals[rows]
-        large = np.hypot(*miss.T) > _LARGE * typical
-        for chosen, colour, width in ((~large, "black", 0.004), (large, "#b00020", 0.008)):
+        large: BoolArray = np.asarray(np.hypot(*miss.T) > _LARGE * typical)
+        plate = _plates(result, rows)
+        usual = ~large & _thinned(place, plate, reach)
+        shades = ["black"] if plate.max(initial=0) == 0 else PLATES
+        drawn = [
+            (usual & (plate % len(shades) == k), shade, 0.004) for k, shade in enumerate(shades)
+        ]
+        for chosen, colour, width in (*drawn, (large, "#b00020", 0.008)):
             axes.quiver(
                 *place[chosen].T, *(miss[chosen] * zoom).T, angles="xy", scale_units="xy",
                 scale=1, width=width, color=colour,
@@ -81,6 +91,27 @@ def draw_vectors(figure: Any, result: Adjustment, cameras: Sequence[Camera], say
             say("residual_bar", size=f"{size:g}"), (left, low), (0, 3),
             textcoords="offset points", fontsize=6,
         )  # fmt: skip
+
+
+def _plates(result: Adjustment, rows: IntArray) -> IntArray:
+    """Return the number of the group, plate or other, that each image point belongs to."""
+    points = result.project.object_points
+    group = dict(zip(points.ids, points.groups, strict=True))
+    names = [group.get(result.project.image_points.ids[row], "") for row in rows.tolist()]
+    number = {name: k for k, name in enumerate(dict.fromkeys(names))}
+    return np.array([number[name] for name in names], dtype=np.int64)
+
+
+def _thinned(place: FloatArray, plate: IntArray, reach: float) -> BoolArray:
+    """Return which vectors are drawn: all, or of many the first of each plate in each cell."""
+    kept: BoolArray = np.ones(len(place), dtype=bool)
+    if len(place) > MOST_ARROWS:
+        across = np.sqrt(MOST_ARROWS / (plate.max() + 1))
+        cell = np.floor((place / reach + 1.0) * 0.5 * across).astype(np.int64)
+        keys = np.column_stack([cell, plate])
+        kept[:] = False
+        kept[np.unique(keys, axis=0, return_index=True)[1]] = True
+    return kept
 
 
 def _draw_outline(axes: Any, sensor: Sensor) -> None:

@@ -80,7 +80,8 @@ def _stage(session: Session) -> str:
     """Return where the user is, where he did not say."""
     if len(session.pictures.infos) < 2:
         return "photos"
-    return "orientation" if session.pictures.pair is None else "points"
+    oriented = session.pictures.pair is not None and session.proposed_path is None
+    return "points" if oriented else "orientation"
 
 
 def _length_unit(session: Session) -> str:

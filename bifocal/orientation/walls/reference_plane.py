@@ -21,7 +21,7 @@ from photocore.errors import GeometryError
 
 
 @dataclass(frozen=True, slots=True)
-class Face:
+class WallFace:
     """A plane parallel to the reference plane on which points gather.
 
     Attributes
@@ -42,7 +42,7 @@ class Face:
     chance: float = 1.0
 
 
-def faces(heights: FloatArray, pixels: FloatArray, *, band: float) -> list[Face]:
+def faces(heights: FloatArray, pixels: FloatArray, *, band: float) -> list[WallFace]:
     """Return the faces on which points gather, the fullest first.
 
     Parameters
@@ -54,7 +54,7 @@ def faces(heights: FloatArray, pixels: FloatArray, *, band: float) -> list[Face]
     band : float
         Half the thickness of a face. [m]
     """
-    planes: list[Face] = []
+    planes: list[WallFace] = []
     count, order = len(heights), np.argsort(heights)
     heights, pixels = heights[order], pixels[order]
     free = np.ones(count, dtype=bool)
@@ -70,7 +70,9 @@ def faces(heights: FloatArray, pixels: FloatArray, *, band: float) -> list[Face]
             break
         if all(abs(offset - other.offset) > WALLS.faces_apart * band for other in planes):
             planes.append(
-                Face(offset, float(members.sum() / count), _midst(pixels, np.flatnonzero(members)))
+                WallFace(
+                    offset, float(members.sum() / count), _midst(pixels, np.flatnonzero(members))
+                )
             )
         free &= np.abs(heights - at) > band
     return planes
@@ -95,7 +97,7 @@ def choose_wall(
     site: SiteMeasures,
     *,
     sigma_ratio: float = np.inf,
-) -> tuple[FloatArray, list[Face]]:
+) -> tuple[FloatArray, list[WallFace]]:
     """Return the wall's plane z = a + b X + c Y and all faces parallel to it, the wall first.
 
     The spot the user named decides; else the face whose distances stand in the ratio of those
@@ -144,7 +146,11 @@ def choose_wall(
 
 
 def _ratio_tests(
-    planes: Sequence[Face], cameras: Cameras, plane: FloatArray, site: SiteMeasures, sigma: float
+    planes: Sequence[WallFace],
+    cameras: Cameras,
+    plane: FloatArray,
+    site: SiteMeasures,
+    sigma: float,
 ) -> FloatArray:
     """Return how far each face's distances are from the measured ratio, in sigma; 0: unknown."""
     d1, d2 = site.distances
@@ -403,13 +409,13 @@ def scale_difference(cameras: Cameras, plane: FloatArray, offset: float) -> floa
     return float(np.log(near / far))
 
 
-def rivals(planes: Sequence[Face]) -> list[Face]:
+def rivals(planes: Sequence[WallFace]) -> list[WallFace]:
     """Return the faces that may as well be the wall."""
     likely = [face for face in planes[1:] if face.chance >= WALLS.unlikely * planes[0].chance]
     return [face for face in likely if face.share >= WALLS.comparable * planes[0].share]
 
 
-def zero_sigma(planes: Sequence[Face]) -> float:
+def zero_sigma(planes: Sequence[WallFace]) -> float:
     """Return how far the wall's zero may be off, as another face may be the wall; 0: none. [m]
 
     Root mean square offset, each face as likely as its share of the points and its chance say.
@@ -420,7 +426,7 @@ def zero_sigma(planes: Sequence[Face]) -> float:
     return float(np.sqrt(weight @ square / weight.sum())) if len(likely) > 1 else 0.0
 
 
-def rivals_in_words(planes: Sequence[Face], site: SiteMeasures) -> str:
+def rivals_in_words(planes: Sequence[WallFace], site: SiteMeasures) -> str:
     """Return the warning that other planes compete with the wall; empty if none does."""
     others = rivals(planes)
     if not others or site.wall is not None:

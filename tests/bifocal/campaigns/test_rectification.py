@@ -265,7 +265,7 @@ def test_a_drawing_says_what_relief_does(church: Path) -> None:
     assert "Ciò che sporge di 20 cm è spostato fino a 2" in page
     assert "foto lontana" not in page
     drawing = ezdxf.readfile(church / "drawing" / "far.dxf").modelspace()
-    assert len(drawing.query('*[layer=="BIFOCAL_CONTROL"]')) >= 12
+    assert len(drawing.query('*[layer=="RIL_PUNTI_APPOGGIO"]')) >= 12
     with rasterio.open(church / "drawing" / "far.tif") as picture:
         assert picture.descriptions == ("red", "green", "blue", "source")
         assert set(np.unique(picture.read(4))) == {0, 1}

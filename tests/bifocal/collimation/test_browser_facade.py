@@ -53,7 +53,7 @@ def test_a_facade_from_two_photos_to_the_drawing_by_clicks_alone(
         page.tab.get_by_label("Near distance d2").fill("9.5")
         page.keys("Enter")
         page.settled("state.setup.d2 === 9.5 && state.setup.sigma_d1 === 0.01")
-        page.tab.get_by_role("button", name="Next: orientation").click()
+        page.click("next")
         page.pick_control(TARGETS)
         page.click("align")
         assert page.finished("align")["state"] == "done"
@@ -84,6 +84,15 @@ def test_a_facade_from_two_photos_to_the_drawing_by_clicks_alone(
         for x in (-3.0, 3.0):
             page.tab.mouse.click(*page.screen(1, true_pixel(1, (x, 1.6, 0.0))))
         page.tab.locator(".profile .curve").wait_for()
+        page.tab.get_by_test_id("ortho-swipe").fill("0")
+        page.click("face")
+        for x, y in ((-0.6, 0.2), (0.6, 0.2), (0.6, 1.8)):
+            page.tab.mouse.click(*page.screen(1, true_pixel(1, (x, y, 0.0))))
+            page.tab.wait_for_timeout(700)
+        page.click("face-close")
+        shape = page.settled("state.shapes.length === 1")["shapes"][0]
+        assert shape["kind"] == "face"
+        assert (tmp_path / "survey.faces.geojson").is_file()
         page.click("run-ortho")
         assert page.finished("ortho")["state"] == "done"
         page.tab.get_by_test_id("deliver-scale").select_option("1:100")
@@ -96,10 +105,34 @@ def test_a_facade_from_two_photos_to_the_drawing_by_clicks_alone(
         archive = Path(got.value.path()).read_bytes()
     with zipfile.ZipFile(io.BytesIO(archive)) as package:
         assert package.testzip() is None
+        page_of_client = next(n for n in package.namelist() if n.endswith("_handover.html"))
+        (tmp_path / "client.html").write_bytes(package.read(page_of_client))
         names = package.namelist()
         drawing = next(name for name in names if name.endswith(".pdf"))
         assert package.read(drawing).startswith(b"%PDF-")
-    assert {Path(name).suffix for name in names} >= {".pdf", ".dxf", ".tif", ".xlsx", ".json"}
+    kinds = {Path(name).suffix for name in names}
+    assert kinds >= {".pdf", ".dxf", ".tif", ".xlsx", ".json", ".html", ".jpg", ".geojson"}
+    client_measures(browser, tmp_path / "client.html")
+
+
+def client_measures(browser: Any, path: Path) -> None:
+    """Measure a known width on the file that is handed over, which asks nobody for anything."""
+    tab = browser.new_page(viewport={"width": 1200, "height": 800})
+    asked: list[str] = []
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.goto(path.as_uri())
+    tab.wait_for_function("() => relief && images[0].complete")
+    tab.click("#measure")
+    left, right = (
+        tab.evaluate("([X, Y]) => screen(pixel(DATA.layers[0], [X, Y]))", [x, 1.6])
+        for x in (-1.62, 1.62)
+    )
+    box = tab.locator("canvas").bounding_box()
+    for x, y in (left, right):
+        tab.mouse.click(box["x"] + x, box["y"] + y)
+    assert float(tab.inner_text("#value-width")[:-2]) == pytest.approx(3.24, abs=0.03)
+    assert {url.partition(":")[0] for url in asked} <= {"file", "data"}
+    tab.close()
 
 
 @pytest.mark.acceptance

@@ -146,13 +146,31 @@ PALE = """() => {
 
 
 def test_everything_has_a_name_and_can_be_read(page: Driver) -> None:
-    for stage in STAGES:
+    for theme in ("dark", "light"):
+        assert page.tab.evaluate("document.documentElement.dataset.theme") == theme
+        for stage in STAGES:
+            page.click(f"mode-{stage}")
+            assert page.tab.evaluate(NAMELESS) == [], stage
+            assert page.tab.evaluate(PALE % CONTRAST) == [], (theme, stage)
+            assert page.tab.locator("main").count() == 1
+            assert page.tab.evaluate("document.documentElement.scrollWidth - innerWidth") <= 0
+        page.keys("F1")
+        assert page.tab.get_by_role("dialog").is_visible()
+        assert page.tab.evaluate(PALE % CONTRAST) == []
+        page.keys("Escape")
+        page.click("theme")
+
+
+def test_back_and_forward_move_between_stages(page: Driver) -> None:
+    for stage in ("photos", "points", "products"):
         page.click(f"mode-{stage}")
-        assert page.tab.evaluate(NAMELESS) == [], stage
-        assert page.tab.evaluate(PALE % CONTRAST) == [], stage
-    page.keys("F1")
-    assert page.tab.get_by_role("dialog").is_visible()
-    assert page.tab.evaluate(PALE % CONTRAST) == []
+    page.tab.go_back()
+    assert page.settled("state.stage === 'points'")["stage"] == "points"
+    page.click("next")
+    page.settled("state.stage === 'products'")
+    page.tab.go_back()
+    page.tab.go_forward()
+    page.settled("state.stage === 'products'")
     page.keys("Escape")
     assert page.tab.get_by_role("dialog").count() == 0
 
@@ -176,7 +194,7 @@ OUTSIDE = """() => [...document.querySelectorAll("header *, .layer-bar *, .hand 
   .map((node) => node.outerHTML.slice(0, 120))"""
 
 
-@pytest.mark.parametrize("size", [(1280, 720), (3840, 2160)])
+@pytest.mark.parametrize("size", [(390, 844), (1024, 768), (1280, 720), (3840, 2160)])
 def test_it_fits_small_screens_and_large(page: Driver, size: tuple[int, int]) -> None:
     page.tab.set_viewport_size({"width": size[0], "height": size[1]})
     for stage in STAGES:

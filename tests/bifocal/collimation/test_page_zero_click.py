@@ -141,6 +141,12 @@ def test_what_is_drawn_lies_beside_the_pair_and_comes_back(tmp_path) -> None:
         shown = client_of(session).get("/api/state").json()["shapes"]
         assert shown[1]["width"] == pytest.approx(200 * 0.00738, abs=1e-4)
         assert shown[1]["area"] == pytest.approx(200 * 300 * 0.00738**2, rel=1e-4)
+        (folder / "d").mkdir()
+        task = {"kind": "deliver", "out": str(folder / "d")}
+        finish(session, task, {"files": [], "made": {}})
+        table = (folder / "d" / "facade_outlines.csv").read_text().splitlines()
+        assert table[0].startswith("id,layer,width [m],height [m],area [m2]")
+        assert table[1].startswith("O2,outlines,1.47")
         session.command({"op": "undo"})
         session.command({"op": "undo"})
         assert not kept.exists()

@@ -8,8 +8,8 @@ import pytest
 from bifocal import GeometryError, Interior, SiteMeasures
 from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.walls.reference_plane import (
-    Face,
     NarrowFace,
+    WallFace,
     choose_wall,
     faces,
     rivals_in_words,
@@ -94,7 +94,7 @@ def test_the_zero_of_relief_is_stated_no_better_than_the_planes_agree() -> None:
 
 
 def test_the_zero_of_relief_is_as_sure_as_the_faces_that_compete() -> None:
-    here, other = Face(0.0, 0.30, (0.0, 0.0)), Face(-0.114, 0.23, (9.0, 9.0))
+    here, other = WallFace(0.0, 0.30, (0.0, 0.0)), WallFace(-0.114, 0.23, (9.0, 9.0))
     # One of two such faces is the wall: 114 mm, with a chance of 23 in 53.
     assert zero_sigma([here, other]) == pytest.approx(0.114 * np.sqrt(23 / 53))
     assert zero_sigma([here, replace(other, share=0.1)]) == 0.0

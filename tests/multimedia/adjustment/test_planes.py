@@ -24,6 +24,8 @@ from multimedia import (
     project,
     write_project,
 )
+from multimedia.adjustment import report_figures
+from multimedia.adjustment.report import adjustment_document
 from multimedia.media.camera import EXTERIOR
 from tests.builders.commands import multimedia_command
 
@@ -118,3 +120,21 @@ def test_the_command_ranks_extensions(tmp_path):
     assert "--plate plate2" in table[2]
     first = json.loads(CliRunner().invoke(multimedia_command, [*words, "--json"]).stdout)
     assert first["extensions"][0]["option"] == "--plate plate2"
+
+
+def test_a_report_says_what_was_estimated_and_draws_plates_apart_and_thinned():
+    result = bundle_adjust(
+        planes(), Unknowns(plates=("plate1", "plate2"), interior=("c",), media=("index3",))
+    )
+    blocks = adjustment_document(result).blocks
+    said = next(b.text for b in blocks if getattr(b, "text", "").startswith("Estimated"))
+    assert said == (
+        "Estimated: the orientation of 4 cameras, the pose of 2 plates, 108 object points, c, "
+        "index3. Taken as the file has them: xh, yh, thickness1, index2."
+    )
+    place = np.random.default_rng(1).uniform(-8, 8, (1620, 2))
+    plate = np.repeat(np.arange(4), 405)
+    kept = report_figures._thinned(place, plate, 9.0)
+    assert 250 < kept.sum() <= 400
+    assert (np.bincount(plate[kept]) > 60).all()
+    assert report_figures._thinned(place[:400], plate[:400], 9.0).all()

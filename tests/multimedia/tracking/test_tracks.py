@@ -45,6 +45,14 @@ def test_particles_that_are_missing_in_some_frames_are_found_again():
     assert (np.diff(none.frame)[np.diff(none.track) == 0] == 1).all()
 
 
+def test_a_new_particle_is_told_by_its_fourth_frame():
+    # Two ways out of the origin: one that bends a little and goes on, one straight that ends.
+    ways = [[[0, 0, 0]], [[1, 0, 0], [0, 1, 0]], [[2.05, 0, 0], [0, 2, 0]], [[3.05, 0, 0]]]
+    places = [np.array(frame, dtype=float) for frame in ways]
+    previous = linked(places, LinkRules(step=1.5, change=0.5, gap=0))
+    assert previous.tolist() == [-1, 0, -1, 1, -1, 3]
+
+
 def test_the_mean_distance_comes_from_nearest_neighbours():
     places, _ = simulated(None, speed=0.1, frames=2, count=1000)
     assert usual_step(places) == pytest.approx(0.5, rel=0.05)

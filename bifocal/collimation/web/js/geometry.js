@@ -41,16 +41,20 @@ export class Wall {
     return place;
   }
 
-  /** The frame of a photo on the wall's grid: its border, cut off where it runs away. */
+  /** The frame of a photo on the wall's grid; none where part of it looks past the wall. */
   frameOf(image, { width, height }) {
     const steps = 24;
     const [right, bottom] = [width - 0.5, height - 0.5];
     const corners = [[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]];
-    const far = 3 * Math.max(this.width, this.height);
-    return corners.flatMap(([x, y], index) => {
+    const [, , [a, b, c]] = this.wallFromPhoto[image - 1];
+    const ahead = corners.map(([x, y]) => Math.sign(a * x + b * y + c));
+    const far = 20 * Math.max(this.width, this.height);
+    const places = corners.flatMap(([x, y], index) => {
       const [u, v] = corners[(index + 1) % 4];
       return Array.from({ length: steps }, (_, k) => this.fromPhoto(image, [x + ((u - x) * k) / steps, y + ((v - y) * k) / steps]));
-    }).filter((place) => place.every((value) => Number.isFinite(value) && Math.abs(value) < far));
+    });
+    const whole = new Set(ahead).size === 1 && places.every((place) => place.every((one) => Math.abs(one) < far));
+    return whole ? places : [];
   }
 
   /** Wall pixel -> (X, Y) on the reference plane [m]. */

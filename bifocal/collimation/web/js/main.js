@@ -56,7 +56,7 @@ class App {
         h("div", { class: "tools" }, this.link, this.nextButton, this.exchangeButton, this.undoButton, this.redoButton,
           this.themeButton, language,
           button("?", () => this.help(), { class: "icon", "aria-label": t("top.help"), testid: "help" }))),
-      h("div", { id: "stage", tabindex: "-1" }, Object.values(this.stages).map(({ element }) => element)),
+      h("main", { id: "stage", tabindex: "-1" }, Object.values(this.stages).map(({ element }) => element)),
       this.toast);
     const wanted = location.hash.slice(1);
     this.open(wanted in STAGES ? wanted : this.state.stage, false);
@@ -219,9 +219,10 @@ class App {
   }
 
   async job(kind, options = {}) {
+    // The server may have the workbook to write first: what was asked for is answered at once.
+    this.say(t("job.started", { kind: t(`job.${kind}`) }));
     try {
       await this.connection.ask("/api/jobs", { kind, options });
-      this.say(t("job.started", { kind: t(`job.${kind}`) }));
     } catch (error) {
       this.refuse(error);
     }

@@ -39,7 +39,7 @@ export class OrientationStage {
     this.acceptAlign = button(t("align.accept"), () => this.accept(), { testid: "align-accept" });
     this.good = h("p", { class: "good", role: "status", testid: "how-good" });
     this.target = h("p", { class: "target", role: "status" });
-    this.element = h("main", { class: "stage work", id: "stage-orientation" }, this.photos,
+    this.element = h("div", { class: "stage work", id: "stage-orientation" }, this.photos,
       h("aside", { class: "panel" }, this.target, this.wallCard.element, this.loupe.element,
         this.#controlTable(), this.#tapeTable(), this.#tellResult(), this.#result()));
   }
@@ -79,7 +79,7 @@ export class OrientationStage {
     };
     return h("section", { class: "card" }, h("h2", {}, t("tape.title")),
       h("table", { class: "grid" }, h("thead", {}, h("tr", {},
-        heads.map((key) => h("th", { scope: "col" }, t(key))), h("th"))), this.tapes),
+        heads.map((key) => h("th", { scope: "col" }, t(key))), h("th", {}, h("span", { class: "unseen" }, t("list.delete"))))), this.tapes),
       h("form", { class: "row add", onsubmit: (event) => { event.preventDefault(); add(); } },
         inputs, h("button", { type: "submit", class: "quiet", testid: "tape-add" }, t("tape.add"))));
   }

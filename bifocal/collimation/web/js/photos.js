@@ -42,7 +42,7 @@ export class PhotosStage {
         h("ul", {}, [1, 2, 3, 4, 5, 6].map((number) => h("li", {}, t(`start.bring.${number}`)))),
         h("div", { class: "row" }, button(t("start.print"), () => window.print(), { class: "quiet", testid: "print" }))),
       h("div", { class: "card" }, h("h2", {}, t("start.recent")), this.recent));
-    this.element = h("main", { class: "stage photos", id: "stage-photos" }, this.zone, this.beginning,
+    this.element = h("div", { class: "stage photos", id: "stage-photos" }, this.zone, this.beginning,
       h("div", { class: "cards" }, this.cards.map(({ element }) => element)), this.form, this.media);
     this.#listen();
   }

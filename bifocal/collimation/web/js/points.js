@@ -49,7 +49,7 @@ export class PointsStage {
     const hand = h("section", { class: "hand" }, this.target, h("div", { class: "row" },
       this.buttons.pick, this.buttons.suggest, this.buttons.accept, this.buttons.snap, this.buttons.fresh),
     this.quality);
-    this.element = h("main", { class: "stage work", id: "stage-points" },
+    this.element = h("div", { class: "stage work", id: "stage-points" },
       h("div", { class: "table-top" }, this.layers.element, this.photos),
       h("aside", { class: "panel" }, hand, this.loupe.element, this.readout.element,
         this.list.element, this.lines.element, this.measure.element));
@@ -69,7 +69,7 @@ export class PointsStage {
   }
 
   status(state) {
-    if (!state.pair) return { text: t("status.points.pair") };
+    if (!state.pair || (!state.pair.accepted && !state.points.length)) return { text: t("status.points.pair") };
     const points = this.app.points();
     const half = points.filter(({ picks }) => !picks[1] || !picks[2]).length;
     if (half) return { text: t("status.points.half", { half }) };

@@ -32,7 +32,7 @@ export class ProductsStage {
       this.pane?.mounted();
       this.pane?.fit();
     });
-    this.element = h("main", { class: "stage work", id: "stage-products" },
+    this.element = h("div", { class: "stage work", id: "stage-products" },
       h("div", { class: "table-top" }, this.#bar(), this.photos, this.profile.element),
       h("aside", { class: "panel" }, this.#deliverBox(), this.#reliefBox(), this.#orthoBox(),
         this.shapes.element, this.loupe.element));
@@ -116,7 +116,7 @@ export class ProductsStage {
   }
 
   status(state) {
-    if (!state.pair) return { text: t("status.points.pair") };
+    if (!state.pair?.accepted) return { text: t("status.points.pair") };
     if (!state.products.relief) return { text: t("status.products.relief") };
     if (!state.products.ortho) return { text: t("status.products.ortho") };
     if (!state.products.files.some(({ name }) => name.endsWith(".pdf"))) {
@@ -231,19 +231,23 @@ export class ProductsStage {
     if (here) drawing.marker(context, 1, pane.place(this.wall.fromPlane(here)));
   }
 
+  /** Say what the relief is under a CSS pixel of the pane, and show that spot of both photos. */
+  async #tell(wanted) {
+    const spot = this.pane.unplace(wanted);
+    const [X, Y] = this.wall.toPlane(spot);
+    const { r, sigma, picks } = await this.app.connection.get(`/relief/value?X=${X}&Y=${Y}`).catch(() => ({}));
+    const relief = Number.isFinite(r) ? `r ${number(r, 3)} ± ${number(sigma, 3)} m` : t("relief.unknown");
+    for (const image of [1, 2]) this.loupe.look(image, picks?.[image - 1] ?? (image === 1 ? this.wall.toPhoto(1, spot) : null));
+    setText(this.value, `X ${number(X, 3)} · Y ${number(Y, 3)} · ${relief}`);
+  }
+
   /** The relief under the pointer, asked at most a dozen times a second. */
   #ask(pixel) {
     this.wanted = pixel && this.app.state.products.relief ? pixel : null;
     if (this.asking || !this.wanted) return;
     this.asking = setTimeout(async () => {
-      const wanted = this.wanted;
-      if (wanted) {
-        const [X, Y] = this.wall.toPlane(this.pane.unplace(wanted));
-        const { r, sigma, picks } = await this.app.connection.get(`/relief/value?X=${X}&Y=${Y}`).catch(() => ({}));
-        const relief = Number.isFinite(r) ? `r ${number(r, 3)} ± ${number(sigma, 3)} m` : t("relief.unknown");
-        for (const image of [1, 2]) this.loupe.look(image, picks?.[image - 1] ?? (image === 1 ? this.wall.toPhoto(1, this.pane.unplace(wanted)) : null));
-        setText(this.value, `X ${number(X, 3)} · Y ${number(Y, 3)} · ${relief}`);
-      }
+      const { wanted } = this;
+      if (wanted) await this.#tell(wanted).catch((error) => this.app.refuse(error));
       this.asking = null;
       if (this.wanted && this.wanted !== wanted) this.#ask(this.wanted);
     }, ASK_MS);

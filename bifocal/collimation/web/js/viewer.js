@@ -215,9 +215,12 @@ export class Pane extends EventTarget {
 
   /** Show these pixels of the grid where all is to be shown: the rest is empty. */
   frameTo(frame) {
+    if (!frame.length) return;
     const places = frame.map(toMap);
     const [x, y] = [0, 1].map((axis) => places.map((place) => place[axis]));
-    this.extent = [Math.min(...x), Math.min(...y), Math.max(...x), Math.max(...y)];
+    const [left, bottom, right, top] = this.view.getProjection().getExtent();
+    this.extent = [Math.max(Math.min(...x), left), Math.max(Math.min(...y), bottom),
+      Math.min(Math.max(...x), right), Math.min(Math.max(...y), top)];
   }
 
   /** Show the whole grid. */

@@ -44,6 +44,7 @@ export class WallCard {
 
   /** What the next click is for, or nothing where it picks control points. */
   get asks() {
+    if (this.ends.length === 2) return t("wall.askLength");
     if (!this.tool) return "";
     if (this.tool === "wall") return t("wall.askSpot");
     return t(this.ends.length === 1 ? "wall.askSecond" : "wall.askFirst");

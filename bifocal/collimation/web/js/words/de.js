@@ -356,4 +356,5 @@ export default {
   "sketch.e1": "Um wie viel Relief den Punkt im fernen Foto verschiebt.",
   "sketch.r": "Wie weit der Punkt vor der Wand steht, zu den Kameras hin.",
   "sketch.sigma": "Wie gut es bekannt ist: in zwei von drei Fällen liegt der wahre Wert darin.",
+  "wall.askLength": "Jetzt eintippen, wie lang sie ist",
 };

@@ -356,4 +356,5 @@ export default {
   "sketch.e1": "By how much relief moves the point in the far photo.",
   "sketch.r": "How far the point stands out from the wall, towards the cameras.",
   "sketch.sigma": "How well it is known: two out of three times the true value lies within this.",
+  "wall.askLength": "Now type how long it is",
 };

@@ -356,4 +356,5 @@ export default {
   "sketch.e1": "Di quanto il rilievo sposta il punto nella foto lontana.",
   "sketch.r": "Quanto il punto sporge dal muro, verso le fotocamere.",
   "sketch.sigma": "Quanto bene è noto: due volte su tre il valore vero sta qui dentro.",
+  "wall.askLength": "Ora scrivi quanto misura",
 };
