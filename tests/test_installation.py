@@ -109,7 +109,7 @@ def test_versions_are_read_from_the_names_of_folders(tmp_path, monkeypatch):
 def test_a_library_that_was_left_out_is_named_with_the_extra_that_brings_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "starlette", None)
     monkeypatch.setitem(sys.modules, "uvicorn", None)
-    for name in [name for name in sys.modules if name.startswith("bifocal.collimation.server")]:
+    for name in [name for name in sys.modules if name.startswith("bifocal.collimation.")]:
         monkeypatch.delitem(sys.modules, name)
     done = CliRunner().invoke(main, ["pick", str(SAMPLE / "facade.pair.json"), "--no-browser"])
     assert done.exit_code == 1
