@@ -124,43 +124,33 @@ def test_flagged_check_points_are_left_out_and_large_errors_are_told_in_sigmas(t
     assert ends[0]["X_from"] == "#N/A"
 
 
-def test_the_worked_row_of_the_first_sheet_comes_out(tmp_path):
+def test_one_book_worked_row_rows_below_the_table_and_a_point_at_the_nadir(tmp_path):
+    """Three things of the sheets that touch each other nowhere, in one recalculation."""
+    worked, nadir = ("TEST", 4.2424, 0, 4.4706, 0), ("N", 0, 0, 0, 0)
     path = typed(tmp_path / "s.xlsx", points=[])
     book = openpyxl.load_workbook(path)
-    for column, value in enumerate(("TEST", 4.2424, 0, 4.4706, 0), start=1):
-        book["Points"].cell(5, column).value = value
-    book.save(path)
-    assert named(recalculated(path, tmp_path), "worked_row").value.startswith("OK")
-    named(book, "d_2").value = 9.0
-    book.save(path)
-    assert named(recalculated(path, tmp_path), "worked_row").value.startswith("CHECK")
-
-
-def test_rows_below_the_table_are_counted_and_may_be_typed(tmp_path):
-    path = typed(tmp_path / "s.xlsx", points=rows(WALL))
-    book = openpyxl.load_workbook(path)
     points = book["Points"]
+    for row, (name, *picks) in enumerate([worked, *rows(WALL), nadir], start=5):
+        for column, value in enumerate([name, *picks], start=1):
+            points.cell(row, column).value = value
     for row, name in enumerate(("1-2", "007"), start=5 + ROWS):
         points.cell(row, 1).value = name
+    book["Log"]["H5"] = "=SUM(tblPoints[r])+SUM(tblPoints[sigma_r])+SUM(tblResults[Z])"
     book.save(path)
-    book = recalculated(path, tmp_path)
-    assert "2 rows below the table wait for formulas" in named(book, "unprinted_Points").value
-    assert named(book, "unprinted_Results").value == named(book, "unprinted_Points").value
+    fresh = recalculated(path, tmp_path)
+    assert named(fresh, "worked_row").value.startswith("OK")
+    assert "2 rows below the table wait for formulas" in named(fresh, "unprinted_Points").value
+    assert named(fresh, "unprinted_Results").value == named(fresh, "unprinted_Points").value
     assert named(openpyxl.load_workbook(path), "unprinted_Points").font.b
     columns = openpyxl.load_workbook(path)["Points"].column_dimensions
     assert not columns["A"].protection.locked
     assert columns["L"].protection.locked
-
-
-def test_a_point_at_the_nadir_poisons_no_sum(tmp_path):
-    path = typed(tmp_path / "s.xlsx", points=[*rows(WALL), ("N", 0, 0, 0, 0)])
-    book = openpyxl.load_workbook(path)
-    book["Log"]["H5"] = "=SUM(tblPoints[r])+SUM(tblPoints[sigma_r])+SUM(tblResults[Z])"
-    book.save(path)
-    fresh = recalculated(path, tmp_path)
     shown = {row["id"]: row for row in rows_of(fresh, "Points", 4)}
     assert shown["N"]["flag"] == "NADIR"
     assert isinstance(fresh["Log"]["H5"].value, float)
+    named(book, "d_2").value = 9.0
+    book.save(path)
+    assert named(recalculated(path, tmp_path), "worked_row").value.startswith("CHECK")
 
 
 def charted(book, table):

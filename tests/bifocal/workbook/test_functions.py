@@ -135,7 +135,9 @@ def test_names_hold_what_the_file_format_wants(book):
         assert bare.count("(") == bare.count(")")
 
 
-@pytest.mark.parametrize("language", ["en", "it", "de"])
+@pytest.mark.parametrize(
+    "language", ["en", *(pytest.param(m, marks=pytest.mark.acceptance) for m in ("it", "de"))]
+)
 def test_sheet_is_sound_and_in_its_language(language, tmp_path):
     path = tmp_path / "book.xlsx"
     write_template(path, functions=True, language=language, rows=3)

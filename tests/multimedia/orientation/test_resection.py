@@ -190,7 +190,9 @@ def test_what_a_flat_target_parallel_to_the_image_cannot_determine_is_named():
         resect(truth, flat, image, estimate=("c",))
 
 
-@pytest.mark.parametrize("estimate", [("c",), ("c", "k1"), ("c", "xh", "yh")])
+@pytest.mark.parametrize(
+    "estimate", [("c",), pytest.param(("c", "k1"), marks=pytest.mark.acceptance), ("c", "xh", "yh")]
+)
 def test_noise_on_a_flat_target_parallel_to_the_image_determines_nothing_either(estimate):
     for seed in range(12):
         rng = np.random.default_rng(seed)
