@@ -47,7 +47,7 @@ def defaults_of(step: str, options: Mapping[str, Any]) -> dict[str, Any]:
     Examples
     --------
     >>> defaults_of("relief", {}), defaults_of("relief", {"quality": "fast"})
-    ({'quality': 'standard'}, {})
+    ({'quality': 'standard', 'cog': False}, {'cog': False})
     """
     unsaid = {name: OF_PAIR[name].fixed_default for name in OF_STEP.get(step, ())}
     return {
