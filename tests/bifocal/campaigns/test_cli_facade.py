@@ -42,7 +42,8 @@ def test_everything_is_delivered_and_a_second_run_makes_only_what_changed(tmp_pa
     for name in (
         "align/wall.pair.json", "relief/wall_relief.tif", "points/wall_points.xlsx",
         "drawing/wall.tif", "drawing/wall.pdf", "drawing/wall.dxf", "drawing/wall_relief.pdf",
-        "view/wall_view.html", "relief/wall_relief.ply", "report/wall_report.html", "report/wall_report.pdf",
+        "view/wall_view.html", "report/wall_report.html", "report/wall_report.pdf",
+        "relief/wall_relief.ply",
     ):  # fmt: skip
         assert (out / name).stat().st_size > 1000, name
     page = (out / "report/wall_report.html").read_text("utf-8")
