@@ -202,6 +202,11 @@ def test_a_set_is_refused_with_the_reason(three):
     with pytest.raises(InputError, match="col4, row4 are missing"):
         read_control(folder / "set.csv", sigma=0.003, sigma_plane=None, photos=4)
     assert Control().of(0, 3).pixels2.shape == (0, 2)
+    ends = np.full((2, 2), 5.0)
+    length = Control(ids=("start", "end"), xyz=np.full((2, 3), np.nan), sigma=np.ones((2, 3)),
+                     pixels1=ends, pixels2=np.full((2, 2), np.nan))  # fmt: skip
+    assert (length.of(0, 3).pixels1 == ends).all()
+    assert np.isnan(length.of(0, 3).pixels2).all()
 
 
 @pytest.mark.acceptance
