@@ -58,7 +58,7 @@ class OtherPhoto:
         return (self.d or math.nan) / ((self.c or math.nan) * (self.enlargement or 1.0))
 
 
-class _Seen(NamedTuple):
+class _PlanePositions(NamedTuple):
     """Where photos see points on the wall [m], what each place weighs; shape (n, photos)."""
 
     x: FloatArray
@@ -108,7 +108,7 @@ def of_all_photos(
     return columns | together, cells | turns
 
 
-def _seen(setup: SurveySetup, points: PointObservations) -> _Seen:
+def _seen(setup: SurveySetup, points: PointObservations) -> _PlanePositions:
     """Return where all photos see the points on the wall."""
     taking, measured = setup.taking, setup.in_millimetres(points)
     unit, _ = setup.typed_frame(1)
@@ -127,11 +127,11 @@ def _seen(setup: SurveySetup, points: PointObservations) -> _Seen:
     wall[np.isnan(wall).any(axis=2)] = np.nan
     weight = np.where(np.isnan(wall[..., 0]), np.nan, scales**-2.0)
     distances = np.array([photo.d or np.nan for photo in photos])
-    return _Seen(wall[..., 0], wall[..., 1], weight, distances, scales)
+    return _PlanePositions(wall[..., 0], wall[..., 1], weight, distances, scales)
 
 
 def _of_pair(
-    seen: _Seen, photo: int, precision: float
+    seen: _PlanePositions, photo: int, precision: float
 ) -> tuple[tuple[FloatArray, FloatArray], FloatArray]:
     """Return relief by the first photo and another with its sigma, and what is divided by."""
     d, radii = seen.distances, np.hypot(seen.x, seen.y)
@@ -146,7 +146,9 @@ def _of_pair(
     return (relief(s1, s2, d1=d1, d2=d2), sigma), rate
 
 
-def _together(seen: _Seen, precision: float) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+def _together(
+    seen: _PlanePositions, precision: float
+) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
     """Return the points by all rays, and the turns that lead there."""
     x, y, w, d, _ = seen
 

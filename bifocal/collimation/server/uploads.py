@@ -68,7 +68,7 @@ def safe_name(name: str) -> str:
     Examples
     --------
     >>> safe_name("../../etc/Façade 1.JPG"), safe_name("C:\\\\x\\\\far?.tif")
-    ('Façade 1.jpg', 'far_.tif')
+    ('Façade 1.jpg', 'far.tif')
     """
     last = name.replace("\\", "/").rpartition("/")[2]
     stem, dot, ending = last.rpartition(".")
