@@ -426,7 +426,8 @@ def _charts(editor: WorkbookEditor, built: BookBuilder, rows: Sequence[int]) -> 
         for row, value in zip(rows, block.columns[LEFT + i], strict=False):
             if 0 <= row < len(values):
                 values[row] = value
-        editor.set_results(title, HEAD + 1, {LEFT + 1 + i: values})
+        for row, value in enumerate(values, start=HEAD + 1):
+            editor.set_result(title, row, LEFT + 1 + i, value)
 
 
 def _log(editor: WorkbookEditor, content: SurveyContent) -> None:
@@ -443,4 +444,4 @@ def _log(editor: WorkbookEditor, content: SurveyContent) -> None:
         for key, value in entry.items():
             editor.set_value(area.sheet, bottom, headings[key], value)
         return
-    editor.append_rows("tblLog", [entry])
+    editor.append_columns("tblLog", {key: [value] for key, value in entry.items()})

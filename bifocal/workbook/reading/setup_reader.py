@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.survey.other_photos import MOST_PHOTOS, OtherPhoto
-from bifocal.survey.setup import Measuring, SurveySetup, Taking
+from bifocal.survey.other_photos import MOST_PHOTOS
+from bifocal.survey.setup import Measuring, OtherPhoto, SurveySetup, Taking
 from bifocal.survey.survey_lens import SurveyLens
 from bifocal.survey.survey_media import (
     FEWEST,

@@ -134,26 +134,6 @@ class WorkbookEditor:
         """
         self._changes(title).cached.setdefault(row, {})[column] = "" if value is None else value
 
-    def set_results(
-        self, title: str, first_row: int, columns: Mapping[int, ArrayLike | Sequence[CellValue]]
-    ) -> None:
-        """Store the results of whole columns of formulas.
-
-        Parameters
-        ----------
-        title : str
-            Sheet.
-        first_row : int
-            Row of the first result.
-        columns : mapping
-            Column number to results, one per row. Texts, booleans and numbers may be mixed in a
-            list.
-        """
-        cached = self._changes(title).cached
-        for column, values in columns.items():
-            for row, value in enumerate(_plain(values), start=first_row):
-                cached.setdefault(row, {})[column] = value
-
     def put(
         self,
         title: str,
@@ -200,7 +180,7 @@ class WorkbookEditor:
             self._changes(title).added.append(NewRows(first, size, columns, "filled"))
 
     def extend(self, table: str, bottom: int) -> None:
-        """Let a named table reach down to a row, over what stands there; as `append_rows`."""
+        """Let a named table reach down to a row, over what stands there; as `append_columns`."""
         area, last = self._growing(table)
         if bottom > last:
             self.grown[area.name] = (area, bottom)
@@ -247,46 +227,6 @@ class WorkbookEditor:
         names = (f"{title}{f' {number}' if number > 1 else ''}" for number in counted(1))
         return next(name for name in names if name.casefold() not in taken)
 
-    def append_rows(
-        self,
-        table: str,
-        rows: Sequence[Mapping[str, CellValue]],
-        results: Sequence[Mapping[str, CellValue]] = (),
-    ) -> list[int]:
-        """Add rows to a named table; formulas and formats are those of its last row.
-
-        The table, its filter, the conditional formats and validations of its last row, and charts
-        and names that reach to its last row grow with it.
-
-        Parameters
-        ----------
-        table : str
-            Name of the table.
-        rows : sequence of mappings
-            Heading to typed value; headings without value stay empty or get their formula.
-        results : sequence of mappings
-            Heading to cached result of the row's formulas.
-
-        Returns
-        -------
-        list of int
-            The new rows' numbers.
-
-        Raises
-        ------
-        InputError
-            If there is no such table or heading, the table ends in a row of totals, or the cells
-            below it are not empty.
-        """
-        headings = [name for row in rows for name in row]
-        cached = [name for row in results for name in row]
-        return self.append_columns(
-            table,
-            {name: [row.get(name) for row in rows] for name in dict.fromkeys(headings)},
-            {name: [row.get(name) for row in results] for name in dict.fromkeys(cached)},
-            count=len(rows),
-        )
-
     def append_columns(
         self,
         table: str,
@@ -295,7 +235,10 @@ class WorkbookEditor:
         *,
         count: int | None = None,
     ) -> list[int]:
-        """Add many rows to a named table, given by columns; as `append_rows` otherwise.
+        """Add rows to a named table, given by columns; formulas and formats are of its last row.
+
+        The table, its filter, the conditional formats and validations of its last row, and charts
+        and names that reach to its last row grow with it.
 
         Parameters
         ----------
@@ -310,6 +253,12 @@ class WorkbookEditor:
         -------
         list of int
             The new rows' numbers.
+
+        Raises
+        ------
+        InputError
+            If there is no such table or heading, the table ends in a row of totals, or the cells
+            below it are not empty.
         """
         area, bottom = self._growing(table)
         where = f"{self.path.name} › {area.sheet}"
@@ -382,19 +331,15 @@ class WorkbookEditor:
                 f"{target}: must end in {self.path.suffix} like {self.path.name}, so that macros "
                 "stay what they are."
             )
-        if not in_place:
+        if in_place:
+            check_writable(target, overwrite=True)
+        else:
             check_new_workbook(target, overwrite=overwrite)
-            parts = self.changed_parts()
-            with new_workbook(target, overwrite=overwrite) as temporary:
-                rewrite_package(self.path, temporary, parts)
-                refuse_lost(temporary, self.path)
-            return None
-        check_writable(target, overwrite=True)
-        parts = self.changed_parts()
-        with atomic_path(target, overwrite=True) as temporary:
+        parts, place = self.changed_parts(), atomic_path if in_place else new_workbook
+        with place(target, overwrite=in_place or overwrite) as temporary:
             rewrite_package(self.path, temporary, parts)
             refuse_lost(temporary, self.path)
-            return kept_copy(self.path)
+            return kept_copy(self.path) if in_place else None
 
     def changed_parts(self) -> dict[str, bytes | None]:
         """Return the parts of the package that change or are new, with their new content."""
