@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from bifocal.remarks import remark
 from bifocal.survey.survey_input import SurveyInput
 from bifocal.survey.what_if import CHANGED
 from bifocal.workbook.changing.setup_update import (
@@ -89,11 +90,7 @@ def refuse_earlier(source: Path, survey: SurveyInput) -> None:
         Naming the way out.
     """
     if is_earlier(survey):
-        raise InputError(
-            f"{source}: was made by an earlier version of this program, whose formulas are not "
-            f"renewed in place. Write to a new workbook, e.g. --out {_other(source)}: set-up, "
-            "points, check and control points are carried over; this one stays as it is."
-        )
+        raise InputError(remark("survey.earlier_version", of=source, other=_other(source)))
 
 
 def is_same_kind(survey: SurveyInput, content: SurveyContent) -> bool:
@@ -121,11 +118,7 @@ def check_kind(source: Path, survey: SurveyInput, content: SurveyContent) -> Non
     kind = "coordinates in mm or px" if content.is_pair else "raw pixels of a pair"
     if content.is_pair == ("col1" in survey.table.present):
         kind = "photos in air"
-    raise InputError(
-        f"{source}: its formulas are made for another kind of measurement ({kind}) and are not "
-        f"changed into others in place. Write to a new workbook, e.g. --out {_other(source)}; this "
-        "one stays as it is."
-    )
+    raise InputError(remark("survey.other_kind", of=source, kind=kind, other=_other(source)))
 
 
 def _other(source: Path) -> str:

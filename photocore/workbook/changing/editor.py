@@ -6,6 +6,7 @@ import math
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache, partial
 from itertools import count as counted
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable, kept_copy
+from photocore.remarks import remark
 from photocore.workbook.changing import formulas
 from photocore.workbook.changing.cells import (
     CellValue,
@@ -86,15 +88,10 @@ class WorkbookEditor:
         self.path = Path(self.path)
         if self.path.suffix.lower() not in (".xlsx", ".xlsm"):
             check_header(self.path)
-            raise InputError(
-                f"{self.path}: only .xlsx and .xlsm workbooks can be changed in place."
-            )
+            raise InputError(remark("book.in_place", of=self.path))
         with open_package(self.path) as package:
             if any(name.startswith("_xmlsignatures/") for name in package.namelist()):
-                raise InputError(
-                    f"{self.path}: is digitally signed; a change would break the signature. Remove "
-                    "the signature first, or write to another kind of file."
-                )
+                raise InputError(remark("book.signed", of=self.path))
             self.book = read_directory(self.path, package)
             self.tables = [t for s in self.book.sheets for t in read_tables(self.path, package, s)]
 
@@ -121,10 +118,8 @@ class WorkbookEditor:
     def set_value(self, title: str, row: int, column: int, value: CellValue) -> None:
         """Type a value into a cell; its format stays. None clears the cell."""
         if isinstance(value, float) and not math.isfinite(value):
-            raise InputError(
-                f"{self.path.name} › {title}!{cell_name(row, column)}: {value} is not a number "
-                "that can be typed into a cell."
-            )
+            where = f"{self.path.name} › {title}!{cell_name(row, column)}"
+            raise InputError(remark("book.no_number", of=where, value=value))
         self._changes(title).inputs.setdefault(row, {})[column] = value
 
     def set_result(self, title: str, row: int, column: int, value: CellValue) -> None:
@@ -296,8 +291,7 @@ class WorkbookEditor:
             raise InputError(f'{self.path.name}: has no table "{table}"; it has {names}.')
         if area.totals_rows:
             raise InputError(
-                f"{self.path.name} › {area.sheet}: the table {area.name} ends in a row of totals; "
-                "switch it off in the spreadsheet program (Table design) before rows are added."
+                remark("book.totals_row", of=f"{self.path.name} › {area.sheet}", table=area.name)
             )
         return self.grown.get(area.name, (area, area.area[2]))
 
@@ -328,8 +322,7 @@ class WorkbookEditor:
         in_place = target.exists() and target.samefile(self.path)
         if target.suffix.lower() != self.path.suffix.lower():
             raise InputError(
-                f"{target}: must end in {self.path.suffix} like {self.path.name}, so that macros "
-                "stay what they are."
+                remark("book.other_ending", of=target, ending=self.path.suffix, name=self.path.name)
             )
         if in_place:
             check_writable(target, overwrite=True)
@@ -385,7 +378,7 @@ class WorkbookEditor:
             for content, titles in self.grafts:
                 graft.add_sheets(content, titles)
             for name, reference in self.names.items():
-                graft.redefine(name, reference)
+                graft.define(name, reference, anew=True)
         if self._styles is not None and self._styles.added:
             parts[part_of_kind(package, self.book, "styles")] = self._styles.written()
 
@@ -394,23 +387,13 @@ class WorkbookEditor:
             with open_package(self.path) as package:
                 part = part_of_kind(package, self.book, "styles")
                 if not part:
-                    raise InputError(
-                        f"{self.path}: has no cell formats. Open it in the spreadsheet program, "
-                        "save it there, and try again."
-                    )
+                    raise InputError(remark("book.no_formats", of=self.path))
                 self._styles = StyleSheet(read_part(self.path, package, part))
         return self._styles
 
     def _splice(self, package: zipfile.ZipFile) -> dict[str, Spliced]:
         """Return the changed sheets."""
-        strings: list[str] | None = None
-
-        def shared() -> list[str]:
-            nonlocal strings
-            if strings is None:
-                strings = read_shared_strings(self.path, package, self.book)
-            return strings
-
+        shared = cache(partial(read_shared_strings, self.path, package, self.book))
         spliced = {}
         for sheet in self.book.sheets:
             changes = self.changes.get(sheet.title)
@@ -437,10 +420,8 @@ class WorkbookEditor:
         for row in rows:
             for column in cells.get(row, {}):
                 if left <= column <= right:
-                    raise InputError(
-                        f"{self.path.name} › {area.sheet}!{cell_name(row, column)}: is not empty, "
-                        f"so the table {area.name} cannot grow. Move what stands below the table."
-                    )
+                    where = f"{self.path.name} › {area.sheet}!{cell_name(row, column)}"
+                    raise InputError(remark("book.table_blocked", of=where, table=area.name))
 
 
 def _plain(values: ArrayLike | Sequence[CellValue]) -> Sequence[CellValue]:
