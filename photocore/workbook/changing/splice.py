@@ -28,6 +28,8 @@ from photocore.workbook.reading.xlsx import unescape
 from photocore.workbook.reading.xmltext import quoted, unescaped
 
 _TAG = re.compile(rb"""<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*(/?)>""")
+#: New rows are kept in pieces of so many bytes, each of which is let go by itself.
+_PIECE = 2**25
 _INLINE = re.compile(r"\s*<(?:\w+:)?t(?:\s[^>]*)?>([^<]*)</(?:\w+:)?t>\s*")
 
 
@@ -408,10 +410,14 @@ class _Splicer:
         tag = f"{self.prefix}row"
         pieces = zip(rows, lines, strict=True)
         made = bytearray()  # rows of a large sheet are never held one by one
+        start, end, opening, closing = place
         for number, xml in pieces:
             if xml:
+                if len(made) > _PIECE:
+                    self.insert(made, (start, end, opening, ""))
+                    made, opening = bytearray(), ""
                 made += f'<{tag} r="{number}">{xml}</{tag}>'.encode()
-        self.insert(made, place)
+        self.insert(made, (start, end, opening, closing))
 
     def row_xml(self, row: int) -> str:
         """Return the XML of the cells of a new row."""
