@@ -411,6 +411,12 @@ def _charts(editor: WorkbookEditor, built: BookBuilder, rows: Sequence[int]) -> 
     title = chart_sheet(editor)
     if title is None:
         return
+    place = place_of(editor, "chart_vectors")
+    if place is not None:  # programs whose titles follow no cell show what is stored in the chart
+        cell = built.book.defined_names["chart_vectors"].attr_text.rpartition("!")[2]
+        stands, empty = editor.value_at(*place), built.word("chart_vectors").format(n=1)
+        said = str(built.results["Charts"][cell.replace("$", "")])
+        editor.replace_text(place[0], stands if isinstance(stands, str) else empty, said)
     block: RowBlock = built.blocks["Charts"]
     cells = editor.grid(title).rows
     last = max((row for row, values in cells.items() if LEFT + 1 in values), default=HEAD)
