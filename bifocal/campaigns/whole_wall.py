@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from bifocal.campaigns.pair_job import PairOutcome, plan_of_steps, run_steps
 from bifocal.campaigns.pair_steps import PairJob, tables_of
@@ -43,8 +44,8 @@ def joint_step(jobs: Sequence[PairJob]) -> Step:
     return Step(name=JOINT, files=files, options=options, make=make)
 
 
-def mosaic_step(jobs: Sequence[PairJob]) -> Step:
-    """Return the step that joins the orthophotos of the drawings.
+def mosaic_step(jobs: Sequence[PairJob], options: Mapping[str, Any]) -> Step:
+    """Return the step that joins the orthophotos of the drawings, by options of `mosaic`.
 
     Raises
     ------
@@ -63,9 +64,9 @@ def mosaic_step(jobs: Sequence[PairJob]) -> Step:
         from bifocal.orthophotos.mosaic_workflow import make_mosaic
 
         out = place / "mosaic.tif"
-        return tuple(make_mosaic(orthos, out, relief=reliefs, progress=progress).remarks)
+        return tuple(make_mosaic(orthos, out, relief=reliefs, progress=progress, **options).remarks)
 
-    return Step(name=MOSAIC, files=files, options={"cog": True}, make=make)
+    return Step(name=MOSAIC, files=files, options={"cog": True, **options}, make=make)
 
 
 def plan_of_whole(folder: Path, step: Step) -> str:

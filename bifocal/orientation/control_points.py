@@ -246,9 +246,13 @@ def _names(texts: Sequence[str], before: str) -> list[str]:
     return [text or name for text, name in zip(texts, own, strict=True)]
 
 
-def known_points(path: Path, *, unit: str = "", photos: int = 2) -> SurveyPoints:
+def known_points(
+    path: Path, *, unit: str = "", columns: str | None = None, photos: int = 2
+) -> SurveyPoints:
     """Return the coordinates of a table of control or check points, NaN where it has none."""
-    control = read_control(path, sigma=0.003, sigma_plane=None, unit=unit, photos=photos)
+    control = read_control(
+        path, sigma=0.003, sigma_plane=None, unit=unit, columns=columns, photos=photos
+    )
     blank = ("",) * len(control.ids)
     return SurveyPoints(
         ids=control.ids, xyz=control.xyz, sigma_r=control.sigma[:, 2], flags=blank, notes=blank,

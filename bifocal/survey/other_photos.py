@@ -30,7 +30,7 @@ def is_of_others(key: str) -> bool:
     return key in OF_ALL or key.startswith(("r_1_", "sigma_1_"))
 
 
-class _OnWall(NamedTuple):
+class _PlanePositions(NamedTuple):
     """Where photos see points on the wall [m], what each place weighs; shape (n, photos)."""
 
     x: FloatArray
@@ -80,7 +80,7 @@ def of_all_photos(
     return columns | together, cells | turns
 
 
-def _on_wall(setup: SurveySetup, points: PointObservations) -> _OnWall:
+def _on_wall(setup: SurveySetup, points: PointObservations) -> _PlanePositions:
     """Return where all photos see the points on the wall."""
     taking, measured = setup.taking, setup.in_millimetres(points)
     unit, _ = setup.typed_frame(1)
@@ -99,11 +99,11 @@ def _on_wall(setup: SurveySetup, points: PointObservations) -> _OnWall:
     wall[np.isnan(wall).any(axis=2)] = np.nan
     weight = np.where(np.isnan(wall[..., 0]), np.nan, scales**-2.0)
     distances = np.array([photo.d or np.nan for photo in photos])
-    return _OnWall(wall[..., 0], wall[..., 1], weight, distances, scales)
+    return _PlanePositions(wall[..., 0], wall[..., 1], weight, distances, scales)
 
 
 def _of_pair(
-    seen: _OnWall, photo: int, precision: float
+    seen: _PlanePositions, photo: int, precision: float
 ) -> tuple[tuple[FloatArray, FloatArray], FloatArray]:
     """Return relief by the first photo and another with its sigma, and what is divided by."""
     d, radii = seen.distances, np.hypot(seen.x, seen.y)
@@ -119,7 +119,7 @@ def _of_pair(
 
 
 def _together(
-    seen: _OnWall, precision: float
+    seen: _PlanePositions, precision: float
 ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
     """Return the points by all rays, and the turns that lead there."""
     x, y, w, d, _ = seen
