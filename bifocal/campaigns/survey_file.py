@@ -11,6 +11,7 @@ from typing import Any
 
 from bifocal.campaigns.pair_steps import PRODUCTS, PairJob, tables_of
 from bifocal.options import FILES, JOINT, OF_PAIR
+from bifocal.remarks import remark
 from photocore.errors import InputError
 from photocore.options import options_of
 from photocore.textfile import file_name, read_toml
@@ -154,10 +155,7 @@ def _faults_of_whole(jobs: Sequence[PairJob], whole: Mapping[str, Any]) -> list[
     ]
     for key in JOINT if whole["joint"] else ():
         if len({job.options.get(key) for job in jobs if tables_of(job)}) > 1:
-            faults.append(
-                f"{key}: the pairs say different things of their tables, and joint = true "
-                "adjusts all tables as one; write it above the pairs."
-            )
+            faults.append(remark("campaign.tables_differ", of=key))
     return faults
 
 
@@ -165,7 +163,7 @@ def _parsed(path: Path) -> dict[str, Any]:
     data = read_toml(path, "survey file")
     if data.get("format", FORMAT) != FORMAT:
         raise InputError(
-            f"{path}: format {data['format']!r} is not known; this program reads {FORMAT}."
+            remark("campaign.unknown_format", of=path, format=repr(data["format"]), known=FORMAT)
         )
     return data
 

@@ -11,6 +11,7 @@ from bifocal.campaigns.pair_job import PairOutcome, plan_of_steps, run_steps
 from bifocal.campaigns.pair_steps import PairJob, tables_of
 from bifocal.campaigns.step_store import Step, clean
 from bifocal.options import JOINT as JOINT_OPTIONS
+from bifocal.remarks import remark
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.provenance import FileHashes
@@ -53,9 +54,7 @@ def mosaic_step(jobs: Sequence[PairJob], options: Mapping[str, Any]) -> Step:
     """
     drawn = [job for job in jobs if job.product("drawing").is_file()]
     if len(drawn) < 2:
-        raise InputError(
-            "mosaic: fewer than two pairs have a drawing; add drawing to their products."
-        )
+        raise InputError(remark("campaign.no_mosaic"))
     orthos = [job.product("drawing") for job in drawn]
     reliefs = [job.product("relief") for job in drawn if job.product("relief").is_file()]
     files = {f"ortho {k}": path for k, path in enumerate(orthos)}

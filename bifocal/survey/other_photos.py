@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from bifocal.equations import relief
 from bifocal.model.flags import FlagLimits
 from bifocal.precision import sigma_relief
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.setup import OtherPhoto, SurveySetup
 from photocore.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from bifocal.survey.observations import PointObservations
-    from bifocal.survey.setup import SurveySetup
 
 #: Most photos of one workbook.
 MOST_PHOTOS = 6
@@ -31,31 +28,6 @@ CHANCE = math.erfc(FlagLimits().redundant / math.sqrt(2.0))
 def is_of_others(key: str) -> bool:
     """Tell whether a column is one that `of_all_photos` returns."""
     return key in OF_ALL or key.startswith(("r_1_", "sigma_1_"))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OtherPhoto:
-    """How a photo beside an ideal pair was taken; its image coordinates are those of the pair.
-
-    Attributes
-    ----------
-    d, c : float or None
-        Distance to the reference plane [m] and principal distance [mm]; None while not typed.
-    enlargement : float or None
-        Of the print that was measured; None or 1 = on the sensor.
-    nadir : tuple of float or None
-        (column, row) of the nadir point, for coordinates in pixels. [px]
-    """
-
-    d: float | None = None
-    c: float | None = None
-    enlargement: float | None = None
-    nadir: tuple[float, float] | None = None
-
-    @property
-    def scale(self) -> float:
-        """Metres on the wall for a millimetre; NaN while a distance is not typed."""
-        return (self.d or math.nan) / ((self.c or math.nan) * (self.enlargement or 1.0))
 
 
 class _PlanePositions(NamedTuple):
@@ -95,7 +67,7 @@ def of_all_photos(
     photo counts once, in however many pairs. With X, Y eliminated a turn of Gauss-Newton is a
     quotient of sums over the photos, which a cell can hold.
     """
-    seen = _seen(setup, points)
+    seen = _on_wall(setup, points)
     columns: dict[str, FloatArray] = {}
     cells: dict[str, FloatArray] = {}
     for k, (x, y, weight) in enumerate(zip(seen.x.T, seen.y.T, seen.weight.T, strict=True), 1):
@@ -108,7 +80,7 @@ def of_all_photos(
     return columns | together, cells | turns
 
 
-def _seen(setup: SurveySetup, points: PointObservations) -> _PlanePositions:
+def _on_wall(setup: SurveySetup, points: PointObservations) -> _PlanePositions:
     """Return where all photos see the points on the wall."""
     taking, measured = setup.taking, setup.in_millimetres(points)
     unit, _ = setup.typed_frame(1)
