@@ -24,13 +24,13 @@ SET_UP, MAP, PICTURE, DRAWING, JOINT, PROJECT = (
 )
 #: What each step of a pair asks for.
 OF_STEP = {
-    "align": ("control", *SET_UP),
+    "align": ("control", "columns", *SET_UP),
     "relief": ("faces", *MAP, "cog"),
-    "points": ("control", "check", "unit", "language"),
+    "points": ("control", "check", "columns", "unit", "language"),
     "ortho": ("faces", *PICTURE, "gsd", "cog"),
-    "drawing": ("control", "check", "faces", *DRAWING, *PICTURE, "language", "cog"),
+    "drawing": ("control", "check", "columns", "faces", *DRAWING, *PICTURE, "language", "cog"),
     "view": ("language",),
-    "report": ("control", "check", "language", "unit", "scale", *PROJECT),
+    "report": ("control", "check", "columns", "language", "unit", "scale", *PROJECT),
 }
 
 
@@ -47,7 +47,7 @@ def defaults_of(step: str, options: Mapping[str, Any]) -> dict[str, Any]:
     Examples
     --------
     >>> defaults_of("relief", {}), defaults_of("relief", {"quality": "fast"})
-    ({'quality': 'standard'}, {})
+    ({'quality': 'standard', 'cog': False}, {'cog': False})
     """
     unsaid = {name: OF_PAIR[name].fixed_default for name in OF_STEP.get(step, ())}
     return {

@@ -36,7 +36,7 @@ Cameras
 Bathymetry
     correct_bathymetry, CorrectedPoints   points from above the water
     correct_lidar_beams; intersect_refracted_rays, RayIntersections   laser echoes; measured rays
-    mean_water_level, WaterLevel      the level from tie points
+    mean_water_level, WaterLevel; depth_offsets, DepthOffsets   from tie points; against soundings
     wave_effect, WaveEffect, wave_statistics, WaveCase   what waves do to points; frames
     Precision, BathymetryStatus       what goes in, what became of a point
 Colours
@@ -51,8 +51,9 @@ Files
     read_experiment, write_experiment, Experiment    OpenPTV folders
     convert, Conversion       cameras of COLMAP, Metashape, OpenCV, AquaCal, in and out
 
-What they take and give: Body, Convention, DetectedTargets, HeightField, Media, Medium,
-OpticalMedia, PlaneCandidates, RefractingSurface, Sight, SurfaceSequence, Term, WaterSurface.
+What they take and give: Body, Convention, DepthClass, DepthTrend, DetectedTargets, HeightField,
+Media, Medium, OpticalMedia, PlaneCandidates, RefractingSurface, Sight, SurfaceSequence, Term,
+WaterSurface.
 
 Errors are one family with one message each that says what is wrong, where, and how to mend it:
 PhotogrammetryError > InputError (a ValueError) > CellError, WorkbookError, MissingExtraError;

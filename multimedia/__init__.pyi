@@ -20,6 +20,7 @@ from .bathymetry.refracted_rays import (
     intersect_refracted_rays,
 )
 from .bathymetry.refraction_correction import correct_bathymetry
+from .bathymetry.soundings import DepthClass, DepthOffsets, DepthTrend, depth_offsets
 from .bathymetry.wave_statistics import WaveCase, wave_statistics
 from .bathymetry.waves import WaveEffect, wave_effect
 from .design.accuracy import (
@@ -127,6 +128,9 @@ __all__ = [
     "Conversion",
     "CorrectedPoints",
     "Cylinder",
+    "DepthClass",
+    "DepthOffsets",
+    "DepthTrend",
     "DetectedTargets",
     "EpipolarCurves",
     "Experiment",
@@ -194,6 +198,7 @@ __all__ = [
     "correct_lidar_beams",
     "correspondences",
     "critical_angle",
+    "depth_offsets",
     "diagnose",
     "epipolar_candidates",
     "epipolar_curve",

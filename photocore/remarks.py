@@ -70,9 +70,9 @@ class Remarks:
                 found |= {f"{section}.{name}": words for name, words in entries.items()}
         return found
 
-    def __call__(self, key: str, **values: Any) -> Remark:
-        """Return a remark by its key, its blanks filled."""
-        told = Remark(self.texts[key]["en"].format(**values))
+    def __call__(self, key: str, /, *, of: object = "", **values: Any) -> Remark:
+        """Return a remark by its key, its blanks filled, behind the place that it is about."""
+        told = Remark((f"{of}: " if of else "") + self.texts[key]["en"].format(**values))
         told.key, told.values = key, values
         return told
 

@@ -196,7 +196,21 @@ def make_bed(folder: Path) -> None:
     las.gps_time = np.arange(400.0)
     for name in ("cloud.las", "echoes.las"):
         las.write(folder / name)
-    (folder / "cameras.csv").write_text("id,X,Y,Z\nA,-12,0,160\nB,12,0,160\nC,0,12,160\n")
+    eyes = [
+        f"{at},160,2026-06-01T10:0{k}:00" for k, at in enumerate(("A,-12,0", "B,12,0", "C,0,12"))
+    ]
+    (folder / "cameras.csv").write_text("\n".join(["id,X,Y,Z,time", *eyes, ""]))
+    tide = "time,level\n2026-06-01T10:00:00,102.3\n2026-06-01T10:20:00,102.5\n"
+    (folder / "tide.csv").write_text(tide)
+    made = [f"{x:.3f} {y:.3f} {0.8 + 0.3 * np.sin(x):.3f}" for x, y in rng.uniform(-9, 9, (60, 2))]
+    (folder / "multibeam.xyz").write_text("\n".join([*made, ""]))
+    book = openpyxl.Workbook()
+    for row in [
+        ("id", "X", "Y", "Z"),
+        *((f"s{k}", *map(float, p)) for k, p in enumerate(xyz[:40])),
+    ]:
+        book.active.append(row)
+    book.save(folder / "check.xlsx")
     (folder / "flight.csv").write_text("time,X,Y,Z\n0,-9,0,150\n200,0,0,150\n400,9,0,150\n")
     ties = xyz.copy()
     ties[:150, 2] = rng.normal(1.8075, 0.005, 150)

@@ -50,6 +50,7 @@ NOT_RUN = {
     "python -m benchmarks.bench_page 100": MINUTES,
     "python -m benchmarks.peers": MINUTES,
     "python docs/make_page_pictures.py": "wants a browser, and writes into docs",
+    "python docs/make_gallery.py": MINUTES,
     "python docs/make_cli.py": "test_docs.py compares what it writes",
     "python docs/make_wrong_pictures.py": "writes into docs; run below into another folder",
     "dask scheduler": SERVES,
@@ -130,6 +131,9 @@ CHEAPER = {
     "bifocal facade far.jpg near.jpg --control points.csv --check check.csv --scale 1:20 --out "
     "wall":
         "--quality fast --products relief,points",
+    "bifocal facade far.jpg near.jpg --control points.csv --check check.csv --scale 1:100 --focal1 "
+    "35 --focal2 19 --sensor-width 22.67 --out wall":
+        "--quality fast --products relief",
     "bifocal facade far.jpg near.jpg --auto --distance1 17.5 --scale 1:100 --language de --out "
     "wall":
         "--quality fast --products relief",

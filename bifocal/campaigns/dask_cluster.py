@@ -16,6 +16,7 @@ from bifocal.campaigns.pair_job import PairOutcome, run_pair
 from bifocal.campaigns.pair_steps import PairJob
 from bifocal.campaigns.shipping import ShippedPair, found_anywhere, packed, run_parcel, unpacked
 from bifocal.campaigns.worker_pool import Listener
+from bifocal.remarks import remark
 from photocore.errors import InputError
 from photocore.installation import how_to_install
 from photocore.provenance import program
@@ -61,16 +62,11 @@ def run_on_cluster(
     try:
         cluster: Any = import_module("distributed")
     except ImportError:
-        raise InputError(
-            f"a cluster needs Dask, here and on its workers: {how_to_install('cluster')}."
-        ) from None
+        raise InputError(remark("campaign.no_dask", how=how_to_install("cluster"))) from None
     try:
         client = cluster.Client(address, timeout=TIMEOUT, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise InputError(
-            f"--scheduler {address}: does not answer ({error}). Start one with `dask scheduler` "
-            "and workers with `dask worker ADDRESS --nthreads 1`."
-        ) from None
+        raise InputError(remark("campaign.no_scheduler", address=address, error=error)) from None
     with client:
         crew = _Crew(client, address, jobs[0].folder, listener, ship=ship)
         topic = f"bifocal-{secrets.token_hex(8)}"
@@ -128,10 +124,8 @@ class _Crew:
             try:
                 client.wait_for_workers(1, timeout=PATIENCE)
             except TimeoutError:
-                raise InputError(
-                    f"--scheduler {address}: no worker came in {PATIENCE / 60:g} minutes; start "
-                    f"some with {start}."
-                ) from None
+                about = {"address": address, "minutes": PATIENCE / 60, "start": start}
+                raise InputError(remark("campaign.no_worker", **about)) from None
         self.look()
 
     @property
@@ -187,17 +181,13 @@ def _see_folder(client: Any, address: str, folder: Path, workers: Sequence[str])
         probe.write_text(mark, encoding="utf-8")
         found = client.run(_look, str(probe.absolute()), workers=list(workers))
     except ImportError as error:
-        raise InputError(
-            f"--scheduler {address}: a worker lacks bifocal ({error}); install it there."
-        ) from None
+        raise InputError(remark("campaign.worker_without", address=address, error=error)) from None
     finally:
         probe.unlink(missing_ok=True)
     for worker, (version, _) in found.items():
         if version != program():
-            raise InputError(
-                f"--scheduler {address}: worker {worker} has {version}, this is {program()}; "
-                "install the same version everywhere."
-            )
+            other = {"address": address, "worker": worker, "version": version, "own": program()}
+            raise InputError(remark("campaign.other_version", **other))
     return all(content == mark for _, content in found.values())
 
 
@@ -216,7 +206,5 @@ def _outcome(future: Any, job: PairJob) -> PairOutcome:
         return unpacked(job, result) if isinstance(result, ShippedPair) else result
     error = future.exception() if future.status == "error" else "cancelled"
     return PairOutcome(
-        name=job.name, failed_step="run",
-        message=f"the cluster gave it up ({error}). Its workers must have this version of bifocal "
-        "and memory enough for it.",
-    )  # fmt: skip
+        name=job.name, failed_step="run", message=remark("campaign.given_up", error=error)
+    )

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from bifocal.remarks import remark
 from photocore.errors import InputError
 
 #: File that says which process works in a folder.
@@ -28,18 +29,15 @@ def locked(folders: Sequence[Path]) -> Iterator[None]:
                 folder.mkdir(parents=True, exist_ok=True)
                 path = folder / LOCK
                 if path.exists() and _is_alive(path):
-                    raise InputError(
-                        f"{folder}: another run works on it ({path.read_text('utf-8').strip()}). "
-                        f"Wait for it; if there is none, delete {path}."
-                    )
+                    who = path.read_text("utf-8").strip()
+                    raise InputError(remark("campaign.other_run", of=folder, who=who, file=path))
                 if path.exists() and not _OURS.fullmatch(path.read_text("utf-8", "replace")):
                     raise InputError(f"{path}: is not this program's; move it away.")
                 taken.append(path)
                 path.write_text(mine, encoding="utf-8")
             except OSError as error:
                 raise InputError(
-                    f"{folder}: cannot be written to ({error.strerror or error}). Free some space "
-                    "or choose another place."
+                    remark("campaign.no_writing", of=folder, error=error.strerror or error)
                 ) from error
         yield
     finally:

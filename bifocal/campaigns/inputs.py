@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from bifocal.campaigns.pair_steps import PairJob, tables_of
+from bifocal.campaigns.pair_steps import PairJob, known_of, tables_of
 from bifocal.faces.faces_files import read_faces
 from bifocal.model.lens import Lens
-from bifocal.orientation.control_points import known_points
 from bifocal.reports.control_survey import refuse_same_names
 from photocore.decoding import refuse_damaged_jpeg
 from photocore.images import image_info, read_image
@@ -29,10 +28,8 @@ def check_files(job: PairJob) -> None:
         image_info(path)
     for role in sorted({"lens", "lens1", "lens2"} & job.files.keys()):
         Lens.read(job.files[role])
-    unit = job.options.get("unit", "")
     tables = tables_of(job)
-    count = len(job.photos)
-    ids = {role: known_points(p, unit=unit, photos=count).ids for role, p in tables.items()}
+    ids = {role: points.ids for role, points in known_of(job).items()}
     if len(ids) > 1:
         refuse_same_names(tables["control"], tables["check"], ids["control"], ids["check"])
 

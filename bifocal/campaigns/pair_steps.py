@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from bifocal.campaigns.step_store import Step, StepRecord, read_record
 from bifocal.faces.faces_files import faces_path
 from bifocal.options import DRAWING, FILES, MAP, OF_PAIR, OF_STEP, PICTURE, PROJECT, SET_UP, typed
+from bifocal.remarks import remark
 from photocore.cli import Progress
 from photocore.errors import InputError
 from photocore.textfile import file_name
@@ -208,7 +209,7 @@ def _align_files(job: PairJob) -> dict[str, Path]:
 
 def _align_step(job: PairJob) -> Step:
     files = _align_files(job)
-    options = _some(job, *SET_UP)
+    options = _some(job, "columns", *SET_UP)
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.orientation.align_workflow import AlignOptions, align_photos
@@ -249,10 +250,11 @@ def _relief_step(job: PairJob) -> Step:
         from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
 
         out = place / job.product("relief").name
+        cloud = out.with_suffix(f".{options['cloud']}") if "cloud" in options else None
         task = ReliefJob(
-            out=out, preview=out.with_suffix(".png"), gsd=options.get("relief_gsd"),
+            out=out, cloud=cloud, preview=out.with_suffix(".png"), gsd=options.get("relief_gsd"),
             faces=job.files.get("faces"),
-            **_some(job, *MAP[1:]),
+            **_some(job, *(name for name in MAP if name not in ("relief_gsd", "cloud"))),
         )  # fmt: skip
         _, remarks = relief_of_pair(job.pair_path, task, progress=progress)
         return remarks
@@ -267,7 +269,7 @@ def tables_of(job: PairJob) -> dict[str, Path]:
 
 
 def _points_step(job: PairJob) -> Step:
-    options = _some(job, "language", "unit")
+    options = _some(job, "language", "unit", "columns")
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
         from bifocal.model.photo_set import pair_or_set
@@ -279,13 +281,11 @@ def _points_step(job: PairJob) -> Step:
         solution = solve_control(
             job.pair_path, **tables, exchanged=is_exchanged(pair, job.far), photos=len(job.photos),
             language=options.get("language", "en"), unit=options.get("unit", ""),
+            columns=options.get("columns"),
         )  # fmt: skip
         if solution.pair.leans:
             write_result(place / f"{job.title}_points.csv", solution)
-            told = (
-                "ports that lean have no formulas in a survey workbook: the points are a text "
-                "table (.csv)."
-            )
+            told = remark("campaign.leaning_ports")
             return (*solution.remarks, told)
         write_result(place / f"{job.title}_points.xlsx", solution)
         return solution.remarks
@@ -324,7 +324,7 @@ def _ortho_step(job: PairJob) -> Step:
 
 
 def _drawing_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
-    options = {"scale": SCALE} | _some(job, *DRAWING, *PICTURE, "language", "cog")
+    options = {"scale": SCALE} | _some(job, "columns", *DRAWING, *PICTURE, "language", "cog")
     tables = {role: job.files[role] for role in ("control", "check", "mark") if role in job.files}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
@@ -345,16 +345,22 @@ def _drawing_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
     )  # fmt: skip
 
 
+def known_of(job: PairJob) -> dict[str, SurveyPoints]:
+    """Return the coordinates that the tables of a pair hold."""
+    from bifocal.orientation.control_points import known_points
+
+    said = _some(job, "unit", "columns")
+    return {
+        role: known_points(path, photos=len(job.photos), **said)
+        for role, path in tables_of(job).items()
+    }
+
+
 def _points_to_draw(job: PairJob, *, solved: bool) -> dict[str, SurveyPoints]:
     """Return what a drawing for CAD holds: known points where they are, and as they were solved."""
     from bifocal.files.point_tables import read_survey_points
-    from bifocal.orientation.control_points import known_points
 
-    unit = str(job.options.get("unit", ""))
-    points = {
-        role: known_points(path, unit=unit, photos=len(job.photos))
-        for role, path in tables_of(job).items()
-    }
+    points = known_of(job)
     if solved:
         (table,) = (job.folder / "points").glob(f"{escape(job.title)}_points.*")
         points["points"] = read_survey_points(table)[0]
@@ -378,7 +384,7 @@ def _view_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
 def _report_step(job: PairJob, before: tuple[Step, ...]) -> Step:
     earlier = tuple(step.name for step in before)
     options: dict[str, Any] = {"title": job.name, "times": job.way == "facade"}
-    options |= _some(job, "language", "unit", "scale", *PROJECT)
+    options |= _some(job, "language", "unit", "columns", "scale", *PROJECT)
     if "drawing" in earlier:
         options.setdefault("scale", SCALE)
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from bifocal.campaigns.survey_file import FORMAT
 from bifocal.matching.features import Features, find_features, match_features
+from bifocal.remarks import remark
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.images import ImageInfo, image_info, read_grey
@@ -141,10 +142,7 @@ def write_survey_file(
     """Write the survey file of a folder's pairs, with what is still to be filled in."""
     check_writable(out, overwrite=overwrite)
     if not pairs:
-        raise InputError(
-            f"{folder}: no two photos show one wall (they share too few features). Write the pairs "
-            "yourself: [[pair]] with name, far and near."
-        )
+        raise InputError(remark("campaign.no_pair", of=folder))
     lines = [
         "# Written by `bifocal survey --init`. Names of files are relative to this one.",
         f"format = {_quoted(FORMAT)}",

@@ -258,19 +258,14 @@ def _told(
         line = LINE * scale
         flat = {"line": 1000 * line, "relief": 100 * abs(relief) * line / (value + 2 * sigma)}
         words.append(remark("rectify.near_plane", scale=f"1:{scale:g}", **flat))
-    words.append(
-        f"Camera {centre[2]:.2f} m before the plane, its foot at X {centre[0]:.2f}, Y "
-        f"{centre[1]:.2f} m; the plane's picture is precise to {np.median(sigmas):.1f} mm "
-        f"(median), {sigmas.max():.1f} mm at its worst place."
-    )
+    about = {**dict(zip("xyz", centre, strict=True)), "median": np.median(sigmas)}
+    words.append(remark("rectify.camera", **about, most=sigmas.max()))
     notes = [*photo.remarks, *(ortho.remarks if isinstance(ortho, RasterResult) else ())]
     if len(photo.ids) > 4 and np.isfinite(photo.test).any():
         parts = (photo.left_out, photo.sigma_left_out)
         errors, expected = (1000 * np.sqrt(np.nanmean(part**2, axis=0)) for part in parts)
-        words.append(
-            f"{len(photo.ids)} points, each left out once and held against all others: RMSE X "
-            f"{errors[0]:.1f}, Y {errors[1]:.1f} mm; expected {expected[0]:.1f}, {expected[1]:.1f}."
-        )
+        both = dict(zip(("x", "y", "expected_x", "expected_y"), (*errors, *expected), strict=True))
+        words.append(remark("rectify.left_out", count=len(photo.ids), **both))
         worst = int(np.nanargmax(photo.test))
         if (times := float(photo.test[worst])) > OUTLIER_LIMIT:
             error = 1000 * float(np.hypot(*photo.left_out[worst]))

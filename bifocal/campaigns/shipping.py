@@ -16,6 +16,7 @@ from typing import Any
 from bifocal.campaigns.pair_job import PairOutcome, run_pair
 from bifocal.campaigns.pair_steps import PairJob
 from bifocal.campaigns.step_store import receive_step
+from bifocal.remarks import remark
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.provenance import FileHashes
@@ -74,10 +75,7 @@ def packed(job: PairJob) -> Parcel:
     try:
         root = Path(os.path.commonpath([job.folder, *(path.parent for path in needed)]))
     except ValueError:
-        raise InputError(
-            f"{job.name}: photos and results lie on different drives; put them on one to send "
-            "them to a cluster."
-        ) from None
+        raise InputError(remark("campaign.drives", of=job.name)) from None
     if job.joint is not None:
         # The pair file of the common frame, and the lens files beside it.
         needed += sorted(job.joint.glob(f"{job.title}.*"))

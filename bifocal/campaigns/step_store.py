@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.options import defaults_of, typed
+from bifocal.remarks import remark
 from photocore import interrupts
 from photocore.cli import Progress
 from photocore.errors import InputError
@@ -166,12 +167,8 @@ def run_step(
         ``overwrite`` is false; or a workbook that is open in a spreadsheet program.
     """
     folder = parent / step.name
-    old = read_record(folder)
-    _refuse_open(folder)
-    if not overwrite:
-        _refuse_changed(folder, old, hashes)
-    start = time.perf_counter()
-    with _written_aside(parent, step.name) as place:
+    with _replacing(folder, hashes, overwrite=overwrite) as place:
+        start = time.perf_counter()
         with told_as(folder, place):
             remarks = step.make(place, progress)
         outputs = {name.as_posix(): file_hash(place / name) for name in _files(place)}
@@ -181,7 +178,6 @@ def run_step(
             command=step.command,
         )  # fmt: skip
         _write_record(place, step, record, hashes)
-        _publish(place, folder, old, overwrite=overwrite)
     return record
 
 
@@ -195,14 +191,21 @@ def receive_step(
     InputError
         As `run_step`.
     """
+    with _replacing(folder, hashes, overwrite=overwrite) as place:
+        for name, content in files.items():
+            (place / name).parent.mkdir(parents=True, exist_ok=True)
+            (place / name).write_bytes(content)
+
+
+@contextmanager
+def _replacing(folder: Path, hashes: FileHashes, *, overwrite: bool) -> Iterator[Path]:
+    """Give a folder to write into, which then takes the place of a step's."""
     old = read_record(folder)
     _refuse_open(folder)
     if not overwrite:
         _refuse_changed(folder, old, hashes)
     with _written_aside(folder.parent, folder.name) as place:
-        for name, content in files.items():
-            (place / name).parent.mkdir(parents=True, exist_ok=True)
-            (place / name).write_bytes(content)
+        yield place
         _publish(place, folder, old, overwrite=overwrite)
 
 
@@ -289,17 +292,11 @@ def _refuse_changed(folder: Path, record: StepRecord | None, hashes: FileHashes)
     """Refuse to replace what is the user's: files not of our making, or changed since."""
     if record is None:
         if folder.is_dir() and any(folder.iterdir()):
-            raise InputError(
-                f"{folder}: holds files that this survey did not make; move them away, choose "
-                "another --out, or add --overwrite."
-            )
+            raise InputError(remark("campaign.not_made", of=folder))
         return
     changed = _changed_files(folder, record, hashes, missing_too=False)
     if changed:
-        raise InputError(
-            f"{folder / changed[0]}: was changed after it was made, and would now be made anew. "
-            "Move it away to keep it, or add --overwrite to lose the change."
-        )
+        raise InputError(remark("campaign.changed", of=folder / changed[0]))
 
 
 def _write_record(place: Path, step: Step, record: StepRecord, hashes: FileHashes) -> None:
@@ -336,10 +333,7 @@ def _publish(place: Path, folder: Path, old: StepRecord | None, *, overwrite: bo
             elif not there.exists():
                 shutil.copy2(path, there, follow_symlinks=False)
             elif not overwrite:
-                raise InputError(
-                    f"{path}: is not this survey's, and a file of this name would now be made. "
-                    "Move it away, or add --overwrite to lose it."
-                )
+                raise InputError(remark("campaign.foreign", of=path))
         _mark(folder, aside.name)
         folder.rename(aside)
     place.rename(folder)

@@ -11,7 +11,9 @@ from typing import Any
 
 from bifocal.campaigns.pair_steps import PRODUCTS, PairJob, tables_of
 from bifocal.options import FILES, JOINT, OF_PAIR
+from bifocal.remarks import remark
 from photocore.errors import InputError
+from photocore.options import options_of
 from photocore.textfile import file_name, read_toml
 
 FORMAT = "bifocal-survey/1"
@@ -22,13 +24,29 @@ _VALUE = r"(?:[a-z]+\d?=[\d.e+-]*\d|[A-Z]+|\d[\d.]*\d|\d)"
 _OPTION = re.compile(rf"(?<![\w-])--([a-z][a-z0-9-]*)(?: ({_VALUE}(?:,{_VALUE})*)\b)?")
 #: What names a pair and its photos.
 OF_PHOTOS = ("name", "far", "near", "photos")
+#: What may be said of the mosaic of all pairs, as on the command line of `bifocal mosaic`.
+OF_MOSAIC = ("gsd", "bounds", "priority", "gain", "blend", "overviews")
 #: What is made of all pairs together, each in a folder of its own: keys above the pairs.
 WHOLE = ("joint", "mosaic")
 
 
-def wants_mosaic(path: Path) -> bool:
-    """Return whether a survey file asks for the mosaic of all its pairs."""
-    return _parsed(path).get("mosaic") is True
+def mosaic_wanted(path: Path) -> dict[str, Any] | None:
+    """Return the options of the mosaic that a checked survey file asks for; None: it wants none."""
+    said = _parsed(path).get("mosaic")
+    return _options_of_mosaic(said, []) if isinstance(said, dict) else {} if said else None
+
+
+def _options_of_mosaic(said: Mapping[str, Any], faults: list[str]) -> dict[str, Any]:
+    """Return what is said of the mosaic, noting what is wrong."""
+    known, found = options_of("bifocal", "mosaic"), {}
+    for key, value in said.items():
+        try:
+            if key not in OF_MOSAIC:
+                raise ValueError(f"no such key there, but {', '.join(OF_MOSAIC)}")
+            found[key] = known[key].read(value)
+        except ValueError as error:
+            faults.append(f"above the pairs: mosaic, {key} = {value!r}: expected {error}.")
+    return found
 
 
 def read_survey_file(
@@ -59,6 +77,9 @@ def read_survey_file(
     folder = out or path.parent / str(data.pop("out", "results"))
     data.pop("out", None)
     whole = {key: data.pop(key, False) for key in WHOLE}
+    if isinstance(whole["mosaic"], dict):
+        _options_of_mosaic(whole["mosaic"], faults)
+        whole["mosaic"] = True
     faults += [
         f"above the pairs: {key} = {value!r}: expected true or false."
         for key, value in whole.items()
@@ -134,10 +155,7 @@ def _faults_of_whole(jobs: Sequence[PairJob], whole: Mapping[str, Any]) -> list[
     ]
     for key in JOINT if whole["joint"] else ():
         if len({job.options.get(key) for job in jobs if tables_of(job)}) > 1:
-            faults.append(
-                f"{key}: the pairs say different things of their tables, and joint = true "
-                "adjusts all tables as one; write it above the pairs."
-            )
+            faults.append(remark("campaign.tables_differ", of=key))
     return faults
 
 
@@ -145,7 +163,7 @@ def _parsed(path: Path) -> dict[str, Any]:
     data = read_toml(path, "survey file")
     if data.get("format", FORMAT) != FORMAT:
         raise InputError(
-            f"{path}: format {data['format']!r} is not known; this program reads {FORMAT}."
+            remark("campaign.unknown_format", of=path, format=repr(data["format"]), known=FORMAT)
         )
     return data
 

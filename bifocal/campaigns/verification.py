@@ -20,6 +20,7 @@ from bifocal.campaigns.workflow import facade
 from bifocal.files.point_tables import read_survey_points
 from bifocal.model.pair import Pair
 from bifocal.options import FILES
+from bifocal.remarks import remark
 from bifocal.reports.worked_point import WorkedPoint, recomputed
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
@@ -137,10 +138,7 @@ def verify(
         hashes = {name: file_hash(folder / name) for name in sorted(_visible(folder))}
         listed = dict(_listed(folder, records, hashes))
         if not listed:
-            raise InputError(
-                f"{path}: holds no record of a delivery ({RECORD} in each folder, or {SUMS}). Name "
-                "the folder that facade or survey made; copies must take its hidden files along."
-            )
+            raise InputError(remark("campaign.no_record", of=path, record=RECORD, sums=SUMS))
         sums = "".join(f"{digest}  {name}\n" for name, digest in hashes.items())
         files = [*_judged(hashes, listed), *_broken(records)]
         return Verification(
@@ -166,10 +164,7 @@ def _opened(path: Path) -> Iterator[Path]:
                 _check_members(path, package.infolist(), place)
                 package.extractall(place)
         except UNPACKING as error:
-            raise InputError(
-                f"{path}: is no zip archive, is damaged or protected by a password ({error}). Copy "
-                "it again, or unpack it and name the folder."
-            ) from None
+            raise InputError(remark("campaign.no_archive", of=path, error=error)) from None
         # An archive of the folder holds that folder.
         while len(inside := list(place.iterdir())) == 1 and inside[0].is_dir():
             (place,) = inside
@@ -189,7 +184,7 @@ def _check_members(path: Path, members: list[zipfile.ZipInfo], place: Path) -> N
         raise InputError(f"{refuse}its parts lie over each other; they may not.")
     if total > shutil.disk_usage(place).free:
         raise InputError(
-            f"{path}: unpacked it needs {total / 1e9:.1f} GB, more than is free in {place.parent}."
+            remark("campaign.too_large", of=path, size=total / 1e9, folder=place.parent)
         )
 
 
@@ -383,7 +378,4 @@ def _source(
     for path in chain(near, *(place.rglob(name) for place in within if place is not None)):
         if path.name == name and path.is_file() and file_hash(path) == digest:
             return path
-    raise InputError(
-        f"{name}: the file that went in, SHA-256 {digest:.12}..., is not found. Name the folder of "
-        "the photos and tables with --sources."
-    )
+    raise InputError(remark("campaign.input_lost", of=name, digest=digest[:12]))

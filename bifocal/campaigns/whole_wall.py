@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from bifocal.campaigns.pair_job import PairOutcome, plan_of_steps, run_steps
 from bifocal.campaigns.pair_steps import PairJob, tables_of
 from bifocal.campaigns.step_store import Step, clean
 from bifocal.options import JOINT as JOINT_OPTIONS
+from bifocal.remarks import remark
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.provenance import FileHashes
@@ -42,8 +44,8 @@ def joint_step(jobs: Sequence[PairJob]) -> Step:
     return Step(name=JOINT, files=files, options=options, make=make)
 
 
-def mosaic_step(jobs: Sequence[PairJob]) -> Step:
-    """Return the step that joins the orthophotos of the drawings.
+def mosaic_step(jobs: Sequence[PairJob], options: Mapping[str, Any]) -> Step:
+    """Return the step that joins the orthophotos of the drawings, by options of `mosaic`.
 
     Raises
     ------
@@ -52,9 +54,7 @@ def mosaic_step(jobs: Sequence[PairJob]) -> Step:
     """
     drawn = [job for job in jobs if job.product("drawing").is_file()]
     if len(drawn) < 2:
-        raise InputError(
-            "mosaic: fewer than two pairs have a drawing; add drawing to their products."
-        )
+        raise InputError(remark("campaign.no_mosaic"))
     orthos = [job.product("drawing") for job in drawn]
     reliefs = [job.product("relief") for job in drawn if job.product("relief").is_file()]
     files = {f"ortho {k}": path for k, path in enumerate(orthos)}
@@ -64,9 +64,9 @@ def mosaic_step(jobs: Sequence[PairJob]) -> Step:
         from bifocal.orthophotos.mosaic_workflow import make_mosaic
 
         out = place / "mosaic.tif"
-        return tuple(make_mosaic(orthos, out, relief=reliefs, progress=progress).remarks)
+        return tuple(make_mosaic(orthos, out, relief=reliefs, progress=progress, **options).remarks)
 
-    return Step(name=MOSAIC, files=files, options={"cog": True}, make=make)
+    return Step(name=MOSAIC, files=files, options={"cog": True, **options}, make=make)
 
 
 def plan_of_whole(folder: Path, step: Step) -> str:

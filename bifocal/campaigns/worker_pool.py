@@ -15,6 +15,7 @@ from typing import Any
 
 from bifocal.campaigns.pair_job import PairOutcome
 from bifocal.campaigns.pair_steps import PairJob
+from bifocal.remarks import remark
 from photocore.machine import cores, free_memory
 
 #: A pair whose process died is tried so often; memory that ran short may be there again.
@@ -147,10 +148,7 @@ def _listen(
 def _died(code: int | None) -> str:
     """Return what to do about a process that ended by itself, twice."""
     if code == -9:
-        return (
-            "its process was killed twice, as systems do when memory runs out. Run fewer pairs at "
-            "once (--jobs 1), give less memory (--memory), or a coarser relief_gsd."
-        )
+        return remark("campaign.no_memory")
     return f"its process ended by itself twice (exit status {code}); run it alone with --debug."
 
 

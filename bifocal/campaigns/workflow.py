@@ -165,7 +165,9 @@ def begin_survey(
     return len(pairs), len(left)
 
 
-def plan_survey(jobs: Sequence[PairJob], *, mosaic: bool = False) -> list[tuple[str, str, str]]:
+def plan_survey(
+    jobs: Sequence[PairJob], *, mosaic: Mapping[str, Any] | None = None
+) -> list[tuple[str, str, str]]:
     """Return (pair, step, ``keep``, ``make`` or what stands against it), doing nothing.
 
     What is made of all pairs, if asked for, comes last.
@@ -185,8 +187,8 @@ def plan_survey(jobs: Sequence[PairJob], *, mosaic: bool = False) -> list[tuple[
         rows += [(job.name, step, what) for step, what in plan]
     if frame:
         rows.append((_ALL, JOINT, frame))
-    if mosaic:
-        rows.append((_ALL, MOSAIC, _plan_of_mosaic(jobs, rows)))
+    if mosaic is not None:
+        rows.append((_ALL, MOSAIC, _plan_of_mosaic(jobs, mosaic, rows)))
     return rows
 
 
@@ -206,11 +208,13 @@ def _plan_of_frame(jobs: Sequence[PairJob]) -> str:
     return plan_of_whole(jobs[0].folder.parent, joint_step(jobs))
 
 
-def _plan_of_mosaic(jobs: Sequence[PairJob], rows: Sequence[tuple[str, str, str]]) -> str:
+def _plan_of_mosaic(
+    jobs: Sequence[PairJob], options: Mapping[str, Any], rows: Sequence[tuple[str, str, str]]
+) -> str:
     if any(what != "keep" for _, _, what in rows):
         return "make"
     try:
-        return plan_of_whole(jobs[0].folder.parent, mosaic_step(jobs))
+        return plan_of_whole(jobs[0].folder.parent, mosaic_step(jobs, options))
     except InputError as error:
         return str(error)
 
@@ -219,7 +223,7 @@ def run_survey(
     jobs: Sequence[PairJob],
     *,
     machines: Machines = Machines(),
-    mosaic: bool = False,
+    mosaic: Mapping[str, Any] | None = None,
     progress: Progress = no_progress,
     tell: Callable[[str], None] | None = None,
 ) -> SurveyResult:
@@ -227,7 +231,8 @@ def run_survey(
 
     One pair's failure stops no other; stopped at any moment, it goes on from there when called
     again. ``tell`` is given a line for every pair that ends. Where the jobs ask for one frame,
-    all pairs are aligned first and adjusted together; ``mosaic`` joins their drawings at the end.
+    all pairs are aligned first and adjusted together; ``mosaic``, the options of `make_mosaic`
+    where it is wanted, joins their drawings at the end.
 
     Raises
     ------
@@ -253,9 +258,9 @@ def run_survey(
                     outcomes[job.name] = replace(alone, failed_step=JOINT, message=why)
                 ready = []
         outcomes |= _made(ready, machines, _Count(ready, progress, tell))
-        if mosaic:
+        if mosaic is not None:
             drawn = [job for job in ready if not outcomes[job.name].failed_step]
-            together.append(_mosaic(drawn, jobs[0], progress, tell))
+            together.append(_mosaic(drawn, mosaic, jobs[0], progress, tell))
     return SurveyResult(
         outcomes=tuple(outcomes[job.name] for job in jobs), together=tuple(together),
         seconds=time.perf_counter() - start,
@@ -295,11 +300,14 @@ def _one_frame(
 
 
 def _mosaic(
-    jobs: Sequence[PairJob], first: PairJob, progress: Progress,
+    jobs: Sequence[PairJob],
+    options: Mapping[str, Any],
+    first: PairJob,
+    progress: Progress,
     tell: Callable[[str], None] | None,
-) -> PairOutcome:  # fmt: skip
+) -> PairOutcome:
     try:
-        step = mosaic_step(jobs)
+        step = mosaic_step(jobs, options)
     except InputError as error:
         return PairOutcome(name=MOSAIC, failed_step=MOSAIC, message=str(error))
     return _whole(step, first, progress, tell)

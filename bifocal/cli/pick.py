@@ -15,16 +15,17 @@ from photocore.options import declared
 def command(sources: tuple[Path, ...], no_browser: bool, as_json: bool, **options: Any) -> None:
     """Open the page: orient two photos, pick points, relief, orthophoto, drawing.
 
-    Starts from a pair file, a survey workbook, two photos, or the folder of a survey (default: the
-    current one). The page runs on this computer alone and works offline; what is picked goes
-    into the workbook and a journal beside it at once. Ctrl-C ends it.
+    Starts from the file of a pair or a set, a survey workbook, photos, or the folder of a survey
+    (default: the current one). More than two photos are oriented together once the first two are.
+    The page runs on this computer alone and works offline; what is picked goes into the workbook
+    and a journal beside it at once. Ctrl-C ends it.
     """
     from bifocal.collimation.workflow import page_server
 
     with page_server(*sources, **options) as server:
-        pair = server.session.files.pair
-        if pair is not None and pair not in sources and sources[0].name.endswith(".photos.json"):
-            remark(f"Of the set its best pair is opened: {pair.name}.")
+        files = server.session.files
+        if files.photo_set is not None and files.pair is not None:
+            remark(f"Of the set its best pair is opened: {files.pair.name}.")
         if as_json:
             print_json({"url": server.url, "token": server.token})
         else:

@@ -21,7 +21,7 @@ def command(
     what changed is made anew; stopped or killed at any moment, it goes on where it was. A pair
     that fails stops no other; a table at the end says what failed and how to mend it.
     """
-    from bifocal.campaigns.survey_file import in_survey_words, read_survey_file, wants_mosaic
+    from bifocal.campaigns.survey_file import in_survey_words, mosaic_wanted, read_survey_file
     from bifocal.campaigns.workflow import (
         Machines,
         begin_survey,
@@ -49,7 +49,7 @@ def command(
     if dry_run:
         plan = [
             (pair, step, in_survey_words(what))
-            for pair, step, what in plan_survey(pairs, mosaic=wants_mosaic(survey))
+            for pair, step, what in plan_survey(pairs, mosaic=mosaic_wanted(survey))
         ]
         if as_json:
             print_json(
@@ -66,7 +66,7 @@ def command(
         return
     if machines["ship"] and not machines["scheduler"]:
         raise click.UsageError("--ship goes with --scheduler.")
-    given: dict[str, Any] = {"machines": Machines(**machines), "mosaic": wants_mosaic(survey)}
+    given: dict[str, Any] = {"machines": Machines(**machines), "mosaic": mosaic_wanted(survey)}
     with progress_bar("survey", quiet=as_json) as progress:
         result = run_survey(pairs, progress=progress, tell=remark, **given)
     result = result.in_words(in_survey_words)

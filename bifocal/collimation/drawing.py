@@ -9,15 +9,12 @@ import numpy as np
 
 from bifocal.collimation.live_results import LiveResults
 from bifocal.collimation.records import SurveyState
-from bifocal.collimation.shapes import places_of
+from bifocal.collimation.shapes import OUTLINES, places_of
 from bifocal.files.exports import export_points
 from bifocal.model.pair import Pair
 from bifocal.model.points import PointLine, SurveyPoints
 from bifocal.remarks import remark
 from photocore.errors import InputError
-
-#: Layer of outlines that were given none.
-OUTLINES = "outlines"
 
 
 def drawn_points(

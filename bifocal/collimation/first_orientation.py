@@ -1,4 +1,7 @@
-"""The orientation without a click: begun in the background as soon as two photos lie there."""
+"""The orientation without a click: begun in the background as soon as two photos lie there.
+
+Further photos of the wall join it as soon as it is accepted.
+"""
 
 from __future__ import annotations
 
@@ -54,14 +57,28 @@ class FirstOrientation:
         """Begin to orient the photos, unless that is done, runs, or was tried with all this."""
         session = self._session
         with session.lock:
-            facts = self._facts()
+            joined = self._to_join()
+            facts = joined or self._facts()
             if facts is None or facts == self._tried:
                 return
             if any(job.state == "running" for job in session.jobs.jobs.values()):
                 return
             self._tried = facts
             with suppress(PhotogrammetryError):  # what is lacking is asked by the page
-                start_job(session, "align", {"way": "auto"}, quiet=True)
+                if joined:
+                    start_job(session, "join", {})
+                else:
+                    start_job(session, "align", {"way": "auto"}, quiet=True)
+
+    def _to_join(self) -> Any:
+        """Return what further photos would join; None where there are none, or they did."""
+        session = self._session
+        pair, others = session.accepted_pair, session.pictures.others
+        if pair is None or not others or session.files.pair_is_workbook or pair.layers:
+            return None
+        if session.photo_set is not None:
+            return None
+        return session.all_photos, pair.image1.plane_from_pixel.tobytes()
 
     def _facts(self) -> Any:
         """Return what a first orientation would rest on; None where it is not for the program."""

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 import sys
+import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from time import monotonic
 from typing import Any
 
+import numpy as np
+
+from bifocal.campaigns.rectification import rectify_photo
 from bifocal.collimation.proposals import wall_sheet
 from bifocal.collimation.shapes import shapes_from
 from bifocal.collimation.stated_media import media_from_dict
@@ -16,7 +20,11 @@ from bifocal.faces.faces_files import faces_path
 from bifocal.faces.suggestions import suggest_faces
 from bifocal.matching.matching import MatchSettings
 from bifocal.model.geotiff import gsd_at_scale
+from bifocal.model.orientation_precision import NAMES
+from bifocal.model.pair import Pair
+from bifocal.model.photo_set import PhotoSet
 from bifocal.model.relief_map import ReliefMap
+from bifocal.networks.set_workflow import align_photo_set
 from bifocal.orientation.align_workflow import (
     AlignOptions,
     KnownLens,
@@ -38,10 +46,14 @@ from photocore.errors import GeometryError, PhotogrammetryError
 from photocore.images import image_info, read_grey
 from photocore.interrupts import end_on_signals
 from photocore.jsonfile import plain
+from photocore.options import options_of
+from photocore.tables import write_csv
 
 Task = Mapping[str, Any]
 #: Progress is told at most so often. [s]
 _OFTEN = 0.2
+#: Points of a pair that hold the frame where further photos join it.
+FRAME = 24
 
 
 def main() -> int:
@@ -103,6 +115,64 @@ def _align(task: Task, progress: Progress) -> dict[str, Any]:
     }
 
 
+def _join(task: Task, progress: Progress) -> dict[str, Any]:
+    """Adjust a pair and further photos of its wall together.
+
+    Without control points, points that the pair gives hold the frame, as precisely as it gives
+    them: X, Y and r stay those of the pair.
+    """
+    first, second, others = (KnownLens(**lens) for lens in task["lenses"])
+    out, photos = Path(task["out"]), [Path(path) for path in task["photos"]]
+    with tempfile.TemporaryDirectory() as folder:
+        control, site = _path(task["control"]), SiteMeasures()
+        if control is None:
+            control = Path(folder) / "points.csv"
+            pair, own = read_pair(task["pair"]), NAMES.index("Z 1")
+            known = None if pair.orientation is None else pair.orientation[own, own]
+            site = SiteMeasures(
+                sigma_control=_frame(pair, control, len(photos)), distance1=pair.d1,
+                sigma=site.sigma if known is None else max(float(np.sqrt(known)), 1e-4),
+            )  # fmt: skip
+        options = AlignOptions(
+            lenses=(first, second), other_lenses=others, site=site, control=control,
+            lengths=_path(task["lengths"]),
+        )  # fmt: skip
+        made = align_photo_set(photos, out, options, overwrite=True, progress=progress)
+    lenses = {photo.extra.get("lens") for photo in made.photos.photos} - {None}
+    # Of points that the program chose nobody can mend the picks.
+    told = made.remarks if task["control"] else ()
+    return {"remarks": [*made.words, *told], "lenses": sorted(lenses)}
+
+
+def _frame(pair: Pair, table: Path, photos: int) -> float:
+    """Write points of a pair, spread over it, as control points; return their precision. [m]"""
+    _, found = match_pair_file(pair, MatchSettings(count=FRAME, features=True))
+    solved = pair.intersect(found.pixels1, found.pixels2)
+    sigma = np.sqrt(np.trace(solved.covariance, axis1=1, axis2=2) / 3)
+    good = np.array([flag in ("OK", "ON-PLANE") for flag in solved.flags]) & (sigma > 0)
+    columns: dict[str, Any] = {
+        "id": [name for name, keep in zip(found.ids, good, strict=True) if keep]
+    }
+    columns |= dict(zip(("X [m]", "Y [m]", "r [m]"), solved.xyz[good].T, strict=True))
+    blank = np.full(int(good.sum()), np.nan)
+    pixels = [*found.pixels1[good].T, *found.pixels2[good].T, *[blank] * (2 * photos - 4)]
+    names = [f"{axis}{number} [px]" for number in range(1, photos + 1) for axis in ("col", "row")]
+    write_csv(table, columns | dict(zip(names, pixels, strict=True)), overwrite=True)
+    return float(np.median(sigma[good])) if good.any() else SiteMeasures().sigma_control
+
+
+def _rectify(task: Task, progress: Progress) -> dict[str, Any]:
+    """Bring one photo alone to scale, with drawings."""
+    given = {name: one.fixed_default for name, one in options_of("bifocal", "rectify").items()}
+    given |= {"scale": 50.0, **task, "corners": np.ravel(task["corners"])}
+    done = rectify_photo(
+        Path(task["photo"]), Path(task["out"]), given, folder=Path(task["folder"]),
+        overwrite=task["overwrite"], progress=progress,
+    )  # fmt: skip
+    assert done.delivery is not None
+    return {"words": [*done.words, *done.remarks], "files": done.delivery.files}
+
+
 def _match(task: Task, progress: Progress) -> dict[str, Any]:
     progress(0.0, 1.0)
     settings = MatchSettings(count=task["count"], features=task["features"])
@@ -137,7 +207,7 @@ def _relief(task: Task, progress: Progress) -> dict[str, Any]:
         out=Path(task["out"]), overwrite=task["overwrite"], faces=faces_path(None, task["pair"]),
         **task["options"],
     )  # fmt: skip
-    summary, remarks = relief_of_pair(read_pair(task["pair"]), job, progress=progress)
+    summary, remarks = relief_of_pair(_source(task), job, progress=progress)
     return {"summary": summary, "remarks": remarks}
 
 
@@ -146,14 +216,13 @@ def _ortho_task(task: Task) -> OrthoTask:
     if "scale" in said:
         said.setdefault("gsd", gsd_at_scale(task["dpi"] or DPI, said["scale"]))
     return OrthoTask.from_given(
-        said, relief=_path(task["relief"]), points=_path(task["points"]),
-        faces=faces_path(None, task["pair"]),
+        said, relief=_path(task["relief"]), faces=faces_path(None, task["pair"]),
     )  # fmt: skip
 
 
 def _ortho(task: Task, progress: Progress) -> dict[str, Any]:
     result = make_ortho(
-        read_pair(task["pair"]), Path(task["out"]), _ortho_task(task), overwrite=task["overwrite"],
+        _source(task), Path(task["out"]), _ortho_task(task), overwrite=task["overwrite"],
         progress=progress,
     )  # fmt: skip
     return {"remarks": result.remarks}
@@ -162,13 +231,15 @@ def _ortho(task: Task, progress: Progress) -> dict[str, Any]:
 def _deliver(task: Task, progress: Progress) -> dict[str, Any]:
     """Make drawings, report and 3-D view; relief and orthophoto first where they are lacking."""
     path, out = Path(task["pair"]), Path(task["out"])
+    if task["mark"] and not Path(task["mark"]).is_file():  # it could not be written
+        task = {**task, "mark": None}
     made: dict[str, list[str]] = {}
     told: list[str] = []
     for kind, first, last in (("relief", 0.0, 0.5), ("ortho", 0.5, 0.65)):
         if before := task.get("before", {}).get(kind):
             told += _WORKS[kind](before, _within(progress, first, last))["remarks"]
             made[kind] = [Path(before["out"]).name]
-    pair = read_pair(path)
+    pair = _source(task)
     title = task["title"] or default_title(pair, path)
     wish = DeliverTask(title=title, mark=_path(task["mark"]), **{"scale": 50.0, **task["drawing"]})
     done = deliver(
@@ -199,7 +270,8 @@ def _documents(task: Task, title: str, progress: Progress) -> list[str]:
         title=title, language=language, scale=task["drawing"].get("scale"), relief=relief,
         ortho=ortho, view=names.get("3d"),
     )  # fmt: skip
-    source = _path(task["mark"]) or Path(task["pair"])
+    # A set tells of all its photos; a workbook of points that two of them show.
+    source = _path(task["set"]) or _path(task["mark"]) or Path(task["pair"])
     report_of(source, names["report"], about, overwrite=task["overwrite"])
     return [path.name for path in names.values()]
 
@@ -223,12 +295,19 @@ def _within(progress: Progress, first: float, last: float) -> Progress:
     return part
 
 
+def _source(task: Task) -> Pair | PhotoSet:
+    """Return the pair, or the set that holds it and further photos."""
+    return PhotoSet.read(task["set"]) if task.get("set") else read_pair(task["pair"])
+
+
 def _path(name: str | None) -> Path | None:
     return Path(name) if name else None
 
 
 _WORKS: dict[str, Callable[[Task, Progress], dict[str, Any]]] = {
     "align": _align,
+    "join": _join,
+    "rectify": _rectify,
     "match": _match,
     "targets": _targets,
     "relief": _relief,

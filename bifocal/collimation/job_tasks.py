@@ -10,16 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.collimation.drawing import OUTLINES, write_points_drawing
+from bifocal.collimation.drawing import write_points_drawing
 from bifocal.collimation.fields import FieldError, positive_of, tupled
 from bifocal.collimation.jobs import PageJob
 from bifocal.collimation.live_orientation import control_of, lenses_of, site_of
 from bifocal.collimation.proposals import NOMINAL
 from bifocal.collimation.session import Session
-from bifocal.collimation.shapes import measures_of
+from bifocal.collimation.shapes import outlines_of
 from bifocal.collimation.stated_media import lacking, media_as_dict, media_of
 from bifocal.collimation.wording import say, without_options
 from bifocal.options import OF_PAIR
+from bifocal.orientation.align_workflow import KnownLens
 from bifocal.orientation.control_points import Control
 from bifocal.remarks import remark
 from photocore.errors import InputError
@@ -27,7 +28,7 @@ from photocore.jsonfile import plain
 from photocore.output import free_path
 from photocore.tables import write_csv
 
-KINDS = ("align", "match", "targets", "relief", "ortho", "deliver", "suggest")
+KINDS = ("align", "join", "match", "targets", "relief", "ortho", "deliver", "suggest", "rectify")
 Options = Mapping[str, Any]
 
 
@@ -46,7 +47,10 @@ def start_job(session: Session, kind: str, options: Options, *, quiet: bool = Fa
             told["out"] = told["out"].replace(".proposed.", ".found.")
         return told
 
-    return session.jobs.start(kind, task, partial(finish, session), quiet=quiet)
+    # The drawing shows the points as the workbook has them; its writer needs the survey's lock.
+    return session.jobs.start(
+        kind, task, partial(finish, session), quiet=quiet, first=session.sync.step
+    )
 
 
 def task_of(session: Session, kind: str, options: Options) -> dict[str, Any]:
@@ -61,6 +65,8 @@ def task_of(session: Session, kind: str, options: Options) -> dict[str, Any]:
         raise FieldError(f"kind: one of {', '.join(KINDS)}.")
     if kind == "align":
         return {"kind": kind, **_align_task(session, options)}
+    if kind == "rectify":
+        return {"kind": kind, **_rectify_task(session, options)}
     if kind == "targets":
         path = session.proposed_path or session.files.pair
         if path is None:
@@ -68,7 +74,13 @@ def task_of(session: Session, kind: str, options: Options) -> dict[str, Any]:
         return {"kind": kind, "pair": str(path.resolve())}
     if session.files.pair is None:
         raise InputError(remark("page.accept_first"))
-    pair = {"kind": kind, "pair": str(session.files.pair.resolve())}
+    of_set = session.photo_set
+    pair = {
+        "kind": kind, "pair": str(session.files.pair.resolve()),
+        "set": None if of_set is None else str(of_set.resolve()),
+    }  # fmt: skip
+    if kind == "join":
+        return pair | _join_task(session)
     if kind == "match":
         count = positive_of(options, "count") or 500
         return pair | {"count": int(min(count, 5000)), "features": options.get("what") != "targets"}
@@ -112,13 +124,12 @@ def _said(options: Options, *keys: str) -> dict[str, Any]:
 
 def _ortho_options(session: Session, options: Options) -> dict[str, Any]:
     relief = session.products.current("relief")
-    points = None
-    if relief is None and options.get("surface") == "points":
-        points = session.files.workbook if session.files.workbook.is_file() else None
+    keys = ["gsd", "bounds", "scale"]
+    if session.photo_set is None:  # of a set each place is taken from the photo that sees it best
+        keys.append("image")
     return {
         "relief": str(relief.resolve()) if relief else None,
-        "points": str(points.resolve()) if points else None,
-        "options": _said(options, "gsd", "bounds", "image", "scale"),
+        "options": _said(options, *keys),
         "dpi": _said(options, "dpi").get("dpi"),
     }
 
@@ -136,7 +147,7 @@ def _deliver_options(session: Session, options: Options, pair: Options) -> dict[
     before: dict[str, Any] = {}
     surface = _ortho_options(session, options)
     for kind, task in (("relief", _relief_task(session, options)), ("ortho", _ortho_task(session))):
-        if products.current(kind) is None and (kind == "ortho" or surface["points"] is None):
+        if products.current(kind) is None:
             before[kind] = {**pair, **task}
             if kind == "relief":
                 surface["relief"] = str(Path(task["out"]).resolve())
@@ -155,15 +166,10 @@ def _deliver_options(session: Session, options: Options, pair: Options) -> dict[
             **_said(options, "scale", "dpi", "sheet", "sections"),
             "language": session.spoken,
         },
-        "mark": None if not _solved_points(session) else str(session.files.workbook.resolve()),
+        "mark": str(session.files.workbook.resolve())
+        if any(point.is_complete for point in session.state.points.values())
+        else None,
     }
-
-
-def _solved_points(session: Session) -> bool:
-    session.sync.step()
-    return session.files.workbook.is_file() and any(
-        point.is_complete for point in session.state.points.values()
-    )
 
 
 def _align_task(session: Session, options: Options) -> dict[str, Any]:
@@ -196,6 +202,58 @@ def _align_task(session: Session, options: Options) -> dict[str, Any]:
     }
 
 
+def _join_task(session: Session) -> dict[str, Any]:
+    """Return what is told of an accepted pair, so that further photos are adjusted with it."""
+    products, photos = session.products, session.pictures
+    pair = photos.needed_pair()
+    control, lenses = control_of(session.state), []
+    measured = (np.isfinite(control.pixels1) & np.isfinite(control.pixels2)).all(axis=1)
+    tables: dict[str, Path | None] = {"control": None, "lengths": None}
+    if (measured & np.isfinite(control.xyz[:, :2]).all(axis=1)).sum() >= 4:
+        tables = _write_control(session, control, photos=len(session.all_photos))
+    for number, known in zip((1, 2), lenses_of(session.state), strict=True):
+        found = pair.extra.get("setup", {}).get("focal_px")
+        told = known.focal or photos.infos[number - 1].focal_pixels
+        # What the pair found of a lens of which no file tells.
+        known = known if told or not found else KnownLens(focal=found[number - 1], pixel_size=1.0)
+        lenses.append(known)
+    return {
+        "photos": [str(path.resolve()) for path in session.all_photos],
+        "out": str(products.place("set", "-set.photos.json").resolve()),
+        "lenses": [plain(asdict(lens)) for lens in (*lenses, lenses[0])],
+        **{key: None if path is None else str(path.resolve()) for key, path in tables.items()},
+    }
+
+
+def _rectify_task(session: Session, options: Options) -> dict[str, Any]:
+    """Return what is told of one photo alone that is brought to scale by a rectangle."""
+    infos = session.pictures.infos
+    if len(infos) != 1:
+        raise InputError(remark("page.one_alone"))
+    corners = tupled(options.get("corners") or ())
+    sides = [positive_of(options, key) for key in ("width", "height")]
+    if len(corners) != 4 or None in sides:
+        raise FieldError(remark("page.rectangle"))
+    out = session.products.place("rectified", "-rectified.tif")
+    folder = session.products.folder / f"{session.products.stem}-rectified"
+    own = any(kind == "rectified" for kind in session.products.made.values())
+    if folder.exists() and not own:
+        folder = free_path(session.products.folder, folder.name)
+    known = session.state.lenses.get(1, {})
+    return {
+        "photo": str(infos[0].path.resolve()),
+        "out": str(out.resolve()),
+        "folder": str(folder.resolve()),
+        "overwrite": own,
+        "corners": corners,
+        "rectangle": sides,
+        "focal": known.get("focal_mm"),
+        "sensor_width": known.get("sensor_width_mm"),
+        "language": session.spoken,
+        **_said(options, "scale"),
+    }
+
+
 def _through_media(session: Session, way: str, given: list[float | None]) -> str:
     """Return the way to set a pair up: through media by control points, or else as it is typed.
 
@@ -214,7 +272,7 @@ def _through_media(session: Session, way: str, given: list[float | None]) -> str
     return "as set up"
 
 
-def _write_control(session: Session, control: Control) -> dict[str, Path | None]:
+def _write_control(session: Session, control: Control, photos: int = 2) -> dict[str, Path | None]:
     """Write the control points and tapes as the tables that `bifocal align` reads."""
     tables: dict[str, Path | None] = {"control": None, "lengths": None}
     columns: dict[str, Any] = {"id": list(control.ids)}
@@ -224,6 +282,10 @@ def _write_control(session: Session, control: Control) -> dict[str, Path | None]
         columns[key] = values
     pixels = np.hstack([control.pixels1, control.pixels2]).T
     columns |= dict(zip(("col1 [px]", "row1 [px]", "col2 [px]", "row2 [px]"), pixels, strict=True))
+    for number in range(3, photos + 1):  # nothing was picked in these
+        columns |= dict.fromkeys(
+            (f"col{number} [px]", f"row{number} [px]"), np.full(len(control.ids), np.nan)
+        )
     contents = {"control": columns}
     if control.lengths:
         starts, ends, lengths = zip(*control.lengths, strict=True)
@@ -245,17 +307,15 @@ def _write_outlines(session: Session, folder: Path) -> list[str]:
     """Write what was drawn to be measured as a table; return its name, if there is any."""
     pair = session.pictures.pair
     with session.lock:
-        drawn = [shape for shape in session.state.shapes.values() if shape.kind == "outline"]
-    if pair is None or not drawn:
+        drawn = {} if pair is None else outlines_of(session.state, pair)
+    if not drawn:
         return []
-    measures = [measures_of(shape, pair) for shape in drawn]
     columns: dict[str, Any] = {
-        "id": [shape.name for shape in drawn],
-        "layer": [shape.layer or OUTLINES for shape in drawn],
-    }
+        "id": list(drawn), "layer": [one["layer"] for one in drawn.values()],
+    }  # fmt: skip
     units = {"width": "m", "height": "m", "area": "m2", "length": "m", "relief": "m"}
     for key, unit in units.items():
-        columns[f"{key} [{unit}]"] = np.array([one[key] for one in measures])
+        columns[f"{key} [{unit}]"] = np.array([one[key] for one in drawn.values()])
     path = folder / f"{session.products.stem}_outlines.csv"
     write_csv(path, columns, overwrite=path.is_file())
     return [path.name]
@@ -270,6 +330,15 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
             return ""  # the user took it in hand meanwhile
         session.propose(Path(task["out"]), result)
         return told
+    if kind == "join":
+        path = Path(task["out"])
+        session.note_made("set", [*result["lenses"], path.name])
+        session.join(path)
+        return told
+    if kind == "rectify":
+        drawn = [f"{Path(task['folder']).name}/{name}" for name in result["files"]]
+        session.note_made("rectified", [*drawn, Path(task["out"]).name])
+        return " ".join(without_options(said, session.spoken) for said in result["words"][:2])
     if kind == "match":
         session.command({"op": "points.add", "points": result["points"]})
         return ""

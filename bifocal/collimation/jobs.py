@@ -102,6 +102,7 @@ class JobRunner:
         finish: Callable[[Task, Task], str],
         *,
         quiet: bool = False,
+        first: Callable[[], object] = lambda: None,
     ) -> PageJob:
         """Start a job.
 
@@ -114,6 +115,8 @@ class JobRunner:
             Takes task and result over; returns what the user should know.
         quiet : bool
             Whether the program begins it by itself: it makes way for one that is not.
+        first : callable
+            What has to be done before the worker begins, without the survey's lock.
 
         Raises
         ------
@@ -132,7 +135,9 @@ class JobRunner:
             self.jobs[job.number] = job
             for number in list(self.jobs)[:-MOST_JOBS]:
                 del self.jobs[number]
-            thread = threading.Thread(target=self._run, args=(job, task, finish), daemon=True)
+            thread = threading.Thread(
+                target=self._run, args=(job, task, finish, first), daemon=True
+            )
             self._threads = [t for t in self._threads if t.is_alive()] + [thread]
         thread.start()
         self._changed()
@@ -163,7 +168,11 @@ class JobRunner:
         for thread in self._threads:
             thread.join(timeout=10)
 
-    def _run(self, job: PageJob, task: Task, finish: Callable[[Task, Task], str]) -> None:
+    def _run(
+        self, job: PageJob, task: Task, finish: Callable[[Task, Task], str],
+        first: Callable[[], object],
+    ) -> None:  # fmt: skip
+        first()
         command = [sys.executable, "-m", "bifocal.collimation.job_process"]
         try:
             process = subprocess.Popen(

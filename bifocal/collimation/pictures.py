@@ -37,7 +37,7 @@ class Pictures:
     folder : Path
         Where tiles are kept.
     photos : sequence of Path
-        Far and near photo, as far as they are given.
+        Far and near photo, as far as they are given, then further ones.
     pair : Pair or None
         None before they are oriented.
 
@@ -50,10 +50,12 @@ class Pictures:
     def __init__(self, folder: Path, photos: Sequence[Path], pair: Pair | None) -> None:
         self.tiles = TileStore(folder)
         self.infos: list[ImageInfo] = []
+        self.others: list[ImageInfo] = []
         self.pyramids: list[Pyramid] = []
         self.pair: Pair | None = None
         self.grid: Grid | None = None
-        self.show_photos(photos)
+        self.show_photos(photos[:2])
+        self.show_others(photos[2:])
         if pair is not None:
             self.show_pair(pair)
 
@@ -65,6 +67,14 @@ class Pictures:
         for number, (info, pyramid) in enumerate(zip(infos, self.pyramids, strict=True), start=1):
             self.tiles.register(f"photo-{number}", pyramid, *_facts(info.path))
             self.tiles.forget(f"wall-{number}")
+
+    def show_others(self, photos: Sequence[Path]) -> None:
+        """Show what further photos there are, beside far and near."""
+        self.others = [image_info(path) for path in photos]
+        for number, info in enumerate(self.others, start=3):
+            self.tiles.register(
+                f"photo-{number}", Pyramid(info.size, _reader(info.path)), *_facts(info.path)
+            )
 
     def show_pair(self, pair: Pair) -> None:
         """Show the photos on the wall, as a pair orients them."""
@@ -160,7 +170,9 @@ class Pictures:
 
     def snap(self, image: int, pixel: Pixel, radius: float) -> dict[str, Any]:
         """Return the target's centre or the corner next to a pick."""
-        return snap(self.photos()[image - 1], pixel, radius)._asdict()
+        if image > len(self.pyramids):
+            raise InputError(remark("page.give_photos"))
+        return snap(self.pyramids[image - 1].halved(0), pixel, radius)._asdict()
 
     def convert(self, image: int, pixels: FloatArray, source: str) -> FloatArray:
         """Return pixels of a photo as pixels of the wall or back, shape (n, 2); any lens model."""

@@ -108,7 +108,7 @@ class Products:
         if kind == "relief":
             data = np.frombuffer(self.overlay(), np.uint8)
             return _png(_small(cv2.imdecode(data, cv2.IMREAD_UNCHANGED)))
-        path = self.current("ortho")
+        path = self.current(kind)
         if path is None:
             raise InputError(remark("page.no_ortho"))
         picture, _ = ortho_thumbnail(path)

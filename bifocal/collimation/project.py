@@ -9,10 +9,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from bifocal.collimation.fields import NOTES, FieldError, fields_of
 from bifocal.files.photos import photo_infos
 from bifocal.model.pair import Pair
-from bifocal.model.photo_set import pair_or_set
+from bifocal.model.photo_set import PhotoSet, pair_or_set
 from bifocal.survey.set_survey import best_pair
 from bifocal.workbook.pair_workflow import is_survey, read_pair
 from bifocal.workbook.reading.reader import read_survey
@@ -42,7 +44,9 @@ class SurveyFiles:
         Pair file, or the workbook itself where its set-up names the photos; None before the photos
         are oriented.
     photos : tuple of Path
-        Far and near photo; empty before they are given.
+        Far and near photo, and what else shows the wall; empty before they are given.
+    photo_set : Path or None
+        File of the set that the page was started with.
     """
 
     folder: Path
@@ -50,6 +54,7 @@ class SurveyFiles:
     workbook: Path
     pair: Path | None = None
     photos: tuple[Path, ...] = ()
+    photo_set: Path | None = None
 
     @property
     def journal(self) -> Path:
@@ -72,7 +77,8 @@ def find_files(sources: Sequence[Path], workbook: Path | None = None) -> SurveyF
     Parameters
     ----------
     sources : sequence of Path
-        A pair file, a survey workbook, a folder, two photos; nothing: the current folder.
+        The file of a pair or a set, a survey workbook, a folder, photos (far, near, further
+        ones); nothing: the current folder.
     workbook : Path, optional
         Where the points go; default the workbook given, else one named after the pair.
 
@@ -81,13 +87,8 @@ def find_files(sources: Sequence[Path], workbook: Path | None = None) -> SurveyF
     InputError
         If they are none of these, do not exist, or leave more than one choice.
     """
-    if len(sources) == 2:
-        return _of_photos((sources[0], sources[1]), workbook)
-    if len(sources) > 2:
-        raise InputError(
-            "give one pair file, one workbook, one folder, or two photos (far near); found "
-            f"{len(sources)} files."
-        )
+    if len(sources) > 1:
+        return _of_photos(tuple(sources), workbook)
     source = sources[0] if sources else Path()
     if source.is_dir():
         return _of_folder(source, workbook)
@@ -112,17 +113,23 @@ def find_files(sources: Sequence[Path], workbook: Path | None = None) -> SurveyF
 
 
 def _of_pair(source: Path, workbook: Path | None) -> SurveyFiles:
-    pair = _pair_of(source)
+    photos = pair_or_set(source)
+    pair, shown = source, []
+    if isinstance(photos, PhotoSet):
+        best, pair = best_pair(photos), _best_of(photos, source)
+        own = [best.photo_file(1), best.photo_file(2)]
+        shown = [*own, *(one.path for one in photos.photos if one.path not in own)]
     stem = pair.name.removesuffix(".json").removesuffix(".pair")
     book = _workbook(workbook or pair.parent / f"{stem}.xlsx")
-    return SurveyFiles(folder=book.parent, stem=stem, workbook=book, pair=pair)
+    files = SurveyFiles(
+        folder=book.parent, stem=stem, workbook=book, pair=pair, photos=tuple(shown),
+        photo_set=source if shown else None,
+    )  # fmt: skip
+    return replace(files, photos=_remembered(files).photos)
 
 
-def _pair_of(source: Path) -> Path:
-    """Return the file of a pair; of a set that of its best pair, written beside it once."""
-    photos = pair_or_set(source)
-    if isinstance(photos, Pair):
-        return source
+def _best_of(photos: PhotoSet, source: Path) -> Path:
+    """Return the file of a set's best pair, written beside it once."""
     best = best_pair(photos)
     photo_infos(best)  # what is not there, or another photo, is refused before a file is written
     stem = source.name.removesuffix(".json").removesuffix(".photos")
@@ -133,17 +140,27 @@ def _pair_of(source: Path) -> Path:
     return pair
 
 
-def _of_photos(photos: tuple[Path, Path], workbook: Path | None) -> SurveyFiles:
-    for photo in photos:
+def holds(photos: PhotoSet, pair: Pair, files: Sequence[Path]) -> bool:
+    """Whether a set is one of these photos, and a pair two of them as the set has them."""
+    names = {photo.path.resolve() for photo in photos.photos}
+    known = [photo.plane_from_pixel for photo in photos.photos]
+    return names == {path.resolve() for path in files} and all(
+        any(np.array_equal(photo.plane_from_pixel, one) for one in known)
+        for photo in (pair.image1, pair.image2)
+    )
+
+
+def _of_photos(photos: tuple[Path, ...], workbook: Path | None) -> SurveyFiles:
+    for number, photo in enumerate(photos):
         image_info(photo)
-    if photos[0].samefile(photos[1]):
-        raise InputError(f"{photos[0]}: is given twice; give the far and the near photo.")
+        if any(photo.samefile(other) for other in photos[:number]):
+            raise InputError(f"{photo}: is given twice; give the far and the near photo.")
     book = _workbook(workbook or photos[0].parent / "survey.xlsx")
     files = SurveyFiles(folder=book.parent, stem=book.stem, workbook=book, photos=photos)
     if workbook is not None and _names_photos(book) and last_opened(files.journal) is None:
         pair = read_pair(book)
         own = [pair.photo_file(1), pair.photo_file(2)]
-        if not all(a.is_file() and a.samefile(b) for a, b in zip(own, photos, strict=True)):
+        if not all(a.is_file() and a.samefile(b) for a, b in zip(own, photos, strict=False)):
             raise InputError(
                 f"{book}: its photos (photo_1, photo_2) are {own[0].name} and {own[1].name}, not "
                 f"{photos[0].name} and {photos[1].name}; give the workbook alone, or another one."

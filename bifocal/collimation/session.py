@@ -20,10 +20,10 @@ from bifocal.collimation.live_orientation import LiveOrientation
 from bifocal.collimation.live_results import LiveResults
 from bifocal.collimation.pictures import Pictures
 from bifocal.collimation.products import Products, accept_pair, discard_pair
-from bifocal.collimation.project import SurveyFiles
+from bifocal.collimation.project import SurveyFiles, holds
 from bifocal.collimation.proposals import measure_of, rescale
 from bifocal.collimation.records import Change, PickedPoint, SurveyState
-from bifocal.collimation.shapes import commands_for, keep_faces
+from bifocal.collimation.shapes import commands_for, keep_faces, outlines_of
 from bifocal.collimation.workbook.rows import PointRow, row_of
 from bifocal.collimation.workbook.setup import ideal_setup, pair_of, typed_of
 from bifocal.collimation.workbook.sync import WorkbookSync
@@ -31,8 +31,10 @@ from bifocal.faces.faces import Faces
 from bifocal.faces.faces_files import beside
 from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
+from bifocal.model.photo_set import PhotoSet
 from bifocal.remarks import remark
 from photocore.errors import InputError, PhotogrammetryError
+from photocore.jsonfile import plain
 from photocore.output import free_path, relative_name
 
 #: Commands that were answered already, by their ids.
@@ -72,6 +74,7 @@ class Session:
         self.orientation: tuple[object, LiveOrientation] | None = None
         self.proposal: dict[str, Any] | None = None
         self.good: tuple[LiveResults, dict[str, Any] | None] | None = None
+        self._joined: tuple[object, bool] | None = None
         self._kept: tuple[dict[str, Any], Pair] | None = None
         #: Faces that the program would draw.
         self.suggested: list[dict[str, Any]] = []
@@ -79,7 +82,10 @@ class Session:
         self.journal = Journal(files.journal)
         try:
             pair = pair_of(files)
-            photos = files.photos if pair is None else (pair.photo_file(1), pair.photo_file(2))
+            own = files.photos[:2] if pair is None else (pair.photo_file(1), pair.photo_file(2))
+            # What a journal says beside another pair is of no use.
+            same = {path.resolve() for path in own} == {p.resolve() for p in files.photos[:2]}
+            photos = (*own, *(files.photos[2:] if same else ()))
             self.pictures = Pictures(files.folder / f".{files.stem}.tiles", photos, pair)
             self.results = None if pair is None else self._results(pair)
             self.products = Products(files)
@@ -102,7 +108,7 @@ class Session:
     # ---- the survey's files
 
     def give_photos(self, photos: Sequence[Path]) -> None:
-        """Begin with two photos; what was picked in others is of no use any more.
+        """Begin with photos, far and near first; what was picked in others is of no use any more.
 
         Raises
         ------
@@ -111,10 +117,48 @@ class Session:
         """
         with self.lock:
             self.check_new_photos()
-            self.pictures.show_photos(photos)
-            self.files = replace(self.files, photos=tuple(photos), pair=None)
+            self.pictures.show_photos(photos[:2])
+            self.pictures.show_others(photos[2:])
+            self.files = replace(self.files, photos=self.all_photos, pair=None)
             self.results, self.proposal = None, None
             self._remember_files()
+            self.changed()
+
+    def give_others(self, photos: Sequence[Path]) -> None:
+        """Let these be the photos beside far and near: they join an orientation, which stays."""
+        with self.lock:
+            self.pictures.show_others(photos)
+            self.files = replace(self.files, photos=self.all_photos)
+            self._remember_files()
+            self.changed()
+
+    @property
+    def all_photos(self) -> tuple[Path, ...]:
+        """Far and near photo, then the others."""
+        return tuple(info.path for info in (*self.pictures.infos, *self.pictures.others))
+
+    @property
+    def photo_set(self) -> Path | None:
+        """File of the set that holds the accepted pair and all further photos, if there is one."""
+        pair = self.accepted_pair
+        for path in (self.products.current("set"), self.files.photo_set):
+            if pair is None or path is None or not path.is_file():
+                continue
+            facts = path, path.stat().st_mtime_ns, pair, self.all_photos
+            if self._joined is None or self._joined[0] != facts:
+                self._joined = facts, holds(PhotoSet.read(path), pair, self.all_photos)
+            if self._joined[1]:
+                return path
+        return None
+
+    def join(self, path: Path) -> None:
+        """Let the pair be that of a set that a job adjusted."""
+        with self.lock:
+            target = self.products.place("pair", ".pair.json")
+            PhotoSet.read(path).pair(0, 1).write(target, overwrite=True)
+            self.note_made("pair", [target.name])
+            self.use_pair(target)
+            self._keep_faces()
             self.changed()
 
     def check_new_photos(self) -> None:
@@ -257,7 +301,7 @@ class Session:
             self.files.pair.replace(aside)
         self.pictures.show_photos(photos)
         self.results, self.proposal = None, None
-        self.files = replace(self.files, photos=tuple(photos), pair=None)
+        self.files = replace(self.files, photos=self.all_photos, pair=None)
         self._remember_files()
 
     def note_made(self, kind: str, names: Sequence[str]) -> None:
@@ -279,7 +323,7 @@ class Session:
             "op": "files",
             "stem": self.files.stem,
             "pair": relative_name(pair, folder) if pair else None,
-            "photos": [relative_name(info.path, folder) for info in self.pictures.infos],
+            "photos": [relative_name(path, folder) for path in self.all_photos],
         }
         known = [old for old in self.journal.records if old["op"] == "files"]
         if not known or {key: known[-1].get(key) for key in record} != record:
@@ -407,6 +451,8 @@ class Session:
                 raise self.journal.refusal(number, str(error)) from None
             if self.state.revision == at:
                 self.sync.synced = {n: row_of(p) for n, p in self.state.points.items()}
+                if self.pictures.pair is not None:
+                    self.sync.outlines = plain(outlines_of(self.state, self.pictures.pair))
 
     def _replay(self, record: Mapping[str, Any]) -> None:
         """Carry out a record of the journal."""

@@ -22,6 +22,8 @@ from photocore.arrays import FloatArray
 
 #: Rounds in which relief and place settle where a ray meets a relief map.
 ROUNDS = 6
+#: Layer of outlines that were given none.
+OUTLINES = "outlines"
 
 
 def places_of(pair: Pair, corners: Sequence[Sequence[float]]) -> FloatArray:
@@ -66,6 +68,15 @@ def relief_within(pair: Pair, relief: ReliefMap, pixels: FloatArray) -> float | 
     found = met(pair, relief, grid[np.array(inside)])[:, 2] if any(inside) else np.array([])
     known = found[np.isfinite(found)]
     return float(np.median(known)) if len(known) else None
+
+
+def outlines_of(state: SurveyState, pair: Pair) -> dict[str, dict[str, Any]]:
+    """Return layer and measures of what was drawn to be measured, by its name. [m, m2]"""
+    return {
+        shape.name: {"layer": shape.layer or OUTLINES, **measures_of(shape, pair)}
+        for shape in state.shapes.values()
+        if shape.kind == "outline"
+    }
 
 
 def faces_of(state: SurveyState, pair: Pair) -> Faces:

@@ -121,26 +121,23 @@ def match_features(first: Features, second: Features) -> tuple[NDArray[np.intp],
         return np.zeros(0, np.intp), np.zeros(0, np.intp)
     count = len(first.pixels)
     nearest = np.zeros(count, np.intp)
+    value = np.zeros(count, np.float32)
     distinct = np.zeros(count, dtype=bool)
-    back_value = np.full(len(second.pixels), -np.inf, np.float32)
-    back = np.zeros(len(second.pixels), np.intp)
+    highest = np.full(len(second.pixels), -np.inf, np.float32)
     for start in range(0, count, 2000):
         part = first.descriptors[start : start + 2000] @ second.descriptors.T
-        best = part.argmax(axis=1)
-        rows = np.arange(len(part))
-        value = part[rows, best].copy()
-        column_best = part.argmax(axis=0)
-        column_value = part[column_best, np.arange(part.shape[1])]
-        better = column_value > back_value
-        back_value[better] = column_value[better]
-        back[better] = column_best[better] + start
+        own = slice(start, start + len(part))
+        best = nearest[own] = part.argmax(axis=1)
+        value[own] = part[np.arange(len(part)), best]
+        np.maximum(highest, part.max(axis=0), out=highest)
         runner = _runner_up(part, best, second.pixels, FEATURES.same_place * second.reduction)
-        nearest[start : start + 2000] = best
         # |a - b|² = 2 - 2 a·b for unit vectors.
-        distinct[start : start + 2000] = (2 - 2 * value) < FEATURES.distinct**2 * (2 - 2 * runner)
-    rows = np.arange(count)
-    good = distinct & (back[nearest] == rows)
-    return rows[good], nearest[good]
+        distinct[own] = (2 - 2 * value[own]) < FEATURES.distinct**2 * (2 - 2 * runner)
+    # Of several that are as near to one feature the first.
+    mutual = np.flatnonzero(value == highest[nearest])
+    mutual = np.sort(mutual[np.unique(nearest[mutual], return_index=True)[1]])
+    good = mutual[distinct[mutual]]
+    return good, nearest[good]
 
 
 def _runner_up(
@@ -150,8 +147,8 @@ def _runner_up(
     rows = np.arange(len(best))
     similarity[rows, best] = -1.0
     runner = np.full(len(best), -1.0, np.float32)
-    for _ in range(4):  # a place has at most a few orientations
-        second = similarity[rows].argmax(axis=1)
+    for once in range(4):  # a place has at most a few orientations
+        second = (similarity[rows] if once else similarity).argmax(axis=1)
         runner[rows] = similarity[rows, second]
         close = np.linalg.norm(pixels[second] - pixels[best[rows]], axis=1) < place
         similarity[rows[close], second[close]] = -1.0

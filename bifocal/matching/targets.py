@@ -160,7 +160,10 @@ def _chequers(image: ByteArray) -> tuple[FloatArray, FloatArray]:
         for row, column in zip(rows.tolist(), columns.tolist(), strict=True)
         if (place := _crossing(image, smooth, column, row)) is not None
     ]
-    array = np.array(out).reshape(-1, 3)
+    # A peak of two equal pixels is one crossing.
+    array = np.unique(np.round(np.array(out).reshape(-1, 3), 3), axis=0)
+    apart = np.hypot(*(array[:, None, :2] - array[None, :, :2]).transpose(2, 0, 1))
+    array = array[~np.tril(apart < 3.0, -1).any(axis=1)]
     return array[:, :2], array[:, 2]
 
 
@@ -184,14 +187,19 @@ def _crossing(
     # Opposite sectors of a chequer are equal.
     if np.abs(ring - np.roll(ring, 16)).mean() > 0.2 * (ring.max() - ring.min()):
         return None
-    # Its sectors are of one grey, and straight: stones that touch and crossing joints are not.
-    low, high = float(np.median(ring[~bright])), float(np.median(ring[bright]))
+    # Its sectors are of one grey, and straight: stones that touch and crossing joints are not. How
+    # sharp the lens drew the edges between them says nothing of that.
+    edge = bright != np.roll(bright, 1)
+    within = ~np.any([np.roll(edge, by) for by in range(-2, 3)], axis=0)
+    if not ((within & bright).any() and (within & ~bright).any()):
+        return None
+    low, high = float(np.median(ring[within & ~bright])), float(np.median(ring[within & bright]))
     for radius in (4.0, 6.0, 7.5):
         around = image[
             np.round(row + radius * np.sin(angles)).astype(int),
             np.round(column + radius * np.cos(angles)).astype(int),
         ].astype(np.float64)
-        off = np.minimum(np.abs(around - low), np.abs(around - high))
+        off = np.minimum(np.abs(around - low), np.abs(around - high))[within]
         same = (around > (low + high) / 2) == bright
         if np.median(off) > TARGETS.uneven * (high - low) or same.mean() < 0.8:
             return None

@@ -84,12 +84,15 @@ def pinhole(photo: PlanePhoto) -> Pinhole:
     Notes
     -----
     ``pixel ~ K R [e1 e2 -C] (X, Y, 1)``; K R follows from the homography's inverse, and an
-    orthogonal decomposition splits it.
+    orthogonal decomposition splits it. Where rows count upwards with Y the photo is a mirror image:
+    its camera matrix has a negative aspect, the rotation none.
     """
     centre = np.array([*photo.nadir, photo.distance])
     base = np.column_stack([np.eye(3)[:, :2], -centre])
     mapped = np.linalg.inv(photo.plane_from_pixel) @ np.linalg.inv(base)
     mapped /= np.cbrt(np.linalg.det(mapped))
+    if mirrored := mapped[2, 2] > 0:  # else its camera would look away from the plane
+        mapped = mapped * [[-1.0], [1.0], [-1.0]]
     # K R = (reversed QR of the transposed, reversed matrix), with a positive diagonal.
     base, triangle = np.linalg.qr(mapped[::-1].T)
     matrix, rotation = triangle.T[::-1, ::-1], base.T[::-1]
@@ -99,6 +102,8 @@ def pinhole(photo: PlanePhoto) -> Pinhole:
     focal, aspect = matrix[0, 0] / scale, matrix[1, 1] / matrix[0, 0]
     ideal = camera_matrix(focal, aspect, *(matrix[:2, 2] / scale))
     ideal[0, 1] = matrix[0, 1] / scale  # a homography typed in may be skewed
+    if mirrored:
+        ideal[1] *= -1.0
     return Pinhole(ideal, rotation, centre)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from bifocal.model.interior_orientation import Interior
 from bifocal.model.orientation_precision import CAMERA
+from bifocal.orientation.adjustment.frame_turn import line_equations
 from bifocal.orientation.facade_lines import FacadeDirection
 from photocore.adjustment.network import NetworkState, Rows
 from photocore.arrays import BoolArray, FloatArray, IntArray
@@ -41,8 +42,8 @@ class CameraKnowledge:
         Taped: how often each camera's distance counts, the sum of these, its sigma. [m]
     lengths : tuple of (int, int, float, float)
         Taped between two points, and their sigmas. [m]
-    lines : tuple of (int, FacadeDirection)
-        Directions along the wall, each with the camera that sees it.
+    lines : tuple of FacadeDirection
+        Directions along the wall; their cameras count from 1.
     sigma_tilts : mapping of int to float
         Cameras set up square to the wall. [rad]
     by_wall : bool
@@ -55,7 +56,7 @@ class CameraKnowledge:
     sigma_body: float | None = None
     distances: tuple[tuple[Mapping[int, float], float, float], ...] = ()
     lengths: tuple[Taped, ...] = ()
-    lines: tuple[tuple[int, FacadeDirection], ...] = ()
+    lines: tuple[FacadeDirection, ...] = ()
     sigma_tilts: Mapping[int, float] = field(default_factory=dict)
     by_wall: bool = False
 
@@ -112,10 +113,9 @@ class CameraKnowledge:
             line = rows.add(np.array([(length - metres) / sigma]))
             rows.by_points(line, np.array([a]), between / length / sigma)
             rows.by_points(line, np.array([b]), -between / length / sigma)
-        for k, direction in self.lines:
-            seen = direction.in_frame(cameras[k])
-            line = rows.add(seen[2:] / direction.sigma)
-            rows.by_label(line, column[k, _TURN : _TURN + 3], skew(seen)[2] / direction.sigma)
+        if self.lines:
+            values, by = line_equations(self.lines, list(cameras.values()))
+            rows.by_label(rows.add(values)[:, None], column.ravel(), by)
         for k, sigma in self.sigma_tilts.items():
             axis = cameras[k].rotation[2]
             line = rows.add(cameras[k].tilt / sigma)

@@ -40,6 +40,7 @@ def named_positions(
     check: Sequence[Path | None] = (),
     sigma: float = 0.003,
     unit: str = "",
+    columns: str | None = None,
 ) -> NamedPositions:
     """Return the points of all tables, one of each for every pair or none, joined by name.
 
@@ -62,7 +63,7 @@ def named_positions(
                 continue
             # That a check point without relief is on the wall is nothing to check by.
             part = read_control(
-                path, sigma=sigma, unit=unit,
+                path, sigma=sigma, unit=unit, columns=columns,
                 sigma_plane=None if role == "check" else CONTROL.sigma_on_wall,
                 unnamed=f"{name_of(paths[index])}, {role} ",
             )  # fmt: skip

@@ -193,10 +193,11 @@ def into_one_frame(
         k = rest[best]
         frames[k] = _robust(places[k], xyz)
         xyz = np.where(np.isfinite(xyz), xyz, _moved(places[k], frames[k]))
-    moved = [_moved_camera(camera, frames[k // 2]) for k, camera in enumerate(cameras)]
+    framed = [(camera, frames[k // 2]) for k, camera in enumerate(cameras)]
+    moved = [camera if frame is None else camera.carried(frame) for camera, frame in framed]
     if fixed[root] < 3 and np.isfinite(known + xyz).all(axis=1).sum() >= 3:
         whole = _robust(xyz, known)
-        xyz, moved = _moved(xyz, whole), [_moved_camera(camera, whole) for camera in moved]
+        xyz, moved = _moved(xyz, whole), [camera.carried(whole) for camera in moved]
     # What no pair sees in both photos stands on the wall, where its rays meet that.
     xyz = np.where(np.isfinite(xyz), xyz, _on_the_wall(moved, shared, ideal, media))
     middle = np.nanmedian(xyz, axis=0)
@@ -293,10 +294,3 @@ def _robust(source: FloatArray, target: FloatArray) -> Similarity:
 
 def _moved(xyz: FloatArray, frame: Similarity | None) -> FloatArray:
     return xyz if frame is None else np.where(np.isfinite(xyz), frame(np.nan_to_num(xyz)), np.nan)
-
-
-def _moved_camera(camera: Pinhole, frame: Similarity | None) -> Pinhole:
-    """Return a camera in the target frame of a similarity."""
-    if frame is None:
-        return camera
-    return camera._replace(rotation=camera.rotation @ frame.rotation.T, centre=frame(camera.centre))

@@ -67,6 +67,8 @@ class JointTask:
         Precision of control picks and of features. [px]
     unit : str
         Of the coordinates; empty: as the headings say, else metres.
+    columns : str, optional
+        Which column of the tables is which; by default as the headings say.
     """
 
     control: tuple[Path | None, ...] = ()
@@ -75,6 +77,7 @@ class JointTask:
     sigma_pick: float = 0.5
     sigma_tie: float = SIGMA_FEATURE
     unit: str = ""
+    columns: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -191,6 +194,7 @@ def adjust_pairs(
         check=task.check,
         sigma=task.sigma_control,
         unit=task.unit,
+        columns=task.columns,
     )
     outputs = [out / "points.csv", *(out / path.name for path in paths)]
     for output in outputs:

@@ -19,12 +19,14 @@ from bifocal.networks.joint_observations import JointObservations, with_rays
 from bifocal.networks.joint_ties import SharedPoints, common_features
 from bifocal.networks.set_start import FirstCameras, first_cameras_of, meeting
 from bifocal.orientation import validation
+from bifocal.orientation.adjustment.frame_turn import turned_by_lines
 from bifocal.orientation.adjustment.pair_observations import (
     INDEPENDENT,
     PairObservations,
     PairUnknowns,
 )
 from bifocal.orientation.control_points import Control, SiteMeasures
+from bifocal.orientation.facade_lines import FacadeDirection
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.tie_points import refine_ties
 from bifocal.orientation.tuning import TIES, WALLS
@@ -287,6 +289,7 @@ def _adjusted(
     assert knowledge is not None
     free_frame = knowledge.by_wall and control.positioned.sum() < 2
     pair = first.pair.observations
+    turning: tuple[FacadeDirection, ...] = ()
     if knowledge.by_wall:
         count = len(control.ids)
         known[:count], spread[:count] = control.xyz, control.sigma
@@ -295,10 +298,9 @@ def _adjusted(
         held = {first.far: ("turn Z", "X", "Y")} if free_frame else {}
         cameras = {1: first.far, 2: first.near}
         tilts = {} if pair.sigma_tilt is None else dict.fromkeys(cameras.values(), pair.sigma_tilt)
-        knowledge = replace(
-            knowledge, held=held, sigma_tilts=tilts,
-            lines=tuple((cameras[line.camera], line) for line in pair.lines),
-        )  # fmt: skip
+        lines = tuple(replace(line, camera=cameras[line.camera] + 1) for line in pair.lines)
+        turning, lines = (lines, ()) if pair.lines_bend_nothing else ((), lines)
+        knowledge = replace(knowledge, held=held, sigma_tilts=tilts, lines=lines)
     own = {"distance1": {0: 1.0}, "distance2": {1: 1.0}, "delta_d": {0: 1.0, 1: -1.0}}
     spreads = control.sigma_lengths or (np.nan,) * len(control.lengths)
     usual = float(control.sigma.min(initial=0.003))
@@ -314,10 +316,30 @@ def _adjusted(
         ),
     )  # fmt: skip
     observed = replace(observed, sigma=sigma, known=known, sigma_known=spread, cameras=knowledge)
+    adjusted = adjust_jointly(observed, state)
+    adjusted = turned_set(adjusted, turning) if turning else adjusted
     return OrientedSet(
-        first=first, adjusted=adjust_jointly(observed, state), control=control,
-        sigma_tie=sigma_tie, on_wall=int(on_wall.sum()),
-        free_frame=bool(free_frame), way="auto" if knowledge.by_wall else "control",
+        first=first, adjusted=adjusted, control=control, sigma_tie=sigma_tie,
+        on_wall=int(on_wall.sum()), free_frame=bool(free_frame),
+        way="auto" if knowledge.by_wall else "control",
+    )  # fmt: skip
+
+
+def turned_set(adjusted: JointAdjustment, lines: Sequence[FacadeDirection]) -> JointAdjustment:
+    """Return cameras and points in a frame that lines turn, as `turned_by_lines` does a pair's."""
+    known, factor = adjusted.observations.cameras, max(adjusted.sigma0, 1.0) ** 2
+    assert known is not None
+    scale = np.sqrt(np.diag(adjusted.of_cameras))
+    unit = np.where(scale > 0, scale, np.inf)[:, None]  # as correlations: units differ by far
+    inverse = np.linalg.pinv(adjusted.of_cameras / (unit * unit.T), rcond=1e-13, hermitian=True)
+    frame, cofactor = turned_by_lines(
+        lines, adjusted.cameras, known.free.ravel(), adjusted.of_cameras / factor,
+        lambda moves: factor * (moves / unit).T @ inverse @ (moves / unit),
+    )  # fmt: skip
+    xyz = np.where(np.isfinite(adjusted.xyz), frame(np.nan_to_num(adjusted.xyz)), np.nan)
+    return replace(
+        adjusted, cameras=tuple(camera.carried(frame) for camera in adjusted.cameras), xyz=xyz,
+        control=adjusted.control + xyz - adjusted.xyz, of_cameras=factor * cofactor,
     )  # fmt: skip
 
 

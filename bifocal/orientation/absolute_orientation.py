@@ -44,7 +44,7 @@ from bifocal.orientation.orientation_stages import (
     oriented_in_stages,
     with_refracted_ties,
 )
-from bifocal.orientation.slips import Fitted, Typed, slip_of
+from bifocal.orientation.slips import TrialOrientation, Typed, slip_of
 from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.tie_points import likely_on_wall
 from bifocal.orientation.tuning import BEND, CONTROL, ORDER, REMARKS, SLIPS, STAGES, TIES
@@ -250,7 +250,7 @@ def _without_gross(pair: OrientedPair) -> OrientedPair:
 
 
 def _typed_right(
-    given: Given, fitted: Callable[[Given], Fitted | None], *, by_control: bool
+    given: Given, fitted: Callable[[Given], TrialOrientation | None], *, by_control: bool
 ) -> OrientedPair | None:
     """Return the pair with the slip mended that explains a misfit, saying so; None without one.
 
@@ -277,7 +277,7 @@ def _told(given: Given, note: str) -> OrientedPair:
     return replace(pair, remarks=(note, *pair.remarks))
 
 
-def _by_control(given: Given, ties: Ties | None) -> Fitted | None:
+def _by_control(given: Given, ties: Ties | None) -> TrialOrientation | None:
     """Return how well control points, lenses, tapes and common points fit each other.
 
     Whichever photo is the far one, the longer distance is its. Control points leave the lines of
@@ -303,10 +303,10 @@ def _by_control(given: Given, ties: Ties | None) -> Fitted | None:
     if ties is not None:
         off = contradiction(adjusted.cameras, ties) / (2 * ties.tolerance)
         square += max(off - 1.0, 0.0) ** 2
-    return Fitted(misfit=float(np.sqrt(square)), cameras=adjusted.cameras, lost=~used)
+    return TrialOrientation(misfit=float(np.sqrt(square)), cameras=adjusted.cameras, lost=~used)
 
 
-def _by_ties(given: Given, ties: Ties, seen: PairObservations) -> Fitted | None:
+def _by_ties(given: Given, ties: Ties, seen: PairObservations) -> TrialOrientation | None:
     """Return how well common points as matched meet, as a share of what they may miss by.
 
     With how far the façade's lines come out of the wall.
@@ -332,7 +332,9 @@ def _by_ties(given: Given, ties: Ties, seen: PairObservations) -> Fitted | None:
         min(lines, SLIPS.most) ** 2,
     )
     misfit = float(np.sqrt(sum(squares)))
-    return Fitted(misfit=misfit, cameras=pair.adjusted.cameras, lost=~pair.observations.pick_used)
+    return TrialOrientation(
+        misfit=misfit, cameras=pair.adjusted.cameras, lost=~pair.observations.pick_used
+    )
 
 
 def _pulled(pair: OrientedPair) -> float:

@@ -197,10 +197,7 @@ def _scaled(cameras: Cameras, given: Given, interiors: Interiors) -> Cameras:
         metres = Similarity(
             scale=scale, rotation=np.eye(3), source_centre=nowhere, target_centre=nowhere
         )
-    first, second = (
-        camera._replace(rotation=camera.rotation @ metres.rotation.T, centre=metres(camera.centre))
-        for camera in cameras
-    )
+    first, second = (camera.carried(metres) for camera in cameras)
     return first, second
 
 

@@ -92,9 +92,10 @@ class Control:
         return (self.pixels1, self.pixels2, *self.more)
 
     def of(self, far: int, near: int) -> Control:
-        """Return the points of two photos of a set, by their numbers from 0."""
-        picks = self.picks if self.ids else [np.zeros((0, 2))] * (max(far, near) + 1)
-        return replace(self, pixels1=picks[far], pixels2=picks[near], more=())
+        """Return the points of two photos of a set, by numbers from 0; not picked: blank."""
+        blank = np.full((len(self.ids), 2), np.nan)  # a length is picked in the first photo alone
+        picks = [self.picks[k] if k < len(self.picks) else blank for k in (far, near)]
+        return replace(self, pixels1=picks[0], pixels2=picks[1], more=())
 
     @property
     def positioned(self) -> BoolArray:
@@ -246,9 +247,13 @@ def _names(texts: Sequence[str], before: str) -> list[str]:
     return [text or name for text, name in zip(texts, own, strict=True)]
 
 
-def known_points(path: Path, *, unit: str = "", photos: int = 2) -> SurveyPoints:
+def known_points(
+    path: Path, *, unit: str = "", columns: str | None = None, photos: int = 2
+) -> SurveyPoints:
     """Return the coordinates of a table of control or check points, NaN where it has none."""
-    control = read_control(path, sigma=0.003, sigma_plane=None, unit=unit, photos=photos)
+    control = read_control(
+        path, sigma=0.003, sigma_plane=None, unit=unit, columns=columns, photos=photos
+    )
     blank = ("",) * len(control.ids)
     return SurveyPoints(
         ids=control.ids, xyz=control.xyz, sigma_r=control.sigma[:, 2], flags=blank, notes=blank,

@@ -13,7 +13,7 @@ from bifocal.model.photo_alone import PhotoAlone
 from bifocal.orientation.adjustment.pair_adjustment import ROUNDING, as_one
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.facade_lines import facing_wall
-from bifocal.orientation.slips import Fitted, Typed, slip_of
+from bifocal.orientation.slips import TrialOrientation, Typed, slip_of
 from bifocal.orientation.starts.space_resection import refuse_line, resect
 from bifocal.orientation.tuning import SLIPS
 from bifocal.remarks import remark
@@ -166,7 +166,7 @@ def by_control(control: Control, interior: Interior, *, sigma_pick: float) -> Or
         pixels2=control.pixels2[whole],
     )  # fmt: skip
 
-    def fitted(typed: Typed) -> Fitted | None:
+    def fitted(typed: Typed) -> TrialOrientation | None:
         if not np.isfinite(typed.control.pixels1).all():
             return None  # the picks of a second photo
         try:
@@ -174,7 +174,7 @@ def by_control(control: Control, interior: Interior, *, sigma_pick: float) -> Or
         except (GeometryError, ConvergenceError):
             return None
         lost = np.nan_to_num(photo.test, nan=OUTLIER_LIMIT) >= OUTLIER_LIMIT
-        return Fitted(misfit=photo.sigma0, cameras=(photo.camera,) * 2, lost=lost)
+        return TrialOrientation(misfit=photo.sigma0, cameras=(photo.camera,) * 2, lost=lost)
 
     known = replace(interior, is_calibrated=True)  # the points' own slips alone are looked for
     typed = Typed(interiors=(known, known), control=control, site=SiteMeasures())

@@ -27,14 +27,14 @@ class Typed:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Fitted:
+class TrialOrientation:
     """How well that fits: the misfit over what it may be, and which control points do not."""
 
     misfit: float
     cameras: Cameras
     lost: BoolArray
 
-    def explains(self, now: Fitted | None) -> bool:
+    def explains(self, now: TrialOrientation | None) -> bool:
         """Return whether this is what was meant, where what was typed fits so.
 
         Both fits with all points: then the sum of squares tells, as precise as the points are.
@@ -60,7 +60,7 @@ class Slip:
 
 
 def slip_of(
-    typed: Typed, fitted: Callable[[Typed], Fitted | None], *, by_control: bool
+    typed: Typed, fitted: Callable[[Typed], TrialOrientation | None], *, by_control: bool
 ) -> Slip | None:
     """Return the slip that explains why something typed does not fit; None where nothing does.
 
@@ -96,7 +96,9 @@ def slip_of(
 
 
 def _explaining(
-    slips: Iterable[Slip], fitted: Callable[[Typed], Fitted | None], now: Fitted | None
+    slips: Iterable[Slip],
+    fitted: Callable[[Typed], TrialOrientation | None],
+    now: TrialOrientation | None,
 ) -> list[tuple[float, Slip]]:
     """Return the slips that explain a misfit, each with what is left of it."""
     found: list[tuple[float, Slip]] = []
@@ -157,7 +159,7 @@ def _of_site(typed: Typed) -> Iterator[Slip]:
         yield Slip(meant=meant, words=words, mended=False)
 
 
-def _of_control(typed: Typed, now: Fitted | None) -> Iterator[Slip]:
+def _of_control(typed: Typed, now: TrialOrientation | None) -> Iterator[Slip]:
     """Yield slips of the control table: how its axes count, which pick and which point is which."""
     control, count = typed.control, len(typed.control.ids)
     xyz, picks = control.xyz, (control.pixels1, control.pixels2)

@@ -264,7 +264,7 @@ def _of_the_wall(
 
 
 def _camera(view: ForeignView, frame: Similarity) -> Pinhole:
-    return Pinhole(view.lens.camera_matrix, view.rotation @ frame.rotation.T, frame(view.centre))
+    return Pinhole(view.lens.camera_matrix, view.rotation, view.centre).carried(frame)
 
 
 def _photos(

@@ -96,6 +96,8 @@ class ReportTask:
         Tables of control points and of independent check points.
     unit : str
         Of their coordinates; empty: as the headings say.
+    columns : str, optional
+        Which column of theirs is which; by default as the headings say.
     far : Path, optional
         Photo that the tables call the far one.
     relief, ortho : Path, optional
@@ -109,7 +111,7 @@ class ReportTask:
     """
 
     #: What is given as it is typed.
-    PLAIN: ClassVar = ("title", "language", "scale", "unit")
+    PLAIN: ClassVar = ("title", "language", "scale", "unit", "columns")
 
     title: str = ""
     language: str = "en"
@@ -117,6 +119,7 @@ class ReportTask:
     control: Path | None = None
     check: Path | None = None
     unit: str = ""
+    columns: str | None = None
     far: Path | None = None
     relief: Path | None = None
     ortho: Path | None = None
@@ -270,6 +273,7 @@ def read_content(source: Path, task: ReportTask) -> PairContent:
             solution = solve_control(
                 source, control=task.control, check=task.check, exchanged=exchanged,
                 photos=2 if of_set is None else len(of_set), language=task.language, unit=task.unit,
+                columns=task.columns,
             )  # fmt: skip
     ortho, gsd = (None, 0.0) if task.ortho is None else ortho_thumbnail(task.ortho)
     return PairContent(

@@ -49,6 +49,7 @@ def solve_control(
     photos: int = 2,
     language: str = "en",
     unit: str = "",
+    columns: str | None = None,
 ) -> SolvedSurvey:
     """Solve the points of control and check tables from their pixels, and compare.
 
@@ -67,6 +68,8 @@ def solve_control(
         Of the workbook that may be made of it.
     unit : str
         Unit of the coordinates; empty: as the headings say, else metres.
+    columns : str, optional
+        Which column of the tables is which; by default as the headings say.
 
     Raises
     ------
@@ -74,7 +77,7 @@ def solve_control(
         If a table is unusable, a name is in both, or none has a point seen in two photos.
     """
     tables = [(path, code) for path, code in ((control, CONTROL), (check, CHECK)) if path]
-    parts = [_read(path, exchanged, unit, photos) for path, _ in tables]
+    parts = [_read(path, exchanged, unit, columns, photos) for path, _ in tables]
     counts = np.array([len(part.ids) for part in parts], dtype=int)
     codes = np.repeat([code for _, code in tables], counts)
     ids = [name for part in parts for name in part.ids]
@@ -110,7 +113,9 @@ def is_exchanged(pair: Pair | PhotoSet, far: Path) -> bool:
     return isinstance(pair, Pair) and pair.photo_file(2).resolve() == far.resolve()
 
 
-def _read(path: Path, exchanged: bool, unit: str, photos: int) -> Control:
+def _read(path: Path, exchanged: bool, unit: str, columns: str | None, photos: int) -> Control:
     # The standard deviations are those of the orientation; here they play no part.
-    control = read_control(path, sigma=0.003, sigma_plane=0.005, unit=unit, photos=photos)
+    control = read_control(
+        path, sigma=0.003, sigma_plane=0.005, unit=unit, columns=columns, photos=photos
+    )
     return control.exchanged() if exchanged else control

@@ -158,6 +158,7 @@ def _remembered(home: Path, task: ReportTask) -> dict[str, Any]:
     return {
         "steps": tuple(steps),
         "scale": float(scale) if isinstance(scale, int | float) else None,
+        "columns": known.get("columns"),
         "language": task.language or known.get("language", "en"),
         "project": {name: known[name] for name in PROJECT if name in known} | dict(task.project),
     }

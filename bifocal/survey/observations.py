@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, as_floats
 from photocore.errors import InputError
 from photocore.series import check_index
@@ -128,10 +129,7 @@ class PointObservations:
         shapes = {key: np.shape(column) for key, column in columns.items()}
         flawed = [key for key, shape in shapes.items() if len(shape) != 1]
         if flawed:
-            raise InputError(
-                f"{flawed[0]}: expected a list of values, one for each point, found shape "
-                f"{shapes[flawed[0]]}."
-            )
+            raise InputError(remark("survey.no_list", of=flawed[0], shape=shapes[flawed[0]]))
         (n,) = next(iter(shapes.values()), (0,))
         uneven = [key for key, shape in shapes.items() if shape != (n,)]
         if uneven:

@@ -150,10 +150,7 @@ def check_orientation(
     labels = list(names) if names is not None else [str(i + 1) for i in range(len(first))]
     measured: BoolArray = np.isfinite(np.hstack([first, second])).all(axis=1)
     if measured.sum() < 2:
-        raise InputError(
-            f"set-up check: {int(measured.sum())} point(s) measured in both photos are marked as "
-            "on the plane; at least 2 are needed, 5 or more well spread are better."
-        )
+        raise InputError(remark("survey.few_plane_points", count=int(measured.sum())))
     origin = pair.image2.nadir
     places = pair.image1.plane_from_pixels(first)
     q1 = rays.apparent_of_plane(places, pair.image2.foot) - origin
@@ -312,10 +309,7 @@ def _fit(
             rounding=ROUNDING,
         )
     except GeometryError:
-        raise GeometryError(
-            "set-up check: the plane points lie on one spot or one line; "
-            "mark points spread over the photo."
-        ) from None
+        raise GeometryError(remark("survey.plane_in_line")) from None
     left = q1 - _mapped(fit.state, q2)[1]
     scaled = np.linalg.norm((weight @ left[:, :, None])[:, :, 0], axis=1)
     return fit.state, fit.linear.cofactor, scaled, left

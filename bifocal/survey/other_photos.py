@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from bifocal.equations import relief
 from bifocal.model.flags import FlagLimits
 from bifocal.precision import sigma_relief
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.setup import OtherPhoto, SurveySetup
 from photocore.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from bifocal.survey.observations import PointObservations
-    from bifocal.survey.setup import SurveySetup
 
 #: Most photos of one workbook.
 MOST_PHOTOS = 6
@@ -33,32 +30,7 @@ def is_of_others(key: str) -> bool:
     return key in OF_ALL or key.startswith(("r_1_", "sigma_1_"))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OtherPhoto:
-    """How a photo beside an ideal pair was taken; its image coordinates are those of the pair.
-
-    Attributes
-    ----------
-    d, c : float or None
-        Distance to the reference plane [m] and principal distance [mm]; None while not typed.
-    enlargement : float or None
-        Of the print that was measured; None or 1 = on the sensor.
-    nadir : tuple of float or None
-        (column, row) of the nadir point, for coordinates in pixels. [px]
-    """
-
-    d: float | None = None
-    c: float | None = None
-    enlargement: float | None = None
-    nadir: tuple[float, float] | None = None
-
-    @property
-    def scale(self) -> float:
-        """Metres on the wall for a millimetre; NaN while a distance is not typed."""
-        return (self.d or math.nan) / ((self.c or math.nan) * (self.enlargement or 1.0))
-
-
-class _Seen(NamedTuple):
+class _PlanePositions(NamedTuple):
     """Where photos see points on the wall [m], what each place weighs; shape (n, photos)."""
 
     x: FloatArray
@@ -95,7 +67,7 @@ def of_all_photos(
     photo counts once, in however many pairs. With X, Y eliminated a turn of Gauss-Newton is a
     quotient of sums over the photos, which a cell can hold.
     """
-    seen = _seen(setup, points)
+    seen = _on_wall(setup, points)
     columns: dict[str, FloatArray] = {}
     cells: dict[str, FloatArray] = {}
     for k, (x, y, weight) in enumerate(zip(seen.x.T, seen.y.T, seen.weight.T, strict=True), 1):
@@ -108,7 +80,7 @@ def of_all_photos(
     return columns | together, cells | turns
 
 
-def _seen(setup: SurveySetup, points: PointObservations) -> _Seen:
+def _on_wall(setup: SurveySetup, points: PointObservations) -> _PlanePositions:
     """Return where all photos see the points on the wall."""
     taking, measured = setup.taking, setup.in_millimetres(points)
     unit, _ = setup.typed_frame(1)
@@ -127,11 +99,11 @@ def _seen(setup: SurveySetup, points: PointObservations) -> _Seen:
     wall[np.isnan(wall).any(axis=2)] = np.nan
     weight = np.where(np.isnan(wall[..., 0]), np.nan, scales**-2.0)
     distances = np.array([photo.d or np.nan for photo in photos])
-    return _Seen(wall[..., 0], wall[..., 1], weight, distances, scales)
+    return _PlanePositions(wall[..., 0], wall[..., 1], weight, distances, scales)
 
 
 def _of_pair(
-    seen: _Seen, photo: int, precision: float
+    seen: _PlanePositions, photo: int, precision: float
 ) -> tuple[tuple[FloatArray, FloatArray], FloatArray]:
     """Return relief by the first photo and another with its sigma, and what is divided by."""
     d, radii = seen.distances, np.hypot(seen.x, seen.y)
@@ -146,7 +118,9 @@ def _of_pair(
     return (relief(s1, s2, d1=d1, d2=d2), sigma), rate
 
 
-def _together(seen: _Seen, precision: float) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+def _together(
+    seen: _PlanePositions, precision: float
+) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
     """Return the points by all rays, and the turns that lead there."""
     x, y, w, d, _ = seen
 

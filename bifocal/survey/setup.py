@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
@@ -15,7 +16,6 @@ from bifocal.model.pair import Pair
 from bifocal.precision import false_relief_of_scale
 from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations
-from bifocal.survey.other_photos import OtherPhoto
 from bifocal.survey.refracted_radii import scale_ratio
 from bifocal.survey.survey_lens import SurveyLens, turns_of
 from bifocal.survey.survey_media import SurveyMedia
@@ -124,6 +124,31 @@ class Measuring:
             on_plane=self.k_plane or FlagLimits().on_plane,
             sigma_r_max=self.sigma_r_max,
         )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OtherPhoto:
+    """How a photo beside an ideal pair was taken; its image coordinates are those of the pair.
+
+    Attributes
+    ----------
+    d, c : float or None
+        Distance to the reference plane [m] and principal distance [mm]; None while not typed.
+    enlargement : float or None
+        Of the print that was measured; None or 1 = on the sensor.
+    nadir : tuple of float or None
+        (column, row) of the nadir point, for coordinates in pixels. [px]
+    """
+
+    d: float | None = None
+    c: float | None = None
+    enlargement: float | None = None
+    nadir: Place | None = None
+
+    @property
+    def scale(self) -> float:
+        """Metres on the wall for a millimetre; NaN while a distance is not typed."""
+        return (self.d or math.nan) / ((self.c or math.nan) * (self.enlargement or 1.0))
 
 
 def given_of(value: Taking | Measuring | None) -> dict[str, Any]:

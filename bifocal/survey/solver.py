@@ -251,10 +251,7 @@ def _check_plane(
     rows = points.on_plane
     if rows.sum() < 2:
         if needed:
-            raise InputError(
-                f"{survey.where}: --adjust-setup needs two or more points that lie on the "
-                "reference plane; mark them with the code PLANE."
-            )
+            raise InputError(remark("survey.no_plane_points", of=survey.where))
         return None
     names = [name for name, on in zip(points.ids, rows, strict=True) if on]
     return check_orientation(pair, pixels[0][rows], pixels[1][rows], names=names, sigma_px=sigma)
@@ -299,10 +296,7 @@ def _ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -> _Arr
     points, setup = survey.points, survey.setup
     if points.has_pixels.any() and not points.is_cartesian.any():
         if setup.taking.pitch is None:
-            raise InputError(
-                f"{survey.where}: raw pixels (col1 row1 col2 row2) need a pair file: --pair "
-                "PAIR.pair.json."
-            )
+            raise InputError(remark("survey.pixels_need_pair", of=survey.where))
         points = replace(points, xy1=points.pixels1, xy2=points.pixels2)
         setup = setup.but(unit="px")
     pair = setup.pair()

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bifocal.remarks import remark
 from bifocal.survey.weighted_similarity import inverse_symmetric
 from photocore.arrays import FloatArray
 from photocore.camera.rotation import skew
@@ -190,10 +191,7 @@ def _turns(
             inverse = np.full((4, 4), np.nan)
         step = inverse @ right
         if not np.isfinite(step).all():
-            raise GeometryError(
-                "the weighted fit of the control points has no rotation: they lie on one line, or "
-                "contradict each other."
-            )
+            raise GeometryError(remark("survey.no_rotation"))
         half = skew(step[:3] / 2)
         halfway = matrix + half @ matrix
         turns.append(

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from bifocal.model.photo import Photo
+from bifocal.remarks import remark
 from multimedia import Layers
 from photocore.errors import InputError
 
@@ -63,10 +64,7 @@ class SurveyMedia:
             If that is no number of media.
         """
         if not FEWEST <= media <= MOST:
-            raise InputError(
-                f"media: must be {FEWEST} (a water surface) to {MOST}, got {media}; air, glass and "
-                "water are 3."
-            )
+            raise InputError(remark("survey.media_number", fewest=FEWEST, most=MOST, media=media))
         return cls(indices=(None,) * media, thicknesses=(None,) * (media - 2), z0=(None, None))
 
     @classmethod
@@ -100,10 +98,7 @@ class SurveyMedia:
             return cls.blank(media) if media else None
         count = len(layers.indices)
         if media and count > media:
-            raise InputError(
-                f"the workbook is prepared for {media} media, the pair looks through {count}; "
-                "write to a new workbook."
-            )
+            raise InputError(remark("survey.media_differ", media=media, count=count))
         more = max(media - count, 0)
         first, second = (photo.z0 for photo in photos)
         inner = (*layers.thicknesses, *(None,) * more)
@@ -153,10 +148,7 @@ class SurveyMedia:
         if layers is None:
             return AIR, 0.0
         if z0 is None:
-            raise InputError(
-                f"z0_{number} is blank: type how far it is from the centre of camera {number} to "
-                "the first interface [m]; or clear the refractive indices, for air."
-            )
+            raise InputError(remark("survey.blank_z0", number=number))
         return layers, z0
 
     def exchanged(self) -> SurveyMedia:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from bifocal.remarks import remark
 from photocore.arrays import positive
 from photocore.errors import InputError
 
@@ -150,10 +151,7 @@ def as_rule(rule: str | ToleranceRule) -> ToleranceRule:
     value = float(length[1].replace(",", ".")) if length else 0.0
     if length is None or value <= 0:
         names = ", ".join(known.key for known in RULES)
-        raise InputError(
-            f"--tolerance-rule: {text!r} is none of {names}, nor a length like 0.2mm (at drawing "
-            "scale) or 2cm (on the wall)."
-        )
+        raise InputError(remark("survey.no_rule", rule=repr(text), names=names))
     if length[2].lower() == "mm":
         return ToleranceRule(key=text, name=f"{value:g} mm", line_mm=value, source="user")
     return ToleranceRule(

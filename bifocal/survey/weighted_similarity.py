@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.camera.similarity import Similarity
 from photocore.errors import GeometryError
@@ -157,10 +158,7 @@ def _turns(reduced: FloatArray, left: FloatArray, direction: FloatArray) -> Floa
         rows.append((c, s, n11, n12, n22, p, q))
         length = np.sqrt(p**2 + q**2)
         if not length > 0:
-            raise GeometryError(
-                "the weighted fit of the control points has no direction: they coincide, or "
-                "contradict each other."
-            )
+            raise GeometryError(remark("survey.no_direction"))
         direction = np.array([p, q]) / length
     return np.array(rows)
 

@@ -45,6 +45,8 @@ POINT_ROWS, CHECK_ROWS, CONTROL_ROWS, SPARE_ROWS = 300, 25, 12, 10
 STRUCTURED_ROWS = 2000
 #: The charts show the first points only.
 CHART_ROWS = 1000
+#: Arrows of errors at check points that are ready to be drawn: a chart gets none by itself.
+ARROWS = 100
 #: Columns that are blank where a point has no place on the wall.
 _PLACES = ("X", "Y", "sigma_X", "sigma_Y")
 
@@ -215,6 +217,11 @@ class SurveyContent:
     def check_rows(self) -> int:
         """Rows of `Check`."""
         return max(CHECK_ROWS, len(self.known) + SPARE_ROWS)
+
+    @property
+    def arrows(self) -> int:
+        """How many errors at check points are drawn as arrows."""
+        return max(ARROWS, self.check_rows)
 
     @property
     def control_rows(self) -> int:

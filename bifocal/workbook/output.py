@@ -90,10 +90,8 @@ def write_result(
         return " ".join([remark("survey.set_as_values", count=len(solution.photos)), *said])
     solution.pair.refuse_ports_that_lean(f"{path}: a survey workbook")
     if len(solution.table) > MOST_ROWS:
-        raise InputError(
-            f"{path}: {len(solution.table)} points are too many for a workbook (limit {MOST_ROWS})."
-            f" Write a text table instead: --out {path.with_suffix('.csv').name}"
-        )
+        about = {"count": len(solution.table), "name": path.with_suffix(".csv").name}
+        raise InputError(remark("survey.too_many_points", of=path, limit=MOST_ROWS, **about))
     content = result_content(solution, path, language)
     in_place, is_book = _is_same_file(path, solution.source), _is_survey_book(solution)
     same_kind = is_same_kind(solution.survey, content)
@@ -150,9 +148,7 @@ def _add_columns(
 ) -> str:
     """Put the results beside the user's own table; return where its old state is kept."""
     if solution.source.suffix.lower() not in (".xlsx", ".xlsm"):
-        raise InputError(
-            f"{path}: a workbook with macros is made from one only; write the result as .xlsx."
-        )
+        raise InputError(remark("survey.no_macros", of=path))
     own = as_typed(solution, content)
     kept = add_results(
         solution.source, path, solution.survey, own, given=_options(solution), overwrite=overwrite

@@ -101,8 +101,7 @@ def write_pair(
     setup = read_survey(book).setup
     if setup.matrices is not None:
         raise InputError(
-            f"{setup.where}: the set-up is that of a pair file ({setup.pair_file or 'not named'}): "
-            "use that one, or the workbook itself."
+            remark("survey.setup_of_file", of=setup.where, file=setup.pair_file or "not named")
         )
     pair = read_pair(book)
     first, second = (
@@ -174,10 +173,7 @@ def _ideal(setup: SurveySetup, folder: Path) -> Pair:
     pitch = taking.pitch
     if pitch is None:
         if setup.sensor is None:
-            raise InputError(
-                "pitch, the size of a pixel [mm], is blank: type it (width of the sensor divided "
-                "by the columns of the photo), or the sensor's width on the sheet Planning."
-            )
+            raise InputError(remark("survey.no_pixel_size"))
         pitch = max(setup.sensor) / max(sizes[0])
         remarks.append(remark("survey.pixel_assumed", size=1000 * pitch))
     nadirs = []

@@ -47,10 +47,7 @@ def measured(source: Source, options: ReadOptions, unit: str | None) -> tuple[Su
     if isinstance(source, SurveyInput):
         return source, Path(source.table.file)
     if not isinstance(source, Path | str):
-        raise InputError(
-            f"solve: expected a file, or columns by key, found {type(source).__name__}. Of a data "
-            "frame give the columns: dict(frame) with pandas, frame.to_dict() with polars."
-        )
+        raise InputError(remark("survey.no_source", kind=type(source).__name__))
     return read_survey(source, options), Path(source)
 
 

@@ -10,7 +10,7 @@ from scipy.special import chdtrc, chdtri, ndtr
 
 from multimedia.adjustment.bundle_columns import BundleColumns
 from multimedia.adjustment.media_unknowns import media_unknowns
-from multimedia.adjustment.unknowns import Adjustment
+from multimedia.adjustment.unknowns import Adjustment, is_angle
 from multimedia.media.camera import ANY_INTERIOR, EXTERIOR
 from multimedia.projects.model import Project
 from multimedia.remarks import remark
@@ -205,19 +205,30 @@ def remarks_on_unknowns(
 ) -> tuple[str, ...]:
     """Return what the user should know of the unknowns: alike, insignificant, or not carried."""
     return (
-        *_uncarried(project, columns, result),
+        *_carried(project, columns, result),
         *alike_remarks(result),
         *_insignificant(result),
     )
 
 
-def _uncarried(project: Project, columns: BundleColumns, result: Adjustment) -> Iterator[str]:
-    """Yield the unknowns of media that rest on their priors alone."""
-    for item in media_unknowns(project, columns.labels, columns.media):
-        prior, own = columns.priors.get(item.column), result.sigma(item.label)
-        if prior is not None and own > UNCARRIED * prior * result.model_error:
-            told = {"label": item.label, "start": item.start, "sigma": prior}
-            yield remark("adjustment.hardly_carried", **told)
+def _carried(project: Project, columns: BundleColumns, result: Adjustment) -> Iterator[str]:
+    """Yield which unknowns with priors the images carry, and those that rest on what was given."""
+    starts = {i.label: i.start for i in media_unknowns(project, columns.labels, columns.media)}
+    ranked = []
+    for column, prior in columns.priors.items():
+        label = columns.labels[column]
+        own, degrees = result.sigma(label), float(np.degrees(1.0)) if is_angle(label) else 1.0
+        unit = f" {result.unit(label)}".rstrip()
+        if own > UNCARRIED * prior * result.model_error:
+            start = f"{starts[label]:g} ± " if label in starts else "± "
+            given = f"{start}{prior * degrees:.2g}{unit}"
+            yield remark("bundle.hardly_carried", label=label, given=given)
+        else:
+            ranked.append(
+                (own / prior, f"{label} ({own * degrees:.2g}{unit}, given {prior * degrees:.2g})")
+            )
+    if ranked:
+        yield remark("bundle.carried", names=", ".join(text for _, text in sorted(ranked)[:_SHOWN]))
 
 
 def alike_remarks(result: Adjustment) -> Iterator[str]:

@@ -158,6 +158,12 @@ def bars_of(bars: Sequence[ScaleBar], names: Sequence[str]) -> tuple[ScaleBar, .
     return tuple(found)
 
 
+def is_angle(label: str) -> bool:
+    """Tell whether an unknown is an angle: radians in arrays, degrees for the user."""
+    parameter = label.rpartition(":")[2]
+    return parameter in EXTERIOR[3:] or parameter.startswith("tilt")
+
+
 #: Beginnings of the names of lengths among the parameters of media.
 _LENGTHS = ("offset", "thickness", "radius", "centre", "shift")
 #: Units of interior parameters.
@@ -238,15 +244,15 @@ class Adjustment:
         """Return name, value, sigma and unit of every unknown; angles in degrees."""
         table = []
         for k, name in enumerate(self.names):
-            unit = self._unit(name)
+            unit = self.unit(name)
             factor = float(np.degrees(1.0)) if unit == "deg" else 1.0
             table.append((name, float(self.values[k]) * factor, self.sigma(name) * factor, unit))
         return table
 
-    def _unit(self, label: str) -> str:
+    def unit(self, label: str) -> str:
         """Return the unit of an unknown; empty for numbers without one."""
         owner, _, parameter = label.rpartition(":")
-        if parameter in EXTERIOR[3:] or parameter.startswith("tilt"):
+        if is_angle(label):
             return "deg"
         if parameter == "gradient":
             return f"1/{self.project.unit}"

@@ -11,7 +11,7 @@ from multimedia.media.height_field import HeightField
 from multimedia.media.height_field import WaterSurface as WaterSurface
 from multimedia.media.surfaces import Plane
 from multimedia.refraction.layers import checked_index
-from photocore.arrays import FloatArray, IntArray, as_floats, not_negative
+from photocore.arrays import FloatArray, IntArray, as_floats, not_negative, positive
 from photocore.errors import GeometryError, InputError
 from photocore.labelled import LabelledCode
 
@@ -43,15 +43,31 @@ class Precision:
         Of the height of the water surface. [m]
     point : float
         Of each coordinate of the apparent points. [m]
+    direction : float
+        Of a ray: with the directions from which a point was seen it gives the precision of the
+        network, beside ``point``. Of points with rays only. [rad]
+    wave : tuple of float
+        Amplitude and length of a wave that runs in another direction with another phase in every
+        photo; (0, 0) is none. Of points with rays through a plane only. [m]
     """
 
     index: float = 0.0
     level: float = 0.0
     point: float = 0.0
+    direction: float = 0.0
+    wave: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        for name in ("index", "level", "point"):
+        for name in ("index", "level", "point", "direction"):
             not_negative(getattr(self, name), f"sigma of the {name}")
+        amplitude, length = self.wave
+        if not_negative(amplitude, "wave: amplitude") > 0:
+            positive(length, "wave: length")
+
+    @property
+    def needs_rays(self) -> bool:
+        """Whether a part of it counts only where rays are known."""
+        return self.direction > 0 or self.wave[0] > 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

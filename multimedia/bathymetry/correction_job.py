@@ -31,7 +31,7 @@ class Job:
     ----------
     source, target : Path
     water_level : str
-        A height [m] or a file, see `read_water_surface`.
+        A height [m] or a file, see `read_water_surface` and `read_levels`.
     waves : tuple of str
         Waves upon that height.
     index : float
@@ -45,8 +45,8 @@ class Job:
         The points are lidar echoes with columns X0, Y0, Z0 or a trajectory.
     rays : bool
         The source is a table of measured rays.
-    sigma_direction : float
-        Of measured rays. [rad]
+    sigma_direction : float or None
+        Of measured rays, 1e-4 unless given. [rad]
     nodata : float or None
     allow_dry : bool
         Accept data without a single point under water.
@@ -66,7 +66,7 @@ class Job:
     group_index: float | None = None
     beams: bool = False
     rays: bool = False
-    sigma_direction: float = 1e-4
+    sigma_direction: float | None = None
     nodata: float | None = None
     allow_dry: bool = False
     overwrite: bool = False

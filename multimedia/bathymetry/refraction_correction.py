@@ -25,9 +25,9 @@ from multimedia.bathymetry.visible_points import VisiblePoints
 from multimedia.media.collinearity import Medium, shifts
 from multimedia.media.ray_tracing import aim_rays
 from multimedia.media.surface_sequence import SurfaceSequence
-from multimedia.media.surfaces import Plane
+from multimedia.media.surfaces import Plane, tangents_of
 from multimedia.refraction.layers import Layers
-from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
+from photocore.arrays import BoolArray, FloatArray, IntArray, as_floats, as_points
 from photocore.errors import GeometryError, InputError
 
 #: Rays per block: bounds memory however many points and cameras there are.
@@ -53,6 +53,7 @@ def correct_bathymetry(
     cameras: ArrayLike | None = None,
     visible: ArrayLike | csr_array | None = None,
     max_angle: float | None = None,
+    rise: ArrayLike | None = None,
     precision: Precision | None = None,
 ) -> CorrectedPoints:
     r"""Correct apparent points under water for the refraction at the water surface.
@@ -74,8 +75,11 @@ def correct_bathymetry(
         cameras (or by rays that hardly differ) gets the nadir correction and says so.
     max_angle : float, optional
         Cameras see nothing farther than this from the vertical below them. [rad]
+    rise : array_like, shape (m,), optional
+        By how much the water stood higher when each camera took its photo (tide). A plane's only.
+        [m]
     precision : Precision, optional
-        Standard deviations of index, level and points, carried through to the result.
+        Standard deviations, carried through to the result.
 
     Returns
     -------
@@ -97,7 +101,8 @@ def correct_bathymetry(
     :math:`\sum_i w_i (I - u_i u_i^T)(A - C_i) = 0` with :math:`w_i = 1/|A - C_i|^2` (equal
     precision in the images). These are three equations for the three coordinates of P, solved by
     Newton's method with exact derivatives; P, A and their covariance follow without any
-    assumption on depth or angle.
+    assumption on depth or angle. With ``rise`` every ray is refracted at the level of its own
+    photo; depths count from ``water_level``.
 
     Examples
     --------
@@ -113,16 +118,19 @@ def correct_bathymetry(
     shape = xyz.shape[:-1]
     flat = xyz.reshape(-1, 3)
     surface, n_water = as_water_surface(water_level), checked_water_index(refractive_index)
-    centres = _checked_cameras(cameras, surface)
+    rises = _checked_rise(rise, cameras, surface)
+    centres = _checked_cameras(cameras, surface, rises)
     seen = VisiblePoints.checked(visible, centres, max_angle, shape)
     precision = precision or Precision()
+    if precision.wave[0] > 0 and not isinstance(surface, Plane):
+        raise InputError("precision: a wave upon what has its own form; give the mean height.")
     count = len(flat)
     result = (
         np.empty((count, 3)), np.empty(count), np.empty(count, np.int64), np.empty((count, 3, 3))
     )  # fmt: skip
     for part, row, camera in seen.blocks(flat, BLOCK_RAYS):
         pairs = (row, camera)
-        corrected = _correct_block(flat[part], surface, n_water, centres, pairs, precision)
+        corrected = _correct_block(flat[part], surface, n_water, centres, rises, pairs, precision)
         for whole, piece in zip(result, corrected, strict=True):
             whole[part] = piece
     return CorrectedPoints(
@@ -138,6 +146,7 @@ def _correct_block(
     surface: WaterSurface,
     index: float,
     centres: FloatArray,
+    rises: FloatArray,
     pairs: tuple[IntArray, IntArray],
     precision: Precision,
 ) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
@@ -152,6 +161,10 @@ def _correct_block(
     status[~np.isfinite(apparent).all(-1)] = BathymetryStatus.FAILED
     xyz = apparent.copy()
     covariance = np.broadcast_to(np.eye(3) * precision.point**2, (len(xyz), 3, 3)).copy()
+    seen = np.bincount(pairs[0], minlength=len(xyz)) >= 2
+    highest = rises.max(initial=0.0)
+    # Between low and high water the rays decide.
+    rows = np.flatnonzero(seen & (below > -highest))
     wet = np.flatnonzero(status == BathymetryStatus.NADIR)
     xyz[wet, 2] = level[wet] - index * below[wet]
     covariance[wet, 2, 2] = (
@@ -159,9 +172,9 @@ def _correct_block(
         + (below[wet] * precision.index) ** 2
         + ((1 - index) * precision.level) ** 2
     )
-    rows = wet[np.bincount(pairs[0], minlength=len(xyz))[wet] >= 2]
+    rows = rows[status[rows] != BathymetryStatus.FAILED]
     if rows.size:
-        task = _Task.near(apparent, rows, centres, pairs, surface, index)
+        task = _Task.near(apparent, rows, centres, pairs, surface, index, rises)
         points, ok, weak = _solve(task, xyz[rows])
         xyz[rows[~weak]] = np.where(ok[~weak, None], points[~weak], np.nan)
         status[rows[~weak]] = np.where(ok[~weak], BathymetryStatus.RAYS, BathymetryStatus.FAILED)
@@ -183,6 +196,7 @@ class _Task(NamedTuple):
     weight: FloatArray  # (k,)
     surface: WaterSurface
     n_water: float
+    rises: FloatArray  # (m,)
     origin: FloatArray  # (3,), to be added again
     heading: FloatArray  # (k, 3), in air, of the rays last found; NaN before
 
@@ -195,13 +209,14 @@ class _Task(NamedTuple):
         pairs: tuple[IntArray, IntArray],
         surface: WaterSurface,
         index: float,
+        rises: FloatArray,
     ) -> _Task:
         """Move some points of a block to the origin: map coordinates would cost six digits."""
         origin = np.round(apparent[rows].mean(0))
         row, camera = _of_rows(pairs, rows, len(apparent))
         local, at = apparent[rows] - origin, centres - origin
         weight = 1 / ((local[row] - at[camera]) ** 2).sum(-1)
-        return cls(local, at, row, camera, weight, surface.shifted(-origin), index, origin,
+        return cls(local, at, row, camera, weight, surface.shifted(-origin), index, rises, origin,
                    np.full((len(row), 3), np.nan))  # fmt: skip
 
     def take(self, rows: IntArray) -> _Task:
@@ -238,6 +253,8 @@ def _solve(task: _Task, start: FloatArray) -> tuple[FloatArray, BoolArray, BoolA
     weak = ok.copy()
     rows = np.arange(len(point))
     last = LAST_STEP if isinstance(task.surface, Plane) else LAST_STEP_KINKED
+    highest = task.rises.max(initial=0.0)
+    water = task.surface.shifted((0.0, 0.0, highest)) if highest else task.surface
     for step_number in range(MOST_STEPS):
         part = task.take(rows)
         balance, normal, change = _balance(part, point[rows])
@@ -251,7 +268,7 @@ def _solve(task: _Task, start: FloatArray) -> tuple[FloatArray, BoolArray, BoolA
         if not rows.size:
             break
         step = np.linalg.solve(change[usable], balance[usable, :, None])[..., 0]
-        point[rows] += _kept_in_water(part.surface, point[rows], step)
+        point[rows] += _kept_in_water(water, point[rows], step)
         # Judged by the whole step: one that was shortened has not arrived.
         length = np.linalg.norm(step, axis=-1) / scale[rows]
         ok[rows] = length <= LAST_STEP
@@ -300,28 +317,33 @@ def _pointing(task: _Task, point: FloatArray) -> tuple[FloatArray, FloatArray]:
         task.heading[:] = path.directions[:, 0]
         return path.directions[:, 0], np.asarray(path.jacobian)
     up = task.surface.normal
-    height = task.surface.side(task.centres)[camera]
+    height = (task.surface.side(task.centres) - task.rises * up[2])[camera]
     vectors = point[row] - task.centres[camera]
-    # A point that Newton lifts out of the water for a moment is treated as if just under it.
-    above = vectors @ up + height * (1 + JUST_UNDER)
-    vectors -= np.maximum(above, 0.0)[:, None] * up
+    # The ray to a point over the water, dry in this photo or lifted by Newton, goes straight.
+    above = np.maximum(vectors @ up + height * (1 + JUST_UNDER), 0.0)
+    vectors -= above[:, None] * up
     medium = Medium(normal=up, height=height, layers=Layers(indices=(1.0, task.n_water)))
     shift = shifts(vectors, medium, media=False)
-    ray = vectors + shift.g[:, None] * up
+    slope = np.where(above[:, None] > 0, 0.0, shift.gradient(vectors, medium))
+    ray = vectors + (shift.g + above)[:, None] * up
     length = np.sqrt((ray * ray).sum(-1))[:, None]
     heading = ray / length
-    derivative = np.eye(3) + up[:, None] * shift.gradient(vectors, medium)[:, None, :]
+    derivative = np.eye(3) + up[:, None] * slope[:, None, :]
     # Only what is at right angles to the ray turns it.
     derivative -= heading[:, :, None] * (heading[:, None, :] @ derivative)
     return heading, derivative / length[:, :, None]
 
 
 def _propagate(task: _Task, points: FloatArray, precision: Precision) -> FloatArray:
-    """Return the covariance of true positions from index, level and apparent points."""
+    """Return the covariance of true positions from all that `Precision` names."""
     point = points - task.origin
     _, normal, change = _balance(task, point)
     by_point = np.linalg.solve(change, normal + _weight_change(task, point))
-    covariance: FloatArray = precision.point**2 * by_point @ by_point.transpose(0, 2, 1)
+    measured = precision.point**2 * np.eye(3) + precision.direction**2 * np.linalg.inv(normal)
+    covariance: FloatArray = by_point @ measured @ by_point.transpose(0, 2, 1)
+    if precision.wave[0] > 0:
+        rate = np.linalg.solve(change, _wave_noise(task, point, *precision.wave))
+        covariance += rate @ rate.transpose(0, 2, 1)
     step = DIFFERENCE * float(np.abs(task.centres[:, 2] - task.apparent[:, 2].mean()).max())
     lift = np.array([0.0, 0.0, step])
 
@@ -341,6 +363,49 @@ def _propagate(task: _Task, points: FloatArray, precision: Precision) -> FloatAr
     return covariance
 
 
+def _wave_noise(task: _Task, point: FloatArray, amplitude: float, length: float) -> FloatArray:
+    """Return a root of the covariance of the balance from waves that differ in every photo.
+
+    Where a ray meets the water the surface is higher by h and leans by g. The place X that makes
+    the optical path shortest, T [(u - n v) + g (up . (u - n v))] = 0 with the directions u in air,
+    v in water and T along the surface, moves to first order, and the ray in air turns. Slopes of a
+    wave of any direction and phase have variance (2 pi amplitude / length)^2 / 4 along each axis,
+    heights amplitude^2 / 2.
+    """
+    row, camera, n = task.row, task.camera, task.n_water
+    heading, _ = _pointing(task, point)
+    assert isinstance(task.surface, Plane)
+    up = task.surface.normal
+    height = (task.surface.side(task.centres) - task.rises * up[2])[camera]
+    air = -height / (heading @ up)
+    below = point[row] - task.centres[camera] - air[:, None] * heading
+    water = np.linalg.norm(below, axis=1)
+    onward = below / water[:, None]
+
+    def across(ray: FloatArray) -> FloatArray:
+        return np.eye(3) - ray[:, :, None] * ray[:, None, :]
+
+    turn = across(heading) / air[:, None, None]
+    bend = turn + n * across(onward) / water[:, None, None]
+    flat = np.eye(3) - np.outer(up, up)
+    stiff = flat @ bend @ flat + np.outer(up, up)
+    push = np.empty((len(row), 3, 3))  # two slopes, and the height
+    push[:, :, :2] = ((heading - n * onward) @ up)[:, None, None] * tangents_of(up).T
+    push[:, :, 2] = flat @ bend @ up
+    place = -np.linalg.solve(stiff, push)
+    place[:, :, 2] += up
+    slope = np.pi * amplitude / length
+    turned = turn @ (place * [slope, slope, amplitude / np.sqrt(2)])
+    toward = task.apparent[row] - task.centres[camera]
+    along = (heading * toward).sum(-1)[:, None, None]
+    noise = along * turned + heading[:, :, None] * (toward[:, None, :] @ turned)
+    noise *= np.where(below @ up < 0, task.weight, 0.0)[:, None, None]
+    total = np.add.reduceat(noise @ noise.transpose(0, 2, 1), task.starts)
+    values, vectors = np.linalg.eigh(total)
+    root: FloatArray = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+    return root
+
+
 def _weight_change(task: _Task, point: FloatArray) -> FloatArray:
     """Return how the balance changes because the weights 1 / |A - C|^2 follow the point A."""
     row, camera = task.row, task.camera
@@ -352,7 +417,24 @@ def _weight_change(task: _Task, point: FloatArray) -> FloatArray:
     return np.add.reduceat(change * toward[:, None, :], task.starts)
 
 
-def _checked_cameras(cameras: ArrayLike | None, surface: WaterSurface) -> FloatArray:
+def _checked_rise(
+    rise: ArrayLike | None, cameras: ArrayLike | None, surface: WaterSurface
+) -> FloatArray:
+    """Return by how much the water stood higher for each camera, shape (m,)."""
+    count = 0 if cameras is None else as_points(cameras, "cameras", dimension=3).size // 3
+    if rise is None:
+        return np.zeros(count)
+    rises = as_floats(rise, "rise")
+    if rises.shape != (count,) or not np.isfinite(rises).all():
+        raise InputError(f"rise: expected {count} finite numbers, one for each camera.")
+    if not isinstance(surface, Plane):
+        raise InputError("rise: the tide lifts a plane; this water surface has its own form.")
+    return rises
+
+
+def _checked_cameras(
+    cameras: ArrayLike | None, surface: WaterSurface, rises: FloatArray
+) -> FloatArray:
     """Return projection centres, shape (m, 3), all of them above the water."""
     if cameras is None:
         return np.zeros((0, 3))
@@ -361,7 +443,7 @@ def _checked_cameras(cameras: ArrayLike | None, surface: WaterSurface) -> FloatA
         raise InputError("cameras: no camera is given; leave them out for the nadir correction.")
     if not np.isfinite(centres).all():
         raise InputError("cameras: every coordinate must be a finite number.")
-    under = np.flatnonzero(surface.side(centres) <= 0)
+    under = np.flatnonzero(surface.side(centres) <= rises)
     if under.size:
         first = centres[under[0]]
         raise GeometryError(

@@ -42,15 +42,15 @@ def pull_back(values: FloatArray, move: FloatArray) -> FloatArray:
         return values
     place = home.copy()
     for _ in range(STEPS):
-        shift = _bilinear(np.moveaxis(move, -1, 0), place)
+        shift = bilinear(np.moveaxis(move, -1, 0), place)
         source = home - np.moveaxis(shift, 0, -1)
         inside = np.asarray(np.isfinite(source).all(axis=-1))
         place = np.where(inside[..., None], source, place)
-    pulled = _bilinear(values, place)
+    pulled = bilinear(values, place)
     return np.where(np.isfinite(pulled), pulled, np.where(known, values, np.nan))
 
 
-def _bilinear(layers: FloatArray, place: FloatArray) -> FloatArray:
+def bilinear(layers: FloatArray, place: FloatArray) -> FloatArray:
     """Return layers (k, rows, columns) at places (..., 2) of (column, row); NaN outside."""
     rows, columns = layers.shape[1:]
     column, row = place[..., 0], place[..., 1]

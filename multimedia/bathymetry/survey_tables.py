@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from datetime import UTC, datetime, time
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +21,9 @@ _XYZ = (
     Column("Y", ("y", "y0", "yc", "north", "northing", "n"), required=True, unit="m"),
     Column("Z", ("z", "z0", "zc", "height", "altitude", "elevation", "h"), required=True, unit="m"),
 )
+_TIME = Column("time", ("date", "datetime", "timestamp", "t", "ora", "zeit"), kind="text")
+#: The date of EXIF data, which no other program writes with colons.
+_EXIF_DATE = re.compile(r"^(\d{4}):(\d\d):(\d\d)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -29,10 +35,13 @@ class CameraPositions:
     ids : tuple of str
     centres : ndarray, shape (m, 3)
         [m]
+    times : tuple of str
+        When each photo was taken, as the table says it; empty texts where it does not.
     """
 
     ids: tuple[str, ...]
     centres: FloatArray
+    times: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -53,7 +62,7 @@ class RayTable:
 
 
 def read_camera_positions(path: Path | str) -> CameraPositions:
-    """Read a table ``id, X, Y, Z`` of projection centres (.csv, .xlsx, .ods), or a project file.
+    """Read a table ``id, X, Y, Z`` and, if there, ``time`` of projection centres, or a project.
 
     Raises
     ------
@@ -67,12 +76,12 @@ def read_camera_positions(path: Path | str) -> CameraPositions:
             centres=np.array([camera.centre for camera in cameras]),
         )
     name = Column("id", ("camera", "image", "photo", "label", "name", "file"), kind="text")
-    table = read_table(path, (name, *_XYZ))
+    table = read_table(path, (name, *_XYZ, _TIME))
     if not len(table):
         raise InputError(f"{path}: holds no camera.")
     centres = _numbers(table, ("X", "Y", "Z"), table.repeated("id"))
     ids = tuple(text or str(k) for k, text in enumerate(table.texts("id"), start=1))
-    return CameraPositions(ids=ids, centres=centres)
+    return CameraPositions(ids=ids, centres=centres, times=tuple(table.texts("time")))
 
 
 def read_visibility(path: Path | str) -> dict[str, set[str]]:
@@ -84,6 +93,70 @@ def read_visibility(path: Path | str) -> dict[str, set[str]]:
     for name, photo in zip(table.texts("point"), table.texts("camera"), strict=True):
         seen.setdefault(name, set()).add(photo)
     return seen
+
+
+def read_levels(path: Path | str, cameras: CameraPositions) -> FloatArray:
+    """Read the height of the water when each photo was taken, shape (m,). [m]
+
+    The table is ``camera, level``, or ``time, level``: a tide gauge, between whose rows heights
+    run straight, for cameras with times. Times are seconds, times of a day or dates with times.
+
+    Raises
+    ------
+    InputError
+        If a photo has no level, or was taken when the gauge had not begun or had ended.
+    """
+    camera = Column("camera", ("image", "photo", "id"), kind="text")
+    level = Column("level", ("water_level", "height", "z", "tide", "h"), required=True, unit="m")
+    table = read_table(path, (camera, _TIME, level))
+    heights = _numbers(table, ("level",))[:, 0]
+    if "camera" in table.present:
+        found = dict(zip(table.texts("camera"), heights.tolist(), strict=True))
+        missing = [name for name in cameras.ids if name not in found]
+        if missing:
+            raise InputError(
+                f"{path}: has no level for photo {missing[0]} ({len(missing)} in all)."
+            )
+        return np.array([found[name] for name in cameras.ids])
+    if "time" not in table.present:
+        raise InputError(f"{path}: water levels of photos need a column time or camera.")
+    if not any(cameras.times):
+        raise InputError(
+            f"{path}: holds levels over time, so the table of cameras needs a column time (or "
+            "name the photos here, in a column camera)."
+        )
+    gauge = np.array([_seconds(text, f"{path}, time") for text in table.texts("time")])
+    if len(gauge) < 2 or not (np.diff(gauge) > 0).all():
+        raise InputError(f"{path}: needs at least two rows whose times increase.")
+    taken = np.array([_seconds(text, "time of a camera") for text in cameras.times])
+    outside = np.flatnonzero((taken < gauge[0]) | (taken > gauge[-1]))
+    if outside.size:
+        first = outside[0]
+        raise InputError(
+            f"{path}: photo {cameras.ids[first]} was taken at {cameras.times[first]}, when the "
+            f"gauge has no levels ({len(outside)} photos in all). Are both in one time zone?"
+        )
+    return np.interp(taken, gauge, heights)
+
+
+def _seconds(text: str, where: str) -> float:
+    """Return a time in seconds: a number, a time of the day, or a date with a time.
+
+    Examples
+    --------
+    >>> _seconds("00:01:30", ""), _seconds("2024:06:01 12:00:00", "") % 86400
+    (90.0, 43200.0)
+    """
+    plain = _EXIF_DATE.sub(r"\1-\2-\3", text.strip())
+    with suppress(ValueError):
+        return float(plain.replace(",", "."))
+    with suppress(ValueError):
+        clock = time.fromisoformat(plain)
+        return clock.hour * 3600 + clock.minute * 60 + clock.second + clock.microsecond / 1e6
+    with suppress(ValueError):
+        when = datetime.fromisoformat(plain)
+        return (when if when.tzinfo else when.replace(tzinfo=UTC)).timestamp()
+    raise InputError(f"{where}: {text!r} is no time; seconds, 14:05:30 or 2026-06-01T14:05:30.")
 
 
 def read_rays(path: Path | str) -> RayTable:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -22,6 +24,7 @@ from multimedia.bathymetry.regrid import pull_back
 from multimedia.bathymetry.survey_tables import (
     CameraPositions,
     read_camera_positions,
+    read_levels,
     read_rays,
     read_trajectory,
     read_visibility,
@@ -48,6 +51,10 @@ _GAINED = {
 }
 #: Refractive index of any water, pure or brine, for any light that passes it.
 WATER = (1.3, 1.4)
+#: Tables of water levels over time or by photo.
+LEVEL_TABLES = (".csv", ".xlsx", ".ods")
+#: Of a measured ray, unless it is given. [rad]
+SIGMA_DIRECTION = 1e-4
 #: Side of the windows in which a DEM is corrected: 8 MB of heights. [cells]
 WINDOW = 1024
 #: Widest planimetric shift that is followed across a window's edge. [cells]
@@ -94,9 +101,11 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
             f"{job.source}: has an attribute '{MARK}', so it has been corrected already. Correct "
             "the original, or remove the attribute."
         )
-    surface = read_water_surface(job.water_level, waves=job.waves)
-    correct, remarks = _corrector(job, cloud, surface)
-    outcome = Outcome(remarks=[*cloud.remarks, *remarks])
+    cameras = read_camera_positions(job.cameras) if job.cameras else None
+    water = _water(job, cameras)
+    surface = water.surface
+    correct, remarks = _corrector(job, cloud, water, cameras)
+    outcome = Outcome(remarks=[*cloud.remarks, *water.remarks, *remarks])
     is_precise = job.precision != Precision() and not job.beams
     gained = {
         name: kind for name, kind in _GAINED.items() if is_precise or not name.startswith("sigma")
@@ -125,10 +134,37 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
     return outcome
 
 
+class _Water(NamedTuple):
+    """The surface, and by how much it stood higher for each camera."""
+
+    surface: WaterSurface
+    rise: FloatArray | None = None
+    remarks: tuple[str, ...] = ()
+
+
+def _water(job: Job, cameras: CameraPositions | None, crs: Any = None) -> _Water:
+    """Return the water surface; of a table of levels their mean, and what each camera adds."""
+    if Path(job.water_level).suffix.lower() not in LEVEL_TABLES:
+        return _Water(read_water_surface(job.water_level, waves=job.waves, crs=crs))
+    if cameras is None or job.waves:
+        raise InputError(
+            f"{job.water_level}: levels of photos need --cameras, and no --wave; or give one "
+            "height."
+        )
+    levels = read_levels(job.water_level, cameras)
+    mean = float(levels.mean())
+    told = (
+        f"The water stood at {levels.min():.3f} to {levels.max():.3f} m while the photos were "
+        f"taken; depths count from the mean, {mean:.3f} m."
+    )
+    return _Water(Plane.level(mean), levels - mean, (told,))
+
+
 def _corrector(
-    job: Job, cloud: Cloud, surface: WaterSurface
+    job: Job, cloud: Cloud, water: _Water, cameras: CameraPositions | None
 ) -> tuple[Callable[[CloudPiece], CorrectedPoints], list[str]]:
     """Return the function that corrects one piece of a cloud, and what the user should know."""
+    surface = water.surface
     corrected = partial(
         correct_bathymetry, water_level=surface, refractive_index=job.index, precision=job.precision
     )
@@ -138,10 +174,9 @@ def _corrector(
             correct_lidar_beams, refractive_index=job.index, group_index=job.group_index
         )
         return lambda piece: beams(sensor(piece), piece.xyz, water_level=surface), []
-    if job.cameras is None:
+    if cameras is None:
         return lambda piece: corrected(piece.xyz), []
     remarks = []
-    cameras = read_camera_positions(job.cameras)
     pairs = read_visibility(job.visibility) if job.visibility else None
     if pairs is not None:
         _check_pairs(pairs, cameras, job)
@@ -157,8 +192,9 @@ def _corrector(
         _check_camera_unit(piece.xyz, cameras.centres, job)
         visible = _visible(piece, cameras, pairs, job)
         return corrected(
-            piece.xyz, cameras=cameras.centres, visible=visible, max_angle=job.max_angle
-        )
+            piece.xyz, cameras=cameras.centres, visible=visible, max_angle=job.max_angle,
+            rise=water.rise,
+        )  # fmt: skip
 
     return correct, remarks
 
@@ -249,22 +285,22 @@ def _correct_dem(job: Job, progress: Progress) -> Outcome:
     with Dem(job.source, nodata=job.nodata) as dem:
         if "REFRACTION_INDEX" in dem.tags:
             raise InputError(f"{job.source}: has been corrected for refraction already.")
-        surface = read_water_surface(job.water_level, waves=job.waves, crs=dem.crs)
+        cameras = read_camera_positions(job.cameras) if job.cameras else None
+        water = _water(job, cameras, dem.crs)
+        surface = water.surface
         is_level = isinstance(surface, Plane) and abs(surface.normal[2]) == 1.0
-        if not dem.has_position and (job.cameras is not None or not is_level):
+        if not dem.has_position and (cameras is not None or not is_level):
             raise InputError(
                 f"{job.source}: has no position (no geotransform), so its cells cannot be related "
                 "to cameras or to a water surface; georeference it first."
             )
-        centres = None
-        outcome = Outcome()
-        if job.cameras is not None:
+        outcome = Outcome(remarks=list(water.remarks))
+        if cameras is not None:
             if dem.is_geographic:
                 raise InputError(
                     f"{job.source}: its cells are in degrees, but rays need metres; transform it "
                     "to a projected reference system."
                 )
-            centres = read_camera_positions(job.cameras).centres
             if job.max_angle is None:
                 outcome.remarks.append(
                     "Every camera is taken to see every cell; --max-angle limits that."
@@ -277,7 +313,7 @@ def _correct_dem(job: Job, progress: Progress) -> Outcome:
             margin = 0  # widened when a window needs more, and kept for the next
             for number, window in enumerate(windows, start=1):
                 bands_of, margin = _correct_window(
-                    job, dem, window, surface, centres, outcome, margin
+                    job, dem, window, water, cameras, outcome, margin
                 )
                 write(window, bands_of)
                 progress(number, len(windows), "DEM windows")
@@ -291,8 +327,8 @@ def _correct_window(
     job: Job,
     dem: Dem,
     window: Window,
-    surface: WaterSurface,
-    centres: FloatArray | None,
+    water: _Water,
+    cameras: CameraPositions | None,
     outcome: Outcome,
     margin: int,
 ) -> tuple[FloatArray, int]:
@@ -304,17 +340,18 @@ def _correct_window(
         points = given[known]
         result = correct_bathymetry(
             points,
-            water_level=surface,
+            water_level=water.surface,
             refractive_index=job.index,
-            cameras=centres,
-            max_angle=None if centres is None else job.max_angle,
+            cameras=None if cameras is None else cameras.centres,
+            max_angle=None if cameras is None else job.max_angle,
+            rise=water.rise,
             precision=job.precision,
         )
         move = np.full((*known.shape, 2), np.nan)
         move[known] = (result.xyz - points)[:, :2] @ np.linalg.inv(dem.xy_from_pixel[:, :2]).T
         reach = int(np.ceil(np.nanmax(np.abs(move), initial=0.0)))
         needed = reach + 2 if reach else 0
-        if needed <= margin or centres is None:
+        if needed <= margin or cameras is None:
             break
         if needed > WIDEST_MARGIN:
             raise GeometryError(
@@ -328,7 +365,7 @@ def _correct_window(
     bands = np.full((len(layers), *known.shape), np.nan)
     for band, values in zip(bands, layers, strict=True):
         band[known] = values
-    if centres is not None:
+    if cameras is not None:
         bands = pull_back(bands, move)
     inner = (slice(margin, margin + window.height), slice(margin, margin + window.width))
     own = np.zeros_like(known)
@@ -355,7 +392,7 @@ def _correct_rays(job: Job) -> Outcome:
         table.directions,
         water_level=surface,
         refractive_index=job.index,
-        sigma_direction=job.sigma_direction,
+        sigma_direction=job.sigma_direction or SIGMA_DIRECTION,
     )
     outcome = Outcome()
     depth = np.maximum(surface.height_at(points.xyz[:, :2]) - points.xyz[:, 2], 0.0)

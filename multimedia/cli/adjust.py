@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,14 +24,15 @@ def command(
 ) -> None:  # fmt: skip
     """Adjust cameras, object points and the media of a project together."""
     from multimedia.adjustment import workflow as adjust
-    from multimedia.adjustment.unknowns import Unknowns
+    from multimedia.adjustment.unknowns import Unknowns, is_angle
     from photocore.adjustment.priors import parse_prior
 
     if (wavelength is None) != (temperature is None):
         raise click.UsageError("the salinity needs both --wavelength and --temperature.")
     told = {name: choices.pop(name) for name in ("language", "overwrite")}
     choices["scale_bars"] = tuple(map(adjust.parse_scale_bar, choices["scale_bars"]))
-    choices["priors"] = dict(map(parse_prior, choices["priors"]))
+    given = dict(map(parse_prior, choices["priors"]))
+    choices["priors"] = {k: math.radians(v) if is_angle(k) else v for k, v in given.items()}
     unknowns = Unknowns(**choices, typical_priors=True)
     result, notes = adjust.adjust_project(project, unknowns, out=out, report=report, **told)
     salinity = None

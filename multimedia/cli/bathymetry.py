@@ -34,11 +34,17 @@ def command(source: Path, target: Path, beams: bool, as_json: bool, **wishes: An
     if beams and cameras:
         raise click.UsageError("--beams and --cameras exclude each other.")
     kinds = ("index", "level", "point")
-    precision = Precision(**{kind: wishes.pop(f"sigma_{kind}") for kind in kinds})
+    precision = Precision(
+        **{kind: wishes.pop(f"sigma_{kind}") for kind in kinds},
+        direction=0.0 if wishes["rays"] else wishes["sigma_direction"] or 0.0,
+        wave=tuple(wishes.pop("sigma_wave") or (0.0, 0.0)),
+    )
     if precision != Precision() and (beams or wishes["rays"]):
         raise click.UsageError(
             "--sigma-index, --sigma-level and --sigma-point are not for --beams and --rays."
         )
+    if precision.needs_rays and not cameras:
+        raise click.UsageError("--sigma-direction and --sigma-wave need --cameras.")
     job = Job(source=source, target=target, beams=beams, precision=precision, **wishes)
     with progress_bar("Refraction correction", quiet=as_json) as progress:
         outcome = correct_file(job, progress=progress)

@@ -66,7 +66,7 @@ def correspondences(
         raise InputError(f"correspondences: {len(cameras)} cameras, at least {fewest} to agree.")
     image = [s.image_from_pixel(t.reshape(-1, 2)) for s, t in zip(sensors, targets, strict=True)]
     rays = [image_rays(c, i, m) for c, i, m in zip(cameras, image, media, strict=True)]
-    frame = _Frame(cameras, targets, media, sensors, rays, tolerance, fewest)
+    frame = _Exposure(cameras, targets, media, sensors, rays, tolerance, fewest)
     few = proposing_pairs(len(cameras), fewest)
     found = [np.empty((0, len(cameras)), dtype=np.int64)]
     found += [frame.proposals(a, b, np.arange(len(targets[a])), np.arange(len(targets[b])))
@@ -149,7 +149,7 @@ def is_chance(found: FloatArray, chance: FloatArray) -> bool:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Frame:
+class _Exposure:
     """Targets of all cameras, and their rays in the object."""
 
     cameras: Sequence[Camera]

@@ -55,7 +55,8 @@ class Dem(RasterFile):
             "like those of the cameras.": self.crs is None,
             f"{name} declares no no-data value; every number in it is taken as a height. If it "
             "has empty cells, name their value with --nodata.": self._unmarked,
-            f"{name} has {self.bands} bands; band 1 is taken as the heights.": self.bands > 1,
+            f"{name} has {self.bands} bands; band 1 is taken as the heights.": self.bands > 1
+            and self.names[1:] != ("sigma",),
         }
         self.remarks = [remark for remark, holds in told.items() if holds]
 

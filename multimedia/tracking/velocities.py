@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -10,7 +12,9 @@ from photocore.arrays import BoolArray, FloatArray, IntArray
 #: Points of a track to which a parabola is fitted.
 WINDOW = 5
 #: Sigmas beyond which the cubics of all tracks differ from their parabolas by more than noise.
-_CERTAIN = 3.0
+_CERTAIN = 2.0
+#: Points of all tracks on the average that count beside those of one.
+_SHARED = 2 * WINDOW
 #: Neighbours with which a vector is compared; ratio to their own spread beyond which it is odd.
 _NEIGHBOURS, _ODD = 8, 4.0
 
@@ -39,27 +43,44 @@ def track_velocities(
     -----
     The slope of the least-squares parabola through the five nearest points of the track (Savitzky
     and Golay 1964, here for unequal times, too). A parabola leaves out how the acceleration
-    changes: what the slope of a cubic differs by, beyond the noise of that difference and on the
-    average of a track, is added to the variance if it cannot be chance in all tracks. Where that
-    makes it larger than the cubic's, the cubic counts. A polynomial has two points more than its
-    degree, or is a line.
+    changes: what the slope of a cubic differs by, beyond the noise of that difference over a
+    track, is added to the variance if it cannot be chance in all tracks, most of it at the ends
+    of the track. A cubic is held against a quartic in the same way, and counts where that makes
+    the smaller variance. A polynomial has two points more than its degree, or is a line.
     """
-    slopes = [_slopes(xyz, covariance, times, track, degree) for degree in (2, 3)]
-    (velocity, own), (other, its) = slopes
-    sizes = np.bincount(track)
-    noise = np.diagonal(its - own, axis1=1, axis2=2)
-    excess = np.nan_to_num((other - velocity) ** 2 - noise)
-    mean = np.stack([np.bincount(track, axis) for axis in excess.T], axis=1) / sizes[:, None]
-    # Windows overlap: one in five is independent of the others.
-    chance = np.sqrt(2.0 * WINDOW * np.nansum(noise**2, axis=0))
-    left_out = np.where(excess.sum(axis=0) > _CERTAIN * chance, np.maximum(mean, 0.0), 0.0)[track]
-    own = own + left_out[:, :, None] * np.eye(3)
-    total = [np.trace(c, axis1=1, axis2=2) for c in (own, its)]
-    means = [np.bincount(track, np.nan_to_num(t)) for t in total]
+    slopes = [_slopes(xyz, covariance, times, track, degree) for degree in (2, 3, 4)]
+    worth = [_with_left_out(*pair, track) for pair in pairwise(slopes)]
+    velocity, own = slopes[0][0], worth[0]
+    means = [np.bincount(track, np.nan_to_num(np.trace(c, axis1=1, axis2=2))) for c in worth]
     cubic = (means[0] > means[1])[track]
     return (
-        np.where(cubic[:, None], other, velocity), np.where(cubic[:, None, None], its, own)
-    )  # fmt: skip
+        np.where(cubic[:, None], slopes[1][0], velocity),
+        np.where(cubic[:, None, None], worth[1], own),
+    )
+
+
+def _with_left_out(
+    fitted: tuple[FloatArray, FloatArray], richer: tuple[FloatArray, FloatArray], track: IntArray
+) -> FloatArray:
+    """Return covariances of slopes with what polynomials of one degree more differ by.
+
+    The difference is the coefficient of the highest power times a number of the window, large at
+    the ends of a track, and so is the root of its noise: what is more than noise over the track
+    is shared out as the noise is.
+    """
+    noise = np.nan_to_num(np.diagonal(richer[1] - fitted[1], axis1=1, axis2=2))
+    known = noise > 0
+    excess = np.divide((richer[0] - fitted[0]) ** 2, noise, out=np.ones_like(noise), where=known)
+    excess -= 1.0
+    count = np.maximum(known.sum(axis=0), 1)
+    mean = excess.sum(axis=0) / count
+    sums = [np.stack([np.bincount(track, axis) for axis in of.T], axis=1) for of in (excess, known)]
+    # A track has few windows: what all have on the average counts as two more.
+    ratio = np.maximum((sums[0] + _SHARED * mean) / (sums[1] + _SHARED), 0.0)
+    # Windows overlap: one in five is independent of the others.
+    certain = mean > _CERTAIN * np.sqrt(2.0 * WINDOW / count)
+    left_out = np.where(certain, ratio[track] * noise, 0.0)
+    return fitted[1] + left_out[:, :, None] * np.eye(3)
 
 
 def _slopes(

@@ -64,7 +64,7 @@ class TrackedParticles:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Particles:
+class _ParticlesOfFrame:
     """Particles of one frame, with the a-posteriori variance factor of each."""
 
     xyz: FloatArray
@@ -223,7 +223,7 @@ def _beyond_chance(
 
 def _particles(
     content: Project, places: list[FloatArray], tolerance: float, fewest: int
-) -> _Particles:
+) -> _ParticlesOfFrame:
     """Return the particles of a frame, intersected rigorously."""
     cameras, media = content.cameras, content.interfaces
     _, numbers, _ = correspondences(cameras, places, media, tolerance=tolerance, fewest=fewest)
@@ -236,7 +236,7 @@ def _particles(
     rays = points.rays[good]
     # Of each point's own variance factor, that which is the median of an honest one's.
     share = chi2.ppf(0.5, 2 * rays - 3) / (2 * rays - 3)
-    return _Particles(
+    return _ParticlesOfFrame(
         points.xyz[good], points.covariance[good], numbers[good], points.sigma0[good] ** 2 / share
     )
 
@@ -248,7 +248,7 @@ def _median_factor(factors: Sequence[FloatArray]) -> float:
 
 
 def _write(
-    result: TrackedParticles, particles: Sequence[_Particles], out: Path | None,
+    result: TrackedParticles, particles: Sequence[_ParticlesOfFrame], out: Path | None,
     folder: Path | None, *, overwrite: bool,
 ) -> None:  # fmt: skip
     content = result.project

@@ -16,6 +16,7 @@ from multimedia.refraction.water import (
     water_index_sigma,
     water_refractive_index,
 )
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError
 
@@ -127,11 +128,11 @@ def find_from_index(
     value = float(solve(index, **given, formula=chosen))
     if not low <= value <= high:
         raise GeometryError(
-            f"no salinity between 0 and 30 % gives water of {water['temperature_c']:g} °C the "
-            f"index {index:g} (it would take {value:.2f} %): check index and wavelength."
+            remark(
+                "shift.no_salinity", temperature=water["temperature_c"], index=index, value=value
+            )
             if what == "salinity"
-            else f"no temperature of liquid water with {water['salinity_percent']:g} % salt gives "
-            f"the index {index:g}: check index, salinity and wavelength."
+            else remark("shift.no_temperature", salinity=water["salinity_percent"], index=index)
         )
     everything = water | {key: max(value, 0.0) if what == "salinity" else value}
     known = {name: sigma for name, sigma in sigmas.items() if name != f"sigma_{key}"}

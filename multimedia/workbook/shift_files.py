@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from multimedia.refraction.layers import Layers
+from multimedia.remarks import remark
 from multimedia.workbook.shift_points import ShiftPoints, ShiftSetup
 from photocore.errors import CellError, InputError, WorkbookError, located
 from photocore.tables import Column, Table, open_tables, read_named_values, read_table
@@ -82,16 +83,11 @@ def read_shift_input(
     _refuse_survey(book)
     table = read_table(book, COLUMNS, name="Multimedia", sheet=sheet, decimal=decimal)  # type: ignore[arg-type]
     if not {"R", "ZP"} <= table.present and not {"X", "Y", "Z"} <= table.present:
-        raise InputError(
-            f"{table.file}: the table needs the columns X, Y, Z (Z = 0 at the interface on the "
-            "water side, points in water negative) or R, ZP (distance from the camera's nadir, "
-            "depth); other headings can be renamed to these."
-        )
+        raise InputError(remark("shift.no_columns", of=table.file))
     units = {table.units[key] for key in ("X", "Y", "Z", "R", "ZP") if key in table.units}
     if len(units) > 1:
         raise InputError(
-            f"{table.file}: the headings mix {' and '.join(sorted(units))}; all lengths must be in "
-            "one unit, the same as camera and thicknesses."
+            remark("shift.units_mixed", of=table.file, units=" and ".join(sorted(units)))
         )
     if Path(path).suffix.lower() in (".csv", ".tsv", ".txt"):
         return ShiftInput(table=table, setup=None)
@@ -130,10 +126,7 @@ def _refuse_survey(book: SheetFile | CsvFile) -> None:
     """Refuse a survey of a bifocal pair: its headings would be taken for coordinates."""
     names = {area.name for area in book.tables} if isinstance(book, SheetFile) else set()
     if "tblPoints" in names and "tblMM" not in names:
-        raise InputError(
-            f"{book.label}: is a survey of a bifocal pair (it holds the table tblPoints); solve it "
-            "with `bifocal solve`. The radial shift needs a table with X, Y, Z or R, ZP."
-        )
+        raise InputError(remark("shift.is_bifocal", of=book.label))
 
 
 def points_of(table: Table, nadir: tuple[float, float]) -> tuple[ShiftPoints, list[int]]:
@@ -185,6 +178,5 @@ def _problems(
     elif value < 0:
         yield (
             COORDINATE[key] if np.isnan(given) else key,
-            f"the point is {-value:g} above the water side of the interface; dry points are not "
-            "refracted: take it out (Z is negative, ZP positive in water).",
+            remark("shift.dry_point", height=-value),
         )

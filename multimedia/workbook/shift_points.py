@@ -9,6 +9,7 @@ import numpy as np
 
 from multimedia.refraction.layers import Layers
 from multimedia.refraction.shifting import radial_shift_ratio
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 
@@ -46,9 +47,7 @@ class ShiftSetup:
         z0 = camera[2] - layers.thickness
         if z0 < 0:
             raise InputError(
-                f"the camera is at Z = {camera[2]:g}, but the media above Z = 0 (the interface on "
-                f"the water side) are {layers.thickness:g} thick: it must be above them. Are "
-                "camera and thicknesses in the same unit?"
+                remark("shift.camera_too_low", z=camera[2], thickness=layers.thickness)
             )
         return cls(layers=layers, z0=z0, nadir=(camera[0], camera[1]))
 

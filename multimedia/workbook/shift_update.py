@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from multimedia.refraction.unrolled import STEPS
+from multimedia.remarks import remark
 from multimedia.workbook.shift_files import ShiftInput
 from multimedia.workbook.shift_points import ShiftPoints, ShiftSetup
 from multimedia.workbook.shift_workbook import (
@@ -243,10 +244,8 @@ def _named(setup: ShiftSetup) -> dict[str, float]:
 
 def _check_count(editor: WorkbookEditor, count: int, setup: ShiftSetup) -> None:
     if len(setup.layers.indices) != count:
-        raise InputError(
-            f"{editor.path}: its formulas are for {count} media, the options give "
-            f"{len(setup.layers.indices)}; add --new for a new workbook."
-        )
+        given = len(setup.layers.indices)
+        raise InputError(remark("shift.other_media", of=editor.path, count=count, given=given))
 
 
 def _store_setup(editor: WorkbookEditor, setup: ShiftSetup, own: ShiftSetup) -> None:
@@ -257,9 +256,7 @@ def _store_setup(editor: WorkbookEditor, setup: ShiftSetup, own: ShiftSetup) -> 
         if value == before[name]:
             continue
         if place is None:
-            raise InputError(
-                f"{editor.path.name}: has no cell named {name}; add --new for a new workbook."
-            )
+            raise InputError(remark("shift.no_cell_named", of=editor.path.name, name=name))
         editor.put(*place, value)
     ratios = [f"{kind}_{i}" for kind in "kq" for i in range(1, len(setup.layers.indices) + 1)]
     places = {name: place for name in ratios if (place := place_of(editor, name)) is not None}

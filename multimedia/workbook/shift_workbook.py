@@ -14,6 +14,7 @@ from openpyxl.utils import get_column_letter
 
 from multimedia.refraction.layers import HIGHEST_INDEX
 from multimedia.refraction.unrolled import STEPS, TOLERANCE, unrolled_shift
+from multimedia.remarks import remark
 from multimedia.workbook.index_sheet import FORMULAS, write_index_sheet
 from multimedia.workbook.shift_points import IN_PLANE, ShiftPoints, ShiftResult, ShiftSetup
 from multimedia.workbook.shift_sketch import shift_sketch
@@ -91,9 +92,7 @@ def write_shift_workbook(
         raise InputError(f"newton: 1 to 30 steps, found {steps}.")
     count = max(rows, len(points.ids) if points else 0)
     if not 1 <= count <= MOST_ROWS:
-        raise InputError(
-            f"{path}: {count} rows; a workbook may have 1 to {MOST_ROWS}. Write a .csv file."
-        )
+        raise InputError(remark("shift.rows", of=path, count=count, most=MOST_ROWS))
     check_new_workbook(path, overwrite=overwrite, other="" if points is None else "-result")
     book = BookBuilder(language=language, words=WORDS)
     book.book.properties.creator = book.book.properties.title = "multimedia"

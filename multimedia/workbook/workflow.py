@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from multimedia.refraction.layers import Layers
+from multimedia.remarks import remark
 from multimedia.workbook.shift_files import points_of, read_shift_input
 from multimedia.workbook.shift_points import ShiftPoints, ShiftResult, ShiftSetup
 from multimedia.workbook.shift_update import add_columns, is_template, update_template
@@ -122,10 +123,7 @@ def shift_file(
     remarks += setup.layers.remarks_about(z0=setup.z0, zp=points.depth)
     unseen = [name for name, flag in zip(points.ids, result.flags, strict=True) if flag != "OK"]
     if unseen:
-        remarks.append(
-            f"{len(unseen)} points cannot be seen from the camera, no ray gets there: "
-            f"{', '.join(unseen[:10])}."
-        )
+        remarks.append(remark("shift.unseen", count=len(unseen), names=", ".join(unseen[:10])))
     return ShiftReport(setup=setup, points=points, result=result, remarks=tuple(remarks))
 
 
@@ -140,11 +138,7 @@ def _setup(
     if camera is not None and z0 is not None:
         raise InputError("give the camera's position or z0, not both.")
     if indices is None and own is None:
-        raise InputError(
-            "the refractive indices are not known: give --indices, from the camera to the object, "
-            "e.g. --indices 1,1.5,1.337 --thicknesses 0.01 for air, 10 mm of glass (in metres), "
-            "water."
-        )
+        raise InputError(remark("shift.no_indices"))
     media = own.layers if own is not None else Layers(indices=(1.0, 1.0))
     if indices is not None or thicknesses is not None:
         media = Layers(
@@ -160,10 +154,7 @@ def _setup(
             raise InputError(f"z0: the camera must be above the first interface, found {z0:g}.")
         return ShiftSetup(layers=media, z0=z0, nadir=own.nadir if own else (0.0, 0.0))
     if own is None:
-        raise InputError(
-            "the camera's position is not known: give --camera X,Y,Z (Z = 0 at the interface on "
-            "the water side), or --z0."
-        )
+        raise InputError(remark("shift.no_camera"))
     return ShiftSetup(layers=media, z0=own.z0, nadir=own.nadir)
 
 

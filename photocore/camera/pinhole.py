@@ -15,6 +15,7 @@ import numpy as np
 
 from photocore.arrays import FloatArray
 from photocore.camera.rotation import AXES_CROSS, by_rotation, rotation_from_vector, skew
+from photocore.camera.similarity import Similarity
 
 #: What a camera is differentiated by: logarithms of fx and fy / fx, principal point [px], a small
 #: turn about the object frame's axes [rad], projection centre [m].
@@ -54,6 +55,11 @@ class Pinhole(NamedTuple):
         return self._replace(
             rotation=self.rotation @ rotation.T, centre=rotation @ (self.centre - origin)
         )
+
+    def carried(self, frame: Similarity) -> Pinhole:
+        """Return the camera in the target frame of a similarity."""
+        rotation = self.rotation @ frame.rotation.T
+        return self._replace(rotation=rotation, centre=frame(self.centre))
 
     def stepped(self, step: FloatArray) -> Pinhole:
         """Return the camera after adding to its `PARAMETERS`, the turn as a rotation vector."""

@@ -40,7 +40,7 @@ _MOST_LINES, _LONGEST_LINE = 10_000, 65_536
 
 
 @dataclass(slots=True)
-class _Element:
+class _PlyElement:
     name: str
     count: int
     #: (property, type), or (property, (count type, item type)) for a list.
@@ -228,12 +228,12 @@ def _heading(lines: Sequence[str]) -> bytes:
     return ("\n".join(lines) + "\n").encode("utf-8")
 
 
-def _read_header(file: BinaryIO, path: Path) -> tuple[list[str], str, list[_Element]]:
+def _read_header(file: BinaryIO, path: Path) -> tuple[list[str], str, list[_PlyElement]]:
     """Return header lines, format and elements; leaves the file at the first vertex."""
     if file.readline(_LONGEST_LINE).strip() != b"ply":
         raise InputError(f"{path}: is not a PLY file.")
     lines, form = ["ply"], ""
-    elements: list[_Element] = []
+    elements: list[_PlyElement] = []
     for _ in range(_MOST_LINES):
         line = file.readline(_LONGEST_LINE).decode("utf-8", errors="replace").strip()
         lines.append(line)
@@ -245,7 +245,7 @@ def _read_header(file: BinaryIO, path: Path) -> tuple[list[str], str, list[_Elem
             case ["format", form, *_]:
                 pass
             case ["element", name, count] if re.fullmatch(r"[0-9]{1,12}", count):
-                elements.append(_Element(name, int(count)))
+                elements.append(_PlyElement(name, int(count)))
             case ["property", "list", counter, item, name] if elements:
                 kinds = (_type(counter, path), _type(item, path))
                 elements[-1].properties.append((name, kinds))

@@ -28,6 +28,7 @@ HEADINGS: dict[str, tuple[str, ...]] = {
     "Z": ("z", "h", "height", "elevation", "altitude", "sfmz", "hoehe", "höhe", "quota"),
     "id": ("id", "point", "pointid", "name", "punkt", "punto"),
     "cameras": ("cameras", "images", "photos"),
+    "sigma_Z": ("sigmaz", "sigmah", "sz"),
     "X0": ("x0", "sensorx"),
     "Y0": ("y0", "sensory"),
     "Z0": ("z0", "sensorz"),

@@ -8,6 +8,7 @@ import io
 import os
 import re
 from collections.abc import Iterator
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -27,29 +28,6 @@ from photocore.reports.document import (
 
 #: Width of figures [inch], resolution of what is drawn as pixels, quality of photos in them.
 WIDTH, DPI, JPEG = 7.4, 110, 82
-_STYLE = """
-body{font:15px/1.45 system-ui,sans-serif;color:#111;background:#fff;max-width:60rem;
-margin:2rem auto;padding:0 1rem}
-h1{font-size:1.7rem;margin:2rem 0 .2rem}h2{font-size:1.2rem;margin:2rem 0 .5rem;border-bottom:2px
-solid #111}h3{font-size:1rem}
-table{border-collapse:collapse;margin:.6rem 0;font-size:.86rem;font-variant-numeric:tabular-nums}
-caption{text-align:left;font-weight:600;padding:.3rem 0}
-th,td{padding:.15rem .6rem;border-bottom:1px solid #bbb;text-align:right;overflow-wrap:anywhere}
-th{border-bottom:2px solid #111}th,td:first-child{overflow-wrap:break-word}
-figure{margin:1rem 0}
-figure img{width:100%;height:auto}
-figcaption,.small{font-size:.85rem;color:#333}
-pre{background:#f2f2f2;padding:.4rem .6rem;white-space:pre-wrap;overflow-wrap:anywhere;
-font-size:.8rem}
-.banner{border:3px solid #111;border-left-width:14px;padding:.6rem 1rem;margin:.6rem 0}
-.banner p{margin:.2rem 0}.banner p:first-child{font-size:1.25rem;font-weight:700}
-.good{border-color:#1a6e2e}.bad{border-color:#b00020}
-@media print{body{margin:0;max-width:none;font-size:11px}figure,table,.banner{break-inside:avoid}}
-"""
-#: Columns of words, to the left.
-_LEFT = "\n".join(
-    f".left{column} :is(th,td):nth-child({column}){{text-align:left}}" for column in range(1, 17)
-)
 
 
 def provenance_text() -> str:
@@ -65,6 +43,7 @@ def write_html(
     for index, block in enumerate(document.blocks):
         progress(index, len(document.blocks), "report")
         parts += _block(block, path.parent)
+    style = files(__package__).joinpath("report.css").read_text("utf-8")
     title, subject = html.escape(document.title), html.escape(document.subject)
     text = (
         f'<!DOCTYPE html>\n<html lang="{document.language}">\n<head>\n<meta charset="utf-8">\n'
@@ -72,9 +51,7 @@ def write_html(
         f'<meta name="generator" content="{subject}">\n'
         f'<meta name="provenance" content="{html.escape(provenance_text())}">\n'
         f"<title>{title}</title>\n"
-        f"<style>{_STYLE}{_LEFT}\n</style>\n</head>\n<body>\n"
-        + "\n".join(parts)
-        + "\n</body>\n</html>\n"
+        f"<style>\n{style}</style>\n</head>\n<body>\n" + "\n".join(parts) + "\n</body>\n</html>\n"
     )
     with atomic_path(path, overwrite=overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -157,11 +157,8 @@ def _read_texts(
         mark = decimal or decimal_of(part, proven, thousands=thousands, elsewhere=elsewhere)
         if mark is None:
             small, large = sorted((part.value("comma") or 0, part.value("point") or 0), key=abs)
-            complain(
-                index,
-                f'found "{part.digits}", which may mean {small:.15g} or {large:.15g}. Say which '
-                "with --decimal comma or --decimal point.",
-            )
+            about = {"found": part.digits, "small": small, "large": large}
+            complain(index, remark("table.two_meanings", **about))
             continue
         value = part.value(mark)
         mixed = decimal is None and len(proven) == 2 and mark != usual and part.evidence != "none"
@@ -229,9 +226,8 @@ def _mixed(part: NumberText, agreed: Decimal) -> str:
     if value is None:
         return f'found "{_short(part.digits)}", expected a number.'
     better = f"{value:.15g}".replace(".", "," if agreed == "comma" else ".")
-    return (
-        f'found "{_short(part.digits)}", while numbers here are written with the decimal '
-        f"{agreed}. Write {better}, or say --decimal {other} if all are."
+    return remark(
+        "table.other_decimal", found=_short(part.digits), agreed=agreed, better=better, other=other
     )
 
 
@@ -259,11 +255,7 @@ def _wrong_type(value: Value, unit: str) -> str:
             return (
                 f"holds a time of day, {expected}. Format the cell as a number and type it again."
             )
-        return (
-            f"holds the date {value.shown}, {expected}. Spreadsheets make dates of numbers typed "
-            f"with the other decimal separator: it was probably {number}. Format the column as a "
-            "number and type it again."
-        )
+        return remark("table.holds_date", date=value.shown, expected=expected, number=number)
     return f"holds {str(value).upper()}, {expected}."
 
 

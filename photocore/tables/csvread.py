@@ -70,10 +70,7 @@ class CsvFile:
         try:
             yield from csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter == " ")
         except csv.Error as error:
-            raise InputError(
-                f"{self.label}: cannot be split into fields ({error}); look for a quotation mark "
-                "that is opened but not closed."
-            ) from None
+            raise InputError(remark("table.no_fields", of=self.label, error=error)) from None
 
     def grid(self, delimiter: str, *, most: int | None = _SAMPLE) -> CellGrid:
         """Return the first records as a grid of texts."""
@@ -155,11 +152,8 @@ def find_in_text(
     if match is None or missing:
         wanted = missing or [c.key for c in columns if c.required] or [c.key for c in columns]
         shown = describe(grid, match)
-        raise InputError(
-            f"{file.label}: no column {', '.join(wanted)}; the headings are {shown or 'absent'}. "
-            f'Rename a heading, or, where it exists, use --columns "{wanted[0]}=HEADING" (or a '
-            "column letter)."
-        )
+        about = {"missing": ", ".join(wanted), "headings": shown or "absent", "first": wanted[0]}
+        raise InputError(remark("table.no_column", of=file.label, **about))
     return grid, match, delimiter
 
 
@@ -315,10 +309,7 @@ def too_wide(file: CsvFile, grid: CellGrid, width: int, rows: Iterable[int]) -> 
     """Yield a complaint for each record that reaches beyond the headings."""
     for row in rows:
         if max(grid.rows[row]) > width:
-            message = (
-                f"the record has {max(grid.rows[row])} fields, the headings {width}. If numbers "
-                "have a decimal comma, separate the fields by semicolons."
-            )
+            message = remark("table.too_many_fields", fields=max(grid.rows[row]), width=width)
             yield CellError(message, file=file.label, cell=cell_name(row, width + 1))
 
 

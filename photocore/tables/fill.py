@@ -95,10 +95,8 @@ def refuse_doubles(label: str, title: str, match: Match) -> None:
     for key, numbers in match.doubles.items():
         cells = " and ".join(cell_name(match.header, number) for number in numbers)
         where = f"{label} › {title}" if title else label
-        raise InputError(
-            f'{where}: the heading "{match.headings[key]}" stands in {cells}; which one is {key}? '
-            f'Say it by letter: --columns "{key}={column_letters(numbers[0])}".'
-        )
+        about = {"heading": match.headings[key], "key": key, "letter": column_letters(numbers[0])}
+        raise InputError(remark("table.same_heading", of=where, cells=cells, **about))
 
 
 def refuse_unknown_units(label: str, title: str, match: Match, columns: Sequence[Column]) -> None:
@@ -114,11 +112,7 @@ def refuse_unknown_units(label: str, title: str, match: Match, columns: Sequence
         heading = match.headings.get(column.key, "")
         unit = "" if column.key in match.units else unknown_unit(heading)
         if unit and column.kind in ("number", "integer"):
-            message = (
-                f'the heading "{heading}" says the unit "{unit}", which is not known. Known are '
-                "um, mm, cm, dm, m, km, px, deg, gon, rad; convert the column. A note belongs in "
-                "round brackets."
-            )
+            message = remark("table.strange_unit", heading=heading, unit=unit)
             cell = cell_name(match.header, match.columns[column.key])
             error = CellError(message, file=label, sheet=title, cell=cell, column=column.key)
             errors.append(error)

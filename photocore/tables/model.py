@@ -11,6 +11,7 @@ import numpy as np
 
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError
+from photocore.remarks import remark
 from photocore.workbook.reading.grid import cell_name, column_letters
 
 Kind = Literal["number", "integer", "flag", "text"]
@@ -249,9 +250,7 @@ def parse_column_map(text: str, keys: Sequence[str] = ()) -> dict[str, str]:
         if named:
             key, equals, place = (part.strip() for part in entry.partition("="))
             if not (key and equals and place):
-                raise InputError(
-                    f'--columns: "{entry}" cannot be understood; write KEY=HEADING or KEY=LETTER.'
-                )
+                raise InputError(remark("table.no_map", entry=entry))
         elif entry in ("-", ""):
             continue
         else:

@@ -70,9 +70,7 @@ def open_tables(path: Path | str, *, max_rows: int = 100_000) -> SheetFile | Csv
 
         return open_xlsx(path, max_rows=max_rows + _MARGIN)
     check_header(path)
-    raise InputError(
-        f'{path}: the ending "{ending}" is not known; give a .xlsx, .xlsm, .ods or .csv file.'
-    )
+    raise InputError(remark("table.unknown_ending", of=path, ending=ending))
 
 
 def read_table(
@@ -133,10 +131,8 @@ def read_table(
     asked = column_map or {}
     for key in (column.key for column in columns if column.key in asked):
         if key not in place.match.columns:
-            raise InputError(
-                f'{book.label}: --columns names "{asked[key]}" for {key}, but there is no such '
-                f"heading; the headings are {describe(place.grid, place.match)}."
-            )
+            about = {"asked": asked[key], "headings": describe(place.grid, place.match)}
+            raise InputError(remark("table.no_such_heading", of=book.label, key=key, **about))
     refuse_doubles(book.label, place.grid.title, place.match)
     refuse_unknown_units(book.label, place.grid.title, place.match, columns)
     take_unit_row(place.grid, place.match)
@@ -146,8 +142,7 @@ def read_table(
         rows = data_rows(place.grid, place.match, columns, visible_only=visible_only)
         if place.grid.truncated or len(rows.rows) > max_rows:
             raise InputError(
-                f"{book.label} › {place.grid.title}: has more than {max_rows} rows. Save the sheet "
-                "as .csv and use that file; text tables have no limit."
+                remark("table.too_long", of=f"{book.label} › {place.grid.title}", count=max_rows)
             )
         table = _new_table(book, place, rows)
         _refuse_merged(table, place.grid, complaints)
@@ -185,7 +180,7 @@ def _find(
         titles = [title for title in titles if bare(title) == bare(sheet)]
         if not titles:
             raise InputError(
-                f'{book.label}: has no sheet "{sheet}"; it has {_quoted(book.titles)}.'
+                remark("table.no_sheet", of=book.label, sheet=sheet, titles=_quoted(book.titles))
             )
     wanted = bare(name or "")
     near: _Place | None = None
@@ -289,11 +284,10 @@ def _nothing_found(
         )
         return InputError(f"{book.label}: {what} (looked in {_quoted(titles)}).{advice}")
     missing = ", ".join(near.match.missing(columns))
-    return InputError(
-        f"{book.label} › {near.grid.title}: the table in row {near.match.header} has no column "
-        f"{missing}; its headings are {describe(near.grid, near.match)}. Rename a heading, or say "
-        f'which column it is: --columns "{near.match.missing(columns)[0]}=HEADING".'
-    )
+    row, first = near.match.header, near.match.missing(columns)[0]
+    about = {"missing": missing, "headings": describe(near.grid, near.match), "first": first}
+    where = f"{book.label} › {near.grid.title}"
+    return InputError(remark("table.lacks_column", of=where, row=row, **about))
 
 
 def _read_text(

@@ -559,7 +559,7 @@ CONTENTS: list[tuple[str, str, Any, str]] = [
     ),
     (
         "bifocal survey street.toml --dry-run", "street.toml",
-        swapped("street.toml", '"far.jpg"', '"far\\u0000.jpg"'), "far and near must name",
+        swapped("street.toml", '"far.jpg"', '"far\\u0000.jpg"'), "must name its photos",
     ),
     *(
         ("multimedia convert aquacal.json o.toml", "aquacal.json",

@@ -122,6 +122,8 @@ INPUTS: list[tuple[str, ...]] = [
         "flight.csv",
     ),
     (f"multimedia bathymetry {{}} --rays --out o.csv {WATER}", "rays.csv", "half"),
+    ("multimedia soundings {} cloud.csv --water-level 1", "dem.tif"),
+    ("multimedia soundings dem.tif {} --water-level 1", "cloud.csv", "half"),
     ("multimedia waterlevel {} --out o.json", "cloud.csv", "half"),
     ("multimedia waterlevel {} --out o.json", "cloud.ply"),
     ("multimedia openptv {} --out o.toml", "ptv", "half"),
@@ -188,6 +190,7 @@ OUTPUTS: list[tuple[str, ...]] = [
             ".laz",
         )
     ),
+    ("multimedia soundings dem.tif cloud.csv --water-level 1 --out {}", ".csv"),
     ("multimedia waterlevel cloud.csv --out {}", ".json"),
     ("multimedia openptv ptv --out {}", ".toml"),
     ("multimedia convert lens.yml {}", ".toml"),

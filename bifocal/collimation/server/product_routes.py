@@ -21,7 +21,7 @@ from bifocal.collimation.pictures import Pictures
 from bifocal.collimation.server.requests import answer, in_thread, json_body, session_of
 from bifocal.collimation.server.state_view import state_of
 from bifocal.collimation.server.streamed_zip import streamed_zip
-from bifocal.collimation.server.uploads import take_photos
+from bifocal.collimation.server.uploads import MOST, take_photos
 from bifocal.collimation.session import Session
 from bifocal.collimation.shapes import met, places_of, relief_within
 from bifocal.collimation.starting import open_sample, recent, reopen
@@ -39,17 +39,31 @@ async def _photos(request: Request) -> Response:
     if kind != "multipart/form-data":
         raise HTTPException(415, "expected multipart/form-data.")
     session = session_of(request)
-    async with request.form(max_files=2, max_fields=2) as form:
-        sent = [form.get(name) for name in ("photo1", "photo2")]
+    async with request.form(max_files=MOST, max_fields=MOST) as form:
+        sent = [form.get(f"photo{number}") for number in range(1, MOST + 1)]
         files = [(each.filename or "", each.file) for each in sent if isinstance(each, UploadFile)]
 
         def take() -> dict[str, Any]:
-            session.check_new_photos()
-            there = [info.path for info in session.pictures.infos]
-            session.give_photos(take_photos(session.files.folder, files, there))
+            there = session.all_photos
+            further = len(there) > 1 and len(files) == 1
+            if not further:
+                session.check_new_photos()
+            photos = take_photos(session.files.folder, files, there)
+            if further:
+                session.give_others(photos[2:])
+            else:
+                session.give_photos(photos)
             return state_of(session)
 
         return answer(await in_thread(take))
+
+
+async def _take_away(request: Request) -> Response:
+    """Let a photo beside far and near go; its file stays where it is."""
+    session, number = session_of(request), request.path_params["number"]
+    photos = [p for n, p in enumerate(session.all_photos, start=1) if n > 2 and n != number]
+    await in_thread(session.give_others, photos)
+    return answer(await in_thread(state_of, session))
 
 
 async def _sample(request: Request) -> Response:
@@ -124,10 +138,9 @@ def bundle_of(session: Session) -> dict[str, Path]:
     """Return all that *Download all* holds: products, workbook, photos and lens files by name."""
     with session.lock:
         more = {}
-        for info in session.pictures.infos:
-            inside = info.path.resolve().is_relative_to(session.files.folder.resolve())
-            name = relative_name(info.path, session.files.folder) if inside else info.path.name
-            more[name] = info.path
+        for path in session.all_photos:
+            inside = path.resolve().is_relative_to(session.files.folder.resolve())
+            more[relative_name(path, session.files.folder) if inside else path.name] = path
         pair = session.pictures.pair
         if pair is not None and session.files.pair is not None:
             folder = session.files.pair.parent
@@ -153,7 +166,7 @@ async def _overlay(request: Request) -> Response:
 
 async def _preview(request: Request) -> Response:
     kind = request.path_params["kind"]
-    if kind not in ("relief", "ortho"):
+    if kind not in ("relief", "ortho", "rectified"):
         raise HTTPException(404, "there is no such picture.")
     data = await in_thread(session_of(request).products.preview, kind)
     return Response(data, media_type="image/png", headers=_FRESH)
@@ -224,6 +237,7 @@ async def _contours(request: Request) -> Response:
 
 ROUTES = [
     Route("/api/photos", _photos, methods=["POST"]),
+    Route("/api/photos/{number:int}", _take_away, methods=["DELETE"]),
     Route("/api/sample", _sample, methods=["POST"]),
     Route("/api/recent", _recent),
     Route("/api/recent", _reopen, methods=["POST"]),

@@ -16,6 +16,7 @@ from bifocal.collimation.session import Session
 from bifocal.collimation.shapes import measures_of
 from bifocal.collimation.wording import say, without_options
 from bifocal.model.pair import Pair
+from bifocal.model.photo_set import PhotoSet
 from bifocal.orientation.align_workflow import interior_of_photo
 from photocore.errors import PhotogrammetryError
 from photocore.images import ImageInfo
@@ -37,6 +38,7 @@ def state_of(session: Session) -> dict[str, Any]:
             "workbook": session.files.workbook.name,
             "workbook_waiting": session.sync.waiting,
             "photos": _photos(session),
+            "others": _others(session),
             "setup": {key: state.setup.get(key) for key in SETUP},
             "pair": None
             if session.pictures.pair is None
@@ -65,6 +67,7 @@ def state_of(session: Session) -> dict[str, Any]:
             "products": {
                 "relief": session.products.facts("relief"),
                 "ortho": session.products.facts("ortho"),
+                "rectified": session.products.facts("rectified"),
                 "files": session.products.listed(session.files.workbook),
             },
             "jobs": [
@@ -115,6 +118,22 @@ def _photos(session: Session) -> list[dict[str, Any]]:
         question = say("ask", "exchange", language, name=shown[0]["name"])
         shown[0]["missing"] = [*shown[0]["missing"], question]
     return shown
+
+
+def _others(session: Session) -> list[dict[str, Any]]:
+    """Return the photos beside far and near, and whether they are oriented with the pair."""
+    joined, known = session.photo_set, {}
+    if joined is not None and session.pictures.others:
+        photos = PhotoSet.read(joined)
+        known = {photo.path.resolve(): photo.distance for photo in photos.photos}
+    return [
+        {
+            "image": number, "name": info.path.name, "width": info.size[0],
+            "height": info.size[1], "joined": joined is not None,
+            "distance": known.get(info.path.resolve()),
+        }
+        for number, info in enumerate(session.pictures.others, start=3)
+    ]  # fmt: skip
 
 
 def _exchanged(session: Session, shown: list[dict[str, Any]]) -> bool:

@@ -18,6 +18,8 @@ from photocore.errors import InputError
 from photocore.images import ImageInfo, image_info, read_image
 from photocore.output import atomic_path, free_path
 
+#: A survey of more photos is one of pairs.
+MOST = 12
 #: Photos of more pixels per byte than any camera writes are no photos. [px/byte, px]
 EMPTIEST, FROM = 400, 20_000_000
 
@@ -31,20 +33,18 @@ def take_photos(
     ----------
     folder : Path
     sent : sequence of (name, file)
-        One or two, as the browser sent them; of the name all that may stand in a file name is kept.
+        As the browser sent them; of the name all that may stand in a file name is kept.
     there : sequence of Path
-        The photo that lay on the table alone: it stays, where one more comes.
+        Photos that lie on the table: they stay, where fewer than two come, or lay there.
 
     Raises
     ------
     InputError
         If they are no photos, or too many; nothing is written then.
     """
-    kept = there if len(there) == 1 and len(sent) == 1 else ()
-    if not 1 <= len(sent) <= 2:
-        raise InputError(remark("page.two_photos", count=len(sent)))
-    if len(there) == 2 and len(sent) == 1:
-        raise InputError(remark("page.third_photo"))
+    kept = there if len(there) == 1 or len(sent) == 1 else ()
+    if not 1 <= len(sent) <= MOST - len(kept):
+        raise InputError(remark("page.many_photos", most=MOST))
     with tempfile.TemporaryDirectory() as place:
         checked = []
         for number, (name, file) in enumerate(sent):
@@ -54,9 +54,10 @@ def take_photos(
                 shutil.copyfileobj(file, target)
             checked.append(_checked(path))
         infos = [*map(image_info, kept), *checked]
-        if len(infos) == 2:
-            if kept and _same(infos[0].path, infos[1].path):
-                raise InputError(remark("page.same_photo", name=infos[1].path.name))
+        for info in checked:
+            if any(_same(info.path, path) for path in kept):
+                raise InputError(remark("page.same_photo", name=info.path.name))
+        if len(kept) < 2:  # else far and near are known
             infos = far_first(infos)
         return tuple(i.path if i.path in kept else _kept(folder, i.path) for i in infos)
 
@@ -67,7 +68,7 @@ def safe_name(name: str) -> str:
     Examples
     --------
     >>> safe_name("../../etc/Façade 1.JPG"), safe_name("C:\\\\x\\\\far?.tif")
-    ('Façade 1.jpg', 'far_.tif')
+    ('Façade 1.jpg', 'far.tif')
     """
     last = name.replace("\\", "/").rpartition("/")[2]
     stem, dot, ending = last.rpartition(".")
@@ -80,12 +81,16 @@ def safe_name(name: str) -> str:
 
 
 def far_first(infos: Sequence[ImageInfo]) -> list[ImageInfo]:
-    """Return two photos with that of the longer lens first, where they tell their lens."""
-    first, second = infos
-    focal = [info.focal_pixels or info.focal_length for info in (first, second)]
-    if focal[0] and focal[1] and focal[1] > focal[0]:
-        return [second, first]
-    return [first, second]
+    """Return photos with that of the longest lens first, then that of the shortest.
+
+    As they are where one does not tell its lens, or all have the same.
+    """
+    focal = {info.path: info.focal_pixels or info.focal_length or 0.0 for info in infos}
+    if not all(focal.values()) or len(infos) < 2:
+        return list(infos)
+    far, *others = sorted(infos, key=lambda info: -focal[info.path])
+    near = others[-1] if focal[others[-1].path] < focal[far.path] else others[0]
+    return [far, near, *(info for info in infos if info not in (far, near))]
 
 
 def _checked(path: Path) -> ImageInfo:

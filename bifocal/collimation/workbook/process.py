@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.collimation.records import PickedPoint
+from bifocal.collimation.workbook.outlines import Outlines
 from bifocal.collimation.workbook.rows import change_rows, read_rows
 from bifocal.remarks import remark
 from bifocal.workbook.pair_workflow import read_pair
@@ -23,8 +24,9 @@ _LONGEST = 600
 
 
 def change_in_process(
-    path: Path, points: Sequence[PickedPoint], pair_path: Path, *, keep: bool
-) -> None:
+    path: Path, points: Sequence[PickedPoint], pair_path: Path, *, keep: bool, outlines: Outlines,
+    language: str,
+) -> None:  # fmt: skip
     """Change the points of a workbook in place; as `rows.change_rows`.
 
     Raises
@@ -35,7 +37,7 @@ def change_in_process(
     task = {
         "workbook": str(path.resolve()),
         "pair": str(pair_path.resolve()),
-        "keep": keep,
+        "more": {"keep": keep, "outlines": outlines, "language": language},
         "points": [asdict(point) for point in points],
     }
     command = [sys.executable, "-m", "bifocal.collimation.workbook.process"]
@@ -57,9 +59,7 @@ def main() -> int:
     path, pair_path = Path(task["workbook"]), Path(task["pair"])
     try:
         points = [_point(entry) for entry in task["points"]]
-        change_rows(
-            path, read_rows(path), points, read_pair(pair_path), pair_path, keep=task["keep"]
-        )
+        change_rows(path, read_rows(path), points, read_pair(pair_path), pair_path, **task["more"])
     except (PhotogrammetryError, OSError) as error:
         sys.stdout.write(json.dumps({"error": str(error)}))
         return 1

@@ -13,6 +13,13 @@ import numpy as np
 
 from bifocal.collimation.live_results import observations
 from bifocal.collimation.records import Known, PickedPoint, Picks, Pixel
+from bifocal.collimation.workbook.outlines import (
+    KEYS,
+    TABLE,
+    Outlines,
+    add_outlines,
+    outline_cells,
+)
 from bifocal.collimation.workbook.setup import typed_setup
 from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
@@ -152,16 +159,19 @@ def _known(xyz: Any) -> Known | None:
 
 
 def write_new(
-    path: Path, points: Sequence[PickedPoint], pair: Pair, pair_path: Path, language: str
-) -> None:
+    path: Path, points: Sequence[PickedPoint], pair: Pair, pair_path: Path, language: str,
+    outlines: Outlines,
+) -> None:  # fmt: skip
     """Write a workbook where there is none."""
     write_survey(
         path, observations(points), pair=pair, pair_path=pair_path, language=language,
         what="points picked with bifocal pick",
     )  # fmt: skip
-    if any(point.reference for point in points):
-        read = read_rows(path)
-        change_rows(path, read, points, pair, pair_path, keep=False)
+    if outlines or any(point.reference for point in points):
+        change_rows(
+            path, read_rows(path), points, pair, pair_path, keep=False, outlines=outlines,
+            language=language,
+        )  # fmt: skip
 
 
 def change_rows(
@@ -172,6 +182,8 @@ def change_rows(
     pair_path: Path,
     *,
     keep: bool,
+    outlines: Outlines | None = None,
+    language: str = "en",
 ) -> None:
     """Change the points of a workbook in place, and all that follows from them.
 
@@ -186,6 +198,10 @@ def change_rows(
         The geometry its formulas use.
     keep : bool
         Whether to keep a copy of the file as it is, under a name that is free.
+    outlines : mapping, optional
+        What was drawn to be measured; its table is added where it is lacking.
+    language : str
+        Of that table.
 
     Raises
     ------
@@ -198,6 +214,7 @@ def change_rows(
         editor = WorkbookEditor(path)
         own = pair_path.resolve() == path.resolve()
         _edit(editor, read, points, pair, None if own else relative_name(pair_path, path.parent))
+        _outlines(editor, outlines or {}, language)
         editor.save(typed, overwrite=True)
         if not _solved(typed, ready):
             shutil.copyfile(typed, ready)
@@ -328,6 +345,19 @@ def _table(
         editor.append_columns(area.name, columns, count=count)
         if follower and editor.table(follower) is not None:
             editor.append_columns(follower, {}, count=count)
+
+
+def _outlines(editor: WorkbookEditor, outlines: Outlines, language: str) -> None:
+    """Type what was drawn to be measured into its own table."""
+    area = editor.table(TABLE)
+    if area is None:
+        if outlines:
+            add_outlines(editor, outlines, language)
+        return
+    cells, column = editor.grid(area.sheet).rows, area.headings()["id"]
+    lines = range(area.area[0] + 1, area.area[2] + 1)
+    stands = {str(name): row for row in lines if (name := cells.get(row, {}).get(column))}
+    _table(editor, area, list(KEYS), outline_cells(outlines), stands)
 
 
 def _set(

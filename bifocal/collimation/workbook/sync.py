@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 from bifocal.collimation.project import SurveyFiles
 from bifocal.collimation.records import SurveyState
+from bifocal.collimation.shapes import outlines_of
 from bifocal.collimation.workbook.process import FROM as LARGE
 from bifocal.collimation.workbook.process import change_in_process
 from bifocal.collimation.workbook.rows import (
@@ -23,6 +24,7 @@ from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.remarks import remark
 from photocore.errors import InputError, PhotogrammetryError
+from photocore.jsonfile import plain
 from photocore.output import check_not_open
 
 #: Quiet seconds after a pick before the workbook is written, and between looks at the file.
@@ -81,6 +83,7 @@ class WorkbookSync:
         self.survey = survey
         self.waiting: str | None = None
         self.synced: dict[str, PointRow] = {}
+        self.outlines: dict[str, Any] = {}
         self.digest = ""
         self.seen = ""
         self.read: ReadBook | None = None
@@ -179,30 +182,33 @@ class WorkbookSync:
             points = survey.state.sorted_points()
             pair, pair_path = survey.accepted_pair, survey.files.pair
             revision = survey.state.revision
+            outlines = {} if pair is None else plain(outlines_of(survey.state, pair))
         wanted = {point.name: row_of(point) for point in points}
         if pair is None or pair_path is None:
             return
         exists = bool(path.exists() and path.stat().st_size)
         if exists and self.read is not None:
             written = wanted == self.synced and self.seen == self.digest
-            if (written or wanted == self.read.rows) and not self._oriented_anew(pair):
+            same = (written or wanted == self.read.rows) and outlines == self.outlines
+            if same and not self._oriented_anew(pair):
                 return
+            more: dict[str, Any] = {"outlines": outlines, "language": survey.spoken}
             keep = self.seen != self.digest
             if len(points) < LARGE:
-                change_rows(path, self.read, points, pair, pair_path, keep=keep)
+                change_rows(path, self.read, points, pair, pair_path, keep=keep, **more)
             else:
-                change_in_process(path, points, pair_path, keep=keep)
+                change_in_process(path, points, pair_path, keep=keep, **more)
         elif survey.files.pair_is_workbook:
             raise InputError(remark("page.book_gone", name=path.name))
         else:
-            if not any(point.is_complete for point in points):
+            if not outlines and not any(point.is_complete for point in points):
                 return
             check_not_open(path)
-            write_new(path, points, pair, pair_path, survey.spoken)
+            write_new(path, points, pair, pair_path, survey.spoken, outlines)
         read = read_rows(path)
         if lost := wanted.keys() - read.rows.keys():
             raise InputError(f"{path.name}: did not take {len(lost)} points, {min(lost)} first.")
-        self.synced = wanted
+        self.synced, self.outlines = wanted, outlines
         self.digest = self.seen = digest_of(path)
         self.read = read
         survey.note_saved(self.digest, revision)

@@ -121,8 +121,17 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
     cofactor[np.ix_(free, free)] = fit.linear.cofactor
     state: PairUnknowns = fit.state.blocks["pair"][0]
     if observations.lines and observations.lines_bend_nothing:
-        turned = turned_by_lines(observations, state, cofactor, pair_equations)
-        state, cofactor = turned[0], np.asarray(turned[1])
+        rates = pair_equations(observations, state)[1]
+
+        def known_of(moves: FloatArray) -> FloatArray:
+            own = rates @ moves
+            return np.asarray(own.T @ own)
+
+        frame, cofactor = turned_by_lines(
+            observations.lines, state.cameras, observations.estimated, cofactor, known_of
+        )
+        first, second = (camera.carried(frame) for camera in state.cameras)
+        state = replace(state, cameras=(first, second))
     covariance = cofactor * max(sigma0, 1.0) ** 2
     by = state.media.by_unknowns()
     return AdjustedPair(
@@ -181,7 +190,7 @@ def pair_equations(observations: PairObservations, state: PairUnknowns) -> Equat
     if wall.any() and not state.media:
         parts.append(wall_equations(observations, state))
     if observations.lines and not observations.lines_bend_nothing:
-        parts.append(line_equations(observations.lines, state))
+        parts.append(line_equations(observations.lines, state.cameras))
     if observations.control.ids:
         control = _control(observations, state)
         by = control.by_unknowns

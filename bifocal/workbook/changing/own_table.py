@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.remarks import remark
 from bifocal.survey.reference import Georeference
 from bifocal.survey.relief_table import ENTRIES
 from bifocal.survey.survey_input import SurveyInput
@@ -84,9 +85,7 @@ def add_results(
         If the workbook cannot be changed.
     """
     if source.suffix.lower() != target.suffix.lower():
-        raise InputError(
-            f"{target}: results go into the table of {source.name} itself, or into a new .xlsx."
-        )
+        raise InputError(remark("survey.into_itself", of=target, name=source.name))
     refuse_earlier(source, survey)
     editor = WorkbookEditor(source, survey.book)
     content = replace(content, links=_links(editor, survey, given))

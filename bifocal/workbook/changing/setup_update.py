@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from bifocal.remarks import remark
 from bifocal.workbook.content import SurveyContent, setup_cells
 from bifocal.workbook.formulas.columns import adjustment_names
 from bifocal.workbook.formulas.setup_cells import TITLE_BLOCK, cells_of, formulas, groups
@@ -85,10 +86,7 @@ def write_options(editor: WorkbookEditor, content: SurveyContent, given: Mapping
         place = place_of(editor, name)
         if place is None:
             if place_of(editor, "d_2") is not None and cells.get(name) is not None:
-                raise InputError(
-                    f"{editor.path}: no cell is named {name} any more, so the value cannot be "
-                    "written. Give the cell its name again, or write to a new workbook."
-                )
+                raise InputError(remark("survey.no_cell_named", of=editor.path, name=name))
             continue
         if not _holds(editor, place, cells.get(name)):
             editor.put(*place, cells.get(name))

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from bifocal.remarks import remark
 from bifocal.survey.survey_input import SurveyInput
 from bifocal.survey.what_if import CHANGED
 from bifocal.workbook.changing.setup_update import (
@@ -89,11 +90,7 @@ def refuse_earlier(source: Path, survey: SurveyInput) -> None:
         Naming the way out.
     """
     if is_earlier(survey):
-        raise InputError(
-            f"{source}: was made by an earlier version of this program, whose formulas are not "
-            f"renewed in place. Write to a new workbook, e.g. --out {_other(source)}: set-up, "
-            "points, check and control points are carried over; this one stays as it is."
-        )
+        raise InputError(remark("survey.earlier_version", of=source, other=_other(source)))
 
 
 def is_same_kind(survey: SurveyInput, content: SurveyContent) -> bool:
@@ -121,11 +118,7 @@ def check_kind(source: Path, survey: SurveyInput, content: SurveyContent) -> Non
     kind = "coordinates in mm or px" if content.is_pair else "raw pixels of a pair"
     if content.is_pair == ("col1" in survey.table.present):
         kind = "photos in air"
-    raise InputError(
-        f"{source}: its formulas are made for another kind of measurement ({kind}) and are not "
-        f"changed into others in place. Write to a new workbook, e.g. --out {_other(source)}; this "
-        "one stays as it is."
-    )
+    raise InputError(remark("survey.other_kind", of=source, kind=kind, other=_other(source)))
 
 
 def _other(source: Path) -> str:
@@ -418,6 +411,12 @@ def _charts(editor: WorkbookEditor, built: BookBuilder, rows: Sequence[int]) -> 
     title = chart_sheet(editor)
     if title is None:
         return
+    place = place_of(editor, "chart_vectors")
+    if place is not None:  # programs whose titles follow no cell show what is stored in the chart
+        cell = built.book.defined_names["chart_vectors"].attr_text.rpartition("!")[2]
+        stands, empty = editor.value_at(*place), built.word("chart_vectors").format(n=1)
+        said = str(built.results["Charts"][cell.replace("$", "")])
+        editor.replace_text(place[0], stands if isinstance(stands, str) else empty, said)
     block: RowBlock = built.blocks["Charts"]
     cells = editor.grid(title).rows
     last = max((row for row, values in cells.items() if LEFT + 1 in values), default=HEAD)
@@ -426,7 +425,8 @@ def _charts(editor: WorkbookEditor, built: BookBuilder, rows: Sequence[int]) -> 
         for row, value in zip(rows, block.columns[LEFT + i], strict=False):
             if 0 <= row < len(values):
                 values[row] = value
-        editor.set_results(title, HEAD + 1, {LEFT + 1 + i: values})
+        for row, value in enumerate(values, start=HEAD + 1):
+            editor.set_result(title, row, LEFT + 1 + i, value)
 
 
 def _log(editor: WorkbookEditor, content: SurveyContent) -> None:
@@ -443,4 +443,4 @@ def _log(editor: WorkbookEditor, content: SurveyContent) -> None:
         for key, value in entry.items():
             editor.set_value(area.sheet, bottom, headings[key], value)
         return
-    editor.append_rows("tblLog", [entry])
+    editor.append_columns("tblLog", {key: [value] for key, value in entry.items()})

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from bifocal.survey.other_photos import OtherPhoto
-from bifocal.survey.setup import SCALE_TOLERANCE, SurveySetup
+from bifocal.survey.setup import SCALE_TOLERANCE, OtherPhoto, SurveySetup
 from bifocal.workbook.formulas.setup_cells import other_cells
 from photocore.workbook.changing.cells import CellValue
 

@@ -97,7 +97,7 @@ def _checked(sheet: SheetBuilder, content: SurveyContent, cells: Cells, head: in
     sheet.formula(at, live, said, name="chart_vectors", font=LABEL_FONT)
     rows = len(counts["sigmas_from"])
     sheet.table("tblBins", bins, at=(head, LEFT + 6), rows=rows, cells=counts)
-    left, count = LEFT + 12, content.check_rows
+    left, count = LEFT + 12, content.arrows
     sheet.table("tblVectors", vectors, at=(head, left), rows=count, cells=arrows)
     area = {"min_row": head + 1, "max_row": head + rows}
     bars, line_of = BarChart(), LineChart()
@@ -149,7 +149,7 @@ def _bin_cells(content: SurveyContent) -> Cells:
 
 def _vector_cells(content: SurveyContent) -> tuple[Cells, float]:
     """Return the ends of the arrows of errors at check points, and how often they are enlarged."""
-    count, check = content.check_rows, content.check
+    count, check = content.arrows, content.check
     start, tip, scale = np.full((count, 2), np.nan), np.full((count, 2), np.nan), 1.0
     if check is not None and len(check.errors):
         errors, known = check.errors[:, :2], content.known.xyz[:, :2]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations
 from bifocal.workbook.reading.reader import TO_MM
 from bifocal.workbook.reading.setup_reader import LARGEST
@@ -90,17 +91,15 @@ def joined(first: PickList, second: PickList, unit: str | None = None) -> PointO
     """
     units = {unit} if unit else {first.unit, second.unit} - {""}
     if len(units) > 1:
-        raise InputError(
-            f"{first.file} is in {first.unit}, {second.file} in {second.unit}; give both alike."
-        )
+        files = {"first": first.file, "second": second.file}
+        said = {"unit1": first.unit, "unit2": second.unit}
+        raise InputError(remark("survey.units_of_lists", **files, **said))
     place = {name: row for row, name in enumerate(second.ids)}
     ids = tuple(name for name in first.ids if name in place)
     if not ids:
-        raise InputError(
-            f"{first.file} and {second.file} share no point: "
-            f"{', '.join(first.ids[:3])} ... against {', '.join(second.ids[:3])} ... "
-            "Give the same points the same names."
-        )
+        here, there = (", ".join(one.ids[:3]) for one in (first, second))
+        files = {"first": first.file, "second": second.file}
+        raise InputError(remark("survey.no_common_point", **files, here=here, there=there))
     rows = {name: row for row, name in enumerate(first.ids)}
     one = first.places[[rows[name] for name in ids]]
     other = second.places[[place[name] for name in ids]]
@@ -129,9 +128,7 @@ def _of_table(path: Path, decimal: Decimal | None) -> PickList:
     table = read_table(path, _COLUMNS, name="Points", decimal=decimal, errors=errors)
     keys = ("col", "row") if {"col", "row"} <= table.present else ("x", "y")
     if not set(keys) <= table.present or "id" not in table.present:
-        raise InputError(
-            f"{path}: the picks of one photo need the headings id and x, y or col, row."
-        )
+        raise InputError(remark("survey.no_pick_columns", of=path))
     errors += table.too_large(keys, LARGEST)
     names = [name or "" for name in table.texts("id")]
     places = np.stack([table.numbers(key) for key in keys], axis=-1)
@@ -207,8 +204,7 @@ def _named(
     """Return each point with the nearest text, nearest couples first, each text once."""
     if len(texts) < len(points):
         raise InputError(
-            f"{path}: {len(points)} points but {len(texts)} texts; write the name beside each "
-            "point."
+            remark("survey.texts_beside", of=path, points=len(points), texts=len(texts))
         )
     size = max(np.ptp(np.array(points), axis=0).max(), 1e-9)
     couples = sorted(

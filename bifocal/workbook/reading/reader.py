@@ -319,18 +319,11 @@ def _require_coordinates(table: Table, book: object, path: Path | str) -> None:
     ours = isinstance(book, SheetFile) and bare(table.sheet) != "points"
     if ours and not any(bare(title) == "points" for title in book.titles):  # type: ignore[attr-defined]
         shown = ", ".join(f'"{title}"' for title in book.titles)  # type: ignore[attr-defined]
-        raise InputError(
-            f'{Path(path).name}: there is no sheet "Points" and no other table of points measured '
-            f"on both photos (looked in {shown}). It needs the headings x1 y1 x2 y2, or s1 s2 "
-            "theta, or col1 row1 col2 row2; say which columns they are with --columns."
-        )
+        raise InputError(remark("survey.no_points_sheet", of=Path(path).name, sheets=shown))
     groups = [keys for keys in kinds if have & set(keys) and not have.issuperset(keys)]
     wanted = groups[0] if groups else XY
     missing = ", ".join(key for key in wanted if key not in have)
-    raise InputError(
-        f"{where}: there is no column {missing}. Points need x1 y1 x2 y2 [mm or px], or s1 s2 [mm] "
-        'and theta, or col1 row1 col2 row2 [px]; say which columns they are: --columns "id=A,...".'
-    )
+    raise InputError(remark("survey.no_column", of=where, missing=missing))
 
 
 def _require_photos(table: Table, photos: int) -> None:
@@ -350,9 +343,7 @@ def _require_photos(table: Table, photos: int) -> None:
     if broken or len(whole) < 2:
         lacking = next(key for key in broken or halves if key not in table.present)
         raise InputError(
-            f"{where_of(table)}: there is no column {lacking}. Points of a set of {photos} photos "
-            f"need col1 row1 ... col{photos} row{photos} [px], of two photos or more, blank where "
-            'not seen; say which columns they are: --columns "id=A,col1=B,...".'
+            remark("survey.no_column_of_set", of=where_of(table), missing=lacking, photos=photos)
         )
 
 
@@ -401,7 +392,7 @@ def _unit_of_xy(table: Table, errors: list[CellError]) -> tuple[str, float]:
         shown = ", ".join(f"{name} [{symbol}]" for name, symbol in said.items())
         errors.append(
             CellError(
-                f"the coordinates have different units: {shown}. Give all in mm or all in px.",
+                remark("survey.units_differ", units=shown),
                 file=table.file,
                 sheet=table.sheet,
                 column=key,
@@ -412,10 +403,7 @@ def _unit_of_xy(table: Table, errors: list[CellError]) -> tuple[str, float]:
     bare_keys = [k for k in XY if k not in said and not np.isnan(table.numbers(k)).all()]
     for key in sorted(table.typed_units.intersection(said)) if bare_keys else ():
         row = int(np.flatnonzero(~np.isnan(table.numbers(key)))[0])
-        message = (
-            f"is in {symbol} by the unit typed into the cell, while {', '.join(bare_keys)} says no "
-            "unit. Write the unit of the coordinates into their headings, the cells without it."
-        )
+        message = remark("survey.unit_of_one", unit=symbol, others=", ".join(bare_keys))
         errors.append(table.error(row, key, message))
     if symbol == "px":
         return "px", 1.0

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations, pixel_keys
 from photocore.errors import CellError
 from photocore.tables import Table
@@ -47,11 +48,7 @@ def check_rows(
             errors.append(table.error(row, lacking[0], _incomplete(ids[row], keys, lacking)))
     for i, key in enumerate(("s1", "s2")):
         for row in np.flatnonzero(used & (polar[:, i] <= 0)).tolist():
-            message = (
-                f"{polar[row, i]:g} mm at point {ids[row]}: a radial distance must be above zero; "
-                "at the nadir itself there is no relief to measure. Set use = 0 or measure it "
-                "again."
-            )
+            message = remark("survey.radius_of_zero", size=polar[row, i], name=ids[row])
             errors.append(table.error(row, key, message))
 
 
@@ -69,10 +66,7 @@ def _check_photos(table: Table, points: PointObservations, errors: list[CellErro
         elif seen.sum() < 2:
             key = pixel_keys(int(np.flatnonzero(~seen)[0]) + 1)[0]
             where = f"only on image {int(np.flatnonzero(seen)[0]) + 1}" if seen.any() else "on none"
-            message = (
-                f"point {points.ids[row]} is measured {where}; measure it on two photos or more, "
-                "or set use = 0."
-            )
+            message = remark("survey.seen_once", name=points.ids[row], seen=where)
             errors.append(table.error(row, key, message))
 
 
@@ -81,8 +75,5 @@ def _incomplete(name: str, keys: Sequence[str], lacking: Sequence[str]) -> str:
     here = {key[-1] for key in keys if key not in lacking}
     if len(images) == 1 and images.isdisjoint(here):
         other = "2" if images == {"1"} else "1"
-        return (
-            f"point {name} is measured only on image {other}; measure it on image "
-            f"{images.pop()} too, or set use = 0."
-        )
+        return remark("survey.one_image", name=name, image=other, other=images.pop())
     return f"point {name} lacks {', '.join(lacking)}; complete it, or set use = 0."

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.survey.other_photos import MOST_PHOTOS, OtherPhoto
-from bifocal.survey.setup import Measuring, SurveySetup, Taking
+from bifocal.remarks import remark
+from bifocal.survey.other_photos import MOST_PHOTOS
+from bifocal.survey.setup import Measuring, OtherPhoto, SurveySetup, Taking
 from bifocal.survey.survey_lens import SurveyLens
 from bifocal.survey.survey_media import (
     FEWEST,
@@ -226,10 +227,7 @@ def _bad_thicknesses(media: SurveyMedia) -> dict[str, str]:
         elif n not in stated and thick:
             complaints[name] = f"found {thick:g} m, but index_{n} is blank: type it, or clear this."
         elif not inside and thick:
-            complaints[name] = (
-                f"found {thick:g} m, but medium {n} is the last one with an index, which has no "
-                f"thickness: type index_{n + 1}, or clear this cell."
-            )
+            complaints[name] = remark("survey.last_medium", thickness=thick, medium=n, next=n + 1)
     return complaints
 
 
@@ -298,13 +296,8 @@ def _distances(
     typed = None if is_formula else number["d_1"]
     total = near + step if near is not None and step is not None else None
     if typed is not None and total is not None and abs(typed - total) > _AGREE:
-        errors.append(
-            values.error(
-                "d_1",
-                f"found {typed:g} m, but d_2 + delta_d = {near:g} + {step:g} = {total:g} m. "
-                "Correct one of the three, or clear delta_d.",
-            )
-        )
+        about = {"far": typed, "near": near, "step": step, "total": total}
+        errors.append(values.error("d_1", remark("survey.distances_differ", **about)))
     far = typed if typed is not None else total
     if near is None and far is not None and step is not None and far > step:
         near = far - step

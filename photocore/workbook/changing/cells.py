@@ -12,6 +12,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from photocore.errors import InputError
+from photocore.remarks import remark
 from photocore.workbook.reading.grid import column_letters
 
 #: Most characters of a cell; Excel cuts or repairs longer ones.
@@ -82,10 +83,8 @@ def type_and_content(value: CellValue, prefix: str, *, formula: bool) -> tuple[s
         return "", ""
     if isinstance(value, str):
         if len(value) > LONGEST_TEXT:
-            raise InputError(
-                f"the text {value[:20]!r}... has {len(value)} characters, more than the "
-                f"{LONGEST_TEXT} a cell can hold."
-            )
+            about = {"start": repr(value[:20]), "count": len(value), "limit": LONGEST_TEXT}
+            raise InputError(remark("book.text_too_long", **about))
         if not formula:
             t, inline = f"{prefix}t", f"{prefix}is"
             text = f'<{t} xml:space="preserve">{escape(value)}</{t}>'

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections import deque
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
+from io import BytesIO
 from operator import itemgetter
 
 from photocore.workbook.changing.cells import CellValue, NewCell, NewRows
@@ -109,20 +111,20 @@ class Spliced:
 
         The changes, which may be as many bytes as the sheet, are let go.
         """
-        edits = [*self.edits]
+        edits = deque(self.edits)
         self.edits.clear()  # not only let go: what made them holds the same list
         if strip and self.strips:
-            edits = sorted([*edits, *self.strips], key=itemgetter(0, 1))
+            edits = deque(sorted([*edits, *self.strips], key=itemgetter(0, 1)))
         if not edits:
             return self.data
-        pieces: list[bytes | memoryview] = []
-        position = 0
-        view = memoryview(self.data)
-        for start, end, replacement in edits:
-            pieces += [view[position:start], replacement]
+        whole, view, position = BytesIO(), memoryview(self.data), 0
+        while edits:  # none is held once it is written
+            start, end, replacement = edits.popleft()
+            whole.write(view[position:start])
+            whole.write(replacement)
             position = end
-        pieces.append(view[position:])
-        return b"".join(pieces)
+        whole.write(view[position:])
+        return whole.getvalue()
 
 
 def column_edits(

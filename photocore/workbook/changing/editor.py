@@ -6,6 +6,7 @@ import math
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache, partial
 from itertools import count as counted
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable, kept_copy
+from photocore.remarks import remark
 from photocore.workbook.changing import formulas
 from photocore.workbook.changing.cells import (
     CellValue,
@@ -86,15 +88,10 @@ class WorkbookEditor:
         self.path = Path(self.path)
         if self.path.suffix.lower() not in (".xlsx", ".xlsm"):
             check_header(self.path)
-            raise InputError(
-                f"{self.path}: only .xlsx and .xlsm workbooks can be changed in place."
-            )
+            raise InputError(remark("book.in_place", of=self.path))
         with open_package(self.path) as package:
             if any(name.startswith("_xmlsignatures/") for name in package.namelist()):
-                raise InputError(
-                    f"{self.path}: is digitally signed; a change would break the signature. Remove "
-                    "the signature first, or write to another kind of file."
-                )
+                raise InputError(remark("book.signed", of=self.path))
             self.book = read_directory(self.path, package)
             self.tables = [t for s in self.book.sheets for t in read_tables(self.path, package, s)]
 
@@ -121,10 +118,8 @@ class WorkbookEditor:
     def set_value(self, title: str, row: int, column: int, value: CellValue) -> None:
         """Type a value into a cell; its format stays. None clears the cell."""
         if isinstance(value, float) and not math.isfinite(value):
-            raise InputError(
-                f"{self.path.name} › {title}!{cell_name(row, column)}: {value} is not a number "
-                "that can be typed into a cell."
-            )
+            where = f"{self.path.name} › {title}!{cell_name(row, column)}"
+            raise InputError(remark("book.no_number", of=where, value=value))
         self._changes(title).inputs.setdefault(row, {})[column] = value
 
     def set_result(self, title: str, row: int, column: int, value: CellValue) -> None:
@@ -133,26 +128,6 @@ class WorkbookEditor:
         NaN is stored as the error value #N/A, None as an empty text.
         """
         self._changes(title).cached.setdefault(row, {})[column] = "" if value is None else value
-
-    def set_results(
-        self, title: str, first_row: int, columns: Mapping[int, ArrayLike | Sequence[CellValue]]
-    ) -> None:
-        """Store the results of whole columns of formulas.
-
-        Parameters
-        ----------
-        title : str
-            Sheet.
-        first_row : int
-            Row of the first result.
-        columns : mapping
-            Column number to results, one per row. Texts, booleans and numbers may be mixed in a
-            list.
-        """
-        cached = self._changes(title).cached
-        for column, values in columns.items():
-            for row, value in enumerate(_plain(values), start=first_row):
-                cached.setdefault(row, {})[column] = value
 
     def put(
         self,
@@ -200,7 +175,7 @@ class WorkbookEditor:
             self._changes(title).added.append(NewRows(first, size, columns, "filled"))
 
     def extend(self, table: str, bottom: int) -> None:
-        """Let a named table reach down to a row, over what stands there; as `append_rows`."""
+        """Let a named table reach down to a row, over what stands there; as `append_columns`."""
         area, last = self._growing(table)
         if bottom > last:
             self.grown[area.name] = (area, bottom)
@@ -247,46 +222,6 @@ class WorkbookEditor:
         names = (f"{title}{f' {number}' if number > 1 else ''}" for number in counted(1))
         return next(name for name in names if name.casefold() not in taken)
 
-    def append_rows(
-        self,
-        table: str,
-        rows: Sequence[Mapping[str, CellValue]],
-        results: Sequence[Mapping[str, CellValue]] = (),
-    ) -> list[int]:
-        """Add rows to a named table; formulas and formats are those of its last row.
-
-        The table, its filter, the conditional formats and validations of its last row, and charts
-        and names that reach to its last row grow with it.
-
-        Parameters
-        ----------
-        table : str
-            Name of the table.
-        rows : sequence of mappings
-            Heading to typed value; headings without value stay empty or get their formula.
-        results : sequence of mappings
-            Heading to cached result of the row's formulas.
-
-        Returns
-        -------
-        list of int
-            The new rows' numbers.
-
-        Raises
-        ------
-        InputError
-            If there is no such table or heading, the table ends in a row of totals, or the cells
-            below it are not empty.
-        """
-        headings = [name for row in rows for name in row]
-        cached = [name for row in results for name in row]
-        return self.append_columns(
-            table,
-            {name: [row.get(name) for row in rows] for name in dict.fromkeys(headings)},
-            {name: [row.get(name) for row in results] for name in dict.fromkeys(cached)},
-            count=len(rows),
-        )
-
     def append_columns(
         self,
         table: str,
@@ -295,7 +230,10 @@ class WorkbookEditor:
         *,
         count: int | None = None,
     ) -> list[int]:
-        """Add many rows to a named table, given by columns; as `append_rows` otherwise.
+        """Add rows to a named table, given by columns; formulas and formats are of its last row.
+
+        The table, its filter, the conditional formats and validations of its last row, and charts
+        and names that reach to its last row grow with it.
 
         Parameters
         ----------
@@ -310,6 +248,12 @@ class WorkbookEditor:
         -------
         list of int
             The new rows' numbers.
+
+        Raises
+        ------
+        InputError
+            If there is no such table or heading, the table ends in a row of totals, or the cells
+            below it are not empty.
         """
         area, bottom = self._growing(table)
         where = f"{self.path.name} › {area.sheet}"
@@ -347,8 +291,7 @@ class WorkbookEditor:
             raise InputError(f'{self.path.name}: has no table "{table}"; it has {names}.')
         if area.totals_rows:
             raise InputError(
-                f"{self.path.name} › {area.sheet}: the table {area.name} ends in a row of totals; "
-                "switch it off in the spreadsheet program (Table design) before rows are added."
+                remark("book.totals_row", of=f"{self.path.name} › {area.sheet}", table=area.name)
             )
         return self.grown.get(area.name, (area, area.area[2]))
 
@@ -379,22 +322,17 @@ class WorkbookEditor:
         in_place = target.exists() and target.samefile(self.path)
         if target.suffix.lower() != self.path.suffix.lower():
             raise InputError(
-                f"{target}: must end in {self.path.suffix} like {self.path.name}, so that macros "
-                "stay what they are."
+                remark("book.other_ending", of=target, ending=self.path.suffix, name=self.path.name)
             )
-        if not in_place:
+        if in_place:
+            check_writable(target, overwrite=True)
+        else:
             check_new_workbook(target, overwrite=overwrite)
-            parts = self.changed_parts()
-            with new_workbook(target, overwrite=overwrite) as temporary:
-                rewrite_package(self.path, temporary, parts)
-                refuse_lost(temporary, self.path)
-            return None
-        check_writable(target, overwrite=True)
-        parts = self.changed_parts()
-        with atomic_path(target, overwrite=True) as temporary:
+        parts, place = self.changed_parts(), atomic_path if in_place else new_workbook
+        with place(target, overwrite=in_place or overwrite) as temporary:
             rewrite_package(self.path, temporary, parts)
             refuse_lost(temporary, self.path)
-            return kept_copy(self.path)
+            return kept_copy(self.path) if in_place else None
 
     def changed_parts(self) -> dict[str, bytes | None]:
         """Return the parts of the package that change or are new, with their new content."""
@@ -440,7 +378,7 @@ class WorkbookEditor:
             for content, titles in self.grafts:
                 graft.add_sheets(content, titles)
             for name, reference in self.names.items():
-                graft.redefine(name, reference)
+                graft.define(name, reference, anew=True)
         if self._styles is not None and self._styles.added:
             parts[part_of_kind(package, self.book, "styles")] = self._styles.written()
 
@@ -449,23 +387,13 @@ class WorkbookEditor:
             with open_package(self.path) as package:
                 part = part_of_kind(package, self.book, "styles")
                 if not part:
-                    raise InputError(
-                        f"{self.path}: has no cell formats. Open it in the spreadsheet program, "
-                        "save it there, and try again."
-                    )
+                    raise InputError(remark("book.no_formats", of=self.path))
                 self._styles = StyleSheet(read_part(self.path, package, part))
         return self._styles
 
     def _splice(self, package: zipfile.ZipFile) -> dict[str, Spliced]:
         """Return the changed sheets."""
-        strings: list[str] | None = None
-
-        def shared() -> list[str]:
-            nonlocal strings
-            if strings is None:
-                strings = read_shared_strings(self.path, package, self.book)
-            return strings
-
+        shared = cache(partial(read_shared_strings, self.path, package, self.book))
         spliced = {}
         for sheet in self.book.sheets:
             changes = self.changes.get(sheet.title)
@@ -492,10 +420,8 @@ class WorkbookEditor:
         for row in rows:
             for column in cells.get(row, {}):
                 if left <= column <= right:
-                    raise InputError(
-                        f"{self.path.name} › {area.sheet}!{cell_name(row, column)}: is not empty, "
-                        f"so the table {area.name} cannot grow. Move what stands below the table."
-                    )
+                    where = f"{self.path.name} › {area.sheet}!{cell_name(row, column)}"
+                    raise InputError(remark("book.table_blocked", of=where, table=area.name))
 
 
 def _plain(values: ArrayLike | Sequence[CellValue]) -> Sequence[CellValue]:

@@ -84,11 +84,11 @@ class Graft:
             if title in titles:
                 own = plain_title(self.book.names.get(name, "").rpartition("!")[0])
                 # Where another sheet has the title by now, the name led to what was ours there.
-                define = self.redefine if own == title != titles[title] else self.define
-                define(name, f"{quoted_title(titles[title])}!{place}")
+                lost = own == title != titles[title]
+                self.define(name, f"{quoted_title(titles[title])}!{place}", anew=lost)
 
-    def define(self, name: str, reference: str) -> None:
-        """Define a name, unless one that leads anywhere is there already."""
+    def define(self, name: str, reference: str, *, anew: bool = False) -> None:
+        """Define a name; one that leads anywhere already stays, unless it is defined anew."""
         data = self._book()
         pattern = re.compile(
             rb"<(?:\w+:)?definedName\s(?![^>]*localSheetId)[^>]*\bname=[\"']%s[\"'][^>]*>([^<]*)</"
@@ -98,23 +98,9 @@ class Graft:
         stands = pattern.search(data)
         if stands is None:
             self._add_name(f" name={quoted(name)}", reference)
-        elif b"#REF!" in stands[1]:
+        elif anew or b"#REF!" in stands[1]:
             start, end = stands.span(1)
             self._put(self.book.part, data[:start] + escaped(reference).encode() + data[end:])
-
-    def redefine(self, name: str, reference: str) -> None:
-        """Define a name anew, wherever it led."""
-        data = self._book()
-        pattern = re.compile(
-            rb"(<(?:\w+:)?definedName\s(?![^>]*localSheetId)[^>]*\bname=[\"']%s[\"'][^>]*>)[^<]*(</)"
-            % re.escape(name.encode()),
-            re.IGNORECASE,
-        )
-        new, found = pattern.subn(lambda m: m[1] + escaped(reference).encode() + m[2], data)
-        if found:
-            self._put(self.book.part, new)
-        else:
-            self._add_name(f" name={quoted(name)}", reference)
 
     def _local_names(
         self, data: bytes, other: Workbook, sheet: SheetPart, index: int, title: str

@@ -10,6 +10,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from photocore.errors import InputError
+from photocore.remarks import remark
 from photocore.workbook.changing.cells import CellValue, NewCell, cell_xml, type_and_content
 from photocore.workbook.changing.changes import SheetChanges, Spliced, column_edits
 from photocore.workbook.changing.formfill import FormFiller
@@ -27,6 +28,8 @@ from photocore.workbook.reading.xlsx import unescape
 from photocore.workbook.reading.xmltext import quoted, unescaped
 
 _TAG = re.compile(rb"""<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*(/?)>""")
+#: New rows are kept in pieces of so many bytes, each of which is let go by itself.
+_PIECE = 2**25
 _INLINE = re.compile(r"\s*<(?:\w+:)?t(?:\s[^>]*)?>([^<]*)</(?:\w+:)?t>\s*")
 
 
@@ -59,10 +62,7 @@ def splice_sheet(
     if head.startswith((b"\xff\xfe", b"\xfe\xff")) or re.search(
         rb"encoding\s*=\s*[\"'](?!utf-?8|us-ascii)", head, re.IGNORECASE
     ):
-        raise InputError(
-            f"{path}: the part {part} is not stored as UTF-8. Open the file in the spreadsheet "
-            "program, save it there, and try again."
-        )
+        raise InputError(remark("book.not_utf8", of=path, part=part))
     return _Splicer(path, part, data, changes, strings).run()
 
 
@@ -110,7 +110,7 @@ class _Splicer:
                     self.parser.Parse(self.data, True)
             except expat.ExpatError as error:
                 raise InputError(
-                    f"{self.path}: damaged, the part {self.part} is not valid XML ({error})."
+                    remark("book.invalid_xml", of=self.path, part=self.part, error=error)
                 ) from None
         if self.changes.columns:
             head = self.data[: self.data_start]
@@ -252,10 +252,7 @@ class _Splicer:
     def refuse_order(self, cell: str) -> None:
         """Refuse to change a sheet where a new cell could not be put in its place."""
         if self.changes:
-            raise InputError(
-                f"{self.path}: the rows and cells of {self.part} are not in their order (at "
-                f"{cell}). Open the file in the spreadsheet program and save it again."
-            )
+            raise InputError(remark("book.not_in_order", of=self.path, part=self.part, cell=cell))
 
     def end_row(self, name: str) -> None:
         """Insert the new cells behind the last one of this row."""
@@ -413,10 +410,14 @@ class _Splicer:
         tag = f"{self.prefix}row"
         pieces = zip(rows, lines, strict=True)
         made = bytearray()  # rows of a large sheet are never held one by one
+        start, end, opening, closing = place
         for number, xml in pieces:
             if xml:
+                if len(made) > _PIECE:
+                    self.insert(made, (start, end, opening, ""))
+                    made, opening = bytearray(), ""
                 made += f'<{tag} r="{number}">{xml}</{tag}>'.encode()
-        self.insert(made, place)
+        self.insert(made, (start, end, opening, closing))
 
     def row_xml(self, row: int) -> str:
         """Return the XML of the cells of a new row."""

@@ -27,6 +27,7 @@ import numpy as np
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable, free_path
 from photocore.provenance import provenance
+from photocore.remarks import remark
 from photocore.workbook.changing.cells import (
     CellValue,
     NewColumn,
@@ -123,7 +124,7 @@ def finish_book(
     drawings : mapping, optional
         Sheet name to the drawing on it, of a sheet that has neither tables nor charts.
     """
-    parts = _finished_parts(source, target, results=results, blocks=blocks)
+    parts = finished_parts(source, results=results, blocks=blocks)
     _add_drawings(source, target, parts, drawings or {})
     rewrite_package(source, target, parts, date=PART_TIME)
     refuse_lost(target)
@@ -136,25 +137,13 @@ def finished_parts(
     blocks: Mapping[str, RowBlock] | None = None,
 ) -> dict[str, bytes]:
     """Return all parts of a finished package, to take sheets from; as `finish_book` otherwise."""
-    made = _finished_parts(source, Path("new sheets"), results=results, blocks=blocks)
-    with zipfile.ZipFile(source) as package:
-        return {name: made.get(name) or package.read(name) for name in package.namelist()}
-
-
-def _finished_parts(
-    source: BinaryIO,
-    target: Path,
-    *,
-    results: Mapping[str, Mapping[str, CellValue]],
-    blocks: Mapping[str, RowBlock] | None,
-) -> dict[str, bytes]:
-    """Return the parts that change."""
+    named = Path("new sheets")
     with zipfile.ZipFile(source) as package:
         parts = {}
-        for sheet in read_directory(target, package).sheets:
+        for sheet in read_directory(named, package).sheets:
             changes, block = SheetChanges(restates=True), (blocks or {}).get(sheet.title)
             if block is not None:
-                prototype = model_cells(target, package, sheet, block.row)
+                prototype = model_cells(named, package, sheet, block.row)
                 if not prototype:
                     raise InputError(f"row {block.row}: no prototype row to repeat.")
                 changes = block.changes(prototype)
@@ -163,10 +152,10 @@ def _finished_parts(
                 if block is None or row != block.row:
                     # openpyxl writes 16 digits; doubles need up to 17.
                     changes.cached.setdefault(row, {})[column] = _result(value)
-            data = read_part(target, package, sheet.part)
-            parts[sheet.part] = splice_sheet(target, sheet.part, data, changes).joined(strip=False)
-        parts[_CORE] = _stated_properties(read_part(target, package, _CORE))
-    return parts
+            data = read_part(named, package, sheet.part)
+            parts[sheet.part] = splice_sheet(named, sheet.part, data, changes).joined(strip=False)
+        parts[_CORE] = _stated_properties(read_part(named, package, _CORE))
+        return {name: parts.pop(name, b"") or package.read(name) for name in package.namelist()}
 
 
 def _add_drawings(
@@ -175,7 +164,7 @@ def _add_drawings(
     """Add drawings to sheets that openpyxl cannot draw on."""
     with zipfile.ZipFile(source) as package:
         sheets = {sheet.title: sheet.part for sheet in read_directory(target, package).sheets}
-        types = read_part(target, package, _TYPES)
+    types = parts[_TYPES]
     for title, drawing in drawings.items():
         folder, _, file = sheets[title].rpartition("/")
         name = f"xl/drawings/sketch-{file}"
@@ -187,8 +176,7 @@ def _add_drawings(
         parts[f"{folder}/_rels/{file}.rels"] = whole.encode()
         kind = f'<Override PartName="/{name}" ContentType="{_DRAWING}"/></Types>'
         types = types.replace(b"</Types>", kind.encode())
-    if drawings:
-        parts[_TYPES] = types
+    parts[_TYPES] = types
 
 
 def _stated_properties(core: bytes) -> bytes:
@@ -300,9 +288,7 @@ def check_new_workbook(
     if is_book and not in_place and not is_untouched(path):
         stem = path.stem if other and path.stem.endswith(other) else f"{path.stem}{other}"
         raise InputError(
-            f"{path}: was not written by this program, or was changed since; a new workbook in its "
-            "place would lose what it holds. Write to another file, e.g. "
-            f"{free_path(path.parent, stem, path.suffix).name}, or move this one away."
+            remark("book.not_ours", of=path, name=free_path(path.parent, stem, path.suffix).name)
         )
     return check_writable(path, overwrite=overwrite)
 

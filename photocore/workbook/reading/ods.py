@@ -10,6 +10,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from photocore.errors import InputError
+from photocore.remarks import remark
 from photocore.workbook.reading.grid import (
     CellDate,
     CellFault,
@@ -143,9 +144,7 @@ class _OdsReader:
                 continue
             self.filled += repeat * row_repeat
             if last > _MOST_COLUMNS or self.filled > _MOST_CELLS:
-                raise InputError(
-                    f"{self.path}: refused, it repeats cells beyond the size of any real sheet."
-                )
+                raise InputError(remark("book.repeats", of=self.path))
             cells.update(dict.fromkeys(range(first, last + 1), value))
         return cells
 

@@ -20,6 +20,7 @@ from xml.etree.ElementTree import Element
 from xml.parsers import expat
 
 from photocore.errors import InputError
+from photocore.remarks import remark
 from photocore.textfile import readable
 
 #: Larger only in bombs, and in small parts of honest workbooks: rows of styled empty cells.
@@ -70,10 +71,7 @@ def open_package(path: Path) -> Iterator[zipfile.ZipFile]:
     try:
         package = zipfile.ZipFile(path)
     except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
-        raise InputError(
-            f"{path}: is not a workbook or is damaged. Open it in the spreadsheet program and "
-            "save it again as .xlsx."
-        ) from None
+        raise InputError(remark("book.damaged", of=path)) from None
     with package:
         check_members(path, package.infolist())
         yield package
@@ -92,15 +90,9 @@ def check_header(path: Path) -> None:
     if not start:
         raise InputError(f"{path}: the file is empty (0 bytes); save or copy it again.")
     if start == _OLE:
-        raise InputError(
-            f"{path}: is protected by a password or of the old .xls format. Save it as .xlsx "
-            "without a password."
-        )
+        raise InputError(remark("book.protected", of=path))
     if not start.startswith(b"PK"):
-        raise InputError(
-            f"{path}: is not a workbook (its content is of another kind). Save it as .xlsx, or "
-            "give text tables the ending .csv."
-        )
+        raise InputError(remark("book.no_workbook", of=path))
 
 
 def check_members(path: Path, members: list[zipfile.ZipInfo]) -> None:
@@ -118,16 +110,12 @@ def check_members(path: Path, members: list[zipfile.ZipInfo]) -> None:
     total = 0
     for member in members:
         if member.flag_bits & 1:
-            raise InputError(
-                f"{path}: is protected by a password. Save it as .xlsx without a password."
-            )
+            raise InputError(remark("book.password", of=path))
         total += member.file_size
         ratio = member.file_size / max(member.compress_size, 1)
         if member.file_size > LARGEST_PART or total > LARGEST_TOTAL:
-            raise InputError(
-                f"{path}: refused, it unpacks to more than {LARGEST_TOTAL // 2**20} MiB (or "
-                f"{LARGEST_PART // 2**20} MiB in one part). For that many rows use a .csv file."
-            )
+            limits = {"total": LARGEST_TOTAL // 2**20, "part": LARGEST_PART // 2**20}
+            raise InputError(remark("book.too_large", of=path, **limits))
         largest = LARGEST_RATIO if member.file_size > SMALL else LARGEST_RATIO_OF_SMALL
         if member.file_size > _RATIO_MATTERS_FROM and ratio > largest:
             raise InputError(
@@ -215,10 +203,7 @@ def _refuse_damage(
         found = _faults(path, new, changed, made=changed)
         fault = next((f for f in found if f not in {*_faults(path, old, changed)}), "")
     if fault:
-        raise InputError(
-            f"{path}: nothing was written, since no program would open the changed workbook "
-            f"({fault}). Open it in the spreadsheet program, save it there, and try again."
-        )
+        raise InputError(remark("book.would_not_open", of=path, fault=fault))
 
 
 def _faults(
@@ -338,10 +323,7 @@ def _fed(path: Path, package: zipfile.ZipFile, name: str, parser: Any) -> Iterat
             parser.close()
             yield
     except (expat.ExpatError, ElementTree.ParseError, LookupError) as error:
-        raise InputError(
-            f"{path}: damaged, the part {name} is not valid XML ({error}). Open it in the "
-            "spreadsheet program and save it again."
-        ) from None
+        raise InputError(remark("book.not_xml", of=path, part=name, error=error)) from None
 
 
 def xml_root(path: Path, package: zipfile.ZipFile, name: str) -> Element:
@@ -361,10 +343,7 @@ def new_parser(
     parser = expat.ParserCreate()
 
     def refuse(*_: object) -> None:
-        raise InputError(
-            f"{path}: refused, the part {name} declares a document type (DOCTYPE), which "
-            "ordinary workbooks never do."
-        )
+        raise InputError(remark("book.document_type", of=path, part=name))
 
     parser.StartDoctypeDeclHandler = refuse
     parser.buffer_text = True
@@ -413,7 +392,4 @@ def _unpacking(path: Path, name: str) -> Iterator[None]:
     except KeyError:
         raise InputError(f"{path}: is not a workbook, the part {name} is missing.") from None
     except UNPACKING as error:
-        raise InputError(
-            f"{path}: damaged, the part {name} cannot be unpacked. Open it in the spreadsheet "
-            "program and save it again."
-        ) from error
+        raise InputError(remark("book.not_unpacked", of=path, part=name)) from error

@@ -312,12 +312,7 @@ class _SheetReader:
         """Return the sheet's cells; empty but formatted cells are left out."""
         grid = CellGrid(title)
         row = 0
-        with understood(
-            lambda: (
-                f"{self.path} › {title}: damaged near row {row}, a cell cannot be understood. "
-                "Open the file in the spreadsheet program and save it again."
-            )
-        ):
+        with understood(lambda: remark("book.damaged_row", of=f"{self.path} › {title}", row=row)):
             try:
                 with uncollected():
                     return self.read_plain(package, title, part)

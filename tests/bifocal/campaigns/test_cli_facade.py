@@ -32,13 +32,18 @@ def facade(out: Path, *options: object) -> dict:
 @pytest.mark.acceptance
 def test_everything_is_delivered_and_a_second_run_makes_only_what_changed(tmp_path):
     control, check = write_tables(tmp_path)
+    for table in (control, check):
+        head, rest = table.read_text().split("\n", 1)
+        table.write_text(f"{head.replace('id', 'mark', 1)}\n{rest}")
     out = tmp_path / "wall"
-    done = facade(out, "--control", control, "--check", check, "--scale", "1:50")
+    said = ("--control", control, "--check", check, "--scale", "1:50", "--columns", "id=mark")
+    done = facade(out, *said, "--cloud", "ply")
     assert done["done"] == ["align", "relief", "points", "drawing", "view", "report"]
     for name in (
         "align/wall.pair.json", "relief/wall_relief.tif", "points/wall_points.xlsx",
         "drawing/wall.tif", "drawing/wall.pdf", "drawing/wall.dxf", "drawing/wall_relief.pdf",
         "view/wall_view.html", "report/wall_report.html", "report/wall_report.pdf",
+        "relief/wall_relief.ply",
     ):  # fmt: skip
         assert (out / name).stat().st_size > 1000, name
     page = (out / "report/wall_report.html").read_text("utf-8")
@@ -52,10 +57,10 @@ def test_everything_is_delivered_and_a_second_run_makes_only_what_changed(tmp_pa
     layers = {entity.dxf.layer for entity in drawn.query("POINT")}
     assert {"BIFOCAL_POINTS", "BIFOCAL_CONTROL", "BIFOCAL_CHECK"} <= layers
     # Nothing changed; then one check point: what holds it, not orientation and relief.
-    again = facade(out, "--control", control, "--check", check, "--scale", "1:50")
+    again = facade(out, *said, "--cloud", "ply")
     assert (again["done"], len(again["kept"])) == ([], 6)
     check.write_text(check.read_text().replace("T30", "T99"))
-    again = facade(out, "--control", control, "--check", check, "--scale", "1:50")
+    again = facade(out, *said, "--cloud", "ply")
     assert again["done"] == ["points", "drawing", "view", "report"]
     report = CliRunner().invoke(main, ["report", str(out), "--out", str(tmp_path / "r.html")])
     assert report.exit_code == 0, report.stderr

@@ -145,13 +145,18 @@ def test_what_a_step_may_be_told_is_a_key_of_the_file_and_an_option_of_facade(tm
     own = {parameter.name for parameter in main.get_command(None, "facade").params}
     assert {*OF_PAIR} - {"sigma_tie"} <= own  # that is of all pairs together
     said = 'mask = false\nfeather = 0\nmark = "p.csv"\nrelief_gsd = "5mm"\npaper = "A3"\n'
+    said += 'cloud = "laz"\ncontrol = "c.csv"\ncolumns = "id=N"\n'
     (tmp_path / "s.toml").write_text(f'{said}[[pair]]\nfar = "a.jpg"\nnear = "b.jpg"\n')
     (job,) = read_survey_file(tmp_path / "s.toml")
     steps = {step.name: step for step in steps_of(job)}
-    assert steps["relief"].options == {"relief_gsd": 0.005}
+    assert steps["relief"].options == {"relief_gsd": 0.005, "cloud": "laz"}
+    for name in ("align", "points", "drawing", "report"):
+        assert steps[name].options["columns"] == "id=N"
     drawn = steps["drawing"]
     assert drawn.files["mark"] == tmp_path / "p.csv"
-    task = OrthoTask.from_given({k: v for k, v in drawn.options.items() if k != "paper"})
+    task = OrthoTask.from_given(
+        {k: v for k, v in drawn.options.items() if k not in ("paper", "columns")}
+    )
     assert (task.options.mask_hidden, task.options.feather) == (False, 0.0)
     given = {"mask": False, "fill": False, "port": 0.0, "sections": (), "paper": None}
     assert facade_job(FAR, NEAR, tmp_path / "o", given=given).options == {"mask": False, "port": 0}

@@ -15,7 +15,7 @@ from bifocal.campaigns import workflow
 from bifocal.campaigns.pair_job import PairOutcome
 from bifocal.campaigns.pair_steps import steps_of
 from bifocal.campaigns.step_store import Step, run_step, step_key
-from bifocal.campaigns.survey_file import read_survey_file
+from bifocal.campaigns.survey_file import mosaic_wanted, read_survey_file
 from bifocal.campaigns.whole_wall import joint_step, run_whole
 from bifocal.campaigns.workflow import plan_survey
 from photocore.cli import no_progress
@@ -64,7 +64,17 @@ def test_what_is_wrong_above_the_pairs_is_said(tmp_path):
     path = survey(tmp_path, 'joint = "yes"')
     with pytest.raises(InputError, match="joint = 'yes': expected true or false"):
         read_survey_file(path)
-    path.write_text(path.read_text().replace('name = "b"', 'name = "mosaic"').replace('"yes"', "1"))
+    text = path.read_text()
+    path.write_text(text.replace('"yes"', "false\nmosaic = {gsd = -1, blend = 2, colour = 1}"))
+    for said in ("gsd = -1: expected a", "blend = 2: expected true", "colour = 1: .* no such key"):
+        with pytest.raises(InputError, match=f"above the pairs: mosaic, {said}"):
+            read_survey_file(path)
+    path.write_text(text.replace('"yes"', 'false\nmosaic = {gsd = "1cm", gain = false}'))
+    assert len(read_survey_file(path)) == 3
+    assert mosaic_wanted(path) == {"gsd": 0.01, "gain": False}
+    path.write_text(text)
+    assert mosaic_wanted(path) is None
+    path.write_text(text.replace('name = "b"', 'name = "mosaic"').replace('"yes"', "1"))
     with pytest.raises(InputError, match="folders of the whole survey"):
         read_survey_file(path)
     path.write_text(path.read_text().replace("joint = 1", "joint = false"))
@@ -103,7 +113,7 @@ def test_the_plan_tells_of_the_common_frame_that_is_still_to_be_found(tmp_path):
         key = step_key(step, {}, hashes)
         run_step(job.folder, step, key, hashes, progress=no_progress, overwrite=False)
     each = [("align", "keep"), ("relief", "make"), ("drawing", "make")]
-    assert plan_survey(jobs, mosaic=True) == [
+    assert plan_survey(jobs, mosaic={}) == [
         *((name, *row) for name in "abc" for row in each),
         ("all pairs", "joint", "make"), ("all pairs", "mosaic", "make"),
     ]  # fmt: skip

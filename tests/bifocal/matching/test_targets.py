@@ -117,3 +117,12 @@ def test_flow_is_trusted_along_the_radius_only(turned):
     assert _trusted(grey, grey, along, grid, centre)[far].all()
     assert not _trusted(grey, grey, across, grid, centre).any()
     assert not _trusted(grey, grey, along, grid, centre)[np.hypot(right, up) < 1.5].any()
+
+
+def test_the_bow_ties_of_a_real_church_are_found(data_dir) -> None:
+    """Seen at 20 px across, their edges drawn over two pixels, as lenses do."""
+    photo = cv2.imread(str(data_dir / "facade_pairs/church_2/far.jpg"), cv2.IMREAD_GRAYSCALE)
+    found = find_targets(photo).pixels
+    for place in ((18, 1582), (790, 1314), (1218, 1475), (2023, 1364), (2396, 1732)):
+        assert np.hypot(*(found - place).T).min() < 2.0
+    assert len(found) <= 7

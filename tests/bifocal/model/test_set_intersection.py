@@ -141,6 +141,22 @@ def test_the_orientation_is_in_every_sigma_and_common_to_the_points():
     assert 0.003 < np.mean(np.array(deviates) > 2.576) < 0.02
 
 
+def test_photos_whose_rows_count_upwards_are_as_precise_as_the_others():
+    mirror, xyz = np.diag([1.0, -1.0, 1.0]), scene(20)
+    mirror[1, 2] = 2047.0
+    turned = PhotoSet(photos=tuple(
+        replace(photo, plane_from_pixel=photo.plane_from_pixel @ mirror)
+        for photo in hand_held().photos
+    ))  # fmt: skip
+    for photo in turned.photos:
+        camera = pinhole(photo)
+        assert camera.matrix[1, 1] < 0 < camera.matrix[0, 0]
+        assert np.linalg.det(camera.rotation) == pytest.approx(1.0)
+        assert project(camera, xyz) == pytest.approx(photo.project(xyz), abs=1e-6)
+    sigmas = [photos.intersect(photos.project(xyz)).sigma for photos in (hand_held(), turned)]
+    assert sigmas[1] == pytest.approx(sigmas[0], rel=1e-9)
+
+
 def test_a_set_of_two_gives_the_pair_to_the_last_bit():
     pair = Pair.read(SAMPLE / "facade.pair.json")
     xyz = scene(200)

@@ -28,6 +28,9 @@ from bifocal.model.orientation_precision import CAMERA
 from bifocal.networks.camera_knowledge import CameraKnowledge
 from bifocal.networks.joint_adjustment import JointUnknowns, adjust_jointly
 from bifocal.networks.joint_observations import JointObservations
+from bifocal.networks.set_orientation import turned_set
+from bifocal.orientation.adjustment.frame_turn import line_equations
+from bifocal.orientation.facade_lines import FacadeDirection
 from tests.bifocal.campaigns.sample_tables import write_tables
 from tests.builders.commands import bifocal_command as main
 from tests.builders.pinholes import camera_matrix, project, rotation_from_vector
@@ -113,6 +116,37 @@ def test_cameras_and_points_of_a_set_are_as_precise_as_their_sigmas_say(by_wall)
     assert 0.85 < np.sqrt(np.mean(points)) < 1.15
 
 
+def test_lines_turn_the_frame_of_a_set_and_neither_its_lenses_nor_its_relative_orientation():
+    seen, start, *_ = simulated(np.random.default_rng(1), by_wall=True)
+    before = adjust_jointly(seen, start)
+    leaning = np.array([0.0, 1.0, np.tan(0.02)])
+    lines = [
+        FacadeDirection(
+            camera=k + 1, name="upright", direction=before.cameras[k].rotation @ leaning,
+            sigma=1e-6, count=50,
+        )
+        for k in (0, 2)
+    ]  # fmt: skip
+    after = turned_set(before, lines)
+    assert abs(line_equations(lines, before.cameras)[0]).min() > 1e4
+    assert abs(line_equations(lines, after.cameras)[0]).max() < 10
+    first, *others = (a.rotation for a in after.cameras)
+    was, *were = (b.rotation for b in before.cameras)
+    for turned, old in zip(others, were, strict=True):
+        assert turned @ first.T == pytest.approx(old @ was.T, abs=1e-12)
+    bases = [np.array([c.centre - one.cameras[0].centre for c in one.cameras[1:]])
+             for one in (before, after)]  # fmt: skip
+    lengths = [np.linalg.norm(base, axis=1) for base in bases]
+    assert lengths[1] / lengths[0] == pytest.approx(lengths[1][0] / lengths[0][0])
+    for a, b in zip(after.cameras, before.cameras, strict=True):
+        assert (a.matrix == b.matrix).all()
+        used = np.isfinite(before.xyz).all(axis=1)
+        assert project(a, after.xyz[used]) == pytest.approx(project(b, before.xyz[used]), abs=1e-6)
+    turn = CAMERA.index("turn X")
+    spread = [np.sqrt(one.of_cameras[turn, turn]) for one in (before, after)]
+    assert spread[1] < 0.5 * spread[0]  # what is left is between the photos
+
+
 @pytest.fixture(scope="module")
 def three(tmp_path_factory):
     """Far and near photo of the sample at half size, and the far one turned where it stood."""
@@ -168,6 +202,11 @@ def test_a_set_is_refused_with_the_reason(three):
     with pytest.raises(InputError, match="col4, row4 are missing"):
         read_control(folder / "set.csv", sigma=0.003, sigma_plane=None, photos=4)
     assert Control().of(0, 3).pixels2.shape == (0, 2)
+    ends = np.full((2, 2), 5.0)
+    length = Control(ids=("start", "end"), xyz=np.full((2, 3), np.nan), sigma=np.ones((2, 3)),
+                     pixels1=ends, pixels2=np.full((2, 2), np.nan))  # fmt: skip
+    assert (length.of(0, 3).pixels1 == ends).all()
+    assert np.isnan(length.of(0, 3).pixels2).all()
 
 
 @pytest.mark.acceptance

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+import zipfile
+
+import numpy as np
 import openpyxl
 import pytest
 
 from bifocal.workbook.template_workflow import write_template
-from tests.bifocal.workbook.test_cli_solve import SETUP, rows
+from tests.bifocal.workbook.test_cli_solve import SETUP, rows, run
 from tests.bifocal.workbook.test_survey_workbook import named
 from tests.recalculate import recalculated, rows_of
 
@@ -122,6 +126,27 @@ def test_flagged_check_points_are_left_out_and_large_errors_are_told_in_sigmas(t
     ends = charted(book, "tblVectors")
     assert [row["X_from"] for row in ends[2:4]] == [WALL[10][1], WALL[11][1]]
     assert ends[0]["X_from"] == "#N/A"
+
+
+def test_forty_check_points_have_an_arrow_each(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys.modules[__name__], "ROWS", 45)
+    places = np.random.default_rng(4).uniform((-5, -3, -0.3), (5, 3, 0.6), (40, 3)).round(3)
+    wall = [(f"C{i}", *place) for i, place in enumerate(places.tolist())]
+    known = [(name, x + 0.02, y - 0.01, r) for name, x, y, r in wall]
+    path = typed(tmp_path / "s.xlsx", points=rows(wall), known=known)
+    assert run("solve", path, "--out", tmp_path / "out.xlsx").exit_code == 0
+    ends = charted(recalculated(tmp_path / "out.xlsx", tmp_path), "tblVectors")
+    drawn = [row["X_from"] for row in ends if isinstance(row["X_to"], float)]
+    shown = openpyxl.load_workbook(tmp_path / "out.xlsx", data_only=True)
+    counted = named(shown, "check_n_X").value
+    assert counted > 35
+    assert len(drawn) == counted
+    assert {round(x, 6) for x in drawn} <= {round(x, 6) for _, x, _, _ in known}
+    with zipfile.ZipFile(tmp_path / "out.xlsx") as book:
+        charts = [book.read(name) for name in book.namelist() if "charts/chart" in name]
+    assert max(chart.count(b"<ser>") for chart in charts) > 40
+    assert named(shown, "chart_vectors").value.encode() in b"".join(charts)
+    assert named(shown, "vector_scale").value > 10
 
 
 def test_the_worked_row_of_the_first_sheet_comes_out(tmp_path):

@@ -9,8 +9,8 @@ import openpyxl
 import pytest
 
 from bifocal import InputError, Measuring, Photo, PhotoSet, PointObservations, Taking, relief, solve
-from bifocal.survey.other_photos import CHANCE, OtherPhoto, of_all_photos
-from bifocal.survey.setup import SurveySetup
+from bifocal.survey.other_photos import CHANCE, of_all_photos
+from bifocal.survey.setup import OtherPhoto, SurveySetup
 from bifocal.workbook.template_workflow import write_template
 from tests.bifocal.workbook.test_cli_solve import put, run
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached

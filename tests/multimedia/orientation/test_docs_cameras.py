@@ -56,7 +56,8 @@ def test_the_dome_of_the_page_is_read(folder):
     assert result.exit_code == 0, result.output
 
 
-def test_the_python_of_the_page_gives_what_it_says():
+def test_the_python_of_the_page_gives_what_it_says(folder):
     failed, tried = doctest.testfile(str(PAGE), module_relative=False)
+    assert (folder / "board.svg").read_text().count("<rect") == 35
     assert tried >= 10
     assert failed == 0

@@ -51,6 +51,21 @@ def splice(xml, **changes):
     return found.joined(strip=False).decode()
 
 
+def append_rows(editor, table, rows, results=()):
+    """Add rows given one by one."""
+    listed = (
+        {key: [row[key] for row in own] for key in own[0]} if own else {} for own in (rows, results)
+    )
+    return editor.append_columns(table, *listed)
+
+
+def set_results(editor, title, first, columns):
+    """Store the results of columns."""
+    for column, values in columns.items():
+        for row, value in enumerate(values, start=first):
+            editor.set_result(title, row, column, value)
+
+
 def test_a_result_changes_only_its_sheet(rich, tmp_path):
     editor = WorkbookEditor(rich)
     editor.set_result("Points", 3, 4, 0.5)
@@ -124,7 +139,7 @@ def test_a_value_the_user_put_in_place_of_a_formula_stays(rich, tmp_path):
 
 def test_no_result_is_stored_as_not_available_and_infinity_is_refused(rich, tmp_path):
     editor = WorkbookEditor(rich)
-    editor.set_results("Points", 3, {4: [math.nan, 0.5], 5: ["text", True]})
+    set_results(editor, "Points", 3, {4: [math.nan, 0.5], 5: ["text", True]})
     editor.save(tmp_path / "out.xlsm")
     sheet = openpyxl.load_workbook(tmp_path / "out.xlsm", data_only=True)["Points"]
     assert [sheet[c].value for c in ("D3", "D4", "E3", "E4")] == ["#N/A", 0.5, "text", True]
@@ -135,13 +150,14 @@ def test_no_result_is_stored_as_not_available_and_infinity_is_refused(rich, tmp_
 def test_rows_are_added_to_a_table_with_formulas_formats_and_all_that_reaches_there(rich, tmp_path):
     out = tmp_path / "out.xlsm"
     editor = WorkbookEditor(rich)
-    rows = editor.append_rows(
+    rows = append_rows(
+        editor,
         "tblpoints",
         [{"id": "P3", "s1": 1.5, "s2": 2.0}, {"id": "P4", "s1": 3.0, "s2": 4.5}],
         [{"ds": 0.5, "twice": 1.0}, {"ds": 1.5, "twice": 3.0}],
     )
     assert rows == [5, 6]
-    editor.set_results("Points", 3, {4: [0.75, 0.75]})
+    set_results(editor, "Points", 3, {4: [0.75, 0.75]})
     editor.save(out)
     changed = {POINTS, NOTES, BOOK, "xl/tables/table1.xml", "xl/charts/chart1.xml"}
     assert differing(rich, out) == changed
@@ -166,15 +182,15 @@ def test_a_table_does_not_grow_over_other_cells(rich):
     editor.set_value("Points", 6, 2, "my remark")
     editor.save()
     with pytest.raises(InputError, match=r"Points!B6: is not empty, so the table tblPoints"):
-        WorkbookEditor(rich).append_rows("tblPoints", [{}, {}])
+        WorkbookEditor(rich).append_columns("tblPoints", {}, count=2)
 
 
 def test_unknown_tables_columns_and_sheets_are_named(rich):
     editor = WorkbookEditor(rich)
     with pytest.raises(InputError, match='has no table "tblX"; it has tblPoints'):
-        editor.append_rows("tblX", [])
+        editor.append_columns("tblX", {})
     with pytest.raises(InputError, match='tblPoints has no column "s9"'):
-        editor.append_rows("tblPoints", [{"s9": 1}])
+        editor.append_columns("tblPoints", {"s9": [1]})
     with pytest.raises(InputError, match='no sheet "X"; it has "Points", "My notes"'):
         editor.set_value("X", 1, 1, 1)
 
@@ -311,7 +327,7 @@ def test_a_damaged_part_is_named_with_the_users_file_not_with_a_temporary_one(tm
 def test_libreoffice_opens_the_changed_workbook_and_calculates_the_new_rows(rich, tmp_path):
     out = tmp_path / "out.xlsm"
     editor = WorkbookEditor(rich)
-    editor.append_rows("tblPoints", [{"id": "P3", "s1": 1.5, "s2": 2.0}])
+    append_rows(editor, "tblPoints", [{"id": "P3", "s1": 1.5, "s2": 2.0}])
     editor.save(out)
     values = office.recalculated(out, tmp_path / "office")
     assert values["Points"]["D5"] == 0.5
@@ -339,7 +355,7 @@ def test_many_rows_are_added_by_columns_and_read_back_to_the_bit(rich, tmp_path)
     editor = WorkbookEditor(rich)
     inputs = {"id": [f"Q{i}" for i in range(5000)], "s1": s1, "s2": [*s2[:7], None, *s2[8:]]}
     editor.append_columns("tblPoints", inputs, {"ds": s2 - s1})
-    editor.set_results("Points", 3, {4: [0.75, 0.75]})
+    set_results(editor, "Points", 3, {4: [0.75, 0.75]})
     editor.save(tmp_path / "out.xlsm")
     sheet = WorkbookEditor(tmp_path / "out.xlsm").grid("Points")
     assert [sheet.rows[row][2] for row in range(5, 5005)] == s1.tolist()
@@ -352,8 +368,8 @@ def test_another_reader_sees_the_stored_results(rich, tmp_path):
     import python_calamine
 
     editor = WorkbookEditor(rich)
-    editor.append_rows("tblPoints", [{"id": "=P3", "s1": 0.1, "s2": 1 / 3}], [{"ds": 7 / 30}])
-    editor.set_results("Points", 3, {4: [0.5, math.nan], 5: ["text", 1e-9]})
+    append_rows(editor, "tblPoints", [{"id": "=P3", "s1": 0.1, "s2": 1 / 3}], [{"ds": 7 / 30}])
+    set_results(editor, "Points", 3, {4: [0.5, math.nan], 5: ["text", 1e-9]})
     editor.save(tmp_path / "out.xlsm")
     book = python_calamine.CalamineWorkbook.from_path(tmp_path / "out.xlsm")
     rows = book.get_sheet_by_name("Points").to_python()[-3:]

@@ -309,7 +309,7 @@ def test_damaged_bytes_never_raise_anything_but_an_input_error(tmp_path, seed):
             read_table(path, COLUMNS)
             editor = WorkbookEditor(path)
             editor.set_value(editor.titles[0], 3, 2, 7.0)
-            editor.append_rows("tblPoints", [{"s1": 1.0}])
+            editor.append_columns("tblPoints", {"s1": [1.0]})
             editor.save(tmp_path / "out.xlsx", overwrite=True)
         except InputError:
             pass

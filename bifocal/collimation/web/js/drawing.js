@@ -122,7 +122,11 @@ export function centre(context, [x, y], text) {
     path.moveTo(x, y - 12);
     path.lineTo(x, y + 12);
   });
-  label(context, text, [x + 10, y - 10]);
+  // Within the picture, also at its edge.
+  context.font = `500 ${12 * unit}px system-ui, sans-serif`;
+  const { width } = context.measureText(text);
+  const room = context.canvas.width / window.devicePixelRatio - 6;
+  label(context, text, [x + 10 + width > room ? x - 10 - width : x + 10, y - 10]);
 }
 
 /**

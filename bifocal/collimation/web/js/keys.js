@@ -1,6 +1,6 @@
 /** Every key, in one table: what the help shows is what the page does. */
 
-const typing = (node) => node.matches?.("input:not([type=range]):not([type=checkbox]), textarea, select");
+const typing = (node) => node.matches?.("input:not([type=range], [type=checkbox], [type=file]), textarea, select");
 
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 

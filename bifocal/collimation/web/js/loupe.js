@@ -96,8 +96,7 @@ export class Loupe {
     }
     const context = canvas.getContext("2d");
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.fillStyle = "#0d0e10";
-    context.fillRect(0, 0, side, side);
+    context.clearRect(0, 0, side, side);
     const place = this.places[image];
     const digits = place ? place.map((value) => value.toFixed(2)).join(", ") : "–";
     setText(this.captions[image], `${image} · ${digits}`);

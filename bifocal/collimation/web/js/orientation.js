@@ -46,7 +46,7 @@ export class OrientationStage {
 
   #controlButtons() {
     const { picker } = this;
-    return h("div", { class: "row" },
+    return h("div", { class: "buttons" },
       button(t("control.new"), () => { this.wallCard.dismiss(); picker.fresh(1); }, { class: "quiet", testid: "control-new" }),
       button(t("pick.snap"), () => picker.snap(), { class: "quiet", testid: "control-snap" }),
       button(t("control.paste"), () => this.#paste(), { class: "quiet", testid: "control-paste" }),
@@ -55,11 +55,11 @@ export class OrientationStage {
 
   #controlTable() {
     const heads = ["control.name", "control.X", "control.Y", "control.r", "control.seen", "control.residual"];
-    return h("section", { class: "card" }, h("h2", {}, t("control.title")),
-      this.#controlButtons(), this.app.jobBox("targets"), h("p", { class: "hint" }, t("control.hint")),
-      h("table", { class: "grid", testid: "control-table", onpaste: (event) => this.#pasted(event) },
-        h("thead", {}, h("tr", {}, heads.map((key) => h("th", { scope: "col" }, t(key))),
-          h("th", {}, h("span", { class: "unseen" }, t("list.delete"))))), this.body));
+    this.table = h("table", { class: "grid", testid: "control-table" },
+      h("thead", {}, h("tr", {}, heads.map((key) => h("th", { scope: "col" }, t(key))),
+        h("th", {}, h("span", { class: "unseen" }, t("list.delete"))))), this.body);
+    return h("section", { class: "card", onpaste: (event) => this.#pasted(event) }, h("h2", {}, t("control.title")),
+      this.#controlButtons(), this.app.jobBox("targets"), h("p", { class: "hint" }, t("control.hint")), this.table);
   }
 
   #tapeTable() {
@@ -214,9 +214,14 @@ export class OrientationStage {
     setText(this.remarkCount, t("known.remarks", { count: remarks }));
     this.#tellKnown(state);
     this.tell.hidden = !remarks && !this.known.children.length;
+    this.table.hidden = !state.control.length;
+    this.acceptAlign.hidden = !state.pair || state.pair.accepted !== false;
     this.acceptAlign.disabled = !state.pair || state.pair.accepted !== false || !state.pair.scaled;
     setText(this.align, t(state.pair?.report?.free_scale ? "align.refine" : "align.run"));
     this.align.classList.toggle("primary", !state.pair);
+    // What the program is about asks for no click.
+    const busy = Boolean(state.looking) && !state.pair && !state.control.length;
+    this.align.hidden = this.target.hidden = busy;
     // The next step stands out.
     this.acceptAlign.classList.toggle("primary", !this.acceptAlign.disabled);
     this.refresh();

@@ -1,4 +1,5 @@
-/** Stage 1: two photos dropped; what their files do not tell is asked in words. */
+/** Stage 1: photos dropped; what their files do not tell is asked in words. */
+import { Alone } from "./alone.js";
 import { h, keyedRows, number, setText } from "./dom.js";
 import { afresh, button, fill, labelled, numberInput } from "./fields.js";
 import { mediaWords } from "./media.js";
@@ -42,8 +43,11 @@ export class PhotosStage {
         h("ul", {}, [1, 2, 3, 4, 5, 6].map((number) => h("li", {}, t(`start.bring.${number}`)))),
         h("div", { class: "row" }, button(t("start.print"), () => window.print(), { class: "quiet", testid: "print" }))),
       h("div", { class: "card" }, h("h2", {}, t("start.recent")), this.recent));
+    this.alone = new Alone(app);
+    this.others = h("div", { class: "cards", testid: "other-photos" });
     this.element = h("div", { class: "stage photos", id: "stage-photos" }, this.zone, this.beginning,
-      h("div", { class: "cards" }, this.cards.map(({ element }) => element)), this.form, this.media);
+      h("div", { class: "cards" }, this.cards.map(({ element }) => element)), this.others, app.jobBox("join"),
+      this.alone.element, this.form, this.media);
     this.#listen();
   }
 
@@ -105,7 +109,6 @@ export class PhotosStage {
   }
 
   async #drop(files) {
-    if (files.length > 2) return this.app.say(t("photos.two"), "warning");
     this.app.open("photos");
     this.zone.classList.add("busy");
     this.app.say(t("photos.reading"));
@@ -134,11 +137,37 @@ export class PhotosStage {
       this.#tellRecent();
     }
     this.zone.classList.toggle("small", state.photos.length > 0);
-    setText(this.lead, t(state.photos.length === 1 ? "photos.dropSecond" : "photos.drop"));
+    this.zone.classList.toggle("further", ready);
+    setText(this.lead, t(["photos.drop", "photos.dropSecond", "photos.dropMore"][state.photos.length]));
+    this.alone.update(state);
+    keyedRows(this.others, state.others, { key: ({ image }) => String(image), signature: JSON.stringify,
+      build: (photo) => this.#other(photo) });
     this.form.hidden = this.media.hidden = !ready;
     for (const card of this.cards) this.#fillCard(card, state);
     for (const [key] of [...SITE, ...MEDIA]) fill(this.site[key], state.setup?.[key]);
     this.#tellMedia(state);
+  }
+
+  /** A photo beside far and near: it joins their orientation. */
+  #other({ image, name, width, height, joined, distance }) {
+    const away = button(t("photo.takeAway"), () => this.#takeAway(image), { class: "quiet", "aria-label": `${t("photo.takeAway")}: ${name}` });
+    const thumb = h("img", { alt: t("photo.alt", { role: name }) });
+    this.app.pyramids.info("photo", image, name).then(({ version, max_level: most }) => {
+      thumb.src = `/tiles/photo/${image}/${Math.min(THUMB_LEVEL, most)}/0_0.jpg?v=${version}`;
+    }).catch((error) => this.app.refuse(error));
+    return h("section", { class: "card photo" }, h("h2", {}, `${image} · ${t("photo.further")}`), thumb,
+      h("div", { class: "card-body" }, h("p", { class: "file" }, name), h("p", { class: "hint" }, `${width} × ${height} px`),
+        h("p", { class: joined ? "good" : "hint" }, t(joined ? "photo.joined" : "photo.joins", { distance: number(distance, 2) })),
+        h("div", { class: "row" }, away)));
+  }
+
+  async #takeAway(image) {
+    try {
+      await this.app.connection.remove(`/api/photos/${image}`);
+      await this.app.connection.refresh();
+    } catch (error) {
+      this.app.refuse(error);
+    }
   }
 
   /** What the oriented pair looks through; the card opens by itself where there is something. */
@@ -156,6 +185,7 @@ export class PhotosStage {
   #fillCard(card, state) {
     const photo = state.photos.find(({ image }) => image === card.image);
     card.element.hidden = !photo;
+    card.element.classList.toggle("bare", state.photos.length === 1);
     if (!photo) return;
     if (card.name.textContent !== photo.name) afresh([card.focal_mm, card.sensor_width_mm]);
     setText(card.name, photo.name);

@@ -103,7 +103,7 @@ export class ProductsStage {
     this.sheet = choice({ label: t("deliver.sheet"), options: { auto: t("deliver.auto"), ...same(SHEETS) },
       save: () => {}, testid: "deliver-sheet" });
     this.deliver = button(t("deliver.run"), () => this.app.job("deliver", { scale: this.scale.value, quality: this.grade.value,
-      image: this.source.value, sheet: this.sheet.value === "auto" ? null : this.sheet.value }), { class: "primary", testid: "deliver" });
+      image: this.source.value, sheet: this.sheet.value === "auto" ? null : this.sheet.value }), { testid: "deliver" });
     this.files = h("ul", { class: "files" });
     this.count = h("summary", {});
     this.download = h("a", { class: "button", href: "/download/all.zip", download: "", testid: "download" },
@@ -259,6 +259,7 @@ export class ProductsStage {
     this.picks &&= Boolean(relief);
     const pixels = (product) => (product.cols ? `${product.cols} × ${product.rows} px` : "");
     this.range.show(relief);
+    this.loupe.element.hidden = !relief;
     for (const [kind, product] of [["relief", relief], ["ortho", ortho]]) {
       const size = product && t(`${kind}.ready`, { size: `${pixels(product)}, ${number(1000 * product.gsd, 1)} mm` });
       setText(this[`${kind}State`], size ?? "");

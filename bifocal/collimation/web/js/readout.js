@@ -4,6 +4,8 @@ import { afresh, button, choice, fill, labelled, numberInput, textInput } from "
 import { sketched } from "./sketches.js";
 import { t } from "./words/words.js";
 
+/** Standard deviation from which millimetres are enough. [m] */
+const COARSE = 0.003;
 export const TYPES = ["plain", "wall", "check", "control"];
 const VALUES = [
   ["r", "m", 4, "sigma_r"], ["X", "m", 4, "sigma_X"], ["Y", "m", 4, "sigma_Y"],
@@ -67,10 +69,12 @@ export class Readout {
     this.type.value = item.type;
     for (const [key, input] of Object.entries(this.reference)) fill(input, item.reference?.[key]);
     const result = item.result ?? {};
-    for (const [key, unit, digits, sigma] of VALUES) {
+    for (const [key, unit, most, sigma] of VALUES) {
+      // Tenths of a millimetre only where they mean something.
+      const digits = result[sigma] > COARSE ? 3 : most;
       const value = number(result[key], digits);
       const shown = unit === "mm" ? this.app.state.length_unit ?? unit : unit;
-      const spread = sigma && Number.isFinite(result[sigma]) ? ` ± ${number(result[sigma], 4)}` : "";
+      const spread = sigma && Number.isFinite(result[sigma]) ? ` ± ${number(result[sigma], digits)}` : "";
       setText(this.cells[key], value === "–" ? value : `${value}${spread} ${shown}`);
     }
     const flag = result.flag ?? null;

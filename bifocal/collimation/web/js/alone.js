@@ -1,0 +1,116 @@
+/** One photo alone: the four corners of a rectangle on a flat wall and its size bring it to scale. */
+import { h, number, parseNumber, setText } from "./dom.js";
+import * as drawing from "./drawing.js";
+import { button, labelled, numberInput } from "./fields.js";
+import { asTaken } from "./geometry.js";
+import { photoMark } from "./tiles.js";
+import { Pane, pixelView, tileLayer } from "./viewer.js";
+import { t } from "./words/words.js";
+
+const CORNERS = 4;
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+const INK = "#ffe14d";
+/** How far off a click may have fallen. [photo pixels] */
+const REACH = 12;
+
+export class Alone {
+  constructor(app) {
+    Object.assign(this, { app, corners: [], cursor: null });
+    this.viewer = h("div", { class: "viewer alone-viewer" });
+    this.asks = h("p", { class: "target", role: "status", testid: "alone-asks" });
+    this.width = numberInput({ label: t("alone.width"), save: () => {}, testid: "alone-width" });
+    this.height = numberInput({ label: t("alone.height"), save: () => {}, testid: "alone-height" });
+    this.run = button(t("alone.run"), () => this.#run(), { class: "primary", testid: "run-rectify" });
+    this.again = button(t("alone.again"), () => { this.corners = []; this.#tell(); }, { class: "quiet" });
+    this.picture = h("img", { class: "preview large", alt: t("alone.alt"), hidden: true });
+    this.told = h("p", { testid: "alone-told" });
+    this.download = h("a", { class: "button", href: "/download/all.zip", download: "", testid: "alone-download" }, t("deliver.download"));
+    this.element = h("section", { class: "card alone", testid: "alone" }, h("h2", {}, t("alone.title")),
+      h("p", { class: "hint" }, t("alone.hint")),
+      h("div", { class: "alone-body" }, this.viewer, h("div", { class: "card-body" }, this.asks,
+        h("div", { class: "fields" }, labelled(t("alone.width"), this.width, "m"), labelled(t("alone.height"), this.height, "m")),
+        h("div", { class: "row" }, this.run, this.again), app.jobBox("rectify"), this.told, this.picture,
+        h("div", { class: "row" }, this.download))));
+  }
+
+  #run() {
+    const [width, height] = [this.width, this.height].map(({ value }) => parseNumber(value));
+    if (!(width > 0) || !(height > 0)) return this.app.say(t("alone.size"), "warning");
+    return this.app.job("rectify", { corners: this.corners, width, height });
+  }
+
+  update(state) {
+    this.element.hidden = state.photos.length !== 1;
+    if (this.element.hidden) return;
+    this.#show(state).catch((error) => this.app.refuse(error));
+    const { rectified } = state.products;
+    this.picture.hidden = this.download.hidden = !rectified;
+    const done = state.jobs.findLast(({ kind, state: how }) => kind === "rectify" && how === "done");
+    setText(this.told, done?.message ?? "");
+    const mark = rectified && `${done?.id}-${state.revision}`;
+    if (rectified && this.seen !== mark) this.picture.src = `/preview/rectified?v=${mark}`;
+    this.seen = mark;
+    this.#tell();
+  }
+
+  async #show(state) {
+    const mark = photoMark(state);
+    if (this.mark === mark) return;
+    Object.assign(this, { mark, corners: [], cursor: null });
+    this.pane?.dispose();
+    const [{ width, height }] = state.photos;
+    const view = pixelView(width, height);
+    this.pane = new Pane({ label: t("alone.pane"), view, frame: asTaken, painter: (context) => this.#draw(context) });
+    Object.assign(this.pane, { image: 1, images: [1] });
+    this.pane.addEventListener("pick", ({ detail }) => this.#click(detail.pixel));
+    this.pane.element.addEventListener("keydown", (event) => this.#key(event));
+    this.viewer.replaceChildren(this.pane.element);
+    this.pane.mounted();
+    const info = await this.app.pyramids.info("photo", 1, mark);
+    if (this.mark === mark) this.pane.setLayers([tileLayer(view, "layer-1", "/tiles/photo/1", info)]);
+  }
+
+  /** Arrows move a cross over the photo, Enter sets a corner there. */
+  #key(event) {
+    const arrow = ARROWS[event.key];
+    if (!arrow && event.key !== "Enter") return;
+    event.preventDefault();
+    const { pane } = this;
+    this.cursor ??= [pane.width / 2, pane.height / 2];
+    if (!arrow) return this.#click(this.cursor);
+    const by = event.altKey ? 1 : event.shiftKey ? 50 : 10;
+    this.cursor = this.cursor.map((value, axis) => value + by * arrow[axis]);
+    return pane.paint();
+  }
+
+  /** A corner, on that of the picture which lies there. */
+  async #click(pixel) {
+    if (this.corners.length >= CORNERS) return;
+    const [column, row] = this.pane.photo(1, pixel);
+    const corner = [column, row];
+    this.corners = [...this.corners, corner];
+    this.#tell();
+    const found = await this.app.connection.ask("/api/snap", { image: 1, column, row, radius: REACH }).catch(() => null);
+    if (found && found.kind !== "none") [corner[0], corner[1]] = [found.column, found.row];
+    if (this.corners.length === CORNERS) this.width.focus();
+    this.#tell();
+  }
+
+  #tell() {
+    const { length } = this.corners;
+    setText(this.asks, length < CORNERS ? t("alone.asks", { corner: t(`alone.corner.${length}`) }) : t("alone.asksSize"));
+    this.run.disabled = length < CORNERS;
+    this.again.disabled = !length;
+    this.pane?.paint();
+  }
+
+  #draw(context) {
+    const places = this.corners.map((corner) => this.pane.screen(1, corner));
+    drawing.polyline(context, INK, places, { width: 2, closed: places.length === CORNERS });
+    places.forEach((place, index) => {
+      drawing.marker(context, 1, place);
+      drawing.label(context, number(index + 1, 0), [place[0] + 10, place[1] - 8], INK);
+    });
+    if (this.cursor) drawing.cursor(context, this.pane, this.cursor, 1);
+  }
+}
