@@ -15,6 +15,10 @@ from bifocal.model.surface import EVERYWHERE, Surface, measured_on
 from bifocal.orthophotos.tuning import TIDYING, VISIBILITY
 from bifocal.rays import Foot, magnification, object_rays, plane_position, straight
 from photocore.arrays import BoolArray, Float32Array
+from photocore.compiled import compiled
+
+#: What numpy takes for a pixel, roughly. [s]
+_NUMPY = 50e-9
 
 
 def hidden_from(surface: Surface, grid: Grid, camera: Foot, relief: Float32Array) -> BoolArray:
@@ -293,12 +297,14 @@ class _Buffer(NamedTuple):
         cells = _cells(u, v, rows, columns)
         if of is not None:
             np.minimum.at(nearest, cells[of], around.rho[of])
-            nearest[-1] = np.inf
-            return cls(nearest, cells[core], columns)
-        np.minimum.at(nearest, cells.ravel(), around.rho.ravel())
-        for first, second in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
-            ends = [(a[first], a[second]) for a in (u, v, around.rho)]
-            _join(nearest, ends, rows, columns)
+        elif _enter.pays(u.size * _NUMPY):
+            most = np.int64(VISIBILITY.most_steps)
+            _enter(u, v, around.rho, cells, nearest, rows, columns, most)
+        else:
+            np.minimum.at(nearest, cells.ravel(), around.rho.ravel())
+            for first, second in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+                ends = [(a[first], a[second]) for a in (u, v, around.rho)]
+                _join(nearest, ends, rows, columns)
         nearest[-1] = np.inf
         return cls(nearest, cells[core], columns)
 
@@ -334,6 +340,30 @@ def _join(
     np.minimum.at(nearest, _cells(points[0], points[1], rows, columns), points[2])
 
 
+@compiled
+def _enter(u, v, rho, cells, nearest, rows, columns, most):  # type: ignore[no-untyped-def]
+    """Enter all pixels in the buffer, and the faces between neighbours, one at a time."""
+    height, width = u.shape
+    for i in range(height):
+        for j in range(width):
+            nearest[cells[i, j]] = min(nearest[cells[i, j]], rho[i, j])
+            for down, right in ((0, 1), (1, 0)):
+                a, b = i + down, j + right
+                if a >= height or b >= width:
+                    continue
+                du, dv, far = u[a, b] - u[i, j], v[a, b] - v[i, j], rho[a, b] - rho[i, j]
+                gap = max(abs(du), abs(dv))
+                if not gap > 1:
+                    continue
+                count = min(int(np.ceil(gap)), most)
+                for part in range(1, count + 1):
+                    t = np.float32(part / (count + 1))
+                    x, y = u[i, j] + du * t, v[i, j] + dv * t
+                    if x >= 0 and y >= 0 and x < columns and y < rows:
+                        cell = int(y) * columns + int(x)
+                        nearest[cell] = min(nearest[cell], rho[i, j] + far * t)
+
+
 def _sharpen(around: _Surroundings, buffer: _Buffer) -> BoolArray:
     """Return the hidden pixels, those at the rims of shadows decided along their own rays.
 
@@ -356,11 +386,12 @@ def _sharpen(around: _Surroundings, buffer: _Buffer) -> BoolArray:
     if not len(row):
         return hidden
     cell = buffer.cells[row, column].astype(np.int64)
+    # At a rim the occluder may lie just beside the pixel's own cell.
+    lit = ~hidden[row, column]
     occluder = buffer.nearest[cell]
-    for shift in [i * buffer.columns + j for i in (-1, 0, 1) for j in (-1, 0, 1)]:
-        # At a rim the occluder may lie just beside the pixel's own cell.
-        occluder = np.fmin(occluder, buffer.nearest[np.clip(cell + shift, 0, cell.max())])
-    occluder = np.where(hidden[row, column], buffer.nearest[cell], occluder)
+    for shift in [i * buffer.columns + j for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]:
+        beside = buffer.nearest[np.clip(cell[lit] + shift, 0, cell.max())]
+        occluder[lit] = np.fmin(occluder[lit], beside)
     sure[row, column] = _above_ray(around, row + core[0].start, column + core[1].start, occluder)
     return sure
 
@@ -369,34 +400,73 @@ def _above_ray(
     around: _Surroundings, row: NDArray[np.int64], column: NDArray[np.int64], occluder: Float32Array
 ) -> BoolArray:
     """Return which pixels' rays to the camera run into relief beside them or at the occluder."""
-    rows, columns = around.relief.shape
     r, rho = around.relief[row, column], around.rho[row, column]
-    slope = (around.distance - r) / rho
     x, y = around.away(row, column)
-    to_x, to_y = -x / rho, y / rho
-    hidden = np.zeros(len(row), bool)
     to_occluder = np.where(np.isfinite(occluder), rho - occluder, np.float32(0))
+    rays = (row, column, r, -x / rho, y / rho, (around.distance - r) / rho, to_occluder)
+    beside, shifts = (np.array(v, np.float32) for v in (VISIBILITY.beside, VISIBILITY.around))
+    rim, steep = np.float32(VISIBILITY.rim), np.float32(VISIBILITY.steep)
+    follow: Any = _followed if _followed.pays(len(row) * _NUMPY) else _followed_by_numpy
+    return follow(around.relief, *rays, beside, shifts, rim, steep)
+
+
+def _followed_by_numpy(  # type: ignore[no-untyped-def]
+    relief, row, column, r, to_x, to_y, slope, to_occluder, beside, shifts, rim, steep
+):
+    """Return which rays run into relief at some distances, one distance at a time."""
+    rows, columns = relief.shape
+    hidden = np.zeros(len(row), bool)
 
     def height(of: NDArray[np.int64], t: Float32Array) -> tuple[Float32Array, BoolArray]:
         i = np.rint(row[of] + to_y[of] * t).astype(np.int32)
         j = np.rint(column[of] + to_x[of] * t).astype(np.int32)
         inside = (i >= 0) & (i < rows) & (j >= 0) & (j < columns)
-        return around.relief[i.clip(0, rows - 1), j.clip(0, columns - 1)], inside
+        return relief[i.clip(0, rows - 1), j.clip(0, columns - 1)], inside
 
-    near = [np.full(len(row), t, np.float32) for t in VISIBILITY.beside]
     left = np.arange(len(row))
-    for t_all in [*near, *(to_occluder + np.float32(shift) for shift in VISIBILITY.around)]:
+    for t_all in [*(np.full(len(row), t) for t in beside), *(to_occluder + t for t in shifts)]:
         t, ray = t_all[left], slope[left]
         above, inside = height(left, t)
         over = above - r[left] - ray * t
-        perhaps = np.nonzero(
-            inside & (t >= VISIBILITY.beside[0]) & (over > -np.float32(VISIBILITY.rim) * ray)
-        )[0]
+        perhaps = np.nonzero(inside & (t >= beside[0]) & (over > -rim * ray))[0]
         # The benefit of the doubt is a step's only: a slope just short of the ray's hides nothing.
         below, _ = height(left[perhaps], t[perhaps] - 1)
-        step = above[perhaps] - below > np.float32(VISIBILITY.steep) * ray[perhaps]
+        step = above[perhaps] - below > steep * ray[perhaps]
         hidden[left[perhaps[step | (over[perhaps] > 0)]]] = True
         left = left[~hidden[left]]
+    return hidden
+
+
+@compiled
+def _followed(  # type: ignore[no-untyped-def]
+    relief, row, column, r, to_x, to_y, slope, to_occluder, beside, shifts, rim, steep
+):
+    """Return the same, one ray at a time."""
+    rows, columns = relief.shape
+    hidden = np.zeros(len(row), np.bool_)
+    near = len(beside)
+    for k in range(len(row)):
+        ray = slope[k]
+        for n in range(near + len(shifts)):
+            t = beside[n] if n < near else to_occluder[k] + shifts[n - near]
+            if not t >= beside[0]:
+                continue
+            i = int(np.rint(row[k] + np.float64(to_y[k] * t)))
+            j = int(np.rint(column[k] + np.float64(to_x[k] * t)))
+            if i < 0 or i >= rows or j < 0 or j >= columns:
+                continue
+            over = relief[i, j] - r[k] - ray * t
+            if not over > -rim * ray:
+                continue
+            if not over > 0:
+                back = t - np.float32(1)
+                low = int(np.rint(row[k] + np.float64(to_y[k] * back)))
+                side = int(np.rint(column[k] + np.float64(to_x[k] * back)))
+                below = relief[min(max(low, 0), rows - 1), min(max(side, 0), columns - 1)]
+                if not relief[i, j] - below > steep * ray:
+                    continue
+            hidden[k] = True
+            break
     return hidden
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bifocal import FlatSurface, Foot, Grid, MapSurface, Surface
+from bifocal.orthophotos import visibility
 from bifocal.orthophotos.visibility import hidden_from
 from tests.bifocal.orthophotos.wall_scene import hidden_at, make_pair, relief_at, wall_grid
 
@@ -93,3 +94,19 @@ def test_unknown_relief_neither_hides_nor_is_hidden() -> None:
     r = np.where(grid.columns_x[None, :] < 2.0, np.nan, 0.0) * np.ones((grid.height, 1))
     surface = MapSurface.of_array(r.astype(np.float32), grid)
     assert not of_tiles(surface, grid, Foot(np.array([0.0, 0.0]), 10.0), 512).any()
+
+
+def test_numpy_and_machine_code_hide_the_same_pixels(monkeypatch: pytest.MonkeyPatch) -> None:
+    grid = Grid.from_bounds((0.2, -0.3, 1.4, 0.5), gsd=0.005)
+    x, y = np.meshgrid(grid.columns_x, grid.rows_y)
+    relief = relief_at(x, y).astype(np.float32)
+    relief += np.random.default_rng(3).normal(0, 0.004, relief.shape).astype(np.float32)
+    relief[np.abs(x - 0.9) < 0.01] += 0.6  # a bar, with faces beside it
+    relief[40:50, 60:90] = np.nan
+    surface, camera = MapSurface.of_array(relief, grid), Foot(np.array([-0.4, 0.2]), 9.5)
+    found = []
+    for compiled in (False, True):
+        monkeypatch.setattr(type(visibility._enter), "pays", lambda *_, way=compiled: way)
+        found.append(hidden_from(surface, grid, camera, relief))
+    assert 0.05 < found[0].mean() < 0.5
+    assert np.array_equal(*found)
