@@ -72,6 +72,8 @@ def make_desk(folder: Path) -> None:
     _reef(folder)
     shutil.copytree(WATER_SAMPLE, folder / "under-water")
     _lenses(folder)
+    _doors(folder)
+    shutil.copyfile(folder / "middle_near.jpg", folder / "third.jpg")
     shutil.copyfile(folder / "points.csv", folder / "control.csv")
     for pair, name in (("a", "left"), ("b", "middle"), ("c", "right")):
         shutil.copyfile(folder / f"{name}.pair.json", folder / f"{pair}.pair.json")
@@ -200,6 +202,21 @@ def _pair(folder: Path, name: str, part: tuple[int, int], files: tuple[str, str]
             principal_distance=focal, image_size=(last - first, SIZE[1]),
         ))  # fmt: skip
     replace(pair, image1=sides[0], image2=sides[1]).write(folder / f"{name}.pair.json")
+
+
+def _doors(folder: Path) -> None:
+    """Write a door leaf as GeoJSON and as a drawing."""
+    corners = [(0, 0), (1.1, 0), (1.1, 2.2), (0, 2.2)]
+    ring = {"type": "Polygon", "coordinates": [[*corners, corners[0]]]}
+    known = {"kind": "face", "name": "door", "relief": -0.24}
+    door = {"type": "Feature", "properties": known, "geometry": ring}
+    collection = {"type": "FeatureCollection", "features": [door]}
+    (folder / "doors.geojson").write_text(json.dumps(collection), encoding="utf-8")
+    drawing = ezdxf.new("R2010", units=6)
+    drawing.modelspace().add_lwpolyline(
+        corners, close=True, dxfattribs={"layer": "FACE", "elevation": -0.24}
+    )
+    drawing.saveas(folder / "doors.dxf")
 
 
 def _set(folder: Path, rows: list[list[float | str]]) -> None:

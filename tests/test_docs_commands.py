@@ -38,6 +38,7 @@ NOT_RUN = {
     "python3 -m venv .venv && .venv/bin/pip install -q . && .venv/bin/bifocal demo --overwrite":
         ELSEWHERE,
     'python3 -m venv .venv && .venv/bin/pip install -q ".[test]" && .venv/bin/pytest': ELSEWHERE,
+    "python3 -m venv .venv": ELSEWHERE,
     "python benchmarks/bench_bathymetry.py": MINUTES,
     "python benchmarks/bench_cameras.py": MINUTES,
     "python benchmarks/bench_campaign.py": MINUTES,
@@ -92,7 +93,7 @@ RUN_BY = {
 }
 #: What a page takes for granted, where it is not the façade's or the tank's folder.
 ONLY = {
-    "picking.md": ("far.jpg", "near.jpg", "wall.pair.json", "survey.xlsx"),
+    "picking.md": ("far.jpg", "near.jpg", "third.jpg", "wall.pair.json", "survey.xlsx"),
     "choosing.md": (),
     "planning.md": (),
     "tutorial-excel.md": (),
