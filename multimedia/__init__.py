@@ -13,8 +13,7 @@ The media
     Material: FLOAT_GLASS, N_BK7, FUSED_SILICA, ACRYLIC, POLYCARBONATE, SAPPHIRE   of ports
     critical_angle, refracted_angle, refracted_direction   Snell's law
 Radial shift
-    radial_shift              where straight rays would see a point
-    radial_shift_derivatives, ShiftDerivatives       with derivatives
+    radial_shift, radial_shift_derivatives, ShiftDerivatives   where straight rays see a point
     radial_shift_ratio, ShiftTable   relative; from a look-up table
     iterated_radius, best_over_compensation, ShiftIteration   the iteration as published
 Surfaces and rays
