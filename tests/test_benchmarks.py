@@ -22,7 +22,12 @@ def test_ours_comes_first_in_every_comparison():
 
 @pytest.mark.parametrize(
     ("name", "limit"),
-    [("shift", 1e-12), ("projection", 1e-12), ("epipolar", 1e-9), ("resection", 1.0)],
+    [
+        ("shift", 1e-12),
+        ("projection", 1e-12),
+        ("epipolar", 1e-9),
+        pytest.param("resection", 1.0, marks=pytest.mark.acceptance),
+    ],
 )
 def test_a_result_is_held_against_the_truth(name, limit):
     comparison = water.COMPARISONS[name]

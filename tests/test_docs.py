@@ -91,7 +91,12 @@ def test_links_between_pages_lead_somewhere(page):
             assert (page.parent / target).exists(), f"{page.name}: {target}"
 
 
-PAGES_WITH_PYTHON = [page for page in PAGES if "```python" in page.read_text(encoding="utf-8")]
+#: Pages whose examples take more than a moment.
+HEAVY = {"dense-relief.md", "underwater-cameras.md"}
+PAGES_WITH_PYTHON = [
+    pytest.param(page, marks=[pytest.mark.acceptance] if page.name in HEAVY else [])
+    for page in PAGES if "```python" in page.read_text(encoding="utf-8")
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("page", PAGES_WITH_PYTHON, ids=lambda p: p.name)

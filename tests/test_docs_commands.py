@@ -28,7 +28,7 @@ from tests.page_commands import DOCS, IN_PART, ROOT, Shown, shown_commands
 RUN = {"bifocal": bifocal, "multimedia": multimedia}
 SHOWN = shown_commands()
 #: Pages that take a moment: with the default tests.
-QUICK = ("choosing.md", "planning.md", "tutorial-excel.md", "tutorial-ptv.md", "tutorial-water.md")
+QUICK = ("choosing.md", "planning.md", "tutorial-excel.md", "tutorial-water.md")
 
 ELSEWHERE = ".ci/run runs it in a fresh clone"
 MINUTES = "minutes of processor time"

@@ -93,6 +93,7 @@ def test_every_option_that_its_steps_advise_is_one_of_its_own_and_a_key_of_surve
                 assert option[2:].replace("-", "_") in {*OF_PAIR, "overwrite", "out"}, option
 
 
+@pytest.mark.acceptance
 def test_it_ends_with_where_the_results_are_and_what_to_open(tmp_path):
     control, _ = write_tables(tmp_path, small=True)
     photos = write_small_photos(tmp_path)

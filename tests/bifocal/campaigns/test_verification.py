@@ -50,6 +50,7 @@ def states(found: dict) -> dict[str, str]:
     return {one["file"]: one["state"] for one in found["files"] if one["state"] != "unchanged"}
 
 
+@pytest.mark.acceptance
 def test_the_report_tells_project_lenses_ties_and_how_it_was_made_and_is_told_again(made):
     out = made / "again.html"
     done = CliRunner().invoke(main, ["report", str(made / "wall"), "--out", str(out)])
@@ -162,6 +163,7 @@ def test_a_report_whose_worked_point_was_written_anew_is_noticed(wall):
     assert not found["worked"][0]["holds"]
 
 
+@pytest.mark.acceptance
 def test_products_made_anew_have_the_same_bytes_and_sources_are_known_by_their_hash(made, wall):
     before = state_of(wall)
     (wall / ".hashes.json").unlink()

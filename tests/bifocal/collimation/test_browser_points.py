@@ -67,6 +67,7 @@ def test_a_pick_is_nudged_to_a_known_centre_at_every_zoom(page: Driver) -> None:
         assert max(abs(np.subtract(found, truth))) <= TENTHS + 1e-9
 
 
+@pytest.mark.acceptance
 def test_snap_centres_a_pick_on_the_target_at_every_zoom(page: Driver) -> None:
     """A click is good to a pixel or two of the screen: some ten of the photo where it is small."""
     for index, (name, zoom) in enumerate((("T08", 0.25), ("T19", 1.0), ("T30", 8.0)), start=1):

@@ -55,6 +55,7 @@ SLOW_STATE = """() => {
 }"""
 
 
+@pytest.mark.acceptance
 def test_a_job_that_is_done_shows_what_it_made_at_once(browser: Any, tmp_path: Path) -> None:
     """However long the state takes that tells of the new files."""
     with sample_survey(tmp_path) as server, tab_of(browser, server) as page:

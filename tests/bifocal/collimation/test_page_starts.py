@@ -150,6 +150,7 @@ def test_every_way_to_start_finds_the_workbooks_pair(survey, form, monkeypatch) 
     assert state["stage"] == "points"
 
 
+@pytest.mark.acceptance
 def test_homographies_in_a_workbook_are_a_pair_too(tmp_path) -> None:
     """What `solve` wrote for a pair file, taken elsewhere with its photos only."""
     folder = sample_folder(tmp_path)

@@ -108,6 +108,7 @@ def typed_rows(path, sheet: str, columns: int) -> list[tuple]:
     return body[first : first + 4]
 
 
+@pytest.mark.acceptance
 @pytest.mark.parametrize("between", [True, pytest.param(False, marks=pytest.mark.acceptance)])
 def test_rows_of_deleted_points_are_blanked_whole_and_used_again(tmp_path, between: bool) -> None:
     folder, picks = sample_folder(tmp_path), sample_picks()

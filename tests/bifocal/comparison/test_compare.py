@@ -108,6 +108,7 @@ def test_maps_without_sigma_take_it_from_their_differences():
     assert "without standard deviations" in done.remarks[0]
 
 
+@pytest.mark.acceptance
 @pytest.mark.parametrize("language", ["en", "it", "de"])
 def test_the_folder_tells_the_same_in_every_file(tmp_path: Path, language: str):
     rng = np.random.default_rng(2)

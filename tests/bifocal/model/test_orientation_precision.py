@@ -67,6 +67,7 @@ def test_the_spread_of_points_over_drawn_orientations_is_the_covariance_stated()
     np.testing.assert_allclose(spread, np.sqrt(np.diagonal(stated, axis1=1, axis2=2)), rtol=0.07)
 
 
+@pytest.mark.acceptance
 def test_control_points_take_up_most_of_it_and_the_rest_is_in_the_sigmas() -> None:
     # Small enough for no curvature; 0.3 px of picks is then about as much as what is left.
     loose = 0.15**2 * covariance()

@@ -59,6 +59,7 @@ def off(made, cameras=OBLIQUE) -> float:
     return max(abs(a / c.centre[2] - 1) for a, c in zip(found, cameras, strict=True))
 
 
+@pytest.mark.acceptance
 @pytest.mark.parametrize(
     ("times", "said"),
     [

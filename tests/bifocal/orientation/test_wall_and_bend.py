@@ -81,6 +81,7 @@ def test_relief_before_the_wall_does_not_bend_it() -> None:
     assert not shape_of_wall(x1, x2, SIZE, height).is_certain
 
 
+@pytest.mark.acceptance
 @pytest.mark.parametrize("seed", range(10, 13))
 def test_two_parallel_faces_are_no_bent_wall(seed: int) -> None:
     # Piers on both sides, 15 cm before the wall between them: all ties bend by 2.5 px.
@@ -149,6 +150,7 @@ def bent_pair(k: tuple[float, float], way: str, seed: int, monkeypatch: pytest.M
     return Pair.from_dict(found.pair.to_dict() | {"setup": found.setup}), points, seen(points, 0.5)
 
 
+@pytest.mark.acceptance
 @pytest.mark.parametrize(
     ("k", "way"),
     [

@@ -361,6 +361,7 @@ def test_a_phantom_does_not_take_the_colours_from_the_wall(wall: Path) -> None:
     assert pixels[300, 580, 0] > pixels[300, 580, 2] + 60  # what stands before it is brown
 
 
+@pytest.mark.acceptance
 def test_a_phantom_before_a_flat_wall_does_not_refuse_the_delivery(wall: Path) -> None:
     relief = ReliefMap.read(wall / "relief.tif")
     r = np.zeros_like(relief.r)

@@ -50,6 +50,7 @@ def test_the_workbook_holds_the_stations_and_two_charts_of_precision(tmp_path):
     assert run(*LENSES, *CANON, "--scale", "500", "--out", str(out), "--overwrite").exit_code == 0
 
 
+@pytest.mark.acceptance
 @pytest.mark.parametrize("language", ["en", "it", "de"])
 def test_the_workbook_follows_what_is_changed_on_site(tmp_path, language):
     """Equal to the plan as written, and to the library after d1, c2, pixels and wall change."""

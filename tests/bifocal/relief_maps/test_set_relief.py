@@ -82,6 +82,7 @@ def test_a_third_photo_measures_the_nadir_and_what_the_pair_cannot_see():
     assert held > 0.88
 
 
+@pytest.mark.acceptance
 def test_a_photo_of_something_else_is_left_out_and_named():
     taken = shot()
     noise = np.random.default_rng(3).integers(0, 255, taken.images[2].shape).astype(np.uint8)

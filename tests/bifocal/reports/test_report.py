@@ -251,6 +251,7 @@ def test_without_check_points_the_figure_is_called_optimistic(tables, tmp_path):
     assert "l'accuratezza non è provata" in text
 
 
+@pytest.mark.acceptance
 @pytest.mark.parametrize("language", ["it", "de"])
 def test_no_english_is_left_in_a_report_full_of_remarks(tables, tmp_path, language):
     pair = json.loads(PAIR.read_text(encoding="utf-8"))

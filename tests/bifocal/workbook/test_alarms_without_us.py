@@ -98,6 +98,7 @@ def test_one_of_eight_control_points_a_metre_off_turns_red_and_is_named(language
     assert named(recalculated(path, tmp_path), "g_alarm").value == 0
 
 
+@pytest.mark.acceptance
 def test_a_wrong_distance_shows_in_the_scale(tmp_path):
     path = typed(tmp_path / "s.xlsx", points=rows(WALL), control=world(WALL[:8]))
     book = openpyxl.load_workbook(path)
@@ -128,6 +129,7 @@ def test_flagged_check_points_are_left_out_and_large_errors_are_told_in_sigmas(t
     assert ends[0]["X_from"] == "#N/A"
 
 
+@pytest.mark.acceptance
 def test_forty_check_points_have_an_arrow_each(tmp_path, monkeypatch):
     monkeypatch.setattr(sys.modules[__name__], "ROWS", 45)
     places = np.random.default_rng(4).uniform((-5, -3, -0.3), (5, 3, 0.6), (40, 3)).round(3)

@@ -57,6 +57,7 @@ def test_a_workbook_of_ours_is_sound_and_a_stale_result_is_named(book, tmp_path)
     assert book.read_bytes() == before
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_functions_that_libreoffice_does_not_know_are_no_difference(tmp_path):
     write_template(tmp_path / "functions.xlsx", functions=True, rows=3)

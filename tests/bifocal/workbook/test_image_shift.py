@@ -141,6 +141,7 @@ def test_a_workbook_alone_moves_the_image_as_the_exact_relief_says(tmp_path):
     assert np.hypot(*left.T).max() < 0.3 * np.hypot(*(seen - foot).T).max()
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_corrected_coordinates_are_carried_back_to_what_was_typed(tmp_path):
     first = np.array([[1.001, 2e-3, 0.05], [-1e-3, 0.999, -0.03], [1e-5, -2e-5, 1.0]])

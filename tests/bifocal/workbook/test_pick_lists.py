@@ -119,6 +119,7 @@ def test_lists_that_cannot_be_joined_are_refused_with_what_is_wrong(tmp_path):
     assert three.exit_code == 2
 
 
+@pytest.mark.acceptance
 def test_a_workbook_is_the_pair_it_states(tmp_path):
     from PIL import Image
 

@@ -38,6 +38,7 @@ def names_in_formulas(path):
     return found
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 @pytest.mark.parametrize("content", [ideal_content, pair_content])
 def test_plain_formulas_recalculated_equal_the_library(content, tmp_path):
@@ -83,6 +84,7 @@ def test_a_plain_template_is_read_back_also_when_its_tables_are_gone(tmp_path):
     assert done.exit_code == 0, done.stderr
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_rows_below_the_prepared_ones_get_plain_formulas_and_all_ranges_reach_them(tmp_path):
     path, out = tmp_path / "plain.xlsx", tmp_path / "out.xlsx"

@@ -37,6 +37,7 @@ def with_known_points(path, use, off=0.0):
     return path
 
 
+@pytest.mark.acceptance
 def test_a_point_out_of_use_is_neither_check_nor_control_point(tmp_path):
     answer, said = solved(with_known_points(tmp_path / "a.xlsx", 0))
     assert f"Check: {BAD} takes no part: use = 0 in Points." in said

@@ -150,6 +150,7 @@ def test_prints_through_water_are_bent_like_the_sensors():
     np.testing.assert_allclose(found.xyz, through(rows(POINTS)).xyz, atol=1e-9)
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 @pytest.mark.parametrize("kind", ["new", "own", "water"])
 def test_formulas_of_prints_equal_the_library(tmp_path, kind):

@@ -144,6 +144,7 @@ def test_solving_again_changes_nothing_but_the_log(tmp_path):
     assert {name for name in a if a[name] != b[name]} <= log
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_points_below_the_prepared_rows_make_the_tables_grow(tmp_path):
     table = rows([(f"Q{i}", 1 + i / 50, 2, 0.3) for i in range(70)])

@@ -260,6 +260,7 @@ def test_every_formula_recalculated_by_libreoffice_equals_the_library(model, tmp
     assert all(row["sigma_r"] > 0.25 * 9.5 for row in shown[14:16])
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 @pytest.mark.parametrize(
     "principal_distance", [pytest.param(None, marks=pytest.mark.acceptance), 35.0]

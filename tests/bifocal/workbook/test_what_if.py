@@ -51,6 +51,7 @@ def named(book, name):
     return book[sheet.strip("'")][cell.replace("$", "")].value
 
 
+@pytest.mark.acceptance
 def test_changes_that_were_typed_are_solved_in_place(tmp_path):
     path = tmp_path / "trial.xlsx"
     write_template(path, rows=8, what_if=True)

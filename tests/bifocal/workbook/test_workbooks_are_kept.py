@@ -150,6 +150,7 @@ def test_a_centre_of_zoom_that_was_found_goes_into_the_cells_too(tmp_path, monke
         assert_recalculated_equals_cached(path, tmp_path)
 
 
+@pytest.mark.acceptance
 def test_another_language_changes_labels_and_nothing_the_user_wrote(tmp_path):
     path = with_own_chart(fill(tmp_path / "own.xlsx"))
     book = openpyxl.load_workbook(path)
@@ -403,6 +404,7 @@ def test_sheets_of_an_ods_are_not_dropped_without_a_word(tmp_path):
     assert ods.read_bytes() == kept
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_of_a_survey_workbook_saved_as_ods_only_own_sheets_are_told_of(tmp_path):
     from tests.office import convert
@@ -575,6 +577,7 @@ def test_a_coordinate_survey_becomes_one_for_pixels_in_a_new_workbook_only(tmp_p
     assert result.exit_code == 0, result.stderr
 
 
+@pytest.mark.acceptance
 @pytest.mark.parametrize(
     "names",
     [

@@ -128,6 +128,7 @@ def test_the_real_cavity_is_adjusted_to_the_known_sigma0(data_dir, tmp_path):
         assert sigma0[camera] * 1000 <= limit
 
 
+@pytest.mark.acceptance
 def test_the_real_cavity_does_not_carry_an_index_and_says_so(data_dir, tmp_path):
     out = tmp_path / "cavity.toml"
     folder = str(data_dir / "openptv_cavity")

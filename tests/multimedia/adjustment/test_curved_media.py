@@ -272,6 +272,7 @@ def test_what_these_media_lack_is_named():
         bundle_adjust(dome_project(count=10), Unknowns(media=("offset",)))
 
 
+@pytest.mark.acceptance
 def test_the_command_adjusts_a_dome_and_graded_water(tmp_path):
     salty = graded_project(noise=0.001)
     graded = replace(salty.media["port"], gradient=1e-6)

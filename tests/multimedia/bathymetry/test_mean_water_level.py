@@ -139,15 +139,11 @@ def assert_honest(pulls: np.ndarray) -> None:
     assert np.mean(np.abs(pulls) > 5) <= 0.02
 
 
-@pytest.mark.parametrize(
-    ("scene", "draws"),
-    [("both", 40), *(pytest.param(s, 150, marks=pytest.mark.acceptance) for s in BANKS)],
-)
-def test_the_sigma_of_a_level_between_banks_is_honest_in_both_tails(scene, draws) -> None:
+@pytest.mark.acceptance
+@pytest.mark.parametrize("scene", BANKS)
+def test_the_sigma_of_a_level_between_banks_is_honest_in_both_tails(scene) -> None:
     *counts, spread, slope, gross = BANKS[scene]
-    levels = [
-        mm.mean_water_level(bank(5000 + k, counts, spread, slope, gross)) for k in range(draws)
-    ]
+    levels = [mm.mean_water_level(bank(5000 + k, counts, spread, slope, gross)) for k in range(150)]
     assert_honest(np.array([(water.level - 102.4) / water.sigma for water in levels]))
 
 
@@ -202,6 +198,7 @@ def chance_bank(seed: int, crowded: float = 0.0) -> tuple[np.ndarray, float]:
     return np.column_stack([x, y, z]), level
 
 
+@pytest.mark.acceptance
 @pytest.mark.parametrize(
     "seeds",
     [range(312, 342), pytest.param(range(2000, 2400), marks=pytest.mark.acceptance)],

@@ -133,6 +133,7 @@ def test_photos_become_plates_and_those_without_a_board_are_named(tmp_path, monk
     assert not Path("none.toml").exists()
 
 
+@pytest.mark.acceptance
 @pytest.mark.parametrize("pattern", ["circles", "charuco"])
 def test_points_are_found_where_rays_say(pattern: str) -> None:
     size, grey, extent = BOARDS[pattern]
