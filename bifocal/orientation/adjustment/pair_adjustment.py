@@ -117,7 +117,7 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
         ) from None
     redundancy = max(fit.redundancy, 1)
     sigma0 = float(np.sqrt((fit.residuals @ fit.residuals) / redundancy))
-    cofactor = np.zeros((len(names), len(names)))
+    cofactor: FloatArray = np.zeros((len(names), len(names)))
     cofactor[np.ix_(free, free)] = fit.linear.cofactor
     state: PairUnknowns = fit.state.blocks["pair"][0]
     if observations.lines and observations.lines_bend_nothing:
