@@ -140,7 +140,9 @@ def assert_honest(pulls: np.ndarray) -> None:
 
 
 @pytest.mark.acceptance
-@pytest.mark.parametrize("scene", BANKS)
+@pytest.mark.parametrize(
+    "scene", ["both", *(pytest.param(s, marks=pytest.mark.long) for s in BANKS if s != "both")]
+)
 def test_the_sigma_of_a_level_between_banks_is_honest_in_both_tails(scene) -> None:
     *counts, spread, slope, gross = BANKS[scene]
     levels = [mm.mean_water_level(bank(5000 + k, counts, spread, slope, gross)) for k in range(150)]
@@ -201,7 +203,7 @@ def chance_bank(seed: int, crowded: float = 0.0) -> tuple[np.ndarray, float]:
 @pytest.mark.acceptance
 @pytest.mark.parametrize(
     "seeds",
-    [range(312, 342), pytest.param(range(2000, 2400), marks=pytest.mark.acceptance)],
+    [range(312, 342), pytest.param(range(2000, 2400), marks=pytest.mark.long)],
     ids=["some", "many"],
 )
 def test_no_chance_bank_is_taken_for_the_water(seeds) -> None:
