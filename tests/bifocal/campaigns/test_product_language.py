@@ -68,7 +68,7 @@ def english(folder: Path) -> set[str]:
 
 
 @pytest.mark.acceptance
-@pytest.mark.parametrize("language", ["it", "de"])
+@pytest.mark.parametrize("language", [pytest.param("it", marks=pytest.mark.long), "de"])
 def test_products_hold_no_english(tmp_path, language):
     control, check = write_tables(tmp_path)
     out = tmp_path / "torre"

@@ -42,6 +42,7 @@ def dropped(page: Driver, photos: list[Path]) -> None:
 
 
 @pytest.mark.acceptance
+@pytest.mark.long
 def test_a_facade_from_two_photos_to_the_drawing_by_clicks_alone(
     browser: Any, tmp_path: Path
 ) -> None:
@@ -136,6 +137,7 @@ def client_measures(browser: Any, path: Path) -> None:
 
 
 @pytest.mark.acceptance
+@pytest.mark.long
 def test_a_thousand_points_pan_nearly_as_smoothly_as_none(browser: Any, tmp_path: Path) -> None:
     """Beside the same page without points, for machines and their load differ."""
     places = np.random.default_rng(5).uniform((20, 20), (1500, 1000), (1000, 2)).tolist()

@@ -99,6 +99,7 @@ def draw(page: Driver) -> None:
 
 
 @pytest.mark.acceptance
+@pytest.mark.long
 @pytest.mark.parametrize("scene", SCENES)
 def test_a_church_from_nothing_to_points_and_drawing(
     browser: Any, tmp_path: Path, data_dir: Path, scene: str

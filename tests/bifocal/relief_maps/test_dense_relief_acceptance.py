@@ -36,7 +36,9 @@ def edge_distance(truth: np.ndarray) -> np.ndarray:
     return cv2.distanceTransform((~steps).astype(np.uint8), cv2.DIST_L2, 3)
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    "name", ["35/19", *(pytest.param(s, marks=pytest.mark.long) for s in SCENES if s != "35/19")]
+)
 def test_rendered_facades_are_measured_as_well_as_promised(name):
     seed, d2, palette, exposure, median, beyond, rmse, ortho = SCENES[name]
     cameras = bifocal_cameras(d2=d2)

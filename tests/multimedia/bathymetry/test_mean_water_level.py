@@ -220,7 +220,7 @@ def test_no_chance_bank_is_taken_for_the_water(seeds) -> None:
     ("seeds", "worst"),
     [
         (range(16, 22), 0),
-        pytest.param(range(1000, 1300), 4, marks=pytest.mark.acceptance),
+        pytest.param(range(1000, 1300), 4, marks=[pytest.mark.acceptance, pytest.mark.long]),
     ],
 )
 def test_points_that_crowd_on_a_bank_are_not_the_water_or_a_remark_says_so(seeds, worst) -> None:
