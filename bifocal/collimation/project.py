@@ -140,7 +140,28 @@ def _best_of(photos: PhotoSet, source: Path) -> Path:
     return pair
 
 
-def holds(photos: PhotoSet, pair: Pair, files: Sequence[Path]) -> bool:
+class JoinedSet:
+    """The set that holds a pair and all photos of a survey; read again only when one is another."""
+
+    def __init__(self) -> None:
+        self._known: tuple[object, bool] | None = None
+
+    def of(
+        self, candidates: Sequence[Path | None], pair: Pair, files: Sequence[Path]
+    ) -> Path | None:
+        """Return the first file that is such a set, if one is."""
+        for path in candidates:
+            if path is None or not path.is_file():
+                continue
+            facts = path, path.stat().st_mtime_ns, pair, tuple(files)
+            if self._known is None or self._known[0] != facts:
+                self._known = facts, _holds(PhotoSet.read(path), pair, files)
+            if self._known[1]:
+                return path
+        return None
+
+
+def _holds(photos: PhotoSet, pair: Pair, files: Sequence[Path]) -> bool:
     """Whether a set is one of these photos, and a pair two of them as the set has them."""
     names = {photo.path.resolve() for photo in photos.photos}
     known = [photo.plane_from_pixel for photo in photos.photos]

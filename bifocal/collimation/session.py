@@ -3,32 +3,31 @@
 from __future__ import annotations
 
 import copy
-import queue
 import threading
 import uuid
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, cast
 
 from bifocal.collimation.commands import changes_of
+from bifocal.collimation.drawn_faces import DrawnFaces
 from bifocal.collimation.fields import NOTES, fields_of
 from bifocal.collimation.jobs import JobRunner
 from bifocal.collimation.journal import Journal
+from bifocal.collimation.listeners import Listeners
 from bifocal.collimation.live_orientation import LiveOrientation
 from bifocal.collimation.live_results import LiveResults
 from bifocal.collimation.pictures import Pictures
 from bifocal.collimation.products import Products, accept_pair, discard_pair
-from bifocal.collimation.project import SurveyFiles, holds
+from bifocal.collimation.project import JoinedSet, SurveyFiles
 from bifocal.collimation.proposals import measure_of, rescale
 from bifocal.collimation.records import Change, PickedPoint, SurveyState
-from bifocal.collimation.shapes import commands_for, keep_faces, outlines_of
+from bifocal.collimation.shapes import outlines_of
 from bifocal.collimation.workbook.rows import PointRow, row_of
 from bifocal.collimation.workbook.setup import ideal_setup, pair_of, typed_of
 from bifocal.collimation.workbook.sync import WorkbookSync
-from bifocal.faces.faces import Faces
-from bifocal.faces.faces_files import beside
 from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
@@ -65,7 +64,8 @@ class Session:
         self.files = files
         self.language = language
         self.lock = threading.RLock()
-        self.listeners: set[queue.SimpleQueue[dict[str, Any] | None]] = set()
+        listeners = Listeners()
+        self.tell, self.listen = listeners.tell, listeners.listen
         #: Tells this run of the server from the one before it, whose revisions mean nothing now.
         self.serving = uuid.uuid4().hex
         self.revision = 0
@@ -74,8 +74,8 @@ class Session:
         self.orientation: tuple[object, LiveOrientation] | None = None
         self.proposal: dict[str, Any] | None = None
         self.good: tuple[LiveResults, dict[str, Any] | None] | None = None
-        self._joined: tuple[object, bool] | None = None
-        self._kept: tuple[dict[str, Any], Pair] | None = None
+        self._joined = JoinedSet()
+        self._faces = DrawnFaces(lambda: self.state, lambda one: self._carry_out(one, write=True))
         #: Faces that the program would draw.
         self.suggested: list[dict[str, Any]] = []
         self.state = SurveyState()
@@ -99,7 +99,7 @@ class Session:
             self._remember_files()
             self._show_proposal()
             self.show_products()
-            self.take_faces()
+            self._faces.take(self.pictures.pair, self.files.pair)
             self.sync.step()
         except BaseException:
             self.journal.close()
@@ -141,15 +141,8 @@ class Session:
     def photo_set(self) -> Path | None:
         """File of the set that holds the accepted pair and all further photos, if there is one."""
         pair = self.accepted_pair
-        for path in (self.products.current("set"), self.files.photo_set):
-            if pair is None or path is None or not path.is_file():
-                continue
-            facts = path, path.stat().st_mtime_ns, pair, self.all_photos
-            if self._joined is None or self._joined[0] != facts:
-                self._joined = facts, holds(PhotoSet.read(path), pair, self.all_photos)
-            if self._joined[1]:
-                return path
-        return None
+        candidates = self.products.current("set"), self.files.photo_set
+        return None if pair is None else self._joined.of(candidates, pair, self.all_photos)
 
     def join(self, path: Path) -> None:
         """Let the pair be that of a set that a job adjusted."""
@@ -158,17 +151,11 @@ class Session:
             PhotoSet.read(path).pair(0, 1).write(target, overwrite=True)
             self.note_made("pair", [target.name])
             self.use_pair(target)
-            self._keep_faces()
+            self._faces.keep(self.pictures.pair, self.files.pair)
             self.changed()
 
     def check_new_photos(self) -> None:
-        """Refuse other photos where points were picked already.
-
-        Raises
-        ------
-        InputError
-            Then.
-        """
+        """Refuse other photos, by an InputError, where points were picked already."""
         if self.state.points or self.state.control:
             raise InputError(remark("page.begun_before"))
 
@@ -330,27 +317,6 @@ class Session:
             self._write(record)
             self.journal.records.append(record)
 
-    def _keep_faces(self) -> None:
-        """Write what was drawn for the relief beside the pair, where it is another now."""
-        pair, file = self.pictures.pair, self.files.pair
-        if pair is None or file is None:
-            return
-        facts = dict(self.state.shapes), pair
-        if self._kept is None or self._kept[0] != facts[0] or self._kept[1] is not pair:
-            if self.state.shapes or self._kept is not None:
-                keep_faces(self.state, pair, file)
-            self._kept = facts
-
-    def take_faces(self) -> None:
-        """Take over what a file beside the pair holds, where it was drawn by others."""
-        pair, file = self.pictures.pair, self.files.pair
-        path = None if file is None else beside(file)
-        if pair is None or path is None or not path.is_file():
-            return
-        for command in commands_for(Faces.read(path), self.state, pair):
-            self._carry_out(command, write=True)
-        self._kept = dict(self.state.shapes), pair
-
     # ---- commands
 
     def command(self, command: Mapping[str, Any]) -> Any:
@@ -369,7 +335,7 @@ class Session:
                 return self.answered[known]
             result = self._checked(fields_of(command))
             self.follow_scale()
-            self._keep_faces()
+            self._faces.keep(self.pictures.pair, self.files.pair)
             if isinstance(known, str):
                 self._remember_answer(known, result)
             self.changed()
@@ -525,17 +491,6 @@ class Session:
         with self.lock:
             self.revision += 1
             self.tell({"revision": self.revision})
-
-    def tell(self, event: dict[str, Any] | None) -> None:
-        """Tell all listeners something; None ends them."""
-        for listener in list(self.listeners):
-            listener.put(event)
-
-    def listen(self) -> tuple[queue.SimpleQueue[dict[str, Any] | None], Callable[[], None]]:
-        """Return a queue of events, and how to leave it."""
-        events: queue.SimpleQueue[dict[str, Any] | None] = queue.SimpleQueue()
-        self.listeners.add(events)
-        return events, lambda: self.listeners.discard(events)
 
     def close(self) -> None:
         """End the session."""
