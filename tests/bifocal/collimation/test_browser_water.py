@@ -109,8 +109,8 @@ def test_a_facade_under_water_is_oriented_and_measured_by_clicks(
             assert shown["media"]["indices"] == list(INDICES)
             assert shown["media"]["z0"] == PORT
         told = page.tab.get_by_test_id("orientation-values")
-        # After *Accept* the page goes on, and folds them away.
-        told.get_by_text("1.4900 (10.0 mm)").wait_for(state="attached")
+        page.click("mode-orientation")  # after *Accept* the page goes on to the points
+        told.get_by_text("1.4900 (10.0 mm)").wait_for()
         page.click("mode-points")
         for count, place in enumerate(MEASURED.values(), start=1):
             page.click("pick")
