@@ -26,10 +26,7 @@ def check_sharp(name: str, image: ByteArray) -> None:
     """Refuse a blurred photo."""
     value = sharpness(image)
     if value < VALIDATION.blurred:
-        raise GeometryError(
-            f"{name}: the photo is blurred (fine detail {value:.2f}, a sharp photo has 0.3). Take "
-            "it again from a tripod, focused on the wall; nothing later can make up for it."
-        )
+        raise GeometryError(remark("align.blurred", of=name, value=value))
 
 
 def check_different(name1: str, name2: str, images: Images) -> None:
