@@ -38,10 +38,7 @@ def check_different(name1: str, name2: str, images: Images) -> None:
     a, b = (part - part.mean() for part in small)
     alike = float((a * b).sum() / max(np.sqrt((a * a).sum() * (b * b).sum()), 1e-9))
     if alike > 0.9995:
-        raise SamePhotoError(
-            f"{name1} and {name2} are the same photo. The method needs two photos taken from two "
-            "distances: a long lens from afar and a short one from near."
-        )
+        raise SamePhotoError(remark("align.same_photo", name1=name1, name2=name2))
 
 
 def unknown_lenses(interiors: Interiors, names: tuple[str, str]) -> str:

@@ -117,10 +117,7 @@ def read_rows(path: Path) -> ReadBook:
     points = survey.points
     in_pixels = "px" in (survey.unit or survey.setup.unit)
     if points.is_cartesian.any() and not (in_pixels and is_survey(path)):
-        raise InputError(
-            f"{path.name}: its points are image coordinates of an ideal pair, the page picks raw "
-            "pixels; give another workbook with --workbook."
-        )
+        raise InputError(remark("page.ideal_workbook", of=path.name))
     pixels1 = np.where(points.is_cartesian[:, None], points.xy1, points.pixels1)
     pixels2 = np.where(points.is_cartesian[:, None], points.xy2, points.pixels2)
     # Relief measured beside the points is the user's own column; the page keeps the sheet Check.
@@ -250,10 +247,7 @@ def _edit(
     area = editor.table("tblPoints")
     places = _IDEAL if pair_file is None and read.survey.setup.matrices is None else _RAW
     if area is None or places[0] not in area.headings():
-        raise InputError(
-            f"{editor.path.name}: is no survey workbook for raw pixels; give another one with "
-            "--workbook."
-        )
+        raise InputError(remark("page.no_pixel_workbook", of=editor.path.name))
     has_lens = "ucol1" in area.headings()
     if has_lens != any(pair.photo(number).lens is not None for number in (1, 2)):
         raise InputError(
@@ -262,10 +256,7 @@ def _edit(
             "not; give another workbook with --workbook."
         )
     if pair.refracted and not read.survey.setup.media:
-        raise InputError(
-            f"{editor.path.name}: its formulas are made for photos in air, the orientation looks "
-            "through media; give another workbook with --workbook."
-        )
+        raise InputError(remark("page.workbook_in_air", of=editor.path.name))
     if pair_file is not None:
         _set_up(editor, read, pair, pair_file)
     elif places is _IDEAL:
