@@ -19,12 +19,7 @@ from bifocal.remarks import remark
 from photocore.arrays import Float32Array
 from photocore.errors import InputError
 from photocore.output import all_or_none, atomic_path, check_all_writable, is_virtual
-from photocore.raster import (
-    RasterFile,
-    RasterWriter,
-    corner_transform,
-    create_geotiff,
-)
+from photocore.raster import RasterFile, RasterWriter, corner_transform, create_geotiff
 
 #: Name of the local system every raster is in.
 LOCAL_CRS = (

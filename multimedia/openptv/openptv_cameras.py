@@ -15,12 +15,7 @@ import numpy as np
 from multimedia.media.camera import EXTERIOR, Camera, Sensor
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.interfaces import Interfaces
-from multimedia.media.lens_conversion import (
-    brown_of,
-    farthest_miss,
-    nearest_camera,
-    sensor_rays,
-)
+from multimedia.media.lens_conversion import brown_of, farthest_miss, nearest_camera, sensor_rays
 from multimedia.media.projection import project
 from multimedia.refraction.layers import Layers
 from multimedia.remarks import remark

@@ -13,13 +13,7 @@ import numpy as np
 
 from bifocal.collimation.live_results import observations
 from bifocal.collimation.records import Known, PickedPoint, Picks, Pixel
-from bifocal.collimation.workbook.outlines import (
-    KEYS,
-    TABLE,
-    Outlines,
-    add_outlines,
-    outline_cells,
-)
+from bifocal.collimation.workbook.outlines import KEYS, TABLE, Outlines, add_outlines, outline_cells
 from bifocal.collimation.workbook.setup import typed_setup
 from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
@@ -35,13 +29,7 @@ from bifocal.workbook.reading.reader import read_survey
 from bifocal.workbook.template_workflow import write_survey
 from bifocal.workbook.workflow import solve
 from photocore.errors import InputError, PhotogrammetryError
-from photocore.output import (
-    atomic_path,
-    check_not_open,
-    kept_copy,
-    relative_name,
-    scratch_beside,
-)
+from photocore.output import atomic_path, check_not_open, kept_copy, relative_name, scratch_beside
 from photocore.workbook.changing.cells import CellValue, name_cell
 from photocore.workbook.changing.editor import WorkbookEditor
 from photocore.workbook.changing.named_cells import place_of
