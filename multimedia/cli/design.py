@@ -86,9 +86,9 @@ def _lines(result: Design) -> Iterator[str]:
         (f"{d:.4g}", f"{x:.3g}", f"{y:.3g}", f"{z:.3g}", f"{a:.1f}", f"{b:.1f}")
         for d, x, y, z, a, b in result.by_depth.tolist()
     ]
-    yield f"Expected precision [{unit}] and intersection angle [deg]"
+    yield f"Expected precision, to first order [{unit}], and intersection angle [deg]"
     yield text_table(("depth", "sigma X", "sigma Y", "sigma Z", "angle", "in air"), rows)
-    yield f"\nWhat unknown media do to coordinates, RMS [{unit}]"
+    yield f"\nWhat unknown media do to coordinates, to first order, RMS [{unit}]"
     yield text_table(
         ("unknown", "wrong by", "dX", "dY", "dZ"),
         [(n, s, *(f"{v:.3g}" for v in moved)) for n, s, moved in result.sensitivities],
@@ -126,7 +126,7 @@ def _lines(result: Design) -> Iterator[str]:
             [(n, *(f"{v:.3g}" for v in e), f"{s * 1000:.2f}") for n, e, s in cases],
         )
     if result.models:
-        yield f"\nSimplified models in place of the rigorous one, error at the points [{unit}]"
+        yield f"\nSimplified models, not the rigorous one: error at the points, to first order [{unit}]"
         yield text_table(
             ("model", "RMS", "largest"),
             [(name, f"{rms:.3g}", f"{largest:.3g}") for name, rms, largest in result.models],

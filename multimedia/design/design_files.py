@@ -30,7 +30,7 @@ def write_design_workbook(path: Path | str, design: Design, *, overwrite: bool =
     headings = ("depth", "sigma X", "sigma Y", "sigma Z", "angle deg", "in air deg")
     fill_sheet(sheet, headings, design.by_depth.tolist())
     chart = LineChart()
-    chart.title = f"Expected sigma over depth [{design.unit}]"
+    chart.title = f"Expected sigma, to first order [{design.unit}]"
     last = 1 + len(design.by_depth)
     chart.add_data(
         Reference(sheet, min_col=2, max_col=4, min_row=1, max_row=last), titles_from_data=True
@@ -130,7 +130,7 @@ def _draw_precision(axes: Axes, design: Design) -> None:
     factor, unit = _shown([float(sigmas.max())], design.unit)
     for sigma, (name, style) in zip(sigmas.T, _STYLES.items(), strict=True):
         axes.plot(depth, factor * sigma, label=f"sigma {name}", **style)
-    axes.set(xlabel=f"depth [{design.unit}]", ylabel=f"[{unit}]", title="Expected precision")
+    axes.set(xlabel=f"depth [{design.unit}]", ylabel=f"[{unit}]", title="Expected precision, first order")
     axes.set_ylim(0, 1.15 * factor * float(sigmas.max()))
     axes.locator_params(axis="x", nbins=5)
 
