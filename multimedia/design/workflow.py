@@ -60,13 +60,13 @@ def design_ring(
     """
     if not 0 <= depths[0] < depths[1]:
         raise InputError(
-            f"depths: {depths[0]:g} to {depths[1]:g}: give the least and the largest depth under "
-            "the last face, positive downwards."
+            f"depths: {depths[0]:g} to {depths[1]:g} {unit}: give the least and the largest depth "
+            "under the last face, positive downwards."
         )
     if max(*extent, depths[1]) > FARTHEST * distance:
         raise InputError(
             f"extent, depths: the object space is more than {FARTHEST:g} times as large as the "
-            f"distance of the cameras, {distance:g}; check the units."
+            f"distance of the cameras, {distance:g} {unit}; check the units."
         )
     interface = FlatInterface(layers=Layers(indices=tuple(indices), thicknesses=tuple(thicknesses)))
     points = object_grid(extent, depths)
