@@ -47,11 +47,8 @@ def write_design_workbook(path: Path | str, design: Design, *, overwrite: bool =
     fill_sheet(
         book.create_sheet("Placement"),
         ("half angle [deg]", *sigmas, "ray angle [deg]"),
-        [
-            (np.degrees(p.half_angle), *p.sigma, np.degrees(p.angle))
-            for p in design.placements
-        ],
-    )  # fmt: skip
+        [(np.degrees(p.half_angle), *p.sigma, np.degrees(p.angle)) for p in design.placements],
+    )
     if design.costs is not None:
         costs = design.costs
         fill_sheet(
