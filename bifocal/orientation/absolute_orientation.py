@@ -49,6 +49,7 @@ from bifocal.orientation.starts.refracted_start import features_of, refracted_st
 from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.tie_points import likely_on_wall
 from bifocal.orientation.tuning import BEND, CONTROL, ORDER, REMARKS, SLIPS, STAGES, TIES
+from bifocal.orientation.walls.reference_plane import rivals_in_words
 from bifocal.orientation.walls.wall_shape import WallShape, shape_between
 from bifocal.remarks import remark
 from photocore.adjustment import OUTLIER_LIMIT
@@ -191,6 +192,9 @@ def _by_refracted_ties(given: Given, lacking: str) -> OrientedPair:
     first, second = (replace(i, sigma_radial=0.0) for i in given.interiors)
     observations = observations_of(given, (first, second), ties, picks)
     pair = oriented_in_stages(observations, start, given.photos, given.site, with_control=False)
+    rivals = rivals_in_words(pair.faces, given.site)
+    if rivals and given.media.depth is not None:
+        raise GeometryError(remark("refused.depth_of_wall", rivals=rivals))
     refuse_impossible_media(pair.adjusted, given.media)
     check_room(pair.adjusted.media, pair.adjusted.cameras)
     ties1, ties2 = pair.observations.straight_ties(pair.adjusted.radial)

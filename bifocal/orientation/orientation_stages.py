@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from bifocal.model.interior_orientation import SIGMA_RADIAL, Cameras, Images, Interior
-from bifocal.model.orientation_precision import NAMES
 from bifocal.orientation import facade_lines, validation
 from bifocal.orientation.adjustment.frame_turn import family_test, line_test
 from bifocal.orientation.adjustment.pair_adjustment import (

@@ -169,9 +169,7 @@ def wall_misfit(observations: PairObservations, state: PairUnknowns) -> FloatArr
     return _wall_ties(observations, state, np.ones(len(observations.tie1), dtype=bool))[0]
 
 
-def _wall_ties(
-    observations: PairObservations, state: PairUnknowns, which: BoolArray
-) -> Equations:
+def _wall_ties(observations: PairObservations, state: PairUnknowns, which: BoolArray) -> Equations:
     """Return how far ties are off the wall plane: `_transfer`, `height_equations`. [px]"""
     rows_of = height_equations if state.media else _transfer
     return rows_of(observations, state, which)

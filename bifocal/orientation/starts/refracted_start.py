@@ -34,9 +34,7 @@ def features_of(given: Given) -> tuple[Features, Features]:
     return find_features(images[0]), find_features(images[1])
 
 
-def refracted_start(
-    given: Given, found: tuple[Features, Features]
-) -> tuple[PairUnknowns, Ties]:
+def refracted_start(given: Given, found: tuple[Features, Features]) -> tuple[PairUnknowns, Ties]:
     """Return approximate cameras and common points, seen through the media and freed of them.
 
     Raises
@@ -52,9 +50,11 @@ def refracted_start(
         free1, free2 = straightened(square, seen[0], seen[1])
         features = replace(found[0], pixels=free1), replace(found[1], pixels=free2)
         ties = find_ties(*features, (first, second), given.names)
-        picks = given.control.pixels1, given.control.pixels2
-        picks = [i.ideal(pixels) for i, pixels in zip(given.interiors, picks, strict=True)]
-        known1, known2 = straightened(square, picks[0], picks[1])
+        first_picks, second_picks = (
+            interior.ideal(pixels)
+            for interior, pixels in zip(given.interiors, given.control.picks, strict=False)
+        )
+        known1, known2 = straightened(square, first_picks, second_picks)
         control = replace(given.control, pixels1=known1, pixels2=known2)
         cameras = first_cameras(ties, (first, second))
         cameras = scaled(cameras, replace(given, control=control), (first, second))
@@ -90,13 +90,14 @@ def _supposed(given: Given) -> tuple[float, float]:
     (first, second), site, control = given.interiors, given.site, given.control
     d1, d2 = site.distances
     ratio = min(second.focal / first.focal, 0.8)
-    if d1 is None and site.delta_d and d2 is None:
+    if d1 is None and d2 is None and site.delta_d:
         d1 = site.delta_d / (1.0 - ratio)
-    if d1 is None and d2 is None and control.lengths:
+    elif d1 is None and d2 is None and control.lengths:
         a, b, length = control.lengths[0]
         ends = first.ideal(control.pixels1[[a, b]])
         apparent = length * first.focal / float(np.linalg.norm(ends[0] - ends[1]))
         d1 = apparent * given.media.layers.indices[-1] / given.media.layers.indices[0]
     if d1 is None and d2 is None:
         raise GeometryError(remark("refused.no_scale"))
-    return d1 or d2 / ratio, d2 or d1 * ratio
+    far = d1 if d1 is not None else (d2 or 0.0) / ratio
+    return far, far * ratio if d2 is None else d2

@@ -355,7 +355,7 @@ def test_common_points_say_that_their_bent_rays_meet():
         assert pair.adjusted.sigma("turn X", number) < 0.9 * alone.adjusted.sigma("turn X", number)
 
 
-def pair_of_features(monkeypatch, kind, draw, *, shuffled=False, **site):
+def pair_of_features(monkeypatch, kind, draw, **site):
     """Return a pair made of features of 0.2 px alone, and errors of 60 points, shape (60, 3). [m]
 
     Ports are square to the axes of tilted cameras; of the wall 840 points, two fifths of them on
@@ -378,9 +378,7 @@ def pair_of_features(monkeypatch, kind, draw, *, shuffled=False, **site):
         Features(pixels=p[inside], size=ones, direction=ones, descriptors=codes, reduction=1.0)
         for p in pixels
     )
-    monkeypatch.setattr(
-        "bifocal.orientation.absolute_orientation.features_of", lambda given: found
-    )
+    monkeypatch.setattr("bifocal.orientation.absolute_orientation.features_of", lambda _: found)
     photos = [
         PhotoInput(grey=None, name=n, interior=lens(c, factor=np.exp(rng.normal(0, 5e-4))))
         for n, c in zip("ab", taken, strict=True)
@@ -563,7 +561,10 @@ def test_a_set_up_as_typed_goes_through_media_with_what_is_uncertain_of_it(place
     ("options", "message"),
     [
         (["--indices", "1,1.337", "--depth", "0.6", "--auto"], "blurred"),
-        (["--indices", "1,1.337", "--port", "0.05", "--auto", "--estimate", "lean1"], "normal axis"),
+        (
+            ["--indices", "1,1.3", "--port", "0.05", "--auto", "--estimate", "lean1"],
+            "normal axis",
+        ),
         (["--indices", "1,1.337", "--depth", "0.6", "--port", "0.05"], "one of the two"),
         (["--indices", "1,1.337"], "one of the two"),
         (["--depth", "0.6"], "--depth goes with --indices"),
