@@ -17,6 +17,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bifocal.remarks import remark
 from photocore.arrays import FloatArray, all_positive, as_floats, check_shapes
 from photocore.errors import GeometryError
 from photocore.series import keeps_index
@@ -251,10 +252,5 @@ def _distances(d1: ArrayLike, d2: ArrayLike) -> tuple[FloatArray, FloatArray]:
     both = np.broadcast_arrays(far, near)
     one, other = (float(array[~(both[0] > both[1])].flat[0]) for array in both)
     if one == other:
-        raise GeometryError(
-            f"d1 and d2 are both {one:g} m: the two photos must be taken from different distances."
-        )
-    raise GeometryError(
-        f"d1 = {one:g} m is shorter than d2 = {other:g} m, but camera 1 is the far one: exchange "
-        "the photos together with their distances."
-    )
+        raise GeometryError(remark("equations.one_distance", one=one))
+    raise GeometryError(remark("equations.exchanged", one=one, other=other))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,8 @@ _RAW = (
     ".raf .raw .rw2 .rwl .sr2 .srf .srw .x3f"
 )
 RAW_ENDINGS = frozenset(_RAW.split())
+#: What Pillow raises of a preview that is no picture, or whose EXIF data are damaged.
+NO_PREVIEW = (OSError, SyntaxError, ValueError, struct.error)
 #: How camera raw is developed: the same way for every photo, no brightness of its own.
 DEVELOPED = {"use_camera_wb": True, "no_auto_bright": True, "output_bps": 16}
 
@@ -60,6 +63,8 @@ def raw_info(path: Path) -> tuple[tuple[int, int], Any]:
     from PIL import Image
 
     with _raw(path) as raw:
+        import rawpy
+
         sizes = raw.sizes
         size = (sizes.width, sizes.height)
         if sizes.flip & 4:
@@ -70,7 +75,7 @@ def raw_info(path: Path) -> tuple[tuple[int, int], Any]:
             if isinstance(preview.data, bytes):
                 exif = Image.open(io.BytesIO(preview.data)).getexif()
                 exif.pop(274, None)  # it is developed upright
-        except Exception:
+        except (rawpy.LibRawError, *NO_PREVIEW):
             exif = {}
     return size, exif
 

@@ -21,6 +21,7 @@ from pathlib import Path
 from photocore import interrupts
 from photocore.errors import InputError
 from photocore.provenance import note_output
+from photocore.remarks import remark
 from photocore.textfile import check_name
 
 #: Temporary names tell the machine and the process, so that what a killed run left is known.
@@ -62,10 +63,7 @@ def check_writable(path: Path | str, *, overwrite: bool) -> Path:
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name a file to write.")
     if path.is_symlink() and not path.exists():
-        raise InputError(
-            f"{path}: is a link to {path.readlink()}, which does not exist. Remove the link, or "
-            "name another file."
-        )
+        raise InputError(remark("output.dangling", of=path, target=path.readlink()))
     if path.exists() and not path.is_file():
         raise InputError(f"{path}: is a device or a pipe; name a file to write.")
     real = path.resolve()
@@ -127,9 +125,7 @@ def check_not_input(path: Path | None, *inputs: Path | str | None) -> None:
     for given in inputs:
         if given is not None and Path(given).exists() and path.samefile(given):
             other = free_path(path.parent, f"{path.stem}-result", path.suffix).name
-            raise InputError(
-                f"{path}: is one of the files that are read; name another output, e.g. {other}."
-            )
+            raise InputError(remark("output.is_read", of=path, other=other))
 
 
 def check_ending(path: Path | None, rule: str, *endings: str) -> None:
@@ -155,10 +151,7 @@ def check_not_open(path: Path) -> None:
     locks = {"Excel": f"~${path.name}", "LibreOffice": f".~lock.{path.name}#"}
     for program, name in locks.items():
         if (path.parent / name).exists():
-            raise InputError(
-                f"{path}: is open in {program}. Close it there and try again, or name another file "
-                f"to write. (If it is not open, delete the left-over file {name}.)"
-            )
+            raise InputError(remark("output.is_open", of=path, program=program, name=name))
 
 
 def free_path(folder: Path, stem: str, ending: str = "") -> Path:
@@ -413,10 +406,7 @@ def _second_name(place: Path) -> Path:
 
 
 def _not_written(path: Path, error: OSError) -> InputError:
-    return InputError(
-        f"{path}: could not be written ({error.strerror or error}); nothing was left behind. "
-        "Free some space or choose another place, and close the file in other programs."
-    )
+    return InputError(remark("output.unwritten", of=path, why=error.strerror or error))
 
 
 #: Stem of a temporary file, from that of its output.

@@ -88,7 +88,8 @@ class Remarks:
         if language == LANGUAGES[0]:
             return str(text)
         for entry in self._entries:
-            if all(literal in text for literal in entry.literals):
+            # The longest alone first: it tells nearly all of them apart.
+            if entry.literals[0] in text and all(part in text for part in entry.literals):
                 text = entry.pattern.sub(partial(self._worded, entry, language), text)
         return str(text)
 
@@ -116,7 +117,7 @@ class _Entry:
 
     def __init__(self, texts: Mapping[str, str]) -> None:
         parts = list(Formatter().parse(texts["en"]))
-        self.literals = [literal for literal, *_ in parts if literal]
+        self.literals = sorted((text for text, *_ in parts if text), key=len, reverse=True)
         self.nested = {name for _, name, _, mark in parts if name and mark == "s"}
         self.pattern = re.compile("".join(_patterns(parts)))
         self.texts = {key: re.sub(r"(?<=\w)[:!][^{}]*}", "}", text) for key, text in texts.items()}

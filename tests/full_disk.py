@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -15,9 +16,12 @@ def full_after(size: int) -> Iterator[None]:
     resource = pytest.importorskip("resource")
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     usual = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    # A module imported here would leave bytecode that ends there too, and break later runs.
+    written, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
         signal.signal(signal.SIGXFSZ, usual)
+        sys.dont_write_bytecode = written

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.special import fdtri
 
 from bifocal.model.lens import Lens
+from bifocal.remarks import remark
 from photocore.arrays import FloatArray, IntArray
 from photocore.camera.boards import BoardView
 from photocore.errors import GeometryError, InputError
@@ -100,10 +101,7 @@ def lens_of_views(
     dropped: list[str] = []
     while True:
         if len(kept) < 3:
-            raise InputError(
-                f"{len(kept)} usable photo(s) of the board; take at least 3, better 10, with the "
-                "board tilted differently and in every corner of the photo."
-            )
+            raise InputError(remark("calibration.few_boards", count=len(kept)))
         best = _solve(kept, image_size, model)
         rms = {view.name: float(v) for view, v in zip(kept, best.per_view, strict=True)}
         worst = max(rms, key=lambda name: rms[name])
@@ -233,9 +231,7 @@ def _solve_fisheye(views: Sequence[BoardView], size: tuple[int, int]) -> _LensFi
 def _refuse_undetermined(matrix: FloatArray) -> None:
     """Refuse the camera matrix of an adjustment that ran away."""
     if not (np.isfinite(matrix).all() and (np.diag(matrix) > 0).all()):
-        raise GeometryError(
-            "the photos do not determine the lens: tilt the board differently from photo to photo."
-        )
+        raise GeometryError(remark("calibration.undetermined"))
 
 
 def _field_of_view(matrix: FloatArray, size: tuple[int, int]) -> float:

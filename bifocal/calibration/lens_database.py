@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.model.lens import Lens
+from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.camera.pinhole import camera_matrix
 from photocore.errors import InputError, MissingExtraError
@@ -176,10 +177,7 @@ def _profile(
     modifier.initialize(focal, info.aperture or 8.0, info.subject_distance or 10.0)
     mapped = modifier.apply_geometry_distortion()
     if mapped is None:
-        raise InputError(
-            f"{info.path}: the database has no distortion data for {glass.model}; "
-            "calibrate the lens with `bifocal calibrate`."
-        )
+        raise InputError(remark("calibration.no_distortion_data", of=info.path, model=glass.model))
     centre = np.array([(width - 1) / 2, (height - 1) / 2])
     # Along both diagonals, so that any half-pixel offset of the map averages out.
     steps = np.linspace(0, 1, 400)[20:]

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from bifocal.model.lens import Lens
+from bifocal.remarks import remark
 from photocore.arrays import ByteArray, FloatArray, as_points
 from photocore.camera.pinhole import camera_matrix
 from photocore.errors import GeometryError, InputError
@@ -102,10 +103,7 @@ def calibrate_from_lines(
     usable = [as_points(line, "line", dimension=2) for line in lines]
     usable = [line for line in usable if len(line) >= 3]
     if len(usable) < 3:
-        raise InputError(
-            f"{len(usable)} usable line(s); at least 3 with 3 points each are needed, better 10 "
-            "near the edges of the photo."
-        )
+        raise InputError(remark("calibration.few_lines", count=len(usable)))
     # Unknowns in units of the half diagonal, so that the steps are of like size.
     share = 2 * focal_px / np.hypot(width, height)
     units = np.array([share**2, share**4])
@@ -127,10 +125,7 @@ def calibrate_from_lines(
     freedom = max(len(left) - 2 * len(usable) - 2, 1)
     normal = solution.jac.T @ solution.jac
     if np.linalg.cond(normal) > 1e12 or normal[0, 0] < 1e-6:
-        raise GeometryError(
-            "the lines pass through the middle of the photo, where distortion bends nothing; "
-            "take lines near its edges."
-        )
+        raise GeometryError(remark("calibration.central_lines"))
     sigmas = np.sqrt(np.diag(np.linalg.inv(normal)) * (left**2).sum() / freedom)
     before, after = (float(np.sqrt(np.mean(v**2))) for v in (straightness(np.zeros(2)), left))
     lens = replace(

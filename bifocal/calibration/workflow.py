@@ -21,6 +21,7 @@ from bifocal.calibration.plumb_line import (
     find_straight_edges,
 )
 from bifocal.model.lens import SIGMA_FOCAL, Lens
+from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
@@ -83,10 +84,7 @@ def calibrate_from_edges(
     sigma_focal = GIVEN_FOCAL if focal_px else GUESSED_FOCAL
     if focal_px is None:
         focal_px = float(np.hypot(*size))
-        remarks.append(
-            f"no focal length in EXIF: a principal distance of {focal_px:.0f} px (the photo's "
-            "diagonal) is assumed; give --focal-px if you know it."
-        )
+        remarks.append(remark("calibration.assumed_focal", focal_px=focal_px))
     if lines is not None:
         chains = _picked_lines(lines)
     else:
@@ -95,12 +93,7 @@ def calibrate_from_edges(
         result = calibrate_from_lines(chains, size, focal_px=focal_px)
     if not result.straightens:
         k1, k2 = result.lens.coefficients[:2]
-        remarks.append(
-            f"the best correction (k1 = {k1:+.4f}, k2 = {k2:+.4f}) hardly straightens the lines: "
-            "either the lens has little distortion, or these edges are not straight in reality. "
-            "The lens file therefore says that there is none. If you see straight lines bent near "
-            "the photo's edge, use a board, or pick points along them (--lines)."
-        )
+        remarks.append(remark("calibration.hardly_straighter", k1=k1, k2=k2))
         result = result.without_distortion()
     result = replace(result, lens=replace(result.lens, extra={SIGMA_FOCAL: sigma_focal}))
     result.lens.write(out, overwrite=overwrite)
@@ -229,10 +222,7 @@ def _common_size(images: Sequence[Path]) -> tuple[int, int]:
         )
     focals = {image_info(path).focal_length for path in images} - {None}
     if len(focals) > 1:
-        raise InputError(
-            f"the photos were taken at different focal lengths ({', '.join(map(str, focals))} mm): "
-            "each zoom mark needs a calibration of its own."
-        )
+        raise InputError(remark("calibration.zoomed", focals=", ".join(map(str, focals))))
     return first
 
 

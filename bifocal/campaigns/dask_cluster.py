@@ -84,9 +84,9 @@ def run_on_cluster(
                         (run_parcel, packed(job)) if crew.ship else (run_pair, found_anywhere(job))
                     )
                 except InputError as error:
-                    yield _told(listener, PairOutcome(
-                        name=job.name, failed_step="send", message=str(error)
-                    ))  # fmt: skip
+                    yield _told(
+                        listener, PairOutcome(name=job.name, failed_step="send", message=str(error))
+                    )
                     continue
                 resources = {RESOURCE: job.memory()} if counted else None
                 key = f"pair-{job.folder}-{job.name}"

@@ -269,9 +269,7 @@ def _told(
         worst = int(np.nanargmax(photo.test))
         if (times := float(photo.test[worst])) > OUTLIER_LIMIT:
             error = 1000 * float(np.hypot(*photo.left_out[worst]))
-            notes.append(
-                remark("rectify.outlier", name=photo.ids[worst], error=error, times=times)
-            )  # fmt: skip
+            notes.append(remark("rectify.outlier", name=photo.ids[worst], error=error, times=times))
     if sigmas.max() > 1000 * UNCERTAIN * np.ptp(places, axis=0).max():
         notes.append(remark("rectify.uncertain", sigma=float(sigmas.max())))
     if not photo.interior.is_calibrated:

@@ -198,9 +198,7 @@ def _control_set(state: SurveyState, command: Fields) -> list[Change]:
     name = _control_name(state, command)
     before = state.control.get(name)
     known = _known(command, before.known if before else None)
-    after = replace(
-        before or PickedControl(name=name, order=state.next_order()), known=known
-    )  # fmt: skip
+    after = replace(before or PickedControl(name=name, order=state.next_order()), known=known)
     return [Change("control", name, before, after)]
 
 
@@ -240,9 +238,7 @@ def _control_paste(state: SurveyState, command: Fields) -> list[Change]:
         before = state.control.get(name)
         start = before or PickedControl(name=name, order=state.next_order())
         both = (picks[0] or start.picks[0], picks[1] or start.picks[1])
-        changes.append(
-            Change("control", name, before, replace(start, known=known, picks=both))
-        )  # fmt: skip
+        changes.append(Change("control", name, before, replace(start, known=known, picks=both)))
     return changes
 
 

@@ -39,8 +39,7 @@ class Journal:
             self._file = path.open("a+b", buffering=0)
         except OSError as error:
             raise InputError(
-                f"{path}: the journal cannot be written ({error.strerror}); choose a folder that "
-                "can be written to."
+                remark("page.journal_unwritten", of=path, strerror=error.strerror)
             ) from error
         try:
             self._lock()
@@ -55,10 +54,7 @@ class Journal:
             if not os.fstat(self._file.fileno()).st_nlink:
                 raise OSError
         except OSError:
-            raise InputError(
-                f"{self.path}: this survey is open already in another `bifocal pick`; use its page "
-                "(several may work on it at once), or end it first."
-            ) from None
+            raise InputError(remark("page.open_already", of=self.path)) from None
 
     def _read(self) -> list[dict[str, Any]]:
         self._file.seek(0)
@@ -77,10 +73,7 @@ class Journal:
 
     def refusal(self, number: int, why: str) -> InputError:
         """Return what is wrong with a line, and how to mend it."""
-        return InputError(
-            f"{self.path}, line {number}: {why} Restore the file from a backup, or delete this "
-            "line."
-        )
+        return InputError(remark("page.journal_line", path=self.path, number=number, why=why))
 
     def cut(self) -> None:
         """Take a last line that a crash cut off from the file, once all others are understood."""

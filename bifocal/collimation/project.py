@@ -15,6 +15,7 @@ from bifocal.collimation.fields import NOTES, FieldError, fields_of
 from bifocal.files.photos import photo_infos
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet, pair_or_set
+from bifocal.remarks import remark
 from bifocal.survey.set_survey import best_pair
 from bifocal.workbook.pair_workflow import is_survey, read_pair
 from bifocal.workbook.reading.reader import read_survey
@@ -102,14 +103,8 @@ def find_files(sources: Sequence[Path], workbook: Path | None = None) -> SurveyF
             raise InputError(f"two workbooks were given, {source} and {workbook}; give one.")
         return _of_workbook(source)
     if ending in PHOTOS:
-        raise InputError(
-            f"{source}: is one photo; give two, the far one first, or bring the one to scale with "
-            "bifocal rectify."
-        )
-    raise InputError(
-        f"{source}: expected a pair file (.pair.json), a survey workbook (.xlsx), a folder or two "
-        "photos."
-    )
+        raise InputError(remark("page.one_photo", of=source))
+    raise InputError(remark("page.unknown_source", of=source))
 
 
 def _of_pair(source: Path, workbook: Path | None) -> SurveyFiles:
@@ -201,12 +196,7 @@ def _of_workbook(workbook: Path) -> SurveyFiles:
         return replace(files, pair=book)
     named = read_survey(book).setup.pair_file
     if not named:
-        raise InputError(
-            f"{workbook}: names neither photos (photo_1, photo_2, beside d_1 and d_2) nor a pair "
-            "file (pair_file) in its sheet Setup, so the page cannot tell its photos. Type the "
-            "names of the photos there, or start the page with the pair: bifocal pick "
-            f"PAIR.pair.json --workbook {workbook.name}"
-        )
+        raise InputError(remark("page.no_photos_named", of=workbook, name=workbook.name))
     pair = book.parent / named
     if not pair.is_file():
         raise InputError(f"{workbook}: its pair file {named} is not there.")

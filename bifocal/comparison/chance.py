@@ -94,7 +94,7 @@ class Patches:
 
 def chance(
     z: FloatArray, unchanged: BoolArray, patches: Patches, least: float, rng: np.random.Generator
-) -> Chance:  # fmt: skip
+) -> Chance:
     """Return what chance can do, learned from the differences themselves.
 
     Parameters

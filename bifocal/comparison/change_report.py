@@ -12,7 +12,7 @@ from bifocal.comparison.chance import LEAST
 from bifocal.comparison.change import Comparison
 from bifocal.remarks import in_language
 from bifocal.reports import figures
-from photocore.provenance import program, provenance, today
+from photocore.provenance import provenance
 from photocore.reports.document import (
     Banner,
     Block,
@@ -22,6 +22,7 @@ from photocore.reports.document import (
     Picture,
     TextTable,
 )
+from photocore.reports.framing import dated_document
 from photocore.reports.words import Words, words_of
 from photocore.textfile import packaged
 
@@ -33,10 +34,7 @@ def change_document(done: Comparison, names: tuple[str, str], language: str) -> 
     """Return the report of a comparison of two files of these names."""
     say = words_of("bifocal.comparison", language)
     title = say("title", before=names[0], after=names[1])
-    made = say("made", program=program(), date=today())
-    blocks: list[Block] = [Heading(text=title, level=1), Paragraph(text=made, small=True)]
-    blocks += _blocks(done, say, language)
-    return Document(title=title, language=language, subject=made, blocks=tuple(blocks))
+    return dated_document(title, language, say, _blocks(done, say, language))
 
 
 def _blocks(done: Comparison, say: Words, language: str) -> Iterator[Block]:

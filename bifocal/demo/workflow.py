@@ -19,6 +19,7 @@ from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
 from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
+from bifocal.remarks import remark
 from bifocal.survey.setup import Measuring
 from bifocal.workbook.output import write_result
 from bifocal.workbook.workflow import solve
@@ -96,10 +97,7 @@ def run_demo(
         raise InputError(f"{folder}: cannot be made ({error.strerror}).") from error
     taken = [name for name, _ in sample.files if (folder / name).exists()]
     if taken and not overwrite:
-        raise InputError(
-            f"{folder}: holds {', '.join(taken[:3])} ... already; add --overwrite, or name another "
-            "folder with --out."
-        )
+        raise InputError(remark("demo.taken", of=folder, names=", ".join(taken[:3])))
     progress(0.0, 1.0, "surveying targets in the workbook")
     for name in sample.given:
         with atomic_path(folder / name, overwrite=True) as path:

@@ -91,15 +91,9 @@ def export_points(
         ".xlsx": _write_xlsx,
     }
     if ending not in writers and ending not in (".ply", ".las", ".laz", ".csv"):
-        raise InputError(
-            f"{path}: ending not known; use one of .dxf .ply .las .laz .geojson .xlsx .csv .points "
-            ".txt."
-        )
+        raise InputError(remark("export.unknown_ending", of=path))
     if world and points.world is None:
-        raise InputError(
-            "the survey has no world coordinates; fill the Georeference sheet and solve again, "
-            "or leave the world coordinates out."
-        )
+        raise InputError(remark("export.no_world"))
     coordinates = points.world if world and points.world is not None else points.xyz
     keep: BoolArray = np.all(np.isfinite(coordinates), axis=1)
     if not keep.any():

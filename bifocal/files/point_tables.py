@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.model.points import SurveyPoints
+from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, Table, open_tables, read_named_values, read_table
@@ -47,16 +48,11 @@ def read_survey_points(path: Path | str) -> tuple[SurveyPoints, tuple[str, ...]]
     table = read_table(book, _COLUMNS, name="Results", errors=errors)
     if any(NOT_CALCULATED in str(error) for error in errors):
         name = Path(path).name
-        raise InputError(
-            f"{path}: its results have never been calculated. Solve it first: bifocal solve {name} "
-            "--out result.xlsx"
-        )
+        raise InputError(remark("points.never_calculated", of=path, name=name))
     if errors:
         raise WorkbookError(errors)
     if not {"X", "Y", "Z"} <= table.present and not {"E", "N", "H"} <= table.present:
-        raise InputError(
-            f"{path}: the table has neither X, Y, Z nor E, N, H; run `bifocal solve` first."
-        )
+        raise InputError(remark("points.no_coordinates", of=path))
     world = np.column_stack([table.numbers(key) for key in "ENH"])
     named = np.array([bool(name) for name in table.texts("id")], dtype=bool)
     cov_xy, cov_en = table.numbers("cov_XY"), table.numbers("cov_EN")

@@ -8,12 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.matching.matching import (
-    MatchSettings,
-    match_pair,
-    precision,
-    raw_metres,
-)
+from bifocal.matching.matching import MatchSettings, match_pair, precision, raw_metres
 from bifocal.matching.patches import refine, same_scale
 from bifocal.matching.tuning import MATCH
 from bifocal.model.photo_set import PhotoSet

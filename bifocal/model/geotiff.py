@@ -15,15 +15,11 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from bifocal.model.grid import Grid
+from bifocal.remarks import remark
 from photocore.arrays import Float32Array
 from photocore.errors import InputError
 from photocore.output import all_or_none, atomic_path, check_all_writable, is_virtual
-from photocore.raster import (
-    RasterFile,
-    RasterWriter,
-    corner_transform,
-    create_geotiff,
-)
+from photocore.raster import RasterFile, RasterWriter, corner_transform, create_geotiff
 
 #: Name of the local system every raster is in.
 LOCAL_CRS = (
@@ -56,10 +52,7 @@ class RasterReader(RasterFile):
         super().__init__(path)
         try:
             if not self.has_position:
-                raise InputError(
-                    "says nothing about where it lies (no GeoTIFF tags, no world file). "
-                    "Put its .tfw beside it, or make it again with this program."
-                )
+                raise InputError(remark("raster.nowhere"))
             self.grid = Grid.from_affine(self.xy_from_pixel, (self.height, self.width))
         except InputError as error:
             self.close()
@@ -176,10 +169,7 @@ def check_relief(reader: RasterReader) -> None:
         If its first band is a picture.
     """
     if reader.dtype == np.uint8 or reader.dtype.kind not in "fiu":
-        raise InputError(
-            f"{reader.path}: band 1 is {reader.dtype}, a picture rather than relief in metres. "
-            "Give the file written by `bifocal relief`."
-        )
+        raise InputError(remark("raster.picture", of=reader.path, dtype=reader.dtype))
 
 
 def _check_space(path: Path, grid: Grid, bytes_per_pixel: int) -> None:

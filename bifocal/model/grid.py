@@ -11,6 +11,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from bifocal.remarks import remark
 from photocore.arrays import Float32Array, FloatArray, positive
 from photocore.errors import InputError
 
@@ -96,10 +97,7 @@ class Grid:
         span = max(shape[0], shape[1]) * abs(gsd)
         off = max(abs(matrix[0, 1]), abs(matrix[1, 0]), abs(matrix[1, 1] + gsd))
         if not (gsd > 0 and off * max(shape[0], shape[1]) <= 1e-2 * gsd and span > 0):
-            raise InputError(
-                "the raster's pixels are not square and parallel to X and Y with row 0 on top; "
-                "resample it first (for instance with gdalwarp)."
-            )
+            raise InputError(remark("raster.turned"))
         return cls(
             x0=float(matrix[0, 2]),
             y0=float(matrix[1, 2]),

@@ -288,10 +288,7 @@ def _turned_coefficients(lens: Lens, coefficients: FloatArray, turn: FloatArray)
     if lens.model == "fisheye" or not len(coefficients):
         return coefficients
     if len(coefficients) > 8:
-        raise InputError(
-            "a lens with thin-prism or tilt terms cannot be turned with an EXIF-turned photo; "
-            "calibrate with photos turned the same way."
-        )
+        raise InputError(remark("lens.turned_with_tilt"))
     tangential = turn @ np.array([coefficients[3], coefficients[2]])
     coefficients[2], coefficients[3] = tangential[1], tangential[0]
     return coefficients

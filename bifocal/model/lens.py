@@ -10,13 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photocore.arrays import (
-    FloatArray,
-    as_floats,
-    as_points,
-    not_negative,
-    read_only,
-)
+from bifocal.remarks import remark
+from photocore.arrays import FloatArray, as_floats, as_points, not_negative, read_only
 from photocore.camera.lensformats import read_foreign_lens
 from photocore.errors import InputError, located
 from photocore.jsonfile import read_object, write_object
@@ -237,10 +232,7 @@ class Lens:
 def _check_matrix(matrix: FloatArray) -> None:
     """Refuse what is no camera matrix: without focal lengths, or not ending in 0 0 1."""
     if not (np.diag(matrix) > 0).all() or tuple(matrix[2]) != (0.0, 0.0, 1.0):
-        raise InputError(
-            "camera_matrix: expected [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] with focal lengths "
-            f"fx and fy above zero [px], found {matrix.tolist()}."
-        )
+        raise InputError(remark("lens.camera_matrix", matrix=matrix.tolist()))
 
 
 def _check_profile(coefficients: FloatArray) -> None:
@@ -249,6 +241,4 @@ def _check_profile(coefficients: FloatArray) -> None:
         raise InputError("lens model 'radial' takes at least four pairs of radius and factor.")
     ideal, factor = coefficients[0::2], coefficients[1::2]
     if ideal[0] != 0 or (np.diff(ideal) <= 0).any() or (np.diff(ideal * factor) <= 0).any():
-        raise InputError(
-            "lens model 'radial': radii must start at 0 and rise, and so must radius x factor."
-        )
+        raise InputError(remark("lens.radii"))

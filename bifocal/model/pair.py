@@ -400,10 +400,7 @@ class Pair:
         first = as_points(pixels1, "pixels1", dimension=2)
         second = as_points(pixels2, "pixels2", dimension=2)
         if first.shape != second.shape:
-            raise InputError(
-                f"pixels1 {first.shape} and pixels2 {second.shape} must both have shape (..., 2), "
-                "the same."
-            )
+            raise InputError(remark("pair.pixel_shapes", shape=first.shape, other=second.shape))
         shape = first.shape[:-1]
         first, second = first.reshape(-1, 2), second.reshape(-1, 2)
         if sigma_r_max is not None:

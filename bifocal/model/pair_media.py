@@ -27,6 +27,7 @@ from bifocal.model.orientation_precision import (
 from bifocal.model.pair import Pair
 from bifocal.model.photo import AXIS
 from bifocal.rays import Foot, foot_of, straight
+from bifocal.remarks import remark
 from multimedia import Layers
 from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX, typical_sigma
 from photocore.arrays import FloatArray, not_negative, positive
@@ -91,26 +92,18 @@ class PairMedia:
 
     def __post_init__(self) -> None:
         if (self.port is None) == (self.depth is None):
-            raise InputError(
-                "media: give the port's distance from the camera (--port), or how deep the wall "
-                "lies behind the glass or surface that stays with it (--depth); one of the two."
-            )
+            raise InputError(remark("media.port_or_depth"))
         for number, value in enumerate(self.port or (), start=1):
             not_negative(value, f"port{number}")
         if self.depth is not None:
             positive(self.depth, "depth", unit="m")
             if any(normal is not None for normal in self.normals):
-                raise InputError(
-                    "a normal of the port (--port-normal) goes with --port: glass or a surface "
-                    "that stays with the object is taken as parallel to the reference plane."
-                )
+                raise InputError(remark("media.normal_without_port"))
         allowed = self._allowed
         possible = {own for name in allowed for own in _unknowns(name)}
         for name, sigma in self.sigmas.items():
             if name not in possible:
-                raise InputError(
-                    f"media: {name!r} is no unknown of them; possible are {', '.join(allowed)}."
-                )
+                raise InputError(remark("media.no_unknown", name=name, allowed=", ".join(allowed)))
             if not sigma > 0:
                 raise InputError(f"--prior {name}={sigma:g}: expected a number above zero, or inf.")
         if "port" in self.sigmas and ({"port1", "port2"} & set(self.sigmas)):
@@ -147,13 +140,7 @@ class PairMedia:
         one_glass = float(np.abs(towards[0] - towards[1]).max()) < ALIKE
         if one_glass and abs(heights[0] - heights[1]) < abs(first - second):
             if any(lean):
-                raise InputError(
-                    "both photos look through one glass or surface that stays with the wall and "
-                    "leans against it: pairs are adjusted together through ports, which turn with "
-                    "their cameras, or through glass parallel to the reference plane. Choose a "
-                    "plane parallel to it (`bifocal align`: coordinates of the control points in "
-                    "that frame)."
-                )
+                raise InputError(remark("media.leaning_together"))
             return cls(layers=pair.layers, depth=heights[0] - pair.layers.thickness)
         own = [
             pinhole(photo).rotation @ normal if leans else None

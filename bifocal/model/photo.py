@@ -19,14 +19,7 @@ from bifocal.model.lens import Lens
 from bifocal.model.orientation_precision import pinhole
 from bifocal.remarks import remark
 from multimedia import Layers
-from photocore.arrays import (
-    BoolArray,
-    FloatArray,
-    as_points,
-    not_negative,
-    positive,
-    read_only,
-)
+from photocore.arrays import BoolArray, FloatArray, as_points, not_negative, positive, read_only
 from photocore.camera.distortion import inverse_2x2
 from photocore.errors import GeometryError, InputError, located
 

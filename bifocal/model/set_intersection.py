@@ -9,12 +9,7 @@ import numpy as np
 
 from bifocal import rays
 from bifocal.model.flags import FlagLimits, point_flags
-from bifocal.model.intersection import (
-    Intersection,
-    MeasuredPoints,
-    PlanePicks,
-    inverse_3x3,
-)
+from bifocal.model.intersection import Intersection, MeasuredPoints, PlanePicks, inverse_3x3
 from bifocal.model.orientation_precision import independent, pixel_rates
 from bifocal.model.photo import Photo
 from photocore.arrays import BoolArray, FloatArray, IntArray

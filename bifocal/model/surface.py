@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.model.grid import Bounds, Grid, cut
+from bifocal.remarks import remark
 from photocore.arrays import BoolArray, Float32Array, FloatArray
 from photocore.errors import InputError
 
@@ -81,10 +82,7 @@ class MapSurface:
         self.grid, self._fetch, self._measured = grid, fetch, fetch_measured
         self._lowest, self._highest = self._scan()
         if np.isnan(self._lowest).all():
-            raise InputError(
-                "the relief map is empty: every pixel is unknown (NaN). Make it again, or render "
-                "on the plane."
-            )
+            raise InputError(remark("relief.empty"))
 
     @classmethod
     def of_array(

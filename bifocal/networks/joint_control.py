@@ -12,6 +12,7 @@ from bifocal.model.pair import Pair
 from bifocal.networks.joint_ties import SharedPoints
 from bifocal.orientation.control_points import Control, read_control
 from bifocal.orientation.tuning import CONTROL
+from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import InputError
 
@@ -100,10 +101,7 @@ def _add(
         if part.positioned[k]:
             before = xyz.get(name)
             if before is not None and np.nanmax(np.abs(before[0] - part.xyz[k])) > 1e-6:
-                raise InputError(
-                    f"{path}: point {name} has other coordinates than in another pair's table; "
-                    "points of one name are one point."
-                )
+                raise InputError(remark("joint.other_coordinates", of=path, name=name))
             if before is None or np.isnan(before[0][2]):
                 xyz[name] = part.xyz[k], part.sigma[k]
         for side, pixels in enumerate((part.pixels1, part.pixels2)):

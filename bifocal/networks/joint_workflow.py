@@ -32,12 +32,7 @@ from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
 from photocore.images import read_grey
 from photocore.jsonfile import write_object
-from photocore.output import (
-    atomic_folder,
-    check_all_writable,
-    check_not_input,
-    relative_name,
-)
+from photocore.output import atomic_folder, check_all_writable, check_not_input, relative_name
 from photocore.tables import write_csv
 
 #: Precision of a feature's coordinate. [px of the searched photo]

@@ -31,6 +31,7 @@ from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.tie_points import refine_ties
 from bifocal.orientation.tuning import TIES, WALLS
 from bifocal.orientation.walls.reference_plane import narrow_face
+from bifocal.remarks import remark
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import BoolArray, FloatArray
@@ -372,10 +373,7 @@ def _wall(
     width = 0.1 * 2 * camera.matrix[0, 2] * camera.centre[2] / camera.matrix[0, 0]
     cells = len(np.unique(np.floor(xyz[chance > LEAST_CHANCE, :2] / width), axis=0))
     if chance.sum() < TIES.fewest_on_wall or cells < TIES.fewest_cells:
-        raise GeometryError(
-            f"no plane: too few details that {len(state.cameras)} photos share lie on one. Frame "
-            "them so that the wall fills them, or give control points on the wall (--control)."
-        )
+        raise GeometryError(remark("set.no_plane", count=len(state.cameras)))
     common = max(float(chance.sum()) / max(cells / 4.0, 3.0), 1.0)
     with np.errstate(divide="ignore"):
         return chance > LEAST_CHANCE, np.hypot(face.roughness, 1e-5) * np.sqrt(common / chance)

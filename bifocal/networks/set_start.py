@@ -15,6 +15,7 @@ from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
 from bifocal.orientation.starts.space_resection import resect
+from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.camera.pinhole import Pinhole, camera_matrix, homogeneous, ray_on_plane
 from photocore.errors import ConvergenceError, GeometryError
@@ -150,11 +151,7 @@ def _first_pair(
                 return (far, near), pair
     if reasons:
         raise reasons[0]
-    raise GeometryError(
-        "no two of the photos can be set up as a pair: they need common details, and four control "
-        "points in both or a distance or length of one of them (--distance1 is that of the first "
-        "photo, --distance2 of the second, --length and --wall are in the first)."
-    )
+    raise GeometryError(remark("set.no_first_pair"))
 
 
 def _measures(site: SiteMeasures, far: int, near: int) -> SiteMeasures:

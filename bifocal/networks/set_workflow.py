@@ -21,12 +21,7 @@ from bifocal.orientation.orientation_stages import PhotoInput
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.images import image_info, read_grey
-from photocore.output import (
-    all_or_none,
-    check_all_writable,
-    check_not_input,
-    relative_name,
-)
+from photocore.output import all_or_none, check_all_writable, check_not_input, relative_name
 
 #: How the file of a set ends.
 ENDING = ".photos.json"

@@ -380,10 +380,7 @@ def _with_photos_exchanged(given: Given, *, typed_stay: bool = False) -> Oriente
     """
     (near, far), site = given.names, given.site
     if site.wall is not None:
-        raise GeometryError(
-            f"{near} is the near photo. --wall is a spot of the far photo: give {far} first, and "
-            "the spot in it."
-        )
+        raise GeometryError(remark("align.spot_of_near", near=near, far=far))
     its = 1 if site.far_first is site else 2
     site, media = site.far_first, given.media.exchanged()
     turned = replace(given, photos=given.photos[::-1])

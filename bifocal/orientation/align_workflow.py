@@ -158,9 +158,7 @@ def align_photos(
         If files or options are at fault, or the photos do not make a pair.
     """
     if out.suffix.lower() != ".json":
-        raise InputError(
-            f"{out.name}: a pair file ends in .json; write --out {out.stem}.pair.json."
-        )
+        raise InputError(remark("align.pair_ending", of=out.name, stem=out.stem))
     check_ending(picture, "a picture is written as .png, .jpg or .tif.", *WRITTEN)
     way, options = way_of(options)
     check_metres(options)
@@ -273,17 +271,9 @@ def way_of(options: AlignOptions) -> tuple[str, AlignOptions]:
         return "site", replace(options, site=replace(site, parallel=True))
     if options.auto:
         if not (measured or options.length or options.lengths):
-            raise InputError(
-                "--auto needs one measure for the scale, two photos alone have none: the distance "
-                "from a camera to the wall (--distance1 or --distance2) or one length on the wall "
-                "(--length)."
-            )
+            raise InputError(remark("align.auto_without_scale"))
         return "auto", options
-    raise InputError(
-        "say how the pair is to be set up: --control FILE (points measured on the wall), "
-        "--distance1 and --distance2 (or one of them and --delta-d) with the cameras square to "
-        "the wall, or --auto with one distance or length."
-    )
+    raise InputError(remark("align.no_way"))
 
 
 def _check_focal(photos: tuple[PhotoInput, PhotoInput]) -> None:

@@ -24,9 +24,7 @@ from bifocal.orientation.media_report import media_in_words
 from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput, Photos
 from bifocal.orientation.tie_coverage import tie_statistics
-from bifocal.orientation.tie_points import (
-    tie_positions,
-)
+from bifocal.orientation.tie_points import tie_positions
 from bifocal.orientation.tuning import LINES
 from bifocal.orientation.walls.reference_plane import zero_sigma
 from bifocal.remarks import remark

@@ -103,11 +103,7 @@ def contradiction(cameras: Cameras, ties: Ties) -> float:
 def check_picks(cameras: Cameras, ties: Ties, interiors: Interiors) -> None:
     """Refuse control points that the photos contradict."""
     if contradiction(cameras, ties) > 0.012 * max(interiors[0].image_size):
-        raise GeometryError(
-            "the control points' pixels do not fit the photos: the details common to both photos "
-            "contradict them. Check that col1, row1 are pixels of the first photo and col2, row2 "
-            "of the second, at full size."
-        )
+        raise GeometryError(remark("align.picks_misfit"))
 
 
 def ties_of(given: Given, *, needed: bool) -> tuple[Ties | None, tuple[str, ...]]:
@@ -188,7 +184,7 @@ def scaled(cameras: Cameras, given: Given, interiors: Interiors) -> Cameras:
         ]
         scale = float(np.median(ratios))
     else:
-        raise GeometryError(remark("refused.no_scale"))
+        raise GeometryError(remark("align.no_scale"))
     if scale:
         nowhere = np.zeros(3)
         metres = Similarity(

@@ -291,9 +291,7 @@ def metres_of(table: Table, key: str, unit: str) -> FloatArray:
     """Return a column of lengths in metres, by its heading's unit."""
     said = unit or table.units.get(key, "m")
     if said not in METRES:
-        raise InputError(
-            f'{table.file}: column {key}: the unit "{said}" is not a length; use m, cm or mm.'
-        )
+        raise InputError(remark("control.no_length", of=table.file, key=key, said=said))
     return table.numbers(key) * METRES[said]
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.model.pair_media import LEANS, Normal, PairMedia
+from bifocal.remarks import remark
 from photocore.adjustment.priors import parse_prior
 from photocore.errors import InputError
 from photocore.options import options_of
@@ -25,10 +26,7 @@ def media_of(given: Mapping[str, Any]) -> PairMedia:
         media = options_of("bifocal", "media_of_pair").values()
         lost = [option for option in media if given.get(option.name) not in (None, ())]
         if lost:
-            raise InputError(
-                f"{lost[0].flag} goes with --indices: give the refractive indices "
-                "from the camera to the wall, e.g. --indices 1,1.49,1.337 --thicknesses 0.01."
-            )
+            raise InputError(remark("media.without_indices", flag=lost[0].flag))
         return PairMedia.none()
     ports, normals = (
         (_own(given, name, 1), _own(given, name, 2)) for name in ("port", "port_normal")
@@ -58,8 +56,5 @@ def _normal(stated: tuple[float, ...] | str | None) -> Normal:
         return stated
     normal = np.array(stated)
     if not normal[2] > 0.1 * np.linalg.norm(normal):
-        raise InputError(
-            f"--port-normal {','.join(map(str, stated))}: expected X,Y,r in the plane frame, "
-            "towards the camera: 0,0,1 is parallel to the wall."
-        )
+        raise InputError(remark("media.port_normal", stated=",".join(map(str, stated))))
     return normal

@@ -205,9 +205,7 @@ def _by_points(control: Control, interior: Interior, sigma_pick: float) -> Orien
     refuse_line(control.pixels1)
     start, _ = resect(control.xyz, control.pixels1, interior)
     spread = pinhole.project_with_jacobian(start, control.xyz).by_point * control.sigma[:, None, :]
-    root = np.linalg.cholesky(
-        spread @ np.swapaxes(spread, 1, 2) + sigma_pick**2 * np.eye(2)
-    )  # fmt: skip
+    root = np.linalg.cholesky(spread @ np.swapaxes(spread, 1, 2) + sigma_pick**2 * np.eye(2))
 
     def misfit(camera: Pinhole) -> FloatArray:
         pixels = pinhole.project(camera, control.xyz) - control.pixels1

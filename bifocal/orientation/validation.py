@@ -26,10 +26,7 @@ def check_sharp(name: str, image: ByteArray) -> None:
     """Refuse a blurred photo."""
     value = sharpness(image)
     if value < VALIDATION.blurred:
-        raise GeometryError(
-            f"{name}: the photo is blurred (fine detail {value:.2f}, a sharp photo has 0.3). Take "
-            "it again from a tripod, focused on the wall; nothing later can make up for it."
-        )
+        raise GeometryError(remark("align.blurred", of=name, value=value))
 
 
 def check_different(name1: str, name2: str, images: Images) -> None:
@@ -41,10 +38,7 @@ def check_different(name1: str, name2: str, images: Images) -> None:
     a, b = (part - part.mean() for part in small)
     alike = float((a * b).sum() / max(np.sqrt((a * a).sum() * (b * b).sum()), 1e-9))
     if alike > 0.9995:
-        raise SamePhotoError(
-            f"{name1} and {name2} are the same photo. The method needs two photos taken from two "
-            "distances: a long lens from afar and a short one from near."
-        )
+        raise SamePhotoError(remark("align.same_photo", name1=name1, name2=name2))
 
 
 def unknown_lenses(interiors: Interiors, names: tuple[str, str]) -> str:

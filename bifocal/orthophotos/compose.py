@@ -178,9 +178,7 @@ def as_surface(relief: ReliefMap | Surface | ArrayLike | None) -> Surface:
         return MapSurface.of_array(r, Grid.from_affine(relief.plane_from_pixel, r.shape), measured)
     number = np.asarray(relief)
     if number.ndim != 0 or number.dtype.kind not in "fiu":
-        raise InputError(
-            "relief: expected a relief map (with .r and .plane_from_pixel) or one number in metres."
-        )
+        raise InputError(remark("ortho.relief_or_number"))
     return FlatSurface(float(number))
 
 

@@ -176,10 +176,7 @@ def _clear_parts(
         left, right = (_looked_up(relief, line + way * aside * normal) for way in (1, -1))
         clear &= _rises(left, right, level, wanted * aside / CONTOURS.aside, stretch)
     bounds = [0, *(np.flatnonzero(np.diff(clear)) + 1).tolist(), len(clear)]
-    return [
-        line[a:b] for a, b in pairwise(bounds)
-        if clear[a] and b - a > shortest
-    ]  # fmt: skip
+    return [line[a:b] for a, b in pairwise(bounds) if clear[a] and b - a > shortest]
 
 
 def _rises(

@@ -153,10 +153,7 @@ def _check_alike(layers: Sequence[_FileLayer]) -> None:
                 "of the same kind, or only relief maps."
             )
         if layer.reader.crs != first.crs:
-            raise InputError(
-                f"{layer.reader.path} and {first.path} are in different coordinate systems; bring "
-                "them into one before."
-            )
+            raise InputError(remark("mosaic.two_systems", path=layer.reader.path, first=first.path))
 
 
 def _relief_of(paths: Sequence[Path], stack: ExitStack, coarse: Grid) -> Float32Array:

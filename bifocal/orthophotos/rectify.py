@@ -15,6 +15,7 @@ from bifocal.model.photo import Photo
 from bifocal.orthophotos.ortho_image import Interpolation
 from bifocal.orthophotos.tuning import RECTIFICATION
 from bifocal.rays import apparent_magnification, plane_position
+from bifocal.remarks import remark
 from photocore.arrays import BoolArray, Float32Array, FloatArray
 from photocore.errors import GeometryError, InputError
 
@@ -170,10 +171,7 @@ def footprint(photo: Photo, size: tuple[int, int]) -> Bounds:
     depth = ideal @ photo.plane_from_pixel[2, :2] + photo.plane_from_pixel[2, 2]
     plane = photo.plane_from_pixels(rim)
     if not np.isfinite(plane).all() or depth.min() * depth.max() <= 0:
-        raise GeometryError(
-            "the photo looks past the horizon of the reference plane, so it covers no finite "
-            "part of it. Say which part is wanted: --bounds XMIN,YMIN,XMAX,YMAX."
-        )
+        raise GeometryError(remark("ortho.horizon"))
     return bounds_of(plane)
 
 
@@ -285,10 +283,7 @@ class LensTable:
         low = np.floor(np.nanmin(ideal, axis=0)) - RECTIFICATION.lens_step
         high = np.ceil(np.nanmax(ideal, axis=0)) + RECTIFICATION.lens_step
         if not (np.isfinite(low).all() and (high - low).max() < 20 * max(size)):
-            raise GeometryError(
-                "the lens file bends the rim of this photo beyond all bounds; calibrate again "
-                "with board photos that reach into the corners."
-            )
+            raise GeometryError(remark("ortho.lens_beyond_bounds"))
         x = np.arange(low[0], high[0] + RECTIFICATION.lens_step, RECTIFICATION.lens_step)
         y = np.arange(low[1], high[1] + RECTIFICATION.lens_step, RECTIFICATION.lens_step)
         points = np.stack(np.meshgrid(x, y), axis=-1)

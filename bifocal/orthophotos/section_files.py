@@ -11,16 +11,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.files.dxf import new_drawing, save_drawing
-from bifocal.orthophotos.canvas import (
-    BLUE,
-    GREY,
-    Canvas,
-    Pen,
-    Place,
-    box,
-    scale_bar,
-    text_width,
-)
+from bifocal.orthophotos.canvas import BLUE, GREY, Canvas, Pen, Place, box, scale_bar, text_width
 from bifocal.orthophotos.drawing import TABLES, Drawing, Section, multiples, round_step, signed
 from bifocal.orthophotos.drawing_files import name_layers
 from bifocal.orthophotos.dxf_canvas import DxfCanvas

@@ -11,6 +11,7 @@ from bifocal.model.grid import Grid
 from bifocal.model.surface import Surface
 from bifocal.orthophotos.drawing import Section
 from bifocal.orthophotos.tuning import PROFILE
+from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 
@@ -89,10 +90,7 @@ def _path(name: str, grid: Grid) -> tuple[str, FloatArray]:
     except ValueError:
         numbers = []
     if len(numbers) < 4 or len(numbers) % 2 or not np.isfinite(numbers).all():
-        raise InputError(
-            f'section {name!r}: write x=1.5 (upright), y=2.0 (level) or corners "0,1 2,1 2,3" '
-            "in metres."
-        )
+        raise InputError(remark("ortho.section_place", name=name))
     corners = np.array(numbers).reshape(-1, 2)
     if not np.ptp(corners, axis=0).any():
         raise InputError(f"section {name!r}: its corners are one point; write two or more.")

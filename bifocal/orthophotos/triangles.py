@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.orthophotos.tuning import TRIANGLES
+from bifocal.remarks import remark
 from photocore.arrays import Float32Array, FloatArray, IntArray, as_points
 from photocore.errors import InputError
 
@@ -49,9 +50,7 @@ class TriangleSurface:
             raise InputError("points: every X, Y and relief must be a number.")
         points, breaklines = _without_doubles(points, breaklines)
         if len(points) < 3:
-            raise InputError(
-                f"points: {len(points)} different ones are too few; three or more span a surface."
-            )
+            raise InputError(remark("ortho.few_points", count=len(points)))
         try:
             for _ in range(TRIANGLES.halvings):
                 # QJ would move points; Qhull's default merges flat triangles exactly.
@@ -62,9 +61,7 @@ class TriangleSurface:
             else:
                 triangles = Delaunay(points[:, :2]).simplices
         except QhullError:
-            raise InputError(
-                "points: all lie on one straight line; add points beside it."
-            ) from None
+            raise InputError(remark("ortho.points_on_line")) from None
         self.points, self.triangles = points, np.asarray(triangles, dtype=np.int64)
         corners = points[self.triangles]
         self._low, self._high = corners.min(axis=1), corners.max(axis=1)

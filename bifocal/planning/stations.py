@@ -136,10 +136,7 @@ def plan_stations(
     ]
     nearest = min(station.d2 for station in drafts)
     if nearest < NEAREST:
-        raise InputError(
-            f"the near camera would stand {nearest * 100:.1f} cm from the wall: the wished scale "
-            "or pixel is too fine. Check its unit: GSD and sigma are given in mm, a scale as 1:N."
-        )
+        raise InputError(remark("plan.too_near", away=nearest * 100))
     if not any(station.feasible for station in drafts):
         notes = "; ".join(f"{s.c1:g}/{s.c2:g} mm {s.note}" for s in drafts)
         raise GeometryError(f"no pair of lenses fits into the free space: {notes}.")
@@ -221,10 +218,7 @@ def _placed(media: PairMedia, number: int, apparent: float, c: float) -> float:
         assert media.depth is not None
         z0, behind = rest - media.depth * first / last, media.depth
     if z0 < 0 or behind <= 0:
-        raise GeometryError(
-            f"the {c:g} mm lens would have to stand inside the glass or the water: the object "
-            f"would seem {apparent:.2f} m away. Choose a smaller scale, or a longer lens."
-        )
+        raise GeometryError(remark("plan.inside_media", c=c, apparent=apparent))
     return z0 + media.layers.thickness + behind
 
 
@@ -240,10 +234,7 @@ def _seen_by_both(pair: Pair, sensor: CameraSensor, c: tuple[float, float]) -> t
     reach = [np.abs(photo.plane_from_pixels(rim)) for photo in (pair.image1, pair.image2)]
     for length, places in zip(c, reach, strict=True):
         if not np.isfinite(places).all():
-            raise GeometryError(
-                f"the {length:g} mm lens sees nothing at the edges of its photo: the media reflect "
-                "rays that steep totally. Choose a longer lens."
-            )
+            raise GeometryError(remark("plan.total_reflection", length=length))
     width, height = np.minimum(*reach)[[0, 1], [0, 1]]
     return 2 * float(width), 2 * float(height)
 

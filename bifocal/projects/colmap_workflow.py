@@ -9,6 +9,7 @@ import numpy as np
 from bifocal.model.orientation_precision import pinhole
 from bifocal.model.photo import Photo
 from bifocal.model.photo_set import PhotoSet
+from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import InputError, located
 from photocore.images import image_info
@@ -74,15 +75,10 @@ def _in_words(photo: Photo) -> tuple[str, FloatArray, FloatArray]:
     matrix = camera.matrix
     terms: FloatArray = np.zeros(0)
     if abs(matrix[0, 1]) / matrix[1, 1] * size[1] > SKEWED:
-        raise InputError(
-            "its homography is no camera's with square axes; COLMAP has no model for that."
-        )
+        raise InputError(remark("projects.no_square_axes"))
     if lens is not None:
         if lens.model == "radial" or np.abs(lens.camera_matrix - matrix).max() > SAME:
-            raise InputError(
-                "its lens file and its homography are of two camera matrices, or the lens is a "
-                "table; write the photos anew with `bifocal undistort` and align those."
-            )
+            raise InputError(remark("projects.two_matrices"))
         matrix, terms = lens.camera_matrix, lens.coefficients
     fisheye = lens is not None and lens.model == "fisheye"
     words = camera_words(matrix, terms, size, fisheye=fisheye)

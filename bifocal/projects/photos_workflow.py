@@ -80,10 +80,7 @@ class ProjectOptions:
         if self.horizontal and len(self.horizontal) != 2:
             raise InputError(f"--horizontal: two points, found {len(self.horizontal)}.")
         if self.control and (self.length or self.wall or self.horizontal or self.unit):
-            raise InputError(
-                "--control: gives frame and scale; leave out --wall, --horizontal, --length and "
-                "--unit."
-            )
+            raise InputError(remark("projects.control_alone"))
         if self.length and self.unit:
             raise InputError("--length and --unit: both give the scale; leave one out.")
         for option in ("wall", "horizontal", "control", "length"):

@@ -8,6 +8,7 @@ from pathlib import Path, PurePath
 import numpy as np
 
 from bifocal.model.lens import Lens
+from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.camera.pinhole import Pinhole, rays_meeting
 from photocore.cloud import open_cloud
@@ -65,10 +66,7 @@ def read_points(path: Path, views: tuple[ForeignView, ...]) -> dict[str, FloatAr
         named = zip(table.texts("id"), xyz, strict=True)
         return {name: place for name, place in named if np.isfinite(place).all()}
     if not {"photo", "col", "row"} <= table.present:
-        raise InputError(
-            f"{path}: expected columns id, photo, col, row (a row for each photo that shows the "
-            "point), or id, x, y, z in the project's own frame."
-        )
+        raise InputError(remark("projects.point_columns", of=path))
     return _intersected(table, views)
 
 
@@ -123,8 +121,5 @@ def chosen(points: Mapping[str, FloatArray], names: tuple[str, ...], option: str
     """
     lacking = [name for name in names if name not in points]
     if lacking:
-        raise InputError(
-            f"{option}: point {lacking[0]} is not known; give its picks or coordinates in the "
-            "table of --points."
-        )
+        raise InputError(remark("projects.unknown_point", of=option, name=lacking[0]))
     return np.array([points[name] for name in names])

@@ -47,10 +47,7 @@ def by_control(
     rows = [row for row, name in enumerate(table.texts("id"))
             if name in points and np.isfinite(xyz[row]).all()]  # fmt: skip
     if len(rows) < 3:
-        raise InputError(
-            f"{path}: {len(rows)} control points with X and Y bear names of the table of --points; "
-            "three are needed, not on one line."
-        )
+        raise InputError(remark("projects.few_control_points", of=path, count=len(rows)))
     names = [table.texts("id")[row] for row in rows]
     target, stated = xyz[rows], metres_of(table, "sigma", "")[rows]
     frame = fit_similarity([points[name] for name in names], target)

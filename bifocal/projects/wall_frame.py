@@ -53,10 +53,7 @@ def found_frame(
     distance = float(np.median(distances)) if len(points) else 0.0
     near = points[distances < 5 * distance]
     if len(near) < 20:
-        raise InputError(
-            f"the project has {len(points)} points, too few to find the wall among. Name a point "
-            "cloud of it with --cloud, or three points of the wall with --points and --wall."
-        )
+        raise InputError(remark("projects.few_points", count=len(points)))
     low, high = np.quantile(near, (0.02, 0.98), axis=0)
     cells = np.floor((near - low) / (np.max(high - low) / CELLS))
     _, place, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
@@ -65,10 +62,7 @@ def found_frame(
     up = upwards(project)
     faces = [plane for plane in planes if abs(plane.normal @ up) < UPRIGHT]
     if not faces:
-        raise InputError(
-            "no façade is found among the points of the project; name three points of the wall "
-            "with --points and --wall."
-        )
+        raise InputError(remark("projects.no_facade"))
     face = max(faces, key=lambda plane: plane.share)
     said: list[str] = [remark("projects.found", share=100 * face.share)]
     others = [f"{100 * one.share:.0f} %" for one in faces if one.share >= RIVAL * face.share]
@@ -108,10 +102,7 @@ def framed(
         y = np.cross(z, along) * np.sign(np.cross(z, along) @ y)
     x = np.cross(y, z)
     if np.linalg.norm(x) < 0.1:
-        raise GeometryError(
-            "the plane lies level: which way is up on it cannot be told. Name two points on a "
-            "level line of the wall with --horizontal, or give control points."
-        )
+        raise GeometryError(remark("projects.level_plane"))
     x /= np.linalg.norm(x)
     rotation = np.array([x, np.cross(z, x), z])
     return Similarity(scale=1.0, rotation=rotation, source_centre=origin, target_centre=np.zeros(3))

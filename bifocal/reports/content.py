@@ -21,6 +21,7 @@ from bifocal.model.photo_set import PhotoSet, pair_or_set
 from bifocal.model.relief_map import Quality, ReliefMap
 from bifocal.model.surface import MapSurface
 from bifocal.options import defaults_of, typed
+from bifocal.remarks import remark
 from bifocal.reports.control_survey import is_exchanged, solve_control
 from bifocal.survey.set_survey import best_pair
 from bifocal.survey.solved_survey import SolvedSurvey
@@ -249,10 +250,7 @@ def read_content(source: Path, task: ReportTask) -> PairContent:
     of_set: PhotoSet | None = None
     if source.suffix.lower() in _WORKBOOKS:
         if task.control or task.check:
-            raise InputError(
-                f"{source}: brings its own check points (sheet Check); --control and --check go "
-                "with a pair file."
-            )
+            raise InputError(remark("report.own_check", of=source))
         solution = solve(source)
         pair = solution.pair
         setup: Any = pair.extra.get("setup")
@@ -336,10 +334,7 @@ def ortho_thumbnail(path: Path, *, side: int = SIDE) -> tuple[tuple[ByteArray, B
     """
     with RasterReader(path) as reader:
         if reader.dtype not in (np.uint8, np.uint16):
-            raise InputError(
-                f"{path}: is no orthophoto; its pixels are numbers of type {reader.dtype}, not "
-                "colours of 8 or 16 bits."
-            )
+            raise InputError(remark("report.no_ortho", of=path, dtype=reader.dtype))
         grid = reader.grid
         step = 1
         while max(grid.width, grid.height) / step > 1.5 * side and step < ROWS:

@@ -24,8 +24,8 @@ from bifocal.reports.worked_point import method_blocks
 from bifocal.survey.remarks import refraction_remarks
 from bifocal.survey.tolerances import RULES
 from photocore.camera.rotation import angles_from_rotation
-from photocore.provenance import file_hash, program, provenance, today
 from photocore.reports.document import Block, Document, Heading, Paragraph, Picture, TextTable
+from photocore.reports.framing import dated_document, provenance_blocks
 from photocore.reports.words import Words, words_of
 
 #: Relief less precise than this is drawn as the area of uncertainty where no scale was asked for;
@@ -37,13 +37,14 @@ def report_document(contents: Sequence[PairContent], language: str) -> Document:
     """Return the report of one or several pairs."""
     say = words_of("bifocal.reports", language)
     title = contents[0].title if len(contents) == 1 else say("report")
-    made = say("made", program=program(), date=today())
-    blocks: list[Block] = [Heading(text=title, level=1), Paragraph(text=made, small=True)]
+    return dated_document(title, language, say, _all_blocks(contents, say))
+
+
+def _all_blocks(contents: Sequence[PairContent], say: Words) -> Iterator[Block]:
     for content in contents:
         if len(contents) > 1:
-            blocks.append(Heading(text=content.title, level=1))
-        blocks += pair_blocks(content, say)
-    return Document(title=title, language=language, subject=made, blocks=tuple(blocks))
+            yield Heading(text=content.title, level=1)
+        yield from pair_blocks(content, say)
 
 
 def pair_blocks(content: PairContent, say: Words) -> Iterator[Block]:
@@ -281,14 +282,7 @@ def _foundations(content: PairContent, say: Words) -> Iterator[Block]:
 
 
 def _provenance(content: PairContent, say: Words) -> Iterator[Block]:
-    yield Heading(text=say("provenance"))
     task = content.task
     files = [content.source, *(photo.path for photo in content.cameras if photo.file)]
     files += [path for path in (task.control, task.check, task.relief, task.ortho) if path]
-    made = provenance()
-    if made.command:
-        yield Paragraph(text=say("made_by"), lines=(made.command,), small=True)
-    rows = [(path.name, file_hash(path)) for path in files if path.is_file()]
-    # Files of one name in two folders are two files.
-    rows = list(dict.fromkeys([*rows, *made.inputs]))
-    yield TextTable(headings=[say("file"), "SHA-256"], rows=[list(row) for row in rows])
+    return provenance_blocks(say, files)

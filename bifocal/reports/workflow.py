@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.options import OF_STEP, PROJECT
+from bifocal.remarks import remark
 from bifocal.reports.content import ReportTask, StepTold, read_content
 from bifocal.reports.pair_report import report_document
 from photocore.cli import Progress, no_progress
@@ -74,10 +75,7 @@ def report_of(
     sources, tasks = [source], [replace(task, language=task.language or "en")]
     if source.is_dir():
         if task.control or task.check or task.relief or task.ortho:
-            raise InputError(
-                f"{source}: the folder says what belongs to its pairs; leave out --control, "
-                "--check, --relief and --ortho."
-            )
+            raise InputError(remark("report.folder_knows", of=source))
         sources, tasks = find_pairs(source, task)
     return write_report(sources, [out], tasks, overwrite=overwrite, progress=progress)
 
@@ -94,10 +92,7 @@ def find_pairs(folder: Path, task: ReportTask) -> tuple[list[Path], list[ReportT
     """
     sources = _aligned(folder, "") or _aligned(folder, "*/")
     if not sources:
-        raise InputError(
-            f"{folder}: holds no pair made by `bifocal facade` or `bifocal survey` (align/*.pair."
-            "json). Name a pair file or a solved workbook."
-        )
+        raise InputError(remark("report.no_pair", of=folder))
     tasks, found = [], []
     for source in sources:
         home, name = source.parent.parent, _ENDINGS.sub("", source.name)

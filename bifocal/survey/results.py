@@ -85,9 +85,8 @@ def _records(solution: SolvedSurvey) -> list[str]:
     names = [json.dumps(name, ensure_ascii=False) for name in table.ids]
     use = ["true" if value else "false" for value in solution.points.use]
     template = (
-        '{{"id": {}, ' + ", ".join(f'"{key}": {{}}' for key in keys)
-        + ', "flag": "{}", "use": {}'
-    )  # fmt: skip
+        '{{"id": {}, ' + ", ".join(f'"{key}": {{}}' for key in keys) + ', "flag": "{}", "use": {}'
+    )
     texts = [table.flags, use]
     if solution.photos is not None:
         template += ', "note": {}'

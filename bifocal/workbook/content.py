@@ -29,12 +29,7 @@ from bifocal.workbook.formulas.columns import (
 )
 from bifocal.workbook.formulas.media_formulas import setup_values
 from bifocal.workbook.formulas.other_values import other_values
-from bifocal.workbook.formulas.setup_cells import (
-    MATRICES,
-    NADIRS,
-    PHOTOS,
-    setup_checks,
-)
+from bifocal.workbook.formulas.setup_cells import MATRICES, NADIRS, PHOTOS, setup_checks
 from photocore.arrays import BoolArray, FloatArray
 from photocore.workbook.changing.cells import CellValue, name_cell
 from photocore.workbook.making.live_columns import LiveColumn

@@ -114,9 +114,7 @@ def _weight_cells(geo: Georeference) -> dict[str, list[CellValue]]:
     centred[used] = geo.solved[used] - geo.world_from_wall.source_centre
     east, north, height = np.where(used[:, None], geo.near, 0.0).T
     zero, turned = np.zeros(size), 1.0 if flat else 0.0
-    design = [
-        (east, turned * north, -north), (north, -turned * east, east), (zero, height, zero)
-    ]  # fmt: skip
+    design = [(east, turned * north, -north), (north, -turned * east, east), (zero, height, zero)]
     cells |= {key: inputs(values) for key, values in entries(weights, "p_").items()}
     columns = {f"u_{{}}{name}": np.stack(d, axis=-1) for name, d in zip("pqm", design, strict=True)}
     for key, column in {**columns, "h_{}": centred}.items():

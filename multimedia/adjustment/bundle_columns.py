@@ -12,6 +12,7 @@ from multimedia.adjustment.media_unknowns import OF_MATERIAL, media_unknowns
 from multimedia.adjustment.unknowns import Unknowns
 from multimedia.media.camera import ANY_INTERIOR, EXTERIOR, Camera
 from multimedia.projects.model import Project
+from multimedia.remarks import remark
 from photocore.arrays import BoolArray, IntArray
 from photocore.errors import InputError
 
@@ -76,9 +77,7 @@ def place_columns(
     media = _media_columns(project, unknowns.media, labels)
     alike = {f"plate {plate}" for plate in unknowns.plates} & set(project.camera_names)
     if alike:
-        raise InputError(
-            f"plates: camera {min(alike)!r} is named like a plate's unknowns; rename the camera."
-        )
+        raise InputError(remark("adjust.named_like_plate", name=min(alike)))
     plates = tuple(places(f"plate {plate}", EXTERIOR) for plate in unknowns.plates)
     points = np.full((len(ids), 3), -1, dtype=np.int64)
     row_of = {name: row for row, name in enumerate(ids)}
@@ -118,10 +117,7 @@ def _interior_names(project: Project, unknowns: Unknowns) -> list[tuple[str, ...
     for camera in project.cameras if unknowns.interior else ():
         first = model.setdefault(interior_group(camera.name, unknowns.shared_interior), camera)
         if type(first.distortion) is not type(camera.distortion):
-            raise InputError(
-                f"shared_interior: cameras {first.name} and {camera.name} have different lens "
-                "models; give each its own set."
-            )
+            raise InputError(remark("adjust.two_lens_models", name=first.name, other=camera.name))
     return names
 
 

@@ -17,7 +17,6 @@ from multimedia.media.interfaces import Interfaces
 from multimedia.media.surfaces import Cylinder, Plane, RefractingSurface, Sphere
 from multimedia.remarks import in_language
 from photocore.arrays import FloatArray
-from photocore.provenance import program, provenance, today
 from photocore.reports.document import (
     Banner,
     Block,
@@ -27,6 +26,7 @@ from photocore.reports.document import (
     Picture,
     TextTable,
 )
+from photocore.reports.framing import dated_document, provenance_blocks
 from photocore.reports.words import Words, words_of
 from photocore.reports.writing import write_document
 
@@ -74,8 +74,7 @@ def adjustment_document(
     """Return the blocks of the report, in the order a reader needs them."""
     say = words_of("multimedia.adjustment", language)
     title = title or say("title", name=result.project.name or "-")
-    made = say("made", program=program(), date=today())
-    blocks: list[Block] = [Heading(text=title, level=1), Paragraph(text=made, small=True)]
+    blocks: list[Block] = []
     for part in (_precision, _media, _unknowns, _residuals, _suspects, _correlations, _points):
         blocks += part(result, say)
         if part is _precision:
@@ -84,8 +83,7 @@ def adjustment_document(
             said = [text for text in (*notes, *result.remarks) if text not in alike]
             told = [in_language(text, language) for text in said]
             blocks += _remarks((*told, *([say("see_correlations")] if alike else [])), say)
-    blocks += _provenance(say)
-    return Document(title=title, language=language, subject=made, blocks=tuple(blocks))
+    return dated_document(title, language, say, [*blocks, *provenance_blocks(say)])
 
 
 def _precision(result: Adjustment, say: Words) -> Iterator[Block]:
@@ -317,15 +315,3 @@ def _points(result: Adjustment, say: Words) -> Iterator[Block]:
     yield TextTable(headings=heads, rows=rows, caption=caption)
     if len(order) > _POINTS:
         yield Paragraph(text=say("more_rows", count=len(order) - _POINTS), small=True)
-
-
-def _provenance(say: Words) -> Iterator[Block]:
-    made = provenance()
-    if not made.command and not made.inputs:
-        return
-    yield Heading(text=say("provenance"))
-    if made.command:
-        yield Paragraph(text=say("made_by"), lines=(made.command,), small=True)
-    if made.inputs:
-        rows = [list(row) for row in made.inputs]
-        yield TextTable(headings=[say("file"), "SHA-256"], rows=rows)

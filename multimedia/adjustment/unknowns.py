@@ -9,6 +9,7 @@ import numpy as np
 
 from multimedia.media.camera import ANY_INTERIOR, EXTERIOR
 from multimedia.projects.model import Project
+from multimedia.remarks import remark
 from photocore.adjustment import OUTLIER_LIMIT, correlations, standardised
 from photocore.arrays import FloatArray, positive
 from photocore.camera.fisheye import TERMS, Fisheye
@@ -140,10 +141,7 @@ def bars_of(bars: Sequence[ScaleBar], names: Sequence[str]) -> tuple[ScaleBar, .
             continue
         heads = (bar.first.split("@"), bar.second.split("@"))
         if not all(len(head) == 2 for head in heads):
-            raise InputError(
-                f"scale bar {bar.first}, {bar.second}: one @ in both names, where the number of "
-                "the wand's place stands: @a and @b for 1a and 1b."
-            )
+            raise InputError(remark("adjust.scale_bar_names", first=bar.first, second=bar.second))
         (start, end), (other, last) = heads
         shortest = len(start + end)
         places = [

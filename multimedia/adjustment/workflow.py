@@ -15,6 +15,7 @@ from multimedia.adjustment.unknowns import Adjustment, ScaleBar, Unknowns
 from multimedia.projects.model import Project
 from multimedia.projects.project_file import read_project, write_project
 from multimedia.refraction.water import salinity_from_index, water_index_derivatives
+from multimedia.remarks import remark
 from photocore.errors import InputError
 from photocore.output import all_or_none, check_all_writable, check_ending
 from photocore.reports.words import words_of
@@ -73,10 +74,7 @@ def _with_all_plates(source: Path, project: Project, unknowns: Unknowns) -> Unkn
     if unknowns.plates != ALL or ALL[0] in groups:
         return unknowns
     if not groups:
-        raise InputError(
-            f"{source}: --plate all: no object point belongs to a group; name the plate of "
-            "each in the column group of its object points, or leave --plate out."
-        )
+        raise InputError(remark("adjust.no_groups", of=source))
     return replace(unknowns, plates=tuple(groups))
 
 
@@ -95,9 +93,7 @@ def parse_scale_bar(text: str) -> ScaleBar:
     except ValueError as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(
-            f"--scale-bar {text}: expected first,second,length,sigma, e.g. 11,14,0.5,0.0001"
-        ) from None
+        raise InputError(remark("adjust.scale_bar_text", text=text)) from None
 
 
 def salinity_of(

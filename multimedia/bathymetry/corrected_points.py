@@ -11,6 +11,7 @@ from multimedia.media.height_field import HeightField
 from multimedia.media.height_field import WaterSurface as WaterSurface
 from multimedia.media.surfaces import Plane
 from multimedia.refraction.layers import checked_index
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray, IntArray, as_floats, not_negative, positive
 from photocore.errors import GeometryError, InputError
 from photocore.labelled import LabelledCode
@@ -114,9 +115,7 @@ def as_water_surface(level: float | WaterSurface) -> WaterSurface:
         return level
     if isinstance(level, Plane):
         if abs(level.normal[2]) < 0.5:
-            raise GeometryError(
-                "water_level: the plane is steeper than 60 degrees; a water surface is not."
-            )
+            raise GeometryError(remark("bathymetry.steep"))
         # Normals of a water surface point up.
         return level if level.normal[2] > 0 else Plane(point=level.point, normal=-level.normal)
     height = as_floats(level, "water_level")

@@ -14,6 +14,7 @@ from multimedia.bathymetry.corrected_points import (
     WaterSurface,
 )
 from multimedia.media.surfaces import Plane
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError
 
@@ -116,10 +117,7 @@ class Outcome:
     def judge(self, surface: WaterSurface, *, allow_dry: bool) -> None:
         """Raise GeometryError when nothing lies under water; note what looks like millimetres."""
         if not np.isfinite(self.lowest):
-            raise GeometryError(
-                "no point has a position: heights are blank, or the rays of each point are "
-                "parallel, point upwards or have no direction."
-            )
+            raise GeometryError(remark("bathymetry.no_position"))
         outside = self.counts.get(BathymetryStatus.NO_SURFACE.label, 0)
         if outside and not self._wet and not allow_dry:
             raise GeometryError(
@@ -153,10 +151,7 @@ class Outcome:
                 f"heights that span only {span:g}: are they in different units (mm and m)?"
             )
         if self.max_depth > DEEPEST:
-            self.remarks.append(
-                f"The deepest point lies {self.max_depth:.0f} m under water, deeper than photos "
-                "see: are the heights in millimetres, or is the water level wrong?"
-            )
+            self.remarks.append(remark("bathymetry.very_deep", max_depth=self.max_depth))
         if failed:
             hint = "" if flat else " Oblique rays through waves have many ways: try --max-angle 40."
             self.remarks.append(f"{failed} points could not be corrected and are marked so.{hint}")

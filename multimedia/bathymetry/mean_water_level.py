@@ -12,6 +12,7 @@ from scipy.special import ndtr
 from scipy.stats import poisson
 
 from multimedia.media.surfaces import Plane
+from multimedia.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import GeometryError, InputError
 
@@ -129,10 +130,7 @@ def mean_water_level(
     xyz = as_points(points, "points", dimension=3).reshape(-1, 3)
     finite = np.asarray(np.isfinite(xyz).all(-1))
     if finite.sum() < FEWEST:
-        raise InputError(
-            f"points: {int(finite.sum())} tie points; at least {FEWEST} on the water surface are "
-            "needed for a level with a standard deviation."
-        )
+        raise InputError(remark("bathymetry.few_ties", count=int(finite.sum()), fewest=FEWEST))
     if spread is not None and not spread > 0:
         raise InputError(f"spread: must be above zero [m], got {spread}.")
     heights = xyz[finite, 2]
@@ -229,10 +227,7 @@ def _highest_group(
     least = max(least, (FEWEST - 0.5) * len(few) / len(ordered))
     good = [k for k, count in enumerate(counts) if count >= least]
     if not good:
-        raise GeometryError(
-            f"points: no {FEWEST} tie points lie at about one height, so none of them shows the "
-            "water surface. Add points on the surface, or give their expected spread."
-        )
+        raise GeometryError(remark("bathymetry.no_surface", fewest=FEWEST))
     highest, most = max(good, key=lambda k: middles[k]), max(good, key=lambda k: counts[k])
     share = len(ordered) / len(few)
     larger = None if most == highest else (round(counts[most] * share), middles[most])
@@ -414,10 +409,7 @@ def _refuse_weak(design: FloatArray, used: BoolArray) -> None:
     """
     needed = max(FEWEST, design.shape[1] + 2)
     if used.sum() < needed:
-        raise GeometryError(
-            f"points: only {int(used.sum())} tie points agree on one water surface; at least "
-            f"{needed} are needed. Add points, or give their expected spread."
-        )
+        raise GeometryError(remark("bathymetry.few_agree", count=int(used.sum()), needed=needed))
 
 
 def _fit(
@@ -433,8 +425,5 @@ def _fit(
     root = np.sqrt(weights)
     solution, _, rank, _ = np.linalg.lstsq(design * root[:, None], heights * root, rcond=1e-12)
     if rank < design.shape[1]:
-        raise GeometryError(
-            "points: the tie points on the water surface lie on one line, about which it may tilt "
-            "at will. Add points beside the line, or fit a level surface (without --tilted)."
-        )
+        raise GeometryError(remark("bathymetry.ties_on_line"))
     return solution, heights - design @ solution

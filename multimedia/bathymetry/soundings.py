@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from multimedia.remarks import remark
 from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import FloatArray, as_floats
 from photocore.errors import GeometryError, InputError
@@ -152,10 +153,7 @@ def depth_offsets(
         if (place == k).any()
     ]
     if not classes:
-        raise GeometryError(
-            f"depth classes: all soundings are {depth.min():.3g} to {depth.max():.3g} m deep, in "
-            "none of the classes."
-        )
+        raise GeometryError(remark("bathymetry.no_class", least=depth.min(), most=depth.max()))
     inside = (place > 0) & (place < len(bounds))
     total = _class(offset[inside], sigma[inside], bounds[0], bounds[-1])
     return DepthOffsets(

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from multimedia.projects.project_file import read_project
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, Table, read_table
@@ -121,10 +122,7 @@ def read_levels(path: Path | str, cameras: CameraPositions) -> FloatArray:
     if "time" not in table.present:
         raise InputError(f"{path}: water levels of photos need a column time or camera.")
     if not any(cameras.times):
-        raise InputError(
-            f"{path}: holds levels over time, so the table of cameras needs a column time (or "
-            "name the photos here, in a column camera)."
-        )
+        raise InputError(remark("bathymetry.no_time_column", of=path))
     gauge = np.array([_seconds(text, f"{path}, time") for text in table.texts("time")])
     if len(gauge) < 2 or not (np.diff(gauge) > 0).all():
         raise InputError(f"{path}: needs at least two rows whose times increase.")

@@ -9,6 +9,7 @@ import numpy as np
 
 from multimedia.bathymetry.mean_water_level import WaterLevel, mean_water_level
 from multimedia.projects.surface_files import FORMAT
+from multimedia.remarks import remark
 from photocore.cloud import open_cloud
 from photocore.jsonfile import write_object
 from photocore.output import check_all_writable, check_ending
@@ -64,16 +65,10 @@ def fit_water_level(
         water=mean_water_level(points, tilted=tilted, spread=spread), remarks=list(cloud.remarks)
     )
     if fitted.water.spread > COARSEST:
-        fitted.remarks.append(
-            f"A surface point scatters by {fitted.water.spread:.3g} m; are the heights in "
-            "millimetres?"
-        )
+        fitted.remarks.append(remark("bathymetry.scatter", spread=fitted.water.spread))
     if fitted.water.larger is not None:
         count, height = fitted.water.larger
-        fitted.remarks.append(
-            f"{count} tie points at about {height:.3f} m are a larger group than the highest one, "
-            "which is taken for the water. If they are the water, leave out the points above them."
-        )
+        fitted.remarks.append(remark("bathymetry.larger_group", count=count, height=height))
     if target is not None:
         write_object(target, fitted.as_dict(), overwrite=overwrite)
     return fitted

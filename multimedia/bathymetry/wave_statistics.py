@@ -13,6 +13,7 @@ from multimedia.bathymetry.waves import wave_effect
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.height_field import WaveSurface
 from multimedia.media.optical_media import OpticalMedia
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray, as_points, positive
 from photocore.errors import InputError
 
@@ -96,10 +97,7 @@ def waves_over(
         and not media.moves_with_camera and abs(media.normal[2]) > LEVEL and len(centres) > 1
     )  # fmt: skip
     if len(waves) < 2 or not open_water or unit != "m":
-        raise InputError(
-            "--waves: give amplitude and one or more lengths [m], for two or more cameras above "
-            "open, level water in m: two media, nothing between."
-        )
+        raise InputError(remark("bathymetry.waves"))
     assert isinstance(media, FlatInterface)
     points = seen.points[seen.seen_by >= 2]
     return wave_statistics(

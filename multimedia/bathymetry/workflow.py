@@ -32,6 +32,7 @@ from multimedia.bathymetry.survey_tables import (
 from multimedia.media.surfaces import Plane
 from multimedia.projects.dem import SENTINELS, Dem
 from multimedia.projects.surface_files import read_water_surface
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.cloud import open_cloud
@@ -92,15 +93,9 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
     if job.nodata is not None:
         raise InputError(f"{job.source}: --nodata is for the cells of a DEM, this is a cloud.")
     if job.target.suffix.lower() != job.source.suffix.lower():
-        raise InputError(
-            f"{job.target}: a {job.source.suffix} cloud is written as {job.source.suffix}, with "
-            "every attribute kept; give --out the same ending."
-        )
+        raise InputError(remark("bathymetry.other_ending", of=job.target, suffix=job.source.suffix))
     if cloud.has(MARK):
-        raise InputError(
-            f"{job.source}: has an attribute '{MARK}', so it has been corrected already. Correct "
-            "the original, or remove the attribute."
-        )
+        raise InputError(remark("bathymetry.corrected_already", of=job.source, mark=MARK))
     cameras = read_camera_positions(job.cameras) if job.cameras else None
     water = _water(job, cameras)
     surface = water.surface
@@ -147,10 +142,7 @@ def _water(job: Job, cameras: CameraPositions | None, crs: Any = None) -> _Water
     if Path(job.water_level).suffix.lower() not in LEVEL_TABLES:
         return _Water(read_water_surface(job.water_level, waves=job.waves, crs=crs))
     if cameras is None or job.waves:
-        raise InputError(
-            f"{job.water_level}: levels of photos need --cameras, and no --wave; or give one "
-            "height."
-        )
+        raise InputError(remark("bathymetry.levels_of_photos", of=job.water_level))
     levels = read_levels(job.water_level, cameras)
     mean = float(levels.mean())
     told = (
@@ -176,17 +168,14 @@ def _corrector(
         return lambda piece: beams(sensor(piece), piece.xyz, water_level=surface), []
     if cameras is None:
         return lambda piece: corrected(piece.xyz), []
-    remarks = []
+    remarks: list[str] = []
     pairs = read_visibility(job.visibility) if job.visibility else None
     if pairs is not None:
         _check_pairs(pairs, cameras, job)
         if not cloud.has("id"):
             raise InputError(f"{job.source}: --visibility needs a column id in the point cloud.")
     elif not cloud.has("cameras") and job.max_angle is None:
-        remarks.append(
-            "Nothing says which camera saw which point; every camera is taken to see every point. "
-            "--visibility, a column 'cameras' or --max-angle do better."
-        )
+        remarks.append(remark("bathymetry.all_see_all"))
 
     def correct(piece: CloudPiece) -> CorrectedPoints:
         _check_camera_unit(piece.xyz, cameras.centres, job)
@@ -253,10 +242,7 @@ def _sensor_positions(job: Job, cloud: Cloud) -> Callable[[CloudPiece], FloatArr
     """Return the function that finds where the sensor was for the points of a piece."""
     if job.trajectory is None:
         if not all(cloud.has(name) for name in ("X0", "Y0", "Z0")):
-            raise InputError(
-                f"{job.source}: lidar beams need the sensor position of each point: columns X0, Y0 "
-                "and Z0, or --trajectory with times."
-            )
+            raise InputError(remark("bathymetry.sensor_position", of=job.source))
         return lambda piece: np.column_stack([piece.numbers[n] for n in ("X0", "Y0", "Z0")])
     if not cloud.has("gps_time"):
         raise InputError(f"{job.source}: --trajectory needs a time (gps_time) for each point.")
@@ -278,10 +264,7 @@ def _correct_dem(job: Job, progress: Progress) -> Outcome:
     """Correct an elevation model window by window."""
     check_ending(job.target, "a DEM is written as .tif.", ".tif", ".tiff")
     if job.beams or job.visibility:
-        raise InputError(
-            f"{job.source}: cells of a DEM have no beams and no names; --beams, --trajectory and "
-            "--visibility are for point clouds."
-        )
+        raise InputError(remark("bathymetry.cells_of_dem", of=job.source))
     with Dem(job.source, nodata=job.nodata) as dem:
         if "REFRACTION_INDEX" in dem.tags:
             raise InputError(f"{job.source}: has been corrected for refraction already.")
@@ -290,17 +273,11 @@ def _correct_dem(job: Job, progress: Progress) -> Outcome:
         surface = water.surface
         is_level = isinstance(surface, Plane) and abs(surface.normal[2]) == 1.0
         if not dem.has_position and (cameras is not None or not is_level):
-            raise InputError(
-                f"{job.source}: has no position (no geotransform), so its cells cannot be related "
-                "to cameras or to a water surface; georeference it first."
-            )
+            raise InputError(remark("bathymetry.dem_nowhere", of=job.source))
         outcome = Outcome(remarks=list(water.remarks))
         if cameras is not None:
             if dem.is_geographic:
-                raise InputError(
-                    f"{job.source}: its cells are in degrees, but rays need metres; transform it "
-                    "to a projected reference system."
-                )
+                raise InputError(remark("bathymetry.degrees", of=job.source))
             if job.max_angle is None:
                 outcome.remarks.append(
                     "Every camera is taken to see every cell; --max-angle limits that."
@@ -354,10 +331,7 @@ def _correct_window(
         if needed <= margin or cameras is None:
             break
         if needed > WIDEST_MARGIN:
-            raise GeometryError(
-                f"{job.source}: the correction would move cells by {reach} cells; are cameras and "
-                "DEM in the same unit and reference system?"
-            )
+            raise GeometryError(remark("bathymetry.far_cells", of=job.source, reach=reach))
         margin = needed
     layers = [result.xyz[:, 2]]
     if result.sigma is not None:

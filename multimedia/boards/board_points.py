@@ -10,6 +10,7 @@ import numpy as np
 
 from multimedia.orientation.plate_poses import plate_pose
 from multimedia.projects.model import ImagePoints, ObjectPoints, Project
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.camera.boards import BoardView
 from photocore.errors import ConvergenceError, GeometryError, InputError
@@ -69,10 +70,7 @@ def with_boards(
     own, seen = project.object_points, project.image_points
     taken = {name.rpartition(" ")[0] for name in set(own.ids) & objects.keys()}
     if taken:
-        raise InputError(
-            f"the project has points of the board in {', '.join(sorted(taken)[:8])} already; give "
-            "the project without boards, or photos of other names."
-        )
+        raise InputError(remark("boards.points_already", names=", ".join(sorted(taken)[:8])))
     sigma = np.concatenate([own.sigma, np.full((len(objects), 3), np.nan)])
     places = np.array([point for _, point in objects.values()]).reshape(-1, 3)
     return replace(

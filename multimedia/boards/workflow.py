@@ -11,6 +11,7 @@ from multimedia.media.camera import Sensor
 from multimedia.projects.model import Project
 from multimedia.projects.photos import read_photo
 from multimedia.projects.project_file import project_files, read_project, write_project
+from multimedia.remarks import remark
 from photocore.arrays import ByteArray, positive
 from photocore.camera.boards import BoardView, checked_board, detect_board, find_board_size
 from photocore.cli import Progress, no_progress
@@ -136,10 +137,7 @@ def _camera_and_pose(project: Project, photo: Path) -> tuple[str, str]:
             return name, rest.strip(" _-.") or "1"
     if photo.absolute().parent.name in names:
         return photo.absolute().parent.name, photo.stem
-    raise InputError(
-        f"{photo}: which camera took it? Begin its name with that of the camera, or put it into a "
-        f"folder of that name; the project has {', '.join(names)}."
-    )
+    raise InputError(remark("boards.which_camera", of=photo, names=", ".join(names)))
 
 
 def _refuse_repeated(places: Sequence[tuple[str, str]], photos: Sequence[Path]) -> None:

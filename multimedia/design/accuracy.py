@@ -22,6 +22,7 @@ from multimedia.orientation.intersection import intersect
 from multimedia.orientation.object_rays import image_rays, largest_angle
 from multimedia.orientation.resection import resect
 from multimedia.refraction.layers import Layers
+from multimedia.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, as_points, positive
 from photocore.errors import GeometryError, InputError, PhotogrammetryError
 
@@ -127,10 +128,7 @@ def study_setup(
         straight.append(np.where(seen[:, None], line, np.nan))
     enough = seen_by >= 2
     if not enough.any():
-        raise GeometryError(
-            "design: no point is seen by two cameras. Turn the cameras towards the object, use a "
-            "shorter principal distance, or choose other points."
-        )
+        raise GeometryError(remark("design.unseen"))
     inverse = np.full_like(normal, np.nan)
     inverse[enough] = np.linalg.inv(normal[enough])
     sigma = sigma_image * np.sqrt(np.diagonal(inverse, axis1=1, axis2=2))
@@ -225,10 +223,7 @@ def ring_of_cameras(
     cameras = []
     target = as_points(target, "target", dimension=3)
     if interface.moves_with_camera:
-        raise InputError(
-            "ring_of_cameras: the interface moves with the camera; give one that stands still in "
-            "the world, a water surface or the wall of a tank."
-        )
+        raise InputError(remark("design.moving_interface"))
     normal = interface.normal
     top = target + ((interface.point - target) @ normal) * normal
     # Azimuths from X, or what is left of it in the face.
@@ -303,9 +298,7 @@ def compare_placements(
         sigma, angle = tuple(study.rms_sigma.tolist()), float(np.mean(study.angle))
         placements.append(Placement(half_angle=float(half_angle), sigma=sigma, angle=angle))
     if not placements:
-        raise GeometryError(
-            "design: under no angle do all cameras see all points; increase the distance."
-        )
+        raise GeometryError(remark("design.no_angle"))
     return tuple(placements)
 
 
@@ -389,10 +382,7 @@ def calibration_costs(
             real, interface, calibrated, sigma_image * water_noise, interior
         )
     except PhotogrammetryError as error:
-        raise GeometryError(
-            f"design: the set-up cannot be calibrated with these points ({error}); give points "
-            "that fill the object space."
-        ) from error
+        raise GeometryError(remark("design.not_calibrated", error=error)) from error
 
     return CalibrationCosts(
         air=first, air_calibration_in_water=second, water=third, sigma0=(sigma1, sigma2, sigma3)

@@ -45,11 +45,8 @@ def write_design_workbook(path: Path | str, design: Design, *, overwrite: bool =
     fill_sheet(
         book.create_sheet("Placement"),
         ("half angle deg", "sigma X", "sigma Y", "sigma Z", "ray angle deg"),
-        [
-            (np.degrees(p.half_angle), *p.sigma, np.degrees(p.angle))
-            for p in design.placements
-        ],
-    )  # fmt: skip
+        [(np.degrees(p.half_angle), *p.sigma, np.degrees(p.angle)) for p in design.placements],
+    )
     if design.costs is not None:
         costs = design.costs
         fill_sheet(
@@ -65,8 +62,7 @@ def write_design_workbook(path: Path | str, design: Design, *, overwrite: bool =
         [*design.models, ("colour seam in the image, mm", design.seam, design.seam)],
     )  # fmt: skip
     if design.planarity:
-        columns = ("deviation", "size", "wavelength", "dX", "dY", "dZ", "largest",
-                    "size as noise")  # fmt: skip
+        columns = ("deviation", "size", "wavelength", "dX", "dY", "dZ", "largest", "size as noise")
         fill_sheet(
             book.create_sheet("Flatness"), columns,
             [

@@ -21,6 +21,7 @@ from multimedia.refraction.materials import Material
 from multimedia.refraction.shifting import radial_shift
 from multimedia.refraction.snell import refracted_angle
 from multimedia.refraction.water import QUAN_FRY, WaterFormula, water_refractive_index
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray, as_floats, as_points, positive
 from photocore.errors import InputError
 
@@ -227,9 +228,7 @@ def colour_positions(
     [11.9868, 12.0, 12.0131]
     """
     if not 0 <= reference < len(colours):
-        raise InputError(
-            f"reference: there are {len(colours)} colours, counted from 0; {reference} is none."
-        )
+        raise InputError(remark("design.reference", count=len(colours), reference=reference))
     constant = positive(principal_distance, "principal_distance", unit="mm")
     places = as_points(offsets, "offsets", dimension=2)
     tangent = np.hypot(places[..., 0], places[..., 1]) / constant
@@ -299,9 +298,7 @@ def correct_dispersion(
     from scipy.ndimage import map_coordinates, spline_filter
 
     if image.ndim != 3 or image.shape[2] != len(colours):
-        raise InputError(
-            f"image: expected {len(colours)} channels, one per colour; found shape {image.shape}."
-        )
+        raise InputError(remark("design.channels", count=len(colours), shape=image.shape))
     size = positive(pixel_size, "pixel_size", unit="mm")
     rows, columns = image.shape[:2]
     middle = ((columns - 1) / 2, (rows - 1) / 2) if nadir is None else nadir

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from multimedia.refraction.layers import Layers
 from multimedia.refraction.shifting import radial_shift_ratio
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray, as_floats, positive
 from photocore.errors import InputError
 
@@ -199,10 +200,7 @@ def telem(
     seen = _seen(radius, z0, zp, layers, principal_distance)
     aside = seen.tangent > 0
     if np.count_nonzero(aside) <= terms:
-        raise InputError(
-            f"radius: {np.count_nonzero(aside)} points off the axis cannot determine a camera "
-            f"constant and {terms} coefficients."
-        )
+        raise InputError(remark("design.few_off_axis", count=np.count_nonzero(aside), terms=terms))
     # r' = c_w T (1 + k1 (c_w T)² + ...) is linear in c_w, c_w³ k1, ...; T scaled against rounding.
     largest = float(seen.tangent.max())
     scaled = (seen.tangent[aside] / largest).ravel()

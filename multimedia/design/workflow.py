@@ -27,6 +27,7 @@ from multimedia.media.camera import Camera
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.projects.project_file import read_project
 from multimedia.refraction.layers import Layers
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
 from photocore.output import all_or_none, check_all_writable, check_ending
@@ -59,15 +60,9 @@ def design_ring(
     of the noise in the simulated calibrations, ``flatness`` asks for `planarity_study`.
     """
     if not 0 <= depths[0] < depths[1]:
-        raise InputError(
-            f"depths: {depths[0]:g} to {depths[1]:g}: give the least and the largest depth under "
-            "the last face, positive downwards."
-        )
+        raise InputError(remark("design.depths", least=depths[0], most=depths[1]))
     if max(*extent, depths[1]) > FARTHEST * distance:
-        raise InputError(
-            f"extent, depths: the object space is more than {FARTHEST:g} times as large as the "
-            f"distance of the cameras, {distance:g}; check the units."
-        )
+        raise InputError(remark("design.extent", farthest=FARTHEST, distance=distance))
     interface = FlatInterface(layers=Layers(indices=tuple(indices), thicknesses=tuple(thicknesses)))
     points = object_grid(extent, depths)
     cameras = ring_of_cameras(
@@ -88,9 +83,7 @@ def design_project(source: Path, *, seed: int = 1, flatness: bool = False) -> De
     """Study the cameras of a project file at its object points."""
     project = read_project(source)
     if not project.object_points.ids:
-        raise InputError(
-            f"{source}: the project has no object points; add the places where you will measure."
-        )
+        raise InputError(remark("design.no_points", of=source))
     return _design(
         project.cameras, project.interfaces, project.object_points.xyz, project.sigma_image,
         project.media_of, (), seed, project.unit, project.remarks, flatness,
@@ -123,10 +116,7 @@ def _design(
         except (GeometryError, InputError) as error:
             notes.append(f"calibration not simulated: {error}")
     else:
-        notes.append(
-            "calibration not simulated: that needs cameras that all look through the same "
-            "plane-parallel layers."
-        )
+        notes.append(remark("design.not_simulated"))
     sensitivities = tuple(
         (name, STEPS[kind_of(name)][1], tuple(moved.tolist()))
         for name, moved in study.sensitivity.items()

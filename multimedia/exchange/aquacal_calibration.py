@@ -18,6 +18,7 @@ from multimedia.projects.camera_poses import FLIP
 from multimedia.projects.model import Project
 from multimedia.projects.point_tables import METRES
 from multimedia.refraction.layers import Layers
+from multimedia.remarks import remark
 from photocore.camera.lensformats import LensData
 from photocore.camera.rotation import checked_rotation
 from photocore.errors import InputError
@@ -138,10 +139,7 @@ def _surface(project: Project, k: int) -> FlatInterface:
     """Return the water surface of a camera, with the level under it as its point."""
     camera, media = project.cameras[k], project.interface_of(k)
     if not isinstance(media, FlatInterface) or len(media.indices) != 2 or media.moves_with_camera:
-        raise InputError(
-            f"camera {camera.name}: AquaCal knows one water surface that stands still, air above "
-            "and water below, not what this camera looks through; choose COLMAP for glass."
-        )
+        raise InputError(remark("exchange.aquacal_media", name=camera.name))
     if abs(abs(media.normal[2]) - 1.0) > _LEVEL:
         raise InputError(
             f"camera {camera.name}: its water surface is not level (normal "

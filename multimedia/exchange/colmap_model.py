@@ -22,6 +22,7 @@ from multimedia.media.surfaces import Sphere
 from multimedia.projects.camera_poses import FLIP
 from multimedia.projects.model import ImagePoints, ObjectPoints, Project
 from multimedia.refraction.layers import Layers
+from multimedia.remarks import remark
 from photocore.arrays import floats_of_words
 from photocore.errors import InputError
 from photocore.programs.colmap import (
@@ -176,10 +177,7 @@ def _port_words(camera: Camera, media: FlatInterface | Interfaces | None) -> str
             if np.abs(first - second).max() <= 1e-12 * inner.radius:
                 wall = outer.radius - inner.radius
                 return f" DOMEPORT {digits([*first, inner.radius, wall, *media.indices])}"
-    raise InputError(
-        f"camera {camera.name}: COLMAP knows flat ports of two or three parallel media and domes "
-        "of two concentric spheres, not what this camera looks through."
-    )
+    raise InputError(remark("exchange.colmap_media", name=camera.name))
 
 
 def _names(names: Sequence[str]) -> list[str]:

@@ -18,6 +18,7 @@ import numpy as np
 from multimedia.exchange.opencv_camera import OpencvCamera, camera_of, left_out, opencv_of
 from multimedia.media.camera import Camera
 from multimedia.projects.model import Project
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.camera.lensformats import FISHEYE_KEY, LensData, opencv_values
 from photocore.camera.rotation import checked_rotation, rotation_from_vector
@@ -70,14 +71,10 @@ def write_opencv(path: Path, project: Project, *, overwrite: bool = False) -> tu
     views = {camera.name: opencv_of(camera) for camera in project.cameras}
     single = path.suffix.lower() in (".yml", ".yaml", ".json")
     if single and len(views) > 1:
-        raise InputError(
-            f"{path}: OpenCV's files hold one camera, the project has {len(views)}; name a folder."
-        )
+        raise InputError(remark("exchange.one_camera_a_file", of=path, count=len(views)))
     odd = [name for name in views if not single and Path(name).name != name]
     if odd:
-        raise InputError(
-            f"{path}: camera {odd[0]!r} cannot give its name to a file in a folder; rename it."
-        )
+        raise InputError(remark("exchange.no_file_name", of=path, name=odd[0]))
     texts = {name: _calibration_text(path, view) for name, view in views.items()}
     if single:
         with atomic_path(path, overwrite=overwrite) as temporary:

@@ -16,6 +16,7 @@ from multimedia.media.camera import Camera, Distortion, Sensor
 from multimedia.media.lens_conversion import farthest_miss, nearest_camera, sensor_rays
 from multimedia.projects.camera_poses import FLIP
 from multimedia.projects.model import Project
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.camera.distortion import Brown, Convention
 from photocore.camera.fisheye import TERMS, Fisheye
@@ -85,18 +86,12 @@ def camera_of(
     """
     matrix = lens.camera_matrix
     if lens.model not in ("opencv", _FISHEYE):
-        raise InputError(
-            f"{lens.source}: camera {name} has a {lens.model} lens; projects hold central lenses "
-            "with k1 k2 k3 p1 p2 and fisheyes with k1 k2 k3 k4."
-        )
+        raise InputError(remark("exchange.lens_model", of=lens.source, name=name, model=lens.model))
     if abs(matrix[0, 1]) > 1e-9 * matrix[0, 0]:
         raise InputError(f"{lens.source}: camera {name} has a skew of {matrix[0, 1]:g} px.")
     fx, fy = float(matrix[0, 0]), float(matrix[1, 1])
     if not (fx > 0 and fy > 0 and np.size(translation) == 3):
-        raise InputError(
-            f"{lens.source}: camera {name}: expected focal lengths above zero and a translation of "
-            "three numbers."
-        )
+        raise InputError(remark("exchange.focal_and_translation", of=lens.source, name=name))
     if lens.coefficients.size > MOST_TERMS:
         raise InputError(
             f"{lens.source}: camera {name} has {lens.coefficients.size} distortion terms; expected "
@@ -159,10 +154,7 @@ def opencv_of(camera: Camera) -> OpencvCamera:
         camera = nearest_camera(start, points, image, _FREE)
         misfit = farthest_miss(camera, points, image)
         if misfit > FARTHEST:
-            raise InputError(
-                f"camera {camera.name}: OpenCV's lens model comes no nearer than {misfit:.2g} px "
-                "to this distortion."
-            )
+            raise InputError(remark("exchange.lens_misfit", name=camera.name, misfit=misfit))
     lens, c = camera.distortion, camera.principal_distance
     matrix = np.eye(3)
     matrix[[0, 1], [0, 1]] = c / sensor.pixel_size * [lens.scale, 1.0]

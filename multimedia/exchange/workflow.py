@@ -13,6 +13,7 @@ from multimedia.exchange.opencv_calibration import read_opencv, write_opencv
 from multimedia.exchange.opencv_camera import PITCH
 from multimedia.projects.model import Project
 from multimedia.projects.project_file import read_project, write_project
+from multimedia.remarks import remark
 from photocore.errors import InputError
 from photocore.jsonfile import read_object
 from photocore.output import check_not_input
@@ -88,17 +89,12 @@ def convert(
     """
     check_not_input(target, source)
     if form is not None and target.suffix.lower() == ".toml":
-        raise InputError(
-            f"{target}: is the name of a project file; leave --to out, or end the name as {form} "
-            "files do."
-        )
+        raise InputError(remark("exchange.project_name", of=target, form=form))
     wanted = "project" if target.suffix.lower() == ".toml" else form
     if wanted is None:
         wanted = _BY_ENDING.get(target.suffix.lower())
     if wanted is None:
-        raise InputError(
-            f"{target}: name the format with --to: {', '.join(FORMATS)}; or end the name in .toml."
-        )
+        raise InputError(remark("exchange.name_the_format", of=target, formats=", ".join(FORMATS)))
     kind, project = read_any(source, pitch=pixel_size, unit=unit)
     if wanted == "project":
         write_project(target, project, overwrite=overwrite)
@@ -124,10 +120,7 @@ def read_any(path: Path, *, pitch: float = PITCH, unit: str = "m") -> tuple[str,
         if is_colmap(path):
             return "colmap", read_colmap(path, pitch=pitch, unit=unit)
         if (path / "cameras.bin").is_file():
-            raise InputError(
-                f"{path}: is a binary COLMAP model; write it as text with "
-                "`colmap model_converter --output_type TXT`."
-            )
+            raise InputError(remark("exchange.binary_colmap", of=path))
         return "opencv", read_opencv(path, pitch=pitch, unit=unit)
     if ending == ".toml":
         return "project", read_project(path)
@@ -141,7 +134,4 @@ def read_any(path: Path, *, pitch: float = PITCH, unit: str = "m") -> tuple[str,
         return "metashape", read_metashape(path, pitch=pitch, unit=unit)
     if ending in (".xml", ".yml", ".yaml"):
         return "opencv", read_opencv(path, pitch=pitch, unit=unit)
-    raise InputError(
-        f"{path}: is no project or calibration known here: a .toml project, a folder with COLMAP's "
-        "cameras.txt and images.txt, Metashape's .xml, OpenCV's .yml or .json, AquaCal's .json."
-    )
+    raise InputError(remark("exchange.unknown_source", of=path))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray, as_floats, as_points, positive, read_only
 from photocore.camera.distortion import NAMES as DISTORTION
 from photocore.camera.distortion import Brown as Brown
@@ -321,8 +322,5 @@ class Camera:
         A covariance of rotation vectors C becomes one of angles as ``A C A.T``.
         """
         if np.hypot(*self.rotation[0, :2]) < 1e-9:
-            raise GeometryError(
-                f"camera {self.name}: phi is 90 degrees, where omega and kappa turn about the "
-                "same axis and have no precision of their own. Turn the world frame."
-            )
+            raise GeometryError(remark("camera.gimbal", name=self.name))
         return angle_rates(self.rotation)

@@ -7,6 +7,7 @@ import numpy as np
 from multimedia.media.camera import Camera
 from multimedia.media.camera_observations import CameraObservations, camera_of, start_at
 from multimedia.media.projection import Media, project
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.camera.distortion import Brown
 from photocore.errors import InputError
@@ -25,10 +26,7 @@ def brown_of(camera: Camera, program: str) -> Brown:
     """
     if isinstance(camera.distortion, Brown):
         return camera.distortion
-    raise InputError(
-        f"camera {camera.name}: has a fisheye lens, for which {program} has no model; write it for "
-        "COLMAP, Metashape or OpenCV (`multimedia convert`), or calibrate with a central lens."
-    )
+    raise InputError(remark("camera.fisheye_elsewhere", name=camera.name, program=program))
 
 
 def sensor_rays(camera: Camera) -> tuple[FloatArray, FloatArray]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.media.height_field import HeightField
+from multimedia.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_floats, read_only
 from photocore.errors import InputError
 
@@ -154,11 +155,7 @@ def _refuse_folds(vertices: FloatArray, triangles: IntArray, area: FloatArray) -
     same = (ends[1:] == ends[:-1]).all(axis=1) & (side[1:] == side[:-1])
     if same.any():
         x, y = vertices[ends[int(same.argmax())], :2].mean(axis=0)
-        raise InputError(
-            f"triangles: {int(same.sum())} edges have two triangles on one side of them, the first "
-            f"at X = {x:g}, Y = {y:g}; a water surface has no overhangs and no triangle twice. "
-            "Remove one of both."
-        )
+        raise InputError(remark("surface.overhang", count=int(same.sum()), x=x, y=y))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -114,9 +114,7 @@ class Body:
         """Radii, or the places of planes along the first normal."""
         first = self.surfaces[0]
         if isinstance(first, Plane):
-            return np.array([
-                first.normal @ s.point for s in self.surfaces if isinstance(s, Plane)
-            ])  # fmt: skip
+            return np.array([first.normal @ s.point for s in self.surfaces if isinstance(s, Plane)])
         return np.array([s.radius for s in self.surfaces if isinstance(s, Sphere | Cylinder)])
 
     def value(self, name: str) -> float:

@@ -14,6 +14,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray, as_floats, positive, read_only
 from photocore.errors import GeometryError
 
@@ -60,10 +61,7 @@ class RefractingSurface(ABC):
         GeometryError
             Unless it is a `RigidSurface`.
         """
-        raise GeometryError(
-            f"with_camera: a {type(self).__name__} stands still in the object frame; "
-            "only a Plane, Sphere or Cylinder can be fixed to the camera."
-        )
+        raise GeometryError(remark("surface.fixed_to_camera", kind=type(self).__name__))
 
 
 class RigidSurface(RefractingSurface):

@@ -37,6 +37,7 @@ from multimedia.orientation.intersection import intersect
 from multimedia.orientation.workflow import known_misses
 from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints, Project
 from multimedia.projects.point_tables import METRES
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import InputError
 from photocore.output import atomic_folder
@@ -186,9 +187,7 @@ def write_experiment(
     for number, camera in enumerate(project.cameras):
         wall = wall_of(camera, project.interface_of(number))
         if layers is not None and wall.layers != layers:
-            raise InputError(
-                f"camera {camera.name}: OpenPTV knows only media that are the same for all cameras."
-            )
+            raise InputError(remark("openptv.other_media", name=camera.name))
         layers = wall.layers
         base = f"cal/{camera.name}.tif"
         glass = glass_vector(camera, wall) * factor
@@ -283,14 +282,8 @@ def _control_path(folder: Path) -> Path:
         shown = ", ".join(str(path.parent) for path in others[:SHOWN])
         raise InputError(f"{folder}: holds several experiments; name one of {shown}.")
     if any(folder.glob("parameters*.y*ml")):
-        raise InputError(
-            f"{folder}: has its parameters as YAML only. Save them once as a parameters folder "
-            "with ptv.par (pyptv: export legacy parameters)."
-        )
-    raise InputError(
-        f"{folder}: neither ptv.par nor parameters/ptv.par was found; is this the folder of an "
-        "OpenPTV experiment?"
-    )
+        raise InputError(remark("openptv.yaml_only", of=folder))
+    raise InputError(remark("openptv.no_parameters", of=folder))
 
 
 def _is_of_parameters(folder: Path) -> bool:
@@ -345,9 +338,7 @@ def _cameras(
     for number, image in enumerate(control.calibration_images, start=1):
         path = _find(roots, f"{image}.ori")
         if path is None:
-            raise InputError(
-                f"{roots[0]}: {image}.ori of camera {number} was not found; ptv.par names it."
-            )
+            raise InputError(remark("openptv.no_ori", of=roots[0], image=image, number=number))
         name = Path(image.replace("\\", "/")).name.split(".")[0] or f"cam{number}"
         if name in {camera.name for camera in cameras}:
             name = f"{name}_{number}"
@@ -366,10 +357,7 @@ def _cameras(
         media_of.append(same[0])
         height = float(wall.normal @ (camera.centre - wall.point))
         if height < control.thickness:
-            remarks.append(
-                f"{path.name}: the camera stands {height:g} mm above the water side of the glass: "
-                "inside or behind it. Turn the glass vector or check the units."
-            )
+            remarks.append(remark("openptv.inside_glass", of=path.name, height=height))
     return cameras, media, tuple(media_of), remarks
 
 

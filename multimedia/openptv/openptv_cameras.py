@@ -15,14 +15,10 @@ import numpy as np
 from multimedia.media.camera import EXTERIOR, Camera, Sensor
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.interfaces import Interfaces
-from multimedia.media.lens_conversion import (
-    brown_of,
-    farthest_miss,
-    nearest_camera,
-    sensor_rays,
-)
+from multimedia.media.lens_conversion import brown_of, farthest_miss, nearest_camera, sensor_rays
 from multimedia.media.projection import project
 from multimedia.refraction.layers import Layers
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.camera.distortion import Brown, Convention
 from photocore.errors import InputError
@@ -138,11 +134,7 @@ def in_openptvs_terms(
         at_points = there < misfit
         start, misfit = (nearer, there) if at_points else (start, misfit)
     if not misfit <= FARTHEST:
-        raise InputError(
-            f"camera {camera.name}: OpenPTV's distortion, common pixel size and scale come no "
-            f"nearer than {misfit:.2g} px to this camera's scale, shear and distortion. Calibrate "
-            'with distortion convention = "openptv" and without scale.'
-        )
+        raise InputError(remark("openptv.lens_misfit", name=camera.name, misfit=misfit))
     return OpenptvCamera(camera=start, scale=scale, misfit=misfit, at_points=at_points)
 
 
@@ -158,10 +150,7 @@ def wall_of(camera: Camera, media: FlatInterface | Interfaces | None) -> FlatInt
     if media is None:
         return _no_glass(camera)
     if not isinstance(media, FlatInterface) or len(media.layers.indices) > 3:
-        raise InputError(
-            f"{who}: OpenPTV holds three plane-parallel media (air, glass, water) before every "
-            "camera, not curved surfaces nor more layers."
-        )
+        raise InputError(remark("openptv.three_media", of=who))
     layers = media.layers
     if len(layers.indices) == 2:
         layers = Layers(indices=(*layers.indices, layers.indices[1]), thicknesses=(0.0,))
@@ -196,10 +185,7 @@ def glass_vector(camera: Camera, wall: FlatInterface) -> FloatArray:
         # Nothing is refracted: any glass before the camera will do.
         return np.asarray(_SHORTEST * wall.normal)
     if reach < -_SHORTEST:
-        raise InputError(
-            f"camera {camera.name}: the water side of the glass must lie between origin and "
-            "camera for OpenPTV; move the origin of the object frame into the water."
-        )
+        raise InputError(remark("openptv.origin", name=camera.name))
     return np.asarray(max(reach, _SHORTEST) * wall.normal)
 
 

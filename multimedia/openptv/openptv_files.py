@@ -11,6 +11,7 @@ from multimedia.media.camera import Camera, Sensor
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.lens_conversion import brown_of
 from multimedia.refraction.layers import Layers
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray, IntArray, floats_of_words
 from photocore.camera.distortion import Brown, Convention
 from photocore.camera.rotation import checked_rotation, nearest_rotation, world_from_camera
@@ -173,10 +174,7 @@ def read_targets(path: Path, *, field: int = 0) -> DetectedTargets:
     first, *rest = read_text(path, KIND).split() or [""]
     count = _count(path, [first], "number of targets")
     if len(rest) != 8 * count:
-        raise InputError(
-            f"{path}: its first line announces {count} targets of 8 numbers, {len(rest)} numbers "
-            "follow. The file is cut off, or is no target file."
-        )
+        raise InputError(remark("openptv.targets_cut", of=path, count=count, size=len(rest)))
     table = floats_of_words(rest, path, "value {} of the targets").reshape(-1, 8)
     pixels = table[:, 1:3].copy()
     if field in (1, 2):
@@ -251,10 +249,7 @@ def read_correspondences(path: Path) -> tuple[FloatArray, IntArray]:
     rows = [line.split() for line in lines[1:]]
     widths = {len(row) for row in rows}
     if len(rows) != count or len(widths) > 1 or (widths and min(widths) < 6):
-        raise InputError(
-            f"{path}: its first line announces {count} particles, {len(rows)} lines follow "
-            "(expected number X Y Z and one target number per camera)."
-        )
+        raise InputError(remark("openptv.particles_cut", of=path, count=count, size=len(rows)))
     if not rows:
         return np.empty((0, 3)), np.empty((0, 0), dtype=np.int64)
     table = np.array([floats_of_words(row, path, f"line {k}") for k, row in enumerate(rows, 2)])

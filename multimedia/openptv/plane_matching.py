@@ -11,6 +11,7 @@ from multimedia.media.camera import Camera
 from multimedia.media.projection import Media
 from multimedia.openptv.plane_sets import PlaneCandidates, PlaneSet
 from multimedia.orientation.resection import Resection, resect
+from multimedia.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.errors import ConvergenceError, GeometryError, InputError
 
@@ -102,15 +103,9 @@ def _matched(
     remarks.insert(0, f"took {int(good.sum())} points of {taken}{misfit}.")
     kept = _resected(camera, xyz[good], image[good], media, estimate=())
     if found is not None and kept is not None and _rms(kept) > 2.0 * _rms(found):
-        remarks.append(
-            f"with the stored interior orientation {_pixels(camera, kept):.1f} px remain; "
-            "`multimedia resect --estimate c,xh,yh,k1,k2,p1,p2` calibrates it."
-        )
+        remarks.append(remark("openptv.interior_misfit", rest=_pixels(camera, kept)))
     if _is_flat(xyz[good]):
-        remarks.append(
-            "all these points lie in one plane, which cannot tell the principal distance from the "
-            "distance of the camera."
-        )
+        remarks.append(remark("openptv.one_plane"))
     return PlaneMatch(tuple(labels[good].tolist()), image[good], xyz[good], tuple(remarks))
 
 
@@ -129,10 +124,7 @@ def _agreeing(
     while len(sets) > 1 and not _fit_together(camera, sets, media):
         if len(sets) == 2:
             names = " and ".join(one.source for one in sets)
-            remarks.append(
-                f"{names} contradict each other: no one camera sees both. Neither was taken; "
-                "remove the wrong one."
-            )
+            remarks.append(remark("openptv.contradict", names=names))
             return
         without = [sets[:k] + sets[k + 1 :] for k in range(len(sets))]
         costs = [_cost(camera, rest, media) for rest in without]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from multimedia.media.camera import EXTERIOR
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.camera.rotation import (
     checked_rotation,
@@ -40,7 +41,7 @@ def read_pose(value: FileSection) -> tuple[FloatArray, FloatArray]:
     angles = [key for key in EXTERIOR[3:] if key in value]
     if len(ways) > 1 or (ways and angles):
         raise InputError(
-            f"{where}: {', '.join([*ways, *angles])} state the rotation more than once; keep one."
+            remark("project.rotation_twice", of=where, names=", ".join([*ways, *angles]))
         )
     axes = value.get("axes", _AXES[0])
     if axes not in _AXES:
@@ -62,9 +63,7 @@ def _from_angles(value: FileSection) -> FloatArray:
         )
     angles = np.array([value.number(key) for key in EXTERIOR[3:]])
     if (np.abs(angles) > 720.0).any():
-        raise InputError(
-            f"{value.where}: omega, phi, kappa are in degrees; found {angles.tolist()}."
-        )
+        raise InputError(remark("project.degrees", of=value.where, angles=angles.tolist()))
     # Whole turns do not matter.
     turns = np.radians(np.remainder(angles + 180.0, 360.0) - 180.0)
     return world_from_camera(*(float(a) for a in turns))

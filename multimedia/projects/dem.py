@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.raster import RasterFile, Window, create_geotiff
@@ -42,10 +43,7 @@ class Dem(RasterFile):
         if self.path.suffix.lower() == ".asc":
             _refuse_bad_cells(self.path)
         if self.dtype == np.uint8 and self.bands > 2:
-            raise InputError(
-                f"{path}: is a picture of {self.bands} bands, expected a raster of heights [m] in "
-                "its band 1."
-            )
+            raise InputError(remark("project.picture", of=path, bands=self.bands))
         self._unmarked = self.nodata is None and not self.masked
         name = self.path.name
         lost = not self.has_position

@@ -34,6 +34,7 @@ from multimedia.projects.point_tables import (
 )
 from multimedia.projects.surface_files import read_mesh, read_raster, wave_rows, waves_of
 from multimedia.refraction.layers import Layers
+from multimedia.remarks import remark
 from photocore.arrays import is_finite_number, positive
 from photocore.camera.distortion import NAMES, Brown, Convention
 from photocore.camera.fisheye import Fisheye
@@ -184,10 +185,7 @@ _OF_MEDIA = frozenset(("layers", "indices", "thicknesses", "surfaces", "medium",
 def _toml(path: Path) -> dict[str, Any]:
     check_name(path)
     if path.is_dir():
-        raise InputError(
-            f"{path}: is a folder. Give the project file in it; for an OpenPTV experiment make "
-            "one with `multimedia openptv`."
-        )
+        raise InputError(remark("project.is_folder", of=path))
     return read_toml(path, "project file")
 
 
@@ -199,10 +197,7 @@ def _project(data: dict[str, Any], folder: Path) -> Project:
     if unit not in METRES:
         raise InputError(f"unit: {unit!r} is no unit of length; choose {', '.join(METRES)}.")
     for key in sorted(_OF_MEDIA & data.keys()):
-        raise InputError(
-            f"{key}: media belong in a section of their own, e.g. [media.tank] with indices and "
-            'thicknesses, which each camera names: media = "tank".'
-        )
+        raise InputError(remark("project.media_section", of=key))
     described = data.pop("media", {})
     if not isinstance(described, dict):
         raise InputError("media: expected sections such as [media.tank].")

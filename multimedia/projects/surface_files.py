@@ -12,6 +12,7 @@ from multimedia.media.height_field import RasterSurface, WaterSurface, WaveSurfa
 from multimedia.media.mesh_surface import MeshSurface
 from multimedia.media.surfaces import Plane
 from multimedia.projects.dem import Dem
+from multimedia.remarks import remark
 from photocore.arrays import is_finite_number
 from photocore.cloud.obj import read_obj_mesh
 from photocore.cloud.ply import read_ply_mesh
@@ -55,18 +56,11 @@ def read_water_surface(given: str, *, waves: Sequence[str] = (), crs: Any = None
             raise InputError(f"water level: {given} is no height; give metres.")
         return _wavy(height, waves) if waves else Plane.level(height)
     if waves:
-        raise InputError(
-            f"--wave: waves are added to a height, not to the surface {given}; choose one of both, "
-            "a height with --wave or a surface."
-        )
+        raise InputError(remark("surface.wave_on_surface", given=given))
     path = Path(given)
     kind = path.suffix.lower()
     if kind not in (*RASTERS, *MESHES, *FITTED):
-        raise InputError(
-            f"water level: {given!r} is neither a height in metres nor a .tif or .asc raster, a "
-            ".ply or .obj mesh or .json of `multimedia waterlevel`. A decimal point, no unit: "
-            "1.8075."
-        )
+        raise InputError(remark("surface.no_level", given=given))
     if kind in FITTED:
         return _read_fitted(path)
     return read_mesh(path) if kind in MESHES else read_raster(path, crs=crs)
@@ -101,15 +95,9 @@ def read_raster(path: Path, *, crs: Any = None) -> RasterSurface:
         raise InputError(f"{path}: a raster of heights is a {', '.join(RASTERS)} file.")
     with Dem(path) as raster:
         if crs is not None and raster.crs is not None and raster.crs != crs:
-            raise InputError(
-                f"{path}: the water surface is in another coordinate reference system than the "
-                "data; transform one of them first."
-            )
+            raise InputError(remark("surface.two_systems", of=path))
         if not raster.has_position:
-            raise InputError(
-                f"{path}: has no position (no geotransform), so nobody knows where its heights "
-                "are; georeference it first."
-            )
+            raise InputError(remark("surface.nowhere", of=path))
         if raster.width * raster.height > MOST_CELLS:
             raise InputError(
                 f"{path}: {raster.width} x {raster.height} cells; average the water surface down "
@@ -145,10 +133,7 @@ def waves_of(level: float, rows: Sequence[Sequence[float]], where: str) -> WaveS
     for row in rows:
         values = [float(v) for v in row]
         if not 2 <= len(values) <= 4 or not all(abs(v) <= LARGEST for v in values):
-            raise InputError(
-                f"{where}: a wave is amplitude, length and, if wanted, direction and phase [deg]; "
-                f"found {', '.join(map(str, row))}."
-            )
+            raise InputError(remark("surface.wave", of=where, row=", ".join(map(str, row))))
         if not (values[0] > 0 and values[1] > 0):
             raise InputError(f"{where}: amplitude and length of a wave must be above zero.")
         full.append([*values, 0.0, 0.0][:4])
@@ -178,10 +163,7 @@ def _wavy(level: float, waves: Sequence[str]) -> WaveSurface:
         try:
             rows.append([float(word) for word in text.split(",")])
         except ValueError:
-            raise InputError(
-                f"--wave {text}: expected AMPLITUDE,LENGTH[,DIRECTION[,PHASE]], e.g. 0.05,4,30 "
-                "(metres and degrees)."
-            ) from None
+            raise InputError(remark("surface.wave_text", text=text)) from None
     return waves_of(level, rows, "--wave")
 
 
@@ -197,6 +179,4 @@ def _read_fitted(path: Path) -> Plane:
             normal=(-float(slope_x), -float(slope_y), 1.0),  # type: ignore[arg-type]
         )
     except (KeyError, TypeError, ValueError):
-        raise InputError(
-            f"{path}: expected level, slope and centre, as `multimedia waterlevel` writes them."
-        ) from None
+        raise InputError(remark("surface.level_file", of=path)) from None

@@ -58,16 +58,10 @@ class Layers:
         object.__setattr__(self, "indices", indices)
         object.__setattr__(self, "thicknesses", thicknesses)
         if len(indices) < 2:
-            raise InputError(
-                f"indices: expected at least two media, the camera's and the object's; found "
-                f"{len(indices)}."
-            )
+            raise InputError(remark("layers.few_media", count=len(indices)))
         for place, thickness in enumerate(thicknesses, start=1):
             if not (np.isfinite(thickness) and thickness >= 0):
-                raise InputError(
-                    f"thicknesses: layer {place} has thickness {thickness:g}; "
-                    "it must be zero or more."
-                )
+                raise InputError(remark("layers.negative", place=place, thickness=thickness))
         if len(thicknesses) != len(indices) - 2:
             raise InputError(
                 f"thicknesses: {len(indices)} media have {len(indices) - 2} layers between the "

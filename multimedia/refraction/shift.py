@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike
 
 from multimedia.refraction.shift_slopes import BLOCK, slopes_row
 from multimedia.refraction.tangent import solve
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray, as_floats
 from photocore.errors import InputError
 
@@ -215,10 +216,7 @@ def as_layers(heights: Sequence[ArrayLike], indices: Sequence[float]) -> list[Fl
     """
     layers = [as_floats(height, f"heights[{i}]") for i, height in enumerate(heights)]
     if len(layers) != len(indices) or not layers:
-        raise InputError(
-            f"heights and indices: expected one refractive index per layer, found "
-            f"{len(layers)} heights and {len(indices)} indices."
-        )
+        raise InputError(remark("layers.one_index_each", heights=len(layers), count=len(indices)))
     return layers
 
 

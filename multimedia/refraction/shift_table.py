@@ -10,6 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from multimedia.refraction.layers import Layers
 from multimedia.refraction.shift import shift_ratio, shifted_radius
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray, as_floats, contiguous_rows, positive
 from photocore.errors import GeometryError, InputError
 
@@ -97,10 +98,7 @@ class ShiftTable:
         if self.degree not in (1, 3):
             raise InputError(f"degree: 1 (bilinear) or 3 (bicubic in R²), found {self.degree}.")
         if not far > near:
-            raise InputError(
-                f"depths: the table must run from the smaller to the larger depth, found {near:g} "
-                f"to {far:g}."
-            )
+            raise InputError(remark("table.depths", near=near, far=far))
         if min(rows, columns) < 4:
             raise InputError(f"shape: at least 4 by 4 nodes, found {rows} by {columns}.")
         depth = np.linspace(near, far, rows)[:, None]
@@ -108,10 +106,7 @@ class ShiftTable:
         radius = self.max_radius * (steps if self.degree == 1 else np.sqrt(steps))
         ratios = shift_ratio(radius, self.layers.heights(z0=self.z0, zp=depth), self.layers.indices)
         if np.isnan(ratios).any():
-            raise GeometryError(
-                f"max_radius: the camera cannot see points {self.max_radius:g} off its nadir at "
-                f"every depth of the table: no ray gets there. Make max_radius smaller."
-            )
+            raise GeometryError(remark("table.max_radius", max_radius=self.max_radius))
         ratios.setflags(write=False)
         object.__setattr__(self, "depths", (near, far))
         object.__setattr__(self, "ratios", ratios)
@@ -157,10 +152,7 @@ class ShiftTable:
         height = as_floats(self.z0 if z0 is None else z0, "z0")
         unknown = np.isnan(height)
         if not (unknown | (height == self.z0)).all():
-            raise GeometryError(
-                f"z0: the table was built for a camera {self.z0:g} above the interface; every "
-                "camera needs its own table."
-            )
+            raise GeometryError(remark("table.other_camera", z0=self.z0))
         r, depth = as_floats(radius, "radius"), as_floats(zp, "zp")
         if unknown.any():
             r = np.where(unknown, np.nan, r)

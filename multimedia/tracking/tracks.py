@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from multimedia.remarks import remark
 from multimedia.tracking.linking import LinkRules, adapted, linked, usual_step
 from multimedia.tracking.velocities import differs_from_neighbours, track_velocities
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points, positive
@@ -126,10 +127,7 @@ def track_particles(
     clouds = [as_points(xyz, "places", dimension=3).reshape(-1, 3) for xyz in places]
     names = np.arange(len(clouds)) if frames is None else np.asarray(frames, dtype=np.int64)
     if len(clouds) < 3 or len(names) != len(clouds) or (np.diff(names) != 1).any():
-        raise InputError(
-            f"frames: {len(clouds)} frames, numbered {names.tolist()[:5]}...; three or more in a "
-            "row are needed. Give an empty list for a frame in which nothing was found."
-        )
+        raise InputError(remark("tracks.few_frames", count=len(clouds), names=names.tolist()[:5]))
     if not all(np.isfinite(xyz).all() for xyz in clouds):
         raise InputError("places: every coordinate must be a finite number.")
     if gap < 0 or shortest < 3:

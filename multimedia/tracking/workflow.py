@@ -21,6 +21,7 @@ from multimedia.orientation.intersection import intersect
 from multimedia.projects.model import SIGMA_PIXEL, Project
 from multimedia.projects.point_tables import METRES
 from multimedia.projects.project_file import read_project
+from multimedia.remarks import remark
 from multimedia.tracking.track_files import check_tracks_path, openptv_files, write_tracks
 from multimedia.tracking.tracks import GAP, SHORTEST, Tracks, track_particles
 from photocore.arrays import FloatArray, IntArray
@@ -171,10 +172,7 @@ def _frames(targets: Sequence[Path], first: int | None, last: int | None) -> ran
         words = [name[len(base.name) : -len(ENDING)] for name in names]
         seen.append({int(word) for word in words if word.isdecimal()})
         if not seen[-1]:
-            raise InputError(
-                f"{base}: no files {base.name}NUMBER{ENDING} there. Give what they begin with, the "
-                "point too: --targets img/cam1. for img/cam1.10001_targets."
-            )
+            raise InputError(remark("tracks.no_files", of=base, name=base.name, ending=ENDING))
     common = sorted(set.intersection(*seen))
     chosen = [n for n in common if (first is None or n >= first) and (last is None or n <= last)]
     begin = first if first is not None else (chosen or [0])[0]

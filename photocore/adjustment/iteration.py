@@ -14,6 +14,7 @@ from photocore.adjustment.outliers import standardised
 from photocore.adjustment.priors import ALIKE
 from photocore.arrays import FloatArray
 from photocore.errors import ConvergenceError, GeometryError
+from photocore.remarks import remark
 
 State = TypeVar("State")
 #: Weighted residuals and their derivatives.
@@ -247,9 +248,7 @@ def fit(
     if not result.settled and rest > hopeless:
         where = f" Most of it lies in {blame(result)}." if blame else ""
         raise ConvergenceError(
-            f"{what}: the observations contradict each other: residuals of {rest:.0f} times their "
-            f"standard deviation remain and fall no more.{where} Do these image points belong to "
-            "these object points, the units and media to the file?",
+            remark("fit.contradict", of=what, rest=rest, where=where),
             iterations=result.iterations,
             residual=rest,
         )
@@ -261,18 +260,13 @@ def refuse_undetermined(result: Fit[State], names: Sequence[str], what: str) -> 
     """Refuse a state that the data do not determine, or that is not settled; see `fit`."""
     open_ = result.linear.undetermined(names)
     if open_:
-        raise GeometryError(
-            f"{what}: the data cannot determine {', '.join(open_)}. Fix some of them, give control "
-            "points or scale bars, or measure more points, better spread in the image and in depth."
-        )
+        raise GeometryError(remark("fit.undetermined", of=what, names=", ".join(open_)))
     if not result.settled:
         alike = np.abs(np.triu(np.nan_to_num(correlations(result.linear.cofactor)), 1))
         one, other = divmod(int(alike.argmax()), len(alike))
         apart = f"{names[one]} and {names[other]}" if alike.max() > ALIKE else "the unknowns"
         raise ConvergenceError(
-            f"{what}: the adjustment does not settle. The data can hardly tell {apart} apart: "
-            "fix one, or measure points at more depths and better spread; or image and object "
-            "points do not belong together",
+            remark("fit.unsettled", of=what, apart=apart),
             iterations=result.iterations,
             residual=float(np.sqrt(np.mean(result.residuals**2))),
         )

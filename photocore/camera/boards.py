@@ -12,6 +12,7 @@ import numpy as np
 
 from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import InputError
+from photocore.remarks import remark
 
 #: Half width of the corner refinement window [px]; smaller where squares are smaller.
 CORNER_WINDOW = 11
@@ -147,10 +148,7 @@ def find_board_size(images: Sequence[ByteArray]) -> tuple[int, int]:
             rows, columns = sorted(meta.shape)
             votes[(int(columns), int(rows))] += 1
     if not votes or votes.most_common(1)[0][1] < min(2, len(images)):
-        raise InputError(
-            "no chessboard was recognised. Say which board it is, e.g. --pattern chessboard "
-            "--board 9x6 (inner corners), or use straight façade lines with --lines."
-        )
+        raise InputError(remark("boards.none"))
     return votes.most_common(1)[0][0]
 
 

@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike
 
 from photocore.arrays import FloatArray, as_points
 from photocore.errors import LARGEST, InputError
+from photocore.remarks import remark
 
 #: Names of the parameters in the order of `Brown`'s fields.
 NAMES = ("k1", "k2", "k3", "p1", "p2", "scale", "shear")
@@ -82,10 +83,7 @@ class Brown:
         if not (np.abs(values) <= LARGEST).all():
             raise InputError(f"distortion: every coefficient must be a number, found {values}.")
         if not (0.5 < self.scale < 2.0 and abs(self.shear) < 0.5):
-            raise InputError(
-                f"distortion: scale {self.scale:g} must be near 1 and shear {self.shear:g} near "
-                "0 [rad]: they describe the axes of the sensor, not the size of the image."
-            )
+            raise InputError(remark("lens.axes", scale=self.scale, shear=self.shear))
 
     @classmethod
     def from_opencv(cls, coefficients: Sequence[float], *, principal_distance: float) -> Brown:
@@ -100,11 +98,7 @@ class Brown:
         """
         values = [float(v) for v in coefficients]
         if any(values[5:]):
-            raise InputError(
-                "OpenCV distortion: only k1 k2 p1 p2 k3 can be used here, found "
-                f"{len(values)} coefficients. Calibrate without the rational, thin-prism and "
-                "tilted models."
-            )
+            raise InputError(remark("lens.more_terms", count=len(values)))
         k1, k2, q1, q2, k3 = [*values, *[0.0] * 5][:5]
         c = principal_distance
         return cls(k1=k1 / c**2, k2=k2 / c**4, k3=k3 / c**6, p1=q2 / c, p2=-q1 / c)

@@ -18,6 +18,7 @@ from photocore.arrays import FloatArray, is_finite_number
 from photocore.camera.pinhole import camera_matrix
 from photocore.errors import LARGEST, InputError
 from photocore.jsonfile import read_object
+from photocore.remarks import remark
 from photocore.textfile import check_file, read_text
 
 
@@ -79,19 +80,14 @@ def read_foreign_lens(path: Path | str) -> LensData:
         return _opencv(path) if "opencv_storage" in text[:500] else _metashape(path, text)
     if ending == ".txt":
         return _colmap(path, text)
-    raise InputError(
-        f"{path}: lens files are lens.json, COLMAP cameras.txt, Metashape .xml or OpenCV .yml."
-    )
+    raise InputError(remark("lens.unknown_file", of=path))
 
 
 def _colmap(path: Path, text: str) -> LensData:
     """Read the one camera of a COLMAP ``cameras.txt``."""
     rows = [line.split() for line in text.splitlines() if line.strip() and line[0] != "#"]
     if len(rows) != 1 or len(rows[0]) < 5:
-        raise InputError(
-            f"{path}: expected COLMAP's cameras.txt with one camera, found {len(rows)} lines; "
-            "keep the line of this lens only."
-        )
+        raise InputError(remark("lens.many_cameras", of=path, count=len(rows)))
     return colmap_lens(rows[0], path)[0]
 
 
@@ -170,9 +166,7 @@ def xml_root(path: Path, text: str) -> ElementTree.Element:
         If it is not valid, or declares a document type, which could stand for anything.
     """
     if "<!DOCTYPE" in text:
-        raise InputError(
-            f"{path}: declares a document type (DOCTYPE), which calibrations never do; remove it."
-        )
+        raise InputError(remark("lens.doctype", of=path))
     try:
         return ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
@@ -331,9 +325,7 @@ def _table(path: Path, key: str, data: Any, shape: Sequence[Any] | None) -> Floa
         if shape is not None:
             table = table.reshape(tuple(int(side) for side in shape))
     except (TypeError, ValueError, OverflowError):
-        raise InputError(
-            f"{path}: the matrix {key} is damaged; export the calibration again."
-        ) from None
+        raise InputError(remark("lens.damaged_matrix", of=path, name=key)) from None
     if not (np.abs(table) <= LARGEST).all():
         raise InputError(f"{path}: {key} holds what is no finite number.")
     return table

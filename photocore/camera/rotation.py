@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from photocore.arrays import FloatArray, as_floats, read_only
 from photocore.errors import GeometryError
+from photocore.remarks import remark
 
 #: The matrices of e_k x v, for the three axes e_k: shape (3, 3, 3).
 AXES_CROSS = np.array(
@@ -145,16 +146,10 @@ def checked_rotation(matrix: ArrayLike, name: str, *, tolerance: float = 1e-6) -
     """
     rotation = read_only(matrix, name, shape=(3, 3))
     if not (np.abs(rotation @ rotation.T - np.eye(3)) <= tolerance + 1e-5 * np.eye(3)).all():
-        raise GeometryError(
-            f"{name} is not a rotation matrix: its rows must be unit vectors at right angles. "
-            "Check the nine numbers, or give the three angles."
-        )
+        raise GeometryError(remark("rotation.none", name=name))
     (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()
     if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0:
-        raise GeometryError(
-            f"{name} is not a rotation but mirrors the world: one of the coordinate systems is "
-            "left-handed. Exchange two axes or change the sign of one."
-        )
+        raise GeometryError(remark("rotation.mirrors", name=name))
     return rotation
 
 

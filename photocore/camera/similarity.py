@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from photocore.arrays import FloatArray, as_points, read_only
 from photocore.errors import GeometryError, InputError
+from photocore.remarks import remark
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -81,10 +82,7 @@ def fit_similarity(source: ArrayLike, target: ArrayLike) -> Similarity:
     first, second, p, q = _centred(source, target, needed=3)
     spread = np.linalg.svd(p, compute_uv=False)
     if spread[1] <= 1e-9 * spread[0]:
-        raise GeometryError(
-            "the control points lie on one line: the rotation about it cannot be found. "
-            "Add a point beside the line."
-        )
+        raise GeometryError(remark("similarity.one_line"))
     left, values, right = np.linalg.svd(q.T @ p)
     # The sign keeps a proper rotation where noise (or points in one plane) would allow a mirror.
     signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left) * np.linalg.det(right)) or 1.0])
@@ -119,17 +117,11 @@ def fit_levelled(source: ArrayLike, target: ArrayLike) -> Similarity:
     b = (p[:, 0] * q[:, 1]).sum() + (p[:, 2] * q[:, 0]).sum()
     total = (p**2).sum()
     if np.hypot(a, b) <= 1e-12 * total or total == 0:
-        raise GeometryError(
-            "the control points stand one above the other: the direction of the wall cannot be "
-            "found. Add a point further to the side."
-        )
+        raise GeometryError(remark("similarity.one_above_other"))
     length = np.sqrt(a**2 + b**2)
     scale = float((length + (p[:, 1] * q[:, 2]).sum()) / total)
     if scale <= 0:
-        raise GeometryError(
-            "the control points are upside down: heights fall where Y grows. Check H against Y, or "
-            "choose the model 3D."
-        )
+        raise GeometryError(remark("similarity.upside_down"))
     cos, sin = a / length, b / length
     rotation = np.array([[cos, 0.0, sin], [sin, 0.0, -cos], [0.0, 1.0, 0.0]])
     return Similarity(scale=scale, rotation=rotation, source_centre=first, target_centre=second)
@@ -173,9 +165,7 @@ def _centred(
     first = as_points(source, "source", dimension=3)
     second = as_points(target, "target", dimension=3)
     if first.shape != second.shape or first.ndim != 2:
-        raise InputError(
-            f"source {first.shape} and target {second.shape} must both have shape (n, 3)."
-        )
+        raise InputError(remark("similarity.shapes", shape=first.shape, other=second.shape))
     if len(first) < needed:
         raise GeometryError(
             f"{len(first)} control point{'s' * (len(first) != 1)}: at least {needed} are needed, "

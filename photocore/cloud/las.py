@@ -22,6 +22,7 @@ from photocore.cloud.model import (
     checked_positions,
 )
 from photocore.errors import InputError
+from photocore.remarks import remark
 
 #: Coordinates of new files are whole multiples of this. [m]
 STEP = 1e-4
@@ -40,10 +41,7 @@ class LasCloud(Cloud):
         if self._header.point_count == 0:
             raise InputError(f"{path}: holds no points.")
         if "LASF_Projection" not in records:
-            self.remarks.append(
-                f"{path.name} has no coordinate reference system; its coordinates are taken as "
-                "metres, like those of the cameras."
-            )
+            self.remarks.append(remark("cloud.no_system", name=path.name))
 
     def _check_counts(self) -> None:
         """Refuse a header that promises more records than the file has room for.
@@ -57,10 +55,7 @@ class LasCloud(Cloud):
         if len(head) == 247 and head[25] >= 4:
             records += struct.unpack_from("<I", head, 243)[0]
         if 54 * records > size:  # the shortest has 54 bytes
-            raise InputError(
-                f"{self.path}: cannot be read as LAS; it is damaged or cut off (its header "
-                f"promises {records} records)."
-            )
+            raise InputError(remark("cloud.cut_records", of=self.path, records=records))
 
         if len(head) > 104 and head[104] & 0x80:
             self._check_chunks(struct.unpack_from("<I", head, 96)[0], size)
@@ -83,10 +78,7 @@ class LasCloud(Cloud):
                 table = file.read(8)
         # A chunk takes a byte or more of the points.
         if len(table) < 8 or struct.unpack_from("<I", table, 4)[0] > at - start:
-            raise InputError(
-                f"{self.path}: cannot be read as LAZ; it is damaged or cut off (its table of "
-                "chunks). Copy or export it again."
-            )
+            raise InputError(remark("cloud.cut_chunks", of=self.path))
 
     @contextmanager
     def _reading(self) -> Iterator[Any]:
@@ -101,9 +93,7 @@ class LasCloud(Cloud):
         except InputError:
             raise
         except damage as error:
-            raise InputError(
-                f"{self.path}: cannot be read as LAS; it is damaged or cut off ({error})."
-            ) from None
+            raise InputError(remark("cloud.damaged", of=self.path, error=error)) from None
 
     def has(self, name: str) -> bool:
         """Return whether the points have a dimension."""
@@ -170,10 +160,7 @@ class LasCloud(Cloud):
         offset, scale = self._header.offsets[axis], self._header.scales[axis]
         steps = np.round((wanted[changed] - offset) / scale)
         if np.abs(steps).max(initial=0.0) > np.iinfo(np.int32).max:
-            raise InputError(
-                f"corrected {name} does not fit the scale {scale:g} of the LAS file; rewrite the "
-                "file with a coarser scale first."
-            )
+            raise InputError(remark("cloud.coarse_scale", name=name, scale=scale))
         whole = np.array(points[name])
         whole[changed] = steps.astype(np.int32)
         points[name] = whole

@@ -20,6 +20,7 @@ from photocore.camera.rotation import checked_rotation, nearest_rotation
 from photocore.errors import InputError
 from photocore.programs.json_values import JsonValue
 from photocore.programs.model import ForeignProject, ForeignView
+from photocore.remarks import remark
 
 #: Which of OpenCV's terms k1 k2 p1 p2 k3 a model's own are, by its names in both programs.
 _BROWN = {
@@ -133,10 +134,7 @@ def _lens(
     fisheye = kind in _FISHEYES
     own = tuple(range(4)) if fisheye else _BROWN.get(kind)
     if own is None or len(own) != len(given):
-        raise InputError(
-            f"{path}: the lens model {kind} with {len(given)} terms is not read; known are radial "
-            "1 and 3, Brown and fisheye 4. Undistort the photos there first."
-        )
+        raise InputError(remark("programs.lens_model", of=path, kind=kind, count=len(given)))
     terms = np.zeros(4 if fisheye else 5)
     terms[list(own)] = given
     return lens_data(
@@ -156,8 +154,6 @@ def _project(
     program: str, path: Path, views: list[ForeignView], unposed: int, points: list[FloatArray]
 ) -> ForeignProject:
     if not views:
-        raise InputError(
-            f"{path}: holds no photo with a pose; name the file of the finished project."
-        )
+        raise InputError(remark("programs.no_pose", of=path))
     said = (f"{unposed} photos without a pose of their own left out.",) if unposed else ()
     return ForeignProject(program, tuple(views), np.array(points).reshape(-1, 3), remarks=said)

@@ -18,12 +18,7 @@ from photocore.tables.csvread import (
     unguarded,
 )
 from photocore.tables.fill import fill, refuse_doubles, refuse_unknown_units, take_unit_row
-from photocore.tables.headings import (
-    Match,
-    bare,
-    describe,
-    find_columns,
-)
+from photocore.tables.headings import Match, bare, describe, find_columns
 from photocore.tables.model import Column, Table
 from photocore.tables.numbers import Decimal
 from photocore.tables.rows import DataRows, block_above, data_rows

@@ -13,13 +13,7 @@ import numpy as np
 
 from bifocal.collimation.live_results import observations
 from bifocal.collimation.records import Known, PickedPoint, Picks, Pixel
-from bifocal.collimation.workbook.outlines import (
-    KEYS,
-    TABLE,
-    Outlines,
-    add_outlines,
-    outline_cells,
-)
+from bifocal.collimation.workbook.outlines import KEYS, TABLE, Outlines, add_outlines, outline_cells
 from bifocal.collimation.workbook.setup import typed_setup
 from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
@@ -35,13 +29,7 @@ from bifocal.workbook.reading.reader import read_survey
 from bifocal.workbook.template_workflow import write_survey
 from bifocal.workbook.workflow import solve
 from photocore.errors import InputError, PhotogrammetryError
-from photocore.output import (
-    atomic_path,
-    check_not_open,
-    kept_copy,
-    relative_name,
-    scratch_beside,
-)
+from photocore.output import atomic_path, check_not_open, kept_copy, relative_name, scratch_beside
 from photocore.workbook.changing.cells import CellValue, name_cell
 from photocore.workbook.changing.editor import WorkbookEditor
 from photocore.workbook.changing.named_cells import place_of
@@ -117,10 +105,7 @@ def read_rows(path: Path) -> ReadBook:
     points = survey.points
     in_pixels = "px" in (survey.unit or survey.setup.unit)
     if points.is_cartesian.any() and not (in_pixels and is_survey(path)):
-        raise InputError(
-            f"{path.name}: its points are image coordinates of an ideal pair, the page picks raw "
-            "pixels; give another workbook with --workbook."
-        )
+        raise InputError(remark("page.ideal_workbook", of=path.name))
     pixels1 = np.where(points.is_cartesian[:, None], points.xy1, points.pixels1)
     pixels2 = np.where(points.is_cartesian[:, None], points.xy2, points.pixels2)
     # Relief measured beside the points is the user's own column; the page keeps the sheet Check.
@@ -250,10 +235,7 @@ def _edit(
     area = editor.table("tblPoints")
     places = _IDEAL if pair_file is None and read.survey.setup.matrices is None else _RAW
     if area is None or places[0] not in area.headings():
-        raise InputError(
-            f"{editor.path.name}: is no survey workbook for raw pixels; give another one with "
-            "--workbook."
-        )
+        raise InputError(remark("page.no_pixel_workbook", of=editor.path.name))
     has_lens = "ucol1" in area.headings()
     if has_lens != any(pair.photo(number).lens is not None for number in (1, 2)):
         raise InputError(
@@ -262,10 +244,7 @@ def _edit(
             "not; give another workbook with --workbook."
         )
     if pair.refracted and not read.survey.setup.media:
-        raise InputError(
-            f"{editor.path.name}: its formulas are made for photos in air, the orientation looks "
-            "through media; give another workbook with --workbook."
-        )
+        raise InputError(remark("page.workbook_in_air", of=editor.path.name))
     if pair_file is not None:
         _set_up(editor, read, pair, pair_file)
     elif places is _IDEAL:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bifocal.collimation.project import SurveyFiles
 from bifocal.model.pair import Pair
+from bifocal.remarks import remark
 from bifocal.survey.setup import SurveySetup
 from bifocal.workbook.pair_workflow import read_pair
 from bifocal.workbook.reading.reader import read_survey
@@ -23,10 +24,7 @@ def pair_of(files: SurveyFiles) -> Pair | None:
         return None
     pair = read_pair(files.pair)
     if files.pair_is_workbook and pair.exchanged:
-        raise InputError(
-            f"{files.pair}: d_1 is less than d_2; photo_1 and d_1 belong to the far photo: "
-            "exchange the values of both photos in its sheet Setup."
-        )
+        raise InputError(remark("page.setup_exchanged", of=files.pair))
     return pair
 
 

@@ -22,6 +22,7 @@ from bifocal.orientation.adjustment.pair_observations import (
     at,
 )
 from bifocal.orientation.adjustment.refracted_ties import height_equations, meeting_equations
+from bifocal.remarks import remark
 from photocore.adjustment.network import Network, NetworkState, Rows
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import (
@@ -111,10 +112,7 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
     try:
         fit = network.solve(NetworkState(blocks={"pair": {0: start}}))
     except GeometryError:
-        raise GeometryError(
-            "the observations do not determine the cameras. Measure more control points, spread "
-            "over the photo and off the wall plane, or give lens files and distances."
-        ) from None
+        raise GeometryError(remark("align.undetermined")) from None
     redundancy = max(fit.redundancy, 1)
     sigma0 = float(np.sqrt((fit.residuals @ fit.residuals) / redundancy))
     cofactor: FloatArray = np.zeros((len(names), len(names)))

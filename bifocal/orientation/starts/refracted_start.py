@@ -98,6 +98,6 @@ def _supposed(given: Given) -> tuple[float, float]:
         apparent = length * first.focal / float(np.linalg.norm(ends[0] - ends[1]))
         d1 = apparent * given.media.layers.indices[-1] / given.media.layers.indices[0]
     if d1 is None and d2 is None:
-        raise GeometryError(remark("refused.no_scale"))
+        raise GeometryError(remark("align.no_scale"))
     far = d1 if d1 is not None else (d2 or 0.0) / ratio
     return far, far * ratio if d2 is None else d2

@@ -24,6 +24,7 @@ from bifocal.matching.features import (
 from bifocal.model.homography import apply_homography
 from bifocal.model.interior_orientation import Cameras, Interiors
 from bifocal.orientation.tuning import TIES
+from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import Pinhole, fundamental, homogeneous, triangulate
 from photocore.errors import GeometryError
@@ -119,11 +120,7 @@ def find_ties(
     homography, on_plane = _dominant_plane(x1, x2, 1.5 * tolerance, 8000)
     count = len(x1)
     if on_plane.sum() < max(TIES.fewest_on_plane * count, 20):
-        raise GeometryError(
-            f"no plane: only {int(on_plane.sum())} of {count} common points lie on one plane. The "
-            "method needs a wall as reference. Frame the photos so that the wall fills them, or "
-            "give control points on the wall (--control)."
-        )
+        raise GeometryError(remark("align.no_plane", some=int(on_plane.sum()), count=count))
     return Ties(
         pixels1=x1,
         pixels2=x2,
@@ -305,10 +302,7 @@ def first_cameras(ties: Ties, interiors: Interiors) -> Cameras:
     ]
     possible = [pair for pair in cameras if pair is not None]
     if not possible:
-        raise GeometryError(
-            "the two photos give no camera in front of the wall. Check the focal lengths "
-            "(--focal1, --focal2) and that both photos show the same wall."
-        )
+        raise GeometryError(remark("align.no_camera_in_front"))
     return min(possible, key=lambda pair: _cost(ties, pair))
 
 

@@ -11,6 +11,7 @@ from bifocal import rays
 from bifocal.model.interior_orientation import Interior
 from bifocal.model.pair_media import PairMedia
 from bifocal.orientation.tuning import RESECTION
+from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.pinhole import Pinhole, camera_matrix, cameras_seeing, project
 from photocore.errors import GeometryError
@@ -75,10 +76,7 @@ def resect(
             seeming = _seeming(camera, media, number, xyz)
             there = np.asarray(np.isfinite(seeming).all(axis=1))
         if there.sum() < 4:
-            raise GeometryError(
-                "the control points do not lie behind the media as they are given. Check --depth "
-                "or --port, the indices in their order from the camera to the wall, and metres."
-            )
+            raise GeometryError(remark("resection.before_media"))
         before = camera.centre
         camera, fits = _in_air(seeming[there], pixels[there], known)
         agree = there.copy()
@@ -99,10 +97,7 @@ def _seeming(camera: Pinhole, media: PairMedia, number: int, xyz: FloatArray) ->
 def _in_air(xyz: FloatArray, pixels: FloatArray, interior: Interior) -> tuple[Pinhole, BoolArray]:
     """Return `resect` of a camera that looks through no media."""
     if len(xyz) < 4:
-        raise GeometryError(
-            f"{len(xyz)} control points with X, Y and pixels in this photo; a camera needs four, "
-            "and nine are advised."
-        )
+        raise GeometryError(remark("resection.few_points", count=len(xyz)))
     refuse_line(xyz)
     generator = np.random.default_rng(7)
     width = max(interior.image_size)
@@ -122,10 +117,7 @@ def _in_air(xyz: FloatArray, pixels: FloatArray, interior: Interior) -> tuple[Pi
             if cost < best:
                 best, camera, agree = cost, candidate, share < 1.0
     if camera is None or agree.sum() < 4:
-        raise GeometryError(
-            "no camera fits four of the control points. Check that their pixels belong to the "
-            "right photo and the right point, that Y points up, and that all are in metres."
-        )
+        raise GeometryError(remark("resection.no_camera"))
     return camera, agree
 
 
@@ -155,6 +147,4 @@ def refuse_line(xyz: FloatArray) -> None:
     """Refuse points that lie (almost) on one line."""
     singular = np.linalg.svd(xyz - xyz.mean(axis=0), compute_uv=False)
     if singular[1] <= 0.02 * singular[0]:
-        raise GeometryError(
-            "the control points lie on one line; choose them spread over the whole wall."
-        )
+        raise GeometryError(remark("resection.one_line"))

@@ -14,11 +14,7 @@ from bifocal.remarks import remark
 from bifocal.survey.reference import Georeference
 from bifocal.survey.relief_table import ENTRIES
 from bifocal.survey.survey_input import SurveyInput
-from bifocal.workbook.changing.setup_update import (
-    add_sheets,
-    write_corrections,
-    write_options,
-)
+from bifocal.workbook.changing.setup_update import add_sheets, write_corrections, write_options
 from bifocal.workbook.changing.update import refuse_earlier, store_named_cells
 from bifocal.workbook.content import SurveyContent, point_cells, result_cells
 from bifocal.workbook.formulas.columns import FORMULAS, NEAR

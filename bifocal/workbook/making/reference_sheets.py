@@ -22,14 +22,7 @@ from bifocal.workbook.reference_cells import check_cells
 from bifocal.workbook.words import word
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
-from photocore.workbook.making.look import (
-    DOUBT,
-    GOOD,
-    HEAD_FONT,
-    WRONG,
-    colour_where,
-    colour_words,
-)
+from photocore.workbook.making.look import DOUBT, GOOD, HEAD_FONT, WRONG, colour_where, colour_words
 from photocore.workbook.reading.grid import column_letters
 
 #: Row of the keys of the check table; statistics stand above.

@@ -25,7 +25,7 @@ from bifocal import (
     rectify,
 )
 from tests.bifocal.orientation.test_facade_lines import MATRIX, SIZE, drawn, view
-from tests.bifocal.orthophotos.test_cli_ortho import page_of
+from tests.bifocal.orthophotos.ortho_command import page_of
 from tests.builders.commands import bifocal_command
 from tests.builders.pinholes import project
 

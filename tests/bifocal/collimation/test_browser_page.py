@@ -175,6 +175,16 @@ def test_back_and_forward_move_between_stages(page: Driver) -> None:
     assert page.tab.get_by_role("dialog").count() == 0
 
 
+def test_what_comes_next_covers_nothing_of_the_panel(page: Driver) -> None:
+    page.tab.set_viewport_size({"width": 1024, "height": 768})
+    page.click("mode-orientation")
+    panel = page.tab.locator("#stage-orientation .panel").bounding_box()
+    card = page.tab.locator("#stage-orientation .card.next").bounding_box()
+    page.tab.set_viewport_size({"width": 1280, "height": 720})
+    assert panel["y"] + panel["height"] <= card["y"] + 0.5
+    assert card["y"] + card["height"] <= 768.5
+
+
 def test_the_stages_are_tabs_that_say_what_is_missing(page: Driver) -> None:
     page.click("mode-points")
     tab = page.tab.get_by_role("tab", selected=True)
@@ -194,7 +204,7 @@ OUTSIDE = """() => [...document.querySelectorAll("header *, .layer-bar *, .hand 
   .map((node) => node.outerHTML.slice(0, 120))"""
 
 
-@pytest.mark.parametrize("size", [(390, 844), (1024, 768), (1280, 720), (3840, 2160)])
+@pytest.mark.parametrize("size", [(390, 844), (640, 400), (1024, 768), (1280, 720), (3840, 2160)])
 def test_it_fits_small_screens_and_large(page: Driver, size: tuple[int, int]) -> None:
     page.tab.set_viewport_size({"width": size[0], "height": size[1]})
     for stage in STAGES:

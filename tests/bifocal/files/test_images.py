@@ -124,15 +124,21 @@ def test_heic_and_raw_are_read_where_their_libraries_are(tmp_path, monkeypatch):
     developed = np.full((4, 6, 3), 700, np.uint16)
     sizes = types.SimpleNamespace(width=4, height=6, flip=5)
 
+    class LibRawError(Exception):
+        pass
+
+    def extract_thumb():
+        raise LibRawError("no thumbnail")
+
     def imread(path):  # what rawpy offers of a file, and of one that it does not know
         if path.endswith("p.nef"):
             held = types.SimpleNamespace(
-                sizes=sizes, postprocess=lambda **_: developed, extract_thumb=lambda: None
+                sizes=sizes, postprocess=lambda **_: developed, extract_thumb=extract_thumb
             )
             return contextlib.nullcontext(held)
-        raise OSError("unknown")
+        raise LibRawError("unknown")
 
-    fake = types.SimpleNamespace(imread=imread, LibRawError=OSError)
+    fake = types.SimpleNamespace(imread=imread, LibRawError=LibRawError)
     monkeypatch.setitem(sys.modules, "rawpy", fake)
     assert (image_info(raw).size, image_info(raw).bits) == ((6, 4), 16)
     np.testing.assert_array_equal(read_image(raw), developed)

@@ -19,9 +19,9 @@ from bifocal import (
 )
 from bifocal.collimation.workbook.setup import completed, typed_setup
 from bifocal.workbook.reading.reader import read_survey
+from tests.bifocal.workbook.kept_workbook import DISTANCES
 from tests.bifocal.workbook.test_cli_solve import POINTS, fill, put, refused, rows, run, write_csv
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached
-from tests.bifocal.workbook.test_workbooks_are_kept import DISTANCES
 
 CAMERAS = {"d1": 17.5, "d2": 9.5, "c1": 35, "c2": 19}
 SIZES = {"enlargement1": 10, "enlargement2": 12}

@@ -128,7 +128,11 @@ class App {
     if (this.current === "points") return { ready: Boolean(pair), go: () => this.open("products") };
     return products.files.some(({ name }) => name.endsWith(".pdf"))
       ? { key: "download", ready: true, go: () => this.stage.download.click() }
-      : { ready: Boolean(pair), go: () => this.stage.deliver.click() };
+      : { ready: Boolean(pair) && !this.running("deliver"), go: () => this.stage.deliver.click() };
+  }
+
+  running(kind) {
+    return this.state.jobs.some((job) => job.kind === kind && job.state === "running");
   }
 
   next() {

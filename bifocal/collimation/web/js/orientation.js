@@ -40,8 +40,8 @@ export class OrientationStage {
     this.good = h("p", { class: "good", role: "status", testid: "how-good" });
     this.target = h("p", { class: "target", role: "status" });
     this.element = h("div", { class: "stage work", id: "stage-orientation" }, this.photos,
-      h("aside", { class: "panel" }, this.target, this.wallCard.element, this.loupe.element,
-        this.#controlTable(), this.#tapeTable(), this.#tellResult(), this.#result()));
+      h("aside", { class: "side" }, h("div", { class: "panel" }, this.target, this.wallCard.element, this.loupe.element,
+        this.#controlTable(), this.#tapeTable(), this.#tellResult()), this.#result()));
   }
 
   #controlButtons() {
@@ -77,9 +77,9 @@ export class OrientationStage {
       for (const input of inputs) input.value = "";
       return inputs[0].focus();
     };
-    return h("section", { class: "card" }, h("h2", {}, t("tape.title")),
-      h("table", { class: "grid" }, h("thead", {}, h("tr", {},
-        heads.map((key) => h("th", { scope: "col" }, t(key))), h("th", {}, h("span", { class: "unseen" }, t("list.delete"))))), this.tapes),
+    this.tapeTable = h("table", { class: "grid" }, h("thead", {}, h("tr", {},
+      heads.map((key) => h("th", { scope: "col" }, t(key))), h("th", {}, h("span", { class: "unseen" }, t("list.delete"))))), this.tapes);
+    return h("section", { class: "card" }, h("h2", {}, t("tape.title")), this.tapeTable,
       h("form", { class: "row add", onsubmit: (event) => { event.preventDefault(); add(); } },
         inputs, h("button", { type: "submit", class: "quiet", testid: "tape-add" }, t("tape.add"))));
   }
@@ -91,7 +91,7 @@ export class OrientationStage {
     return this.tell;
   }
 
-  /** What is to be done next stays in sight, however long the table. */
+  /** What is to be done next stays in sight below the panel, however long the table. */
   #result() {
     return h("section", { class: "card next" }, h("h2", {}, t("align.title")), this.good, this.advice,
       h("div", { class: "row" }, this.align, this.acceptAlign), this.app.jobBox("align"));
@@ -215,6 +215,7 @@ export class OrientationStage {
     this.#tellKnown(state);
     this.tell.hidden = !remarks && !this.known.children.length;
     this.table.hidden = !state.control.length;
+    this.tapeTable.hidden = !state.tapes.length;
     this.acceptAlign.hidden = !state.pair || state.pair.accepted !== false;
     this.acceptAlign.disabled = !state.pair || state.pair.accepted !== false || !state.pair.scaled;
     setText(this.align, t(state.pair?.report?.free_scale ? "align.refine" : "align.run"));

@@ -142,9 +142,12 @@ export class ProductsStage {
       this.app.pyramids.info("wall", 1, this.wallMark), this.app.pyramids.both("photo", photoMark(state)),
       ortho ? this.app.pyramids.info("ortho", 0, mark).catch(() => null) : null]);
     if (this.mark !== mark) return;
-    photos.forEach((info, index) => this.loupe.source(index + 1, info));
+    photos.forEach((info, index) => {
+      this.loupe.source(index + 1, info);
+      if (!this.loupe.places[index + 1]) this.loupe.look(index + 1, this.pane.middle(index + 1));
+    });
     this.wallLayer = tileLayer(this.view, "layer-1", "/tiles/wall/1", walls, null, this.wall.frameOf(1, state.photos[0]));
-    this.ortho = image && this.#orthoLayer(ortho, image);
+    this.ortho = image && this.#orthoLayer(ortho, image, state.photos);
     this.reliefMark = `${done.length}-${state.revision}`;
     this.#showRelief();
   }
@@ -211,10 +214,12 @@ export class ProductsStage {
     return [...this.wall.fromPlane([xmin, ymax]), ...this.wall.fromPlane([xmax, ymin])];
   }
 
-  #orthoLayer(ortho, info) {
+  /** Within both photos alone: what neither of them shows is no grey board. */
+  #orthoLayer(ortho, info, photos) {
     const [left, top, right] = this.#edges(ortho.bounds);
     const scale = (right - left) / info.width;
-    return tileLayer(this.view, "layer-ortho", "/tiles/ortho/0", info, [left + 0.5, -top - 0.5, scale]);
+    return tileLayer(this.view, "layer-ortho", "/tiles/ortho/0", info, [left + 0.5, -top - 0.5, scale],
+      ...[1, 2].map((one) => this.wall.frameOf(one, photos[one - 1])));
   }
 
   #apply() {
@@ -272,7 +277,9 @@ export class ProductsStage {
       }
     }
     this.shapes.update(state);
-    for (const one of [this.runRelief, this.runOrtho, this.deliver]) one.disabled = !state.pair;
+    for (const [kind, one] of [["relief", this.runRelief], ["ortho", this.runOrtho], ["deliver", this.deliver]]) {
+      one.disabled = !state.pair || this.app.running(kind);
+    }
     this.download.hidden = !files.length;
     const bytes = files.reduce((sum, file) => sum + file.bytes, 0);
     setText(this.count, t("deliver.files", { count: files.length, size: size(bytes) }));

@@ -52,25 +52,27 @@ async function loadTile(tile, address) {
 /** Place on the map -> CSS pixel of a frame. */
 const onScreen = ({ coordinateToPixelTransform: [a, b, c, d, e, f] }, [x, y]) => [a * x + c * y + e, b * x + d * y + f];
 
-/** Show of a layer what lies within a frame alone: outside there is no photo, and no black. */
-function clipped(layer, frame) {
+/** Show of a layer what lies within some frames alone: outside there is no photo, and no black. */
+function clipped(layer, frames) {
   layer.on("prerender", (event) => {
     const { context } = event;
     context.save();
     context.beginPath();
-    frame.forEach((pixel, index) => {
-      const place = ol.render.getRenderPixel(event, onScreen(event.frameState, toMap(pixel)));
-      if (index) context.lineTo(...place);
-      else context.moveTo(...place);
-    });
-    context.closePath();
+    for (const frame of frames) {
+      frame.forEach((pixel, index) => {
+        const place = ol.render.getRenderPixel(event, onScreen(event.frameState, toMap(pixel)));
+        if (index) context.lineTo(...place);
+        else context.moveTo(...place);
+      });
+      context.closePath();
+    }
     context.clip();
   });
   layer.on("postrender", ({ context }) => context.restore());
 }
 
 /** Layer of one tile pyramid; `info` is what the server says of it. `place`: where its grid lies. */
-export function tileLayer(view, className, address, info, place = null, frame = null) {
+export function tileLayer(view, className, address, info, place = null, ...frames) {
   const [left, top, scale] = place ?? [0, 0, 1];
   const extent = [left, top - info.height * scale, left + info.width * scale, top];
   const resolutions = [];
@@ -93,7 +95,7 @@ export function tileLayer(view, className, address, info, place = null, frame = 
   // No `preload`: its timers outlive a layer's move to another map and end in an error. The coarse
   // tiles of the whole picture, loaded at the start, stand in for what is not there yet.
   const layer = new ol.layer.Tile({ className, extent, source });
-  if (frame?.length > 2) clipped(layer, frame);
+  if (frames.length && frames.every((frame) => frame.length > 2)) clipped(layer, frames);
   return layer;
 }
 

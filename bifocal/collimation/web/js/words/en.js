@@ -309,7 +309,7 @@ export default {
   "relief.hatch": "Hatch what is filled in",
   "relief.points": "Points by click",
   "relief.point": "{name}: r {r} m; Ctrl+Z takes it back",
-  "deliver.files": "{count} files, {size}",
+  "deliver.files": "Files: {count} · {size}",
   "job.suggest": "Suggestions",
   "shape.title": "What you know of the wall",
   "shape.kind": "What is drawn",
