@@ -37,6 +37,8 @@ class Kernel(Generic[P, T]):
         that it calls stand in the same module: the disk's copy is renewed when that changes.
     plain : callable, optional
         The same as numpy does it well, where a loop is too slow without numba.
+    inline : bool
+        Whether callers take in the machine code instead of calling it.
 
     Attributes
     ----------
@@ -56,8 +58,11 @@ class Kernel(Generic[P, T]):
     3.5
     """
 
-    def __init__(self, function: Callable[P, T], plain: Callable[P, T] | None = None) -> None:
+    def __init__(
+        self, function: Callable[P, T], plain: Callable[P, T] | None = None, *, inline: bool = False
+    ) -> None:
         self._written, self._numpy = function, plain
+        self._how = _HOW | {"forceinline": True} if inline else _HOW
         self._run: Callable[P, T] | None = None
         self._spent = 0.0
         update_wrapper(self, function)
@@ -107,13 +112,13 @@ class Kernel(Generic[P, T]):
             return self.plain
         bound = self._bound(lambda kernel: kernel.machine_code())
         try:
-            return numba.njit(cache=True, **_HOW)(bound)
+            return numba.njit(cache=True, **self._how)(bound)
         except RuntimeError:  # neither the module's folder nor the user's cache may be written
             return self._uncached()
 
     def _uncached(self) -> Any:
         numba = _numba()
-        return numba.njit(**_HOW)(self._bound(lambda kernel: kernel._uncached()))
+        return numba.njit(**self._how)(self._bound(lambda kernel: kernel._uncached()))
 
     def _bound(self, made: Callable[[Any], Any]) -> Any:
         """Return the function with what is made of the kernels that it calls in their place."""
@@ -123,6 +128,11 @@ class Kernel(Generic[P, T]):
             if isinstance(names.get(name), Kernel):
                 names[name] = made(names[name])
         return FunctionType(code, names, code.co_name, written.__defaults__)
+
+
+def inlined(function: Callable[P, T]) -> Kernel[P, T]:
+    """Return a few sums as a `Kernel` whose machine code stands inside that of its callers."""
+    return Kernel(function, inline=True)
 
 
 def compiled(function: Callable[P, T]) -> Kernel[P, T]:

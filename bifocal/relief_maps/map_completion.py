@@ -64,18 +64,23 @@ def _relief_per_pixel(frame: Frame, grid: Grid) -> Float32Array:
 
 def with_sigma_of_steps(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
     """Return a map whose sigma knows the doubt of which side of a step a pixel is on."""
-    high, low = surroundings(bands.r)
+    return bands._replace(sigma=_sigma_at_steps(frame, bands, grid, MAP.step_window))
+
+
+def _sigma_at_steps(frame: Frame, bands: MapBands, grid: Grid, side: int) -> Float32Array:
+    """Return sigma with a share of the step within a square of pixels. [m]"""
+    high, low = surroundings(bands.r, side)
     height = high - low
     step = np.where(
         height > _relief_per_pixel(frame, grid), np.float32(MAP.sigma_of_step) * height, 0
     )
-    sigma = np.where(np.isfinite(bands.r), np.hypot(bands.sigma, step), np.float32(np.nan))
-    return bands._replace(sigma=sigma)
+    return np.where(np.isfinite(bands.r), np.hypot(bands.sigma, step), np.float32(np.nan))
 
 
 def guarded(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
-    """Call nothing measured that camera 2 cannot see, or hardly (in place)."""
-    vague = ~(bands.sigma < EVIDENCE.sigma_share * frame.distances[1])
+    """Call nothing measured that camera 2 cannot see, or hardly, or that is on a step, in place."""
+    sigma = _sigma_at_steps(frame, bands, grid, MAP.on_step)
+    vague = ~(sigma < EVIDENCE.sigma_share * frame.distances[1])
     bands.quality[vague & (bands.quality == Quality.MEASURED)] = Quality.INTERPOLATED
     rays = frame.fields and frame.fields[1]
     hidden = forward_projection.hidden_on_map(bands.r, grid, frame.foot(2), rays)

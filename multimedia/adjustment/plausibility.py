@@ -83,11 +83,13 @@ def refuse_impossible_media(
             if others[twin] > ALIKE / 2
             else ""
         )
+        unit = f" {result.unit(label)}".rstrip()
         raise GeometryError(
-            f"adjust: {label} comes out as {value:.4g} ± {own:.2g}, {start:g} was given: the data "
-            f"cannot carry it{alike}. Give what is known as a standard deviation (--prior "
-            f"{label}={item.typical:.3g}), measure points at more depths, or take {item.name} out "
-            "of --media. If it really is so, change its start value in the project."
+            f"adjust: {label} comes out as {value:.4g} ± {own:.2g}{unit}, {start:g}{unit} was "
+            f"given: the data cannot carry it{alike}. Give what is known as a standard deviation "
+            f"(--prior {label}={item.typical:.3g}), measure points at more depths, or take "
+            f"{item.name} out of --media. If it really is so, change its start value in the "
+            "project."
         )
 
 
@@ -224,9 +226,8 @@ def _carried(project: Project, columns: BundleColumns, result: Adjustment) -> It
             given = f"{start}{prior * degrees:.2g}{unit}"
             yield remark("bundle.hardly_carried", label=label, given=given)
         else:
-            ranked.append(
-                (own / prior, f"{label} ({own * degrees:.2g}{unit}, given {prior * degrees:.2g})")
-            )
+            given = f"given {prior * degrees:.2g}{unit}"
+            ranked.append((own / prior, f"{label} ({own * degrees:.2g}{unit}, {given})"))
     if ranked:
         yield remark("bundle.carried", names=", ".join(text for _, text in sorted(ranked)[:_SHOWN]))
 

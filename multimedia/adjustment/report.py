@@ -122,7 +122,10 @@ def _model(result: Adjustment, say: Words, points: int) -> str:
     counted = (("orientations", len(poses) - plates), ("plate_poses", plates),
                ("free_points", points))  # fmt: skip
     estimated = [*(say(key, count=count) for key, count in counted if count), *own]
-    project, assumed = result.project, dict[str, None]()
+    project = result.project
+    held = (("orientations", len(project.cameras) - len(poses) + plates),
+            ("free_points", len(project.object_points.ids) - points))  # fmt: skip
+    assumed = dict.fromkeys(say(key, count=count) for key, count in held if count > 0)
     for camera in project.cameras:
         ideal = type(camera.distortion)()
         assumed |= dict.fromkeys(

@@ -121,6 +121,8 @@ def as_dict(result: Adjustment) -> dict[str, Any]:
     points = result.project.object_points
     sigma = np.asarray(points.sigma)
     return {
+        "unit": result.project.unit,
+        "unit_of_angles": "rad",
         "sigma0_mm": result.sigma0,
         "sigma0_mm_of": dict(result.sigma0_of),
         "model_error": result.model_error,

@@ -141,14 +141,14 @@ class Outcome:
                 hint = " The heights look like millimetres, the water level like metres."
             raise GeometryError(
                 f"no point lies under the water surface: heights {self.lowest:g} to "
-                f"{self.highest:g}, water level {level:g}.{hint} Check level and unit, or say "
+                f"{self.highest:g} m, water level {level:g} m.{hint} Check level and unit, or say "
                 "--allow-dry if that is right."
             )
         span = self.highest - self.lowest
         if self.max_depth > DEEPEST and 0 < span < self.max_depth / MIXED_UNITS:
             raise GeometryError(
-                f"the water level {surface.middle:g} lies {self.max_depth:g} above "
-                f"heights that span only {span:g}: are they in different units (mm and m)?"
+                f"the water level {surface.middle:g} m lies {self.max_depth:g} m above "
+                f"heights that span only {span:g} m: are they in different units (mm and m)?"
             )
         if self.max_depth > DEEPEST:
             self.remarks.append(remark("bathymetry.very_deep", max_depth=self.max_depth))

@@ -448,7 +448,7 @@ def _checked_cameras(
         first = centres[under[0]]
         raise GeometryError(
             f"cameras: {under.size} of {len(centres)} are not above the water surface (first: "
-            f"number {under[0] + 1} at Z = {first[2]:g}). Check the water level, the sign of Z and "
-            "the unit (m, not mm)."
+            f"number {under[0] + 1} at Z = {first[2]:g} m). Check the water level, the sign of Z "
+            "and the unit (m, not mm)."
         )
     return centres

@@ -114,7 +114,7 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
             unknown = piece.xyz[np.isin(piece.xyz[:, 2], SENTINELS), 2]
             if unknown.size:
                 raise InputError(
-                    f"{job.source}: {unknown.size} points have the height {unknown[0]:g}, which "
+                    f"{job.source}: {unknown.size} points have the height {unknown[0]:g} m, which "
                     "programs write where they know none; leave these points out."
                 )
             result = correct(piece)
@@ -223,8 +223,8 @@ def _check_camera_unit(points: FloatArray, centres: FloatArray, job: Job) -> Non
     height = float(np.median(centres[:, 2]) - np.nanmedian(points[:, 2]))
     if 0 < MIXED_UNITS * extent < height:
         raise GeometryError(
-            f"{job.cameras}: the cameras are {height:g} above points that cover only {extent:g}: "
-            "are cameras and points in different units (mm and m)?"
+            f"{job.cameras}: the cameras are {height:g} m above points that cover only {extent:g} "
+            "m: are cameras and points in different units (mm and m)?"
         )
 
 
@@ -252,8 +252,8 @@ def _sensor_positions(job: Job, cloud: Cloud) -> Callable[[CloudPiece], FloatArr
         when = piece.numbers["gps_time"]
         if when.min() < times[0] or when.max() > times[-1]:
             raise InputError(
-                f"{job.trajectory}: covers times {times[0]:g} to {times[-1]:g}, the points need "
-                f"{when.min():g} to {when.max():g}."
+                f"{job.trajectory}: covers times {times[0]:g} to {times[-1]:g} s, the points need "
+                f"{when.min():g} to {when.max():g} s."
             )
         return np.column_stack([np.interp(when, times, positions[:, k]) for k in range(3)])
 

@@ -66,14 +66,17 @@ def command(
 def _wave_lines(result: Design, cases: tuple[WaveCase, ...]) -> Iterator[str]:
     """Yield what waves cost, and the frames whose mean is as good as the set-up itself."""
     unit, goal = result.unit, sum(v * v for v in result.study.rms_sigma) ** 0.5
-    yield f"\nWaves taken for flat water, RMS [{unit}], and frames whose mean is within {goal:.2g}"
+    within = f"{goal:.2g} {unit}"
+    yield f"\nWaves taken for flat water, RMS [{unit}], and frames whose mean is within {within}"
     rows = [
         (f"{c.wavelength:g}", f"{c.period:.1f}", f"{c.from_base:.0f}",
          *(f"{v:.2g}" for v in c.rms), f"{float(c.mean @ c.mean) ** 0.5:.2g}",
          f"{c.frames:.0f}" if c.frames < float("inf") else "no number")
         for c in cases
     ]  # fmt: skip
-    yield text_table(("length", "period s", "from base", "dX", "dY", "dZ", "stays", "frames"), rows)
+    yield text_table(
+        (f"length {unit}", "period s", "from base deg", "dX", "dY", "dZ", "stays", "frames"), rows
+    )
     yield "Spread the frames over several periods, not in step with the wave."
 
 
@@ -86,15 +89,15 @@ def _lines(result: Design) -> Iterator[str]:
         (f"{d:.4g}", f"{x:.3g}", f"{y:.3g}", f"{z:.3g}", f"{a:.1f}", f"{b:.1f}")
         for d, x, y, z, a, b in result.by_depth.tolist()
     ]
-    yield f"Expected precision [{unit}] and intersection angle [deg]"
+    yield f"Expected precision, to first order [{unit}], and intersection angle [deg]"
     yield text_table(("depth", "sigma X", "sigma Y", "sigma Z", "angle", "in air"), rows)
-    yield f"\nWhat unknown media do to coordinates, RMS [{unit}]"
+    yield f"\nWhat unknown media do to coordinates, to first order, RMS [{unit}]"
     yield text_table(
         ("unknown", "wrong by", "dX", "dY", "dZ"),
         [(n, s, *(f"{v:.3g}" for v in moved)) for n, s, moved in result.sensitivities],
     )
     if result.placements:
-        yield "\nPlacement of the cameras"
+        yield f"\nPlacement of the cameras, sigma [{unit}] and angles [deg]"
         places = [
             (
                 f"{degrees(p.half_angle):.0f}",
@@ -126,7 +129,7 @@ def _lines(result: Design) -> Iterator[str]:
             [(n, *(f"{v:.3g}" for v in e), f"{s * 1000:.2f}") for n, e, s in cases],
         )
     if result.models:
-        yield f"\nSimplified models in place of the rigorous one, error at the points [{unit}]"
+        yield f"\nSimplified models, not the rigorous: error at the points, to first order [{unit}]"
         yield text_table(
             ("model", "RMS", "largest"),
             [(name, f"{rms:.3g}", f"{largest:.3g}") for name, rms, largest in result.models],

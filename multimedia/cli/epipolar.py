@@ -30,20 +30,21 @@ def command(
     from multimedia.orientation.epipolar_workflow import epipolar_project
 
     result = epipolar_project(project, out=out, picture=picture, **options)
-    data = {name: getattr(result, name) for name in ("z_range", "curves", "candidates")}
+    data = {name: getattr(result, name) for name in ("unit", "z_range", "curves", "candidates")}
     print_result(data, _lines(result), as_json=as_json, notes=result.remarks)
     tell_written(out, picture)
 
 
 def _lines(result: EpipolarResult) -> Iterator[str]:
     """Yield the curves if they are few, and the candidates."""
+    axes = [f"{axis} {result.unit}" for axis in "XYZ"]
     if len(result.curves) <= 3:
         rows = [
             (c["id"], *(f"{v:.5f}" for v in xy), *(f"{v:.4f}" for v in xyz))
             for c in result.curves
             for xy, xyz in zip(c["image"], c["points"], strict=True)
         ]
-        yield text_table(("point", "x mm", "y mm", "X", "Y", "Z"), rows)
+        yield text_table(("point", "x mm", "y mm", *axes), rows)
     else:
         yield f"{len(result.curves)} curves; --out writes their vertices."
     rows = [
@@ -52,6 +53,6 @@ def _lines(result: EpipolarResult) -> Iterator[str]:
     ]
     yield f"\n{len(rows)} candidates"
     if rows:
-        yield text_table(("point", "candidate", "off um", "X", "Y", "Z"), rows[:40])
+        yield text_table(("point", "candidate", "off um", *axes), rows[:40])
     if len(rows) > 40:
         yield f"... and {len(rows) - 40} more; --json lists them all."

@@ -95,7 +95,9 @@ def study_setup(
     Notes
     -----
     Covariance ``sigma² (sum J^T J)^-1`` over the cameras that see the point; an error of a media
-    parameter p moves the intersected point by ``-(sum J^T J)^-1 sum J^T dx/dp``.
+    parameter p moves the intersected point by ``-(sum J^T J)^-1 sum J^T dx/dp``. Both are first
+    order: how derivatives change over an error is left out. In a tank 0.2 m deep an index wrong
+    by 0.03 moves points by 3.15 mm (RMS of Z), where this says 3.23.
     """
     if len(cameras) < 2:
         raise InputError("design: at least two cameras are needed to intersect anything.")

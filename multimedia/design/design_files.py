@@ -27,10 +27,12 @@ def write_design_workbook(path: Path | str, design: Design, *, overwrite: bool =
     book = Workbook()
     sheet = book.active
     sheet.title = "Precision"
-    headings = ("depth", "sigma X", "sigma Y", "sigma Z", "angle deg", "in air deg")
+    unit = design.unit
+    sigmas, errors = ([f"{what}{axis} [{unit}]" for axis in "XYZ"] for what in ("sigma ", "d"))
+    headings = (f"depth [{unit}]", *sigmas, "angle [deg]", "in air [deg]")
     fill_sheet(sheet, headings, design.by_depth.tolist())
     chart = LineChart()
-    chart.title = f"Expected sigma over depth [{design.unit}]"
+    chart.title = f"Expected sigma, to first order [{design.unit}]"
     last = 1 + len(design.by_depth)
     chart.add_data(
         Reference(sheet, min_col=2, max_col=4, min_row=1, max_row=last), titles_from_data=True
@@ -39,18 +41,19 @@ def write_design_workbook(path: Path | str, design: Design, *, overwrite: bool =
     chart.x_axis.delete = chart.y_axis.delete = False
     sheet.add_chart(chart, "H2")
     fill_sheet(
-        book.create_sheet("Sensitivity"), ("unknown", "step", "dX", "dY", "dZ"),
+        book.create_sheet("Sensitivity"), ("unknown", "step", *errors),
         [(name, step, *moved) for name, step, moved in design.sensitivities],
     )  # fmt: skip
     fill_sheet(
         book.create_sheet("Placement"),
-        ("half angle deg", "sigma X", "sigma Y", "sigma Z", "ray angle deg"),
+        ("half angle [deg]", *sigmas, "ray angle [deg]"),
         [(np.degrees(p.half_angle), *p.sigma, np.degrees(p.angle)) for p in design.placements],
     )
     if design.costs is not None:
         costs = design.costs
         fill_sheet(
-            book.create_sheet("Calibration"), ("case", "mu X", "mu Y", "mu Z", "sigma0 mm"),
+            book.create_sheet("Calibration"),
+            ("case", *(f"mu {axis} [{unit}]" for axis in "XYZ"), "sigma0 [mm]"),
             [
                 ("I air, calibrated in air", *costs.air, costs.sigma0[0]),
                 ("II water, calibrated in air", *costs.air_calibration_in_water, costs.sigma0[1]),
@@ -58,11 +61,14 @@ def write_design_workbook(path: Path | str, design: Design, *, overwrite: bool =
             ],
         )  # fmt: skip
     fill_sheet(
-        book.create_sheet("Models"), ("model", "RMS", "largest"),
+        book.create_sheet("Models"), ("model", f"RMS [{unit}]", f"largest [{unit}]"),
         [*design.models, ("colour seam in the image, mm", design.seam, design.seam)],
     )  # fmt: skip
     if design.planarity:
-        columns = ("deviation", "size", "wavelength", "dX", "dY", "dZ", "largest", "size as noise")
+        columns = (
+            "deviation", f"size [{unit} sag, rad]", f"wavelength [{unit}]", *errors,
+            f"largest [{unit}]", f"size as noise [{unit} sag, rad]",
+        )  # fmt: skip
         fill_sheet(
             book.create_sheet("Flatness"), columns,
             [
@@ -126,7 +132,7 @@ def _draw_precision(axes: Axes, design: Design) -> None:
     factor, unit = _shown([float(sigmas.max())], design.unit)
     for sigma, (name, style) in zip(sigmas.T, _STYLES.items(), strict=True):
         axes.plot(depth, factor * sigma, label=f"sigma {name}", **style)
-    axes.set(xlabel=f"depth [{design.unit}]", ylabel=f"[{unit}]", title="Expected precision")
+    axes.set(xlabel=f"depth [{design.unit}]", ylabel=f"[{unit}]", title="Precision, to first order")
     axes.set_ylim(0, 1.15 * factor * float(sigmas.max()))
     axes.locator_params(axis="x", nbins=5)
 

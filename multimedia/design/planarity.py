@@ -49,8 +49,8 @@ class Deviation:
     largest : float
         Largest error of a point.
     allowed : float
-        Size whose RMS error equals the expected standard deviation of the points; infinite where
-        it costs nothing, as behind media of one index.
+        Size whose RMS error equals the expected standard deviation of the points, to first order
+        (in proportion to ``size``); infinite where it costs nothing, as behind media of one index.
     left_out : int
         Points, counted in each variant, that two cameras no longer see and no figure here counts.
     """

@@ -21,7 +21,8 @@ class Study:
     points : ndarray, shape (n, 3)
         Where it was evaluated. [object unit]
     sigma : ndarray, shape (n, 3)
-        Expected standard deviations of X, Y, Z; NaN where fewer than two cameras see the point.
+        Expected standard deviations of X, Y, Z, to first order; NaN where fewer than two cameras
+        see the point. [object unit]
     angle : ndarray, shape (n,)
         Largest angle between two rays at the point, in its medium. [rad]
     angle_in_air : ndarray, shape (n,)
@@ -30,7 +31,7 @@ class Study:
         Cameras that see it.
     sensitivity : mapping of str to ndarray, shape (3,)
         Unknown of the media, e.g. ``tank:index3``, to the RMS error of X, Y, Z that one step of it
-        causes (steps as `multimedia.design.accuracy.STEPS`). [object unit]
+        causes, to first order (steps as `multimedia.design.accuracy.STEPS`). [object unit]
     """
 
     points: FloatArray
@@ -77,7 +78,7 @@ class Placement:
     half_angle : float
         Opening of the ring of cameras. [rad]
     sigma : tuple of float
-        RMS standard deviations of X, Y, Z. [object unit]
+        RMS standard deviations of X, Y, Z, to first order. [object unit]
     angle : float
         Between the rays that meet in a point. [rad]
     """

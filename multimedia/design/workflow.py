@@ -60,9 +60,9 @@ def design_ring(
     of the noise in the simulated calibrations, ``flatness`` asks for `planarity_study`.
     """
     if not 0 <= depths[0] < depths[1]:
-        raise InputError(remark("design.depths", least=depths[0], most=depths[1]))
+        raise InputError(remark("design.depths", least=depths[0], most=depths[1], unit=unit))
     if max(*extent, depths[1]) > FARTHEST * distance:
-        raise InputError(remark("design.extent", farthest=FARTHEST, distance=distance))
+        raise InputError(remark("design.extent", farthest=FARTHEST, distance=distance, unit=unit))
     interface = FlatInterface(layers=Layers(indices=tuple(indices), thicknesses=tuple(thicknesses)))
     points = object_grid(extent, depths)
     cameras = ring_of_cameras(

@@ -75,8 +75,8 @@ class Sensor:
         sides = np.broadcast_to(as_floats(self.pixel_size, "pitch"), (2,))
         if not (sides >= SMALLEST_PIXEL).all():
             raise InputError(
-                f"pitch: a pixel is {sides} mm wide and high; both must be {SMALLEST_PIXEL:g} or "
-                "more."
+                f"pitch: a pixel is {sides} mm wide and high; both must be {SMALLEST_PIXEL:g} mm "
+                "or more."
             )
         origin = ((self.width - 1) / 2, (self.height - 1) / 2)
         set_(self, "pixel_size", read_only(sides, "pitch", shape=(2,)))

@@ -145,8 +145,9 @@ class FlatInterface(OpticalMedia):
             where = "inside the layers" if height > 0 else "on the object's side of the interface"
             raise GeometryError(
                 f"{who} is {where}: its centre is {height:g} above the last face, but the "
-                f"layers are {thickness:g} thick. Check the signs of the normal (it points from "
-                "the object to the camera) and the units of centre, point and thicknesses."
+                f"layers are {thickness:g} thick, in the unit of the centre. Check the signs of "
+                "the normal (it points from the object to the camera) and the units of centre, "
+                "point and thicknesses."
             )
         return Medium(normal=normal, height=height, layers=self.layers)
 

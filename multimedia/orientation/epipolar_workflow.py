@@ -35,7 +35,9 @@ class EpipolarResult:
     candidates : list of dict
         ``id``, ``target``, ``distance`` [mm] and the object point.
     z_range : tuple of float
-        Depth range used.
+        Depth range used. [unit]
+    unit : str
+        Of object coordinates.
     remarks : tuple of str
         What the user should know.
     """
@@ -43,6 +45,7 @@ class EpipolarResult:
     curves: list[dict[str, Any]]
     candidates: list[dict[str, Any]]
     z_range: tuple[float, float]
+    unit: str
     remarks: tuple[str, ...]
 
 
@@ -115,8 +118,8 @@ def epipolar_project(
     if not any(np.isfinite(c["image"]).any() for c in curves):
         raise GeometryError(
             f"{other} sees nothing of the rays of {camera} between Z {depths[0]:g} and "
-            f"{depths[1]:g}. Check --z-range, which must lie on the object's side of the "
-            "interface, and that --at names a pixel of the photo."
+            f"{depths[1]:g} {project.unit}. Check --z-range, which must lie on the object's side "
+            "of the interface, and that --at names a pixel of the photo."
         )
     if lost:
         remarks.append(
@@ -150,7 +153,7 @@ def epipolar_project(
         )  # fmt: skip
     return EpipolarResult(
         curves=curves, candidates=candidates, z_range=depths,
-        remarks=(*project.remarks, *remarks),
+        unit=project.unit, remarks=(*project.remarks, *remarks),
     )  # fmt: skip
 
 

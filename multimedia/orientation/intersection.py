@@ -16,7 +16,6 @@ from multimedia.media.optical_media import OpticalMedia
 from multimedia.media.projection import (
     Media,
     as_media,
-    project,
     project_with_jacobian,
     refuse_pixels,
 )
@@ -29,6 +28,8 @@ from multimedia.orientation.object_rays import (
     times,
 )
 from multimedia.orientation.point_status import PointStatus
+from multimedia.orientation.pose_kernel import seen_points
+from multimedia.orientation.quick_pose import layering_of
 from multimedia.projects.model import SIGMA_IMAGE, SIGMA_PIXEL
 from photocore.adjustment import standardised
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
@@ -44,6 +45,8 @@ WEAK_ANGLE = np.radians(2.0)
 _MOST_STEPS = 25
 #: A step smaller than this share of the distance ends the iteration: 1e-12 of 1 m is 1e-9 mm.
 _SMALL = 1e-12
+#: Up to this share of the distance, a step changes images linearly: what is left is its square.
+_LINEAR = 1e-8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -247,107 +250,138 @@ def _block(
     xyz = nearest_points([o for o, _ in rays], [d for _, d in rays])
     angle = largest_angle([d for _, d in rays])
     status = np.where(np.isfinite(xyz).all(axis=1), PointStatus.NOT_CONVERGED, PointStatus.WEAK)
-    count = seen.sum(axis=0)
-    normal: FloatArray = np.full((6, n), np.nan)
+    equations = _Equations(
+        rows=np.ascontiguousarray(np.moveaxis(image, -1, 1)),
+        weights=np.ascontiguousarray(np.moveaxis(1.0 / sigmas, -1, 1)), seen=seen,
+        normal=np.full((6, n), np.nan), slopes=np.zeros((m, 2, 3, n)), misses=np.zeros((m, 2, n)),
+    )  # fmt: skip
     active = np.flatnonzero(status == PointStatus.NOT_CONVERGED)
     reach = np.abs(xyz - cameras[0].centre).max(axis=1)
-    slopes: FloatArray = np.full((m, n, 2, 3), np.nan)
     before: FloatArray = np.full(n, np.nan)
     for _ in range(_MOST_STEPS):
         if not active.size:
             break
-        everything = active.size == n
-        some = slice(None) if everything else active
-        new, step, by_point = _step(
-            cameras, xyz[some], image[:, some], sigmas[:, some], seen[:, some], placed
-        )
+        some = slice(None) if active.size == n else active
+        step = equations.step(cameras, xyz[some], some, placed)
         lost: BoolArray = np.asarray(np.isnan(step[:, 0]))
-        moved = np.where(lost[:, None], xyz[some], xyz[some] + step)
-        normal[:, some], slopes[:, some], xyz[some] = new, by_point, moved
-        size = np.sqrt(np.einsum("ni,ni->n", step, step))
+        xyz[some] += np.where(lost[:, None], 0.0, step)
+        size = np.sqrt(np.einsum("ni,ni->n", step, step)) / reach[some]
         with np.errstate(invalid="ignore", divide="ignore"):
             # Each step is shorter than the last by the same factor: the next one need not be made
             # to know that it is nothing.
             following = size * np.fmin(size / before[some], 1.0)
-            done: BoolArray = np.asarray(np.fmin(size, following) <= _SMALL * reach[some])
+            done: BoolArray = np.asarray((following <= _SMALL) & (size <= _LINEAR))
         before[some] = size
         status[active[done]] = PointStatus.OK
         status[active[lost]] = PointStatus.BEHIND
         active = active[~done & ~lost]
-    return _assembled(
-        cameras, image, sigmas, placed, xyz=xyz, normal=normal, slopes=slopes, angle=angle,
-        rays=count, status=status,
-    )  # fmt: skip
+    return _assembled(equations, xyz=xyz, angle=angle, status=status)
 
 
-def _step(
-    cameras: Sequence[Camera],
-    xyz: FloatArray,
-    image: FloatArray,
-    sigmas: FloatArray,
-    seen: BoolArray,
-    placed: Sequence[OpticalMedia],
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return normal matrices (6, n), steps (n, 3), weighted derivatives (m, n, 2, 3)."""
-    n = len(xyz)
-    slopes: FloatArray = np.full((len(cameras), n, 2, 3), np.nan)
-    normal, right = np.zeros((6, n)), np.zeros((3, n))
-    for k, camera in enumerate(cameras):
-        use: slice | BoolArray = slice(None) if seen[k].all() else seen[k]
-        seen_at = project_with_jacobian(camera, xyz[use], placed[k])
-        weight = 1.0 / sigmas[k][use]
-        miss = (image[k][use] - seen_at.image) * weight
-        weighted = seen_at.by_point * weight[:, :, None]
-        slopes[k, use] = weighted
-        for axis in range(2):
-            a, b, c = weighted[:, axis].T
-            v = miss[:, axis]
-            normal[:, use] += np.stack([a * a, a * b, a * c, b * b, b * c, c * c])
-            right[:, use] += np.stack([a * v, b * v, c * v])
-    return normal, times(inverse_3x3(normal), right).T, slopes
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Equations:
+    """Rows of one value a point: measured, and as of the last step of each point.
+
+    Attributes
+    ----------
+    rows, weights : ndarray, shape (m, 2, n)
+        Image coordinates [mm] and one over their standard deviations.
+    seen : ndarray of bool, shape (m, n)
+    normal : ndarray, shape (6, n)
+    slopes, misses : ndarray, shape (m, 2, 3, n), (m, 2, n)
+        Weighted derivatives and residuals, the latter after the step; 0 where not seen.
+    """
+
+    rows: FloatArray
+    weights: FloatArray
+    seen: BoolArray
+    normal: FloatArray
+    slopes: FloatArray
+    misses: FloatArray
+
+    def step(
+        self,
+        cameras: Sequence[Camera],
+        xyz: FloatArray,
+        some: slice | IntArray,
+        placed: Sequence[OpticalMedia],
+    ) -> FloatArray:
+        """Return the steps (n, 3) of some points, and keep what they were made of."""
+        m, n = len(cameras), len(xyz)
+        slopes, misses = np.zeros((m, 2, 3, n)), np.zeros((m, 2, n))
+        for k, (camera, media) in enumerate(zip(cameras, placed, strict=True)):
+            seen = self.seen[k, some]
+            use: slice | BoolArray = slice(None) if seen.all() else seen
+            image, by_point = _images(camera, xyz[use], media)
+            weight = self.weights[k][:, some][:, use]
+            slopes[k][..., use] = by_point * weight[:, None]
+            misses[k][:, use] = (self.rows[k][:, some][:, use] - image) * weight
+        a, v = slopes.reshape(2 * m, 3, n), misses.reshape(2 * m, n)
+        pairs = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+        normal = np.stack([np.einsum("kn,kn->n", a[:, i], a[:, j]) for i, j in pairs])
+        right = np.stack([np.einsum("kn,kn->n", a[:, i], v) for i in range(3)])
+        step = times(inverse_3x3(normal), right)
+        # The last steps are so short that what they do to a residual is linear to rounding.
+        misses -= np.einsum("mkin,in->mkn", slopes, step)
+        self.normal[:, some], self.slopes[..., some], self.misses[..., some] = (
+            normal, slopes, misses,
+        )  # fmt: skip
+        return step.T
+
+
+def _images(camera: Camera, xyz: FloatArray, media: OpticalMedia) -> tuple[FloatArray, FloatArray]:
+    """Return images (2, n) and their derivatives by the points (2, 3, n), as rows."""
+    layering = layering_of(media)
+    if layering is None:
+        general = project_with_jacobian(camera, xyz, media)
+        return general.image.T, np.moveaxis(general.by_point, 0, -1)
+    c, lens = camera.principal_distance, camera.distortion
+    possible, image, by_point = seen_points(
+        np.ascontiguousarray(xyz.T), camera.centre, camera.rotation, c, layering
+    )
+    if lens.is_identity:
+        image += camera.principal_point[:, None]
+    else:
+        measured, by_ideal, _ = lens.measured_with_jacobian(image.T, camera.principal_point, (), c)
+        image, by_point = measured.T, np.einsum("nij,jkn->ikn", by_ideal, by_point)
+    if not possible.all():
+        rest = ~possible
+        general = project_with_jacobian(camera, xyz[rest], media)
+        image[:, rest] = general.image.T
+        by_point[..., rest] = np.moveaxis(general.by_point, 0, -1)
+    return image, by_point
 
 
 def _assembled(
-    cameras: Sequence[Camera],
-    image: FloatArray,
-    sigmas: FloatArray,
-    placed: Sequence[OpticalMedia],
-    *,
-    xyz: FloatArray,
-    normal: FloatArray,
-    slopes: FloatArray,
-    angle: FloatArray,
-    rays: IntArray,
-    status: IntArray,
+    equations: _Equations, *, xyz: FloatArray, angle: FloatArray, status: IntArray
 ) -> IntersectedPoints:
     """Return precision, residuals and tests of the points found."""
+    seen, rays = equations.seen, equations.seen.sum(axis=0)
     xyz[status != PointStatus.OK] = np.nan
     status[rays == 1] = PointStatus.ONE_RAY
     status[rays == 0] = PointStatus.NO_RAY
-    inverse = inverse_3x3(normal)
-    covariance = np.moveaxis(inverse[[0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(3, 3, -1), 2, 0).copy()
-    covariance[np.isnan(xyz[:, 0])] = np.nan
-    residuals: FloatArray = np.empty_like(image)
-    for k, camera in enumerate(cameras):
-        residuals[k] = image[k] - project(camera, xyz, placed[k])
-    weighted = residuals / sigmas
-    known = np.nan_to_num(weighted, nan=0.0)
-    square = np.einsum("mnk,mnk->n", known, known)
+    unknown = np.isnan(xyz[:, 0])
+    inverse = inverse_3x3(equations.normal)
+    inverse[:, unknown] = np.nan
+    m, n = seen.shape
+    slopes = equations.slopes.reshape(2 * m, 3, n)
+    weighted = np.where((seen & ~unknown)[:, None], equations.misses, np.nan)
+    square = np.einsum("mkn,mkn->n", equations.misses, equations.misses)
     redundancy = 2 * rays - 3
     with np.errstate(divide="ignore", invalid="ignore"):
-        sigma0 = np.where(redundancy > 0, np.sqrt(square / redundancy), np.nan)
-        sigma0[np.isnan(xyz[:, 0])] = np.nan
+        sigma0 = np.where((redundancy > 0) & ~unknown, np.sqrt(square / redundancy), np.nan)
     # Cofactor of a weighted residual: 1 - a N^-1 a^T.
-    spread = 1.0 - np.einsum("mnki,mnki->mnk", slopes @ covariance, slopes)
+    spread = 1.0 - np.einsum("ikn,kin->kn", times(inverse, np.moveaxis(slopes, 1, 0)), slopes)
     good = status == PointStatus.OK
     status[good & (angle < WEAK_ANGLE)] = PointStatus.WEAK
-    limits = chdtri(np.maximum(2 * np.arange(len(cameras) + 1) - 3, 1), RISK)
+    limits = chdtri(np.maximum(2 * np.arange(m + 1) - 3, 1), RISK)
     status[good & (square > limits[rays])] = PointStatus.GROSS_ERROR
+    normed = standardised(weighted, spread.reshape(m, 2, n))
     return IntersectedPoints(
         xyz=xyz,
-        covariance=covariance,
-        residuals=residuals,
-        standardised=standardised(weighted, spread),
+        covariance=np.ascontiguousarray(inverse[[0, 1, 2, 1, 3, 4, 2, 4, 5]].T).reshape(n, 3, 3),
+        residuals=np.ascontiguousarray(np.moveaxis(weighted / equations.weights, 1, -1)),
+        standardised=np.ascontiguousarray(np.moveaxis(normed, 1, -1)),
         sigma0=sigma0,
         rays=rays.astype(np.int64),
         angle=angle,

@@ -2,7 +2,8 @@
 
 What `photocore.adjustment` does for any network, without its generality: 20 control points are so
 few that its bookkeeping takes longer than the sums. `point_equations` is one formula for numbers
-and for rows of numpy; only what walks over the points is written twice.
+and for rows of numpy; only what walks over the points is written twice. `seen_points` is its half
+without the pose, for points to be found.
 """
 
 from __future__ import annotations
@@ -11,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from photocore.arrays import FloatArray
-from photocore.compiled import Kernel, compiled
+from photocore.arrays import BoolArray, FloatArray
+from photocore.compiled import Kernel, compiled, inlined
 
 #: Steps after which the general adjustment takes over; from 20 mm and 2 degrees off it takes 4.
 MOST_STEPS = 20
@@ -49,7 +50,7 @@ class Layering(NamedTuple):
 Vector = Any
 
 
-@compiled
+@inlined
 def _out(r: FloatArray, v: Vector) -> Vector:
     """Return R v."""
     return (
@@ -59,7 +60,7 @@ def _out(r: FloatArray, v: Vector) -> Vector:
     )
 
 
-@compiled
+@inlined
 def _into(r: FloatArray, v: Vector) -> Vector:
     """Return R^T v."""
     return (
@@ -69,28 +70,28 @@ def _into(r: FloatArray, v: Vector) -> Vector:
     )
 
 
-@compiled
+@inlined
 def _dot(a: Any, b: Any) -> Any:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@compiled
+@inlined
 def _less(a: Any, factor: Any, b: Any) -> Vector:
     """Return a - factor b."""
     return a[0] - factor * b[0], a[1] - factor * b[1], a[2] - factor * b[2]
 
 
-@compiled
+@inlined
 def _times(a: Any, factor: Any) -> Vector:
     return a[0] * factor, a[1] * factor, a[2] * factor
 
 
-@compiled
+@inlined
 def _cross(a: Vector, b: Vector) -> Vector:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@compiled
+@inlined
 def _apparent_depth(rho: Any, first: float, depth: Any, layering: Layering) -> tuple[Any, ...]:
     """Return V, F' and t of a point at rho, and whether the iteration settled."""
     inner, last = layering.thicknesses, len(layering.thicknesses)
@@ -118,7 +119,18 @@ def _apparent_depth(rho: Any, first: float, depth: Any, layering: Layering) -> t
     return value, slope, t, (t < STEEPEST) & (np.abs(step) <= 1e-9 * t + 1e-300)
 
 
-@compiled
+@inlined
+def _by_point(
+    by_seen: Vector, rotation: FloatArray, moving: bool, m: FloatArray, change: Vector
+) -> tuple[Any, ...]:
+    """Return derivatives by u, along the normal and by the point, from those by the seen vector."""
+    by_u = by_seen if moving else _out(rotation, by_seen)
+    raised = _dot(by_u, m)
+    by_point = _less(by_u, raised, change)
+    return by_u, raised, _out(rotation, by_point) if moving else by_point
+
+
+@inlined
 def _row(
     lens: FloatArray, x: Any, y: Any, scale: Any, c: float, rotation: FloatArray, moving: bool,
     m: FloatArray, change: Vector, by_height: Any, away: Vector, u: Vector,
@@ -126,11 +138,8 @@ def _row(
     """Return a residual and its derivatives, from those of V by the point and the height."""
     linear = lens[0] * x + lens[1] * y
     by_seen = (lens[0] * scale, lens[1] * scale, linear * scale / c)
-    by_u = by_seen if moving else _out(rotation, by_seen)
-    raised = _dot(by_u, m)
-    by_point = _less(by_u, raised, change)
+    by_u, raised, by_point = _by_point(by_seen, rotation, moving, m, change)
     if moving:
-        by_point = _out(rotation, by_point)
         centre, turn = by_point, _cross(by_point, away)
     else:
         # Faces that stand still: the height follows the centre, and the whole seen vector turns.
@@ -140,30 +149,22 @@ def _row(
     )  # fmt: skip
 
 
-@compiled
-def point_equations(
-    point: FloatArray, lens: FloatArray, centre: FloatArray, rotation: FloatArray, c: float,
-    layering: Layering,
-) -> tuple[Any, ...]:  # fmt: skip
-    r"""Return what a point, or each of many, adds to the equations of a pose.
-
-    Parameters
-    ----------
-    point : ndarray, shape (3,) or (3, n)
-    lens : ndarray, shape (2, 3) or (2, 3, n)
-        Residuals in x and y are linear in the ideal image coordinates: ``l0 x + l1 y + l2``.
-    centre, rotation, c
-        Of the camera.
-    layering : Layering
+@inlined
+def _sight(
+    point: FloatArray, centre: FloatArray, rotation: FloatArray, c: float, layering: Layering
+) -> tuple[Any, ...]:
+    r"""Return where a point, or each of many, is seen, and how V changes.
 
     Returns
     -------
     possible : bool
         Whether the point is seen, and not too obliquely.
-    x, y : float
-        Ideal image coordinates. [mm]
-    by_x, by_y : tuple of 7
-        Residuals, and their derivatives by centre and small rotation vector in the world.
+    x, y, scale : float
+        Ideal image coordinates, and theirs over the seen vector's. [mm]
+    change, by_height : tuple of 3, float
+        Derivatives of V + w by the point and by the height of the camera.
+    away, u : tuple of 3
+        From the centre to the point, and the direction in which it is seen.
 
     Notes
     -----
@@ -197,9 +198,64 @@ def point_equations(
     by_rho2 = (value - slope) * value / (np.maximum(rho2, 1e-300) * slope)
     change = _less(_times(m, 1.0 + by_w), by_rho2, along)
     by_height = value / slope + by_w
+    possible = settled & (first > 0.0) & (depth >= 0.0) & (seen[2] < 0.0)
+    return possible, x, y, scale, change, by_height, away, u
+
+
+@inlined
+def point_equations(
+    point: FloatArray, lens: FloatArray, centre: FloatArray, rotation: FloatArray, c: float,
+    layering: Layering,
+) -> tuple[Any, ...]:  # fmt: skip
+    """Return what a point, or each of many, adds to the equations of a pose.
+
+    Parameters
+    ----------
+    point : ndarray, shape (3,) or (3, n)
+    lens : ndarray, shape (2, 3) or (2, 3, n)
+        Residuals in x and y are linear in the ideal image coordinates: ``l0 x + l1 y + l2``.
+    centre, rotation, c
+        Of the camera.
+    layering : Layering
+
+    Returns
+    -------
+    possible : bool
+        Whether the point is seen, and not too obliquely.
+    x, y : float
+        Ideal image coordinates. [mm]
+    by_x, by_y : tuple of 7
+        Residuals, and their derivatives by centre and small rotation vector in the world.
+    """
+    possible, x, y, scale, change, by_height, away, u = _sight(point, centre, rotation, c, layering)
+    m, moving = layering.normal, layering.moving
     by_x = _row(lens[0], x, y, scale, c, rotation, moving, m, change, by_height, away, u)
     by_y = _row(lens[1], x, y, scale, c, rotation, moving, m, change, by_height, away, u)
-    return settled & (first > 0.0) & (depth >= 0.0) & (seen[2] < 0.0), x, y, by_x, by_y
+    return possible, x, y, by_x, by_y
+
+
+@inlined
+def _seen_point(
+    point: FloatArray, centre: FloatArray, rotation: FloatArray, c: float, layering: Layering
+) -> tuple[Any, ...]:
+    """Return whether a point is seen, its ideal image, and the derivatives of that by the point."""
+    possible, x, y, scale, change, _, _, _ = _sight(point, centre, rotation, c, layering)
+    m, moving, none = layering.normal, layering.moving, 0.0 * scale
+    _, _, by_x = _by_point((scale, none, x * scale / c), rotation, moving, m, change)
+    _, _, by_y = _by_point((none, scale, y * scale / c), rotation, moving, m, change)
+    return possible, x, y, by_x, by_y
+
+
+def seen_points(
+    points: FloatArray, centre: FloatArray, rotation: FloatArray, c: float, layering: Layering
+) -> tuple[BoolArray, FloatArray, FloatArray]:
+    """Return which of points (3, n) are seen, ideal images (2, n), derivatives of these (2, 3, n).
+
+    Rows of numpy: one by one, machine code has no more to gain than the rows' memory.
+    """
+    with np.errstate(all="ignore"):
+        seen, x, y, by_x, by_y = _seen_point.plain(points, centre, rotation, c, layering)
+    return seen, np.stack((x, y)), np.array((by_x, by_y))
 
 
 def _rows(
@@ -232,7 +288,7 @@ def _rows_one_by_one(
     return all_seen, ideal, rows
 
 
-pose_rows = Kernel(_rows_one_by_one, plain=_rows)
+pose_rows = Kernel(_rows_one_by_one, plain=_rows, inline=True)
 
 
 def _step(rows: FloatArray, damping: float) -> tuple[FloatArray, float]:

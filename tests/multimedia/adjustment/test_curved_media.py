@@ -251,7 +251,7 @@ def test_a_camera_in_the_middle_of_its_dome_cannot_tell_its_radius_without_a_pri
     )  # fmt: skip
     straight = [image_of(given.object_points.xyz - pose[:3], pose[3:], C) for pose in STATIONS]
     noisy = a_project(STATIONS, straight, given.object_points.xyz, at_home, noise=0.001)
-    wanted = r"port:radius comes out as 80 ± \S+, 80 was given: the data cannot carry it.*--prior"
+    wanted = r"port:radius comes out as 80 ± \S+ mm, 80 mm was given: the data.*--prior"
     with pytest.raises(GeometryError, match=wanted):
         bundle_adjust(noisy, Unknowns(media=("radius",)))
     with pytest.raises(GeometryError, match=r"index3 comes out as 1\.3.*cannot carry it"):

@@ -134,8 +134,8 @@ def test_what_the_images_carry_of_a_port_is_said() -> None:
     near = " ".join(bundle_adjust(project, unknowns_of(project)).remarks)
     carried = near.split("Carried by the images")[1]
     assert "port:offset (" in carried
-    assert "mm, given 1)" in carried
-    assert "deg, given 0.57)" in carried
+    assert "mm, given 1 mm)" in carried
+    assert "deg, given 0.57 deg)" in carried
     # Far boards, few of them: the port's distance rests on what was measured with callipers.
     project = a_project(3, count=4, near=900.0, far=1400.0)
     far = bundle_adjust(project, unknowns_of(project, priors=PRIORS | {"port:offset": 0.1}))

@@ -130,7 +130,7 @@ def test_a_report_says_what_was_estimated_and_draws_plates_apart_and_thinned():
     said = next(b.text for b in blocks if getattr(b, "text", "").startswith("Estimated"))
     assert said == (
         "Estimated: the orientation of 4 cameras, the pose of 2 plates, 108 object points, c, "
-        "index3. Taken as the file has them: xh, yh, thickness1, index2."
+        "index3. Taken as the file has them: 108 object points, xh, yh, thickness1, index2."
     )
     place = np.random.default_rng(1).uniform(-8, 8, (1620, 2))
     plate = np.repeat(np.arange(4), 405)

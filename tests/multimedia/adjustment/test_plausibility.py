@@ -62,7 +62,7 @@ def test_an_index_that_the_medium_cannot_have_is_refused_with_its_reason():
 
 def test_glass_of_another_thickness_is_refused():
     thin = with_start(a_project(noise=0.0001), glass=GLASS / 4, index=INDICES[2])
-    with pytest.raises(GeometryError, match=r"thickness1 comes out as .* 2 was given"):
+    with pytest.raises(GeometryError, match=r"thickness1 comes out as .* mm, 2 mm was given"):
         bundle_adjust(thin, Unknowns(media=("thickness1",)))
 
 

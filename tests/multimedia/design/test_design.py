@@ -127,6 +127,7 @@ def test_the_command_prints_tables_and_writes_workbook_and_picture(tmp_path):
     result = CliRunner().invoke(main, [*ARGUMENTS, "--out", str(out), "--plot", str(plot)])
     assert result.exit_code == 0, result.stderr
     assert "III water" in result.stdout
+    assert result.stdout.count("to first order") == 3
     assert openpyxl.load_workbook(out).sheetnames[:2] == ["Precision", "Sensitivity"]
     assert plot.read_bytes()[:4] == b"\x89PNG"
     data = json.loads(CliRunner().invoke(main, [*ARGUMENTS, "--json"]).stdout)

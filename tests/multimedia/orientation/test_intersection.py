@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from multimedia import (
+    Brown,
     InputError,
     Interfaces,
     Plane,
@@ -20,6 +21,7 @@ from multimedia import (
     intersect_rays,
     project,
 )
+from multimedia.orientation.pose_kernel import seen_points
 from tests.multimedia.tank import LAYERS, cameras, control, images
 
 VIEWS = cameras()
@@ -177,3 +179,28 @@ def test_points_through_a_wedge_of_glass_and_behind_domes_are_exact():
     found = intersect(VIEWS[:3], image, media)
     assert np.abs(found.xyz - POINTS[:8]).max() < 1e-9
     assert (found.status == PointStatus.OK).all()
+
+
+def test_rows_of_layers_equal_the_general_road_for_any_lens_and_obliquely(monkeypatch):
+    """Every third point is taken for one that the rows cannot say: seen very obliquely."""
+    room = "multimedia.orientation.intersection"
+
+    def rows(*given):
+        seen, image, by_point = seen_points(*given)
+        seen[::3], image[:, ::3], by_point[..., ::3] = False, np.nan, np.nan
+        return seen, image, by_point
+
+    bent = Brown(k1=2e-4, p1=1e-5, shear=1e-4)
+    views = [replace(VIEWS[0], distortion=Brown()), *(replace(v, distortion=bent) for v in VIEWS)]
+    image = images(views, POINTS, noise=0.002)
+    image[1, 4] = np.nan
+    monkeypatch.setattr(f"{room}.seen_points", rows)
+    mixed = intersect(views, image, LAYERS, sigma=0.002)
+    monkeypatch.setattr(f"{room}.layering_of", lambda _: None)
+    general = intersect(views, image, LAYERS, sigma=0.002)
+    assert mixed.status.tolist() == general.status.tolist()
+    assert np.isnan(mixed.residuals[1, 4]).all()
+    for name in ("xyz", "residuals", "standardised", "sigma0", "covariance"):
+        one, other = getattr(mixed, name), getattr(general, name)
+        assert np.nanmax(np.abs(one - other)) < 1e-10
+        assert np.array_equal(np.isnan(one), np.isnan(other))
