@@ -311,8 +311,8 @@ def _pictures(
         everything = drawing
         if relief is not None:
             everything = replace(drawing, contours=relief.lines, spots=relief.spots)
-        write_drawing(place / f"{name}.dxf", everything, sheet, f"{name}.png", overwrite=False)
-        return write_sheet(place / f"{name}.pdf", drawing, sheet, strips(), overwrite=False)
+        write_drawing(place / f"{name}.dxf", everything, sheet, f"{name}.png")
+        return write_sheet(place / f"{name}.pdf", drawing, sheet, strips())
 
 
 def _prepared(

@@ -21,9 +21,7 @@ from photocore.output import atomic_path
 _POINTS = {"points": "BIFOCAL_POINTS", "control": "BIFOCAL_CONTROL", "check": "BIFOCAL_CHECK"}
 
 
-def write_drawing(
-    path: Path, drawing: Drawing, sheet: PrintSheet, image_name: str | None, *, overwrite: bool
-) -> None:
+def write_drawing(path: Path, drawing: Drawing, sheet: PrintSheet, image_name: str | None) -> None:
     """Write an R2010 drawing in metres with the image attached at its place, and its sheet.
 
     Parameters
@@ -78,7 +76,7 @@ def write_drawing(
     )
     _lay_out(document, drawing, sheet)
     name_layers(document, drawing.layers, drawing.language)
-    with atomic_path(path, overwrite=overwrite) as temporary:
+    with atomic_path(path, overwrite=False) as temporary:
         save_drawing(document, temporary)
 
 

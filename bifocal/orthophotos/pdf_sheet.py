@@ -44,15 +44,13 @@ class LeftOut(NamedTuple):
     points: int
 
 
-def write_sheet(
-    path: Path, drawing: Drawing, sheet: PrintSheet, strips: Strips, *, overwrite: bool
-) -> LeftOut:
+def write_sheet(path: Path, drawing: Drawing, sheet: PrintSheet, strips: Strips) -> LeftOut:
     """Write a drawing on a sheet; empty pixels are white; return what was left out.
 
     Names that would lie over others are left out, and where points are many their names keep
     apart, so that they never bury the picture.
     """
-    with atomic_path(path, overwrite=overwrite) as temporary, temporary.open("wb") as file:
+    with atomic_path(path, overwrite=False) as temporary, temporary.open("wb") as file:
         pdf = _Pdf(file)
         picture = pdf.begin_stream(
             f"/Type /XObject /Subtype /Image /Width {drawing.grid.width} "

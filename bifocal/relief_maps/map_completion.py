@@ -78,7 +78,7 @@ def _sigma_at_steps(frame: Frame, bands: MapBands, grid: Grid, side: int) -> Flo
 
 
 def guarded(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
-    """Call nothing measured that camera 2 hardly or never sees, or that is on a step (in place)."""
+    """Call nothing measured that camera 2 cannot see, or hardly, or that is on a step, in place."""
     sigma = _sigma_at_steps(frame, bands, grid, MAP.on_step)
     vague = ~(sigma < EVIDENCE.sigma_share * frame.distances[1])
     bands.quality[vague & (bands.quality == Quality.MEASURED)] = Quality.INTERPOLATED

@@ -118,15 +118,12 @@ async def _download(request: Request) -> Response:
                 return points_drawing(session.state, session.results)
 
         data = await in_thread(drawing)
-        return _attached(data, "image/vnd.dxf", f"{session.files.stem}_points.dxf")
+        headers = _attachment(f"{session.files.stem}_points.dxf")
+        return Response(data, media_type="image/vnd.dxf", headers=headers)
     path = session.products.downloads(session.files.workbook).get(name)
     if path is None:
         raise HTTPException(404, "there is no such file.")
     return FileResponse(path, filename=path.name, headers=_FRESH)
-
-
-def _attached(data: bytes, kind: str, name: str) -> Response:
-    return Response(data, media_type=kind, headers=_attachment(name))
 
 
 def _attachment(name: str) -> dict[str, str]:

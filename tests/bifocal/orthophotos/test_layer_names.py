@@ -46,7 +46,7 @@ def test_points_stand_on_layers_of_a_country(tmp_path, language, manner, names):
         sections=(BENT,), language=language, layers=manner,
     )  # fmt: skip
     path = tmp_path / "t.dxf"
-    write_drawing(path, drawing, PrintSheet.fitting(drawing, None), None, overwrite=False)
+    write_drawing(path, drawing, PrintSheet.fitting(drawing, None), None)
     model = ezdxf.readfile(path).modelspace()
     found = {name: len(model.query(f'POINT[layer=="{name}"]')) for name in names}
     assert found == dict(zip(names, (2, 1, 1), strict=True))

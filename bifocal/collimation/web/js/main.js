@@ -165,8 +165,9 @@ class App {
     const { online, locked, unsent } = this.connection;
     const { workbook_waiting: waiting } = this.state;
     const key = locked ? "link.locked" : !online ? "link.away" : waiting ? "link.waiting" : unsent.length ? "link.sending" : "link.saved";
-    setText(this.link, t(key, { count: unsent.length }));
-    this.link.title = waiting ?? "";
+    const words = t(key, { count: unsent.length });
+    setText(this.link, words);
+    this.link.title = waiting ?? words;
     this.link.dataset.level = locked || !online ? "warn" : waiting ? "fair" : "good";
   }
 
