@@ -169,6 +169,12 @@ class PairMedia:
         return self.layers is not AIR
 
     @property
+    def leaning(self) -> bool:
+        """Whether a port leans by what counts in the plane frame: a stated normal, an unknown."""
+        stated = any(isinstance(normal, np.ndarray) for normal in self.normals)
+        return stated or any(name.startswith("lean") for name in self.sigmas)
+
+    @property
     def counted(self) -> tuple[str, ...]:
         """What the covariance of a pair through them counts: `names_of`."""
         return names_of(self.layers if self else None)

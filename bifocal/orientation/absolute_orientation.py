@@ -45,9 +45,11 @@ from bifocal.orientation.orientation_stages import (
     with_refracted_ties,
 )
 from bifocal.orientation.slips import TrialOrientation, Typed, slip_of
+from bifocal.orientation.starts.refracted_start import features_of, refracted_start
 from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.tie_points import likely_on_wall
 from bifocal.orientation.tuning import BEND, CONTROL, ORDER, REMARKS, SLIPS, STAGES, TIES
+from bifocal.orientation.walls.reference_plane import rivals_in_words
 from bifocal.orientation.walls.wall_shape import WallShape, shape_between
 from bifocal.remarks import remark
 from photocore.adjustment import OUTLIER_LIMIT
@@ -151,7 +153,7 @@ def _through_media(given: Given, lacking: str) -> OrientedPair:
     Common points say that their bent rays meet; the plane is that of the control points.
     """
     if not given.enough:
-        raise GeometryError(remark("refused.through_media"))
+        return _by_refracted_ties(given, lacking)
     cameras, agree, interiors = approximate_cameras(given, None, True)
     if cameras[0].centre[2] < cameras[1].centre[2]:
         return _with_photos_exchanged(given)
@@ -173,6 +175,33 @@ def _through_media(given: Given, lacking: str) -> OrientedPair:
     refuse_impossible_media(pair.adjusted, given.media)
     check_room(pair.adjusted.media, pair.adjusted.cameras)
     return _with_words(pair, given, remarks)
+
+
+def _by_refracted_ties(given: Given, lacking: str) -> OrientedPair:
+    """Return the cameras of a pair that looks through media, from its common points alone."""
+    if lacking:
+        raise GeometryError(remark("refused.focal_through_media", lacking=lacking))
+    if given.media.leaning:
+        raise GeometryError(remark("refused.port_through_media"))
+    start, ties = refracted_start(given, features_of(given))
+    if start.cameras[0].centre[2] < start.cameras[1].centre[2]:
+        return _with_photos_exchanged(given)
+    validation.is_flat(ties, given.interiors, given.names, flat_is_fine=False)
+    given = replace(given, site=replace(given.site, parallel=False))
+    picks = np.ones(len(given.control.ids), dtype=bool)
+    first, second = (replace(i, sigma_radial=0.0) for i in given.interiors)
+    observations = observations_of(given, (first, second), ties, picks)
+    pair = oriented_in_stages(observations, start, given.photos, given.site, with_control=False)
+    rivals = rivals_in_words(pair.faces, given.site)
+    if rivals and given.media.depth is not None:
+        raise GeometryError(remark("refused.depth_of_wall", rivals=rivals))
+    refuse_impossible_media(pair.adjusted, given.media)
+    check_room(pair.adjusted.media, pair.adjusted.cameras)
+    ties1, ties2 = pair.observations.straight_ties(pair.adjusted.radial)
+    bend = shape_between(
+        pair.adjusted, ties1, ties2, pair.observations.tie_used, given.interiors[0].image_size
+    )
+    return _with_words(replace(pair, shape=bend), given, ())
 
 
 def _with_words(pair: OrientedPair, given: Given, remarks: tuple[str, ...]) -> OrientedPair:

@@ -259,7 +259,7 @@ def way_of(options: AlignOptions) -> tuple[str, AlignOptions]:
     measured = [value for value in (site.distance1, site.distance2, site.delta_d) if value]
     if site.distance1 and site.distance2 and site.delta_d:
         raise InputError("give two of --distance1, --distance2 and --delta-d; the third follows.")
-    if options.media and options.control is None and not options.as_set_up:
+    if options.media and not (options.control or options.as_set_up or options.auto):
         raise InputError(remark("refused.through_media"))
     if options.as_set_up:
         if options.control is not None or options.auto:

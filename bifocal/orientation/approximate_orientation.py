@@ -145,7 +145,7 @@ def approximate_cameras(
     interiors = plausible_focals(interiors, ties, given.site)
     if all(interior.is_sought for interior in interiors):
         interiors = sought_focal(ties, interiors)
-    return _scaled(first_cameras(ties, interiors), given, interiors), agree, interiors
+    return scaled(first_cameras(ties, interiors), given, interiors), agree, interiors
 
 
 def plausible_focals(interiors: Interiors, ties: Ties, site: SiteMeasures) -> Interiors:
@@ -163,7 +163,7 @@ def plausible_focals(interiors: Interiors, ties: Ties, site: SiteMeasures) -> In
     return replace(first, focal=second.focal / ratio), second
 
 
-def _scaled(cameras: Cameras, given: Given, interiors: Interiors) -> Cameras:
+def scaled(cameras: Cameras, given: Given, interiors: Interiors) -> Cameras:
     """Return cameras of far distance 1 brought to metres and, where known, to X and Y."""
     control, site = given.control, given.site
     near, scale = cameras[1].centre[2], 0.0

@@ -15,7 +15,7 @@ from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.orientation.adjustment.pair_observations import PairObservations
 from bifocal.orientation.tuning import AREA
 from photocore.arrays import BoolArray, ByteArray, FloatArray
-from photocore.camera.pinhole import project, ray_on_plane
+from photocore.camera.pinhole import project
 
 
 def even_points(
@@ -55,7 +55,7 @@ def even_points(
 def _grid(observations: PairObservations, adjusted: AdjustedPair) -> tuple[FloatArray, float]:
     """Return plane positions over what both photos show, and their spacing. [m]"""
     ties = observations.straight_ties(adjusted.radial)[0][observations.tie_used]
-    seen = ray_on_plane(adjusted.cameras[0], ties)[:, :2]
+    seen = adjusted.media.on_plane(0, adjusted.cameras[0], ties)[:, :2]
     low, high = np.nanpercentile(seen, [1, 99], axis=0)
     gsd = float(np.sqrt(np.prod(high - low) / AREA.pixels))
     x = np.arange(low[0], high[0], gsd)
@@ -67,8 +67,11 @@ def _pixels(
     observations: PairObservations, adjusted: AdjustedPair, positions: FloatArray, number: int
 ) -> FloatArray:
     """Return raw pixels of positions on the reference plane, shape (..., 2)."""
-    xyz = np.concatenate([positions, np.zeros((*positions.shape[:-1], 1))], axis=-1)
-    ideal = project(adjusted.cameras[number], xyz)
+    camera, flat = adjusted.cameras[number], np.zeros((*positions.shape[:-1], 1))
+    if adjusted.media:
+        foot = adjusted.media.foot(number, camera)
+        positions = rays.plane_position(np.concatenate([positions, flat], axis=-1), foot)
+    ideal = project(camera, np.concatenate([positions, flat], axis=-1))
     interior = observations.interiors[number]
     return interior.raw(interior.radial(*adjusted.radial[number]).distort(ideal))
 

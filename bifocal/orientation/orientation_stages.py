@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from bifocal.model.interior_orientation import SIGMA_RADIAL, Cameras, Images, Interior
-from bifocal.model.orientation_precision import NAMES
 from bifocal.orientation import facade_lines, validation
 from bifocal.orientation.adjustment.frame_turn import family_test, line_test
 from bifocal.orientation.adjustment.pair_adjustment import (
@@ -149,7 +148,7 @@ def oriented_in_stages(
     lines. The plane is found afterwards, and comes from the control points where there are some.
     """
     images = photos[0].grey, photos[1].grey
-    named = site.wall is not None
+    named, in_media = site.wall is not None, bool(start.media)
     if with_control:
         pair = control_alone(observations, start, named)
     else:
@@ -161,18 +160,18 @@ def oriented_in_stages(
         ).settled()
     if len(observations.tie1):
         pair = _with_ties(pair, observations) if with_control else pair
-        pair = _unbent(pair)
+        pair = pair if in_media else _unbent(pair)
         if images[0] is not None and images[1] is not None:
             pair = _refined(pair, (images[0], images[1]), photos)
             if not with_control:
-                pair = _facing_the_wall(pair, site)
+                pair = pair if in_media else _facing_the_wall(pair, site)
                 pair = _on_the_wall(pair, (images[0], images[1]), site)
-                pair = _with_lines(pair, (images[0], images[1]))
+                pair = pair if in_media else _with_lines(pair, (images[0], images[1]))
         if with_control:
             pair = _with_named_wall(pair)
     if not with_control:
         pair = pair.readjusted(measured=observations.measured).settled()
-        if pair.observations.free_datum and pair.observations.sigma_tilt is None:
+        if observations.free_datum and observations.sigma_tilt is None and not in_media:
             pair = _parallel_if_so(pair, np.inf if site.parallel else np.deg2rad(1.5))
     return pair
 
@@ -200,12 +199,7 @@ def _with_ties(pair: OrientedPair, observations: PairObservations) -> OrientedPa
 
 def with_refracted_ties(pair: OrientedPair, ties: Ties) -> OrientedPair:
     """Return a pair oriented by control points through media with ties whose bent rays meet."""
-    count = len(ties.seen1)
-    some = np.linspace(0, count - 1, min(count, STAGES.most_bent_ties)).astype(int)
-    few = replace(
-        ties, seen1=ties.seen1[some], seen2=ties.seen2[some], on_plane=ties.on_plane[some]
-    )
-    base = with_ties(pair.observations, few)
+    base = with_ties(pair.observations, ties.fewer(STAGES.most_bent_ties))
     adjusted = evaluated(base, pair.adjusted)
     for _ in range(3):
         # Control leaves the rays uncertain by some pixels: the majority shows by how much.
@@ -409,7 +403,7 @@ def _sigma_ratio(pair: OrientedPair) -> float:
     """Return the standard deviation of ln(d1 / d2); infinite where both tapes are in already."""
     if len(pair.observations.measured) > 1:
         return np.inf
-    row = np.zeros(len(NAMES))
+    row = np.zeros(len(pair.adjusted.covariance))
     for number, (camera, sign) in enumerate(zip(pair.adjusted.cameras, (1.0, -1.0), strict=True)):
         row[at("Z", number + 1)] = sign / camera.centre[2]
     return float(np.sqrt(row @ pair.adjusted.covariance @ row))

@@ -56,7 +56,8 @@ def align(
         ``site.sigma`` goes into the pair; ``interiors`` must tell both principal distances.
     media : PairMedia, optional
         Plane-parallel media that both cameras look through, with what is unknown of them
-        (`PairMedia.stated`): with ``control`` of four points and more, or ``as_set_up``.
+        (`PairMedia.stated`): with ``control`` of four points and more, ``as_set_up``, or photos
+        with known lenses and one distance or length.
 
     Returns
     -------

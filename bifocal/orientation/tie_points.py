@@ -9,6 +9,8 @@ import numpy as np
 from bifocal.matching.patches import refine, same_scale
 from bifocal.model.homography import apply_homography
 from bifocal.model.interior_orientation import Cameras, Images, Interiors
+from bifocal.orientation.adjustment import refracted_ties
+from bifocal.orientation.adjustment.observed_points import views_of
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair, wall_equations
 from bifocal.orientation.adjustment.pair_observations import PairObservations, PairUnknowns
 from bifocal.orientation.starts.relative_orientation import Ties, supported
@@ -34,12 +36,12 @@ def relief_rate(cameras: Cameras, xyz: FloatArray) -> FloatArray:
 
 
 def local_maps(
-    cameras: Cameras, interiors: Interiors, xyz: FloatArray, ideal: tuple[FloatArray, FloatArray]
+    state: PairUnknowns, interiors: Interiors, xyz: FloatArray, ideal: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
     """Return the derivative of photo 2 by photo 1 for surfaces parallel to the wall, (n, 2, 2)."""
     first, second = (
-        interior.raw_by_ideal(pixels) @ project_with_jacobian(camera, xyz).by_point[:, :, :2]
-        for camera, interior, pixels in zip(cameras, interiors, ideal, strict=True)
+        interior.raw_by_ideal(pixels) @ seen.by_point[:, :, :2]
+        for seen, interior, pixels in zip(views_of(state, xyz), interiors, ideal, strict=True)
     )
     bad = ~(np.abs(np.linalg.det(np.nan_to_num(first))) > 0)
     first[bad], second[bad] = np.eye(2), np.eye(2)
@@ -53,7 +55,7 @@ def refine_ties(
     interiors, ties = observations.interiors, (observations.tie1, observations.tie2)
     xyz = tie_positions(observations, adjusted)
     raw1, raw2 = interiors[0].raw(ties[0]), interiors[1].raw(ties[1])
-    local = local_maps(adjusted.cameras, interiors, xyz, ties)
+    local = local_maps(adjusted, interiors, xyz, ties)
     usable = observations.tie_used & np.isfinite(local).all(axis=(1, 2))
     smooth1, smooth2 = same_scale(*images, local[usable])
     both = np.broadcast_to(np.eye(2), (len(raw1), 2, 2))
@@ -97,8 +99,12 @@ def with_support(observations: PairObservations, adjusted: AdjustedPair) -> Pair
     """Return the observations without ties that move unlike their neighbours (`supported`)."""
     used = np.flatnonzero(observations.tie_used)
     seen1, seen2 = observations.straight_ties(adjusted.radial)
-    transfer = plane_transfer(*adjusted.cameras, np.zeros(3))
-    parallax = seen2[used] - apply_homography(transfer, seen1[used])
+    if adjusted.media:
+        flat = adjusted.media.on_plane(0, adjusted.cameras[0], seen1[used])
+        on_wall = views_of(adjusted, flat)[1].pixels
+    else:
+        on_wall = apply_homography(plane_transfer(*adjusted.cameras, np.zeros(3)), seen1[used])
+    parallax = seen2[used] - on_wall
     width = max(observations.interiors[0].image_size)
     keep = np.zeros(len(seen1), dtype=bool)
     keep[used[supported(seen1[used], parallax, width)]] = True
@@ -114,6 +120,8 @@ def tie_positions(observations: PairObservations, state: PairUnknowns) -> FloatA
 
 def relief_per_pixel(observations: PairObservations, state: PairUnknowns) -> FloatArray:
     """Return the relief of a pixel along the line in photo 2 at the ties, signed, (m,). [m/px]"""
+    if state.media:
+        return refracted_ties.relief_per_pixel(observations, state)
     far, near = state.cameras
     seen1 = observations.straight_ties(state.radial)[0]
     on_plane = ray_on_plane(far, seen1)

@@ -363,7 +363,8 @@ def _points(bundle: Bundle, result: Fit[NetworkState]) -> tuple[ObjectPoints, Fl
             covariance[j] = rows @ pose @ rows.T
     control = bundle.project.object_points
     group = dict(zip(control.ids, control.groups, strict=True))
-    unseen = [row for row, name in enumerate(control.ids) if name not in set(bundle.ids)]
+    seen = set(bundle.ids)
+    unseen = [row for row, name in enumerate(control.ids) if name not in seen]
     ids = (*bundle.ids, *(control.ids[row] for row in unseen))
     full = np.concatenate([covariance * result.sigma0**2, np.full((len(unseen), 3, 3), np.nan)])
     return ObjectPoints(

@@ -21,7 +21,7 @@ from bifocal.orientation.adjustment.pair_observations import (
     PairUnknowns,
     at,
 )
-from bifocal.orientation.adjustment.refracted_ties import meeting_equations
+from bifocal.orientation.adjustment.refracted_ties import height_equations, meeting_equations
 from bifocal.remarks import remark
 from photocore.adjustment.network import Network, NetworkState, Rows
 from photocore.arrays import BoolArray, FloatArray
@@ -162,11 +162,15 @@ def _tie_equations(
 def wall_misfit(observations: PairObservations, state: PairUnknowns) -> FloatArray:
     """Return how far all ties lie from the wall plane's transfer, shape (m,). [px]
 
-    NaN through media, where the plane is no homography.
+    Through media, where the plane is no homography, how far off it their rays meet.
     """
-    if state.media:
-        return np.full(len(observations.tie1), np.nan)
-    return _transfer(observations, state, np.ones(len(observations.tie1), dtype=bool))[0]
+    return _wall_ties(observations, state, np.ones(len(observations.tie1), dtype=bool))[0]
+
+
+def _wall_ties(observations: PairObservations, state: PairUnknowns, which: BoolArray) -> Equations:
+    """Return how far ties are off the wall plane: `_transfer`, `height_equations`. [px]"""
+    rows_of = height_equations if state.media else _transfer
+    return rows_of(observations, state, which)
 
 
 def evaluated(observations: PairObservations, adjusted: AdjustedPair) -> AdjustedPair:
@@ -185,7 +189,7 @@ def pair_equations(observations: PairObservations, state: PairUnknowns) -> Equat
     if used.any():
         values, by = _tie_equations(observations, state, used)
         parts.append((values / observations.sigma_ties, by / observations.sigma_ties))
-    if wall.any() and not state.media:
+    if wall.any() and (observations.wall_rows.any() or not state.media):
         parts.append(wall_equations(observations, state))
     if observations.lines and not observations.lines_bend_nothing:
         parts.append(line_equations(observations.lines, state.cameras))
@@ -204,7 +208,7 @@ def pair_equations(observations: PairObservations, state: PairUnknowns) -> Equat
 def wall_equations(observations: PairObservations, state: PairUnknowns) -> Equations:
     """Return what the wall's ties tell of the reference plane: height and slopes, in sigma."""
     asked = observations.wall_rows.any(axis=0) & observations.tie_used
-    values, by = _transfer(observations, state, asked)
+    values, by = _wall_ties(observations, state, asked)
     rows = observations.wall_rows[:, asked]
     return rows @ values, rows @ by
 

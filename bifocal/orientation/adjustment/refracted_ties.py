@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from bifocal.model.orientation_precision import rates_of
@@ -11,7 +13,7 @@ from bifocal.orientation.adjustment.pair_observations import (
     PairObservations,
     PairUnknowns,
 )
-from photocore.arrays import BoolArray
+from photocore.arrays import BoolArray, FloatArray
 
 #: Steps to the point nearest to both rays; the first is good to a thousandth of the misfit.
 STEPS = 2
@@ -30,6 +32,58 @@ def meeting_equations(
     direction, square to all that moving the point can do. The point being nearest, neither it nor
     that direction needs a derivative.
     """
+    met = _met(observations, state, which)
+    return met.along[:, 3], met.along_by[:, 3]
+
+
+def height_equations(
+    observations: PairObservations, state: PairUnknowns, which: BoolArray
+) -> Equations:
+    """Return how high above the reference plane the refracted rays of ties meet, (m,). [px]
+
+    With the derivatives by the unknowns, shape (m, u). A pixel is what `relief_per_pixel` says.
+    """
+    met = _met(observations, state, which)
+    by = np.linalg.solve(met.triangle, met.along_by[:, :3])[:, 2]
+    metres = _relief_per_pixel(met.triangle)
+    return met.xyz[:, 2] / metres, by / metres[:, None]
+
+
+def relief_per_pixel(observations: PairObservations, state: PairUnknowns) -> FloatArray:
+    """Return the relief of a pixel between the two photos at the ties, shape (m,). [m/px]"""
+    every = np.ones(len(observations.tie1), dtype=bool)
+    return _relief_per_pixel(_met(observations, state, every).triangle)
+
+
+def _relief_per_pixel(triangle: FloatArray) -> FloatArray:
+    """Return the sigma of relief from pixels of sigma 1 / sqrt(2), shape (m,). [m/px]"""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # Of the inverse of an upper triangle the last row is the last diagonal element alone.
+        return np.asarray(1.0 / np.abs(triangle[:, 2, 2]) / np.sqrt(2.0))
+
+
+class _Met(NamedTuple):
+    """Points nearest to both rays of ties, and what they leave of the pixels.
+
+    Attributes
+    ----------
+    xyz : ndarray, shape (m, 3)
+        [m]
+    along, along_by : ndarray, shapes (m, 4) and (m, 4, u)
+        Observed minus computed pixels, turned so that a move of the point changes the first three
+        alone, and their derivatives by the unknowns at the point held. [px]
+    triangle : ndarray, shape (m, 3, 3)
+        How a move of the point changes those three. [px/m]
+    """
+
+    xyz: FloatArray
+    along: FloatArray
+    along_by: FloatArray
+    triangle: FloatArray
+
+
+def _met(observations: PairObservations, state: PairUnknowns, which: BoolArray) -> _Met:
+    """Return where refracted rays of ties meet, and what is left of their pixels."""
     models = observations.radial_models(state.radial)
     raw = observations.tie1[which], observations.tie2[which]
     straight = [model.undistort(x) for model, x in zip(models, raw, strict=True)]
@@ -41,12 +95,12 @@ def meeting_equations(
         design[lost] = np.eye(4, 3)
         off = pixels - np.concatenate([seen.pixels for seen in views], axis=1)
         base, triangle = np.linalg.qr(design, mode="complete")
-        along = base.transpose(0, 2, 1) @ off[..., None]
-        xyz = xyz + np.linalg.solve(triangle[:, :3], along[:, :3])[..., 0]
+        turn = base.transpose(0, 2, 1)
+        along = (turn @ off[..., None])[..., 0]
+        xyz = xyz + np.linalg.solve(triangle[:, :3], along[:, :3, None])[..., 0]
     rates = [
         rates_of(seen, -model.undistorted_by_k(x), number)
         for number, (seen, model, x) in enumerate(zip(views, models, raw, strict=True))
     ]
-    across = base[:, None, :, 3]
-    by = state.media.rates_by_unknowns(-(across @ np.concatenate(rates, axis=1))[:, 0])
-    return along[:, 3, 0], by
+    by = state.media.rates_by_unknowns(-(turn @ np.concatenate(rates, axis=1)))
+    return _Met(xyz, along, by, triangle[:, :3])

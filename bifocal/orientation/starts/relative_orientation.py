@@ -64,6 +64,13 @@ class Ties:
         on_plane = apply_homography(self.homography, self.pixels1)
         return np.linalg.norm(self.pixels2 - on_plane, axis=1)
 
+    def fewer(self, most: int) -> Ties:
+        """Return no more than so many of the points, spread evenly over their order."""
+        count = len(self.seen1)
+        some = np.linspace(0, count - 1, min(count, most)).astype(int)
+        each = ("pixels1", "pixels2", "seen1", "seen2", "on_plane")
+        return replace(self, **{name: getattr(self, name)[some] for name in each})
+
 
 def find_ties(
     first: Features, second: Features, interiors: Interiors, names: tuple[str, str]
