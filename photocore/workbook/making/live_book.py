@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from openpyxl import Workbook
+from openpyxl.cell import Cell
 from openpyxl.styles import Alignment, Font, PatternFill, Protection
+from openpyxl.styles.cell_style import StyleArray
 from openpyxl.utils import absolute_coordinate, get_column_letter
 from openpyxl.workbook.defined_name import DefinedName
 from openpyxl.worksheet.datavalidation import DataValidation
@@ -65,6 +68,7 @@ class BookBuilder:
     blocks: dict[str, RowBlock] = field(default_factory=dict)
     tables: dict[str, TableContent] = field(default_factory=dict)
     drawings: dict[str, bytes] = field(default_factory=dict)
+    looks: dict[Hashable, tuple[Font | None, StyleArray]] = field(default_factory=dict)
 
     def word(self, key: str) -> str:
         """Return a word in the language of the workbook."""
@@ -178,9 +182,9 @@ class SheetBuilder:
 
     def text(self, cell: str, value: str, font: Font | None = None) -> None:
         """Write a text."""
-        self.worksheet[cell].value = value
-        self.worksheet[cell].data_type = "s"
-        self.worksheet[cell].font = font or BODY_FONT
+        target = self.worksheet[cell]
+        target.value, target.data_type = value, "s"
+        self._look(target, font=font or BODY_FONT)
 
     def word(self, cell: str, key: str, font: Font | None = None) -> None:
         """Write a word in the language of the workbook."""
@@ -192,9 +196,10 @@ class SheetBuilder:
     ) -> None:  # fmt: skip
         """Write a formula with its value."""
         target = self.worksheet[cell]
-        target.value, target.font = "=" + text, font
+        target.value = "=" + text
         self.book.results[self.worksheet.title][cell] = value
-        self._dress(cell, form, name, editable=editable)
+        self._look(target, font=font, form=form, editable=editable)
+        self._name(cell, name)
 
     def input(
         self, cell: str, value: CellValue, *, form: str = "", name: str = "", editable: bool = True
@@ -207,16 +212,29 @@ class SheetBuilder:
                 target.data_type = "s"
             else:
                 self.book.results[self.worksheet.title][cell] = float(value)
-        self._dress(cell, form, name, editable=editable)
+        self._look(target, form=form, editable=editable)
+        self._name(cell, name)
 
-    def _dress(self, cell: str, form: str, name: str, *, editable: bool) -> None:
-        """Give a cell its number format, its name, and the look of one that may be changed."""
-        target = self.worksheet[cell]
+    def _look(
+        self, cell: Cell, *, font: Font | None = None, form: str = "", editable: bool = False
+    ) -> None:
+        """Give a cell its font, its number format, and the look of one that may be changed."""
+        # openpyxl looks every part of a style up by all its fields: half the time of a workbook.
+        key = None if cell.has_style else (id(font), form, editable)
+        if key in self.book.looks:
+            cell._style = copy(self.book.looks[key][1])
+            return
+        if font:
+            cell.font = font
         if editable:
-            target.fill, target.border = INPUT_FILL, INPUT_EDGE
-            target.protection = Protection(locked=False)
+            cell.fill, cell.border = INPUT_FILL, INPUT_EDGE
+            cell.protection = Protection(locked=False)
         if form:
-            target.number_format = form
+            cell.number_format = form
+        if key is not None:
+            self.book.looks[key] = font, copy(cell._style)
+
+    def _name(self, cell: str, name: str) -> None:
         if name:
             self.book.define(name, f"'{self.worksheet.title}'!{absolute_coordinate(cell)}")
 
