@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from photocore import interrupts
 from photocore.arrays import ByteArray
 from photocore.errors import InputError
+from photocore.remarks import remark
 
 _ONE_AT_A_TIME = threading.RLock()
 #: What is said of pixels that are not those of the photo; not stray bytes between headers.
@@ -58,11 +59,7 @@ def decoded(path: Path | str, data: ByteArray, flags: int) -> NDArray[Any]:
         hole = _shifted(image, cell)
     damage = next((found[0] for word in words if (found := _DAMAGE.search(word))), hole)
     if damage and not _is_padded(data, damage):
-        raise InputError(
-            f"{path}: the photo is damaged ({damage}): a part of it is dark, shifted or missing. "
-            "Copy it from the camera again. If there is no better copy, look at it in a picture "
-            "program and save it anew from there."
-        )
+        raise InputError(remark("photo.damaged", of=path, damage=damage))
     return image
 
 

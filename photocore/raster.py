@@ -28,6 +28,7 @@ from photocore.raster_places import (
     raster_place,
     why_unreadable,
 )
+from photocore.remarks import remark
 from photocore.textfile import check_file, check_name
 
 #: Side of a tile of the file; GDAL's and most viewers' sweet spot. [px]
@@ -179,8 +180,7 @@ class RasterFile(ExitStack):
             part = fetch(window=RasterWindow(c0, r0, c1 - c0, r1 - r0))
         except OSError as error:
             raise InputError(
-                f"{self.path}: cannot be read at column {c0}, row {r0}; the file is damaged "
-                f"({error})."
+                remark("raster.unreadable", of=self.path, c0=c0, r0=r0, error=error)
             ) from error
         if part.shape == whole.shape:
             return part

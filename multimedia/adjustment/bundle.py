@@ -214,9 +214,7 @@ def _movable(
     """Return which coordinates are unknowns of their own."""
     new: BoolArray = np.isnan(points)
     if unknowns.control == "weighted" and np.isnan(sigma[~new[:, 0]]).any():
-        raise InputError(
-            "control = weighted: every control point needs a sigma (0 for an error-free one)."
-        )
+        raise InputError(remark("adjust.control_sigmas"))
     free = unknowns.control == "free"
     return (new | (np.nan_to_num(sigma) > 0) | free) & (plate_of < 0)[:, None]
 
@@ -249,11 +247,7 @@ def _start_points(project: Project, ids: Sequence[str], points: FloatArray) -> F
     filled[wanted] = _intersected(project, ids, wanted)
     lost = [ids[j] for j in wanted.tolist() if np.isnan(filled[j]).any()]
     if lost:
-        raise GeometryError(
-            f"adjust: from the start orientations the rays of {', '.join(lost[:8])} do not meet "
-            "in the object's medium. Improve the orientations (`multimedia resect`), or check "
-            "that these image points belong together."
-        )
+        raise GeometryError(remark("adjust.rays_lost", names=", ".join(lost[:8])))
     return filled
 
 
@@ -295,10 +289,7 @@ def _pose_from_one(project: Project, names: Sequence[str], local: FloatArray, la
     seen: BoolArray = np.asarray(np.isfinite(image).all(axis=2))
     k = int(seen.sum(axis=1).argmax())
     if seen[k].sum() < FEWEST:
-        raise GeometryError(
-            f"adjust: plate {label}: fewer than 3 of its points are seen by two cameras and fewer "
-            f"than {FEWEST} by one; that is too few for a start."
-        )
+        raise GeometryError(remark("adjust.plate_unseen", label=label, fewest=FEWEST))
     try:
         rotation, shift = plate_pose(
             project.cameras[k], local[seen[k]], image[k, seen[k]], project.interface_of(k)
@@ -372,7 +363,8 @@ def _points(bundle: Bundle, result: Fit[NetworkState]) -> tuple[ObjectPoints, Fl
             covariance[j] = rows @ pose @ rows.T
     control = bundle.project.object_points
     group = dict(zip(control.ids, control.groups, strict=True))
-    unseen = [row for row, name in enumerate(control.ids) if name not in set(bundle.ids)]
+    seen = set(bundle.ids)
+    unseen = [row for row, name in enumerate(control.ids) if name not in seen]
     ids = (*bundle.ids, *(control.ids[row] for row in unseen))
     full = np.concatenate([covariance * result.sigma0**2, np.full((len(unseen), 3, 3), np.nan)])
     return ObjectPoints(

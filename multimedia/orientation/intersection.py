@@ -36,7 +36,7 @@ from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
 from photocore.errors import InputError
 
 #: Points worked on at a time, so that their equations stay in the processor's cache.
-BLOCK = 4096
+BLOCK = 8192
 #: Chance that an honest point is called a gross error.
 RISK = 0.001
 #: Largest angle between two rays below which a point is called weak. [rad]

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from multimedia.media.camera import Camera
 from multimedia.media.optical_media import OpticalMedia
 from multimedia.media.projection import Media, as_media
+from multimedia.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import InputError
 
@@ -69,11 +70,7 @@ def refuse_curved_rays(media: Sequence[OpticalMedia], what: str) -> None:
         If the index changes with depth.
     """
     if any(item.curves_in_object for item in media):
-        raise InputError(
-            f"{what}: in water whose index changes with depth rays are curves, and this takes them "
-            "for straight lines. Use project, resect, intersect or adjust, or leave the gradient "
-            "out of the media."
-        )
+        raise InputError(remark("rays.curved", of=what))
 
 
 def nearest_points(origins: Sequence[FloatArray], directions: Sequence[FloatArray]) -> FloatArray:

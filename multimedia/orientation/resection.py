@@ -13,6 +13,7 @@ from multimedia.media.camera_observations import CameraObservations, camera_of, 
 from multimedia.media.projection import Media, as_media, refuse_pixels
 from multimedia.orientation.pose_starts import pose_starts
 from multimedia.orientation.quick_pose import quick_pose
+from multimedia.remarks import remark
 from photocore.adjustment import OUTLIER_LIMIT, Fit, correlations
 from photocore.adjustment.iteration import refuse_undetermined
 from photocore.adjustment.network import NetworkState
@@ -197,10 +198,7 @@ def _best_start(camera: Camera, seen: CameraObservations) -> Fit[NetworkState]:
             break
     if not poses:
         raise ConvergenceError(
-            f"{seen.what}: no position was found from which the camera sees all control points "
-            "through the interface. Check that image and object points belong together, the units "
-            "(mm in the image), the principal distance, and on which side of the interface the "
-            "normal points",
+            remark("resect.no_position", of=seen.what),
             iterations=count,
             residual=float("nan"),
         )
@@ -277,11 +275,7 @@ def _refuse_mirrored(camera: Camera, sigma0: float, seen: CameraObservations) ->
     except ConvergenceError:
         return
     if other.sigma0 < 0.2 * sigma0:
-        raise GeometryError(
-            f"{seen.what}: the control points fit the image only as in a mirror. One coordinate "
-            "system is left-handed, or x or y of the image points the wrong way: image x runs to "
-            "the right, y up; X, Y, Z must be right-handed."
-        )
+        raise GeometryError(remark("resect.mirrored", of=seen.what))
 
 
 def _refuse_flat(camera: Camera, names: tuple[str, ...], covariance: FloatArray, what: str) -> None:

@@ -24,6 +24,7 @@ from multimedia.orientation.resection import Resection, resect
 from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints, Project
 from multimedia.projects.point_tables import read_image_points, read_object_points, write_columns
 from multimedia.projects.project_file import project_files, read_project, write_project
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import InputError
 from photocore.output import all_or_none, check_all_writable, check_ending, check_not_input
@@ -195,9 +196,7 @@ def resect_project(
     unknown = [name for name in cameras if name not in project.camera_names]
     if unknown:
         have = ", ".join(project.camera_names)
-        raise InputError(
-            f"--camera: no camera is called {', '.join(unknown)}; the project has {have}."
-        )
+        raise InputError(remark("resect.no_camera", names=", ".join(unknown), have=have))
     objects = project.object_points
     if not objects.ids:
         raise InputError(f"{path}: names no object_points; a resection needs control points.")
@@ -238,10 +237,7 @@ def _resected(
         estimate=wanted, sigma=_image_sigma(project, rows),
     )  # fmt: skip
     if result.redundancy == 0:
-        remarks.append(
-            f"{len(rows)} points just determine {len(result.names)} parameters; nothing checks "
-            "them, and no precision can be given."
-        )
+        remarks.append(remark("resect.unchecked", count=len(rows), unknowns=len(result.names)))
     names = tuple(objects.ids[at] for at in place)
     suspects = [name for name, bad in zip(names, result.suspects, strict=True) if bad]
     if suspects:

@@ -7,6 +7,7 @@ from pathlib import Path, PurePath
 
 from photocore.errors import InputError
 from photocore.images import image_info
+from photocore.remarks import remark
 
 _ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff")
 #: Folders beside a project in which programs keep its photos.
@@ -57,8 +58,5 @@ class PhotoFinder:
             If the photo is not there.
         """
         if (path := self.find(name)) is None:
-            raise InputError(
-                f"{name}: the photo is not beside the project, which does not tell its size; name "
-                "the folder of the photos with --images."
-            )
+            raise InputError(remark("programs.no_size", of=name))
         return image_info(path).size

@@ -128,6 +128,7 @@ def shown_apart(folder, xyz, pick):
 HEAVY = pytest.param(28, 14.0, marks=pytest.mark.acceptance)
 
 
+@pytest.mark.acceptance
 @pytest.mark.parametrize(("c2", "d2"), [(19, 9.5), HEAVY])
 def test_template_to_orthophoto_and_cad(c2, d2, tmp_path, photo):
     xyz = truth(3)

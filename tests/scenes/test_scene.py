@@ -100,6 +100,7 @@ def test_the_pair_file_projects_points_to_the_pixels_of_the_cameras():
     assert cameras.nominal.image1.nadir.tolist() == [0.0, 0.0]
 
 
+@pytest.mark.acceptance
 def test_a_rendering_is_reproducible_and_its_photos_show_the_gain():
     scene = facade(seed=3, texel=0.05)
     cameras = bifocal_cameras(size=(96, 64), pixel=0.118)
@@ -114,6 +115,7 @@ def test_a_rendering_is_reproducible_and_its_photos_show_the_gain():
     assert first.truth.r.min() < -0.6
 
 
+@pytest.mark.acceptance
 def test_the_demo_scene_has_targets_that_both_cameras_see():
     cameras = bifocal_cameras(size=(192, 128), pixel=0.059)
     result = render(demo_scene(texel=0.04), cameras, rng=np.random.default_rng(1))

@@ -284,6 +284,7 @@ SLOW_COMMAND = """() => {
 }"""
 
 
+@pytest.mark.acceptance
 def test_what_is_refused_stays_as_it_was_typed(page: Driver) -> None:
     """Tape, table and fields keep what the survey does not take, until it is mended."""
     page.click("mode-orientation")

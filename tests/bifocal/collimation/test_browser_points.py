@@ -132,6 +132,7 @@ def test_a_point_is_picked_suggested_and_accepted_by_clicks(page: Driver) -> Non
     )
 
 
+@pytest.mark.acceptance
 def test_a_doubtful_suggestion_offers_the_other_place_too(page: Driver) -> None:
     """Above the pediment, beside a step: the second place is the true one (ray caster)."""
     page.zoom_to(1, (383.0, 320.0), 3.0)
@@ -289,6 +290,7 @@ def test_points_are_named_typed_joined_deleted_and_brought_back(page: Driver) ->
     page.settled("state.points.filter(({ deleted }) => !deleted).length === 1")
 
 
+@pytest.mark.acceptance
 def test_the_list_is_sorted_by_a_column_and_flies_to_a_point(page: Driver) -> None:
     for place in (TARGETS["T08"], SHADED):
         page.keys("n")

@@ -107,6 +107,7 @@ def test_a_pick_that_the_other_photo_cannot_show_says_so(sample) -> None:
         suggest(pair, photos, 1, np.array([0.0, 0.0]), relief_range=(3.0, 3.5))
 
 
+@pytest.mark.acceptance
 def test_snap_finds_the_centres_of_the_samples_targets(sample) -> None:
     rng = np.random.default_rng(4)
     errors = []

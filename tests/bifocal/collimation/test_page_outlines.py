@@ -25,6 +25,7 @@ def rows_of(book: Path) -> dict[str, list[Any]]:
     return {row[0]: row[1:] for row in rows[1:] if row[0]}
 
 
+@pytest.mark.acceptance
 def test_outlines_are_a_table_of_the_workbook_and_follow_what_is_drawn(tmp_path: Path) -> None:
     with opened(sample_folder(tmp_path)) as session:
         pick_both(session, "T01", sample_picks()["T01"])

@@ -70,6 +70,7 @@ def test_control_points_tell_the_cameras_as_they_come() -> None:
     assert taped.advice[-1] != enough.advice[-1]
 
 
+@pytest.mark.acceptance
 def test_a_wrong_control_point_is_named() -> None:
     wrong = live_orientation(control_state(7, blunder=6.0), infos(), "it")
     assert "C1" in wrong.advice[0]
@@ -226,6 +227,7 @@ def test_an_orthophoto_is_made_shown_and_replaced(tmp_path) -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.acceptance
 def test_a_job_that_fails_says_why_and_one_that_is_cancelled_leaves_nothing(tmp_path) -> None:
     folder = sample_folder(tmp_path)
     with opened(folder) as session:

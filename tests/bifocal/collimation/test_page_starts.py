@@ -71,6 +71,7 @@ def reliefs(path) -> dict[str, float]:
     return dict(zip(table.ids, table["r"].tolist(), strict=True))
 
 
+@pytest.mark.acceptance
 def test_a_workbook_that_names_its_photos_is_picked_in(survey) -> None:
     """The ideal set-up: Points of the template, x1 to y2 in pixels, a relief by hand."""
     typed(survey, {}, [("own", *(None,) * 4, 40.0, 42.0, 30.0)])  # s1, s2, theta: not picked
@@ -104,6 +105,7 @@ def test_a_workbook_that_names_its_photos_is_picked_in(survey) -> None:
     assert reliefs(survey) | live == pytest.approx(reliefs(survey), rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.acceptance
 def test_the_page_types_pixels_where_nothing_is_measured_yet(survey) -> None:
     """And what of the set-up it assumed: the middle of the photo."""
     blank = [f"nadir_{number}_{axis}" for number in (1, 2) for axis in ("col", "row")]

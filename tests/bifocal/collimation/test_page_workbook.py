@@ -68,6 +68,7 @@ def test_a_workbook_keeps_its_mode_and_the_link_that_leads_to_it(tmp_path) -> No
     assert not [path.name for path in folder.glob(".facade-*.xlsx")]
 
 
+@pytest.mark.acceptance
 def test_changes_go_into_the_workbook_in_place(tmp_path) -> None:
     folder = sample_folder(tmp_path)
     picks = sample_picks()
@@ -165,6 +166,7 @@ def _change(path, name: str, key: str, value: float | None) -> None:
     book.save(path)
 
 
+@pytest.mark.acceptance
 def test_rows_changed_by_others_are_taken_over(tmp_path) -> None:
     folder, picks = sample_folder(tmp_path), sample_picks()
     with opened(folder) as session:
@@ -186,6 +188,7 @@ def test_rows_changed_by_others_are_taken_over(tmp_path) -> None:
         assert again.sync.waiting is None
 
 
+@pytest.mark.acceptance
 @pytest.mark.parametrize("lock", ["~$facade.xlsx", ".~lock.facade.xlsx#"])
 def test_a_workbook_open_elsewhere_waits_in_the_journal(tmp_path, lock: str) -> None:
     folder, picks = sample_folder(tmp_path), sample_picks()
@@ -236,6 +239,7 @@ def test_a_survey_of_the_command_line_opens_on_the_page(tmp_path) -> None:
         assert session.results.sigma_px == 0.2
 
 
+@pytest.mark.acceptance
 def test_another_orientation_reaches_the_formulas(tmp_path) -> None:
     folder, picks = sample_folder(tmp_path), sample_picks()
     pair = Pair.read(folder / "facade.pair.json")

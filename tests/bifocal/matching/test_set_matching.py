@@ -59,6 +59,7 @@ def greys_of(photos):
     return lambda first, second: (images[first], images[second])
 
 
+@pytest.mark.acceptance
 def test_points_are_found_in_every_photo_to_a_tenth_of_a_pixel(wall):
     folder, far_from_turned = wall
     photos = PhotoSet.read(folder / "wall.photos.json")
@@ -73,6 +74,7 @@ def test_points_are_found_in_every_photo_to_a_tenth_of_a_pixel(wall):
     assert np.isfinite(found.pixels[0]).all()
 
 
+@pytest.mark.acceptance
 def test_the_command_writes_what_solve_takes(wall):
     folder, _ = wall
     out = folder / "picks.csv"

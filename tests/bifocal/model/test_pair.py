@@ -165,6 +165,7 @@ def test_covariances_explain_the_scatter_of_noisy_picks(pair):
     assert found.standardised.std() == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.acceptance
 def test_uncertain_distances_scale_and_nadirs_enter_the_covariance():
     point = np.array([[2.1, -1.4, 0.6]])
     rng = np.random.default_rng(4)

@@ -68,6 +68,7 @@ def test_gross_errors_of_rays_and_of_control_are_named_and_do_no_harm():
     assert np.nanmedian(error) < 0.02
 
 
+@pytest.mark.acceptance
 def test_of_many_honest_rays_none_is_called_a_gross_error():
     case = many_pairs(30, np.random.default_rng(3), columns=6, ties=60)
     assert len(case.observations.camera) > 7000  # of which six or seven lie beyond 3.5 sigma

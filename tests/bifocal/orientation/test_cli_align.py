@@ -132,6 +132,7 @@ def test_units_in_the_headings_are_taken(folder, unit, heading) -> None:
     assert Pair.read(folder / "u.pair.json").image1.distance == pytest.approx(16.0, rel=0.005)
 
 
+@pytest.mark.acceptance
 def test_millimetres_without_saying_so_are_refused(folder) -> None:
     write_control(folder / "mm.csv", unit=1000.0)
     result = align(folder, "--control", "mm.csv", *lens(), out="mm.pair.json")
@@ -277,6 +278,7 @@ def test_a_survey_workbook_is_written_and_solved(folder) -> None:
     assert len(json.loads(solved.stdout)["points"]) >= 50
 
 
+@pytest.mark.acceptance
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -139,6 +139,7 @@ def test_two_points_exchanged_are_put_right() -> None:
     assert off(made) < 0.01
 
 
+@pytest.mark.acceptance
 def test_two_slips_at_once_are_both_named() -> None:
     typed, points = photos(times=(36 / SENSOR,) * 2), control()
     turned = replace(points, xyz=points.xyz[:, [1, 0, 2]])

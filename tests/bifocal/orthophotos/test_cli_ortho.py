@@ -88,6 +88,7 @@ def test_sigma_and_quality_lie_beside_the_delivered_relief(wall: Path) -> None:
     np.testing.assert_allclose(found.sigma[:, hidden], 0.02)
 
 
+@pytest.mark.acceptance
 def test_a_nameless_pair_is_called_as_its_folder_where_its_file_has_no_name(wall: Path) -> None:
     data = json.loads((wall / "wall.pair.json").read_text())
     del data["name"]
@@ -103,6 +104,7 @@ def test_a_nameless_pair_is_called_as_its_folder_where_its_file_has_no_name(wall
         assert (wall / name / f"{title}.pdf").exists()
 
 
+@pytest.mark.acceptance
 def test_a_phantom_does_not_take_the_colours_from_the_wall(wall: Path) -> None:
     relief = ReliefMap.read(wall / "relief.tif")
     r = np.where(relief.r > 0.1, relief.r, np.float32(0))
@@ -206,6 +208,7 @@ def test_a_photo_is_no_place_for_the_orthophoto(wall: Path) -> None:
     assert (wall / "near.tif").read_bytes() == before
 
 
+@pytest.mark.acceptance
 def test_any_file_of_an_earlier_delivery_is_refused_before_the_work(
     wall: Path, monkeypatch
 ) -> None:

@@ -115,6 +115,7 @@ def test_filling_closes_the_holes_and_says_so(
     assert (filled.source[kept] == 1).all()
 
 
+@pytest.mark.acceptance
 def test_an_offset_near_photo_shows_what_the_far_one_cannot_see() -> None:
     size = (620, 360)
     pair = make_pair(GSD, size, (0.55, 0.35))

@@ -104,6 +104,7 @@ def test_what_a_set_cannot_is_refused(folder, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.acceptance
 def test_a_set_is_drawn_to_scale_and_reported(folder, tmp_path):
     relief = ("--relief", folder / "relief.tif")
     deliver = ("--deliver", tmp_path, "--scale", "1:200", "--dpi", "100", "--title", "porch")

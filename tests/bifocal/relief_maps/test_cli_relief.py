@@ -178,6 +178,7 @@ def test_swapped_photos_are_set_right_with_a_remark(folder, tmp_path):
     assert "exchanged" in told
 
 
+@pytest.mark.acceptance
 def test_a_set_of_photos_is_taken_wherever_a_pair_is(folder, tmp_path):
     pair = Pair.read(folder / "wall.pair.json")
     two = PhotoSet(photos=(pair.image2, pair.image1), folder=folder)

@@ -47,6 +47,7 @@ def away_from_edges(truth: np.ndarray, pixels: int = 8) -> np.ndarray:
     return near == 0
 
 
+@pytest.mark.acceptance
 def test_the_map_lies_on_the_pixels_of_an_ideal_far_photo():
     np.testing.assert_allclose(result().plane_from_pixel, shot().truth.plane_from_pixel, atol=1e-9)
     assert result().shape == (512, 768)

@@ -7,6 +7,7 @@ from functools import cache
 
 import cv2
 import numpy as np
+import pytest
 
 from bifocal import Foot, Grid, MapSurface, dense_relief
 from bifocal.model.image import as_grey
@@ -43,6 +44,7 @@ def railing() -> tuple[Rendering, np.ndarray]:
     return shot, shot.visible1 & shot.visible2 & (truth - body > 0.3)
 
 
+@pytest.mark.acceptance
 def test_a_railing_is_found_that_flow_cannot_find(monkeypatch):
     monkeypatch.setattr(HYPOTHESIS, "least_valid", 0.0)  # there is little else in the picture
     shot, rail = railing()

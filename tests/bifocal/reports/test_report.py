@@ -243,6 +243,7 @@ def test_every_line_of_the_worked_point_follows_from_the_digits_above_it(page):
     assert abs(program - r) < said / 1000
 
 
+@pytest.mark.acceptance
 def test_without_check_points_the_figure_is_called_optimistic(tables, tmp_path):
     text = Page(report(tmp_path / "r.html", "--control", tables[0], "--language", "de")).text
     # The pair file of the sample rests on no control: what is compared is then independent.
@@ -279,6 +280,7 @@ def test_no_english_is_left_in_a_report_full_of_remarks(tables, tmp_path, langua
     assert not re.findall(r".{0,40}\b(?:the|is|are|and|with|give)\b.{0,40}", text)
 
 
+@pytest.mark.acceptance
 def test_the_pdf_has_the_same_pages_and_names_its_program(tables, tmp_path):
     control, check = tables
     out = tmp_path / "report.pdf"

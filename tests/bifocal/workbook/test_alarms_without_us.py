@@ -110,6 +110,7 @@ def test_a_wrong_distance_shows_in_the_scale(tmp_path):
     assert named(book, "g_alarm").value == 1
 
 
+@pytest.mark.acceptance
 def test_flagged_check_points_are_left_out_and_large_errors_are_told_in_sigmas(tmp_path):
     picks = rows(WALL)
     picks[8] = (*picks[8][:2], picks[8][2] + 3, *picks[8][3:])

@@ -112,6 +112,7 @@ def test_check_sheet_gives_errors_and_a_verdict(tmp_path):
     assert "0.18 mm: holds 1:100 (18 mm), fails 1:50 (9 mm)" in answer["check"]["verdict"]
 
 
+@pytest.mark.acceptance
 def test_the_clients_own_tolerance_is_judged_and_written(tmp_path):
     path = fill(tmp_path / "s.xlsx", Check=[("P1", None, None, 1.005)])
     out = tmp_path / "r.xlsx"
@@ -133,6 +134,7 @@ def test_georeference_sheet_gives_world_coordinates(tmp_path):
     assert [found["E"], found["N"], found["H"]] == pytest.approx([997, 1999.5, 52], abs=1e-8)
 
 
+@pytest.mark.acceptance
 def test_result_workbook_holds_numbers_and_formulas(tmp_path):
     out = tmp_path / "result.xlsx"
     result = run("solve", fill(tmp_path / "s.xlsx"), "--out", out)
@@ -277,6 +279,7 @@ def test_a_unit_typed_into_every_cell_is_that_of_the_coordinates(tmp_path):
         assert by_id(answer)[name]["r"] == pytest.approx(r, abs=1e-9)
 
 
+@pytest.mark.acceptance
 def test_another_unit_in_a_cell_of_the_set_up_is_said_and_not_dropped(tmp_path):
     result = run("solve", fill(tmp_path / "s.xlsx", setup={**SETUP, "c_1": "3,5 cm"}))
     assert result.exit_code == 1

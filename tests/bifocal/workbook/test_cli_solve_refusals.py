@@ -97,6 +97,7 @@ def test_radial_distance_not_above_zero(tmp_path):
     refused(fill(tmp_path / "s.xlsx", table), "Points!F5 (s1)", "Points!G6 (s2)", "above zero")
 
 
+@pytest.mark.acceptance
 def test_point_measured_on_one_image_only(tmp_path):
     table = [*rows(POINTS), ("P9", 1.0, 2.0, None, None)]
     refused(fill(tmp_path / "s.xlsx", table), "Points!D9 (x2)", "P9 is measured only on image 1")

@@ -101,6 +101,7 @@ def test_cells_equal_the_library_recalculated(book, tmp_path):
     assert "no LAMBDA" in sheet["A3"].value
 
 
+@pytest.mark.acceptance
 def test_functions_equal_the_library_where_lambda_is_known(book):
     ironcalc = pytest.importorskip("ironcalc")
     model = ironcalc.load_from_xlsx(str(book), "en", "UTC", "en")

@@ -118,6 +118,7 @@ def test_millimetres_without_a_pixel_size_are_refused_and_nothing_is_written(tmp
     assert not (tmp_path / "s.points").exists()
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_a_workbook_alone_moves_the_image_as_the_exact_relief_says(tmp_path):
     rng, pair = np.random.default_rng(3), general_pair(sigma_pixel=0.3)

@@ -113,6 +113,7 @@ def test_the_formulas_recalculated_by_libreoffice_equal_the_library(tmp_path, la
     assert assert_recalculated_equals_cached(path, tmp_path) > 4000
 
 
+@pytest.mark.acceptance
 def test_pairs_stand_beside_each_other_with_their_errors_at_check_points(tmp_path):
     xyz, seen = picks()
     path = form(tmp_path / "four.xlsx", seen, xyz)
@@ -147,6 +148,7 @@ def test_pairs_stand_beside_each_other_with_their_errors_at_check_points(tmp_pat
     assert shown("compare_sigma_r_all") <= 1.01 * shown("compare_sigma_r")
 
 
+@pytest.mark.acceptance
 def test_a_workbook_whose_near_photo_was_typed_first_has_the_same_pairs(tmp_path):
     xyz, seen = picks()
     path = form(
@@ -159,6 +161,7 @@ def test_a_workbook_whose_near_photo_was_typed_first_has_the_same_pairs(tmp_path
     np.testing.assert_allclose(found, whole, rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.acceptance
 def test_impossible_forms_and_set_ups_are_refused(tmp_path):
     for options in ({"photos": 1}, {"photos": 7}, {"photos": 3, "lens": True}):
         with pytest.raises(InputError, match="photos:"):

@@ -51,6 +51,7 @@ def set_up(folder):
     return folder / "setup.xlsx"
 
 
+@pytest.mark.acceptance
 def test_two_tables_are_joined_by_the_names_of_the_points(tmp_path):
     first = csv(tmp_path / "far.csv", [*NAMES, "alone"], np.vstack([FAR, [[1.0, 1.0]]]))
     second = csv(
@@ -146,6 +147,7 @@ def test_a_workbook_is_the_pair_it_states(tmp_path):
     assert "assumed: the nadir point of photo 1" in assumed.remarks[0]
 
 
+@pytest.mark.acceptance
 def test_align_takes_the_set_up_of_a_workbook_as_it_is_typed(tmp_path):
     from PIL import Image
 
@@ -176,6 +178,7 @@ def test_align_takes_the_set_up_of_a_workbook_as_it_is_typed(tmp_path):
     assert "FAR and NEAR" in alone.stderr
 
 
+@pytest.mark.acceptance
 def test_a_workbook_without_photos_says_which_cells(tmp_path):
     CliRunner().invoke(main, ["template", str(tmp_path / "t.xlsx")])
     typed = openpyxl.load_workbook(tmp_path / "t.xlsx")

@@ -62,6 +62,7 @@ def filled(path, rows=2):
     return book
 
 
+@pytest.mark.acceptance
 def test_a_plain_template_is_read_back_also_when_its_tables_are_gone(tmp_path):
     path, out = tmp_path / "plain.xlsx", tmp_path / "out.xlsx"
     assert run("template", path, "--plain", "--media", 2, "--rows", 5).exit_code == 0

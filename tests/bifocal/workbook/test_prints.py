@@ -182,6 +182,7 @@ def test_formulas_of_prints_equal_the_library(tmp_path, kind):
         assert any(c.value == pytest.approx(10 * np.hypot(36, 24) / 2) for c in shown["B"])
 
 
+@pytest.mark.acceptance
 def test_correcting_the_set_up_by_the_plane_keeps_prints_prints(tmp_path):
     table = [
         *on_prints(),

@@ -33,6 +33,7 @@ def numbers(path, title):
 XY = [pytest.approx((x, y), abs=1e-9) for _, x, y, _ in POINTS]
 
 
+@pytest.mark.acceptance
 def test_charts_that_were_deleted_are_there_again(tmp_path):
     path = changed(fill(tmp_path / "s.xlsx"), lambda book: book.remove(book["Charts"]))
     assert "missing sheets were added again, behind all others: Charts; the workb" in solved(path)
@@ -43,6 +44,7 @@ def test_charts_that_were_deleted_are_there_again(tmp_path):
     assert "missing" not in solved(path)
 
 
+@pytest.mark.acceptance
 def test_charts_under_another_title_are_the_same_sheet(tmp_path):
     path = changed(fill(tmp_path / "s.xlsx"), lambda book: setattr(book["Charts"], "title", "G"))
     assert "missing" not in solved(path)

@@ -85,6 +85,7 @@ def test_a_survey_in_pixels_of_a_pair_is_updated_too(tmp_path):
     assert_recalculated_equals_cached(out, tmp_path)
 
 
+@pytest.mark.acceptance
 def test_what_the_user_added_stays_byte_for_byte(tmp_path):
     path = survey(tmp_path / "s.xlsx")
     book = openpyxl.load_workbook(path)
@@ -106,6 +107,7 @@ def test_what_the_user_added_stays_byte_for_byte(tmp_path):
     assert openpyxl.load_workbook(out)["Points"]["AF5"].value == "my own column"
 
 
+@pytest.mark.acceptance
 def test_macros_stay_in_a_macro_workbook(tmp_path):
     path, macro = survey(tmp_path / "s.xlsx"), tmp_path / "s.xlsm"
     with zipfile.ZipFile(path) as old, zipfile.ZipFile(macro, "w") as new:
@@ -123,6 +125,7 @@ def test_macros_stay_in_a_macro_workbook(tmp_path):
     assert parts(out)["xl/vbaProject.bin"] == b"MACROS" * 50
 
 
+@pytest.mark.acceptance
 def test_solving_in_place_keeps_one_backup(tmp_path):
     path = survey(tmp_path / "s.xlsx")
     before = path.read_bytes()
@@ -165,6 +168,7 @@ def test_a_workbook_open_in_a_spreadsheet_program_is_not_touched(tmp_path):
     assert "open in Excel" in result.stderr
 
 
+@pytest.mark.acceptance
 def test_limits_typed_in_setup_decide_the_flags(tmp_path):
     path = survey(tmp_path / "s.xlsx")
     book = openpyxl.load_workbook(path)

@@ -310,6 +310,7 @@ def test_long_tables_written_with_short_references_calculate_the_same(tmp_path, 
     assert assert_recalculated_equals_cached(tmp_path / "long.xlsx", tmp_path) > 1500
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_an_empty_template_shows_no_error_anywhere(tmp_path):
     write_template(tmp_path / "empty.xlsx", rows=15)

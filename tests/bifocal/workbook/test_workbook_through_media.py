@@ -116,6 +116,7 @@ def test_a_form_filled_in_by_hand_shows_where_shot_rays_meet(tank, tmp_path):
         assert named(book, f"reach_{image}").value == pytest.approx(1.337 * seen, rel=1e-12)
 
 
+@pytest.mark.acceptance
 def test_unequal_scales_are_told_as_seen_through_the_media(form):
     """The sentence names what is compared: not c/d, which is never equal through media."""
     for language, told in (("en", "c_1/seen_1"), ("it", "mezzi"), ("de", "Medien")):

@@ -54,6 +54,7 @@ OPTIONS = [
 ]
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 @pytest.mark.parametrize(("options", "cells"), OPTIONS, ids=lambda value: str(value)[:20])
 def test_options_are_written_into_the_cells_of_the_users_workbook(tmp_path, options, cells):
@@ -194,6 +195,7 @@ def test_deleted_rows_leave_no_errors_in_results(tmp_path):
     assert_recalculated_equals_cached(path, tmp_path)
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 @pytest.mark.parametrize(
     "title",
@@ -223,6 +225,7 @@ def test_a_text_table_is_not_replaced_by_its_own_results(tmp_path):
     assert path.read_text() == TABLE
 
 
+@pytest.mark.acceptance
 def test_a_result_is_replaced_until_somebody_else_saved_it(tmp_path):
     source, out = write_csv(tmp_path / "p.csv", TABLE), tmp_path / "r.xlsx"
     for _ in range(3):
@@ -281,6 +284,7 @@ def test_every_writer_respects_locks_and_foreign_workbooks(tmp_path, name):
     assert out.read_bytes() == kept
 
 
+@pytest.mark.acceptance
 def test_a_changed_copy_never_replaces_another_workbook_of_the_user(tmp_path):
     source, out = fill(tmp_path / "s.xlsx"), own_table(tmp_path / "mine.xlsx")
     kept = out.read_bytes()
@@ -293,6 +297,7 @@ def test_a_changed_copy_never_replaces_another_workbook_of_the_user(tmp_path):
         assert run("solve", source, "--out", copy, "--overwrite").exit_code == 0
 
 
+@pytest.mark.acceptance
 def test_the_mode_of_a_workbook_changed_in_place_stays_and_a_link_is_followed(tmp_path):
     folder = tmp_path / "elsewhere"
     folder.mkdir()
@@ -310,6 +315,7 @@ def test_the_mode_of_a_workbook_changed_in_place_stays_and_a_link_is_followed(tm
     assert str(backup) in result.stderr
 
 
+@pytest.mark.acceptance
 def test_the_first_state_stays_in_its_backup(tmp_path):
     path = fill(tmp_path / "s.xlsx")
     states = []
@@ -323,6 +329,7 @@ def test_the_first_state_stays_in_its_backup(tmp_path):
         assert (tmp_path / name).read_bytes() == state
 
 
+@pytest.mark.acceptance
 def test_a_backup_of_somebody_else_is_not_replaced(tmp_path):
     path = fill(tmp_path / "s.xlsx", setup=SETUP)
     before = path.read_bytes()
@@ -332,6 +339,7 @@ def test_a_backup_of_somebody_else_is_not_replaced(tmp_path):
     assert (tmp_path / "s.xlsx.bak2").read_bytes() == before
 
 
+@pytest.mark.acceptance
 def test_a_coordinate_survey_becomes_one_for_pixels_in_a_new_workbook_only(tmp_path):
     pair = write_pair(
         tmp_path / "wall.pair.json", image1_principal_distance=35, image2_principal_distance=19

@@ -144,6 +144,7 @@ def test_perfect_data_give_the_truth_from_poor_starts():
         np.testing.assert_allclose(inner, INTERIORS[k], atol=1e-8)
 
 
+@pytest.mark.acceptance
 def test_noisy_data_equal_an_independent_least_squares_solution():
     given = a_project(noise=0.001, seed=4)
     result = bundle_adjust(given, ALL)

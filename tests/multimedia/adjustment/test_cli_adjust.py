@@ -32,6 +32,7 @@ def project(tmp_path_factory):
     return path
 
 
+@pytest.mark.acceptance
 def test_adjusting_writes_project_and_report_and_says_the_salinity(project, tmp_path):
     out, report = tmp_path / "new.toml", tmp_path / "r.html"
     arguments = [
@@ -165,9 +166,10 @@ def test_the_files_of_an_adjustment_appear_together_or_not_at_all(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.acceptance
 @pytest.mark.parametrize(
     ("language", "said"),
-    [("it", "Le coordinate immagine valgono"), ("de", "Medien zwischen Kameras und Objekt")],
+    [("it", "Le coordinate immagine sono precise"), ("de", "Medien zwischen Kameras und Objekt")],
 )
 def test_the_report_speaks_the_language_asked_for(project, tmp_path, language, said):
     out = tmp_path / "r.html"
@@ -177,6 +179,7 @@ def test_the_report_speaks_the_language_asked_for(project, tmp_path, language, s
     assert said in Page(out.read_text("utf-8")).text
 
 
+@pytest.mark.acceptance
 def test_the_report_is_a_pdf_where_its_name_says_so_and_nothing_else(project, tmp_path):
     words = ["adjust", str(project), "--report", str(tmp_path / "r.pdf")]
     assert CliRunner().invoke(main, words).exit_code == 0

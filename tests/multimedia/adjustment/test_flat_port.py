@@ -129,6 +129,7 @@ def test_exact_images_give_the_port_to_rounding() -> None:
     assert found.value("cam1:c") == pytest.approx(C, abs=1e-8)
 
 
+@pytest.mark.acceptance
 def test_what_the_images_carry_of_a_port_is_said() -> None:
     project = a_project(3)
     near = " ".join(bundle_adjust(project, unknowns_of(project)).remarks)

@@ -43,6 +43,7 @@ def test_points_over_the_water_are_rejected_too() -> None:
     assert abs(water.level - 1.8) < 0.001
 
 
+@pytest.mark.acceptance
 def test_sigma_is_that_of_the_mean() -> None:
     levels = [mm.mean_water_level(tie_points(s, surface=100, bottom=100)) for s in range(60)]
     scatter = np.std([water.level for water in levels])

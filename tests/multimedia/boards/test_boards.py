@@ -245,6 +245,7 @@ def seen_by(
     return views
 
 
+@pytest.mark.acceptance
 def test_boards_of_two_cameras_get_one_numbering_and_adjust() -> None:
     given = rig()
     turned = BOARD.max(axis=0) - BOARD

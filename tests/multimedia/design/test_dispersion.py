@@ -79,6 +79,7 @@ def seam_between(image: np.ndarray) -> float:
     return worst
 
 
+@pytest.mark.acceptance
 def test_correction_removes_the_seam_of_a_rendered_image() -> None:
     exaggerated = tuple(Layers(indices=(1.0, n)) for n in (1.30, 1.335, 1.37))
     scene = {"z0": 0.5, "zp": 0.41}

@@ -257,6 +257,7 @@ def test_two_planes_that_contradict_each_other_are_both_refused_one_alone_is_sai
     assert "cam1: all these points lie in one plane" in " ".join(found.project.remarks)
 
 
+@pytest.mark.acceptance
 def test_targets_that_have_nothing_to_do_with_the_body_are_no_match(folder):
     (folder / "parameters" / "multi_planes.par").unlink()
     for path in [*folder.rglob("*.crd"), *folder.rglob("*.fix")]:

@@ -121,6 +121,7 @@ def test_every_public_shift_says_unknown(
         assert (np.isnan(values) == any(unknown)).all()
 
 
+@pytest.mark.acceptance
 def test_a_lazy_shift_says_unknown() -> None:
     array = pytest.importorskip("dask.array")
     radius = array.from_array(np.array([0.1, 0.2]), chunks=1)

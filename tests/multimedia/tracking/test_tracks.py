@@ -34,6 +34,7 @@ def test_a_thousand_particles_with_steps_to_half_their_distance_are_followed(kin
     assert wrong < 0.001
 
 
+@pytest.mark.acceptance
 def test_particles_that_are_missing_in_some_frames_are_found_again():
     places, whose = simulated(vortices(0.3), speed=0.3, missing=0.03, frames=20, seed=13)
     whole, wrong = shares(places, whose)

@@ -191,6 +191,7 @@ def test_a_new_workbook_has_live_formulas(own: Path, tmp_path: Path) -> None:
     assert "Rbar" in str(office.formulas_of(out)["Multimedia"].values())
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_a_template_gets_results_and_the_options_set_up(tmp_path: Path) -> None:
     first, second = tmp_path / "tank.xlsx", tmp_path / "moved.xlsx"

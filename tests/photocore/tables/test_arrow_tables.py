@@ -94,6 +94,7 @@ def large_file(path, flavour="plain"):
     return columns
 
 
+@pytest.mark.acceptance
 @pytest.mark.parametrize("flavour", ["plain", "excel-it"])
 def test_a_large_clean_table_goes_through_arrow_to_the_last_bit(
     tmp_path, monkeypatch, flavour
@@ -120,6 +121,7 @@ def test_without_arrow_a_large_table_is_read_all_the_same(tmp_path, monkeypatch)
     assert table.numbers("x").tolist() == columns["x"]
 
 
+@pytest.mark.acceptance
 def test_a_bad_cell_of_a_large_table_is_named(tmp_path) -> None:
     large_file(tmp_path / "large.csv")
     content = (tmp_path / "large.csv").read_bytes()

@@ -323,6 +323,7 @@ def test_a_damaged_part_is_named_with_the_users_file_not_with_a_temporary_one(tm
     assert not (tmp_path / "out.xlsx").exists()
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_libreoffice_opens_the_changed_workbook_and_calculates_the_new_rows(rich, tmp_path):
     out = tmp_path / "out.xlsm"
