@@ -152,6 +152,8 @@ def _through_media(given: Given, lacking: str) -> OrientedPair:
 
     Common points say that their bent rays meet; the plane is that of the control points.
     """
+    if given.control.positioned.any() and not given.enough:
+        raise GeometryError(remark("refused.through_media"))
     if not given.enough:
         return _by_refracted_ties(given, lacking)
     cameras, agree, interiors = approximate_cameras(given, None, True)
