@@ -152,6 +152,8 @@ def _through_media(given: Given, lacking: str) -> OrientedPair:
 
     Common points say that their bent rays meet; the plane is that of the control points.
     """
+    if given.control.positioned.any() and not given.enough:
+        raise GeometryError(remark("refused.through_media"))
     if not given.enough:
         return _by_refracted_ties(given, lacking)
     cameras, agree, interiors = approximate_cameras(given, None, True)
@@ -186,7 +188,9 @@ def _by_refracted_ties(given: Given, lacking: str) -> OrientedPair:
     start, ties = refracted_start(given, features_of(given))
     if start.cameras[0].centre[2] < start.cameras[1].centre[2]:
         return _with_photos_exchanged(given)
-    validation.is_flat(ties, given.interiors, given.names, flat_is_fine=False)
+    air, *_, water = given.media.layers.indices
+    freed = replace(ties, tolerance=ties.tolerance * air / water)  # pixels as small as in water
+    validation.is_flat(freed, given.interiors, given.names, flat_is_fine=False)
     given = replace(given, site=replace(given.site, parallel=False))
     picks = np.ones(len(given.control.ids), dtype=bool)
     first, second = (replace(i, sigma_radial=0.0) for i in given.interiors)

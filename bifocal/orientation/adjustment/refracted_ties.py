@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -32,8 +33,8 @@ def meeting_equations(
     direction, square to all that moving the point can do. The point being nearest, neither it nor
     that direction needs a derivative.
     """
-    met = _met(observations, state, which)
-    return met.along[:, 3], met.along_by[:, 3]
+    met = _met(observations, state)
+    return met.along[which, 3], met.along_by[which, 3]
 
 
 def height_equations(
@@ -43,23 +44,18 @@ def height_equations(
 
     With the derivatives by the unknowns, shape (m, u). A pixel is what `relief_per_pixel` says.
     """
-    met = _met(observations, state, which)
-    by = np.linalg.solve(met.triangle, met.along_by[:, :3])[:, 2]
-    metres = _relief_per_pixel(met.triangle)
-    return met.xyz[:, 2] / metres, by / metres[:, None]
+    met = _met(observations, state)
+    by = np.linalg.solve(met.triangle[which], met.along_by[which, :3])[:, 2]
+    metres = relief_per_pixel(observations, state)[which]
+    return met.xyz[which, 2] / metres, by / metres[:, None]
 
 
 def relief_per_pixel(observations: PairObservations, state: PairUnknowns) -> FloatArray:
     """Return the relief of a pixel between the two photos at the ties, shape (m,). [m/px]"""
-    every = np.ones(len(observations.tie1), dtype=bool)
-    return _relief_per_pixel(_met(observations, state, every).triangle)
-
-
-def _relief_per_pixel(triangle: FloatArray) -> FloatArray:
-    """Return the sigma of relief from pixels of sigma 1 / sqrt(2), shape (m,). [m/px]"""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # Of the inverse of an upper triangle the last row is the last diagonal element alone.
-        return np.asarray(1.0 / np.abs(triangle[:, 2, 2]) / np.sqrt(2.0))
+    with np.errstate(divide="ignore"):
+        # Of the inverse of an upper triangle the last row is the last diagonal element alone: the
+        # sigma of relief from pixels of sigma 1 / sqrt(2).
+        return np.asarray(1.0 / np.abs(_met(observations, state).triangle[:, 2, 2]) / np.sqrt(2.0))
 
 
 class _Met(NamedTuple):
@@ -82,10 +78,14 @@ class _Met(NamedTuple):
     triangle: FloatArray
 
 
-def _met(observations: PairObservations, state: PairUnknowns, which: BoolArray) -> _Met:
-    """Return where refracted rays of ties meet, and what is left of their pixels."""
+@lru_cache(maxsize=1)
+def _met(observations: PairObservations, state: PairUnknowns) -> _Met:
+    """Return where refracted rays of ties meet, and what is left of their pixels.
+
+    Misfits and heights are asked for in turn of one state: it is solved once.
+    """
     models = observations.radial_models(state.radial)
-    raw = observations.tie1[which], observations.tie2[which]
+    raw = observations.tie1, observations.tie2
     straight = [model.undistort(x) for model, x in zip(models, raw, strict=True)]
     pixels, xyz = np.concatenate(straight, axis=1), state.media.meeting(state.cameras, *straight)
     for _ in range(STEPS):

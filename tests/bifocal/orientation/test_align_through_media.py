@@ -27,6 +27,7 @@ from bifocal import (
     SiteMeasures,
     align,
 )
+from bifocal.demo import WATER_SAMPLE
 from bifocal.matching.features import Features
 from bifocal.media import interface_axes, view
 from bifocal.model.orientation_precision import NAMES, from_dict, names_of
@@ -248,6 +249,24 @@ def test_common_points_and_one_distance_set_up_a_pair_through_media(monkeypatch,
     assert 0.1 < np.sqrt(((error / sigma)[:, 2] ** 2).mean()) < 1.5
     assert made.setup["common_points"]["count"] > 600
     assert made.deviations["tilt1_deg"] < 0.4
+
+
+@pytest.mark.acceptance
+def test_the_sample_under_water_is_set_up_by_the_command_and_one_distance(tmp_path):
+    """20 targets to 4 mm, as with the exact cameras: one pixel at 3.5 m is 3 mm."""
+    out = tmp_path / "reef.pair.json"
+    words = ["--auto", "--distance1", "3.5", "--focal1", "41.784", "--focal2", "22.769"]
+    words += ["--sensor-width", "36", "--indices", "1,1.49,1.337", "--thicknesses", "0.01"]
+    words += ["--port", "0.05", "--port-normal", "axis", "--no-picture"]
+    photos = [str(WATER_SAMPLE / name) for name in ("far.jpg", "near.jpg")]
+    result = CliRunner().invoke(main, ["align", *photos, *words, "--out", str(out)])
+    assert result.exit_code == 0, result.output
+    table = np.genfromtxt(WATER_SAMPLE / "targets.csv", delimiter=",", skip_header=1)
+    pair = Pair.read(out)
+    off = pair.intersect(table[:, 1:3], table[:, 3:5]).xyz[:, 2] - table[:, 5]
+    assert np.isfinite(off).sum() == 20
+    assert np.sqrt(np.nanmean(off**2)) < 0.006
+    assert pair.image1.z0 == 0.05
 
 
 @pytest.mark.parametrize(

@@ -169,7 +169,7 @@ def test_the_files_of_an_adjustment_appear_together_or_not_at_all(
 @pytest.mark.acceptance
 @pytest.mark.parametrize(
     ("language", "said"),
-    [("it", "Le coordinate immagine valgono"), ("de", "Medien zwischen Kameras und Objekt")],
+    [("it", "Le coordinate immagine sono precise"), ("de", "Medien zwischen Kameras und Objekt")],
 )
 def test_the_report_speaks_the_language_asked_for(project, tmp_path, language, said):
     out = tmp_path / "r.html"

@@ -260,7 +260,7 @@ def test_a_camera_in_the_middle_of_its_dome_cannot_tell_its_radius_without_a_pri
 
 @pytest.mark.acceptance
 def test_a_dome_of_another_size_is_refused():
-    with pytest.raises(GeometryError, match=r"port:radius comes out as 79.* 200 was given"):
+    with pytest.raises(GeometryError, match=r"port:radius comes out as 79.* mm, 200 mm was given"):
         bundle_adjust(
             dome_project(noise=0.0005, radius=200.0, glass=8.0, centre=DOME),
             Unknowns(media=("radius",), priors={"port:radius": 5.0}),
