@@ -164,6 +164,7 @@ def test_a_report_whose_worked_point_was_written_anew_is_noticed(wall):
 
 
 @pytest.mark.acceptance
+@pytest.mark.long
 def test_products_made_anew_have_the_same_bytes_and_sources_are_known_by_their_hash(made, wall):
     before = state_of(wall)
     (wall / ".hashes.json").unlink()

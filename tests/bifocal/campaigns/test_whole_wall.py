@@ -37,6 +37,7 @@ def survey(folder: Path, *above: str) -> Path:
 
 
 @pytest.mark.acceptance
+@pytest.mark.long
 def test_a_street_comes_into_one_frame_and_one_picture_and_stays(tmp_path):
     write_street(tmp_path)
     for name in "abc":

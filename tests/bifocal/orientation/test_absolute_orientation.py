@@ -54,6 +54,7 @@ def test_the_photos_alone_with_one_distance_give_the_relief(views) -> None:
 
 
 @pytest.mark.acceptance
+@pytest.mark.long
 def test_both_distances_square_to_the_wall_give_the_relief(views) -> None:
     site = SiteMeasures(distance1=16.0, distance2=9.0, parallel=True)
     made = orient_pair(inputs(views, sigma=0.02), control=Control(), site=site)
@@ -82,6 +83,7 @@ def test_four_wall_points_and_one_relief_point_repair_the_set_up(views) -> None:
 
 
 @pytest.mark.acceptance
+@pytest.mark.long
 def test_a_dark_photo_is_matched_all_the_same(views) -> None:
     dark = (views.near * 0.2 + 5).astype(np.uint8)
     first, second = inputs(views)
@@ -167,6 +169,7 @@ def test_without_any_distance_there_is_no_scale(views) -> None:
 
 
 @pytest.mark.acceptance
+@pytest.mark.long
 def test_a_length_on_the_wall_gives_the_scale(views) -> None:
     ends = np.array([[-4.5, 2.9, 0.0], [4.6, 3.0, 0.0]])
     unknown = np.array([[np.nan, np.nan, 0.0]] * 2)
@@ -183,6 +186,7 @@ def test_a_length_on_the_wall_gives_the_scale(views) -> None:
 
 
 @pytest.mark.acceptance
+@pytest.mark.long
 def test_equal_distances_are_refused(views) -> None:
     beside = camera(15.9, offset=(4.0, 0.0), turn_deg=(0.0, 14.0, 0.0))
     first, second = inputs(views)

@@ -84,6 +84,7 @@ def test_json_goes_to_stdout_alone(folder) -> None:
 
 
 @pytest.mark.acceptance
+@pytest.mark.long
 def test_a_photo_turned_by_exif_gives_the_same_pair(folder) -> None:
     from PIL import Image
 
@@ -101,6 +102,7 @@ def test_a_photo_turned_by_exif_gives_the_same_pair(folder) -> None:
 
 
 @pytest.mark.acceptance
+@pytest.mark.long
 def test_a_lens_file_with_distortion_is_carried_into_the_pair(folder) -> None:
     for name, cam in (("lens1.json", FAR), ("lens2.json", NEAR)):
         data = {
@@ -122,7 +124,9 @@ def test_a_lens_file_with_distortion_is_carried_into_the_pair(folder) -> None:
 
 
 @pytest.mark.acceptance
-@pytest.mark.parametrize(("unit", "heading"), [(1000.0, " [mm]"), (100.0, " [cm]")])
+@pytest.mark.parametrize(
+    ("unit", "heading"), [(1000.0, " [mm]"), pytest.param(100.0, " [cm]", marks=pytest.mark.long)]
+)
 def test_units_in_the_headings_are_taken(folder, unit, heading) -> None:
     write_control(folder / "unit.csv", unit=unit, heading=heading)
     result = align(
@@ -294,6 +298,7 @@ def test_match_explains_what_it_cannot_do(folder, options, message, tmp_path) ->
 
 
 @pytest.mark.acceptance
+@pytest.mark.long
 def test_a_spot_on_a_board_makes_the_board_the_wall(folder) -> None:
     spot = project(FAR, np.array([[4.6, -1.0, 0.35]]))[0]
     result = align(
@@ -352,6 +357,7 @@ def test_what_a_set_up_lacks_is_said_at_once(folder, options, said) -> None:
 
 
 @pytest.mark.acceptance
+@pytest.mark.long
 def test_a_control_table_without_headings_is_read_by_columns(folder) -> None:
     lines = (folder / "control.csv").read_text(encoding="utf-8").splitlines()
     (folder / "bare.csv").write_text("\n".join(lines[1:]), encoding="utf-8")

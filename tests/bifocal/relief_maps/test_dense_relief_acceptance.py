@@ -36,9 +36,8 @@ def edge_distance(truth: np.ndarray) -> np.ndarray:
     return cv2.distanceTransform((~steps).astype(np.uint8), cv2.DIST_L2, 3)
 
 
-@pytest.mark.parametrize(
-    "name", ["35/19", *(pytest.param(s, marks=pytest.mark.long) for s in SCENES if s != "35/19")]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("name", SCENES)
 def test_rendered_facades_are_measured_as_well_as_promised(name):
     seed, d2, palette, exposure, median, beyond, rmse, ortho = SCENES[name]
     cameras = bifocal_cameras(d2=d2)
@@ -89,7 +88,10 @@ def church(folder: Path) -> Pair:
     return Pair.from_dict({"format": "bifocal-pair/1", **photos}, folder=folder)
 
 
-@pytest.mark.parametrize(("name", "median"), [("church_1", 10.0), ("church_2", 15.0)])
+@pytest.mark.parametrize(
+    ("name", "median"),
+    [pytest.param("church_1", 10.0, marks=pytest.mark.long), ("church_2", 15.0)],
+)
 def test_real_oblique_photos_of_a_church_agree_with_the_reference(data_dir, name, median):
     folder = data_dir / "facade_pairs" / name
     pair = church(folder)
