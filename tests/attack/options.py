@@ -182,7 +182,7 @@ WORDS: list[tuple[str, str]] = [
     ("bifocal facade far.jpg near.jpg --out o --control control.csv --port 0.1", "--indices"),
     ("bifocal facade far.jpg near.jpg --out o --indices 1,x --port 0", "--indices"),
     ("bifocal facade far.jpg near.jpg --out o --indices 1,1.337 --port -1", "--port"),
-    ("bifocal facade far.jpg near.jpg --out o --indices 1,1.337 --port 0 --auto", "--control"),
+    ("bifocal facade far.jpg near.jpg --out o --indices 1,1.337 --port 0 --auto", "--length"),
     (
         "bifocal facade far.jpg near.jpg --out o --control control.csv --indices 1,1.337 --port 0 "
         "--estimate lean3",

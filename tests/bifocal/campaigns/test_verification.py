@@ -69,6 +69,7 @@ def test_the_report_tells_project_lenses_ties_and_how_it_was_made_and_is_told_ag
     )
 
 
+@pytest.mark.acceptance
 def test_the_pdf_of_a_report_says_what_its_parts_are(made):
     data = (made / "wall/report/wall_report.pdf").read_bytes()
     for part in (b"/StructTreeRoot", b"/Marked true", b"/Lang (de)", b"/S /H1", b"/S /TH",

@@ -46,6 +46,7 @@ def bands(relief: ReliefMap) -> list[np.ndarray]:
     return [relief.r, relief.sigma, relief.quality]
 
 
+@pytest.mark.acceptance
 def test_a_set_of_two_gives_what_the_pair_gives_in_any_order():
     taken, part = shot(), {"gsd": shot().truth.gsd, "bounds": (-1.5, -1.0, 1.5, 1.0)}
     pair = dense_relief(taken.photos.pair(0, 1), *taken.images[:2], **part)

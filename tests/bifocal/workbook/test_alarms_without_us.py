@@ -152,6 +152,7 @@ def test_forty_check_points_have_an_arrow_each(tmp_path, monkeypatch):
     assert named(shown, "vector_scale").value > 10
 
 
+@pytest.mark.acceptance
 def test_one_book_worked_row_rows_below_the_table_and_a_point_at_the_nadir(tmp_path):
     """Three things of the sheets that touch each other nowhere, in one recalculation."""
     worked, nadir = ("TEST", 4.2424, 0, 4.4706, 0), ("N", 0, 0, 0, 0)
