@@ -69,6 +69,9 @@ NOT_RUN = {
         "wants three photos; test_photo_sets.py has them",
     "bifocal adjust a.pair.json b.pair.json c.pair.json --control a.csv --control none --control "
     "c.csv --out joint": "wants a street; test_joint_adjustment.py has one",
+    "bifocal align far.jpg near.jpg --auto --distance1 3.5 --focal1 35 --focal2 19 --sensor-width "
+    "22.7 --indices 1,1.337 --depth 0.6 --wall 1480,910 --out pond.pair.json":
+        "wants photos through a surface of water; test_align_through_media.py has them",
     **dict.fromkeys(IN_PART, "names options, is no whole line"),
 }  # fmt: skip
 
