@@ -71,7 +71,7 @@ NOT_RUN = {
     "c.csv --out joint": "wants a street; test_joint_adjustment.py has one",
     "bifocal align far.jpg near.jpg --auto --distance1 3.5 --focal1 35 --focal2 19 --sensor-width "
     "22.7 --indices 1,1.337 --depth 0.6 --wall 1480,910 --out pond.pair.json":
-        "wants photos through a surface of water; test_align_through_media.py has them",
+        "wants photos through a surface of water; test_common_points_through_media.py has them",
     **dict.fromkeys(IN_PART, "names options, is no whole line"),
 }  # fmt: skip
 

@@ -20,6 +20,7 @@ from bifocal.orientation.approximate_orientation import (
     approximate_cameras,
     check_picks,
     contradiction,
+    features_of,
     observations_of,
     order_of,
     ties_of,
@@ -45,7 +46,7 @@ from bifocal.orientation.orientation_stages import (
     with_refracted_ties,
 )
 from bifocal.orientation.slips import TrialOrientation, Typed, slip_of
-from bifocal.orientation.starts.refracted_start import features_of, refracted_start
+from bifocal.orientation.starts.refracted_start import refracted_start
 from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.tie_points import likely_on_wall
 from bifocal.orientation.tuning import BEND, CONTROL, ORDER, REMARKS, SLIPS, STAGES, TIES

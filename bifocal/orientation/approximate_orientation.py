@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bifocal.matching.features import find_features
+from bifocal.matching.features import Features, find_features
 from bifocal.model.interior_orientation import Cameras, Interiors
 from bifocal.model.pair_media import PairMedia
 from bifocal.orientation import validation
@@ -106,17 +106,23 @@ def check_picks(cameras: Cameras, ties: Ties, interiors: Interiors) -> None:
         raise GeometryError(remark("align.picks_misfit"))
 
 
-def ties_of(given: Given, *, needed: bool) -> tuple[Ties | None, tuple[str, ...]]:
-    """Return the photos' common points and remarks; none only if control points suffice."""
+def features_of(given: Given) -> tuple[Features, Features]:
+    """Return the features of both photos, refusing photos that are missing, blurred or the same."""
     far, near = given.photos[0].grey, given.photos[1].grey
     if far is None or near is None:
+        raise GeometryError(remark("refused.through_media"))
+    for name, image in zip(given.names, (far, near), strict=True):
+        validation.check_sharp(name, image)
+    validation.check_different(*given.names, (far, near))
+    return find_features(far), find_features(near)
+
+
+def ties_of(given: Given, *, needed: bool) -> tuple[Ties | None, tuple[str, ...]]:
+    """Return the photos' common points and remarks; none only if control points suffice."""
+    if any(photo.grey is None for photo in given.photos):
         return None, ()
     try:
-        for name, image in zip(given.names, (far, near), strict=True):
-            validation.check_sharp(name, image)
-        validation.check_different(*given.names, (far, near))
-        features = find_features(far), find_features(near)
-        return find_ties(*features, given.interiors, given.names), ()
+        return find_ties(*features_of(given), given.interiors, given.names), ()
     except GeometryError as error:
         if needed or isinstance(error, validation.SamePhotoError):
             raise

@@ -10,8 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bifocal.matching.features import Features, find_features
-from bifocal.orientation import validation
+from bifocal.matching.features import Features
 from bifocal.orientation.adjustment.observed_points import views_of
 from bifocal.orientation.adjustment.pair_observations import PairUnknowns
 from bifocal.orientation.approximate_orientation import Given, scaled
@@ -21,17 +20,6 @@ from bifocal.orientation.walls.wall_shape import straightened
 from bifocal.remarks import remark
 from photocore.camera.pinhole import Pinhole, ray_on_plane
 from photocore.errors import GeometryError
-
-
-def features_of(given: Given) -> tuple[Features, Features]:
-    """Return the features of both photos, refusing photos that are missing, blurred or the same."""
-    images = [photo.grey for photo in given.photos if photo.grey is not None]
-    if len(images) < 2:
-        raise GeometryError(remark("refused.through_media"))
-    for name, image in zip(given.names, images, strict=True):
-        validation.check_sharp(name, image)
-    validation.check_different(*given.names, (images[0], images[1]))
-    return find_features(images[0]), find_features(images[1])
 
 
 def refracted_start(given: Given, found: tuple[Features, Features]) -> tuple[PairUnknowns, Ties]:

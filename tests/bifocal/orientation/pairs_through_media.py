@@ -3,16 +3,34 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
-from bifocal import (
-    Control,
-    Interior,
-)
+from bifocal import Control, Interior
+from tests.scenes import SetupErrors, bifocal_cameras
+from tests.scenes.wet import under_water
 
 SIZE = (3072, 2048)
 GLASS = ((1.0, 1.49, 1.337), (0.01,))
+WATER = ((1.0, 1.337), ())
+
+
+@cache
+def cameras(kind, seed=2):
+    """Return cameras 3.5 and 1.9 m before a wall behind media, and what is typed of the media."""
+    square = bifocal_cameras(
+        size=SIZE, pixel=0.00074, d1=3.5, d2=1.9, rng=np.random.default_rng(seed),
+        errors=SetupErrors(tilt_deg=2.0, distance=0.02, offset=0.1),
+    )  # fmt: skip
+    distances = [float(camera.centre[2]) for camera in (square.far, square.near)]
+    media, z0, placed = {
+        "port": (GLASS, [0.05, 0.06], {"ports": (0.05, 0.06)}),
+        "tank": (GLASS, [d - 0.91 for d in distances], {"depth": 0.9}),
+        "surface": (WATER, [d - 0.6 for d in distances], {"depth": 0.6}),
+    }[kind]
+    wet = under_water(square, indices=media[0], thicknesses=media[1], z0=tuple(z0))
+    return (wet.far, wet.near), media, placed
 
 
 def points(rng, count, relief=0.3):
