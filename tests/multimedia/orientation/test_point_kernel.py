@@ -103,7 +103,9 @@ def test_the_kernel_s_loops_give_what_the_rows_give(seed, monkeypatch):
 
 def test_nearly_parallel_rays_and_no_points_are_as_by_rows(monkeypatch):
     views = cameras()[:2]
-    views[0] = replace(views[0], centre=views[1].centre + (3.0, 0, 0), rotation=views[1].rotation)
+    views[0] = replace(
+        views[0], centre=views[1].centre + np.eye(3)[0] * 3, rotation=views[1].rotation
+    )
     image = np.stack([project(c, control(3), LAYERS) for c in views])
     found, want, settled = both(monkeypatch, settled_points.plain, views, image, LAYERS, 0.003)
     assert settled == 3
