@@ -48,7 +48,10 @@ def setup_sheet(builder: BookBuilder, content: SurveyContent) -> None:
             sheet.worksheet[f"{letter}4"].fill = HEAD_FILL
             sheet.worksheet[f"{letter}4"].alignment = Alignment(horizontal="right")
             sheet.worksheet.column_dimensions[letter].width = 18 if letter == "C" else 11
-    listed = groups(is_pair=content.is_pair, media=content.media_cells, lens=content.has_lens)
+    listed = groups(
+        is_pair=content.is_pair, media=content.media_cells, lens=content.has_lens,
+        leaning=content.leaning,
+    )  # fmt: skip
     row = 5
     for group in listed:
         for name in group:
@@ -84,7 +87,10 @@ def _setup_cell(
     told = known.in_language(sheet.book.language).format(n=name[-1]) if known else matrix
     unit = known.unit if known else ""
     sheet.describe(row, (name, told), unit)
-    live = formulas(is_pair=content.is_pair, media=content.media_cells, others=content.others)
+    live = formulas(
+        is_pair=content.is_pair, media=content.media_cells, others=content.others,
+        leaning=content.leaning,
+    )  # fmt: skip
     is_default = {
         "d_1": content.pair is None,
         "sigma_s": content.setup is None or content.setup.measuring.sigma_s is None,
