@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -100,7 +101,7 @@ def _leaning_feet(media: MediaPath, away: FloatArray) -> dict[str, FloatArray]:
     radius, indices = length(foot), media.layers.indices
     least = min(indices)
     reduced = [ratios(index, least) for index in indices]
-    heights = (media.z0, *media.layers.thicknesses, behind)
+    heights: list[Any] = [media.z0, *media.layers.thicknesses, behind]
     bent = [(height * k, q) for height, (k, q) in zip(heights, reduced, strict=True)]
     arm, _ = ray_sums(np.zeros(len(away)), 0.0, bent)
     with np.errstate(divide="ignore", invalid="ignore"):

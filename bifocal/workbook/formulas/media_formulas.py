@@ -55,7 +55,7 @@ def setup_values(
     if pair is None:
         return cells
     photos = pair.as_given if as_given else (pair.image1, pair.image2)
-    stretch = media.used[-1] / media.used[0]
+    stretch, reach = media.used[-1] / media.used[0], []
     for image, (photo, z0) in enumerate(zip(photos, media.z0, strict=True), start=1):
         thick = sum(value or 0.0 for value in media.thicknesses)
         seen, c = seen_distance(photo.foot), photo.principal_distance
@@ -63,13 +63,14 @@ def setup_values(
         if media.normals and photo.media:
             seen, behind = straight(photo.foot).distance / stretch, photo.media.highest
             cells |= dict(zip(UNIT_NORMALS[image - 1], photo.towards_camera.tolist(), strict=True))
+        reach.append(seen * stretch)
         cells |= {
             f"behind_{image}": behind,
-            f"reach_{image}": seen * stretch,
+            f"reach_{image}": reach[-1],
             f"seen_{image}": seen,
             f"c_rays_{image}": photo.distance if c is None else c,
         }
-    d1, d2 = cells["reach_1"], cells["reach_2"]
+    d1, d2 = reach
     cells |= {"r_top": pair.highest_relief, "b_lever": d1 * d2 / (d1 - d2)}
     first, second = photos
     seen1, seen2 = (seen_distance(photo.foot) for photo in photos)
