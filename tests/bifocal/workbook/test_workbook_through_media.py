@@ -177,7 +177,7 @@ def test_a_workbook_of_raw_pixels_equals_the_library(name, tmp_path):
     write_survey(tmp_path / "p.xlsx", points, pair=pair, sigma_px=0.3)
     assert lint(tmp_path / "p.xlsx") == []
     assert assert_recalculated_equals_cached(tmp_path / "p.xlsx", tmp_path) > 800
-    rows = rows_of(recalculated(tmp_path / "p.xlsx", tmp_path), "Points", 4)[:12]
+    rows = rows_of(openpyxl.load_workbook(tmp_path / "p.xlsx", data_only=True), "Points", 4)[:12]
     used = [i for i in range(12) if i != 3]
     found = [[float(rows[i][key]) for key in ("X", "Y", "r")] for i in used]
     np.testing.assert_allclose(found, pair.intersect(*pixels).xyz[used], atol=1e-12)
@@ -359,7 +359,7 @@ def test_the_formulas_of_ports_that_lean_equal_the_library(name, language, tmp_p
     pair, pixels = leaning_book(name, path, language)
     assert lint(path) == []
     assert assert_recalculated_equals_cached(path, tmp_path) > 4000
-    rows = rows_of(recalculated(path, tmp_path), "Points", 4)[:10]
+    rows = rows_of(openpyxl.load_workbook(path, data_only=True), "Points", 4)[:10]
     truth = pair.intersect(*pixels).xyz
     found = [[row[key] if row[key] else np.nan for key in ("X", "Y", "r")] for row in rows]
     np.testing.assert_allclose(np.array(found, float), truth, atol=1e-12)
