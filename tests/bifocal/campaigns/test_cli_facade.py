@@ -147,7 +147,7 @@ def test_impossible_wishes_are_refused(tmp_path, options, said):
 
 
 @pytest.mark.acceptance
-@pytest.mark.parametrize("leans", [False, True])
+@pytest.mark.parametrize("leans", [pytest.param(False, marks=pytest.mark.long), True])
 def test_a_facade_under_water_is_delivered_by_the_bent_rays(tmp_path, leans):
     """The sample's cameras as they stood; its points' relief is known."""
     away = ["--port-normal", "0.0001,0,1"] if leans else []  # next to nothing

@@ -94,7 +94,8 @@ def test_killed_again_and_again_it_ends_with_the_same_files(survey, undisturbed)
     assert not any(outcome.done for outcome in again.outcomes)
 
 
-@pytest.mark.parametrize("ship", [pytest.param(False, marks=pytest.mark.long), True])
+@pytest.mark.long
+@pytest.mark.parametrize("ship", [False, True])
 def test_a_cluster_that_loses_a_worker_gives_the_same_files(survey, undisturbed, ship):
     distributed = pytest.importorskip("distributed")
     out = survey.parent / f"cluster{ship}"
