@@ -76,6 +76,7 @@ NOT_RUN = {
     **dict.fromkeys(IN_PART, "names options, is no whole line"),
 }  # fmt: skip
 
+DRAWN = "bifocal ortho wall.pair.json --relief relief.tif --deliver drawing --scale 1:50"
 #: Lines that another page runs on the same files: page -> its lines, and that page.
 RUN_BY = {
     "README.md": {
@@ -86,7 +87,7 @@ RUN_BY = {
         "bifocal survey street.toml": "tutorial-many-pairs.md",
         "bifocal align far.jpg near.jpg --control points.csv --out wall.pair.json": "align.md",
         "bifocal match wall.pair.json --out survey.xlsx": "align.md",
-        "bifocal ortho wall.pair.json --relief relief.tif --deliver drawing --scale 1:50": "other-programs.md",
+        DRAWN: "other-programs.md",
     },
     "surveys.md": {
         "bifocal survey --init photos street.toml": "tutorial-many-pairs.md",
