@@ -6,17 +6,19 @@ small problems, loops that depend on their last step) and must give the same num
 
 from __future__ import annotations
 
-import sys
+import os
+import zlib
 from collections.abc import Callable
 from functools import cache, cached_property, update_wrapper
 from importlib.util import find_spec
+from pathlib import Path
 from types import FunctionType
 from typing import Any, Generic, ParamSpec, TypeVar
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
-#: Loading numba and a kernel from the disk takes about twice as long. [s]
+#: Loading a kernel from the disk takes about as long, and numba before it twice that. [s]
 _WORTH_LOADING = 0.25
 
 
@@ -33,8 +35,8 @@ class Kernel(Generic[P, T]):
     Parameters
     ----------
     function : callable
-        Of arrays and numbers, in the part of Python and numpy that numba knows. Other kernels
-        that it calls stand in the same module: the disk's copy is renewed when that changes.
+        Of arrays and numbers, in the part of Python and numpy that numba knows. The copy on the
+        disk is renewed when its module changes, or that of a kernel that it calls.
     plain : callable, optional
         The same as numpy does it well, where a loop is too slow without numba.
     inline : bool
@@ -91,7 +93,7 @@ class Kernel(Generic[P, T]):
         """
         if self._run is None:
             self._spent += seconds
-            if "numba" not in sys.modules and self._spent < _WORTH_LOADING:
+            if self._spent < _WORTH_LOADING:
                 return False
         return _numba() is not None
 
@@ -127,7 +129,20 @@ class Kernel(Generic[P, T]):
         for name in code.co_names:
             if isinstance(names.get(name), Kernel):
                 names[name] = made(names[name])
-        return FunctionType(code, names, code.co_name, written.__defaults__)
+        function = FunctionType(code, names, code.co_name, written.__defaults__)
+        # numba looks at this module alone: the others go into the name that the copy is kept under.
+        others = sorted(filter(os.path.isfile, self._modules() - {code.co_filename}))
+        if others:
+            read = b"".join(Path(path).read_bytes() for path in others)
+            function.__qualname__ += f"-{zlib.crc32(read):08x}"
+        return function
+
+    def _modules(self) -> set[str]:
+        """Return the files of this kernel and of all that it calls."""
+        written: Any = self._written
+        known = (written.__globals__.get(name) for name in written.__code__.co_names)
+        called = (kernel._modules() for kernel in known if isinstance(kernel, Kernel))
+        return {written.__code__.co_filename}.union(*called)
 
 
 def inlined(function: Callable[P, T]) -> Kernel[P, T]:

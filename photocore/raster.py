@@ -93,7 +93,7 @@ class RasterFile(ExitStack):
     def __init__(self, path: Path | str, *, nodata: float | None = None) -> None:
         import rasterio
         from rasterio.enums import MaskFlags
-        from rasterio.errors import RasterioError
+        from rasterio.errors import RasterioError, RasterioIOError
 
         super().__init__()
         self.path = Path(path)
@@ -104,7 +104,7 @@ class RasterFile(ExitStack):
         self.enter_context(rasterio.Env(GDAL_CACHEMAX=CACHE))
         try:
             file = self._file = self.enter_context(_opened(self.path))
-        except RasterioError as error:
+        except (RasterioError, RasterioIOError) as error:  # one of the other from 1.4 on
             self.close()
             raise InputError(f"{self.path}: {why_unreadable(self.path, error)}") from None
         note(self.path)
@@ -408,7 +408,7 @@ def check_whole(path: Path, *, width: int, height: int, bands: int) -> None:
     width, height, bands : int
         What it must hold. [px, px, -]
     """
-    from rasterio.errors import RasterioError
+    from rasterio.errors import RasterioError, RasterioIOError
 
     size = path.stat().st_size
     try:
@@ -424,7 +424,7 @@ def check_whole(path: Path, *, width: int, height: int, bands: int) -> None:
         for level in range(levels):
             with _opened(path, overview_level=level) as file:
                 _check_blocks(file, size)
-    except RasterioError as error:
+    except (RasterioError, RasterioIOError) as error:
         raise OSError("the file is incomplete; is the disk full?") from error
 
 

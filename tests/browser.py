@@ -47,6 +47,9 @@ def chromium() -> str:
     pytest.skip("Chromium is not installed")
 
 
+#: The Playwright of this process, while a browser is open.
+_running: list[Any] = []
+
 #: Note in the page how long each frame takes. [ms]
 WATCH = """() => {
   window.frames_seen = [];
@@ -115,12 +118,26 @@ def served(folder: Path, *arguments: str) -> Iterator[Served]:
 
 
 @contextlib.contextmanager
-def launched(*more: str) -> Iterator[Any]:
-    """Return a headless browser, with more arguments."""
-    program = chromium()
+def _driver() -> Iterator[Any]:
+    """Return Playwright: the one that runs, as a thread can hold no second one."""
     from playwright.sync_api import sync_playwright
 
+    if _running:
+        yield _running[0]
+        return
     with sync_playwright() as playwright:
+        _running.append(playwright)
+        try:
+            yield playwright
+        finally:
+            _running.clear()
+
+
+@contextlib.contextmanager
+def launched(*more: str) -> Iterator[Any]:
+    """Return a headless browser, with more arguments; another one may be open."""
+    program = chromium()
+    with _driver() as playwright:
         arguments = ["--no-sandbox", *(more or ("--disable-gpu",))]
         browser = playwright.chromium.launch(executable_path=program, args=arguments)
         try:

@@ -62,6 +62,7 @@ NOT_RUN = {
     "--cog": "wants an account on object storage",
     "bifocal demo": "tutorial-facade.md runs it with --out",
     "bifocal demo --out sample --overwrite": "tutorial-facade.md runs it with another folder",
+    "bifocal demo --water": "tests/bifocal/demo runs it with --out",
     "bifocal demo --water --out under-water": "tests/bifocal/demo runs it with another folder",
     "bifocal align far.jpg mid.jpg near.jpg --control set.csv --out wall.photos.json":
         "wants three photos; test_photo_sets.py has them",
@@ -75,6 +76,7 @@ NOT_RUN = {
     **dict.fromkeys(IN_PART, "names options, is no whole line"),
 }  # fmt: skip
 
+DRAWN = "bifocal ortho wall.pair.json --relief relief.tif --deliver drawing --scale 1:50"
 #: Lines that another page runs on the same files: page -> its lines, and that page.
 RUN_BY = {
     "README.md": {
@@ -85,6 +87,7 @@ RUN_BY = {
         "bifocal survey street.toml": "tutorial-many-pairs.md",
         "bifocal align far.jpg near.jpg --control points.csv --out wall.pair.json": "align.md",
         "bifocal match wall.pair.json --out survey.xlsx": "align.md",
+        DRAWN: "other-programs.md",
     },
     "surveys.md": {
         "bifocal survey --init photos street.toml": "tutorial-many-pairs.md",
@@ -140,6 +143,12 @@ CHEAPER = {
         "--quality fast --products relief",
     "bifocal facade far.jpg near.jpg --auto --distance1 17.5 --scale 1:100 --language de --out "
     "wall":
+        "--quality fast --products relief",
+    "bifocal facade reef_far.jpg reef_near.jpg --control reef.csv --indices 1,1.49,1.337 "
+    "--thicknesses 0.01 --port 0.05 --prior index3=0.003 --out reef":
+        "--quality fast --products relief",
+    "bifocal facade reef_far.jpg reef_near.jpg --control reef.csv --indices 1,1.49,1.337 "
+    "--thicknesses 0.01 --port 0.05 --scale 1:20 --out reef":
         "--quality fast --products relief",
 }  # fmt: skip
 #: What a reader of the page types into the survey file that `--init` wrote.

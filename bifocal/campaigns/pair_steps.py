@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 from bifocal.campaigns.step_store import Step, StepRecord, read_record
 from bifocal.faces.faces_files import faces_path
 from bifocal.options import DRAWING, FILES, MAP, OF_PAIR, OF_STEP, PICTURE, PROJECT, SET_UP, typed
-from bifocal.remarks import remark
 from photocore.cli import Progress
 from photocore.errors import InputError
 from photocore.textfile import file_name
@@ -283,10 +282,6 @@ def _points_step(job: PairJob) -> Step:
             language=options.get("language", "en"), unit=options.get("unit", ""),
             columns=options.get("columns"),
         )  # fmt: skip
-        if solution.pair.leans:
-            write_result(place / f"{job.title}_points.csv", solution)
-            told = remark("campaign.leaning_ports")
-            return (*solution.remarks, told)
         write_result(place / f"{job.title}_points.xlsx", solution)
         return solution.remarks
 

@@ -261,22 +261,6 @@ class Pair:
         """Whether interfaces lean against the reference plane."""
         return self.image1.leans or self.image2.leans
 
-    def refuse_ports_that_lean(self, what: str) -> None:
-        """Raise where interfaces lean against the reference plane and the work asked for cannot.
-
-        Parameters
-        ----------
-        what : str
-            The work.
-
-        Raises
-        ------
-        InputError
-            Naming it.
-        """
-        if self.leans:
-            raise InputError(remark("pair.leaning_ports", what=what))
-
     @property
     def d1(self) -> float:
         """Distance of the far camera to the reference plane. [m]"""

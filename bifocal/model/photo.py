@@ -29,6 +29,8 @@ FARTHEST, OUTERMOST = 1e5, 1e8
 FARTHEST_WALL = 500.0
 #: Numbers of a photo that the pair file may hold, with their units.
 _OPTIONAL = {"sigma_pixel": "px", "principal_distance": "mm", "pixel_size": "mm"}
+#: Least cosine between the normal of interfaces and that of the reference plane.
+LEAST_COSINE = 0.1
 #: The normal of a port that is square to the camera's optical axis.
 AXIS = "axis"
 #: What else it holds where the pair file has `layers`.
@@ -433,6 +435,6 @@ def _checked_normal(value: FloatArray) -> FloatArray:
         If it does not point from the object to the cameras.
     """
     normal = read_only(value, "interface_normal", shape=(3,))
-    if not normal[2] > 0.1 * float(np.linalg.norm(normal)):
+    if not normal[2] > LEAST_COSINE * float(np.linalg.norm(normal)):
         raise GeometryError(remark("photo.interface_normal", normal=normal.tolist()))
     return normal

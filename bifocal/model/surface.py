@@ -156,11 +156,19 @@ class MapSurface:
         window, columns, rows = grid.resampling(self.grid, 1)
         patch = np.ascontiguousarray(self._fetch(*window))
         near = cv2.remap(patch, columns, rows, cv2.INTER_NEAREST)
-        smooth = cv2.remap(patch, columns, rows, cv2.INTER_LINEAR)
+        # Not by cv2.remap: OpenCV 4 rounds places to 1/32 px.
+        left, top = columns[0].astype(int), rows[:, 0].astype(int)
+        smooth = _between(patch[top], patch[top + 1], rows[:, :1] - top[:, None])
+        smooth = _between(smooth[:, left], smooth[:, left + 1], columns[:1] - left)
         # Steps and holes of the map, as seen by the four neighbours of a position.
         known = np.where(np.isnan(patch), np.float32(1e6), patch)
         corner = np.ones((2, 2), np.uint8)
         spread = cv2.dilate(known, corner, anchor=(0, 0)) - cv2.erode(known, corner, anchor=(0, 0))
         steps = spread > _STEP * self.grid.gsd
-        rough = steps[np.ix_(rows[:, 0].astype(int), columns[0].astype(int))]
+        rough = steps[np.ix_(top, left)]
         return np.asarray(np.where(rough | np.isnan(smooth), near, smooth), np.float32)
+
+
+def _between(one: Float32Array, other: Float32Array, share: FloatArray) -> Float32Array:
+    """Return what lies between two values by a share of the way; exactly both where they agree."""
+    return one + (other - one) * share.astype(np.float32)

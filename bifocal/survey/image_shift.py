@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -12,10 +13,15 @@ from bifocal.model.homography import apply_homography
 from bifocal.model.photo import Photo
 from bifocal.rays import apparent_of_plane
 from bifocal.survey.observations import PointObservations
+from bifocal.survey.refracted_radii import length, level_too
 from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.survey_lens import turns_of
+from multimedia.refraction.tangent import ratios, ray_sums
 from photocore.arrays import FloatArray
+
+#: Turns of Newton to the foot through ports that lean.
+_TURNS = 8
 
 
 def image_shift(
@@ -64,8 +70,10 @@ def foot_tangents(photo: Photo, table: ReliefTable) -> dict[str, FloatArray]:
     ``foot_0`` is that of the pick's arm; each turn of Newton makes the next. Three reach rounding.
     """
     media = photo.media
-    if not isinstance(media, MediaPath) or photo.leans:
+    if not isinstance(media, MediaPath):
         return {}
+    if "down1" in table.formula_cells:
+        return _leaning_feet(level_too(media), table.xyz[:, :2] - photo.nadir)
     radius = np.hypot(*(table.xyz[:, :2] - photo.nadir).T)
     tangent, turns = radius / table.formula_cells["arm1"], {}
     for turn in range(4):
@@ -73,6 +81,41 @@ def foot_tangents(photo: Photo, table: ReliefTable) -> dict[str, FloatArray]:
         way = media.radial_rays(tangent)
         tangent = tangent - (tangent * way.arm - radius) / way.pace
     return turns
+
+
+def _leaning_feet(media: MediaPath, away: FloatArray) -> dict[str, FloatArray]:
+    """Return how the feet of points, (X, Y) from the nadir, are seen through ports that lean.
+
+    ``behind`` is the way of each behind the last interface, ``foot_x foot_y foot_z`` its place
+    along the interfaces [m]; ``foot_0`` to ``foot_8`` are turns of Newton for the tangent in the
+    thinnest medium, eight reaching rounding up to 80 degrees; ``foot_a`` the arm over that in the
+    first, ``foot_tx foot_ty`` the ray there in the plane frame; NaN where no ray is found.
+    """
+    assert media.rotation is not None
+    normal, depth = media.rotation[2], media.last_interface
+    behind = media.distance * normal[2] - away @ normal[:2] - depth
+    behind = np.where(behind >= 0, behind, np.nan)
+    foot = np.column_stack([away, np.full(len(away), -media.distance)])
+    foot = foot + (behind + depth)[:, None] * normal
+    columns = {"behind": behind, **dict(zip(("foot_x", "foot_y", "foot_z"), foot.T, strict=True))}
+    radius, indices = length(foot), media.layers.indices
+    least = min(indices)
+    reduced = [ratios(index, least) for index in indices]
+    heights: list[Any] = [media.z0, *media.layers.thicknesses, behind]
+    bent = [(height * k, q) for height, (k, q) in zip(heights, reduced, strict=True)]
+    arm, _ = ray_sums(np.zeros(len(away)), 0.0, bent)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        tangent = radius / arm
+        for turn in range(_TURNS + 1):
+            columns[f"foot_{turn}"] = tangent
+            arm, pace = ray_sums(tangent, 0.0, bent)
+            off = tangent * arm - radius
+            last, tangent = tangent, tangent - off / pace
+        k, q = reduced[0]
+        arm = np.where(np.abs(off) <= 1e-12 * radius, arm * np.sqrt(1 + q * last**2) / k, np.nan)
+        way = foot / arm[:, None] - normal
+        seen = np.where(way[:, 2:] < 0, way[:, :2] / -way[:, 2:], np.nan)
+    return columns | {"foot_a": arm, "foot_tx": seen[:, 0], "foot_ty": seen[:, 1]}
 
 
 def lens_turns(

@@ -153,14 +153,17 @@ def ray_columns(
     -------
     dict
         ``p`` tangents in the first medium, ``t`` slopes outwards [mm/m], ``u`` their gains [mm/m
-        per mm of q]; where interfaces are parallel to the plane ``arm`` [m] and ``bend`` too.
+        per mm of q]; ``arm`` [m] and ``bend``; where interfaces lean what `_leaning_columns` adds.
     """
     columns: dict[str, FloatArray] = {}
     both = zip(picks, places, fitted, strict=True)
+    leaning = any(pick.foot.media and pick.foot.media.rotation is not None for pick in picks)
     for image, (pick, place, moved) in enumerate(both, start=1):
         tangent = (pick.positions - pick.foot.nadir) / pick.foot.distance
         media = pick.foot.media
-        if media is not None and media.rotation is None:
+        if media is not None and leaning:
+            columns |= _leaning_columns(image, level_too(media), tangent, pick.foot.nadir, moved)
+        elif media is not None:
             way = media.radial_rays(length(tangent))
             columns |= {f"arm{image}": way.arm, f"bend{image}": way.bend}
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -170,3 +173,50 @@ def ray_columns(
             columns[f"t{image}{axis}"] = -place.slope[:, k] * to_mm
             columns[f"u{image}{axis}"] = gain[:, k] * to_mm
     return columns
+
+
+def level_too(path: MediaPath) -> MediaPath:
+    """Return a path with axes of its interfaces, those of the plane frame where they are level."""
+    return path if path.rotation is not None else replace(path, rotation=np.eye(3))
+
+
+def _leaning_columns(
+    image: int, path: MediaPath, tangent: FloatArray, nadir: FloatArray, fitted: ObjectRays
+) -> dict[str, FloatArray]:
+    """Return the columns of rays that are bent about a normal a of their own.
+
+    Parameters
+    ----------
+    image : int
+        1 or 2, which the columns' names tell.
+    path : MediaPath
+        With axes.
+    tangent : ndarray, shape (n, 2)
+        Of the rays in the first medium, in the plane frame.
+    nadir : ndarray, shape (2,)
+        [m]
+    fitted : ObjectRays
+        The adjusted rays behind the last interface.
+
+    Returns
+    -------
+    dict
+        ``down1`` makes a ray (p, -1) go down by 1 along a; ``w1x w1y w1z`` is what is left of it
+        along the interfaces, tan in the first medium; ``arm1`` to the last interface [m] and
+        ``bend1``; ``fall1`` how much it then falls in the plane frame; ``top1`` the relief at which
+        the adjusted ray leaves the last interface [m].
+    """
+    assert path.rotation is not None
+    normal = path.rotation[2]
+    against = normal[2] - tangent @ normal[:2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        down = np.where(against > 0, 1 / against, np.nan)
+        along = np.column_stack([tangent, -np.ones(len(tangent))]) * down[:, None] + normal
+        way = path.radial_rays(length(along))
+        fall = normal[2] - way.bend * along[:, 2]
+        start = path.distance * normal[2] - (fitted.position - nadir) @ normal[:2]
+        top = (start - path.last_interface) / (normal[2] + fitted.slope @ normal[:2])
+    fall = np.where(fall > 0, fall, np.nan)
+    single = {"down": down, "arm": way.arm, "bend": way.bend, "fall": fall, "top": top}
+    columns = {f"{name}{image}": values for name, values in single.items()}
+    return columns | {f"w{image}{axis}": along[:, k] for k, axis in enumerate("xyz")}

@@ -269,10 +269,7 @@ class SurveySetup:
             return pair
         if self.refracted and own.c1 is None:
             raise InputError(remark("setup.media_without_c"))
-        photos = []
-        for number, photo in enumerate(pair.as_given, start=1):
-            layers, z0 = self.media.through(number)
-            photos.append(replace(photo, layers=layers, z0=z0))
+        photos = [replace(p, **self.media.through(k)) for k, p in enumerate(pair.as_given, 1)]
         return Pair(image1=photos[0], image2=photos[1])
 
     @property

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from bifocal.model.photo import Photo
 from bifocal.remarks import remark
@@ -28,11 +29,15 @@ def thickness_names(media: int) -> tuple[str, ...]:
 
 #: Cells of the ways from both cameras to the first interface.
 HEIGHTS = ("z0_1", "z0_2")
+#: Cells of the normals (X, Y, r) of both cameras' interfaces, in a workbook for ports that lean.
+NORMALS = tuple(tuple(f"normal_{axis}_{image}" for axis in "xyr") for image in "12")
+Normal = tuple[float | None, float | None, float | None]
 
 
-def media_names(media: int) -> tuple[str, ...]:
+def media_names(media: int, *, leaning: bool) -> tuple[str, ...]:
     """Return the cells a user types in a workbook prepared for so many media; none for none."""
-    return (*index_names(media), *thickness_names(media), *HEIGHTS) if media else ()
+    normals = (name for group in NORMALS for name in group if leaning)
+    return (*index_names(media), *thickness_names(media), *HEIGHTS, *normals) if media else ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,11 +53,15 @@ class SurveyMedia:
         Of all but the first and the last; blank: 0. [m]
     z0 : tuple of float or None
         Both cameras' centres to the first interface, in the order of the workbook. [m]
+    normals : pair of (X, Y, r), or None
+        Of both cameras' interfaces, towards the camera, of any length; blank: parallel to the
+        reference plane. None in a workbook without cells for ports that lean.
     """
 
     indices: tuple[float | None, ...]
     thicknesses: tuple[float | None, ...]
     z0: tuple[float | None, float | None]
+    normals: tuple[Normal, Normal] | None = None
 
     @classmethod
     def blank(cls, media: int) -> SurveyMedia:
@@ -71,31 +80,40 @@ class SurveyMedia:
     def of_cells(cls, cells: Mapping[str, float | None], media: int) -> SurveyMedia:
         """Return what cells hold, by their names."""
         first, second = (cells.get(name) for name in HEIGHTS)
+        leaning = NORMALS[0][0] in cells
+        normals: Any = tuple(tuple(map(cells.get, names)) for names in NORMALS)
         return cls(
             indices=tuple(cells.get(name) for name in index_names(media)),
             thicknesses=tuple(cells.get(name) for name in thickness_names(media)),
             z0=(first, second),
+            normals=normals if leaning else None,
         )
 
     @classmethod
-    def of_photos(cls, photos: tuple[Photo, ...], media: int = 0) -> SurveyMedia | None:
+    def of_photos(
+        cls, photos: tuple[Photo, ...], stands: SurveyMedia | None = None
+    ) -> SurveyMedia | None:
         """Return the cells that state a pair's media; None for one in air without such cells.
 
         Parameters
         ----------
         photos : tuple of Photo
             In the order of the workbook.
-        media : int
-            How many the workbook has cells for; 0 for a new one.
+        stands : SurveyMedia, optional
+            What the workbook has cells for; None for a new one.
 
         Raises
         ------
         InputError
             If the pair looks through more.
         """
-        layers = photos[0].layers
+        layers, media = photos[0].layers, stands.media if stands else 0
+        leaning = bool(stands and stands.normals) or any(photo.leans for photo in photos)
+        both: Any = tuple((None,) * 3 if p.interface_normal is None else
+                          tuple(p.interface_normal.tolist()) for p in photos)  # fmt: skip
+        normals = both if leaning else None
         if layers is None or layers == AIR:
-            return cls.blank(media) if media else None
+            return replace(cls.blank(media), normals=normals) if media else None
         count = len(layers.indices)
         if media and count > media:
             raise InputError(remark("survey.media_differ", media=media, count=count))
@@ -103,8 +121,9 @@ class SurveyMedia:
         first, second = (photo.z0 for photo in photos)
         inner = (*layers.thicknesses, *(None,) * more)
         return cls(
-            indices=(*layers.indices, *(None,) * more), thicknesses=inner, z0=(first, second)
-        )
+            indices=(*layers.indices, *(None,) * more), thicknesses=inner, z0=(first, second),
+            normals=normals,
+        )  # fmt: skip
 
     @property
     def media(self) -> int:
@@ -132,12 +151,13 @@ class SurveyMedia:
     @property
     def cells(self) -> dict[str, float | None]:
         """What the cells hold, by their names."""
-        media = self.media
-        values = (*self.indices, *self.thicknesses, *self.z0)
-        return dict(zip(media_names(media), values, strict=True))
+        normals = (part for normal in self.normals or () for part in normal)
+        values = (*self.indices, *self.thicknesses, *self.z0, *normals)
+        names = media_names(self.media, leaning=self.normals is not None)
+        return dict(zip(names, values, strict=True))
 
-    def through(self, number: int) -> tuple[Layers, float]:
-        """Return the media before photo 1 or 2 and its z0; light is not bent where cells are blank.
+    def through(self, number: int) -> dict[str, Any]:
+        """Return `Photo`'s layers, z0 and interface_normal; blank cells bend no light.
 
         Raises
         ------
@@ -146,13 +166,19 @@ class SurveyMedia:
         """
         layers, z0 = self.layers, self.z0[number - 1]
         if layers is None:
-            return AIR, 0.0
+            layers, z0 = AIR, 0.0
         if z0 is None:
             raise InputError(remark("survey.blank_z0", number=number))
-        return layers, z0
+        return {"layers": layers, "z0": z0, "interface_normal": self.normal(number)}
+
+    def normal(self, number: int) -> tuple[float, ...] | None:
+        """Return the normal of photo 1 or 2 as used, blanks filled in; None without such cells."""
+        if self.normals is None:
+            return None
+        typed = self.normals[number - 1]
+        return (0.0, 0.0, 1.0) if typed == (None,) * 3 else tuple(part or 0.0 for part in typed)
 
     def exchanged(self) -> SurveyMedia:
         """Return the same with the cameras exchanged."""
-        return SurveyMedia(
-            indices=self.indices, thicknesses=self.thicknesses, z0=(self.z0[1], self.z0[0])
-        )
+        normals = None if self.normals is None else (self.normals[1], self.normals[0])
+        return replace(self, z0=(self.z0[1], self.z0[0]), normals=normals)

@@ -156,6 +156,11 @@ class SurveyContent:
         return 0 if self.bent is None else self.bent.media
 
     @property
+    def leaning(self) -> bool:
+        """Whether there are cells for ports that lean."""
+        return self.bent is not None and self.bent.normals is not None
+
+    @property
     def has_lens(self) -> bool:
         """Whether there are cells for the distortion of each lens."""
         return self.lens if self.setup is None else self.setup.lenses is not None
@@ -191,7 +196,9 @@ class SurveyContent:
     def point_columns(self, **there: bool) -> tuple[LiveColumn, ...]:
         """Return the columns of `Points`; of an ideal pair those of the inputs that are there."""
         if self.is_pair:
-            return pair_points(undistorted=self.undistorted, media=self.media_cells)
+            return pair_points(
+                undistorted=self.undistorted, media=self.media_cells, leaning=self.leaning
+            )
         return ideal_points(
             **there, adjusted=self.corrected, media=self.media_cells, lens=self.has_lens,
             others=self.others,
@@ -277,7 +284,10 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
         cells[key] = _unless(blank, values)
     undirected = incomplete | np.isnan(table["theta_used"])
     first = content.photos[0]
-    shifts = image_shift(first, content.setup, points, table) | foot_tangents(first, table)
+    feet = foot_tangents(first, table)
+    found = ~np.isnan(feet.get("foot_a", np.zeros(len(points))))
+    moves = image_shift(first, content.setup, points, table)
+    shifts = {key: np.where(found, values, np.nan) for key, values in moves.items()} | feet
     if content.setup is not None and content.has_lens:
         more = lens_turns(content.setup, points, shifts)
         shifts["grown"] = more.pop("grown", np.full(len(points), np.nan))

@@ -40,8 +40,6 @@ def match_photos(
     """
     check_ending(out, "points are written as .xlsx (survey workbook) or .csv.", ".xlsx", ".csv")
     check_new_workbook(out, overwrite=overwrite)
-    if out.suffix.lower() != ".csv":
-        Pair.of(pair_path).refuse_ports_that_lean("a survey workbook")
     pair, matches = match_pair_file(pair_path, settings)
     if out.suffix.lower() == ".csv":
         matches.write(out, overwrite=overwrite)

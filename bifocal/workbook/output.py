@@ -88,7 +88,6 @@ def write_result(
 
         said = export_points(path, survey_points(solution), overwrite=overwrite)
         return " ".join([remark("survey.set_as_values", count=len(solution.photos)), *said])
-    solution.pair.refuse_ports_that_lean(f"{path}: a survey workbook")
     if len(solution.table) > MOST_ROWS:
         about = {"count": len(solution.table), "name": path.with_suffix(".csv").name}
         raise InputError(remark("survey.too_many_points", of=path, limit=MOST_ROWS, **about))

@@ -198,11 +198,7 @@ def _ideal(setup: SurveySetup, folder: Path) -> Pair:
         )
     ]  # fmt: skip
     if setup.media and setup.refracted:
-        through = [setup.media.through(number) for number in (1, 2)]
-        photos = [
-            replace(photo, layers=layers, z0=z0)
-            for photo, (layers, z0) in zip(photos, through, strict=True)
-        ]
+        photos = [replace(p, **setup.media.through(k)) for k, p in enumerate(photos, start=1)]
     return Pair(
         image1=photos[0],
         image2=photos[1],

@@ -135,8 +135,7 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
     orientation, remarks, extra = None, list[str](), {"setup": None}
     media: list[dict[str, Any]] = [{}, {}]
     if setup.media:
-        through = [setup.media.through(number) for number in (1, 2)]
-        media = [{"layers": layers, "z0": z0} for layers, z0 in through]
+        media = [setup.media.through(number) for number in (1, 2)]
     if setup.pair_file and file is None:
         remarks.append(remark("survey.no_lens", file=setup.pair_file))
     if file is not None:

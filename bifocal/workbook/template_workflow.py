@@ -132,7 +132,6 @@ def write_survey(
     scale about the zoom centre. `bifocal solve` gives the same from the workbook as from the pair.
     """
     path = check_book_path(path)
-    pair.refuse_ports_that_lean("a survey workbook")
     check_new_workbook(path, overwrite=overwrite)
     content = SurveyContent(
         language=language,

@@ -10,12 +10,13 @@ WORDS = WordBook(__package__)
 term, word = WORDS.term, WORDS.word
 
 
-def readme(language: str, *, media: bool = False) -> list[str]:
+def readme(language: str, *, media: bool = False, leaning: bool = False) -> list[str]:
     """Return the paragraphs of the sheet `Readme`; with media the formulas of bent rays."""
     lines = WORDS.readme(language)
     if not media:
         return lines
-    bent = str(WORDS.content["readme_media"][language]).splitlines()
+    told = WORDS.content["readme_leaning" if leaning else "readme_media"]
+    bent = str(told[language]).splitlines()
     first = next(row for row, line in enumerate(lines) if line.startswith("ds ="))
     return [*lines[:first], *bent, *lines[first + len(bent) :]]
 

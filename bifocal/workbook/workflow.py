@@ -112,8 +112,7 @@ def solve(
     )
     media = solved.media
     if general is not None and pair is not None:  # the cells of media take those of its file
-        count = media.media if media else 0
-        media = SurveyMedia.of_photos((general.image1, general.image2), count)
+        media = SurveyMedia.of_photos((general.image1, general.image2), media)
     return replace(solved, media=media, source=path, pair_path=pair_path, given=asked)
 
 

@@ -23,12 +23,14 @@ the squared invariant :math:`\pi = (n_i \sin\beta_i)^2`:
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from multimedia.refraction.layers import Layers
 from multimedia.refraction.shift import ratio_of, shift_ratio
 from photocore.arrays import FloatArray
+from photocore.compiled import inlined
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -170,6 +172,50 @@ def shifts(vectors: FloatArray, medium: Medium, *, media: bool = True) -> Shifts
     )
 
 
+@inlined
+def ray_beyond(
+    direction: Any, m: Any, height: Any, thicknesses: FloatArray, k: FloatArray
+) -> tuple[Any, tuple[Any, Any, Any], tuple[Any, Any, Any]]:
+    """Follow a direction, or each of many, from a projection centre into the last medium.
+
+    Parameters
+    ----------
+    direction : three numbers or rows
+        Of any length.
+    m : ndarray, shape (3,)
+        Normal towards the camera, in the same frame.
+    height : float
+        Of the centre above the last face.
+    thicknesses, k : ndarray, shape (j,), (j + 1,)
+        Of the inner layers; n_1 / n_i of these and of the last medium.
+
+    Returns
+    -------
+    ahead : bool
+        Whether it goes towards the layers.
+    origin, ray : tuple of 3
+        From the centre to where the ray leaves the last face; its unit vector beyond.
+    """
+    length = np.sqrt(
+        direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2]
+    )
+    x, y, z = direction[0] / length, direction[1] / length, direction[2] / length
+    cosine = -(x * m[0] + y * m[1] + z * m[2])
+    # Snell: n_i times the component along the interface is the same in every medium.
+    x, y, z = x + cosine * m[0], y + cosine * m[1], z + cosine * m[2]
+    along2 = x * x + y * y + z * z
+    inner, first = 0.0 * along2, height
+    for i in range(len(thicknesses)):
+        first = first - thicknesses[i]
+        inner = inner + thicknesses[i] * k[i] / np.sqrt(1.0 - k[i] * k[i] * along2)
+    travel = first / cosine + inner
+    last = k[len(thicknesses)]
+    down = np.sqrt(1.0 - last * last * along2)
+    origin = travel * x - height * m[0], travel * y - height * m[1], travel * z - height * m[2]
+    ray = last * x - down * m[0], last * y - down * m[1], last * z - down * m[2]
+    return cosine > 0, origin, ray
+
+
 def rays_in_object_space(directions: FloatArray, medium: Medium) -> tuple[FloatArray, FloatArray]:
     """Follow rays from the projection centre into the last medium.
 
@@ -188,19 +234,16 @@ def rays_in_object_space(directions: FloatArray, medium: Medium) -> tuple[FloatA
         Unit vectors in the last medium. NaN for rays away from the interface and after total
         reflection.
     """
-    m, n = medium.normal, medium.layers.indices
-    unit = directions / np.sqrt(np.einsum("ni,ni->n", directions, directions))[:, None]
-    cosine = -(unit @ m)
-    # Snell: n_i times the component along the interface is the same in every medium.
-    along = (unit + cosine[:, None] * m) * n[0]
-    along2 = np.einsum("ni,ni->n", along, along)
+    n = np.array(medium.layers.indices)
+    thicknesses = np.array(medium.layers.thicknesses)
     with np.errstate(invalid="ignore", divide="ignore"):
-        travel = medium.first_height / np.where(cosine > 0, n[0] * cosine, np.nan)
-        for index, thickness in zip(n[1:-1], medium.layers.thicknesses, strict=True):
-            travel += thickness / np.sqrt(index**2 - along2)
-        last = np.sqrt(n[-1] ** 2 - along2)
-    origins = travel[:, None] * along - medium.height * m
-    return origins, (along - last[:, None] * m) / n[-1]
+        ahead, origin, ray = ray_beyond.plain(
+            directions.T, medium.normal, medium.height, thicknesses, n[0] / n[1:]
+        )
+    origins: FloatArray = np.stack(origin, axis=-1)
+    if not ahead.all():
+        origins[~ahead] = np.nan
+    return origins, np.stack(ray, axis=-1)
 
 
 def _inverse_ratio(

@@ -27,6 +27,15 @@ from multimedia.orientation.object_rays import (
     refuse_curved_rays,
     times,
 )
+from multimedia.orientation.point_kernel import (
+    LINEAR,
+    MOST_STEPS,
+    SMALL,
+    WEAK_ANGLE,
+    Found,
+    settled_points,
+    views_of,
+)
 from multimedia.orientation.point_status import PointStatus
 from multimedia.orientation.pose_kernel import seen_points
 from multimedia.orientation.quick_pose import layering_of
@@ -39,14 +48,8 @@ from photocore.errors import InputError
 BLOCK = 8192
 #: Chance that an honest point is called a gross error.
 RISK = 0.001
-#: Largest angle between two rays below which a point is called weak. [rad]
-WEAK_ANGLE = np.radians(2.0)
-#: Gauss-Newton steps: exact rays need one, picks a few pixels off three.
-_MOST_STEPS = 25
-#: A step smaller than this share of the distance ends the iteration: 1e-12 of 1 m is 1e-9 mm.
-_SMALL = 1e-12
-#: Up to this share of the distance, a step changes images linearly: what is left is its square.
-_LINEAR = 1e-8
+#: What the rows of numpy take for a point, roughly. [s]
+POINT_SECONDS = 5e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -131,7 +134,8 @@ def intersect(
     -----
     The start is the point nearest to the rays in the object's medium; Gauss-Newton with analytic
     derivatives through the media follows until the steps vanish. The gross-error test compares
-    the weighted square sum with chi-square at 0.1 %.
+    the weighted square sum with chi-square at 0.1 %. With the extra ``fast``, many points before
+    parallel layers run compiled.
 
     Examples
     --------
@@ -145,11 +149,47 @@ def intersect(
     """
     image, placed = _checked(cameras, image_points, media)
     sigmas = _sigmas(cameras, sigma, image.shape)
-    parts = [_block(cameras, image[:, p], sigmas[:, p], placed) for p in _parts(image)]
+    views = None
+    if settled_points.pays(POINT_SECONDS * image.shape[1]):
+        views = views_of(cameras, placed)
+    if views is None:
+        return _by_rows(cameras, image, sigmas, placed)
+    found = _nothing_found(*image.shape[:2])
+    whole = np.ascontiguousarray(image), np.ascontiguousarray(sigmas)
+    settled = settled_points(views, *whole, _limits(len(image)), found)
+    left = np.flatnonzero(~settled)
+    if left.size:
+        rest = _by_rows(cameras, image[:, left], sigmas[:, left], placed)
+        for name, values in found._asdict().items():
+            values[(slice(None), left) if name in _BY_CAMERA else left] = getattr(rest, name)
+    return IntersectedPoints(**found._asdict())
 
-    by_camera = ("residuals", "standardised")
+
+#: Values of shape (cameras, n, 2).
+_BY_CAMERA = ("residuals", "standardised")
+
+
+def _nothing_found(m: int, n: int) -> Found:
+    """Return room for n points of m cameras."""
+    return Found(
+        xyz=np.empty((n, 3)), covariance=np.empty((n, 3, 3)), sigma0=np.empty(n),
+        residuals=np.full((m, n, 2), np.nan), standardised=np.full((m, n, 2), np.nan),
+        rays=np.empty(n, np.int64), angle=np.empty(n), status=np.empty(n, np.int64),
+    )  # fmt: skip
+
+
+def _limits(count: int) -> FloatArray:
+    """Return the largest square sums of honest points, by the number of rays."""
+    return np.asarray(chdtri(np.maximum(2 * np.arange(count + 1) - 3, 1), RISK))
+
+
+def _by_rows(
+    cameras: Sequence[Camera], image: FloatArray, sigmas: FloatArray, placed: Sequence[OpticalMedia]
+) -> IntersectedPoints:
+    """Intersect points by rows of numpy."""
+    parts = [_block(cameras, image[:, p], sigmas[:, p], placed) for p in _parts(image)]
     whole: dict[str, Any] = {
-        name: np.concatenate([getattr(part, name) for part in parts], axis=int(name in by_camera))
+        name: np.concatenate([getattr(part, name) for part in parts], axis=int(name in _BY_CAMERA))
         for name in IntersectedPoints.__slots__
     }
     return IntersectedPoints(**whole)
@@ -258,7 +298,7 @@ def _block(
     active = np.flatnonzero(status == PointStatus.NOT_CONVERGED)
     reach = np.abs(xyz - cameras[0].centre).max(axis=1)
     before: FloatArray = np.full(n, np.nan)
-    for _ in range(_MOST_STEPS):
+    for _ in range(MOST_STEPS):
         if not active.size:
             break
         some = slice(None) if active.size == n else active
@@ -270,7 +310,7 @@ def _block(
             # Each step is shorter than the last by the same factor: the next one need not be made
             # to know that it is nothing.
             following = size * np.fmin(size / before[some], 1.0)
-            done: BoolArray = np.asarray((following <= _SMALL) & (size <= _LINEAR))
+            done: BoolArray = np.asarray((following <= SMALL) & (size <= LINEAR))
         before[some] = size
         status[active[done]] = PointStatus.OK
         status[active[lost]] = PointStatus.BEHIND
@@ -320,7 +360,7 @@ class _Equations:
         pairs = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
         normal = np.stack([np.einsum("kn,kn->n", a[:, i], a[:, j]) for i, j in pairs])
         right = np.stack([np.einsum("kn,kn->n", a[:, i], v) for i in range(3)])
-        step = times(inverse_3x3(normal), right)
+        step = np.stack(times.plain(inverse_3x3(normal), right))
         # The last steps are so short that what they do to a residual is linear to rounding.
         misses -= np.einsum("mkin,in->mkn", slopes, step)
         self.normal[:, some], self.slopes[..., some], self.misses[..., some] = (
@@ -343,7 +383,10 @@ def _images(camera: Camera, xyz: FloatArray, media: OpticalMedia) -> tuple[Float
         image += camera.principal_point[:, None]
     else:
         measured, by_ideal, _ = lens.measured_with_jacobian(image.T, camera.principal_point, (), c)
-        image, by_point = measured.T, np.einsum("nij,jkn->ikn", by_ideal, by_point)
+        image, (one, two) = measured.T, by_point
+        with np.errstate(invalid="ignore"):  # what is not possible is done again below
+            rows = [by_ideal[:, i, 0] * one + by_ideal[:, i, 1] * two for i in range(2)]
+        by_point = np.stack(rows)
     if not possible.all():
         rest = ~possible
         general = project_with_jacobian(camera, xyz[rest], media)
@@ -371,11 +414,11 @@ def _assembled(
     with np.errstate(divide="ignore", invalid="ignore"):
         sigma0 = np.where((redundancy > 0) & ~unknown, np.sqrt(square / redundancy), np.nan)
     # Cofactor of a weighted residual: 1 - a N^-1 a^T.
-    spread = 1.0 - np.einsum("ikn,kin->kn", times(inverse, np.moveaxis(slopes, 1, 0)), slopes)
+    cofactor = np.stack(times.plain(inverse, np.moveaxis(slopes, 1, 0)))
+    spread = 1.0 - np.einsum("ikn,kin->kn", cofactor, slopes)
     good = status == PointStatus.OK
     status[good & (angle < WEAK_ANGLE)] = PointStatus.WEAK
-    limits = chdtri(np.maximum(2 * np.arange(m + 1) - 3, 1), RISK)
-    status[good & (square > limits[rays])] = PointStatus.GROSS_ERROR
+    status[good & (square > _limits(m)[rays])] = PointStatus.GROSS_ERROR
     normed = standardised(weighted, spread.reshape(m, 2, n))
     return IntersectedPoints(
         xyz=xyz,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +14,7 @@ from multimedia.media.optical_media import OpticalMedia
 from multimedia.media.projection import Media, as_media
 from multimedia.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, as_points
+from photocore.compiled import inlined
 from photocore.errors import InputError
 
 
@@ -93,28 +95,32 @@ def nearest_points(origins: Sequence[FloatArray], directions: Sequence[FloatArra
         along = np.einsum("ni,ni->n", o, d)
         normal[:, use] += part
         right[:, use] += (o - along[:, None] * d).T
-    return times(inverse_3x3(normal), right).T
+    return np.stack(times.plain(inverse_3x3(normal), right), axis=-1)
+
+
+@inlined
+def cofactors(xx: Any, xy: Any, xz: Any, yy: Any, yz: Any, zz: Any) -> tuple[Any, Any, Any]:
+    """Return adjugate and determinant of symmetric 3 x 3 matrices, and whether they are regular."""
+    first = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+    rest = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
+    determinant = xx * first[0] + xy * first[1] + xz * first[2]
+    # Singular when the determinant is rounding of its own terms.
+    return first + rest, determinant, determinant > 1e-13 * (xx * yy * zz)
+
+
+@inlined
+def times(inverse: Any, right: Any) -> tuple[Any, Any, Any]:
+    """Return symmetric matrices, as rows xx, xy, xz, yy, yz, zz, times vectors."""
+    xx, xy, xz, yy, yz, zz = inverse
+    a, b, c = right
+    return xx * a + xy * b + xz * c, xy * a + yy * b + yz * c, xz * a + yz * b + zz * c
 
 
 def inverse_3x3(normal: FloatArray) -> FloatArray:
     """Return the inverses of symmetric 3 x 3 matrices, as rows xx, xy, xz, yy, yz, zz."""
-    xx, xy, xz, yy, yz, zz = normal
-    out = np.empty_like(normal)
-    out[0], out[1], out[2] = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
-    out[3], out[4], out[5] = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
-    determinant = xx * out[0] + xy * out[1] + xz * out[2]
-    # Singular when the determinant is rounding of its own terms.
-    size = xx * yy * zz
+    adjugate, determinant, regular = cofactors.plain(*normal)
     with np.errstate(divide="ignore", invalid="ignore"):
-        out /= np.where(determinant > 1e-13 * size, determinant, np.nan)
-    return out
-
-
-def times(inverse: FloatArray, right: FloatArray) -> FloatArray:
-    """Return symmetric matrices times vectors, shape (3, n)."""
-    xx, xy, xz, yy, yz, zz = inverse
-    a, b, c = right
-    return np.stack([xx * a + xy * b + xz * c, xy * a + yy * b + yz * c, xz * a + yz * b + zz * c])
+        return np.stack(adjugate) / np.where(regular, determinant, np.nan)
 
 
 def largest_angle(directions: Sequence[FloatArray]) -> FloatArray:

@@ -17,10 +17,14 @@ from photocore.compiled import Kernel, compiled, inlined
 
 #: Steps after which the general adjustment takes over; from 20 mm and 2 degrees off it takes 4.
 MOST_STEPS = 20
-#: Newton steps for the tangent, which settle it for every ray below `STEEPEST`.
-ROOT_STEPS = 4
+#: Halley's steps for the tangent: three settle it for nearly every ray below `STEEPEST`.
+ROOT_STEPS = 3
 #: Tangents of rays in air beyond which roots want more digits than float64 has.
 STEEPEST = 2.0
+
+
+#: Numbers, or rows of them, one of each point.
+Vector = Any
 
 
 class Layering(NamedTuple):
@@ -38,45 +42,42 @@ class Layering(NamedTuple):
         n_1 / n_i and 1 - k^2 of the inner layers and the last medium.
     """
 
-    point: FloatArray
-    normal: FloatArray
-    moving: bool
-    thicknesses: FloatArray
-    k: FloatArray
-    q: FloatArray
-
-
-#: Three numbers, or three rows of them, one of each point.
-Vector = Any
+    point: Vector
+    normal: Vector
+    moving: Any
+    thicknesses: Vector
+    k: Vector
+    q: Vector
 
 
 @inlined
-def _out(r: FloatArray, v: Vector) -> Vector:
+def out(r: FloatArray, v: Vector) -> Vector:
     """Return R v."""
     return (
-        r[0, 0] * v[0] + r[0, 1] * v[1] + r[0, 2] * v[2],
-        r[1, 0] * v[0] + r[1, 1] * v[1] + r[1, 2] * v[2],
-        r[2, 0] * v[0] + r[2, 1] * v[1] + r[2, 2] * v[2],
+        r[0][0] * v[0] + r[0][1] * v[1] + r[0][2] * v[2],
+        r[1][0] * v[0] + r[1][1] * v[1] + r[1][2] * v[2],
+        r[2][0] * v[0] + r[2][1] * v[1] + r[2][2] * v[2],
     )
 
 
 @inlined
-def _into(r: FloatArray, v: Vector) -> Vector:
+def into(r: FloatArray, v: Vector) -> Vector:
     """Return R^T v."""
     return (
-        r[0, 0] * v[0] + r[1, 0] * v[1] + r[2, 0] * v[2],
-        r[0, 1] * v[0] + r[1, 1] * v[1] + r[2, 1] * v[2],
-        r[0, 2] * v[0] + r[1, 2] * v[1] + r[2, 2] * v[2],
+        r[0][0] * v[0] + r[1][0] * v[1] + r[2][0] * v[2],
+        r[0][1] * v[0] + r[1][1] * v[1] + r[2][1] * v[2],
+        r[0][2] * v[0] + r[1][2] * v[1] + r[2][2] * v[2],
     )
 
 
 @inlined
-def _dot(a: Any, b: Any) -> Any:
+def dot(a: Any, b: Any) -> Any:
+    """Return the product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @inlined
-def _less(a: Any, factor: Any, b: Any) -> Vector:
+def less(a: Any, factor: Any, b: Any) -> Vector:
     """Return a - factor b."""
     return a[0] - factor * b[0], a[1] - factor * b[1], a[2] - factor * b[2]
 
@@ -107,12 +108,14 @@ def _apparent_depth(rho: Any, first: float, depth: Any, layering: Layering) -> t
         square = t * t
         bent = 1.0 / (1.0 + q * square)
         part = depth * k * np.sqrt(bent)
-        value, slope = first + part, first + part * bent
+        value, slope, curve = first + part, first + part * bent, part * bent * bent * q
         for i in range(last):
             bent = 1.0 / (1.0 + layering.q[i] * square)
             part = inner[i] * layering.k[i] * np.sqrt(bent)
             value, slope = value + part, slope + part * bent
-        step = (rho - value * t) / slope
+            curve = curve + part * bent * bent * layering.q[i]
+        miss = rho - value * t
+        step = miss * slope / (slope * slope - 1.5 * miss * t * curve)
         t = t + step
     # V follows the last step by V' d(t^2) = (F' - V) dt / t.
     value = value + (slope - value) * (step / np.maximum(t, 1e-300))
@@ -124,10 +127,10 @@ def _by_point(
     by_seen: Vector, rotation: FloatArray, moving: bool, m: FloatArray, change: Vector
 ) -> tuple[Any, ...]:
     """Return derivatives by u, along the normal and by the point, from those by the seen vector."""
-    by_u = by_seen if moving else _out(rotation, by_seen)
-    raised = _dot(by_u, m)
-    by_point = _less(by_u, raised, change)
-    return by_u, raised, _out(rotation, by_point) if moving else by_point
+    by_u = by_seen if moving else out(rotation, by_seen)
+    raised = dot(by_u, m)
+    by_point = less(by_u, raised, change)
+    return by_u, raised, out(rotation, by_point) if moving else by_point
 
 
 @inlined
@@ -143,7 +146,7 @@ def _row(
         centre, turn = by_point, _cross(by_point, away)
     else:
         # Faces that stand still: the height follows the centre, and the whole seen vector turns.
-        centre, turn = _less(by_point, -raised * by_height, m), _cross(by_u, u)
+        centre, turn = less(by_point, -raised * by_height, m), _cross(by_u, u)
     return (
         linear + lens[2], -centre[0], -centre[1], -centre[2], turn[0], turn[1], turn[2],
     )  # fmt: skip
@@ -151,7 +154,7 @@ def _row(
 
 @inlined
 def _sight(
-    point: FloatArray, centre: FloatArray, rotation: FloatArray, c: float, layering: Layering
+    point: Any, centre: FloatArray, rotation: FloatArray, c: float, layering: Layering
 ) -> tuple[Any, ...]:
     r"""Return where a point, or each of many, is seen, and how V changes.
 
@@ -182,21 +185,23 @@ def _sight(
     """
     m, moving, last = layering.normal, layering.moving, len(layering.thicknesses)
     away = (point[0] - centre[0], point[1] - centre[1], point[2] - centre[2])
-    face = _less(layering.point, 0.0 if moving else 1.0, centre)
-    a, height = _into(rotation, away) if moving else away, -_dot(m, face)
-    w = _dot(m, a)
-    depth, first = -w - height, height - layering.thicknesses.sum()
-    along = _less(a, w, m)  # the faces
-    rho2 = _dot(along, along)
+    face = less(layering.point, 0.0 if moving else 1.0, centre)
+    a, height = into(rotation, away) if moving else away, -dot(m, face)
+    w = dot(m, a)
+    depth, first = -w - height, height
+    for i in range(last):
+        first = first - layering.thicknesses[i]
+    along = less(a, w, m)  # the faces
+    rho2 = dot(along, along)
     value, slope, t, settled = _apparent_depth(np.sqrt(rho2), first, depth, layering)
-    u = _less(along, value, m)
-    seen = u if moving else _into(rotation, u)
+    u = less(along, value, m)
+    seen = u if moving else into(rotation, u)
     scale = -c / seen[2]
     x, y = seen[0] * scale, seen[1] * scale
     by_w = -layering.k[last] * value / (slope * np.sqrt(1.0 + layering.q[last] * t * t))
     # On the axis V' t^2 = (F' - V) / 2 and rho^2 vanish together; what V' is does not matter there.
     by_rho2 = (value - slope) * value / (np.maximum(rho2, 1e-300) * slope)
-    change = _less(_times(m, 1.0 + by_w), by_rho2, along)
+    change = less(_times(m, 1.0 + by_w), by_rho2, along)
     by_height = value / slope + by_w
     possible = settled & (first > 0.0) & (depth >= 0.0) & (seen[2] < 0.0)
     return possible, x, y, scale, change, by_height, away, u
@@ -204,7 +209,7 @@ def _sight(
 
 @inlined
 def point_equations(
-    point: FloatArray, lens: FloatArray, centre: FloatArray, rotation: FloatArray, c: float,
+    point: Any, lens: FloatArray, centre: FloatArray, rotation: FloatArray, c: float,
     layering: Layering,
 ) -> tuple[Any, ...]:  # fmt: skip
     """Return what a point, or each of many, adds to the equations of a pose.
@@ -235,8 +240,8 @@ def point_equations(
 
 
 @inlined
-def _seen_point(
-    point: FloatArray, centre: FloatArray, rotation: FloatArray, c: float, layering: Layering
+def seen_point(
+    point: Any, centre: FloatArray, rotation: FloatArray, c: float, layering: Layering
 ) -> tuple[Any, ...]:
     """Return whether a point is seen, its ideal image, and the derivatives of that by the point."""
     possible, x, y, scale, change, _, _, _ = _sight(point, centre, rotation, c, layering)
@@ -254,7 +259,7 @@ def seen_points(
     Rows of numpy: one by one, machine code has no more to gain than the rows' memory.
     """
     with np.errstate(all="ignore"):
-        seen, x, y, by_x, by_y = _seen_point.plain(points, centre, rotation, c, layering)
+        seen, x, y, by_x, by_y = seen_point.plain(points, centre, rotation, c, layering)
     return seen, np.stack((x, y)), np.array((by_x, by_y))
 
 
@@ -288,7 +293,7 @@ def _rows_one_by_one(
     return all_seen, ideal, rows
 
 
-pose_rows = Kernel(_rows_one_by_one, plain=_rows, inline=True)
+pose_rows = Kernel(_rows_one_by_one, plain=_rows)
 
 
 def _step(rows: FloatArray, damping: float) -> tuple[FloatArray, float]:
@@ -440,13 +445,22 @@ def fitted_poses(
     for i in range(m):
         used = np.flatnonzero(np.isfinite(lens[i, 0, 2]))
         some, own = np.empty((3, len(used))), np.empty((2, 3, len(used)))
-        for place in range(len(used)):
-            some[:, place] = points[i if len(points) > 1 else 0, :, used[place]]
-            own[:, :, place] = lens[i, :, :, used[place]]
-        steps[i], placed[i], turned[i], seen, rows_seen = fitted_pose(
+        block = points[i if len(points) > 1 else 0]
+        # Number by number: numba takes seconds to compile that slices are assigned.
+        for place, point in enumerate(used):
+            for j in range(3):
+                some[j, place] = block[j, point]
+                own[0, j, place], own[1, j, place] = lens[i, 0, j, point], lens[i, 1, j, point]
+        steps[i], found, turn, seen, rows_seen = fitted_pose(
             some, own, centres[i], rotations[i], c[i], layering, rounding[i]
         )
-        for place in range(len(used)):
-            ideal[i, :, used[place]] = seen[:, place]
-            rows[i, :, :, used[place]] = rows_seen[:, :, place]
+        for j in range(3):
+            placed[i, j] = found[j]
+            for k in range(3):
+                turned[i, j, k] = turn[j, k]
+        for place, point in enumerate(used):
+            for axis in range(2):
+                ideal[i, axis, point] = seen[axis, place]
+                for j in range(7):
+                    rows[i, axis, j, point] = rows_seen[axis, j, place]
     return steps, placed, turned, ideal, rows

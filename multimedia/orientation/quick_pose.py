@@ -86,8 +86,9 @@ def quick_pose(camera: Camera, seen: CameraObservations) -> Fit[NetworkState] | 
         return None
     few = len(ideal) < FEW
     fitted = fitted_pose if few and fitted_pose.pays(POSE_SECONDS) else fitted_pose.plain
-    points, centre, rotation = np.ascontiguousarray(seen.points.T), camera.centre, camera.rotation
-    count = 0
+    # Copies: numba compiles once more for arrays that may not be written.
+    centre, rotation = camera.centre.copy(), camera.rotation.copy()
+    points, count = np.ascontiguousarray(seen.points.T), 0
     for _ in range(LENS_ROUNDS):
         lens = linear_lens(camera, ideal, seen.image, seen.sigma)
         steps, centre, rotation, flat, rows = fitted(

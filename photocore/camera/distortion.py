@@ -18,19 +18,61 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photocore.arrays import FloatArray, as_points
+from photocore.compiled import inlined
 from photocore.errors import LARGEST, InputError
 from photocore.remarks import remark
 
 #: Names of the parameters in the order of `Brown`'s fields.
 NAMES = ("k1", "k2", "k3", "p1", "p2", "scale", "shear")
 #: Newton steps of the inverse; honest lenses need 3 to 5.
-_STEPS = 25
+STEPS = 25
+
+
+@inlined
+def _brown(terms: FloatArray, x: Any, y: Any) -> tuple[Any, Any]:
+    """Return x', y': B without the axes' scale and shear."""
+    k1, k2, k3, p1, p2 = terms[0], terms[1], terms[2], terms[3], terms[4]
+    xx, yy, xy = x * x, y * y, x * y
+    r2 = xx + yy
+    q = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    x1 = x * q + p1 * (r2 + 2.0 * xx) + 2.0 * p2 * xy
+    return x1, y * q + p2 * (r2 + 2.0 * yy) + 2.0 * p1 * xy
+
+
+@inlined
+def bent(terms: FloatArray, x: Any, y: Any) -> tuple[Any, Any]:
+    """Return B of a point, or of each of many: `Brown.terms` are what it takes."""
+    x1, y1 = _brown(terms, x, y)
+    return terms[5] * x1 - terms[6] * y1, terms[7] * y1
+
+
+@inlined
+def bent_slopes(terms: FloatArray, x: Any, y: Any) -> tuple[Any, Any, Any, Any]:
+    """Return dB/d(x, y), row by row, of a point or of each of many."""
+    k1, k2, k3, p1, p2 = terms[0], terms[1], terms[2], terms[3], terms[4]
+    scale, sin, cos = terms[5], terms[6], terms[7]
+    r2 = x * x + y * y
+    q = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    dq = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))  # dq/dx = dq * x
+    xx = q + dq * x * x + 6.0 * p1 * x + 2.0 * p2 * y
+    mixed = dq * x * y + 2.0 * p1 * y + 2.0 * p2 * x
+    yy = q + dq * y * y + 6.0 * p2 * y + 2.0 * p1 * x
+    return scale * xx - sin * mixed, scale * mixed - sin * yy, cos * mixed, cos * yy
+
+
+@inlined
+def towards(terms: FloatArray, at_x: Any, at_y: Any, x: Any, y: Any) -> tuple[Any, Any]:
+    """Return Newton's step towards the point for which B gives (x, y), or each of many."""
+    seen_x, seen_y = bent(terms, at_x, at_y)
+    a, b, c, d = bent_slopes(terms, at_x, at_y)
+    miss_x, miss_y, determinant = x - seen_x, y - seen_y, a * d - b * c
+    return (d * miss_x - b * miss_y) / determinant, (a * miss_y - c * miss_x) / determinant
 
 
 class Convention(Enum):
@@ -206,39 +248,23 @@ class Brown:
                     by_names[..., axis, k] = 1.0
         return measured, by_argument, by_names
 
+    @property
+    def terms(self) -> FloatArray:
+        """k1, k2, k3, p1, p2, scale, sine and cosine of shear: what the kernels take, (8,)."""
+        radial = (self.k1, self.k2, self.k3, self.p1, self.p2)
+        return np.array([*radial, self.scale, np.sin(self.shear), np.cos(self.shear)])
+
     def _formula(self, points: FloatArray) -> FloatArray:
         """Return B(x, y)."""
-        x, y = points[..., 0], points[..., 1]
-        x1, y1 = self._brown(x, y)
         out = np.empty_like(points)
-        out[..., 0] = self.scale * x1 - np.sin(self.shear) * y1
-        out[..., 1] = np.cos(self.shear) * y1
+        out[..., 0], out[..., 1] = bent.plain(self.terms, points[..., 0], points[..., 1])
         return out
-
-    def _brown(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return x', y': B without the axes' scale and shear."""
-        xx, yy, xy = x * x, y * y, x * y
-        r2 = xx + yy
-        q = 1.0 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3))
-        x1 = x * q + self.p1 * (r2 + 2.0 * xx) + 2.0 * self.p2 * xy
-        y1 = y * q + self.p2 * (r2 + 2.0 * yy) + 2.0 * self.p1 * xy
-        return x1, y1
 
     def _by_argument(self, points: FloatArray) -> FloatArray:
         """Return dB/d(x, y), shape (..., 2, 2)."""
-        x, y = points[..., 0], points[..., 1]
-        r2 = x * x + y * y
-        q = 1.0 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3))
-        dq = 2.0 * (self.k1 + r2 * (2.0 * self.k2 + r2 * 3.0 * self.k3))  # dq/dx = dq * x
-        xx = q + dq * x * x + 6.0 * self.p1 * x + 2.0 * self.p2 * y
-        mixed = dq * x * y + 2.0 * self.p1 * y + 2.0 * self.p2 * x
-        yy = q + dq * y * y + 6.0 * self.p2 * y + 2.0 * self.p1 * x
-        sin, cos = np.sin(self.shear), np.cos(self.shear)
+        slopes = bent_slopes.plain(self.terms, points[..., 0], points[..., 1])
         out = np.empty((*points.shape, 2))
-        out[..., 0, 0] = self.scale * xx - sin * mixed
-        out[..., 0, 1] = self.scale * mixed - sin * yy
-        out[..., 1, 0] = cos * mixed
-        out[..., 1, 1] = cos * yy
+        out[..., 0, 0], out[..., 0, 1], out[..., 1, 0], out[..., 1, 1] = slopes
         return out
 
     def _by_coefficient(self, points: FloatArray, name: str) -> FloatArray:
@@ -247,7 +273,7 @@ class Brown:
         r2 = x * x + y * y
         sin, cos = np.sin(self.shear), np.cos(self.shear)
         if name in ("scale", "shear"):
-            x1, y1 = self._brown(x, y)
+            x1, y1 = _brown.plain(self.terms, x, y)
             zero = np.zeros_like(x1)
             parts = (x1, zero) if name == "scale" else (-cos * y1, -sin * y1)
             return np.stack(parts, axis=-1)
@@ -262,17 +288,20 @@ class Brown:
 
     def _inverse(self, target: FloatArray) -> FloatArray:
         """Return the argument for which B gives ``target``, NaN where Newton finds none."""
-        points = target.copy()
-        size = 1.0 + np.abs(target).max(axis=-1, initial=0.0)
+        x, y = target[..., 0], target[..., 1]
+        at_x, at_y, terms = x.copy(), y.copy(), self.terms
+        size = 1.0 + np.maximum(np.abs(x), np.abs(y))
         with np.errstate(all="ignore"):
-            for _ in range(_STEPS):
-                miss = target - self._formula(points)
-                step = (inverse_2x2(self._by_argument(points)) @ miss[..., None])[..., 0]
-                points += step
+            for _ in range(STEPS):
+                step_x, step_y = towards.plain(terms, at_x, at_y, x, y)
+                at_x += step_x
+                at_y += step_y
                 # Quadratic convergence: after a step this small the next would be lost in rounding.
-                if not (np.abs(step).max(axis=-1) > 1e-9 * size).any():
+                if not (np.maximum(np.abs(step_x), np.abs(step_y)) > 1e-9 * size).any():
                     break
-            lost = ~(np.abs(self._formula(points) - target).max(axis=-1) <= 1e-11 * size)
+            seen_x, seen_y = bent.plain(terms, at_x, at_y)
+            lost = ~(np.maximum(np.abs(seen_x - x), np.abs(seen_y - y)) <= 1e-11 * size)
+        points = np.stack([at_x, at_y], axis=-1)
         points[lost] = np.nan
         return points
 
@@ -332,7 +361,7 @@ class RadialDivision(NamedTuple):
             factor = 2.0 / (1.0 + np.sqrt(1.0 - 4.0 * self.k1 * square))
             if self.k2:
                 factor = np.where(np.isfinite(factor), factor, 1.0)
-                for _ in range(_STEPS):
+                for _ in range(STEPS):
                     t = factor**2 * square
                     miss = 1.0 + t * (self.k1 + t * self.k2) - factor
                     slope = 2.0 * factor * square * (self.k1 + 2.0 * self.k2 * t) - 1.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import subprocess
 import sys
@@ -55,6 +56,27 @@ def test_kernels_call_each_other_and_are_kept_on_the_disk(tmp_path: Path) -> Non
     assert [path.suffix for path in sorted(cache.rglob("kernels.*"))].count(".nbi") == 2
 
 
+def test_the_copy_on_the_disk_is_another_when_a_module_called_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "called.py").write_text(MODULE, encoding="utf-8")
+    (tmp_path / "calling.py").write_text(
+        "from called import square, compiled\n@compiled\ndef half(x):\n    return square(x) / 2\n",
+        encoding="utf-8",
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    half = importlib.import_module("calling").half
+
+    def name() -> str:
+        return half._bound(lambda kernel: kernel.plain).__qualname__
+
+    before = name()
+    assert half.plain(2.0) == 6.0
+    assert name() == before != "half"
+    (tmp_path / "called.py").write_text(MODULE.replace("3.0", "4.0"), encoding="utf-8")
+    assert name() != before
+
+
 def test_without_numba_the_function_itself_is_called(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_numba", lambda: None)
     kernel = compiled(lambda numbers: sum(numbers))
@@ -75,8 +97,6 @@ def test_a_kernel_pays_once_the_road_of_numpy_has_taken_long(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(module, "_numba", lambda: np)
-    monkeypatch.setitem(sys.modules, "numba", None)
-    monkeypatch.delitem(sys.modules, "numba")
     kernel: Kernel = compiled(lambda: None)
     assert [kernel.pays(0.1) for _ in range(4)] == [False, False, True, True]
 

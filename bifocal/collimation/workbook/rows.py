@@ -44,7 +44,7 @@ _RAW, _IDEAL = ("col1", "row1", "col2", "row2"), ("x1", "y1", "x2", "y2")
 _REFERENCE = ("id", "use", "X_ref", "Y_ref", "Z_ref")
 #: Cells of the sheet Setup that hold the orientation.
 _TYPED = {
-    "pair_file", "d_1", "d_2", "c_1", "c_2", "pitch", *media_names(MOST),
+    "pair_file", "d_1", "d_2", "c_1", "c_2", "pitch", *media_names(MOST, leaning=True),
     *(name for group in (*MATRICES, *NADIRS) for name in group),
 }  # fmt: skip
 
@@ -243,7 +243,8 @@ def _edit(
             f"{'with' if has_lens else 'without'} lens distortion, the orientation is "
             "not; give another workbook with --workbook."
         )
-    if pair.refracted and not read.survey.setup.media:
+    media = read.survey.setup.media
+    if (pair.refracted and not media) or (pair.leans and media and not media.normals):
         raise InputError(remark("page.workbook_in_air", of=editor.path.name))
     if pair_file is not None:
         _set_up(editor, read, pair, pair_file)
@@ -355,7 +356,7 @@ def _set(
 def _set_up(editor: WorkbookEditor, read: ReadBook, pair: Pair, pair_file: str) -> None:
     """Type the orientation into the sheet Setup, where it is another one."""
     typed = read.survey.setup.media
-    media = SurveyMedia.of_photos((pair.image1, pair.image2), typed.media) if typed else None
+    media = SurveyMedia.of_photos((pair.image1, pair.image2), typed) if typed else None
     content = SurveyContent(pair=pair, pair_file=pair_file, sigma_px=read.sigma_px, media=media)
     _type_names(editor, {n: value for n, value in setup_cells(content).items() if n in _TYPED})
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from bifocal.remarks import remark
 from bifocal.survey.survey_input import SurveyInput
+from bifocal.survey.survey_media import NORMALS
 from bifocal.survey.what_if import CHANGED
 from bifocal.workbook.changing.setup_update import (
     add_missing_sheets,
@@ -99,6 +100,7 @@ def is_same_kind(survey: SurveyInput, content: SurveyContent) -> bool:
     measured = content.is_pair == ("col1" in survey.table.present)
     alike = content.has_lens == ("lens_1_k1" in names)
     alike &= content.media_cells == media_count(names)
+    alike &= content.leaning == (NORMALS[0][0] in names)
     return measured and alike and not is_earlier(survey)
 
 
@@ -117,7 +119,7 @@ def check_kind(source: Path, survey: SurveyInput, content: SurveyContent) -> Non
         return
     kind = "coordinates in mm or px" if content.is_pair else "raw pixels of a pair"
     if content.is_pair == ("col1" in survey.table.present):
-        kind = "photos in air"
+        kind = "ports parallel to the wall" if content.leaning else "photos in air"
     raise InputError(remark("survey.other_kind", of=source, kind=kind, other=_other(source)))
 
 

@@ -122,7 +122,9 @@ def _sums(others: int) -> dict[str, str]:
     }  # fmt: skip
 
 
-def pair_points(*, undistorted: bool, media: int = 0) -> tuple[LiveColumn, ...]:
+def pair_points(
+    *, undistorted: bool, media: int = 0, leaning: bool = False
+) -> tuple[LiveColumn, ...]:
     """Return the `Points` table of a general pair measured in raw pixels.
 
     Parameters
@@ -132,8 +134,10 @@ def pair_points(*, undistorted: bool, media: int = 0) -> tuple[LiveColumn, ...]:
         it are then written beside the raw ones.
     media : int
         How many media `Setup` has cells for; 0 in air.
+    leaning : bool
+        Whether `Setup` has cells for ports that lean.
     """
-    there = {"undistorted": undistorted, "media": media, "pair": True}
+    there = {"undistorted": undistorted, "media": media, "pair": True, "leaning": leaning}
     facts = {name for name, has in there.items() if has}
     return FORMULAS.columns("pair_points", facts, _layers(media) | placed_parts())
 
@@ -141,7 +145,8 @@ def pair_points(*, undistorted: bool, media: int = 0) -> tuple[LiveColumn, ...]:
 def _layers(media: int) -> dict[str, str]:
     """Return the parts of formulas that depend on how many media there are cells for."""
     glass = (f"+N(thick_{n})*{{{{1}} {n} {{2}}}}" for n in range(2, media))
-    return {"last": str(media), "glass": "".join(glass)}
+    plates = "".join(f"+N(thick_{n})" for n in range(2, media))
+    return {"last": str(media), "glass": "".join(glass), "plates": plates}
 
 
 def results_columns(*, is_pair: bool) -> tuple[LiveColumn, ...]:

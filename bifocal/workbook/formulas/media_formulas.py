@@ -7,25 +7,28 @@ iterating: see `bifocal.media`, whose notation this is.
 from __future__ import annotations
 
 from bifocal.model.pair import Pair
-from bifocal.rays import seen_distance
+from bifocal.rays import seen_distance, straight
 from bifocal.survey.survey_media import SurveyMedia
 from photocore.workbook.changing.cells import CellValue
 
 #: What may be typed as refractive index: vacuum to germanium.
 INDEX_LIMITS = (1.0, 4.1)
+#: Unit normals of both cameras' interfaces, of which `NORMALS` may be of any length.
+UNIT_NORMALS = tuple(tuple(f"axis_{axis}_{image}" for axis in "xyr") for image in "12")
 
 
 def _used(media: int) -> tuple[str, ...]:
     return tuple(f"n_used_{number}" for number in range(1, media + 1))
 
 
-def calculated_names(media: int, *, is_pair: bool) -> tuple[str, ...]:
+def calculated_names(media: int, *, is_pair: bool, leaning: bool) -> tuple[str, ...]:
     """Return the cells of `Setup` that follow from those of the media."""
     if not media:
         return ()
+    units = ("n_least", *UNIT_NORMALS[0], *UNIT_NORMALS[1]) if leaning else ()
     rays = () if is_pair else ("c_rays_1", "c_rays_2", "mm_1", "m_seen")
     both = tuple(f"{name}_{image}" for name in ("behind", "seen", "reach") for image in "12")
-    return (*_used(media), *both, "r_top", *rays)
+    return (*_used(media), *units, *both, "r_top", *rays)
 
 
 def setup_values(
@@ -48,21 +51,26 @@ def setup_values(
         return {}
     used = dict(zip(_used(media.media), media.used, strict=True))
     cells: dict[str, CellValue] = {**media.cells, **used}
-    cells["mm_1"] = 1
+    cells |= {"mm_1": 1, "n_least": min(media.used)}
     if pair is None:
         return cells
     photos = pair.as_given if as_given else (pair.image1, pair.image2)
-    stretch = media.used[-1] / media.used[0]
+    stretch, reach = media.used[-1] / media.used[0], []
     for image, (photo, z0) in enumerate(zip(photos, media.z0, strict=True), start=1):
         thick = sum(value or 0.0 for value in media.thicknesses)
         seen, c = seen_distance(photo.foot), photo.principal_distance
+        behind = photo.distance - (z0 or 0.0) - thick
+        if media.normals and photo.media:
+            seen, behind = straight(photo.foot).distance / stretch, photo.media.highest
+            cells |= dict(zip(UNIT_NORMALS[image - 1], photo.towards_camera.tolist(), strict=True))
+        reach.append(seen * stretch)
         cells |= {
-            f"behind_{image}": photo.distance - (z0 or 0.0) - thick,
-            f"reach_{image}": seen * stretch,
+            f"behind_{image}": behind,
+            f"reach_{image}": reach[-1],
             f"seen_{image}": seen,
             f"c_rays_{image}": photo.distance if c is None else c,
         }
-    d1, d2 = (seen_distance(photo.foot) * stretch for photo in photos)
+    d1, d2 = reach
     cells |= {"r_top": pair.highest_relief, "b_lever": d1 * d2 / (d1 - d2)}
     first, second = photos
     seen1, seen2 = (seen_distance(photo.foot) for photo in photos)

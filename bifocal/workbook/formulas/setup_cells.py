@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from bifocal.model.flags import SIGMA_PIXEL, UNCERTAIN_SHARE
+from bifocal.model.photo import LEAST_COSINE
 from bifocal.survey.setup import SCALE_TOLERANCE, SIGMA_PRINT, SIGMA_RADIAL
 from bifocal.survey.survey_media import HEIGHTS, index_names, media_names, thickness_names
 from bifocal.workbook.formulas.columns import FORMULAS, other_numbers
@@ -146,7 +147,7 @@ def lens_cells() -> Groups:
     return tuple(typed.split()), tuple(calculated.split())
 
 
-def groups(*, is_pair: bool, media: int, lens: bool = False) -> Groups:
+def groups(*, is_pair: bool, media: int, lens: bool = False, leaning: bool = False) -> Groups:
     """Return the cells of `Setup` group by group; the last group is calculated.
 
     Parameters
@@ -157,6 +158,8 @@ def groups(*, is_pair: bool, media: int, lens: bool = False) -> Groups:
         How many media there are cells for; 0 in air.
     lens : bool
         Whether there are cells for the distortion of each lens.
+    leaning : bool
+        Whether there are cells for ports that lean.
     """
     cells = FORMULAS.content["setup"]["pair" if is_pair else "ideal"]
     first, *others, last = (tuple(group.split()) for group in cells)
@@ -165,7 +168,8 @@ def groups(*, is_pair: bool, media: int, lens: bool = False) -> Groups:
         others, last = [typed, *others], (*last, *calculated)
     if not media:
         return (first, *others, last)
-    return (first, media_names(media), *others, (*last, *calculated_names(media, is_pair=is_pair)))
+    calculated = calculated_names(media, is_pair=is_pair, leaning=leaning)
+    return (first, media_names(media, leaning=leaning), *others, (*last, *calculated))
 
 
 #: Cells of photo 2 beside which those of further photos stand: the typed ones and the others.
@@ -187,7 +191,9 @@ def other_cells(photo: int) -> tuple[str, ...]:
     return tuple(form.format(photo) for form in list(_BESIDE.values())[:5])
 
 
-def formulas(*, is_pair: bool = False, media: int = 0, others: int = 0) -> Mapping[str, str]:
+def formulas(
+    *, is_pair: bool = False, media: int = 0, others: int = 0, leaning: bool = False
+) -> Mapping[str, str]:
     """Return the formulas of `Setup` by name; there may be more than cells for them."""
     limits = {
         "sigma_print": SIGMA_PRINT,
@@ -197,11 +203,13 @@ def formulas(*, is_pair: bool = False, media: int = 0, others: int = 0) -> Mappi
         "scale_tolerance": SCALE_TOLERANCE,
     }
     parts = {name: f"{value:g}" for name, value in limits.items()}
-    parts |= {"last": str(media), "stated": ",".join(_stated(media))}
+    parts |= {"last": str(media), "stated": ",".join(_stated(media)), "least": f"{LEAST_COSINE:g}"}
+    parts["indices"] = ",".join(f"n_used_{n}" for n in range(1, media + 1))
     parts["inner"] = "".join(f"-N({name})" for name in thickness_names(media))
     parts["glass"] = "".join(f"+N(thick_{n})*n_used_1/n_used_{n}" for n in range(2, media))
     parts["others"] = " ".join(map(str, other_numbers(others)))
-    facts = {name for name, holds in (("pair", is_pair), ("media", media)) if holds}
+    there = {"pair": is_pair, "media": media, "leaning": leaning}
+    facts = {name for name, holds in there.items() if holds}
     missing = _missing_formula(_PAIR_NEEDED if is_pair else _IDEAL_NEEDED, _stated(media))
     lines = FORMULAS.columns("setup", facts, parts, rows="lines")
     return {line.key: line.formula for line in lines} | {"setup_missing": missing}

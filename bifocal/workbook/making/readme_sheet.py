@@ -29,9 +29,10 @@ def readme_sheet(builder: BookBuilder, content: SurveyContent, cells: Cells) -> 
     cells : mapping
         The columns of `Points`.
     """
-    lines = readme(builder.language, media=bool(content.media_cells))
+    media = bool(content.media_cells)
+    lines = readme(builder.language, media=media, leaning=content.leaning)
     sketch = cameras_sketch(builder.word("nadir"), builder.word("sketch"))
-    if content.is_pair or content.media_cells:
+    if content.is_pair or media:
         builder.readme(lines, sketch, rows=_ROWS)
         return
     lines += [""] * (_SECOND - _TOP - len(lines))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from openpyxl.styles import Alignment
 
@@ -48,11 +49,13 @@ def setup_sheet(builder: BookBuilder, content: SurveyContent) -> None:
             sheet.worksheet[f"{letter}4"].fill = HEAD_FILL
             sheet.worksheet[f"{letter}4"].alignment = Alignment(horizontal="right")
             sheet.worksheet.column_dimensions[letter].width = 18 if letter == "C" else 11
-    listed = groups(is_pair=content.is_pair, media=content.media_cells, lens=content.has_lens)
+    media: dict[str, Any] = {"media": content.media_cells, "leaning": content.leaning}
+    listed = groups(is_pair=content.is_pair, lens=content.has_lens, **media)
+    live = formulas(is_pair=content.is_pair, others=content.others, **media)
     row = 5
     for group in listed:
         for name in group:
-            _setup_cell(sheet, row, name, cells, content, typed=group is not listed[-1])
+            _setup_cell(sheet, row, name, cells, content, live, typed=group is not listed[-1])
             row += 1
         row += 1
     for image in (1, 2):
@@ -75,6 +78,7 @@ def _setup_cell(
     name: str,
     cells: Mapping[str, CellValue],
     content: SurveyContent,
+    live: Mapping[str, str],
     *,
     typed: bool,
 ) -> None:
@@ -84,7 +88,6 @@ def _setup_cell(
     told = known.in_language(sheet.book.language).format(n=name[-1]) if known else matrix
     unit = known.unit if known else ""
     sheet.describe(row, (name, told), unit)
-    live = formulas(is_pair=content.is_pair, media=content.media_cells, others=content.others)
     is_default = {
         "d_1": content.pair is None,
         "sigma_s": content.setup is None or content.setup.measuring.sigma_s is None,

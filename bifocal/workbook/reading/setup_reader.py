@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, fields
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.model.photo import LEAST_COSINE
 from bifocal.remarks import remark
 from bifocal.survey.other_photos import MOST_PHOTOS
 from bifocal.survey.setup import Measuring, OtherPhoto, SurveySetup, Taking
@@ -17,6 +19,7 @@ from bifocal.survey.survey_media import (
     FEWEST,
     HEIGHTS,
     MOST,
+    NORMALS,
     SurveyMedia,
     index_names,
     media_names,
@@ -88,7 +91,7 @@ def read_setup(survey: OpenSurvey) -> SurveySetup:
         columns = [c for c in (*columns, *titles) if c.key.casefold() in book.names]
     else:
         # Cells of media are found by name only: no workbook of a user's own has them otherwise.
-        named_only = (*media_names(MOST), *lens_cells()[0])
+        named_only = (*media_names(MOST, leaning=True), *lens_cells()[0])
         columns = [c for c in columns if c.key not in named_only]
     count = other_count(book.names)
     others = [name for k in other_numbers(count) for name in other_cells(k)]
@@ -168,9 +171,10 @@ def _media(book: SheetFile, values: NamedValues, errors: list[CellError]) -> Sur
     count = media_count(book.names)
     if not count:
         return None
-    cells = {name: values.given(name) for name in media_names(count)}
+    leaning = NORMALS[0][0] in book.names
+    cells = {name: values.given(name) for name in media_names(count, leaning=leaning)}
     media = SurveyMedia.of_cells(cells, count)
-    complaints = {**_bad_indices(media), **_bad_thicknesses(media)}
+    complaints = {**_bad_indices(media), **_bad_thicknesses(media), **_bad_normals(media)}
     for name in HEIGHTS:
         z0 = cells[name]
         if z0 is not None and z0 < 0:
@@ -231,6 +235,16 @@ def _bad_thicknesses(media: SurveyMedia) -> dict[str, str]:
     return complaints
 
 
+def _bad_normals(media: SurveyMedia) -> dict[str, str]:
+    """Return which normals do not point to their camera, by the cell along relief."""
+    normals = {names[2]: media.normal(k) for k, names in enumerate(NORMALS, start=1)}
+    return {
+        name: remark("photo.interface_normal", normal=list(normal))
+        for name, normal in normals.items()
+        if normal is not None and not normal[2] > LEAST_COSINE * math.hypot(*normal)
+    }
+
+
 def is_general(book: SheetFile) -> bool:
     """Whether a workbook describes a general pair by homographies."""
     return "h1_11" in book.names
@@ -238,7 +252,8 @@ def is_general(book: SheetFile) -> bool:
 
 def _columns() -> list[Column]:
     columns = []
-    for key in (*numbers(), *media_names(MOST), *lens_cells()[0], *_general_names(), *_TEXTS):
+    media = media_names(MOST, leaning=True)
+    for key in (*numbers(), *media, *lens_cells()[0], *_general_names(), *_TEXTS):
         known = term("setup", key)
         unit = known.unit if known is not None and key not in _TEXTS else ""
         kind: Kind = "text" if key in _TEXTS else "number"

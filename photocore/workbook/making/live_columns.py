@@ -161,7 +161,7 @@ class _Formulas:
     def _column(self, row: Mapping[str, Any], given: Sequence[str]) -> LiveColumn:
         values = {n: chosen(v, self.facts) for n, v in row.items() if n not in ("when", "each")}
         values = {name: value for name, value in values.items() if value is not None}
-        for name in ("key", "formula"):
+        for name in ("key", "label", "formula"):
             values[name] = self.filled(values.get(name, "{0}" if name == "key" else ""), given)
         if "limits" in values:
             values["limits"] = tuple(values["limits"])

@@ -16,7 +16,7 @@ import openpyxl
 import pytest
 from click.testing import CliRunner
 
-from tests.bifocal.campaigns.sample_tables import FAR, NEAR, write_tables
+from tests.bifocal.campaigns.sample_tables import write_small_photos, write_tables
 from tests.builders.commands import bifocal_command as main
 
 #: Words of English sentences that are neither Italian nor German.
@@ -68,11 +68,12 @@ def english(folder: Path) -> set[str]:
 
 
 @pytest.mark.acceptance
-@pytest.mark.parametrize("language", [pytest.param("it", marks=pytest.mark.long), "de"])
+@pytest.mark.parametrize("language", ["it", pytest.param("de", marks=pytest.mark.long)])
 def test_products_hold_no_english(tmp_path, language):
-    control, check = write_tables(tmp_path)
+    photos = write_small_photos(tmp_path)
+    control, check = write_tables(tmp_path, small=True)
     out = tmp_path / "torre"
-    words = ["facade", FAR, NEAR, "--control", control, "--check", check, "--out", out]
+    words = ["facade", *photos, "--control", control, "--check", check, "--out", out]
     words += ["--language", language, "--section", "x=0", "--quality", "fast"]
     done = CliRunner().invoke(main, [str(word) for word in words])
     assert done.exit_code == 0, done.stderr

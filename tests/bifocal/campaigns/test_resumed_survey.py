@@ -79,10 +79,10 @@ def test_killed_again_and_again_it_ends_with_the_same_files(survey, undisturbed)
     whole = whole_pairs(out)
     assert 0 < len(whole) < 3  # of those that can be made
     left_alone = {name: marks(out / name) for name in whole}
-    for number, pause in enumerate(rng.uniform(2, 6, 4)):
+    for number, pause in enumerate(rng.uniform(2, 6, 2)):
         process = run(survey, out)
         time.sleep(pause)
-        # Twice as Ctrl-C does it, else as the system does without memory.
+        # Once as Ctrl-C does it, else as the system does without memory.
         process.send_signal(signal.SIGINT if number % 2 else signal.SIGKILL)
         process.wait(60)
     result = run_survey(read_survey_file(survey, out=out), machines=Machines(jobs=2))
@@ -94,7 +94,8 @@ def test_killed_again_and_again_it_ends_with_the_same_files(survey, undisturbed)
     assert not any(outcome.done for outcome in again.outcomes)
 
 
-@pytest.mark.parametrize("ship", [pytest.param(False, marks=pytest.mark.long), True])
+@pytest.mark.long
+@pytest.mark.parametrize("ship", [False, True])
 def test_a_cluster_that_loses_a_worker_gives_the_same_files(survey, undisturbed, ship):
     distributed = pytest.importorskip("distributed")
     out = survey.parent / f"cluster{ship}"

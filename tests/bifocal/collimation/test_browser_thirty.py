@@ -136,7 +136,8 @@ def measure(page: Driver, hand: Hand, places: Places, names: list[str]) -> None:
 
 
 @pytest.mark.acceptance
-@pytest.mark.parametrize("way", ["mouse", pytest.param("keys", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("way", ["mouse", "keys"])
 def test_photos_to_package_in_thirty_clicks(
     browser: Any, tmp_path: Path, data_dir: Path, way: str
 ) -> None:

@@ -143,10 +143,10 @@ console.log(JSON.stringify([1, 2].map((image) => [
         np.testing.assert_allclose(back, places[0], atol=1e-6)
 
 
-@pytest.mark.acceptance
-def test_the_workbook_of_the_page_follows_the_bent_rays(tmp_path):
+@pytest.mark.parametrize("name", [pytest.param("tank", marks=pytest.mark.acceptance), NAMES[2]])
+def test_the_workbook_of_the_page_follows_the_bent_rays(name, tmp_path):
     """Written new, then changed in place by the page's own way."""
-    folder, seen = folder_of("tank", tmp_path), shot("tank")
+    folder, seen = folder_of(name, tmp_path), shot(name)
     with opened(folder) as session:
         for rows in (range(3), range(3, 5)):
             for row in rows:
@@ -157,15 +157,6 @@ def test_the_workbook_of_the_page_follows_the_bent_rays(tmp_path):
             np.testing.assert_allclose(found.xyz, POINTS[: len(found)], atol=1e-9)
     assert len(found) == 5
     assert lint(tmp_path / "wall.xlsx") == []
-
-
-def test_what_leans_is_measured_but_stands_in_no_workbook(tmp_path):
-    folder, seen = folder_of("leaning port", tmp_path), shot("leaning port")
-    with opened(folder) as session:
-        pick_both(session, "P0", (tuple(seen[0][0]), tuple(seen[1][0])))
-        session.sync.step()
-        assert "ports that lean" in session.sync.waiting
-    assert not (tmp_path / "wall.xlsx").exists()
 
 
 def test_the_wall_is_shown_by_bent_rays(tmp_path):

@@ -267,6 +267,7 @@ def test_an_output_that_cannot_be_is_refused_before_any_work(tmp_path):
 
 
 @pytest.mark.acceptance
+@pytest.mark.long
 def test_a_rendered_street_is_adjusted_by_the_command(tmp_path):
     paths = write_street(tmp_path)
     words = ["adjust", *map(str, paths), "--out", str(tmp_path / "joint"), "--json"]

@@ -198,9 +198,8 @@ def street_under_water(folder, depth=3.0, middles=(-2.4, 0.0, 2.4), leans=None):
 
 
 @pytest.mark.acceptance
-@pytest.mark.parametrize(
-    "leans", [pytest.param(None, marks=pytest.mark.long), ((6.0, -4.0), (-3.0, 5.0))]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("leans", [None, ((6.0, -4.0), (-3.0, 5.0))])
 def test_a_rendered_street_under_water_is_adjusted_by_the_command(tmp_path, leans):
     middles = (-2.4, 0.0, 2.4) if leans is None else (-2.4, 0.0)
     paths = street_under_water(tmp_path, middles=middles, leans=leans)

@@ -74,11 +74,11 @@ def test_control_points_give_a_pair_file_with_picture_and_diagnostics(folder) ->
 @pytest.mark.acceptance
 def test_json_goes_to_stdout_alone(folder) -> None:
     result = align(
-        folder, "--auto", "--distance1", "16", *lens(), "--json", "--no-picture", out="j.pair.json"
+        folder, "--control", "control.csv", *lens(), "--json", "--no-picture", out="j.pair.json"
     )
     assert result.exit_code == 0, result.output
     data = json.loads(result.stdout)
-    assert data["way"] == "auto"
+    assert data["way"] == "control"
     assert data["distance2"] == pytest.approx(9.0, rel=0.02)
     assert not (folder / "j.pair.png").exists()
 

@@ -150,7 +150,7 @@ def test_turned_cameras_and_both_distances_give_what_one_distance_gives() -> Non
 
 
 @pytest.mark.acceptance
-@pytest.mark.parametrize("first", ["d9.png", "d18.png"])
+@pytest.mark.parametrize("first", ["d9.png", pytest.param("d18.png", marks=pytest.mark.long)])
 def test_a_rendered_church_dropped_in_either_order_lies_back(
     data_dir: Path, tmp_path: Path, first: str
 ) -> None:

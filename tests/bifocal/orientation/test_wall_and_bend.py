@@ -304,7 +304,7 @@ def through_water(photo: np.ndarray, cam: Pinhole, depth: float) -> np.ndarray:
 
 
 @pytest.mark.acceptance
-@pytest.mark.parametrize("medium", ["port", "surface"])
+@pytest.mark.parametrize("medium", ["port", pytest.param("surface", marks=pytest.mark.long)])
 def test_photos_through_water_are_said_not_to_fit(medium: str) -> None:
     cameras = wall_camera(16.0), wall_camera(9.0, offset=(0.05, -0.04))
     views = take(*cameras)

@@ -104,6 +104,7 @@ def test_a_new_book_of_twenty_thousand_rows_takes_seconds_and_little_memory(tmp_
 
 
 @pytest.mark.acceptance
+@pytest.mark.long
 def test_twenty_thousand_rows_are_changed_in_place_in_seconds(tmp_path):
     path = tmp_path / "s.xlsx"
     xyz = write_many(path, 20_000)

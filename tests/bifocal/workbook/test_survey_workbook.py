@@ -215,6 +215,8 @@ def pair_content(rows=60, principal_distance=None, lens=None, placed=False):
 
 def of_turns(sheet, cell, cached):
     """Return relative and absolute tolerance: turns that solve the model 3D are worth 1e-9."""
+    if sheet.title == "Points" and sheet.cell(4, cell.column).value in ("dx", "dy"):
+        return 1e-12, 1e-11  # a difference of two places on the wall, in pixels
     if sheet.title == "Georeference" and sheet.cell(12, cell.column).value in LEFT_OUT:
         return 1e-9, 1e-12
     if sheet.title != "Georeference" or cell.column < LEFT or cell.row > 11:

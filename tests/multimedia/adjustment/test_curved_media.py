@@ -211,7 +211,9 @@ def errors_of(world: str, seed: int) -> tuple[np.ndarray, float]:
 
 
 @pytest.mark.acceptance
-@pytest.mark.parametrize("world", list(WORLDS))
+@pytest.mark.parametrize(
+    "world", [pytest.param(w, marks=() if w == "dome" else pytest.mark.long) for w in WORLDS]
+)
 def test_errors_over_sigmas_scatter_by_one(world):
     """Cameras and media together, 25 to 35 unknowns in each of 10 draws: chi-square at 0.1 %."""
     pulls, squares = zip(*(errors_of(world, seed) for seed in range(10)), strict=True)

@@ -141,9 +141,8 @@ def assert_honest(pulls: np.ndarray) -> None:
 
 
 @pytest.mark.acceptance
-@pytest.mark.parametrize(
-    "scene", ["both", *(pytest.param(s, marks=pytest.mark.long) for s in BANKS if s != "both")]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("scene", BANKS)
 def test_the_sigma_of_a_level_between_banks_is_honest_in_both_tails(scene) -> None:
     *counts, spread, slope, gross = BANKS[scene]
     levels = [mm.mean_water_level(bank(5000 + k, counts, spread, slope, gross)) for k in range(150)]

@@ -70,7 +70,10 @@ def render(folder: Path, pattern: str, count: int, **greys: float) -> None:
 
 
 @pytest.mark.acceptance
-@pytest.mark.parametrize("pattern", BOARDS)
+@pytest.mark.parametrize(
+    "pattern",
+    [pytest.param(p, marks=() if p == "charuco" else pytest.mark.long) for p in BOARDS],
+)
 def test_port_index_and_lens_come_back_within_their_sigmas(pattern, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     render(tmp_path, pattern, 12)

@@ -293,6 +293,7 @@ def test_openptvs_scale_is_a_longer_principal_distance(tmp_path, tank_project):
 
 
 @pytest.mark.acceptance
+@pytest.mark.long
 def test_points_clicked_by_hand_replace_a_useless_orientation(tank_project, tmp_path):
     folder = tmp_path / "exp"
     write_experiment(folder, tank_project)

@@ -51,8 +51,8 @@ def test_the_kernel_s_rows_are_those_of_the_projection(name):
     ideal, ones = np.zeros((len(points), 2)), np.ones((len(points), 2))
     lens = linear_lens(camera, ideal, ideal, ones)
     args = (
-        points.T.copy(), lens, camera.centre, camera.rotation, camera.principal_distance,
-        layering_of(media),
+        points.T.copy(), lens, camera.centre.copy(), camera.rotation.copy(),
+        camera.principal_distance, layering_of(media),
     )  # fmt: skip
     want = project_with_jacobian(camera, points, media, camera_names=EXTERIOR)
     size = np.abs(want.by_camera).max(axis=(0, 1))
