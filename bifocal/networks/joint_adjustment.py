@@ -198,7 +198,9 @@ def _coarse(
     a control point with a wrong coordinate. The misfit of a point that is no control is 0.
     """
     fixed = np.isfinite(seen.known).any(axis=1)
-    spread = LOOSE * seen.sigma_known
+    # Nothing else tells where on its ray the end of a length is: loose, it takes the scale along.
+    fixed &= ~seen.unchecked
+    spread = np.where(fixed[:, None], LOOSE, 1.0) * seen.sigma_known
     for number in range(rounds):
         away = _away(_System(seen, start, focal))
         away = np.nan_to_num(away, nan=1e6)
@@ -419,6 +421,8 @@ def _gross(
     count = 2 * len(seen.camera)
     tests = standardised(fit.residuals, fit.linear.redundancy_numbers)
     tests = np.abs(np.nan_to_num(tests))
+    points = np.concatenate([np.repeat(seen.point, 2), system.fixed[:, 0]])
+    tests[: len(points)][seen.unchecked[points]] = 0.0
     units = _units(fit.residuals[:count], fit.linear.redundancy_numbers[:count],
                    np.repeat(seen.sigma, 2), sigma0)  # fmt: skip
     rays = (tests[:count] / units).reshape(-1, 2).max(axis=1, initial=0.0)

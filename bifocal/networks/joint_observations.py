@@ -75,6 +75,12 @@ class JointObservations:
             return True
         return int(np.isfinite(self.known).all(axis=1).sum()) >= FEWEST_KNOWN
 
+    @property
+    def unchecked(self) -> BoolArray:
+        """Which points nothing checks: one ray and no more than their relief, shape (p,)."""
+        rays = np.bincount(self.point, minlength=len(self.known))
+        return np.asarray((rays == 1) & np.isnan(self.known[:, 0]))
+
 
 def with_rays(observations: JointObservations, keep: BoolArray) -> JointObservations:
     """Return the observations with some of their rays."""

@@ -30,12 +30,12 @@ from bifocal.orientation.facade_lines import FacadeDirection
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.tie_points import refine_ties
 from bifocal.orientation.tuning import TIES, WALLS
-from bifocal.orientation.walls.reference_plane import narrow_face
+from bifocal.orientation.walls.reference_plane import frame_of, largest_plane, narrow_face
 from bifocal.remarks import remark
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera.pinhole import project_with_jacobian
+from photocore.camera.pinhole import project_with_jacobian, ray_on_plane
 from photocore.cli import Progress, no_progress
 from photocore.errors import GeometryError
 
@@ -125,6 +125,11 @@ def orient_set(
         for camera in first.cameras
     ]
     there = np.array(before)[observed.camera, np.arange(len(is_tie))]
+    # Ends of a length that one photo shows lie on the wall: they wait until that is found.
+    alone = ~is_tie & (np.bincount(observed.point)[observed.point] == 1)
+    waiting = with_rays(
+        observed, alone & ~np.asarray(np.isfinite(observed.known).any(axis=1))[observed.point]
+    )
     # A tie whose rays run along each other would wander on them.
     observed = with_rays(observed, there & (~is_tie | first.met[observed.point]))
     count = len(control.ids)
@@ -136,7 +141,45 @@ def orient_set(
         observed, state, misfit = settled_jointly(observed, state, 1)
         observed, sigma = _without_gross(observed, misfit, count)
         observed, state = _met(observed, state, count)
+    if not _holds_frame(control):
+        state = _levelled(observed, state, first)
+    observed, state = _with_ends(observed, state, waiting)
     return _adjusted(observed, state, first, control, site, sigma)
+
+
+def _levelled(
+    observed: JointObservations, state: JointUnknowns, first: FirstCameras
+) -> JointUnknowns:
+    """Return the state in the frame of the wall on which the first pair stands.
+
+    While nothing but a pair's cameras holds the frame, principal points that move turn the wall in
+    it: by 5 mrad on a church seen aslant, 9 cm at its ends.
+    """
+    band = WALLS.rough_band * float(max(camera.centre[2] for camera in state.cameras))
+    near = first.met & (np.abs(first.xyz[:, 2]) < band)
+    near &= np.bincount(observed.point, minlength=len(near)) >= 2
+    if near.sum() < TIES.fewest_on_wall:
+        return state
+    turn, origin = frame_of(largest_plane(state.xyz[near], band=band))
+    cameras = tuple(camera.moved(turn, origin) for camera in state.cameras)
+    return replace(state, cameras=cameras, xyz=(state.xyz - origin) @ turn.T)
+
+
+def _with_ends(
+    observed: JointObservations, state: JointUnknowns, ends: JointObservations
+) -> tuple[JointObservations, JointUnknowns]:
+    """Return the observations with rays that meet no other, and their points on the wall."""
+    xyz = state.xyz.copy()
+    for camera, point, pixels in zip(ends.camera, ends.point, ends.pixels, strict=True):
+        xyz[point] = ray_on_plane(state.cameras[camera], pixels[None])[0]
+    joined = replace(
+        observed,
+        camera=np.concatenate([observed.camera, ends.camera]),
+        point=np.concatenate([observed.point, ends.point]),
+        pixels=np.concatenate([observed.pixels, ends.pixels]),
+        sigma=np.concatenate([observed.sigma, ends.sigma]),
+    )
+    return joined, replace(state, xyz=xyz)
 
 
 def _met(

@@ -86,6 +86,7 @@ def pair_relief(
     quality: str = "standard",
     relief_range: tuple[float, float] | None = None,
     sideways: bool = False,
+    of_set: bool = False,
     progress: Progress = no_progress,
 ) -> DenseRelief:
     """Measure the relief of everything both photos of a pair show: `dense_relief` of a pair."""
@@ -103,7 +104,7 @@ def pair_relief(
                 f"plane, and nothing beyond it is measured; got {low:g}, {high:g}."
             )
     wanted, target, work = _grids(pair, (grey1, grey2), gsd, bounds, quality, relief_range)
-    whole = make_frame(pair, grey1, grey2, work, relief_range, sideways=sideways)
+    whole = make_frame(pair, grey1, grey2, work, relief_range, sideways=sideways, of_set=of_set)
     fast = quality == "fast"
     frame = coarse_level.halved(whole) if fast else whole
     progress(0.1, 1.0, "First relief")

@@ -42,6 +42,8 @@ class Frame:
         The rays of both photos where the pair looks through media.
     sideways : bool
         Whether the cameras, of a set, stand beside each other rather than before one another.
+    of_set : bool
+        Whether further photos of a set tell what is right where these cannot.
     """
 
     grid: Grid
@@ -52,6 +54,7 @@ class Frame:
     pair: Pair
     fields: tuple[RayField, RayField] | None = None
     sideways: bool = False
+    of_set: bool = False
 
     @property
     def centre(self) -> FloatArray:
@@ -250,6 +253,7 @@ def make_frame(
     relief_range: tuple[float, float] | None = None,
     *,
     sideways: bool = False,
+    of_set: bool = False,
 ) -> Frame:
     """Bring both photos onto the grid; each is sampled once, through lens and homography.
 
@@ -268,7 +272,7 @@ def make_frame(
         fields = first_rays, second_rays
     return Frame(
         grid=grid, image1=first, image2=second, seen1=seen1, seen2=seen2, pair=pair, fields=fields,
-        sideways=sideways,
+        sideways=sideways, of_set=of_set,
     )  # fmt: skip
 
 

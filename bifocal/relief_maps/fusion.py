@@ -1,14 +1,15 @@
 """The relief maps of several pairs of a set made one: by covariance where they agree.
 
-Where they do not, the photos decide: the relief at which all that see the place show the same. If
-they cannot, the place is unknown. What no pair measured comes from the pair whose photos see it.
+Where they do not, the photos decide: the relief at which those that see the place show the same,
+whether or not a pair measured it. If they cannot, the place is unknown.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.photo_evidence import Witness, exposed_alike, misfit, shown_by
 from bifocal.relief_maps.tuning import FUSION
 from photocore.arrays import BoolArray, Float32Array
+
+#: Misfit of what no pair proposes.
+NEVER = np.float32(1e6)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,13 +61,12 @@ def fused(found: Sequence[PairRelief], witnesses: Sequence[Witness], grid: Grid)
     there: sigma is as if their errors were one, so more pairs make relief better than it says.
     """
     measured = np.stack([one.measured for one in found])
-    apart = _apart(found)
-    open_ = apart | ~measured.any(axis=0)
-    result = _averaged(found, measured & ~apart)
-    photos = exposed_alike(witnesses, result.r, grid)
-    misfits = np.stack([misfit(photos, one.bands.r, grid, open_) for one in found])
-    _decide(result, found, measured, misfits, apart)
-    _fill(result, found, misfits, open_ & ~apart)
+    open_ = _apart(found) | ~measured.any(axis=0)
+    result = _averaged(found, measured & ~open_)
+    photos, usual = exposed_alike(witnesses, result.r, grid)
+    misfits = np.stack([misfit(photos, one.bands.r, grid, open_, usual) for one in found])
+    near = min(witness.photo.distance for witness in witnesses)
+    _decide(result, found, misfits, open_, FUSION.in_front * near)
     rest = np.isfinite(result.r) & (result.quality != Quality.MEASURED)
     seen = np.isfinite(shown_by(photos, result.r, grid, rest)).sum(axis=0)
     result.quality[rest] = np.where(seen < 2, Quality.HIDDEN, Quality.INTERPOLATED)
@@ -71,14 +74,15 @@ def fused(found: Sequence[PairRelief], witnesses: Sequence[Witness], grid: Grid)
 
 
 def _apart(found: Sequence[PairRelief]) -> BoolArray:
-    """Return where two pairs measured what differs beyond their sigmas, or visibly."""
+    """Return where two pairs differ visibly, or measured what differs beyond their sigmas."""
     apart = np.zeros(found[0].bands.r.shape, bool)
     for one, other in combinations(found, 2):
         variance = sum(of.bands.sigma**2 for of in (one, other))
         with np.errstate(invalid="ignore"):
             limit = np.minimum(FUSION.beyond * np.sqrt(variance), FUSION.visible)
-            far = np.abs(one.bands.r - other.bands.r) > limit
-        apart |= far & one.measured & other.measured
+            off = np.abs(one.bands.r - other.bands.r)
+            apart |= (off > limit) & one.measured & other.measured
+        apart |= off > FUSION.visible
     return apart
 
 
@@ -101,42 +105,51 @@ def _averaged(found: Sequence[PairRelief], use: BoolArray) -> MapBands:
 
 
 def _decide(
-    result: MapBands, found: Sequence[PairRelief], measured: BoolArray, misfits: Float32Array,
-    apart: BoolArray,
+    result: MapBands, found: Sequence[PairRelief], misfits: Float32Array, where: BoolArray,
+    in_front: float,
 ) -> None:  # fmt: skip
-    """Where pairs differ take the one that the photos fit best, if clearly so (in place)."""
-    row, column = np.nonzero(apart)
-    at = (slice(None), row, column)
-    relief, sigma = (
-        np.stack([getattr(one.bands, name)[row, column] for one in found])
-        for name in ("r", "sigma")
-    )
-    cost = np.where(measured[at], misfits[at], np.float32(np.inf))
+    """Take the relief that the photos fit best, whether or not a pair measured it (in place).
+
+    Of a railing and the wall behind it both may fit, and both are there: what stands in front by
+    more than ``in_front`` [m] and fits nearly as well is what the map shows. Pairs that measured
+    the same give the mean. What fits hardly better than another relief is not measured; what two
+    pairs measured and the photos cannot tell apart is unknown.
+    """
+    at = np.nonzero(where)
+    row, column = at
+
+    def all_of(band: Callable[[PairRelief], Any]) -> Any:
+        return np.stack([band(one)[at] for one in found])
+
+    relief, sigma = all_of(lambda one: one.bands.r), all_of(lambda one: one.bands.sigma)
+    measured, known = all_of(lambda one: one.measured), np.isfinite(relief)
+    behind = all_of(lambda one: one.bands.quality == Quality.HIDDEN)
+    doubt = FUSION.unmeasured * ~measured + FUSION.behind * behind
+    cost = np.where(known, misfits[:, row, column] + doubt, NEVER)
     best = cost.argmin(axis=0)[None]
-    value, own, least = (np.take_along_axis(a, best, 0)[0] for a in (relief, sigma, cost))
-    off = np.where(measured[at], np.abs(relief - value), np.float32(0))
-    rival = np.where(off > FUSION.beyond * own, cost, np.float32(np.inf)).min(axis=0)
-    clear = rival - least > FUSION.margin
-    spread = off.max(axis=0)
-    limit = FUSION.beyond * np.sqrt(np.where(measured[at], sigma**2, 0).sum(axis=0))
+    with np.errstate(invalid="ignore"):
+        front = relief > np.take_along_axis(relief, best, 0) + np.float32(in_front)
+    front &= cost < np.take_along_axis(cost, best, 0) + np.float32(FUSION.front)
+    first = np.where(front, relief, -NEVER).argmax(axis=0)[None]
+    best = np.where(front.any(axis=0), first, best)
+    value, own, least = (np.take_along_axis(a, best, 0) for a in (relief, sigma, cost))
+    off = np.nan_to_num(np.abs(relief - value))
+    limit = np.minimum(FUSION.beyond * np.hypot(sigma, own), np.float32(FUSION.visible))
+    same = measured & (off <= limit)
+    share = np.where(same, all_of(lambda one: one.weight), np.float32(0))
+    some = same.any(axis=0)
+    share /= np.where(some, share.sum(axis=0), np.float32(1))
+    mean, variance = ((share * np.nan_to_num(a)).sum(axis=0) for a in (relief, sigma**2))
+    rival = np.where(known & (off > limit), cost, NEVER) - least
+    clear = rival.min(axis=0) > FUSION.margin
     # What differs by less than anyone sees at 1:50 is told by its sigma, not taken out.
-    good = clear | (spread < np.maximum(limit, np.float32(FUSION.visible)))
-    result.r[row, column] = np.where(good, value, np.float32(np.nan))
-    doubt = np.where(clear, np.float32(0), spread)
-    result.sigma[row, column] = np.where(good, np.hypot(own, doubt), np.float32(np.nan))
-    result.quality[row, column] = np.where(good, Quality.MEASURED, Quality.UNKNOWN)
-
-
-def _fill(
-    result: MapBands, found: Sequence[PairRelief], misfits: Float32Array, where: BoolArray
-) -> None:
-    """Take what no pair measured from the pair whose photos fit best there (in place)."""
-    row, column = np.nonzero(where)
-    cost = misfits[:, row, column]
-    known = np.stack([np.isfinite(one.bands.r[row, column]) for one in found])
-    behind = np.stack([one.bands.quality[row, column] == Quality.HIDDEN for one in found])
-    cost = np.where(known, cost + FUSION.behind * behind, np.float32(np.inf))
-    best = cost.argmin(axis=0)
-    for number, one in enumerate(found):
-        mine = (best == number) & known[number]
-        result.put((row[mine], column[mine]), one.bands.at((row[mine], column[mine])))
+    spread = np.where(measured, off, np.float32(0)).max(axis=0)
+    small = spread < FUSION.visible
+    even = (measured & (np.abs(rival) < FUSION.undecided)).any(axis=0)
+    good = np.isfinite(value[0]) & (small | ~(even & some))
+    told = np.where(small & ~clear, spread, np.float32(0))
+    precise = np.hypot(np.where(some, np.sqrt(variance), own[0]), told)
+    result.r[at] = np.where(good, np.where(some, mean, value[0]), np.float32(np.nan))
+    result.sigma[at] = np.where(good, precise, np.float32(np.nan))
+    quality = np.where(some & (clear | small), Quality.MEASURED, Quality.INTERPOLATED)
+    result.quality[at] = np.where(good, quality, Quality.UNKNOWN)

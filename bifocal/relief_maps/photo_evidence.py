@@ -79,9 +79,9 @@ def shown_by(
 
 
 def misfit(
-    witnesses: Sequence[Witness], relief: Float32Array, grid: Grid, where: BoolArray
+    witnesses: Sequence[Witness], relief: Float32Array, grid: Grid, where: BoolArray, usual: float
 ) -> Float32Array:
-    """Return how differently the photos show a relief: mean over those that see it. [grey levels]
+    """Return how differently the photos show a relief, over how differently they show any.
 
     Parameters
     ----------
@@ -91,32 +91,53 @@ def misfit(
     grid : Grid
     where : ndarray of bool
         Pixels that matter; those around them are looked at, too.
+    usual : float
+        `exposed_alike`. [grey levels]
 
     Returns
     -------
     ndarray of float32
-        Averaged over a window; as bad as can be where fewer than two photos see it, and elsewhere.
+        Mean of what all that see a place and of what the two most alike say of it, averaged over
+        the best of the windows that contain it; ``FUSION.worst`` where fewer than two photos see
+        it, and elsewhere.
+
+    Notes
+    -----
+    What differs by a few times the usual is wrong, and no more wrong if it differs by all: cut off
+    at 30 grey levels one strong edge decided for its whole window. A window about the pixel mixes
+    both sides of a step; of those that contain it one lies on its own side.
     """
-    worst = np.float32(FUSION.worst)
-    side = int(FUSION.window)
-    around = cv2.dilate(where.astype(np.uint8), np.ones((side, side), np.uint8)) > 0
+    worst, side = float(FUSION.worst), int(FUSION.window)
+    square, reach = (np.ones((n, n), np.uint8) for n in (side, 2 * side - 1))
+    around = cv2.dilate(where.astype(np.uint8), reach) > 0
     around &= np.isfinite(relief)
-    grey = shown_by(witnesses, relief, grid, around)
+    grey = np.sort(shown_by(witnesses, relief, grid, around), axis=0)
+    every = _differing(grey, worst * usual)
+    with np.errstate(invalid="ignore"):
+        alike = np.minimum(np.diff(grey, axis=0), worst * usual)
+    two = np.nan_to_num(alike, nan=worst * usual).min(axis=0)
+    result = np.full(grid.shape, worst, np.float32)
+    result[around] = (every + two) / np.float32(2 * usual)
+    return np.asarray(cv2.erode(cv2.blur(result, (side, side)), square))
+
+
+def _differing(grey: Float32Array, worst: float) -> Float32Array:
+    """Return how differently photos show places, (photos, n) to (n,); worst where one or none."""
     count = np.isfinite(grey).sum(axis=0)
-    total = np.nansum(grey, axis=0)
-    mean = total / np.maximum(count, 1)
+    mean = np.nansum(grey, axis=0) / np.maximum(count, 1)
     apart = np.nansum(np.minimum(np.abs(grey - mean), worst), axis=0)
     # The mean of two lies amidst them: they are twice as far from each other.
     apart = apart / np.maximum(count - 1, 1) * 2 / np.maximum(np.minimum(count, 2), 1)
-    result = np.full(grid.shape, worst, np.float32)
-    result[around] = np.where(count >= 2, np.minimum(apart, worst), worst)
-    return np.asarray(cv2.blur(result, (side, side)))
+    return np.where(count >= 2, np.minimum(apart, worst), worst).astype(np.float32)
 
 
-def exposed_alike(witnesses: Sequence[Witness], relief: Float32Array, grid: Grid) -> list[Witness]:
+def exposed_alike(
+    witnesses: Sequence[Witness], relief: Float32Array, grid: Grid
+) -> tuple[list[Witness], float]:
     """Return the photos exposed like the first that they share a part of the wall with.
 
-    ``I1 = a + b I2 + c x + d y``, robustly, over a few thousand places of the map.
+    ``I1 = a + b I2 + c x + d y``, robustly, over a few thousand places of the map; and by how many
+    grey levels they then differ in the median.
     """
     step = max(1, max(grid.shape) // FUSION.exposure_samples)
     part = np.zeros(grid.shape, bool)
@@ -141,4 +162,6 @@ def exposed_alike(witnesses: Sequence[Witness], relief: Float32Array, grid: Grid
             done[number] = Witness(witness.photo, grey, witness.size)
             shown[number] = terms @ [a, b, c, d]
             break
-    return done
+    shown = shown[:, np.isfinite(shown).sum(axis=0) >= 2]
+    typical = float(np.median(_differing(shown, np.inf))) if shown.size else 0.0
+    return done, max(typical, FUSION.quiet)

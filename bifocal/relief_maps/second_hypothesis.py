@@ -48,7 +48,7 @@ def with_swept(frame: Frame, matched: Measurement) -> tuple[Measurement, BoolArr
     where that finds what flow does not, through what either found at full resolution. Plain walls
     are swept in photos blurred like those of their flow. Where flow finds little in walls that are
     not plain, photos are oblique and much of them hidden: there is no telling by fit (church_2,
-    `fast`, beyond 10 cm 2.0 to 4.5 %).
+    `fast`, beyond 10 cm 2.0 to 4.5 %); of a set other photos tell.
     """
     sigma = sigma_of_relief(frame, matched.r, matched.sigma_px)
     valid = evidence.validated(matched.across, matched.loop, sigma, frame.distances[1])
@@ -57,7 +57,9 @@ def with_swept(frame: Frame, matched: Measurement) -> tuple[Measurement, BoolArr
             cv2.GaussianBlur(image, (0, 0), QUIET_BLUR) for image in (frame.image1, frame.image2)
         )
         frame = replace(frame, image1=first, image2=second)
-    elif valid[frame.seen1].mean() < HYPOTHESIS.least_valid:
+    elif valid[frame.seen1].mean() < (
+        HYPOTHESIS.least_valid_of_set if frame.of_set else HYPOTHESIS.least_valid
+    ):
         return matched, np.zeros_like(valid)
     fine = _Level(frame, np.nan_to_num(matched.r), valid, evidence.supported(valid))
     half = coarse_level.halved(frame)

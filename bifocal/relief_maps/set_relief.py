@@ -100,9 +100,10 @@ def dense_relief(
     residual: the scale must come from control points or distances (`bifocal align`).
 
     Of a set each useful pair is measured alone. Where pairs agree, relief is their mean by what a
-    pixel of parallax is worth; where they differ beyond their sigmas the photos decide, and what
-    they cannot decide is unknown. What is hidden from one pair comes from another; HIDDEN is what
-    fewer than two photos see. Sigma is as if the errors of all pairs were one.
+    pixel of parallax is worth; where they differ the photos decide, for what stands in front if it
+    fits nearly as well, and what they cannot decide is unknown. What is hidden from one pair comes
+    from another; HIDDEN is what fewer than two photos see. Sigma is as if the errors
+    of all pairs were one.
 
     Examples
     --------
@@ -145,6 +146,7 @@ class _Wishes(NamedTuple):
     quality: str
     relief_range: tuple[float, float] | None
     sideways: bool = False
+    of_set: bool = False
 
     def fulfilled(
         self, pair: Pair, image1: Image, image2: Image, progress: Progress
@@ -322,7 +324,7 @@ def _measured(
     middle = np.array([left + right, bottom + top]) / 2
     turn = None if pair.refracted else TurnedPlane.for_base(two, middle)
     sideways = steepness(two) < _SIDEWAYS
-    wishes = wishes._replace(gsd=part.gsd, bounds=part.bounds, sideways=sideways)
+    wishes = wishes._replace(gsd=part.gsd, bounds=part.bounds, sideways=sideways, of_set=True)
     if turn is None:
         relief = wishes.fulfilled(pair, images[far], images[near], progress)
         bands = MapBands(relief.r, relief.sigma, relief.quality)

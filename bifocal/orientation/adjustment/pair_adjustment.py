@@ -424,7 +424,8 @@ def _lengths(
     first, second, taped, own = (np.array(column) for column in zip(*lengths, strict=True))
     between = control.xyz[first] - control.xyz[second]
     between_by = control.xyz_by_unknowns[first] - control.xyz_by_unknowns[second]
-    length = np.linalg.norm(between, axis=1)
+    # Where no ray of an end meets the wall, on the way to a solution, it is nowhere.
+    length = np.maximum(np.linalg.norm(between, axis=1), 1e-9)
     pick = 1.41 * far.centre[2] / far.matrix[0, 0] * observations.sigma_pick
     sigma = np.hypot(np.where(np.isnan(own), points.sigma.min(initial=0.003), own), pick)
     misfit = (length - taped) / sigma

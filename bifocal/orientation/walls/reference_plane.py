@@ -226,12 +226,17 @@ def refitted(xyz: FloatArray, plane: FloatArray, *, band: float) -> FloatArray:
 
 def onto_plane(cameras: Cameras, plane: FloatArray) -> Cameras:
     """Return cameras in the frame of the plane z = a + b X + c Y, X and Y all but kept."""
+    turn, origin = frame_of(plane)
+    return cameras[0].moved(turn, origin), cameras[1].moved(turn, origin)
+
+
+def frame_of(plane: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return axes, as rows, and origin of the frame of z = a + b X + c Y, X and Y all but kept."""
     slope = float(np.hypot(plane[1], plane[2]))
     # The rotation that takes the normal to the new Z axis, about their common perpendicular.
     angle = np.arctan(slope) / slope if slope > 0 else 0.0
     turn = rotation_from_vector([-angle * plane[2], angle * plane[1], 0.0])
-    origin = np.array([0.0, 0.0, plane[0]])
-    return cameras[0].moved(turn, origin), cameras[1].moved(turn, origin)
+    return turn, np.array([0.0, 0.0, plane[0]])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

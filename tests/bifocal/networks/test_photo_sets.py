@@ -147,6 +147,30 @@ def test_lines_turn_the_frame_of_a_set_and_neither_its_lenses_nor_its_relative_o
     assert spread[1] < 0.5 * spread[0]  # what is left is between the photos
 
 
+def test_a_length_between_two_points_of_one_photo_is_the_scale_of_a_set():
+    """Nothing checks its ends: points off the wall must not call them gross, nor take it along."""
+    seen, start, cameras, xyz = simulated(np.random.default_rng(2), by_wall=True)
+    rays = [int(np.flatnonzero((seen.camera == 0) & (seen.point == k))[0]) for k in range(100)]
+    across = xyz[:100, 0]
+    rays = [rays[int(across.argmin())], rays[int(across.argmax())]]
+    ends, pixels = xyz[seen.point[rays]], seen.pixels[rays]
+    length = float(np.linalg.norm(ends[1] - ends[0]))
+    with_ends = replace(
+        seen, camera=np.r_[seen.camera, 0, 0], point=np.r_[seen.point, 300, 301],
+        pixels=np.vstack([seen.pixels, pixels]), sigma=np.r_[seen.sigma, 0.3, 0.3],
+        ids=(*seen.ids, "one end", "other end"),
+        known=np.vstack([seen.known, [[np.nan, np.nan, 0.0]] * 2]),
+        sigma_known=np.vstack([seen.sigma_known, np.full((2, 3), 0.003)]),
+        cameras=replace(seen.cameras, distances=(), lengths=((300, 301, length, 0.002),)),
+    )  # fmt: skip
+    got = adjust_jointly(with_ends, replace(start, xyz=np.vstack([start.xyz, ends])))
+    assert not any(blunder.point in ("one end", "other end") for blunder in got.blunders)
+    sigma = np.sqrt(np.diag(got.of_cameras)).reshape(4, -1)
+    for k, (one, true) in enumerate(zip(got.cameras, cameras, strict=True)):
+        assert sigma[k, 9] < 0.01 * true.centre[2]
+        assert abs(one.centre[2] - true.centre[2]) < 4 * sigma[k, 9]
+
+
 @pytest.fixture(scope="module")
 def three(tmp_path_factory):
     """Far and near photo of the sample at half size, and the far one turned where it stood."""
@@ -209,28 +233,57 @@ def test_a_set_is_refused_with_the_reason(three):
     assert np.isnan(length.of(0, 3).pixels2).all()
 
 
-@pytest.mark.acceptance
-def test_four_photos_of_a_church_are_no_worse_than_its_best_pair(data_dir, tmp_path):
-    """Both pairs show one church in one frame; photos a third as large, with their lens."""
+def church(data_dir: Path, folder: Path) -> tuple[list[Path], list[dict], dict]:
+    """Write four photos of one church, a third as large, and their lens; where points are seen.
+
+    Both pairs show it in one frame. Returned are the photos, the picks of each by point, in pixels
+    of the whole photos, and the rows of the last pair's table of points by name.
+    """
     folders = [data_dir / "facade_pairs" / f"church_{k}" for k in (2, 1)]
     whole = json.loads((folders[0] / "geometry.json").read_text())["far"]["K"]
     small = np.diag([1 / 3, 1 / 3, 1]) @ whole + [[0, 0, -1 / 3], [0, 0, -1 / 3], [0, 0, 0]]
     Lens(camera_matrix=small, coefficients=np.zeros(5), image_size=(1024, 683)).write(
-        tmp_path / "k.lens.json"
+        folder / "k.lens.json"
     )
     photos, seen = [], []
-    for folder in folders:
-        with (folder / "points.csv").open(encoding="utf-8") as file:
+    for source in folders:
+        with (source / "points.csv").open(encoding="utf-8") as file:
             rows = {row["id"]: row for row in csv.DictReader(file)}
         for side in ("far", "near"):
-            photos.append(tmp_path / folder.name / f"{side}.png")
+            photos.append(folder / source.name / f"{side}.png")
             photos[-1].parent.mkdir(exist_ok=True)
-            image = cv2.imread(str(folder / f"{side}.jpg"))
+            image = cv2.imread(str(source / f"{side}.jpg"))
             cv2.imwrite(
                 str(photos[-1]), cv2.resize(image, (1024, 683), interpolation=cv2.INTER_AREA)
             )
             seen.append({k: (float(row[f"x_{side}_px"]), float(row[f"y_{side}_px"]))
                          for k, row in rows.items()})  # fmt: skip
+    return photos, seen, rows
+
+
+@pytest.mark.acceptance
+def test_three_photos_of_a_church_and_one_length_are_a_set(data_dir, tmp_path):
+    """Seen aslant: principal points turn the wall by 9 cm before its points are known."""
+    photos, _, rows = church(data_dir, tmp_path)
+    flat = [row for row in rows.values() if abs(float(row["relief_m"])) < 0.01]
+    ends = [choose(flat, key=lambda row: float(row["x_far_px"])) for choose in (min, max)]
+    picks = [(float(row[f"{axis}_far_px"]) - 1) / 3 for row in ends for axis in "xy"]
+    places = np.array([[float(row[key]) for key in ("X_m", "Y_m", "relief_m")] for row in ends])
+    length = ",".join(f"{value:.3f}" for value in (*picks, np.linalg.norm(places[1] - places[0])))
+    line = ["align", *(str(photos[k]) for k in (2, 3, 0)), "--auto", "--length", length, "--lens",
+            str(tmp_path / "k.lens.json"), "--out", str(tmp_path / "c.photos.json")]  # fmt: skip
+    result = CliRunner().invoke(main, line)
+    assert result.exit_code == 0, result.output
+    made = PhotoSet.read(tmp_path / "c.photos.json").photos
+    for photo, (pair, side) in zip(made, ((1, "far"), (1, "near"), (2, "far")), strict=True):
+        geometry = data_dir / "facade_pairs" / f"church_{pair}" / "geometry.json"
+        true = json.loads(geometry.read_text())[side]["height_over_plane_m"]
+        assert photo.distance == pytest.approx(true, rel=0.01)
+
+
+@pytest.mark.acceptance
+def test_four_photos_of_a_church_are_no_worse_than_its_best_pair(data_dir, tmp_path):
+    photos, seen, rows = church(data_dir, tmp_path)
     names = sorted(set.intersection(*map(set, seen)) & rows.keys())
     xyz = np.array([[float(rows[k][key]) for key in ("X_m", "Y_m", "relief_m")] for k in names])
     picks = [(np.array([own[k] for k in names]) - 1) / 3 for own in seen]

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from bifocal import Grid, InputError, Pair, PhotoSet, Quality, ReliefMap, dense_relief
+from bifocal.relief_maps import fusion
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.fusion import PairRelief, fused
 from bifocal.relief_maps.photo_evidence import Witness
+from bifocal.relief_maps.tuning import FUSION
 from bifocal.relief_maps.turned_plane import TurnedPlane
 from tests.scenes import Exposure, bifocal_cameras, facade
 from tests.scenes.sets import SetRendering, aside, render_set
@@ -134,6 +136,33 @@ def test_a_difference_nobody_sees_goes_into_sigma():
     near = fused([pair_relief(0.0, 0.002), pair_relief(0.02, 0.002)], witnesses(), GRID)
     assert (near.sigma > 0.0199).all()
     assert (near.quality == Quality.MEASURED).all()
+
+
+def decided(*misfits: float, quality: Quality = Quality.MEASURED) -> MapBands:
+    """Return the wall or a rail 1 m before it, of which the second is of some quality."""
+    wall, rail = pair_relief(0.0, 0.002), pair_relief(1.0, 0.002)
+    rail.bands.quality[:] = quality
+    everywhere = np.ones(GRID.shape, bool)
+    result = MapBands(*(np.zeros(GRID.shape, np.float32) for _ in range(2)), rail.bands.quality * 0)
+    costs = np.stack([np.full(GRID.shape, value, np.float32) for value in misfits])
+    fusion._decide(result, [wall, rail], costs, everywhere, FUSION.in_front * 9.5)
+    return result
+
+
+def test_what_stands_in_front_is_shown_where_it_fits_nearly_as_well():
+    measured, interpolated = Quality.MEASURED, Quality.INTERPOLATED
+    for misfits, right, quality in (
+        ((0.5, 0.8), 1.0, interpolated), ((0.5, 1.1), 0.0, measured), ((0.8, 0.5), 1.0, measured),
+    ):  # fmt: skip
+        found = decided(*misfits)
+        assert (found.r == np.float32(right)).all()
+        assert (found.quality == quality).all()
+
+
+def test_what_photos_show_best_is_shown_though_no_pair_measured_it():
+    found = decided(1.5, 0.5, quality=Quality.INTERPOLATED)
+    assert (found.r == 1.0).all()
+    assert (found.quality == Quality.INTERPOLATED).all()
 
 
 def test_photos_decide_between_pairs_where_they_can():
