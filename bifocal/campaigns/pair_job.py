@@ -20,6 +20,7 @@ from bifocal.campaigns.step_store import (
     run_step,
     step_key,
 )
+from bifocal.model.doubts import untold
 from photocore.cli import Progress, no_progress, unforeseen_message
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.provenance import FileHashes, recording
@@ -148,6 +149,7 @@ def run_steps(
     done: list[str] = []
     kept: list[str] = []
     remarks: list[str] = []
+    told: list[str] = []
     records: dict[str, StepRecord] = {}
     failed = message = ""
     try:
@@ -166,7 +168,9 @@ def run_steps(
                     )
                 done.append(step.name)
             records[step.name] = record
-            remarks += [f"{step.name}: {remark}" for remark in record.remarks]
+            new = untold(told, record.remarks)
+            told += new
+            remarks += [f"{step.name}: {remark}" for remark in new]
         failed = ""
     except Exception as error:  # one fault, whatever it is, must not stop the other pairs
         message = failure_message(error, f"{where}step {failed}", parent)

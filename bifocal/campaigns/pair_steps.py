@@ -21,6 +21,7 @@ from photocore.textfile import file_name
 if TYPE_CHECKING:
     from bifocal.model.points import SurveyPoints
     from bifocal.orthophotos.ortho_workflow import OrthoTask
+    from bifocal.survey.solved_survey import SolvedSurvey
 
 #: What may be wanted of a pair, in the order of work.
 PRODUCTS = ("relief", "points", "ortho", "drawing", "view", "report")
@@ -276,17 +277,9 @@ def _points_step(job: PairJob) -> Step:
     options = _some(job, "language", "unit", "columns")
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
-        from bifocal.model.photo_set import pair_or_set
-        from bifocal.reports.control_survey import is_exchanged, solve_control
         from bifocal.workbook.output import write_result
 
-        pair = pair_or_set(job.pair_path)
-        tables = {"control": None, **tables_of(job)}
-        solution = solve_control(
-            job.pair_path, **tables, exchanged=is_exchanged(pair, job.far), photos=len(job.photos),
-            language=options.get("language", "en"), unit=options.get("unit", ""),
-            columns=options.get("columns"),
-        )  # fmt: skip
+        solution = _solved(job, tables_of(job), options)
         write_result(place / f"{job.title}_points.xlsx", solution)
         return solution.remarks
 
@@ -298,6 +291,31 @@ def _points_step(job: PairJob) -> Step:
         options=options,
         make=make,
     )
+
+
+def _solved(job: PairJob, tables: Mapping[str, Path], options: Mapping[str, Any]) -> SolvedSurvey:
+    """Return the points of tables, solved and compared."""
+    from bifocal.model.photo_set import pair_or_set
+    from bifocal.reports.control_survey import is_exchanged, solve_control
+
+    return solve_control(
+        job.pair_path, **{"control": None, **tables}, photos=len(job.photos),
+        exchanged=is_exchanged(pair_or_set(job.pair_path), job.far),
+        language=options.get("language", "en"), unit=options.get("unit", ""),
+        columns=options.get("columns"),
+    )  # fmt: skip
+
+
+def _checked(job: PairJob) -> tuple[int, float, float] | None:
+    """Return check points, and their RMSE in X, Y and in relief; None if too few prove it. [m]"""
+    from bifocal.survey.tolerances import FEW
+
+    if "check" not in job.files:
+        return None
+    check = _solved(job, {"check": job.files["check"]}, job.options).check
+    x, y, r = (check.axes[axis] for axis in "XYZ")
+    count = min(x.n, y.n, r.n)
+    return (count, max(x.rmse, y.rmse), r.rmse) if count >= FEW else None
 
 
 def _ortho_task(job: PairJob, options: Mapping[str, Any]) -> OrthoTask:
@@ -334,6 +352,7 @@ def _drawing_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
         wish = DeliverTask(
             title=job.name, **drawing, mark=job.files.get("mark"),
             cad=_points_to_draw(job, solved="points" in earlier),
+            checked=_checked(job) if "points" in earlier else None,
         )  # fmt: skip
         task = _ortho_task(job, options)
         return deliver(job.pair_path, place, task, wish, progress=progress).ortho.remarks
@@ -410,6 +429,18 @@ def _report_step(job: PairJob, before: tuple[Step, ...]) -> Step:
 
     files = {**_photos(job), **tables_of(job)}
     return Step(name="report", files=files, after=earlier, options=options, make=make)
+
+
+def proven(job: PairJob) -> list[str]:
+    """Return what the compared points of a finished pair prove, for the terminal."""
+    from bifocal.reports.accuracy import verdict_in_words
+    from bifocal.reports.content import ReportTask, read_content
+
+    said: dict[str, Any] = {k: job.options[k] for k in ReportTask.PLAIN if k in job.options}
+    if "drawing" in job.products:
+        said.setdefault("scale", SCALE)
+    task = ReportTask(**(said | tables_of(job)), far=job.far)
+    return verdict_in_words(read_content(job.pair_path, task, pictures=False))
 
 
 def _tables(step: Step) -> dict[str, Path]:

@@ -37,12 +37,16 @@ def command(
 
 
 def _lines(job: PairJob, outcome: PairOutcome) -> list[str]:
-    """Return what was made where, for people."""
+    """Return what was made where, and how good it proved to be, for people."""
+    from bifocal.campaigns.pair_steps import proven
+
     lines = []
     for step in (*outcome.kept, *outcome.done):
         names = sorted(path.name for path in (job.folder / step).iterdir() if path.name[0] != ".")
         kept = " (kept)" if step in outcome.kept else ""
         lines.append(f"{job.folder / step}{kept}: {', '.join(names)}")
+    if {"points", "report"} & {*outcome.kept, *outcome.done}:
+        lines += proven(job)
     ready = [path for kind in _TO_OPEN for path in sorted(job.folder.glob(kind))]
     opened = f"; open {' and '.join(map(str, ready[:2]))} first" if ready else ""
     return [*lines, f"All of it is in {job.folder.resolve()}{opened}."]

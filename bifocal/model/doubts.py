@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any
 
@@ -35,6 +36,22 @@ def doubts_in_words(setup: Any) -> tuple[str, ...]:
     if told is None and (bend := _bend(setup)):
         told = [remark("pair.bent", bend=bend, most=MOST_BENT)]
     return tuple(map(str, told)) if isinstance(told, list | tuple) else ()
+
+
+def untold(told: Iterable[str], remarks: Iterable[str]) -> list[str]:
+    """Return the remarks that were not told before, be it without the file they are of.
+
+    Examples
+    --------
+    >>> untold(["It is bent."], ["w.pair.json: It is bent.", "It leans.", "It leans."])
+    ['It leans.']
+    """
+    known = tuple(told)
+    new: list[str] = []
+    for text in remarks:
+        if not text.endswith((*known, *new)):
+            new.append(text)
+    return new
 
 
 def covariance_of_doubts(setup: Any) -> FloatArray | None:

@@ -14,6 +14,7 @@ import numpy as np
 from bifocal.faces.faced_surface import FacedSurface
 from bifocal.files.strips import write_png
 from bifocal.media import media_words
+from bifocal.model.doubts import MISFIT
 from bifocal.model.geotiff import (
     RELIEF_BANDS,
     RasterReader,
@@ -105,6 +106,9 @@ class DeliverTask:
         Of the sheets and sections.
     camera : str
         What the sheet says of one photo alone, instead of the distances of two cameras.
+    checked : (int, float, float), optional
+        Independent check points, and their RMSE in X, Y (the worse) and in relief [m]: told by the
+        sheet in place of the standard deviations.
     """
 
     scale: float
@@ -120,6 +124,7 @@ class DeliverTask:
     hatch: bool = True
     language: str = "en"
     camera: str = ""
+    checked: tuple[int, float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -214,9 +219,9 @@ def deliver(
         if missing.points:
             remarks += (remark("drawing.outside", count=missing.points),)
         if relief:
-            share = _draw_relief(place, f"{name}_relief", relief, drawing, sheet, hatch=wish.hatch)
-            if share:
-                remarks += (remark("drawing.relief_not_measured", share=share),)
+            told = _draw_relief(place, f"{name}_relief", relief, drawing, sheet, hatch=wish.hatch)
+            if told["guessed"]:
+                remarks += (remark("drawing.relief_not_measured", **told),)
         for number, cut in enumerate(cuts, start=1):
             for writer, ending in ((write_section_dxf, "dxf"), (write_section_svg, "svg")):
                 writer(place / f"{name}_section{number}.{ending}", cut, drawing=drawing)
@@ -342,14 +347,15 @@ def _prepared(
 
 def _draw_relief(
     place: Path, name: str, relief: _Relief, drawing: Drawing, sheet: PrintSheet, *, hatch: bool
-) -> float:
+) -> dict[str, float]:
     """Write the relief as numbers, and shaded with contour lines as picture, drawing and sheet.
 
-    Returns the share of the picture whose relief is known but was not measured.
+    Returns what share of the coloured part was measured and what was not, and what share of the
+    picture is unknown.
     """
     grid, measured, (low, high) = drawing.grid, relief.measured, relief.limits
     _write_values(place / f"{name}_values.tif", relief, grid)
-    guessed = 0
+    guessed = coloured = 0
     with create_raster(
         place / f"{name}.tif", grid, bands=3, dtype=np.uint8, colour=True, world_file=True,
         dpi=dpi_at_scale(grid.gsd, drawing.scale), overviews=True, names=("red", "green", "blue"),
@@ -360,22 +366,26 @@ def _draw_relief(
                 measured=measured if hatch else None,
             )  # fmt: skip
             guessed += int(np.count_nonzero((known > 0) & np.isnan(measured.window(part))))
+            coloured += int(np.count_nonzero(known))
             writer.write(picture, column=column, row=row, mask=known > 0)
-    share = guessed / (grid.width * grid.height)
+    share = guessed / max(coloured, 1)
+    unknown = 1.0 - coloured / (grid.width * grid.height)
+    shares = {"measured": 1.0 - share, "guessed": share, "unknown": unknown}
     scale = np.concatenate([np.linspace(low, 0, 18), np.linspace(0, high, 18)])
     colours = np.rint(tints(scale, (low, high))).astype(int).tolist()
     legend = Legend(
         limits=(low, high), beyond=relief.beyond, colours=tuple((r, g, b) for r, g, b in colours),
-        guessed=share if hatch else 0.0,
+        hatched=hatch and guessed > 0,
     )  # fmt: skip
     lowest, highest = legend.words
     words = drawing.say("contours", low=lowest, high=highest, interval=relief.interval)
+    words += f"; {drawing.say('shares', **shares)}" if guessed else ""
     drawing = replace(
         drawing, kind="relief", contours=relief.lines, notes=(words, *drawing.notes),
         legend=legend, spots=relief.spots,
     )  # fmt: skip
     _pictures(place, name, drawing, sheet, relief, hatch=False)
-    return share
+    return shares
 
 
 def _write_values(path: Path, relief: _Relief, grid: Grid) -> None:
@@ -456,6 +466,15 @@ def _notes(
     """Return the lines of the title block."""
     precise = _accuracy(pair, grid, task, reader)
     known = dict(zip(("own", "place", "relief"), precise, strict=False))
+    words = "accuracy" if len(known) > 1 else "photo_pixel"
+    misfit = any(text.startswith(MISFIT) for text in pair.remarks)
+    if wish.checked is not None:
+        count, place, deep = wish.checked
+        words, known = "accuracy_checked", known | {
+            "count": count, "place": 1000 * place, "relief": 1000 * deep
+        }  # fmt: skip
+    elif misfit:
+        words = "photo_pixel"
     relief, say = task.relief or task.points, words_of("bifocal.orthophotos", wish.language)
     if isinstance(pair, PhotosOfSet):
         distances = ", ".join(f"{photo.distance:.3f} m" for photo in pair.photos)
@@ -465,7 +484,8 @@ def _notes(
         cameras = say(f"photo_{task.photo_words}", d1=d1, d2=d2)
     return (
         say("pixel", size=grid.gsd * 1000, dpi=dpi_at_scale(grid.gsd, wish.scale)),
-        say("accuracy" if len(known) > 1 else "photo_pixel", **known),
+        say(words, **known),
+        *((say("misfit"),) if misfit else ()),
         wish.camera or cameras,
         *((say("media", media=media_words(pair.layers)),) if pair.layers else ()),
         say("relief_of", name=relief.name) if relief else say("relief_plane", plane=task.plane),

@@ -138,14 +138,14 @@ class Legend:
     beyond : tuple of bool
         Whether there is relief below the first, above the last.
     colours : tuple of (red, green, blue), 0 to 255
-    guessed : float
-        Share of the picture whose relief was not measured; hatched.
+    hatched : bool
+        Whether relief that was not measured is.
     """
 
     limits: tuple[float, float]
     beyond: tuple[bool, bool] = (False, False)
     colours: tuple[tuple[int, int, int], ...]
-    guessed: float = 0.0
+    hatched: bool = False
 
     @property
     def words(self) -> tuple[str, str]:

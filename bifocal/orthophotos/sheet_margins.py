@@ -179,10 +179,8 @@ class SheetMargins:
                 ("> " if legend.beyond[1] else "") + f"{top} m")  # fmt: skip
         for share, words in zip((0.0, 0.5, 1.0), ends, strict=True):
             self.canvas.text((x + share * wide, y + 3), words, _FRAME, size=2.2, middle=True)
-        if not legend.guessed:
-            return
-        words = self.drawing.say("not_measured", share=legend.guessed)
-        self._hatch((x + wide + 5, y), (1,), words)
+        if legend.hatched:
+            self._hatch((x + wide + 5, y), (1,), self.drawing.say("not_measured"))
 
     def _hatches(self) -> None:
         """Draw what each hatch of an orthophoto means, and how much of the picture it covers."""

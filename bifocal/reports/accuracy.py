@@ -6,11 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from bifocal.model.doubts import MISFIT
+from bifocal.remarks import in_language
 from bifocal.reports.content import PairContent
 from bifocal.survey.reference import CheckResult
 from bifocal.survey.tolerances import SCALES, judge
 from photocore.reports.document import Banner, Block, Paragraph, TextTable
-from photocore.reports.words import Words
+from photocore.reports.words import Words, words_of
 
 #: What is judged by itself: the plan of a drawing, and what stands out of it.
 _PARTS = {"part_drawing": "XY", "part_relief": "Z"}
@@ -26,7 +28,11 @@ FAR_OFF = 3.0
 
 
 def accuracy_blocks(content: PairContent, say: Words) -> Iterator[Block]:
-    """Yield the verdict, its table per drawing scale, and the compared points."""
+    """Yield doubts in the model, the verdict, its table per drawing scale, and compared points."""
+    doubts = [text for text in content.pair.remarks if text.startswith(MISFIT)]
+    if doubts:
+        told = tuple(in_language(text, content.task.language) for text in doubts)
+        yield Banner(text=say("misfit"), details=told, good=False)
     solution = content.solution
     check = None if solution is None else solution.check
     if check is None or not np.isfinite(check.accuracy):
@@ -39,12 +45,33 @@ def accuracy_blocks(content: PairContent, say: Words) -> Iterator[Block]:
     hidden = int(np.isfinite(check.errors).any(axis=1).sum()) - MOST_POINTS
     if hidden > 0:
         yield Paragraph(text=say("more_points", n=hidden), small=True)
-    errors = content.map_errors()
-    if len(errors):
-        rmse, median = float(np.sqrt(np.mean(errors**2))), float(np.median(np.abs(errors)))
-        yield Paragraph(
-            text=say("map_check", n=len(errors), rmse=millimetres(rmse), median=millimetres(median))
-        )
+
+
+def verdict_in_words(content: PairContent) -> list[str]:
+    """Return what is proven of drawing and relief in a few lines of English, for the terminal."""
+    say = words_of("bifocal.reports", "en")
+    solution = content.solution
+    if solution is None or not np.isfinite(solution.check.accuracy):
+        return [say("verdict_none")]
+    banner = _banner(content, solution.check, say)
+    misfit = any(text.startswith(MISFIT) for text in content.pair.remarks)
+    parts, (_, *expected) = banner.details[: len(_PARTS)], banner.details[len(_PARTS) :]
+    return [f"{banner.text}.", *parts, *expected[:1], *[say("misfit")] * misfit]
+
+
+def _map_in_words(content: PairContent, say: Words) -> Iterator[str]:
+    """Yield what the relief map is off at the compared points, which were picked, not mapped."""
+    names, errors, sigma = content.map_errors()
+    if not names:
+        return
+    rmse, median = float(np.sqrt(np.mean(errors**2))), float(np.median(np.abs(errors)))
+    yield say("map_check", n=len(names), rmse=millimetres(rmse), median=millimetres(median))
+    size = np.abs(errors)
+    off = [k for k in np.argsort(-size).tolist() if size[k] > FAR_OFF * sigma[k]]
+    if off:
+        worst = (f"{names[k]} ({millimetres(float(errors[k]))})" for k in off[:5])
+        more = f" (+{len(off) - 5})" if len(off) > 5 else ""
+        yield say("map_far_off", names=", ".join(worst) + more)
 
 
 def millimetres(length: float | None) -> str:
@@ -79,7 +106,7 @@ def _banner(content: PairContent, check: CheckResult, say: Words) -> Banner:
         verdict = " ".join(said) if known else say("part_none")
         details.append(say(part, accuracy=millimetres(accuracy), verdict=verdict))
         good |= {holds} if known else set()
-    details += _foundation(content, check, say)
+    details += [*_foundation(content, check, say), *_map_in_words(content, say)]
     text = say(key, accuracy=millimetres(check.accuracy), n=count)
     return Banner(text=text, details=tuple(details), good=good.pop() if len(good) == 1 else None)
 

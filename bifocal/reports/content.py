@@ -26,7 +26,7 @@ from bifocal.reports.control_survey import is_exchanged, solve_control
 from bifocal.survey.set_survey import best_pair
 from bifocal.survey.solved_survey import SolvedSurvey
 from bifocal.workbook.workflow import solve
-from photocore.arrays import BoolArray, ByteArray, FloatArray
+from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import InputError, located
 from photocore.images import read_image, to_eight_bit
 from photocore.reports.words import Words
@@ -217,29 +217,41 @@ class PairContent:
         compared = np.asarray(np.isfinite(self.solution.check.errors).any(axis=1))
         return not self.control_ids.intersection(compress(self.solution.check.ids, compared))
 
-    def map_errors(self) -> FloatArray:
-        """Return map minus known relief at measured pixels of the compared points. [m]"""
+    def map_errors(self) -> tuple[list[str], FloatArray, FloatArray]:
+        """Return map minus known relief at measured pixels of the compared points.
+
+        Returns
+        -------
+        list of str
+            Names of the points.
+        ndarray, shape (n,)
+            Errors of the map. [m]
+        ndarray, shape (n,)
+            Standard deviations that the map states there. [m]
+        """
         if self.relief is None or self.solution is None:
-            return np.zeros(0)
+            return [], np.zeros(0), np.zeros(0)
         known = self.solution.survey.known
-        xyz = known.xyz[known.used]
-        xyz = xyz[np.asarray(np.isfinite(xyz).all(axis=1))]
-        inside = self._measured(xyz[:, :2])
-        errors: FloatArray = (self.relief.sample(xyz[:, :2]) - xyz[:, 2])[inside]
-        return errors[np.isfinite(errors)]
-
-    def _measured(self, positions: FloatArray) -> BoolArray:
-        """Tell which positions lie on measured pixels of the relief map."""
-        assert self.relief is not None
-        pixels = np.rint(self.relief.grid.pixel_of(positions)).astype(int)
+        rows = np.flatnonzero(known.used & np.isfinite(known.xyz).all(axis=1))
+        pixels = np.rint(self.relief.grid.pixel_of(known.xyz[rows, :2])).astype(int)
         height, width = self.relief.shape
-        inside = np.asarray(((pixels >= 0) & (pixels < [width, height])).all(axis=1))
-        column, row = np.where(inside[:, None], pixels, 0).T
-        return np.asarray(inside & (self.relief.quality[row, column] == Quality.MEASURED))
+        inside = ((pixels >= 0) & (pixels < [width, height])).all(axis=1)
+        rows, (column, row) = rows[inside], pixels[inside].T
+        errors = self.relief.sample(known.xyz[rows, :2]) - known.xyz[rows, 2]
+        good = np.isfinite(errors) & (self.relief.quality[row, column] == Quality.MEASURED)
+        sigma = np.asarray(self.relief.sigma[row, column], dtype=float)
+        return [known.ids[k] for k in rows[good]], errors[good], sigma[good]
 
 
-def read_content(source: Path, task: ReportTask) -> PairContent:
+def read_content(source: Path, task: ReportTask, *, pictures: bool = True) -> PairContent:
     """Return what a pair file or a solved workbook and the task's files tell.
+
+    Parameters
+    ----------
+    source : Path
+    task : ReportTask
+    pictures : bool
+        Read the photos, too.
 
     Raises
     ------
@@ -281,7 +293,7 @@ def read_content(source: Path, task: ReportTask) -> PairContent:
         setup=setup if isinstance(setup, dict) else {},
         solution=solution,
         of_set=of_set,
-        photos=_photos(of_set or pair),
+        photos=_photos(of_set or pair) if pictures else (),
         relief=None if task.relief is None else _relief(task.relief),
         ortho=ortho,
         ortho_gsd=gsd,

@@ -341,11 +341,3 @@ def scale_bar(axes: Any, bounds: Bounds) -> None:
     for colour, width in (("white", 6.0), ("black", 3.0)):
         axes.plot([x, x + length], [y, y], color=colour, lw=width, solid_capstyle="butt", zorder=5)
     axes.annotate(f"{length:g} m", (x + length / 2, y), **_styles()["bar_length"])
-
-
-def tilt_of(photo: Photo, seen: ReportedPhoto) -> float:
-    """Return the angle between the wall's normal and the ray of a photo's middle. [deg]"""
-    width, height = seen.size
-    middle = photo.apparent_from_pixels(np.array([(width - 1) / 2, (height - 1) / 2]))
-    away = float(np.hypot(*(middle - photo.nadir)))
-    return float(np.rad2deg(np.arctan2(away, photo.distance)))

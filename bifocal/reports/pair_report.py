@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from bifocal.media import media_words
+from bifocal.model.doubts import MISFIT, untold
 from bifocal.model.orientation_precision import pinhole
 from bifocal.model.photo import Photo
-from bifocal.model.relief_map import Quality, ReliefMap
+from bifocal.model.relief_map import TOLD, Quality, ReliefMap
 from bifocal.remarks import in_language
 from bifocal.reports import figures
 from bifocal.reports.accuracy import accuracy_blocks, millimetres
@@ -96,7 +97,7 @@ def _geometry(content: PairContent, say: Words) -> Iterator[Block]:
         add("focal_given", *(in_language(str(source), language) for source in sources))
     if content.photos:
         add("gsd", *(millimetres(seen.photo.gsd(seen.size)) for seen in content.photos))
-        add("tilt", *(f"{figures.tilt_of(seen.photo, seen):.2f}°" for seen in content.photos))
+        add("tilt", *(f"{_tilt(seen.photo):.2f}°" for seen in content.photos))
     if layers := content.pair.layers:
         add("media", media_words(layers))
         add("z0", *(f"{photo.z0 or 0.0:.3f} m" for photo in photos))
@@ -119,6 +120,11 @@ def _angles(photo: Photo, sigma: float | None) -> str:
     turn = pinhole(photo).rotation.T @ np.diag([1.0, -1.0, -1.0])  # from a camera that looks back
     angles = np.rad2deg(angles_from_rotation(turn))
     return "{:.2f}°, {:.2f}°, {:.2f}°".format(*angles) + _spread(sigma, 2)
+
+
+def _tilt(photo: Photo) -> float:
+    """Return the angle between the wall's normal and the axis of a camera. [deg]"""
+    return float(np.rad2deg(np.arccos(min(1.0, abs(pinhole(photo).rotation[2, 2])))))
 
 
 def _focal(pixels: float, pitch: float | None, sigma: float | None) -> str:
@@ -164,7 +170,10 @@ def _relief(content: PairContent, say: Words) -> Iterator[Block]:
     if content.relief is None:
         return
     relief = content.relief
-    shares = {q.name.lower(): f"{float((relief.quality == q).mean()):.0%}" for q in Quality}
+    unknown = float((relief.quality == Quality.UNKNOWN).mean())
+    measured = float(np.isin(relief.quality, TOLD).mean()) / max(1.0 - unknown, 1e-9)
+    parts = {"measured": measured, "guessed": 1.0 - measured, "unknown": unknown}
+    shares = {name: f"{share:.0%}" for name, share in parts.items()}
     yield Heading(text=say("relief_map"))
     ratio = figures.ratio_of(relief.bounds)
     draw = partial(figures.draw_relief, content=content, say=say)
@@ -275,9 +284,12 @@ def _foundations(content: PairContent, say: Words) -> Iterator[Block]:
     if content.solution is not None:  # told with the geometry, in the language of the report
         told = refraction_remarks(content.solution.pair, content.solution.points)
         remarks = [remark for remark in remarks if remark not in told]
+    # What does not fit heads the report; a solution tells the doubts of its pair with their file.
+    head = tuple(text for text in content.pair.remarks if text.startswith(MISFIT))
+    remarks = [remark for remark in untold((), remarks) if not remark.endswith(head)]
     if remarks:
         yield Heading(text=say("remarks"), level=3)
-        for remark in dict.fromkeys(remarks):
+        for remark in remarks:
             yield Paragraph(text=in_language(remark, content.task.language), small=True)
 
 

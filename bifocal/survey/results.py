@@ -13,7 +13,7 @@ from bifocal.survey.basis import basis
 from bifocal.survey.image_shift import image_shift
 from bifocal.survey.other_photos import is_of_others
 from bifocal.survey.solved_survey import SolvedSurvey
-from bifocal.survey.tolerances import sentence
+from bifocal.survey.tolerances import FEW, sentence
 from photocore.arrays import FloatArray
 from photocore.jsonfile import to_text
 
@@ -208,7 +208,12 @@ def summary(solution: SolvedSurvey) -> list[str]:
                 f"Check {axis}: {errors.n} {_points(errors.n)}, RMSE {errors.rmse:.4f} m, "
                 f"mean {errors.mean:+.4f} m, largest {errors.max_abs:.4f} m"
             )
-    lines += [f"Drawing scale, {line}" for line in verdict_lines(solution)]
+    counts = [errors.n for errors in solution.check.axes.values() if errors.n]
+    few = min(counts, default=FEW)
+    compared = int(np.isfinite(solution.check.errors).any(axis=1).sum())
+    doubt = f"; of only {compared} {_points(compared)}" if few < FEW else ""
+    doubt += f", {few} of them on one axis" if few < min(compared, FEW) else ""
+    lines += [f"Drawing scale, {line}{doubt}" for line in verdict_lines(solution)]
     geo = solution.georeference
     if geo is not None:
         used = int(geo.used.sum())

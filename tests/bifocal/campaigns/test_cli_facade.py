@@ -104,7 +104,9 @@ def test_it_ends_with_where_the_results_are_and_what_to_open(tmp_path):
     with contextlib.chdir(tmp_path):
         done = CliRunner().invoke(main, [str(word) for word in words])
     assert done.exit_code == 0, done.stderr
-    said = done.stdout.splitlines()[-1]
+    *_, verdict, _, relief, said = done.stdout.splitlines()
+    assert "at 12 control points (RMSE of the worst axis)" in verdict
+    assert relief.startswith("Relief (r), ")
     assert said == (
         f"All of it is in {tmp_path / 'wall'}; open {Path('wall/points/wall_points.xlsx')} first."
     )

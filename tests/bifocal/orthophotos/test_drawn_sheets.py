@@ -13,7 +13,11 @@ import pytest
 import rasterio
 from PIL import Image
 
-from bifocal import Grid, ReliefMap
+from bifocal import Grid, Pair, ReliefMap
+from bifocal.model.geotiff import RasterReader
+from bifocal.orthophotos.deliver_workflow import DeliverTask, _notes
+from bifocal.orthophotos.ortho_workflow import OrthoTask
+from bifocal.remarks import remark
 from tests.bifocal.orthophotos.ortho_command import GSD, page_of, run
 
 
@@ -297,9 +301,10 @@ def test_the_relief_sheet_hatches_what_was_not_measured_and_has_a_legend(wall: P
         "--control", "c.csv", "--section", "y=0.5", "--contours", "0.01",
     )  # fmt: skip
     assert done.exit_code == 0, done.output
-    assert "20.0% of it was not measured" in done.stderr
+    assert "80% measured, 20% interpolated or hidden" in done.stderr
     page = page_of(wall / "d" / "Torre_est_relief.pdf")
-    assert "(not measured 20.0%)" in page
+    assert "(not measured)" in page
+    assert "; of what is coloured 80% measured, 20% interpolated or hidden; 0% of the sheet" in page
     assert "(+0.30 m)" in page
     for sheet in (page, page_of(wall / "d" / "Torre_est.pdf")):
         assert "(sections A-A  y=0.5)" in sheet
@@ -360,3 +365,23 @@ def test_many_marked_points_do_not_bury_the_sheet_under_their_names(wall: Path) 
     assert sum(0.556 * 2.0 * len(name) * 2.0 for name in names) < 84 * 60 / 6
     model = ezdxf.readfile(wall / "d" / "Torre_est.dxf").modelspace()
     assert len(model.query('POINT[layer=="BIFOCAL_POINTS"]')) == 3000
+
+
+@pytest.mark.parametrize("fits", [True, False])
+def test_the_title_block_states_no_sigma_that_the_check_points_or_the_model_gainsay(
+    wall: Path, fits: bool
+) -> None:
+    pair = Pair.read(wall / "wall.pair.json")
+    if not fits:
+        setup = {"doubts": [remark("pair.bent", bend=0.7, most=0.2)]}
+        pair = replace(pair, extra={**pair.extra, "setup": setup})
+    task = OrthoTask(relief=wall / "relief.tif")
+    with RasterReader(wall / "relief.tif") as reader:
+        grid, wish = reader.grid, DeliverTask(scale=50)
+        plain = "\n".join(_notes(pair, grid, wish, task, reader))
+        checked = replace(wish, checked=(20, 0.0204, 0.0671), language="de")
+        proven = "\n".join(_notes(pair, grid, checked, task, reader))
+    assert ("one sigma" in plain) == fits
+    assert ("THE MODEL DOES NOT FIT" in plain) != fits
+    assert "20 Kontrollpunkte weichen um 20 mm in der Lage, 67 mm im Relief ab" in proven
+    assert "Sigma" not in proven

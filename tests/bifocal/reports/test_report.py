@@ -14,15 +14,16 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bifocal import SAMPLE, Grid
+from bifocal import SAMPLE, Grid, ReliefMap
 from bifocal.model.geotiff import create_raster
 from bifocal.orientation.walls.wall_shape import WallShape, shape_in_words
 from bifocal.remarks import in_language, remark
-from bifocal.reports.accuracy import accuracy_blocks
+from bifocal.reports.accuracy import accuracy_blocks, verdict_in_words
 from bifocal.reports.content import read_content
-from bifocal.reports.pair_report import _provenance, report_document
+from bifocal.reports.pair_report import _provenance, pair_blocks, report_document
 from bifocal.reports.workflow import ReportTask, find_pairs
-from photocore.reports.document import Banner, Document
+from bifocal.survey.results import summary
+from photocore.reports.document import Banner, Document, Paragraph
 from photocore.reports.words import LANGUAGES, texts_of, words_of
 from photocore.reports.writing import write_document
 from tests.bifocal.campaigns.sample_tables import CONTROL, FAR, NEAR, write_tables
@@ -163,6 +164,62 @@ def test_errors_far_below_what_was_expected_are_told_as_such(tables):
     small = replace(solution.check, errors=solution.check.errors * 0.01)
     *_, foundation = verdict_of(control, check, solution=replace(solution, check=small))
     assert "better than was assumed" in foundation
+
+
+def test_a_model_that_does_not_fit_heads_the_report_and_is_told_once(tables):
+    control, check = tables
+    bent = str(remark("pair.bent", bend=0.7, most=0.2))
+    content = read_content(PAIR, ReportTask(control=control, check=check, language="it"))
+    pair = replace(content.pair, extra={"setup": {"doubts": [bent]}})
+    told = replace(content.solution, remarks=(f"w.pair.json: {bent}", "It leans.", "It leans."))
+    content = replace(content, pair=pair, solution=told)
+    blocks = list(pair_blocks(content, words_of("bifocal.reports", "it")))
+    assert blocks[1].text.startswith("Il modello di questa coppia non si adatta")
+    assert blocks[1].details == (in_language(bent, "it"),)
+    assert blocks[1].good is False
+    said = [block.text for block in blocks if isinstance(block, Paragraph)]
+    assert said.count("It leans.") == 1
+    assert not any(in_language(bent, "it") in text for text in said)
+    assert verdict_in_words(content)[-1].startswith("The model of this pair does not fit")
+
+
+def test_points_where_the_map_is_off_are_named_beside_the_verdict(tables):
+    control, check = tables
+    content = read_content(PAIR, ReportTask(control=control, check=check))
+    known = content.solution.survey.known
+    xyz = known.xyz[known.used]
+    grid = Grid.from_bounds((-6, -6, 6, 6), gsd=0.05)
+    x, y = np.meshgrid(grid.columns_x, grid.rows_y)
+    # Each pixel as its nearest point has it; one point's is half a metre off.
+    nearest = ((x[..., None] - xyz[:, 0]) ** 2 + (y[..., None] - xyz[:, 1]) ** 2).argmin(axis=-1)
+    r = (xyz[:, 2] + np.where(np.arange(len(xyz)) == 3, 0.5, 0.0))[nearest]
+    relief = ReliefMap.from_relief(r, plane_from_pixel=grid.plane_from_pixel)
+    relief = replace(relief, sigma=np.full(r.shape, 0.01, np.float32))
+    details = next(
+        accuracy_blocks(replace(content, relief=relief), words_of("bifocal.reports", "en"))
+    ).details
+    assert details[-2].startswith("This is of points picked in both photos. The relief map itself")
+    name = np.array(known.ids)[known.used][3]
+    assert f"standard deviations off at {name} (500 mm): look" in details[-1]
+
+
+def test_few_points_prove_no_drawing_scale(tables, tmp_path):
+    few = tmp_path / "few.csv"
+    few.write_text("\n".join(tables[1].read_text().splitlines()[:3]))
+    solution = read_content(PAIR, ReportTask(check=few)).solution
+    (line, *_) = [one for one in summary(solution) if one.startswith("Drawing scale")]
+    assert line.endswith("; of only 2 points")
+    whole = read_content(PAIR, ReportTask(check=tables[1])).solution
+    assert "of only" not in " ".join(summary(whole))
+
+
+def test_the_tilt_is_that_of_the_angles_beside_it(page):
+    text = Page(page).text
+    angles = re.findall(r"(-?[0-9.]+)°, (-?[0-9.]+)°, -?[0-9.]+°", text)[:2]
+    tilts = re.search(r"Tilt against the wall's normal\s*([0-9.]+)°\s*([0-9.]+)°", text)
+    for (omega, phi), tilt in zip(angles, tilts.groups(), strict=True):
+        cosine = math.cos(math.radians(float(omega))) * math.cos(math.radians(float(phi)))
+        assert float(tilt) == pytest.approx(math.degrees(math.acos(cosine)), abs=0.02)
 
 
 def test_the_report_leads_to_the_view_where_it_lies(tmp_path):
