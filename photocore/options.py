@@ -28,7 +28,8 @@ class Option:
     name : str
         The key in files and the argument in Python, e.g. ``sigma_pick``.
     flags : str
-        What stands on the command line, e.g. ``--sigma-pick`` or ``--mask/--no-mask``.
+        What stands on the command line, e.g. ``--sigma-pick`` or ``--mask/--no-mask``; more names
+        behind spaces.
     argument : bool
         It stands there without its flag.
     **attributes
@@ -42,7 +43,7 @@ class Option:
     @property
     def flag(self) -> str:
         """What stands on the command line, e.g. ``--sigma-pick``."""
-        return self.flags.partition("/")[0]
+        return self.flags.split()[0].partition("/")[0]
 
     @property
     def is_switch(self) -> bool:
@@ -58,7 +59,7 @@ class Option:
         """Return it as a command takes it."""
         if self.argument:
             return click.Argument([self.name], **self.attributes)
-        return click.Option([self.flags, self.name], **self.attributes)
+        return click.Option([*self.flags.split(), self.name], **self.attributes)
 
     def unset(self) -> Option:
         """Return it without a value where it is not given; its help still tells the default."""

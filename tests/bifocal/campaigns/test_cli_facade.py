@@ -8,6 +8,7 @@ import re
 import shutil
 from pathlib import Path
 
+import click
 import ezdxf
 import numpy as np
 import openpyxl
@@ -196,3 +197,11 @@ def test_a_facade_under_water_is_delivered_by_the_bent_rays(tmp_path, leans):
         ]
     assert np.isfinite(off).mean() > 0.7
     assert np.nanmedian(np.abs(off)) < 0.006  # fast; 80 mm where refraction is neglected
+
+
+def test_every_command_takes_its_language_by_either_name():
+    context = click.Context(main)
+    commands = [main.get_command(context, name) for name in main.list_commands(context)]
+    options = [param for each in commands for param in each.params if param.name == "language"]
+    assert len(options) > 8
+    assert all({"--lang", "--language"} == set(option.opts) for option in options)
