@@ -5,7 +5,7 @@ A step imports the workflow it calls when it is made: a run that keeps everythin
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from glob import escape
 from pathlib import Path
@@ -230,6 +230,11 @@ def _named(job: PairJob) -> dict[str, Path]:
     """Return the photos by their part in it."""
     others = {f"photo {number}": path for number, path in enumerate(job.more, start=3)}
     return {"far": job.far, "near": job.near, **others}
+
+
+def photo_roles(roles: Iterable[str]) -> list[str]:
+    """Return those that are photos of the pair or set."""
+    return [role for role in roles if role in ("far", "near") or role.startswith("photo ")]
 
 
 def _photos(job: PairJob) -> dict[str, Path]:

@@ -131,15 +131,23 @@ def record_key(made: Mapping[str, Any], after: Mapping[str, Mapping[str, str]]) 
 
 def read_record(folder: Path) -> StepRecord | None:
     """Return the record of a step's folder; None where there is none that can be read."""
+    data = read_whole_record(folder)
+    with suppress(KeyError, TypeError):
+        return StepRecord(
+            key=data["key"], outputs=data["outputs"], remarks=tuple(data["remarks"]),
+            seconds=data["seconds"], machine=data.get("machine", ""),
+            command=data.get("command", ""),
+        )  # fmt: skip
+    return None
+
+
+def read_whole_record(folder: Path) -> dict[str, Any]:
+    """Return all that the record of a step's folder tells; empty where none can be read."""
     with suppress(OSError, ValueError, KeyError, TypeError):
         data = json.loads((folder / RECORD).read_text(encoding="utf-8"))
         if data["format"] == FORMAT:
-            return StepRecord(
-                key=data["key"], outputs=data["outputs"], remarks=tuple(data["remarks"]),
-                seconds=data["seconds"], machine=data.get("machine", ""),
-                command=data.get("command", ""),
-            )  # fmt: skip
-    return None
+            return dict(data)
+    return {}
 
 
 def is_current(folder: Path, record: StepRecord | None, key: str, hashes: FileHashes) -> bool:
@@ -195,6 +203,32 @@ def receive_step(
         for name, content in files.items():
             (place / name).parent.mkdir(parents=True, exist_ok=True)
             (place / name).write_bytes(content)
+
+
+def remove_made(folder: Path, made: Mapping[str, str], hashes: FileHashes) -> list[str]:
+    """Remove a step's unchanged files and its record; return the files that are not ours, or stay.
+
+    Parameters
+    ----------
+    folder : Path
+    made : mapping of str to str
+        Files that the step made, and their SHA-256.
+    hashes : FileHashes
+    """
+    left = []
+    for name in _files(folder):
+        path = folder / name
+        if made.get(name.as_posix()) == hashes(path):
+            with suppress(OSError):  # open in another program
+                path.unlink()
+                continue
+        left.append(name.as_posix())
+    (folder / RECORD).unlink()
+    inside = sorted((path for path in folder.rglob("*") if path.is_dir()), reverse=True)
+    for path in (*inside, folder):
+        with suppress(OSError):  # not empty
+            path.rmdir()
+    return left
 
 
 @contextmanager

@@ -11,6 +11,7 @@ from typing import Any
 
 from bifocal.campaigns.folder_locks import locked
 from bifocal.campaigns.inputs import check_files, check_photos
+from bifocal.campaigns.leftovers import refuse_other_delivery, remove_leftovers
 from bifocal.campaigns.pair_job import PairOutcome, plan_of
 from bifocal.campaigns.pair_steps import (
     FIRST_STEP,
@@ -229,6 +230,7 @@ def run_survey(
 ) -> SurveyResult:
     """Make the products of every pair; what is there already and still good is kept.
 
+    Products of an earlier run that do not follow from what a pair holds now are removed, and named.
     One pair's failure stops no other; stopped at any moment, it goes on from there when called
     again. ``tell`` is given a line for every pair that ends. Where the jobs ask for one frame,
     all pairs are aligned first and adjusted together; ``mosaic``, the options of `make_mosaic`
@@ -258,6 +260,8 @@ def run_survey(
                     outcomes[job.name] = replace(alone, failed_step=JOINT, message=why)
                 ready = []
         outcomes |= _made(ready, machines, _Count(ready, progress, tell))
+        for job in ready:
+            outcomes[job.name] = _without_leftovers(job, outcomes[job.name])
         if mosaic is not None:
             drawn = [job for job in ready if not outcomes[job.name].failed_step]
             together.append(_mosaic(drawn, mosaic, jobs[0], progress, tell))
@@ -277,6 +281,18 @@ def _made(jobs: Sequence[PairJob], machines: Machines, listener: _Count) -> dict
         for job in waiting:
             clean(job.folder)
     return {outcome.name: outcome for outcome in listener.outcomes}
+
+
+def _without_leftovers(job: PairJob, made: PairOutcome) -> PairOutcome:
+    """Remove what a pair's folder held before and does not belong to it any more, and say so.
+
+    A pair that failed may go on from there, unless what was there was to be overwritten.
+    """
+    if made.failed_step and not (job.overwrite and made.done):
+        return made
+    said = remove_leftovers(job, (*made.done, *made.kept))
+    message = "\n".join((made.message, *said)) if made.failed_step else made.message
+    return replace(made, message=message, remarks=(*made.remarks, *said))
 
 
 def _aligned(
@@ -417,7 +433,7 @@ def facade_job(
     products : tuple of str, optional
         Of `PRODUCTS`.
     overwrite : bool
-        Replace files changed since they were made.
+        Replace files changed since they were made, and what was made from other photos.
 
     Raises
     ------
@@ -452,11 +468,13 @@ def facade(
     Raises
     ------
     InputError
-        Where a step fails: with what it said. What was made before stays and counts.
+        Where a step fails: with what it said. What was made before stays and counts. If the folder
+        holds a delivery made from other photos, which is not to be overwritten.
     """
     if (fresh := not job.folder.exists()) and (told := refusal(job)):
         raise InputError(told)
     check_files(job)
+    refuse_other_delivery(job)
     outcome = run_survey([job], machines=machines, progress=progress).outcomes[0]
     if outcome.failed_step:
         if fresh and not outcome.done:
