@@ -32,7 +32,7 @@ from multimedia.orientation.point_kernel import (
     MOST_STEPS,
     SMALL,
     WEAK_ANGLE,
-    Found,
+    PointValues,
     settled_points,
     views_of,
 )
@@ -169,9 +169,9 @@ def intersect(
 _BY_CAMERA = ("residuals", "standardised")
 
 
-def _nothing_found(m: int, n: int) -> Found:
+def _nothing_found(m: int, n: int) -> PointValues:
     """Return room for n points of m cameras."""
-    return Found(
+    return PointValues(
         xyz=np.empty((n, 3)), covariance=np.empty((n, 3, 3)), sigma0=np.empty(n),
         residuals=np.full((m, n, 2), np.nan), standardised=np.full((m, n, 2), np.nan),
         rays=np.empty(n, np.int64), angle=np.empty(n), status=np.empty(n, np.int64),

@@ -41,7 +41,7 @@ _OK, _WEAK, _GROSS_ERROR = (
 BATCH = 256
 
 
-class Found(NamedTuple):
+class PointValues(NamedTuple):
     """What `multimedia.orientation.intersection.IntersectedPoints` is made of."""
 
     xyz: FloatArray
@@ -239,7 +239,7 @@ def _equations(
 
 @compiled
 def _judge(
-    found: Found, point: int, inverse: tuple[float, ...], step: tuple[float, float, float],
+    found: PointValues, point: int, inverse: tuple[float, ...], step: tuple[float, float, float],
     sigma: FloatArray, rows: FloatArray, seen: BoolArray, limits: FloatArray,
 ) -> None:  # fmt: skip
     """Write precision, residuals and tests of a point; rows (m, 8) are of its last step."""
@@ -268,7 +268,7 @@ def _judge(
 
 @compiled
 def settled_points(
-    views: Views, image: FloatArray, sigma: FloatArray, limits: FloatArray, found: Found
+    views: Views, image: FloatArray, sigma: FloatArray, limits: FloatArray, found: PointValues
 ) -> BoolArray:
     """Intersect points, and return which of them settled.
 
@@ -280,7 +280,7 @@ def settled_points(
         Measured, NaN where not seen, and standard deviations. [mm]
     limits : ndarray, shape (m + 1,)
         Of the square sum, by the number of rays.
-    found : Found
+    found : PointValues
         Written where a point settled.
     """
     m, n, _ = image.shape
