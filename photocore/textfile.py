@@ -82,6 +82,8 @@ def check_file(path: Path, missing: str = "file", *, folder: str = "") -> None:
         raise InputError(f"{path}: is a folder{folder}")
     if not path.exists():
         raise InputError(f"{path}: no such {missing}.")
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; name a file in it.")
     if not path.is_file():
         raise InputError(f"{path}: is a pipe or a device; save what it gives as a file first.")
 

@@ -143,7 +143,7 @@ def verify(
         files = [*_judged(hashes, listed), *_broken(records)]
         return Verification(
             files=tuple(sorted(files, key=lambda one: one.file)),
-            worked=tuple(_worked(folder, hashes)),
+            worked=tuple(_worked(folder, hashes, listed, path)),
             remade=tuple(_remade(folder, records, sources, progress)) if remake else (),
             digest=hashlib.sha256(os.fsencode(sums)).hexdigest(),
         )
@@ -287,7 +287,13 @@ def _broken(records: Mapping[str, dict[str, Any]]) -> Iterator[FileState]:
             yield FileState(file=name, state="changed", why=why)
 
 
-def _worked(folder: Path, hashes: Mapping[str, str]) -> Iterator[WorkedPoint]:
+def _is_pair_of(title: str, name: str) -> bool:
+    return PurePosixPath(name).name == f"{title}{_PAIR}"
+
+
+def _worked(
+    folder: Path, hashes: Mapping[str, str], listed: Mapping[str, str], path: Path
+) -> Iterator[WorkedPoint]:
     """Yield the worked point of each report, computed from the pair file beside it."""
     for name in (one for one in hashes if one.endswith("_report.html")):
         title = PurePosixPath(name).name.removesuffix("_report.html")
@@ -295,15 +301,22 @@ def _worked(folder: Path, hashes: Mapping[str, str]) -> Iterator[WorkedPoint]:
         for other in hashes:
             # Damaged ones are told of as changed files; the point then fails.
             with suppress(InputError):
-                if PurePosixPath(other).name == f"{title}{_PAIR}":
+                if _is_pair_of(title, other):
                     pairs.append(Pair.read(folder / other))
                 if PurePosixPath(other).name in (f"{title}_points.xlsx", f"{title}_points.csv"):
                     points.append(read_survey_points(folder / other)[0].xyz)
+        point = None
         with suppress(InputError, UnicodeDecodeError):
             page = (folder / name).read_text(encoding="utf-8")
             point = recomputed(page, pairs, points, name)
-            if point is not None:
-                yield point
+        if (
+            point is not None
+            and "/" not in name
+            and not any(_is_pair_of(title, other) for other in listed)
+        ):
+            raise InputError(remark("campaign.part_of_delivery", of=path, report=name))
+        if point is not None:
+            yield point
 
 
 def _remade(

@@ -104,6 +104,8 @@ class Lens:
             foreign = read_foreign_lens(path)
             with located(path):
                 return cls(**foreign._asdict())
+        if Path(path).suffix.lower() in {".csv", ".xlsx", ".jpg", ".tif"}:
+            raise InputError(remark("lens.other_file", path=path))
         data = read_object(path, what="lens file")
         if str(data.get("format", "")).startswith("bifocal-pair"):
             raise InputError(f"{path}: is a pair file, not a lens file; name the lens.json.")

@@ -137,6 +137,11 @@ def _oriented(given: Given) -> OrientedPair:
         # Photos through glass or water may fit no cameras at all: then that is the reason.
         raise _reason(error, observations, start, lacking) from error
     pair = _without_gross(replace(pair, shape=_bend(pair.observations, pair.adjusted)))
+    wrong = int((~pair.observations.pick_used).sum())
+    if ties is None and remarks and wrong > CONTROL.of_another_wall * len(given.control.ids):
+        first, second = given.names
+        about = {"first": first, "second": second, "count": wrong}
+        raise GeometryError(remark("refused.another_wall", why=remarks[0], **about))
     if model_remarks(pair, given.site) or pair.lines_off:
         right = _mended_by_ties(given, ties, pair.observations)
         if right is not None:

@@ -207,6 +207,9 @@ def read_control(
             f"{path}: the columns {', '.join(missing)} are missing: where the points are seen. "
             f"Each control point needs its pixel in {each}"
         )
+    lone = [axis for axis in "XY" if axis not in table.present]
+    if len(lone) == 1:
+        raise InputError(remark("control.lone_axis", path=path, missing=lone[0]))
     if not len(table):
         raise InputError(f"{path}: no control points in the table.")
     names = _names(table.texts("id"), unnamed)

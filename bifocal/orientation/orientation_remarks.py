@@ -16,11 +16,16 @@ from bifocal.remarks import remark
 def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
     """Return where photos and what was given contradict each other, with the likely reason."""
     observations, adjusted = pair.observations, pair.adjusted
-    remarks = [_shape_of(observations, pair.shape)]
+    tapes = _contradicted_tapes(pair, site)
+    remarks = [_shape_of(observations, pair.shape, tape=bool(tapes))]
     unit = max(observations.interiors[0].image_size) / 3000
     sigma = observations.sigma_tie
     if observations.tie_used.sum() >= 20 and sigma > REMARKS.worst_fit * unit:
-        remarks.append(remark("orientation.misses_lines", sigma=sigma))
+        known = "_lens_known" * _with_lens(observations)
+        cause = "tape" if tapes else f"misses{known}"
+        reason = remark(f"orientation.reason_{cause}")
+        remarks.append(remark("orientation.misses_lines", sigma=sigma, reason=reason))
+    remarks.extend(tapes)
     lenses = observations.interiors
     changes = [
         float(np.log(camera.matrix[0, 0] / interior.focal))
@@ -37,23 +42,35 @@ def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
         about = {"number": int(n) + 1, "source": lens.source, **told}
         key = f"orientation.focal_contradicts{'_both' if both else ''}"
         remarks.append(remark(key, sigmas=abs(change) / lens.sigma_focal, **about))
+    return [text for text in remarks if text]
+
+
+def _contradicted_tapes(pair: OrientedPair, site: SiteMeasures) -> list[str]:
+    """Return which distances measured on site the adjusted ones contradict."""
+    remarks: list[str] = []
     for name, camera, given in zip(
-        ("far", "near"), adjusted.cameras, (site.distance1, site.distance2), strict=True
+        ("far", "near"), pair.adjusted.cameras, (site.distance1, site.distance2), strict=True
     ):
         off = float(camera.centre[2]) - (given or 0.0)
         if given and abs(off) > REMARKS.contradicts * site.sigma:
             sigmas, key = abs(off) / site.sigma, f"orientation.distance_contradicts_{name}"
             remarks.append(remark(key, off=off, given=given, sigmas=sigmas))
-    return [text for text in remarks if text]
+    return remarks
 
 
-def _shape_of(observations: PairObservations, shape: WallShape) -> str:
+def _with_lens(observations: PairObservations) -> bool:
+    """Whether the lenses were calibrated, or estimated from the photos."""
+    return any(i.is_calibrated or i.sigma_radial > 0 for i in observations.interiors)
+
+
+def _shape_of(observations: PairObservations, shape: WallShape, *, tape: bool = False) -> str:
     """Return that the wall is bent, if it certainly is."""
     return shape_in_words(
         shape,
-        with_lens=any(i.is_calibrated or i.sigma_radial > 0 for i in observations.interiors),
+        with_lens=_with_lens(observations),
         through_media=bool(observations.media),
         left_out=not observations.pick_used.all(),
+        tape=tape,
     )
 
 

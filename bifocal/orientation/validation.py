@@ -75,6 +75,10 @@ def is_flat(
     return True
 
 
+#: Units in which lengths are typed by mistake, parts of a metre.
+_UNITS = ((1000.0, "mm"), (100.0, "cm"))
+
+
 def check_units(cameras: Cameras, site: SiteMeasures) -> None:
     """Refuse control points and distances that are not in metres, one beside the other."""
     d1, d2 = (float(camera.centre[2]) for camera in cameras)
@@ -85,8 +89,10 @@ def check_units(cameras: Cameras, site: SiteMeasures) -> None:
         agree |= 0.8 < distance / measured < 1.25
         if measured > FARTHEST_WALL and not agree:
             about = {"number": name, "given": measured, "found": distance}
-            raise InputError(remark("refused.too_far", meant=measured / 1000, **about))
-        for factor, unit in ((1000.0, "mm"), (100.0, "cm")):
+            nearest = min(_UNITS, key=lambda one: abs(np.log(measured / one[0] / distance)))
+            meant = {"unit": nearest[1], "meant": measured / nearest[0]}
+            raise InputError(remark("refused.too_far", **meant, **about))
+        for factor, unit in _UNITS:
             if 0.8 < distance / measured / factor < 1.25:
                 about = {"unit": unit, "number": name, "found": distance, "given": measured}
                 raise InputError(remark("refused.control_unit", **about))

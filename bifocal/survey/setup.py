@@ -364,6 +364,9 @@ class SurveySetup:
             place = f"{self.where}: " if self.where else ""
             about = {"apart": apart, "first": own.c1 / own.d1, "second": own.c2 / own.d2}
             name = "setup.scales_through_media" if self.refracted else "setup.scales"
+            exchanged = (own.d1 / own.c2) / (own.d2 / own.c1) / enlarged
+            if not self.refracted and abs(exchanged * enlarged - 1.0) <= tolerance:
+                name = "setup.scales_exchanged"
             raise GeometryError(f"{place}{remark(name, tolerance=tolerance, **about)}")
         if abs(share) < 1e-4:
             return ""

@@ -247,8 +247,9 @@ def _fitted(
 
 
 def shape_in_words(
-    bend: WallShape, *, with_lens: bool, through_media: bool = False, left_out: bool = False
-) -> str:
+    bend: WallShape, *, with_lens: bool, through_media: bool = False, left_out: bool = False,
+    tape: bool = False,
+) -> str:  # fmt: skip
     """Return the warning that the model does not fit; empty if the wall is flat enough.
 
     Parameters
@@ -260,13 +261,14 @@ def shape_in_words(
         Whether the pair was set up through media, and the ties are freed of their refraction.
     left_out : bool
         Whether control points that no camera fits were left out.
+    tape : bool
+        Whether a distance measured on site is contradicted.
     """
     if not bend.is_certain:
         return ""
     lens = "lens_known" if with_lens else "certain_lens"
-    reason = remark(f"orientation.reason_{'media' if through_media else lens}")
-    if bend.px <= BEND.strongly_curved:
-        reason = remark("orientation.reason_probably", reason=reason)
+    cause = "tape" if tape else "media" if through_media else lens
+    reason = remark(f"orientation.reason_{cause}")
     return remark(
         "orientation.bent", px=bend.px, sigma=bend.sigma, most=MOST_BENT, reason=reason,
         control=remark(f"orientation.control_{'left_out' if left_out else 'kept'}"),

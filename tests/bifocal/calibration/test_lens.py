@@ -388,3 +388,9 @@ def test_photos_are_undistorted_all_or_none(tmp_path):
     assert done.exit_code == 1
     assert "b.png" in done.stderr
     assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_table_in_place_of_a_lens_is_told_what_is_read(tmp_path):
+    (tmp_path / "points.csv").write_text("id,X\n")
+    with pytest.raises(InputError, match="is no lens file"):
+        Lens.read(tmp_path / "points.csv")

@@ -220,3 +220,9 @@ def test_a_list_of_hashes_as_other_programs_write_it_is_read(tmp_path):
     digest = hashlib.sha256(b"x").hexdigest().upper()
     (tmp_path / "SHA256SUMS").write_text(f"{digest} *a b.txt\n{digest}  gone.txt\n\n")
     assert states(verify(tmp_path, status=1)[0]) == {"gone.txt": "missing"}
+
+
+def test_a_report_without_its_pair_is_not_called_wrong(wall):
+    _, said = verify(wall / "report", status=1)
+    assert "Name the folder of the whole delivery" in said
+    assert "nan" not in said

@@ -338,6 +338,12 @@ def test_a_row_without_a_name_takes_none_that_another_row_has(tmp_path):
     assert read_control(path, sigma=0.003, sigma_plane=0.005).ids == ("A", "row 2", "2")
 
 
+def test_a_table_without_y_is_refused(tmp_path):
+    (tmp_path / "c.csv").write_text("id,X,r,col1,row1,col2,row2\nA,1,0,5,6,7,8\n")
+    with pytest.raises(InputError, match="the column Y is missing"):
+        read_control(tmp_path / "c.csv", sigma=0.003, sigma_plane=0.005)
+
+
 def test_a_check_point_without_relief_is_compared_in_x_and_y_alone(tmp_path):
     check = tables_of(tmp_path, c="A,1,2,,5,6,7,8\nB,1,3,0.4,5,6,7,8\n")
     pair = Pair.ideal(d1=17.5, d2=9.5)

@@ -1,5 +1,7 @@
 """Pairs set up from photos of a wall of boards whose relief and cameras are known."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -204,3 +206,19 @@ def test_equal_distances_are_refused(views) -> None:
 def test_boards_do_not_overlap() -> None:
     centres = np.array([[x + w / 2, y + h / 2, r] for x, y, w, h, r in BOARDS])
     np.testing.assert_array_equal(relief_at(centres), centres[:, 2])
+
+
+def test_photos_of_different_walls_are_refused_where_control_contradicts_itself(views) -> None:
+    """Of a wall and another one only picks that were guessed agree with nothing."""
+    rng = np.random.default_rng(3)
+    xyz = np.column_stack([rng.uniform(-4, 4, 9), rng.uniform(-2.5, 2.5, 9), rng.uniform(0, 1, 9)])
+    pixels = [project(camera, xyz) for camera in (FAR, NEAR)]
+    pixels[1][:3] += [[300, -200], [-250, 150], [200, 280]]
+    control = Control(
+        ids=tuple("abcdefghi"), xyz=xyz, sigma=np.full((9, 3), 0.003),
+        pixels1=pixels[0], pixels2=pixels[1],
+    )  # fmt: skip
+    first, second = inputs(views)
+    other = replace(second, grey=take(FAR, NEAR, seed=11).near, name="other.jpg")
+    with pytest.raises(GeometryError, match=r"other\.jpg show different walls.*3 of these"):
+        orient_pair((first, other), control=control, site=SiteMeasures())

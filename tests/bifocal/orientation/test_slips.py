@@ -5,14 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifocal import Control, GeometryError, Interior, SiteMeasures
+from bifocal import Control, GeometryError, InputError, Interior, SiteMeasures
 from bifocal.orientation.absolute_orientation import _with_words
 from bifocal.orientation.adjustment.pair_observations import PairObservations
 from bifocal.orientation.alignment import make_alignment
 from bifocal.orientation.approximate_orientation import Given
 from bifocal.orientation.orientation_remarks import hopeless_shape, model_remarks
 from bifocal.orientation.slips import slip_of
-from bifocal.orientation.walls.wall_shape import WallShape
+from bifocal.orientation.validation import check_units
+from bifocal.orientation.walls.wall_shape import WallShape, shape_in_words
 from tests.bifocal.orientation.layered_wall import SIZE, camera
 from tests.bifocal.orientation.test_pair_adjustment import POINTS
 from tests.builders.orientation import PhotoInput, orient_pair
@@ -241,3 +242,23 @@ def test_clean_control_is_charged_with_no_slip(seed) -> None:
         site = SiteMeasures(distance1=16.0, distance2=9.0) if seed % 2 else SiteMeasures()
         made = orient_pair(typed, control=control(cameras, seed=seed), site=site)
         assert not [text for text in made.remarks if "taken" in text or "exchanged" in text]
+
+
+def test_a_contradicted_tape_is_the_likely_reason() -> None:
+    words = shape_in_words(WallShape(3.0, 0.1), with_lens=True, tape=True)
+    assert "The likely reason is a distance measured on site" in words
+    assert "lens" not in words
+    pair = orient_pair(photos(), control=control(), site=SiteMeasures())
+    rough = replace(pair, observations=replace(pair.observations, sigma_tie=9.0))
+    far = float(pair.adjusted.cameras[0].centre[2])
+    for off, reason in ((0.0, "lens distortion"), (2.0, "a distance measured on site")):
+        said = model_remarks(rough, SiteMeasures(distance1=far + off, sigma=0.02))
+        assert all(reason in text for text in said if "miss their lines" in text)
+
+
+@pytest.mark.parametrize(("typed", "unit"), [(900.0, "cm"), (9430.0, "mm")])
+def test_a_distance_too_far_is_taken_for_the_nearest_unit(typed, unit) -> None:
+    cameras = orient_pair(photos(), control=control(), site=SiteMeasures()).adjusted.cameras
+    scale = float(cameras[0].centre[2]) / 9.43
+    with pytest.raises(InputError, match=f"is it in {unit}"):
+        check_units(cameras, SiteMeasures(distance1=typed * scale))

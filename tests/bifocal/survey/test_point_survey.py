@@ -210,6 +210,12 @@ def test_scales_that_differ_too_much_are_refused_with_the_size_of_the_fault():
         SurveySetup(taking=Taking(d1=17.5, d2=14.0, c1=35.0, c2=19.0)).check_scales()
 
 
+def test_exchanged_distances_are_named():
+    with pytest.raises(GeometryError, match="Exchange d_1 and d_2") as refused:
+        SurveySetup(taking=Taking(d1=9.5, d2=17.5, c1=35.0, c2=19.0)).check_scales()
+    assert "tolerance" not in str(refused.value)
+
+
 def test_pixels_without_the_size_of_a_pixel_are_refused():
     with pytest.raises(InputError, match="pitch"):
         SurveySetup(taking=Taking(d1=17.5, d2=9.5), measuring=Measuring(unit="px")).pair()
