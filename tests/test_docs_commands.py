@@ -43,6 +43,7 @@ NOT_RUN = {
     "python benchmarks/bench_cameras.py": MINUTES,
     "python benchmarks/bench_campaign.py": MINUTES,
     "python benchmarks/bench_delivery.py": MINUTES,
+    "python benchmarks/bench_intersection.py": MINUTES,
     "python benchmarks/bench_relief.py": MINUTES,
     "python benchmarks/relief_ablation.py": MINUTES,
     "python benchmarks/relief_tuning.py": MINUTES,
