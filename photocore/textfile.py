@@ -60,7 +60,7 @@ def read_text(path: Path, what: str, *, form: str = "") -> str:
             raise InputError(f"{path}: is not a text file, expected a {what}{form}.") from None
 
 
-def check_file(path: Path, missing: str = "file", *, folder: str = "") -> None:
+def check_file(path: Path, missing: str = "file", *, folder: str = ", expected a file.") -> None:
     """Refuse what is no file: nothing at all, or a pipe or device, reading which may wait for ever.
 
     Parameters
@@ -70,7 +70,7 @@ def check_file(path: Path, missing: str = "file", *, folder: str = "") -> None:
     missing : str
         What it should be, for the message.
     folder : str
-        What to say of a folder after "is a folder"; left blank, the caller has refused it.
+        What to say of a folder after "is a folder".
 
     Raises
     ------
@@ -78,12 +78,10 @@ def check_file(path: Path, missing: str = "file", *, folder: str = "") -> None:
         Saying which of them, or that no file can have this name.
     """
     check_name(path)
-    if folder and path.is_dir():
+    if path.is_dir():
         raise InputError(f"{path}: is a folder{folder}")
     if not path.exists():
         raise InputError(f"{path}: no such {missing}.")
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; name a file in it.")
     if not path.is_file():
         raise InputError(f"{path}: is a pipe or a device; save what it gives as a file first.")
 

@@ -8,7 +8,7 @@ from bifocal.model.lens import Lens
 from bifocal.reports.control_survey import refuse_same_names
 from photocore.decoding import refuse_damaged_jpeg
 from photocore.images import image_info, read_image
-from photocore.textfile import check_file, check_name
+from photocore.textfile import check_file
 
 
 def check_files(job: PairJob) -> None:
@@ -20,7 +20,6 @@ def check_files(job: PairJob) -> None:
         Naming the first of them.
     """
     for path in (*job.photos, *job.files.values()):
-        check_name(path)
         check_file(path)
     if "faces" in job.files:
         read_faces(job.files["faces"])

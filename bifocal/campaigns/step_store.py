@@ -32,7 +32,7 @@ from photocore.errors import InputError
 from photocore.jsonfile import to_text
 from photocore.output import check_not_open, told_as
 from photocore.provenance import FileHashes, file_hash, program, today
-from photocore.textfile import check_file, check_name
+from photocore.textfile import check_file
 
 FORMAT = "bifocal-step/1"
 #: The record of a step, in its folder.
@@ -107,7 +107,6 @@ class StepRecord:
 def step_key(step: Step, earlier: Mapping[str, StepRecord], hashes: FileHashes) -> str:
     """Return the hash of everything that decides a step's result."""
     for path in step.files.values():
-        check_name(path)
         check_file(path)
     content = {
         "program": program(),

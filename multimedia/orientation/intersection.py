@@ -32,7 +32,6 @@ from multimedia.orientation.point_kernel import (
     MOST_STEPS,
     SMALL,
     WEAK_ANGLE,
-    PointValues,
     settled_points,
     views_of,
 )
@@ -155,23 +154,24 @@ def intersect(
     if views is None:
         return _by_rows(cameras, image, sigmas, placed)
     found = _nothing_found(*image.shape[:2])
+    arrays: Any = tuple(getattr(found, name) for name in found.__slots__)
     whole = np.ascontiguousarray(image), np.ascontiguousarray(sigmas)
-    settled = settled_points(views, *whole, _limits(len(image)), found)
+    settled = settled_points(views, *whole, _limits(len(image)), arrays)
     left = np.flatnonzero(~settled)
     if left.size:
         rest = _by_rows(cameras, image[:, left], sigmas[:, left], placed)
-        for name, values in found._asdict().items():
+        for name, values in zip(found.__slots__, arrays, strict=True):
             values[(slice(None), left) if name in _BY_CAMERA else left] = getattr(rest, name)
-    return IntersectedPoints(**found._asdict())
+    return found
 
 
 #: Values of shape (cameras, n, 2).
 _BY_CAMERA = ("residuals", "standardised")
 
 
-def _nothing_found(m: int, n: int) -> PointValues:
+def _nothing_found(m: int, n: int) -> IntersectedPoints:
     """Return room for n points of m cameras."""
-    return PointValues(
+    return IntersectedPoints(
         xyz=np.empty((n, 3)), covariance=np.empty((n, 3, 3)), sigma0=np.empty(n),
         residuals=np.full((m, n, 2), np.nan), standardised=np.full((m, n, 2), np.nan),
         rays=np.empty(n, np.int64), angle=np.empty(n), status=np.empty(n, np.int64),

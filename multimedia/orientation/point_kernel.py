@@ -39,19 +39,10 @@ _OK, _WEAK, _GROSS_ERROR = (
 )
 #: Points worked on at a time: their rows stay in the processor's first caches.
 BATCH = 256
-
-
-class PointValues(NamedTuple):
-    """What `multimedia.orientation.intersection.IntersectedPoints` is made of."""
-
-    xyz: FloatArray
-    covariance: FloatArray
-    residuals: FloatArray
-    standardised: FloatArray
-    sigma0: FloatArray
-    rays: IntArray
-    angle: FloatArray
-    status: IntArray
+#: Arrays of `multimedia.orientation.intersection.IntersectedPoints`, in its order.
+Arrays = tuple[
+    FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, IntArray, FloatArray, IntArray
+]
 
 
 class Views(NamedTuple):
@@ -239,13 +230,14 @@ def _equations(
 
 @compiled
 def _judge(
-    found: PointValues, point: int, inverse: tuple[float, ...], step: tuple[float, float, float],
+    found: Arrays, point: int, inverse: tuple[float, ...], step: tuple[float, float, float],
     sigma: FloatArray, rows: FloatArray, seen: BoolArray, limits: FloatArray,
 ) -> None:  # fmt: skip
     """Write precision, residuals and tests of a point; rows (m, 8) are of its last step."""
+    _, covariance, residuals, normed, sigma0, count, angle, status = found
     place, square, rays = (0, 1, 2, 1, 3, 4, 2, 4, 5), 0.0, 0
     for j in range(9):
-        found.covariance[point, j // 3, j % 3] = inverse[place[j]]
+        covariance[point, j // 3, j % 3] = inverse[place[j]]
     for k in range(len(seen)):
         if not seen[k]:
             continue
@@ -257,18 +249,18 @@ def _judge(
             # Cofactor of a weighted residual: 1 - a N^-1 a^T.
             spread = 1.0 - dot(times(inverse, a), a)
             square += v * v
-            found.residuals[k, point, axis] = v * sigma[k, point, axis]
+            residuals[k, point, axis] = v * sigma[k, point, axis]
             if spread > CONTROLLED:
-                found.standardised[k, point, axis] = v / np.sqrt(spread)
-    found.sigma0[point], found.rays[point] = np.sqrt(square / (2 * rays - 3)), rays
-    found.status[point] = _OK if found.angle[point] >= WEAK_ANGLE else _WEAK
+                normed[k, point, axis] = v / np.sqrt(spread)
+    sigma0[point], count[point] = np.sqrt(square / (2 * rays - 3)), rays
+    status[point] = _OK if angle[point] >= WEAK_ANGLE else _WEAK
     if square > limits[rays]:
-        found.status[point] = _GROSS_ERROR
+        status[point] = _GROSS_ERROR
 
 
 @compiled
 def settled_points(
-    views: Views, image: FloatArray, sigma: FloatArray, limits: FloatArray, found: PointValues
+    views: Views, image: FloatArray, sigma: FloatArray, limits: FloatArray, found: Arrays
 ) -> BoolArray:
     """Intersect points, and return which of them settled.
 
@@ -280,10 +272,11 @@ def settled_points(
         Measured, NaN where not seen, and standard deviations. [mm]
     limits : ndarray, shape (m + 1,)
         Of the square sum, by the number of rays.
-    found : PointValues
+    found : tuple of ndarray
         Written where a point settled.
     """
     m, n, _ = image.shape
+    points, angle = found[0], found[6]
     settled, first = np.zeros(n, dtype=np.bool_), views.centres[0]
     for start in range(0, n, BATCH):
         stop = min(start + BATCH, n)
@@ -294,7 +287,7 @@ def settled_points(
             for i in range(count):
                 seen[k, i] = np.isfinite(image[k, start + i, 0] + image[k, start + i, 1])
             _trace(views, k, image[k, start:stop], rays[k])
-        active, reach = _begin(rays, seen, xyz, found.angle[start:stop]), np.zeros(count)
+        active, reach = _begin(rays, seen, xyz, angle[start:stop]), np.zeros(count)
         for j in range(3):
             for i in range(count):
                 reach[i] = max(reach[i], abs(xyz[j, i] - first[j]))
@@ -324,7 +317,7 @@ def settled_points(
                     p, (a, b, c, d, e, f) = start + i, adjugate
                     inverse = a / whole, b / whole, c / whole, d / whole, e / whole, f / whole
                     for j in range(3):
-                        found.xyz[p, j] = xyz[j, i]
+                        points[p, j] = xyz[j, i]
                     _judge(found, p, inverse, (x, y, z), sigma, rows[:, :, i], seen[:, i], limits)
                     settled[p] = True
             if not going:
