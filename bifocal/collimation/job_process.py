@@ -16,6 +16,7 @@ from bifocal.campaigns.rectification import rectify_photo
 from bifocal.collimation.proposals import wall_sheet
 from bifocal.collimation.shapes import shapes_from
 from bifocal.collimation.stated_media import media_from_dict
+from bifocal.command_options import RectifyCommand
 from bifocal.faces.faces_files import faces_path
 from bifocal.faces.suggestions import suggest_faces
 from bifocal.matching.matching import MatchSettings
@@ -163,7 +164,7 @@ def _frame(pair: Pair, table: Path, photos: int) -> float:
 
 def _rectify(task: Task, progress: Progress) -> dict[str, Any]:
     """Bring one photo alone to scale, with drawings."""
-    given = {name: one.fixed_default for name, one in options_of("bifocal", "rectify").items()}
+    given = {name: one.fixed_default for name, one in options_of(RectifyCommand).items()}
     given |= {"scale": 50.0, **task, "corners": np.ravel(task["corners"])}
     done = rectify_photo(
         Path(task["photo"]), Path(task["out"]), given, folder=Path(task["folder"]),
