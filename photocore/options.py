@@ -49,7 +49,7 @@ class Typed:
 
     def __init__(
         self,
-        kind: click.ParamType | None = None,
+        kind: click.ParamType | None = None,  # type: ignore[type-arg,unused-ignore]
         unit: str = "",
         *,
         flag: str = "",
@@ -277,7 +277,7 @@ def _option(field: Field[Any], hint: Any, notes: Sequence[Typed], text: str) -> 
     return Option(field.name, flags, **attributes)
 
 
-def _type_of(kind: Any) -> click.ParamType:
+def _type_of(kind: Any) -> click.ParamType:  # type: ignore[type-arg,unused-ignore]
     """Return how values of a type are typed where nothing is noted."""
     if typing.get_origin(kind) is typing.Literal:
         return click.Choice(typing.get_args(kind))
@@ -295,9 +295,9 @@ def options_of(declaring: type) -> dict[str, Option]:
     texts = _texts(declaring.__module__)[declaring.__name__]
     options: dict[str, Option] = {}
     for field in fields(declaring):
-        hint, notes = hints[field.name], ()
+        hint, notes = hints[field.name], []
         if typing.get_origin(hint) is Annotated:
-            hint, *notes = hint.__origin__, *reversed(hint.__metadata__)
+            hint, notes = hint.__origin__, hint.__metadata__[::-1]
         if is_dataclass(hint):
             for option in options_of(hint).values():  # type: ignore[arg-type]
                 options.setdefault(option.name, option.unset() if UNSET in notes else option)

@@ -10,9 +10,9 @@ import click
 
 from bifocal.options import LensDatabaseOptions
 from photocore.cli import print_result, progress_bar, remark, text_table
-from photocore.option_types import POSITIVE
+from photocore.option_types import POSITIVE, Size
 from photocore.options import Argument, Typed, declared
-from photocore.shared_options import BoardOption, JsonOption, OverwriteOption, PatternOption
+from photocore.shared_options import JsonOption, OverwriteOption, PatternOption
 
 if TYPE_CHECKING:
     from bifocal.calibration.board_calibration import Calibration
@@ -35,7 +35,7 @@ class CalibrateCommand:
     out: Path
     """The lens file."""
     pattern: PatternOption = "chessboard"
-    board: BoardOption = None
+    board: Annotated[tuple[int, int] | None, Typed(Size(least=1, whole=True))] = None
     """Inner corners of a chessboard, circles of a grid, squares of a ChArUco board, across x
     up.  [default: chessboard recognised by itself]"""
     model: Literal["auto", "k1", "k1k2", "k1k2p", "k1k2pk3", "fisheye"] = "auto"
