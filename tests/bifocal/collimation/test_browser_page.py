@@ -46,9 +46,10 @@ def test_what_is_not_ours_is_versioned_and_licensed() -> None:
         assert any(path.name.startswith("LICENSE") for path in folder.iterdir())
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def page(browser: Any, server: Served) -> Iterator[Driver]:
     with tab_of(browser, server) as driver:
+        driver.empty()
         yield driver
 
 
