@@ -213,6 +213,13 @@ if __name__ == "__main__":
         else:
             shot = shots(given[0])
             grid = shot.truth.grid
-            show(given[0], rendered(shot, dense_relief(
-                shot.pair, shot.image1, shot.image2, gsd=grid.gsd, bounds=grid.bounds)))
+            show(
+                given[0],
+                rendered(
+                    shot,
+                    dense_relief(
+                        shot.pair, shot.image1, shot.image2, gsd=grid.gsd, bounds=grid.bounds
+                    ),
+                ),
+            )
             given = given[1:]

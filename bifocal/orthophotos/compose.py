@@ -343,11 +343,16 @@ def _closing_gaps(
         return second
     measured = measured_on(surface, grid)
     usable = first.inside & ~first.hidden
-    _, label, stats, _ = cv2.connectedComponentsWithStats(gaps.astype(np.uint8), connectivity=8)
+    # What lies beyond the first photo is one part, lest it join the gaps that reach its edge.
+    inner = (gaps & first.inside).astype(np.uint8)
+    _, label, stats, _ = cv2.connectedComponentsWithStats(inner, connectivity=8)
+    boxes = [tuple(int(side) for side in box[:4]) for box in stats[1:]]
+    if not first.inside.all():
+        label[~first.inside] = len(stats)
+        boxes.append(cv2.boundingRect((~first.inside).astype(np.uint8)))
     ring = np.ones((2 * GAPS.rim + 1,) * 2, np.uint8)
-    for number in range(1, len(stats)):
-        left, top, width, height, _ = stats[number]
-        box = grown((left, top, width, height), TIDYING.margin, grid.shape)
+    for number, bounds in enumerate(boxes, start=1):
+        box = grown(bounds, TIDYING.margin, grid.shape)
         gap = label[box] == number
         wanted = gap & free[box]
         level = np.nanmedian(relief[box][gap]) + np.float32(GAPS.before)

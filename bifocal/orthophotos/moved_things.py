@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from bifocal.model.grid import Grid
 from bifocal.model.surface import Surface, measured_on
 from bifocal.orthophotos.rectify import SourcePhoto
 from bifocal.orthophotos.tuning import MOVED
 from bifocal.orthophotos.visibility import hidden_from, tidied
-from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
+from photocore.arrays import BoolArray, ByteArray, Float32Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -132,7 +134,7 @@ def _opened(mask: BoolArray, disc: ByteArray) -> BoolArray:
     return cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, disc) > 0
 
 
-def _padded(image: FloatArray, box: tuple[int, int, int, int]) -> FloatArray:
+def _padded(image: NDArray[Any], box: tuple[int, int, int, int]) -> NDArray[Any]:
     """Return a box (left, top, width, height) of an image with 4 px around, zero outside."""
     left, top, width, height = box
     part = image[max(top - 4, 0) : top + height + 4, max(left - 4, 0) : left + width + 4]

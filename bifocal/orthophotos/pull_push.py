@@ -49,9 +49,7 @@ def membrane(values: Float32Array, known: BoolArray) -> Float32Array:
     return _pushed(values, known, 16, WHOLE.sweeps)
 
 
-def _pushed(
-    image: NDArray[Any], known: BoolArray, halvings: int, sweeps: int = 0
-) -> Float32Array:
+def _pushed(image: NDArray[Any], known: BoolArray, halvings: int, sweeps: int = 0) -> Float32Array:
     """Return the image with what is unknown from coarser levels, relaxed so many times at each."""
     weight = known.astype(np.float32)
     colour: NDArray[Any] = image.astype(np.float32)

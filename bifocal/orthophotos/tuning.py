@@ -45,9 +45,10 @@ class MovedTuning:
     pixels: float = 2.0
     #: Blur before the photos are compared. [px]
     blur: float = 1.25
-    #: They differ by more than this in the middle of a thing, and than that up to its rim. [of 255]
+    #: They differ by more than this in the middle of a thing. [of 255]
     #: Evidence: castle_A's parked machine; without the test of likeness every pane is a thing.
     core: float = 28.0
+    #: And by more than this up to its rim. [of 255]
     rim: float = 12.0
     #: Smaller things are left. [m2]
     area: float = 0.05
@@ -55,8 +56,9 @@ class MovedTuning:
     measured: float = 0.6
     #: Where half of the blocks correlate by more, too: it is mirrored, or misplaced.
     likeness: float = 0.5
-    #: Side of the blocks, and how far they are sought. [px]
+    #: Side of the blocks. [px]
     block: int = 15
+    #: How far they are sought. [px]
     reach: int = 5
     #: Blocks of less spread show nothing. [of 255]
     contrast: float = 6.0

@@ -104,19 +104,21 @@ class CompletedSurface:
         """Return a mask of the sheet at the nearest pixels of a grid."""
         if mask.all():
             return np.ones(grid.shape, bool)
-        flags = mask.astype(np.uint8)
-        edge = cv2.BORDER_REPLICATE
-        return cv2.remap(flags, *self._maps(grid), cv2.INTER_NEAREST, borderMode=edge) > 0
+        columns, rows = self._maps(grid)
+        edge, flags = cv2.BORDER_REPLICATE, mask.astype(np.uint8)
+        return cv2.remap(flags, columns, rows, cv2.INTER_NEAREST, borderMode=edge) > 0
 
     def _at(self, sheet: Float32Array, grid: Grid) -> Float32Array:
         """Return the sheet at the pixels of a grid, bilinear, its rim going on outside."""
+        columns, rows = self._maps(grid)
         edge = cv2.BORDER_REPLICATE
-        return cv2.remap(sheet, *self._maps(grid), cv2.INTER_LINEAR, borderMode=edge)
+        return np.asarray(cv2.remap(sheet, columns, rows, cv2.INTER_LINEAR, borderMode=edge))
 
-    def _maps(self, grid: Grid) -> list[Float32Array]:
+    def _maps(self, grid: Grid) -> tuple[Float32Array, Float32Array]:
         columns = ((grid.columns_x - self._grid.x0) / self._grid.gsd).astype(np.float32)
         rows = ((self._grid.y0 - grid.rows_y) / self._grid.gsd).astype(np.float32)
-        return np.meshgrid(columns, rows)
+        across, down = np.meshgrid(columns, rows)
+        return across, down
 
 
 def _sheet_grid(surface: Surface, grid: Grid) -> Grid:
