@@ -346,10 +346,11 @@ def _closing_gaps(
     # What lies beyond the first photo is one part, lest it join the gaps that reach its edge.
     inner = (gaps & first.inside).astype(np.uint8)
     _, label, stats, _ = cv2.connectedComponentsWithStats(inner, connectivity=8)
-    boxes = [tuple(int(side) for side in box[:4]) for box in stats[1:]]
+    boxes = [(int(c), int(r), int(wide), int(high)) for c, r, wide, high, _ in stats[1:]]
     if not first.inside.all():
         label[~first.inside] = len(stats)
-        boxes.append(cv2.boundingRect((~first.inside).astype(np.uint8)))
+        column, row, wide, high = cv2.boundingRect((~first.inside).astype(np.uint8))
+        boxes.append((column, row, wide, high))
     ring = np.ones((2 * GAPS.rim + 1,) * 2, np.uint8)
     for number, bounds in enumerate(boxes, start=1):
         box = grown(bounds, TIDYING.margin, grid.shape)
