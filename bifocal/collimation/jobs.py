@@ -15,6 +15,7 @@ from typing import Any
 from bifocal.collimation.wording import without_options
 from bifocal.remarks import remark
 from photocore.errors import InputError, PhotogrammetryError
+from photocore.remarks import learn
 
 #: Plain data, as it goes to the worker and comes back.
 Task = dict[str, Any]
@@ -209,6 +210,7 @@ class JobRunner:
         for line in process.stdout:
             try:
                 told = json.loads(line)
+                learn(told)
             except ValueError:
                 continue
             if "progress" in told and job.state == "running":
