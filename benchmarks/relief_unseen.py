@@ -3,8 +3,8 @@
     python benchmarks/relief_unseen.py [--kept] [--second] [--large] [--alone] [SCENE ...]
 
 Scenes of `tests.scenes.unseen`, of the first seed numbers are tuned on; ``--kept`` takes one that
-they never are, ``--second`` the other of the two, ``--large`` photos of 6 MP; ``--alone`` leaves the
-peers out. Counted is every pixel that both cameras see; what is missing counts as beyond. DIS
+they never are, ``--second`` the other of the two, ``--large`` photos of 6 MP, ``--alone`` leaves
+the peers out. Counted is every pixel that both cameras see; what is missing counts as beyond. DIS
 ("medium", to full resolution) is projected on the radius; StereoSGBM runs once in log-polar rings
 and is told the range; what either leaves open takes its nearest neighbour. Renderings are kept in
 the folder ``$RELIEF_SCENES``, if that is set.
