@@ -28,6 +28,8 @@ from tests.scenes.streets import (
 
 #: Seeds that numbers may be tuned on, and seeds that they never are.
 TUNED, KEPT = (5001, 5002), (6001, 6002)
+#: Pixel on the wall of a photo of 6 MP. [m]
+FINE = 0.00369
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +46,7 @@ class Taking:
     tilt_deg, offset : float
         Half widths of the cameras' tilts [deg] and of their offsets along the wall [m].
     residual : float
-        What the lens calibration leaves, RMS. [px]
+        What the lens calibration leaves, RMS. [px of `FINE`]
     jpeg : int, optional
         Quality of both photos; None keeps them as they are.
     passers : int
@@ -57,7 +59,7 @@ class Taking:
     d2: float = 9.5
     tilt_deg: float = 1.0
     offset: float = 0.2
-    residual: float = 0.15
+    residual: float = 0.1
     jpeg: int | None = 85
     passers: int = 0
 
@@ -113,7 +115,9 @@ def unseen(
         rng=rng,
     )  # fmt: skip
     cameras = replace(
-        cameras, far=_aimed(cameras.far, taking, rng), near=_aimed(cameras.near, taking, rng)
+        cameras,
+        far=_aimed(cameras.far, taking, pixel, rng),
+        near=_aimed(cameras.near, taking, pixel, rng),
     )
     exposures = [
         Exposure(
@@ -130,10 +134,12 @@ def unseen(
     )  # fmt: skip
 
 
-def _aimed(camera: SceneCamera, taking: Taking, rng: np.random.Generator) -> SceneCamera:
+def _aimed(
+    camera: SceneCamera, taking: Taking, pixel: float, rng: np.random.Generator
+) -> SceneCamera:
     """Return a camera turned back to the middle of the scene, with a lens residual."""
     middle = (camera.view_of(np.zeros((1, 3)))[0] - np.subtract(camera.size, 1) / 2) * 0.9
     matrix = camera.matrix.copy()
     matrix[:2, 2] -= middle  # as a shifted lens does, or cropping
-    residual = taking.residual * rng.choice([-1.0, 1.0])
+    residual = taking.residual * rng.choice([-1.0, 1.0]) * FINE / pixel
     return replace(camera, matrix=matrix, residual=residual)
