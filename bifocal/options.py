@@ -258,11 +258,12 @@ class PictureOptions:
     """How the orthophoto is made."""
 
     image: Literal["1", "2", "both"] | None = None
-    """Photo that gives the colours: 1 far, 2 near, both: 1 where it sees the wall, else
-    2.  [default: both; with --measured-only 1]"""
+    """Photo that gives the colours: 1 far, 2 near, both: 1 where it sees the wall, 2 in gaps whose
+    rim is measured and alike in both.  [default: both; with --measured-only 1]"""
     measured_only: bool = False
     """Leave empty what is not measured or hidden. Otherwise the picture is whole: unknown relief is
-    interpolated, far from all else the plane; the last band says so of each pixel."""
+    interpolated, far from all else the plane, what no photo sees white; the last band says so of
+    each pixel."""
     bounds: BoundsOption = None
     interpolation: InterpolationOption = "cubic"
     mask: bool = True
@@ -277,7 +278,7 @@ class PictureOptions:
     """Undo the fall-off of light to the corners.  [default: off]"""
     chromatic: bool = False
     """Measure and undo red and blue fringes."""
-    feather: Annotated[float, Typed(NOT_NEGATIVE, "PX")] = 8.0
+    feather: Annotated[float, Typed(NOT_NEGATIVE, "PX")] = 4.0
     """Width of the transition between the photos [px]."""
     overviews: OverviewsOption = None
     any_size: AnySizeOption = False

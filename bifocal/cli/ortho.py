@@ -83,12 +83,13 @@ def command(
     map, from measured points, or is none (--plane); by default from the points of the workbook,
     if PAIR is one: its set-up is then taken as typed. What the camera cannot see stays empty; the
     last band says where each pixel comes from (0 nothing, 1 and 2 the photos, 3 both, 4 filled,
-    5 a photo on interpolated relief, 6 a photo on the plane). Of a set each pixel is taken from
-    the photo that sees it best: 11 is its first photo, 12 the second, 3 a transition.
+    5 a photo on interpolated relief, 6 a photo on the plane, 7 seen by no photo). Of a set each
+    pixel is taken from the photo that sees it best: 11 is its first photo, 12 the second, 3 a
+    transition.
     """
     from bifocal.faces.faces_files import faces_path, keep_faces
     from bifocal.orthophotos.deliver_workflow import DeliverTask, default_title, deliver
-    from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho, not_measured
+    from bifocal.orthophotos.ortho_workflow import OrthoTask, basis_in_words, make_ortho
     from bifocal.workbook.pair_workflow import is_workbook, points_of, read_photos
 
     if out is None and folder is None:
@@ -138,8 +139,8 @@ def command(
         f"{result.path}: {grid.width} x {grid.height} px of {grid.gsd * 1000:g} mm; "
         f"{100 * (1 - shares['none']):.1f} % covered, {100 * shares['hidden']:.1f} % hidden"
     ]
-    if told := not_measured(shares):
-        lines.append(f"Not measured: {told}")
+    if told := basis_in_words(result.basis):
+        lines.append(f"Of the picture {told}")
     if files:
         lines.append(f"{folder}: {', '.join(done.files)} (sheet {done.sheet})")
     print_result(result.to_dict() | files, lines, as_json=as_json, remarks=remarks)

@@ -48,6 +48,7 @@ from photocore.images import image_info, read_grey
 from photocore.interrupts import end_on_signals
 from photocore.jsonfile import plain
 from photocore.options import options_of
+from photocore.remarks import with_keys
 from photocore.tables import write_csv
 
 Task = Mapping[str, Any]
@@ -72,8 +73,8 @@ def main() -> int:
             share = min(max(done / total, 0.0), 1.0) if total > 0 else 0.0
             tell({"progress": share, "message": what})
 
-    def tell(line: Mapping[str, Any]) -> None:
-        out.write(json.dumps(line) + "\n")
+    def tell(line: dict[str, Any]) -> None:
+        out.write(json.dumps(with_keys(plain(line))) + "\n")
         out.flush()
 
     try:
@@ -84,7 +85,7 @@ def main() -> int:
     except MemoryError:
         tell({"error": "there is not enough memory; choose a coarser pixel."})
         return 1
-    tell({"result": plain(result)})
+    tell({"result": result})
     return 0
 
 
