@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.campaigns.pair_steps import PRODUCTS, PairJob, tables_of
-from bifocal.command_options import MosaicCommand
 from bifocal.options import FILES, JOINT, OF_PAIR
+from bifocal.options.commands import MosaicCommand
 from bifocal.remarks import remark
 from photocore.errors import InputError
 from photocore.options import options_of

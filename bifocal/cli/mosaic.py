@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from bifocal.command_options import MosaicCommand
+from bifocal.options.commands import MosaicCommand
 from photocore.cli import print_result, progress_bar
 from photocore.options import declared
 

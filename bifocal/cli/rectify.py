@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from bifocal.command_options import RectifyCommand
+from bifocal.options.commands import RectifyCommand
 from photocore.cli import print_result, progress_bar, remark
 from photocore.options import declared
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from bifocal.command_options import SolveCommand
+from bifocal.options.commands import SolveCommand
 from photocore.cli import print_json, remark, text_table
 from photocore.options import declared
 

@@ -16,7 +16,6 @@ from bifocal.campaigns.rectification import rectify_photo
 from bifocal.collimation.proposals import wall_sheet
 from bifocal.collimation.shapes import shapes_from
 from bifocal.collimation.stated_media import media_from_dict
-from bifocal.command_options import RectifyCommand
 from bifocal.faces.faces_files import faces_path
 from bifocal.faces.suggestions import suggest_faces
 from bifocal.matching.matching import MatchSettings
@@ -26,6 +25,7 @@ from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
 from bifocal.model.relief_map import ReliefMap
 from bifocal.networks.set_workflow import align_photo_set
+from bifocal.options.commands import RectifyCommand
 from bifocal.orientation.align_workflow import (
     AlignOptions,
     KnownLens,
