@@ -334,9 +334,7 @@ def declared(declaring: type) -> Callable[[Callable[..., Any]], click.Command]:
             return function(_made(declaring, values))
 
         arguments = str(inspect.signature(function))
-        callback = (
-            work if takes_object and "**" not in str(inspect.signature(function)) else function
-        )
+        callback = work if arguments.startswith("(options:") else function
         return click.command(epilog="\n\n".join(parts) + "\n", params=parameters)(callback)
 
     return command_of

@@ -74,5 +74,6 @@ def command(options: TemplateCommand) -> None:
         overwrite=options.overwrite,
     )
     remark(
-        f"{options.out}: fill in Setup and Points; then: bifocal solve {options.out} --out result.xlsx"
+        f"{options.out}: fill in Setup and Points; then: bifocal solve {options.out} "
+        "--out result.xlsx"
     )

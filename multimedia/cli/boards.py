@@ -63,8 +63,8 @@ def command(options: BoardsCommand) -> None:
         )
     counts = _counts(found)
     data = {
-        "file": options.out, "photos": len(options.photos), "found": len(found.views), "cameras": counts,
-        "left_out": list(found.without), "adjust": found.next_command,
+        "file": options.out, "photos": len(options.photos), "found": len(found.views),
+        "cameras": counts, "left_out": list(found.without), "adjust": found.next_command,
     }  # fmt: skip
     rows = [(name, boards, points) for name, (boards, points) in counts.items()]
     lines = [
