@@ -105,7 +105,7 @@ def _is_rolling(node: ElementTree.Element) -> bool:
 
 
 def _aligned(chunk: ElementTree.Element, component: str | None) -> list[ElementTree.Element]:
-    """Return the cameras of a chunk that have a place, in one of its components if it has several."""
+    """Return the cameras of a chunk, or of a component of it, that have a place."""
     return [
         camera
         for camera in chunk.findall("./cameras//camera")
