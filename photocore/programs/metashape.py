@@ -133,9 +133,9 @@ def _world_from_chunk(
     """Return rotation, translation and scale of the chunk, or of a component of it."""
     node = None if component else chunk.find("./transform")
     if node is None or node.find("scale") is None:
-        parts = chunk.findall("./components/component")
-        parts = [part for part in parts if component in (None, part.get("id"))]
-        node = parts[0].find("./transform") if len(parts) == 1 else None
+        nodes = chunk.findall("./components/component")
+        nodes = [part for part in nodes if component in (None, part.get("id"))]
+        node = nodes[0].find("./transform") if len(nodes) == 1 else None
     if node is None:
         return np.eye(3), np.zeros(3), 1.0
     parts = dict(FRAME)
