@@ -79,6 +79,8 @@ class HolesTuning:
 
     #: Larger holes stay paper white. [m2]
     largest: float = 0.05
+    #: But for their fringe, parts of them narrower than this. [m]
+    narrow: float = 0.06
     #: Breadth of the rim at which a copy must fit. [px]
     rim: int = 6
     #: What stands this much before the hole is no part of its rim. [m]
