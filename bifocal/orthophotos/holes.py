@@ -9,6 +9,7 @@ from bifocal.model.image import ImageArray
 from bifocal.orthophotos.ortho_image import Source, shows
 from bifocal.orthophotos.pull_push import fill_holes
 from bifocal.orthophotos.tuning import HOLES
+from bifocal.orthophotos.visibility import parts_of
 from photocore.arrays import BoolArray, ByteArray, Float32Array, IntArray
 
 
@@ -23,12 +24,11 @@ def close_holes(
     the rim fits best, and levelled along the rim. It comes from what lies no farther out than the
     hole: that is what goes on behind.
     """
-    _, label, stats, _ = cv2.connectedComponentsWithStats(holes.astype(np.uint8), connectivity=8)
-    large = stats[:, cv2.CC_STAT_AREA] * gsd**2 > largest
-    large[0] = False
     side = int(HOLES.narrow / gsd) | 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
-    white = cv2.morphologyEx(large[label].astype(np.uint8), cv2.MORPH_OPEN, disc) > 0
+    large = parts_of(holes, largest / gsd**2).astype(np.uint8)
+    # What the fringe leaves of one may be a crumb.
+    white = parts_of(cv2.morphologyEx(large, cv2.MORPH_OPEN, disc) > 0, largest / 2 / gsd**2)
     image[white] = np.iinfo(image.dtype).max
     source[white] = Source.NEITHER
     rest = (holes & ~white).astype(np.uint8)

@@ -90,7 +90,7 @@ class HolesTuning:
     #: How far around a hole texture is sought, at least. [m]
     reach: float = 0.25
     #: Holes in larger windows take the colours at their rim. [px]
-    most: int = 40_000
+    most: int = 6_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
