@@ -2,20 +2,77 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import click
 
-from bifocal.options import DRAWING, OF_PAIR
+from bifocal.options import (
+    DRAWING,
+    OF_PAIR,
+    DrawingOptions,
+    FacesOption,
+    GsdOption,
+    LanguageOption,
+    PictureOptions,
+)
 from photocore.cli import print_result, progress_bar, remark
-from photocore.options import declared
+from photocore.option_types import Length
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption, RasterCogOption
 
 if TYPE_CHECKING:
     from bifocal.model.points import SurveyPoints
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class OrthoCommand:
+    """The options of ``bifocal ortho``, and examples.
+
+    bifocal ortho wall.pair.json --relief relief.tif --out ortho.tif
+    bifocal ortho porch.photos.json --relief relief.tif --out ortho.tif
+    bifocal ortho wall.pair.json --points result.xlsx --breakline P7,P8,P9 --out ortho.tif
+    bifocal ortho result.xlsx --out ortho.tif
+    bifocal ortho wall.pair.json --plane --gsd 5mm --bounds -4,0,4,7.5 --out flat.tif
+    bifocal ortho wall.pair.json --relief relief.tif --faces doors.dxf --out ortho.tif
+    bifocal ortho wall.pair.json --relief relief.tif --measured-only --out measured.tif
+    bifocal ortho wall.pair.json --relief relief.tif --deliver drawing --scale 1:50 --dpi 254
+                  --control control.csv --mark result.xlsx --section x=1.5
+                  --section y=2 --contours 0.05
+    """
+
+    pair: Annotated[Path, Argument()]
+    out: Path | None = None
+    """GeoTIFF to write."""
+    relief: Path | None = None
+    """Relief map of `bifocal relief`."""
+    points: Path | None = None
+    """Result of `bifocal solve`: relief between its points."""
+    breaklines: Annotated[tuple[str, ...], Typed(unit="ID,ID,...", flag="--breakline")] = ()
+    """Points along an edge that no triangle may cross; repeat it. With --points."""
+    plane: Annotated[float | None, Typed(Length(), "[M]", flag_value="0", is_flag=False)] = None
+    """No relief: the reference plane, or one so many metres before it."""
+    faces: FacesOption = None
+    gsd: GsdOption = None
+    picture: PictureOptions = field(default_factory=PictureOptions)
+    folder: Annotated[Path | None, Typed(unit="DIR", flag="--deliver")] = None
+    """Write GeoTIFF, PNG, DXF and PDF, of the relief too, into a folder. Needs --scale."""
+    drawing: DrawingOptions = field(default_factory=DrawingOptions)
+    control: Path | None = None
+    """Table of control points to draw."""
+    language: LanguageOption = "en"
+    """Of sheets and sections."""
+    title: str = ""
+    """Title of the drawing.  [default: the pair's name]"""
+    tfw: bool = False
+    """Also write the world file beside it."""
+    cog: RasterCogOption = False
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(OrthoCommand)
 def command(
     pair: Path, out: Path | None, relief: Path | None, points: Path | None, plane: float | None,
     folder: Path | None, title: str, tfw: bool, overwrite: bool, as_json: bool, **given: Any,

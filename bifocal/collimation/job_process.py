@@ -25,6 +25,7 @@ from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
 from bifocal.model.relief_map import ReliefMap
 from bifocal.networks.set_workflow import align_photo_set
+from bifocal.options.commands import RectifyCommand
 from bifocal.orientation.align_workflow import (
     AlignOptions,
     KnownLens,
@@ -164,7 +165,7 @@ def _frame(pair: Pair, table: Path, photos: int) -> float:
 
 def _rectify(task: Task, progress: Progress) -> dict[str, Any]:
     """Bring one photo alone to scale, with drawings."""
-    given = {name: one.fixed_default for name, one in options_of("bifocal", "rectify").items()}
+    given = {name: one.fixed_default for name, one in options_of(RectifyCommand).items()}
     given |= {"scale": 50.0, **task, "corners": np.ravel(task["corners"])}
     done = rectify_photo(
         Path(task["photo"]), Path(task["out"]), given, folder=Path(task["folder"]),
