@@ -97,6 +97,7 @@ def tank(form, tmp_path):
     return shutil.copyfile(form, tmp_path / "filled.xlsx")
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_a_form_filled_in_by_hand_shows_where_shot_rays_meet(tank, tmp_path):
     book = recalculated(tank, tmp_path)
@@ -341,19 +342,12 @@ def leaning_book(name, path, language="en"):
     return pair, pixels
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 @pytest.mark.parametrize(
     ("name", "language"),
-    [
-        ("port", "en"),
-        *(
-            pytest.param(name, language, marks=pytest.mark.acceptance)
-            for name, language in (
-                ("one", "it"), ("surface", "de"), ("gap", "en"),
-            )
-        ),
-    ],
-)  # fmt: skip
+    [("port", "en"), ("one", "it"), ("surface", "de"), ("gap", "en")],
+)
 def test_the_formulas_of_ports_that_lean_equal_the_library(name, language, tmp_path):
     path = tmp_path / "p.xlsx"
     pair, pixels = leaning_book(name, path, language)
