@@ -6,10 +6,9 @@ from itertools import groupby
 from pathlib import Path
 from string import Formatter
 
-import pytest
-
 from bifocal.remarks import in_language, remark
 from photocore.workbook.making.words import LANGUAGES
+from tests.tables import each
 
 CODE = {
     path: path.read_text(encoding="utf-8")
@@ -39,7 +38,7 @@ def said_of(section):
     return {one for text in CODE.values() for one in re.findall(rf"{stem}([\w{{}}' .]*)", text)}
 
 
-@pytest.mark.parametrize("section", SECTIONS)
+@each("section", SECTIONS)
 def test_a_remark_has_its_words_in_three_languages_with_the_same_blanks(section):
     for key in SECTIONS[section]:
         texts = remark.texts[key]
@@ -47,7 +46,7 @@ def test_a_remark_has_its_words_in_three_languages_with_the_same_blanks(section)
         assert all(blanks(texts[language]) == blanks(texts["en"]) for language in LANGUAGES), key
 
 
-@pytest.mark.parametrize("section", [section for section in SECTIONS if section != "word"])
+@each("section", [section for section in SECTIONS if section != "word"])
 def test_a_remark_is_known_by_its_words_wherever_it_stands(section):
     for key in SECTIONS[section]:
         texts, values = remark.texts[key], sample(remark.texts[key]["en"])
@@ -59,7 +58,7 @@ def test_a_remark_is_known_by_its_words_wherever_it_stands(section):
             assert in_language(f"pair.json: {told}", language) == f"pair.json: {words}"
 
 
-@pytest.mark.parametrize("section", [section for section in SECTIONS if section != "word"])
+@each("section", [section for section in SECTIONS if section != "word"])
 def test_a_remark_is_used(section):
     said = [re.split("[{']", one)[0] for one in said_of(section)]
     unused = [key for key in SECTIONS[section] if not key.split(".")[1].startswith(tuple(said))]
