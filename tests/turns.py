@@ -2,8 +2,8 @@
 
 Which third, the commit's hash says, so that landings take them all by and by, and a red run is
 red again at the same commit. Tests that recalculate with LibreOffice run every time. All run where
-files are named on the command line, where no commit is known, and with `BIFOCAL_TURN=all`, as
-before a release (`.ci/check long`); `BIFOCAL_TURN=0`, `1` or `2` names a third.
+files are named on the command line, where no commit is known, and with `TEST_TURN=all`, as before
+a release (`.ci/check long`); `TEST_TURN=0`, `1` or `2` names a third.
 """
 
 from __future__ import annotations
@@ -16,18 +16,24 @@ from pathlib import Path
 import pytest
 
 THIRDS = 3
+#: Where the turn is kept for the processes of the run.
+TURN = "TEST_TURN"
 
 
-def turn_of(commit: str, wish: str = "") -> int | None:
-    """Return which third is run; None for all of them."""
-    if wish:
-        return None if wish == "all" else int(wish) % THIRDS
-    return int(commit, 16) % THIRDS if commit else None
+def turn_of(commit: str) -> str:
+    """Return which third is run at a commit; without one, all."""
+    return str(int(commit, 16) % THIRDS) if commit else "all"
 
 
-def is_in_turn(name: str, turn: int | None) -> bool:
+def is_in_turn(name: str, turn: str) -> bool:
     """Return whether a test of this id runs; cases of one test are dealt one by one."""
-    return turn is None or zlib.crc32(name.encode()) % THIRDS == turn
+    return turn == "all" or zlib.crc32(name.encode()) % THIRDS == int(turn)
+
+
+def choose(config: pytest.Config) -> None:
+    """Set the turn of a run; its workers, which are given every argument, take it over."""
+    named = config.args_source is pytest.Config.ArgsSource.ARGS
+    os.environ.setdefault(TURN, "all" if named else turn_of(_commit()))
 
 
 def _commit() -> str:
@@ -38,18 +44,14 @@ def _commit() -> str:
         return ""
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+def leave_out(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out the slow tests whose turn it is not."""
-    named = config.invocation_params.args and config.args_source.name == "ARGS"
-    if named or "not acceptance" in (config.option.markexpr or ""):
-        return
-    turn = turn_of(_commit(), os.environ.get("BIFOCAL_TURN", ""))
-    waiting = {
+    waiting = [
         item
         for item in items
         if item.get_closest_marker("acceptance")
         and not item.get_closest_marker("office")
-        and not is_in_turn(item.nodeid, turn)
-    }
-    config.hook.pytest_deselected(items=list(waiting))
-    items[:] = [item for item in items if item not in waiting]
+        and not is_in_turn(item.nodeid, os.environ.get(TURN, "all"))
+    ]
+    config.hook.pytest_deselected(items=waiting)
+    items[:] = [item for item in items if item not in set(waiting)]
