@@ -17,8 +17,10 @@ from PIL import Image
 
 from bifocal import Grid, Pair, ReliefMap
 from bifocal.model.geotiff import RasterReader
+from bifocal.orthophotos.canvas import Pen, text_width
 from bifocal.orthophotos.deliver_workflow import DeliverTask, _notes
 from bifocal.orthophotos.ortho_workflow import OrthoTask
+from bifocal.orthophotos.pdf_sheet import _PdfCanvas
 from bifocal.remarks import remark
 from tests.bifocal.orthophotos.ortho_command import GSD, page_of, run, write_wall
 
@@ -388,3 +390,12 @@ def test_the_title_block_states_no_sigma_that_the_check_points_or_the_model_gain
     assert ("THE MODEL DOES NOT FIT" in plain) != fits
     assert "20 Kontrollpunkte weichen um 20 mm in der Lage, 67 mm im Relief ab" in proven
     assert "Sigma" not in proven
+
+
+def test_words_in_the_middle_of_a_place_stay_there_when_they_are_turned() -> None:
+    for angle, (x, y) in ((0.0, (-1, 0)), (90.0, (0, -1)), (180.0, (1, 0))):
+        canvas = _PdfCanvas()
+        canvas.text((30.0, 20.0), "ABC", Pen("X"), size=2.0, middle=True, angle=angle)
+        half = text_width("ABC", 2.0) / 2
+        (place,) = re.findall(r"(\S+) (\S+) Tm", canvas.parts[-1])
+        assert [float(v) for v in place] == pytest.approx([30 + x * half, 20 + y * half], abs=1e-4)

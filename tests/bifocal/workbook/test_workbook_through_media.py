@@ -486,3 +486,14 @@ def test_the_heading_of_the_slopes_says_what_they_are(tmp_path):
     labels = {cell.value: sheet.cell(3, cell.column).value for cell in sheet[4]}
     assert labels["den"] == "T2 - T1 of the rays [mm/m]"
     assert "image 2" in labels["tan2"]
+
+
+def test_coordinates_corrected_by_the_plane_say_at_which_images_scale_they_are():
+    """Through media image 2 keeps its own scale; in air it takes that of image 1."""
+    for name, image in (("tank", 2), ("air", 1)):
+        picks = measured("tank", np.column_stack([POINTS[:, :2] * [1, 1.3], np.zeros(5)]))
+        pair = Pair.from_dict(content("tank"))
+        pair = pair if name == "tank" else pair.in_air()
+        codes = picks | {"code": ["PLANE"] * 5}
+        found = solve(codes, pair=pair, measuring=PICKS, adjust_setup=True)
+        assert any(f"at the scale of image {image}" in said for said in map(str, found.remarks))
