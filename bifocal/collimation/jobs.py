@@ -16,6 +16,7 @@ from bifocal.collimation.background import in_background
 from bifocal.collimation.wording import without_options
 from bifocal.remarks import remark
 from photocore.errors import InputError, PhotogrammetryError
+from photocore.remarks import learn
 
 #: Plain data, as it goes to the worker and comes back.
 Task = dict[str, Any]
@@ -223,6 +224,7 @@ class JobRunner:
         for line in process.stdout:
             try:
                 told = json.loads(line)
+                learn(told)
             except ValueError:
                 continue
             if "progress" in told and job.state == "running":
