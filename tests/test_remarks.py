@@ -84,8 +84,8 @@ def test_what_holds_no_remark_stays_as_it_is():
     assert in_language(like_one, "de") == like_one
 
 
-@pytest.mark.parametrize("language", LANGUAGES)
-@pytest.mark.parametrize("section", [section for section in SECTIONS if section != "word"])
+@each("language", LANGUAGES)
+@each("section", [section for section in SECTIONS if section != "word"])
 def test_names_that_read_like_words_of_a_remark_stay_whole(section, language):
     for key in SECTIONS[section]:
         texts = remark.texts[key]
