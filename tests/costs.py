@@ -1,4 +1,4 @@
-"""What the tests cost in CPU seconds, with all they start, and which cost much for no stated reason.
+"""What the tests cost in CPU seconds, with all they start; dear ones must say what only they see.
 
     .venv/bin/python -m tests.costs                     the default tests against `tests/costs.json`
     .venv/bin/python -m tests.costs tests/papers        some of them
