@@ -398,7 +398,7 @@ def test_the_title_block_states_no_sigma_that_the_check_points_or_the_model_gain
 def test_words_in_the_middle_of_a_place_stay_there_when_they_are_turned() -> None:
     for angle, (x, y) in ((0.0, (-1, 0)), (90.0, (0, -1)), (180.0, (1, 0))):
         canvas = _PdfCanvas()
-        canvas.text((30.0, 20.0), "ABC", Pen("X"), size=2.0, middle=True, angle=angle)
+        canvas.text((30.0, 20.0), "ABC", Pen(layer="X"), size=2.0, middle=True, angle=angle)
         half = text_width("ABC", 2.0) / 2
         (place,) = re.findall(r"(\S+) (\S+) Tm", canvas.parts[-1])
         assert [float(v) for v in place] == pytest.approx([30 + x * half, 20 + y * half], abs=1e-4)
