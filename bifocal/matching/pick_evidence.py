@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from bifocal.model.hypotheses import Picks, PickSlip, picks_meant
 from bifocal.model.homography import apply_homography
+from bifocal.model.hypotheses import Picks, PickSlip, picks_meant
 from bifocal.model.interior_orientation import Images
+from bifocal.remarks import remark
 from photocore.arrays import ByteArray, FloatArray
 
 
@@ -56,6 +57,15 @@ class PickVerdict:
     likeness: FloatArray
     slip: PickSlip | None = None
     moved: tuple[int, int] | None = None
+
+    @property
+    def words(self) -> str:
+        """What is to be said of it; empty where the photos agree with the picks."""
+        if self.slip is not None:
+            return remark(f"picks.{self.slip.key}")
+        if self.moved is not None:
+            return remark("picks.moved", right=self.moved[0], down=self.moved[1])
+        return remark("picks.alien") if self.are_alien else ""
 
     @property
     def are_alien(self) -> bool:

@@ -45,7 +45,7 @@ def _from_bottom(picks: Picks, sizes: Sizes) -> Picks:
 
 def _enlarged(times: float) -> Callable[[Picks, Sizes], Picks]:
     """Return picks of copies so many times smaller, pixel centres at integers."""
-    return lambda picks, sizes: (
+    return lambda picks, _: (
         times * (picks[0] + 0.5) - 0.5,
         times * (picks[1] + 0.5) - 0.5,
     )
@@ -53,7 +53,7 @@ def _enlarged(times: float) -> Callable[[Picks, Sizes], Picks]:
 
 #: Of the pixels of both photos.
 PICKS = (
-    PickSlip("picks", lambda picks, sizes: picks[::-1]),
+    PickSlip("picks", lambda picks, _: picks[::-1]),
     PickSlip("control_rows", _from_bottom, mended=False),
     *(PickSlip(f"copies_{times}", _enlarged(times)) for times in (2, 4)),
 )

@@ -35,7 +35,6 @@ from bifocal.orientation.orientation_remarks import (
     hopeless_shape,
     model_remarks,
     order_remarks,
-    pick_remarks,
     wall_remarks,
 )
 from bifocal.orientation.orientation_stages import (
@@ -221,7 +220,7 @@ def _with_words(pair: OrientedPair, given: Given, remarks: tuple[str, ...]) -> O
     validation.check_movement(pair.adjusted)
     told = (
         *model_remarks(pair, given.site),
-        *pick_remarks(given.pick_verdict),
+        *filter(None, [given.pick_verdict.words]),
         *remarks,
         *pair.remarks,
         *wall_remarks(pair),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.matching.pick_evidence import PickVerdict
 from bifocal.orientation.adjustment.pair_observations import PairObservations
 from bifocal.orientation.alignment import standard_deviations, wall_relief
 from bifocal.orientation.control_points import Control, SiteMeasures
@@ -85,15 +84,6 @@ def order_remarks(order: float, names: tuple[str, str]) -> list[str]:
     if order > ORDER.sure:
         return []
     return [remark("orientation.near_unsure", name=names[1])]
-
-
-def pick_remarks(verdict: PickVerdict) -> list[str]:
-    """Return that the photos show other things where the control points were picked."""
-    if verdict.slip is not None:
-        return [remark(f"picks.{verdict.slip.key}")]
-    if verdict.moved is not None:
-        return [remark("picks.moved", right=verdict.moved[0], down=verdict.moved[1])]
-    return [remark("picks.alien")] if verdict.are_alien else []
 
 
 def wall_remarks(pair: OrientedPair) -> list[str]:

@@ -174,9 +174,12 @@ def _of_control(typed: Typed, now: TrialOrientation | None) -> Iterator[Slip]:
     control, count = typed.control, len(typed.control.ids)
     xyz, (first, second) = control.xyz, typed.interiors
     same = first.image_size == second.image_size and typed.site.wall is None
-    by_number = [(i.is_typed or i.is_calibrated, i.is_assumed) for i in typed.interiors]
-    if same and by_number[0] == by_number[1] and any(by_number[0]):  # else EXIF goes with its file
-        yield Slip(meant=replace(typed, exchanged=True), words=remark("slips.photos"))
+    if same and first.is_typed == second.is_typed:
+        # A focal length of the EXIF data goes with its file, one that was typed with its number.
+        by_number = first.is_typed or any(i.is_assumed or i.is_calibrated for i in typed.interiors)
+        lenses = typed.interiors if by_number else (second, first)
+        meant = replace(typed, exchanged=True, interiors=lenses)
+        yield Slip(meant=meant, words=remark("slips.photos"))
     sizes = first.image_size, second.image_size
     for slip, (pixels1, pixels2) in picks_meant((control.pixels1, control.pixels2), sizes):
         meant = replace(control, pixels1=pixels1, pixels2=pixels2)
@@ -184,9 +187,7 @@ def _of_control(typed: Typed, now: TrialOrientation | None) -> Iterator[Slip]:
         yield Slip(meant=replace(typed, control=meant), words=words, mended=slip.mended)
     for key, axes in COORDINATES.items():
         meant = replace(control, xyz=axes(xyz))
-        yield Slip(
-            meant=replace(typed, control=meant), words=remark(f"slips.{key}"), mended=False
-        )
+        yield Slip(meant=replace(typed, control=meant), words=remark(f"slips.{key}"), mended=False)
     few = list(range(count)) if now is None else np.flatnonzero(now.lost).tolist()
     for a, b in combinations(few, 2) if len(few) <= 7 else ():
         order = np.arange(count)
