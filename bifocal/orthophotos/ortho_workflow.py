@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, fields
@@ -175,6 +176,8 @@ def make_ortho(
             )  # fmt: skip
             if counts[0] == total and not hidden:
                 raise InputError(remark("ortho.nothing_in_common"))
+            basis = _basis(counts, flat=isinstance(beneath(surface), FlatSurface))
+            writer.tag(BIFOCAL_BASIS=json.dumps({key: round(v, 4) for key, v in basis.items()}))
     shares = {source.name.lower(): float(counts[source]) / total for source in Source}
     if isinstance(pair, PhotosOfSet):
         for number, photo in enumerate(pair.photos, start=OF_SET + 1):
@@ -183,7 +186,6 @@ def make_ortho(
     for thing in moved:
         words = "ortho.moved" if thing.drawn_from_second else "ortho.occluder"
         notes.append(remark(words, x=thing.place[0], y=thing.place[1], area=thing.area))
-    basis = _basis(counts, flat=isinstance(beneath(surface), FlatSurface))
     if task.relief and basis["plane"] > PIXELS.rectified:
         notes.append(remark("ortho.rectified", share=basis["plane"]))
     notes += [] if isinstance(pair, PhotoAlone | PhotosOfSet) else _advice(shares, task)
