@@ -117,7 +117,7 @@ def image_info(path: Path | str) -> ImageInfo:
     if path.suffix.lower() in RAW_ENDINGS:
         size, exif = raw_info(path)
         return _info_from_exif(path, size, 16, exif)
-    formats = FORMATS
+    formats: tuple[str, ...] = FORMATS
     if path.suffix.lower() in HEIF_ENDINGS:
         open_heif(path)
         formats = (*FORMATS, "HEIF")
