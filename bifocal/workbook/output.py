@@ -129,7 +129,7 @@ def _update(path: Path, solution: SolvedSurvey, content: SurveyContent, *, overw
     if done.added:
         titles = ", ".join(done.added)
         kept = f"missing sheets were added again, behind all others: {titles}; {kept}".rstrip("; ")
-    return kept
+    return " ".join([kept, *done.remarks]).strip()
 
 
 def _options(solution: SolvedSurvey) -> dict[str, Any]:
