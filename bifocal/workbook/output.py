@@ -149,11 +149,12 @@ def _add_columns(
     if solution.source.suffix.lower() not in (".xlsx", ".xlsm"):
         raise InputError(remark("survey.no_macros", of=path))
     own = as_typed(solution, content)
-    kept = add_results(
+    done = add_results(
         solution.source, path, solution.survey, own, given=_options(solution), overwrite=overwrite
     )
     said = "the results are new columns of your table"
-    return f"{said}; {_kept_as(kept)}" if kept else f"{said}."
+    said = f"{said}; {_kept_as(done.kept)}" if done.kept else f"{said}."
+    return " ".join([said, *done.remarks])
 
 
 def _left_behind(solution: SolvedSurvey) -> str:

@@ -210,19 +210,24 @@ def update_book(
     _verdict(editor, built, content, rules="rules" in given, words=other_words)
     _charts(editor, built, rows)
     _log(editor, content)
+    return replace(saved(editor, built, target, overwrite=overwrite), added=tuple(added))
+
+
+def saved(
+    editor: WorkbookEditor, built: BookBuilder, target: Path, *, overwrite: bool
+) -> BookUpdate:
+    """Write a changed workbook; where formulas of ours were changed too, with what they give."""
     changed = changed_formulas(editor, *_results_of(editor, built))
-    settling = Settling()
+    settling, remarks = Settling(), list[str]()
     kept = editor.save(target, overwrite=overwrite, settle=settling if changed else None)
-    about = {"cells": _few(changed), "results": len(settling.cells)}
-    remarks = [remark("survey.own_formulas", **about)] if changed else []
+    if changed:
+        cells = ", ".join(changed[:5]) + (", ..." if len(changed) > 5 else "")
+        count = len(settling.cells)
+        remarks.append(remark("survey.own_formulas", cells=cells, results=count))
     if settling.unknown:
         words = ", ".join(f"{word} ({cell})" for word, cell in settling.unknown.items())
         remarks.append(remark("survey.unknown_functions", names=words))
-    return BookUpdate(kept=kept, added=tuple(added), remarks=tuple(remarks))
-
-
-def _few(cells: Sequence[str]) -> str:
-    return ", ".join(cells[:5]) + (", ..." if len(cells) > 5 else "")
+    return BookUpdate(kept=kept, added=(), remarks=tuple(remarks))
 
 
 def _results_of(
