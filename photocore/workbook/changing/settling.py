@@ -16,6 +16,7 @@ from openpyxl import load_workbook
 from photocore.workbook.calculation import Calculation, Unknown
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.changing.editor import WorkbookEditor
+from photocore.workbook.making.newbook import is_untouched
 from photocore.workbook.reading.grid import CellFault, Value, cell_name, column_number
 from photocore.workbook.reading.package import open_package, read_part, rewrite_package
 from photocore.workbook.reading.xmltext import unescaped
@@ -24,10 +25,7 @@ from photocore.workbook.reading.xmltext import unescaped
 ALIKE = 1e-9
 #: Formulas of a workbook that are calculated at most; one takes 0.2 ms.
 MOST = 100_000
-_TEXT = re.compile(rb"<(?:\w+:)?f(?: [^>]*[^/>])?>([^<]+)<")
-_CELL = re.compile(
-    rb'<(?:\w+:)?c (?:[^>]*? )?r="([A-Z]+)(\d+)"[^>]*>\s*<(?:\w+:)?f(?: [^>]*[^/>])?>([^<]+)<'
-)
+_CELL = re.compile(rb'r="([A-Z]+)(\d+)"[^>]*>\s*+<(?:\w+:)?f(?: [^>]*[^/>])?>([^<]+)<')
 _RELATIVE = re.compile(r"(?<![\w$!'.:\[])([A-Z]{1,3})\d+(?![\w(\]])")
 
 #: A column's number and its rows, first and last.
@@ -53,19 +51,22 @@ def changed_formulas(
     places : mapping
         Sheet to the columns, or single cells, where results stand.
     """
-    changed = []
+    changed: list[str] = []
+    if is_untouched(editor.path):
+        return changed
     with open_package(editor.path) as package:
         for sheet in editor.book.sheets:
             columns = places.get(sheet.title, ())
             data = read_part(editor.path, package, sheet.part) if columns else b""
-            texts = {text: _normal(text) for text in set(_TEXT.findall(data))}
-            foreign = {text for text, form in texts.items() if form not in ours}
-            if not foreign:
-                continue
+            cells = _CELL.findall(data)
+            # Formulas that differ in the number of their row alone are looked at once.
+            forms = [text.replace(row, b"#") for _, row, text in cells]
+            texts = dict(zip(forms, (text for _, _, text in cells), strict=True))
+            normals = {form: _normal(text) for form, text in texts.items()}
             found = {
-                (int(row), column_number(letters.decode())): texts[text]
-                for letters, row, text in _CELL.findall(data)
-                if text in foreign
+                (int(row), column_number(letters.decode())): normals[form]
+                for (letters, row, _), form in zip(cells, forms, strict=True)
+                if normals[form] not in ours
             }
             changed += [f"{sheet.title}!{cell_name(*at)}" for at in _deviating(found, columns)]
     return changed
