@@ -255,6 +255,8 @@ def _results_of(
     if isinstance(editor, PlainEditor):
         return ours, {}  # its formulas are the cells' own, none like another
     for name, defined in built.book.defined_names.items():
+        if name.startswith("unprinted_"):
+            continue  # follows how many points there were
         sheet, _, cell = defined.attr_text.replace("$", "").partition("!")
         place = place_of(editor, name)
         if place and ":" not in cell and built.book[plain_title(sheet)][cell].data_type == "f":
