@@ -133,8 +133,13 @@ def _texts(texts: ArrayLike, bad: ArrayLike = False) -> Cells:
 
 def _spread(*cells: Cells) -> list[Cells]:
     shape = np.broadcast_shapes(*(one.numbers.shape for one in cells))
-    parts = ((one, (one.numbers, one.kinds, one.texts)) for one in cells)
-    return [Cells(*(np.broadcast_to(p, shape) for p in own), one.size) for one, own in parts]
+    return [
+        Cells(
+            np.broadcast_to(one.numbers, shape), np.broadcast_to(one.kinds, shape),
+            np.broadcast_to(one.texts, shape), one.size,
+        )
+        for one in cells
+    ]  # fmt: skip
 
 
 def _as_numbers(cells: Cells) -> tuple[FloatArray, BoolArray]:
@@ -225,7 +230,7 @@ class _Reader:
             case {"number": number}:
                 return "value", _numbers([[float(number)]])
             case {"text": text}:
-                return "value", _texts([[text.replace('""', '"')]])
+                return "value", _texts([[str(text).replace('""', '"')]])
             case {"error": _}:
                 return "value", _numbers([[np.nan]])
             case {"table": table, **column}:
@@ -612,7 +617,7 @@ class Calculation:
         kind, *parts = node
         match kind:
             case "value":
-                return parts[0]  # type: ignore[no-any-return]
+                return parts[0]
             case "sign":
                 sign, one, other = parts
                 return _signed(sign, self._value(one, where), self._value(other, where))
@@ -689,8 +694,11 @@ class Calculation:
             column = column_number(letters)
             if number == "0":  # the row where the formula stands
                 own = [self._cell(title, row, column) for row in rows]
-                return Cells(*(np.concatenate([getattr(c, part) for c in own])
-                               for part in ("numbers", "kinds", "texts")))  # fmt: skip
+                return Cells(
+                    np.concatenate([one.numbers for one in own]),
+                    np.concatenate([one.kinds for one in own]),
+                    np.concatenate([one.texts for one in own]),
+                )
             return self._cell(title, int(number), column)
         top, left, bottom, right = split_area(area)
         bottom, right = (
@@ -735,7 +743,9 @@ _ROW_CELL = re.compile(r"(?<![\w$!'.:\"])([A-Z]{1,3})(\d+)(?![\w(:.!\"])")
 def _no_blank(cells: Cells, rows: int) -> Cells:
     """Return what formulas show, one a row: 0 for a cell that is blank."""
     shape = (rows, 1)
-    parts = (np.broadcast_to(p[:, :1], shape) for p in (cells.numbers, cells.kinds, cells.texts))
-    numbers, kinds, texts = parts
-    return Cells(numbers.copy(), np.where(kinds == BLANK, NUMBER, kinds).astype(np.uint8),
-                 texts.copy())  # fmt: skip
+    kinds = np.broadcast_to(cells.kinds[:, :1], shape)
+    return Cells(
+        np.broadcast_to(cells.numbers[:, :1], shape).copy(),
+        np.where(kinds == BLANK, NUMBER, kinds).astype(np.uint8),
+        np.broadcast_to(cells.texts[:, :1], shape).copy(),
+    )

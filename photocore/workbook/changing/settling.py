@@ -92,9 +92,9 @@ def _deviating(
     long = [one for one in columns if one[2] > one[1]]
     whole = [c for c, own in rows.items() if c in long and len(own) > (c[2] - c[1] + 1) / 2]
     if 2 * len(whole) > len(long):
-        for column in whole:
-            most = Counter(found[at] for at in rows[column]).most_common(1)[0][0]
-            rows[column] = [at for at in rows[column] if found[at] != most]
+        for place in whole:
+            most = Counter(found[at] for at in rows[place]).most_common(1)[0][0]
+            rows[place] = [at for at in rows[place] if found[at] != most]
     return [at for own in rows.values() for at in own]
 
 
