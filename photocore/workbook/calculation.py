@@ -236,7 +236,7 @@ class _Reader:
             case {"table": table, **column}:
                 return "table", table, column.get("part", ""), column.get("key") or column["whole"]
             case {"area": area, **place}:
-                title = place.get("quoted", place.get("sheet", "")).replace("''", "'")
+                title = str(place.get("quoted", place.get("sheet", ""))).replace("''", "'")
                 return "area", title, area.replace("$", "")
             case {"function": name}:
                 return "call", name.upper().removeprefix("_XLFN."), *self.arguments()
@@ -578,7 +578,7 @@ class Calculation:
             self._known[at] = None  # meanwhile: met again, it follows from itself
             try:
                 self._known[at] = make()
-            except Unknown as why:
+            except (Unknown, ValueError, IndexError, OverflowError) as why:
                 self._known[at] = str(why)
                 self.unknown.setdefault(str(why), f"{at[0]}!{column_letters(at[-1])}{at[1]}")
             except RecursionError:
