@@ -18,6 +18,7 @@ from typing import Any
 import click
 
 from photocore.option_types import Length, Names, Number, Numbers, Scale, Size, TableFile
+from photocore.provenance import changed_photos
 
 
 class Option:
@@ -178,6 +179,10 @@ def _enter_cog(ctx: click.Context, param: click.Parameter, value: bool) -> None:
         ctx.with_resource(cloud_optimised())
 
 
+def _take_changes(ctx: click.Context, param: click.Parameter, value: bool) -> None:  # noqa: ARG001
+    ctx.with_resource(changed_photos(taken=value))
+
+
 def _thousandth(value: float) -> float:
     """Return metres of millimetres, or millimetres of micrometres."""
     return value / 1000
@@ -185,6 +190,7 @@ def _thousandth(value: float) -> float:
 
 #: What a row's ``kind`` stands for, given the limits it states.
 KINDS: dict[str, Callable[..., Any]] = {
+    "changed photos": partial(dict, is_flag=True, expose_value=False, callback=_take_changes),
     "choice": click.Choice,
     "cog": partial(dict, is_flag=True, expose_value=False, callback=_enter_cog),
     "degrees": partial(Number, to=math.radians),

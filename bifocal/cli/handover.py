@@ -20,4 +20,4 @@ def command(pair: Path, out: Path, overwrite: bool, as_json: bool, **given: Any)
 
     told = write_handover(pair, out, HandoverTask(**given), overwrite=overwrite)
     line = f"{out} written, {told['bytes'] / 1e6:.1f} MB."
-    print_result(told, (line,), as_json=as_json)
+    print_result(told, (line,), as_json=as_json, remarks=told["remarks"])

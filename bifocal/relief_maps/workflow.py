@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from bifocal.faces.faces import Faces
 from bifocal.faces.faces_files import given_faces
 from bifocal.faces.suggestions import suggest_faces
+from bifocal.files.made_from import MadeFrom
 from bifocal.files.photos import photo_infos
 from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
@@ -107,6 +108,7 @@ def relief_of_pair(
         "BIFOCAL_D1": f"{pair.image1.distance:.6g}",
         "BIFOCAL_D2": f"{pair.image2.distance:.6g}",
         "BIFOCAL_PAIR": named or str(pair.extra.get("name", "")),
+        **MadeFrom.of(of_set, faces=(faces or Faces()).digest).tags(),
     }
     result.write(job.out, overwrite=job.overwrite, tags=tags)
     written = [job.out]
