@@ -295,6 +295,17 @@ def changed_photos(*, taken: bool = True) -> Iterator[None]:
     ----------
     taken : bool
         False: nothing changes.
+
+    Yields
+    ------
+    None
+        Photos, relief maps and orthophotos are read within.
+
+    Examples
+    --------
+    >>> with changed_photos():
+    ...     print("whatever lies beside the pair file is taken")
+    whatever lies beside the pair file is taken
     """
     before = os.environ.get(_CHANGED)
     if taken:
