@@ -86,7 +86,7 @@ class MadeFrom:
     def differences(self, now: MadeFrom) -> Iterator[str]:
         """Yield which causes are others now: ``pair``, ``photos``, ``relief``, ``faces``.
 
-        One camera in common is enough: a set and a pair of its photos lie in one frame.
+        A set and a pair of its photos lie in one frame: the cameras of one are among the other's.
         """
         shared = self.cameras.keys() & now.cameras.keys()
         alike = any(
@@ -94,9 +94,9 @@ class MadeFrom:
             for before in self.distances
             for after in now.distances
         )
-        if (self.cameras and now.cameras and not shared) or (
-            self.distances and now.distances and not alike
-        ):
+        if (
+            self.cameras and now.cameras and len(shared) < min(len(self.cameras), len(now.cameras))
+        ) or (self.distances and now.distances and not alike):
             yield "pair"
         files = [(self.cameras[key], now.cameras[key]) for key in shared]
         if any(before and after and before != after for before, after in files):

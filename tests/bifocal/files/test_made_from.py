@@ -145,6 +145,11 @@ def test_the_same_distances_before_another_homography_are_another_pair(wall):
     assert "made from another pair" in ortho(wall, "--relief", moved).stderr
 
 
+def test_one_camera_in_common_does_not_make_it_the_same_pair(wall):
+    relief = flat(wall.parent, "r.tif", photo(18.0, "far.png"), photo(9.5, "near.png"))
+    assert "made from another pair" in ortho(wall, "--relief", relief).stderr
+
+
 def test_maps_of_older_versions_are_judged_by_their_distances(wall):
     grid = bifocal.Grid.from_bounds((-1.5, -1.0, 1.5, 1.0), gsd=0.1)
     relief = ReliefMap.from_relief(
