@@ -12,10 +12,11 @@ import numpy as np
 
 from bifocal.faces.faced_surface import FacedSurface, beneath
 from bifocal.faces.faces import Faces
-from bifocal.faces.faces_files import given_faces
+from bifocal.faces.faces_files import check_faces, given_faces
 from bifocal.files.made_from import MadeFrom, check_maps, photos_of
 from bifocal.files.photos import photo_info
 from bifocal.files.point_tables import read_survey_points
+from bifocal.model.doubts import check_scale, unit_of
 from bifocal.model.geotiff import (
     RasterReader,
     bytes_in_words,
@@ -136,6 +137,8 @@ def make_ortho(
     """
     check_ending(out, ORTHO_ENDING, ".tif", ".tiff")
     pair = PhotosOfSet.of(pair_path)
+    if task.scale:
+        check_scale(pair.extra, pair_path if isinstance(pair_path, Path) else "")
     check_not_input(out, task.relief, *pair.photo_files)
     check_writable(out, overwrite=overwrite)
     with open_surface(task, pair) as (surface, _, remarks):
@@ -243,6 +246,7 @@ def open_surface(
 ) -> Iterator[tuple[Surface, RasterReader | None, tuple[str, ...]]]:
     """Yield the relief asked for, checked against the cameras' distances, its map, and remarks."""
     faces, told = given_faces(task.faces)
+    told += check_faces(faces, photos_of(pair))
     if task.relief is not None:
         now = MadeFrom.of(photos_of(pair), faces=(faces or Faces()).digest)
         told += check_maps(now, relief=task.relief)
@@ -373,6 +377,7 @@ def _tags(pair: Pair, task: OrthoTask) -> dict[str, str]:
     return {
         "BIFOCAL_IMAGE": "all" if isinstance(pair, PhotosOfSet) else task.photo_words,
         "BIFOCAL_RELIEF": relief.name if relief else f"plane r = {task.plane:g} m",
+        "BIFOCAL_UNIT": unit_of(pair.extra),
         "BIFOCAL_D1": f"{pair.image1.distance:.6g}",
         **({} if isinstance(pair, PhotoAlone) else {"BIFOCAL_D2": f"{pair.image2.distance:.6g}"}),
         **({"BIFOCAL_SCALE": f"1:{task.scale:g}"} if task.scale else {}),

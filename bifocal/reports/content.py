@@ -14,6 +14,7 @@ import numpy as np
 from bifocal.files.made_from import MadeFrom, check_maps, photos_of
 from bifocal.files.photos import photo_infos
 from bifocal.files.strips import ROWS, colour_strips
+from bifocal.model.doubts import check_scale
 from bifocal.model.geotiff import RasterReader
 from bifocal.model.grid import Bounds
 from bifocal.model.pair import Pair
@@ -289,6 +290,8 @@ def read_content(source: Path, task: ReportTask, *, pictures: bool = True) -> Pa
                 columns=task.columns,
             )  # fmt: skip
     if named is not None:
+        if task.scale:
+            check_scale(named.extra, source)
         remarks = check_maps(MadeFrom.of(photos_of(named)), relief=task.relief, ortho=task.ortho)
         pair = replace(pair, remarks=(*pair.remarks, *remarks)) if remarks else pair
     ortho, gsd = (None, 0.0) if task.ortho is None else ortho_thumbnail(task.ortho)

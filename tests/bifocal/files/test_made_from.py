@@ -190,3 +190,33 @@ def test_a_hash_is_taken_once_while_size_and_time_stay(wall, monkeypatch):
     assert known_hash(path) != "read again"
     os.utime(path, (2, 2))
     assert known_hash(path) == "read again"
+
+
+def face(folder, r, x=0.0):
+    ring = [[x, 0.0], [x + 0.5, 0.0], [x + 0.5, 0.5], [x, 0.0]]
+    one = {"type": "Feature", "geometry": {"type": "Polygon", "coordinates": [ring]},
+           "properties": {"kind": "face", "name": "door", "relief": r}}  # fmt: skip
+    path = folder / "f.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": [one]}))
+    return path
+
+
+@pytest.mark.parametrize("r", [-240.0, 9.6])
+@pytest.mark.parametrize("command", ["relief", "ortho"])
+def test_a_face_where_no_wall_can_be_is_refused_and_not_kept(wall, r, command, monkeypatch):
+    monkeypatch.chdir(wall.parent)
+    words = {"relief": (), "ortho": ("--plane", "0")}[command]
+    done = run(command, wall.name, *words, "--faces", face(wall.parent, r), "--out", "x.tif")
+    assert done.exit_code == 1, done.output
+    assert "face door" in done.stderr
+    assert "in metres" in done.stderr
+    assert not (wall.parent / "x.tif").exists()
+    assert not (wall.parent / "w.faces.geojson").exists()
+
+
+def test_a_face_that_no_photo_shows_is_named_and_one_in_the_picture_is_not(wall):
+    def said(x):
+        return ortho(wall, "--plane", "0", "--faces", face(wall.parent, -0.2, x)).stderr
+
+    assert "no photo shows it" in said(600.0)
+    assert "no photo shows it" not in said(0.2)

@@ -165,11 +165,11 @@ class App {
   reach() {
     const { online, locked, unsent } = this.connection;
     const { workbook_waiting: waiting } = this.state;
-    const key = locked ? "link.locked" : !online ? "link.away" : waiting ? "link.waiting" : unsent.length ? "link.sending" : "link.saved";
+    const key = locked ? "link.locked" : !online ? "link.away" : unsent.length ? "link.sending" : waiting ? "link.waiting" : "link.saved";
     const words = t(key, { count: unsent.length });
     setText(this.link, words);
     this.link.title = waiting ?? words;
-    this.link.dataset.level = locked || !online ? "warn" : waiting ? "fair" : "good";
+    this.link.dataset.level = locked || !online ? "warn" : waiting || unsent.length ? "fair" : "good";
   }
 
   /** Far and near the other way round: what is picked goes along, an orientation has to be made anew. */
