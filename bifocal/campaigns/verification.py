@@ -205,12 +205,9 @@ def _no_files(folder: Path, hashes: Mapping[str, str]) -> Iterator[FileState]:
     """Yield links that lead out of the delivery, to folders or nowhere, and what is no file."""
     for path in sorted(folder.rglob("*")):
         name = path.relative_to(folder).as_posix()
-        shown = not any(part[0] == "." for part in path.relative_to(folder).parts)
-        if (
-            shown
-            and name not in hashes
-            and (path.is_symlink() or not (path.is_file() or path.is_dir()))
-        ):
+        hidden = any(part[0] == "." for part in path.relative_to(folder).parts)
+        plain = path.is_file() or path.is_dir()
+        if name not in hashes and not hidden and (path.is_symlink() or not plain):
             yield FileState(file=name, state="not listed", why="a link or pipe, not a file")
 
 
