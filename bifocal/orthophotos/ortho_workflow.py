@@ -30,7 +30,7 @@ from bifocal.model.pair import Pair
 from bifocal.model.photo_alone import PhotoAlone
 from bifocal.model.photo_set import PhotoSet
 from bifocal.model.photos_of_set import PhotosOfSet
-from bifocal.model.points import SurveyPoints
+from bifocal.model.points import Points
 from bifocal.model.relief_map import measured_part, told_pixels
 from bifocal.model.surface import EVERYWHERE, FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.compose import choose_grid, render
@@ -63,7 +63,7 @@ class OrthoTask:
     ----------
     relief : Path, optional
         Relief map; else ``points``, else the plane ``r = plane``.
-    points : Path or SurveyPoints, optional
+    points : Path or Points, optional
         Points, or the workbook or table that holds them.
     breaklines : sequence of sequences of str
         Ids of points along edges.
@@ -90,7 +90,7 @@ class OrthoTask:
     """
 
     relief: Path | None = None
-    points: Path | SurveyPoints | None = None
+    points: Path | Points | None = None
     breaklines: Sequence[Sequence[str]] = ()
     plane: float = 0.0
     faces: Faces | Path | None = None
@@ -302,7 +302,7 @@ def open_surface(
 
 
 def _triangles(
-    source: Path | SurveyPoints, breaklines: Sequence[Sequence[str]]
+    source: Path | Points, breaklines: Sequence[Sequence[str]]
 ) -> tuple[TriangleSurface, tuple[str, ...]]:
     """Return the surface through the useful points of a table, and remarks."""
     points, notes = survey_points_of(source)
@@ -330,9 +330,9 @@ def _triangles(
         return TriangleSurface(used.xyz, lines), tuple(remarks)
 
 
-def survey_points_of(source: Path | SurveyPoints) -> tuple[SurveyPoints, tuple[str, ...]]:
+def survey_points_of(source: Path | Points) -> tuple[Points, tuple[str, ...]]:
     """Return points as they are, or those of a table, and remarks."""
-    return (source, ()) if isinstance(source, SurveyPoints) else read_survey_points(source)
+    return (source, ()) if isinstance(source, Points) else read_survey_points(source)
 
 
 def planned_grid(pair: Pair, surface: Surface, task: OrthoTask) -> Grid:
