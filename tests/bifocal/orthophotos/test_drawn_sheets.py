@@ -253,6 +253,14 @@ def test_the_sheet_of_a_whole_picture_says_what_was_not_measured(wall: Path) -> 
     lined = (pictures[0] != pictures[1]).any(axis=2)
     with rasterio.open(wall / "d" / "Torre_est.tif") as file:
         source, image = file.read(4), np.moveaxis(file.read([1, 2, 3]), 0, -1)
+        basis, bound = json.loads(file.tags()["BIFOCAL_BASIS"]), file.tags()["BIFOCAL_BOUND"]
+    # Terminal, sheet, file: on the base of what is shown or should be.
+    assert told.startswith(f"{100 * basis['interpolated']:.1f} %")
+    assert basis["interpolated"] == pytest.approx(
+        (source == 5).sum() / (source > 0).sum(), abs=1e-4
+    )
+    assert sum(basis.values()) == pytest.approx(1, abs=1e-3)
+    assert bound == "0.0050 m"  # half of the photo's 10 mm
     np.testing.assert_array_equal(image, pictures[1][..., :3])  # the GeoTIFF bears no lines
     assert 0.05 < lined[source == 5].mean() < 0.4
     assert not lined[np.isin(source, (1, 2, 3))].any()
