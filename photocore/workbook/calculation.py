@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from openpyxl import Workbook
 from openpyxl.worksheet.formula import ArrayFormula
-from scipy.special import chdtrc, fdtrc, ndtr
 
 from photocore.arrays import BoolArray, FloatArray
 from photocore.workbook.changing.cells import CellValue
@@ -461,6 +460,15 @@ def _angle(x: FloatArray, y: FloatArray) -> FloatArray:
     return np.asarray(np.where((x == 0) & (y == 0), np.nan, np.arctan2(y, x)))
 
 
+def _special(name: str) -> Callable[..., FloatArray]:
+    def apply(*given: FloatArray) -> FloatArray:
+        from scipy import special  # late: seldom needed
+
+        return np.asarray(getattr(special, name)(*given))
+
+    return apply
+
+
 def _average(*given: Cells) -> Cells:
     return _signed("/", FUNCTIONS["SUM"](*given), FUNCTIONS["COUNT"](*given))
 
@@ -480,9 +488,9 @@ FUNCTIONS: dict[str, Callable[..., Cells]] = {
     "LN": _each(np.log), "INT": _each(np.floor), "SIN": _each(np.sin), "COS": _each(np.cos),
     "TAN": _each(np.tan), "ASIN": _each(np.arcsin), "ACOS": _each(np.arccos),
     "ATAN": _each(np.arctan), "ATAN2": _each(_angle), "DEGREES": _each(np.degrees),
-    "RADIANS": _each(np.radians), "ROUND": _each(_half_up), "NORMSDIST": _each(ndtr),
-    "MOD": _each(np.mod), "FDIST": _each(lambda x, m, n: fdtrc(m, n, x)),
-    "CHIDIST": _each(lambda x, n: chdtrc(n, x)),
+    "RADIANS": _each(np.radians), "ROUND": _each(_half_up), "NORMSDIST": _each(_special("ndtr")),
+    "MOD": _each(np.mod), "FDIST": _each(lambda x, m, n: _special("fdtrc")(m, n, x)),
+    "CHIDIST": _each(lambda x, n: _special("chdtrc")(n, x)),
     "TRIM": _worded(lambda t: " ".join(t.split())), "UPPER": _worded(str.upper),
     "LEFT": _worded(lambda t, n: t[:n]), "MID": _worded(lambda t, i, n: t[i - 1 : i - 1 + n]),
     "CHAR": lambda v: _texts([[chr(int(n)) for n in row] for row in v.numbers]),
