@@ -42,3 +42,14 @@ def test_hooks_fetch_nothing() -> None:
     hooks = (ROOT / ".pre-commit-config.yaml").read_text("utf-8")
     assert "http" not in hooks
     assert re.findall(r"- repo: (\S+)", hooks) == ["local"]
+
+
+def test_the_plan_of_a_room_names_all_of_its_modules() -> None:
+    planned = 0
+    for room in ROOT.glob("*/*/__init__.py"):
+        plan, _, code = room.read_text("utf-8").removeprefix('"""').partition('"""')
+        if room.parts[-3] in ("bifocal", "multimedia") and "\n\n" in plan and not code.strip():
+            planned += 1
+            modules = {path.stem for path in room.parent.glob("*.py")} - {"__init__"}
+            assert modules <= set(re.findall(r"`(\w+)`", plan)), room
+    assert planned >= 6

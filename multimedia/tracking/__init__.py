@@ -1,1 +1,5 @@
-"""Particles over time: which are one, where they go, and how fast."""
+"""Particles over time: which are one, where they go, and how fast.
+
+`linking` joins the particles of consecutive frames, `tracks` makes tracks of many frames of it,
+`velocities` says how fast and how surely; `track_files` writes them, `workflow` is the command.
+"""
