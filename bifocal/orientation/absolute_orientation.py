@@ -220,7 +220,7 @@ def _with_words(pair: OrientedPair, given: Given, remarks: tuple[str, ...]) -> O
     validation.check_movement(pair.adjusted)
     told = (
         *model_remarks(pair, given.site),
-        *filter(None, [given.pick_verdict.words]),
+        *filter(None, [given.pick_verdict.words, *(i.doubt for i in given.interiors)]),
         *remarks,
         *pair.remarks,
         *wall_remarks(pair),
