@@ -18,7 +18,7 @@ The pair
     align, align_set          a pair, or a set of photos, from them and what was measured on site
     Control, Interior, SiteMeasures, PairMedia, read_control   what `align` is told
 Points
-    solve, SolvedSurvey       relief, coordinates, precision, check of measured points
+    solve, SolvedSurvey, Points   relief, coordinates, precision, check of measured points
     Taking, Measuring, ReadOptions   lenses, distances, precision, columns that `solve` is told
     georeference, Georeference   wall coordinates to world coordinates by control points
     match, Matches, MatchSettings   homologous points found automatically, with their precision
@@ -32,7 +32,7 @@ The whole wall
 The page
     pick                      orient, pick and draw in the browser, as the command `bifocal pick`
     page_server, PageServer, Session   the same without a browser, for programs that drive it
-    recording                 what the outputs written within it say made them
+    recording, changed_photos   what outputs say made them; changed photos taken, within it
 Sample pairs                  SAMPLE, WATER_SAMPLE: folders of photos with exact truth
 
 What they take and give: Alignment, Bounds, BreakLine, ChangedRegion, CheckResult, Comparison, Face,

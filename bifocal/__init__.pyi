@@ -30,7 +30,7 @@ from .equations import (
 )
 from .faces.faces import BreakLine, Face, Faces, Occluder
 from .faces.suggestions import suggest_faces
-from .files.provenance import recording
+from .files.provenance import changed_photos, recording
 from .matching.homologous_points import match
 from .matching.matches import Matches
 from .matching.matching import MatchSettings
@@ -44,6 +44,7 @@ from .model.pair import Pair
 from .model.pair_media import PairMedia
 from .model.photo import Photo
 from .model.photo_set import PhotoSet, RankedPair
+from .model.points import Points
 from .model.relief_map import Quality, ReliefMap
 from .model.set_intersection import SetIntersection
 from .model.surface import FlatSurface, MapSurface, Surface
@@ -128,6 +129,7 @@ __all__ = [
     "Pinhole",
     "PlanePicks",
     "PointObservations",
+    "Points",
     "Progress",
     "ProjectOptions",
     "ProjectPhotos",
@@ -164,6 +166,7 @@ __all__ = [
     "align",
     "align_set",
     "calibrate",
+    "changed_photos",
     "compare",
     "dense_relief",
     "georeference",

@@ -20,10 +20,15 @@ from bifocal.options import (
 from photocore.cli import print_result, progress_bar, remark
 from photocore.option_types import Length
 from photocore.options import Argument, Typed, declared
-from photocore.shared_options import JsonOption, OverwriteOption, RasterCogOption
+from photocore.shared_options import (
+    ChangedPhotosOption,
+    JsonOption,
+    OverwriteOption,
+    RasterCogOption,
+)
 
 if TYPE_CHECKING:
-    from bifocal.model.points import SurveyPoints
+    from bifocal.model.points import Points
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +73,7 @@ class OrthoCommand:
     tfw: bool = False
     """Also write the world file beside it."""
     cog: RasterCogOption = False
+    changed_photos: ChangedPhotosOption = False
     overwrite: OverwriteOption = False
     as_json: JsonOption = False
 
@@ -103,7 +109,7 @@ def command(
     source = read_photos(pair)
     drawn = given["faces"]
     given["faces"] = faces_path(drawn, pair)
-    own: Path | SurveyPoints | None = points
+    own: Path | Points | None = points
     if relief is None and points is None and plane is None and is_workbook(pair):
         own = points_of(pair)
     breaklines = [line.split(",") for line in given.pop("breaklines")]

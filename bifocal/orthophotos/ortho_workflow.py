@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, fields
@@ -12,9 +13,11 @@ import numpy as np
 
 from bifocal.faces.faced_surface import FacedSurface, beneath
 from bifocal.faces.faces import Faces
-from bifocal.faces.faces_files import given_faces
+from bifocal.faces.faces_files import check_faces, given_faces
+from bifocal.files.made_from import MadeFrom, check_maps, photos_of
 from bifocal.files.photos import photo_info
 from bifocal.files.point_tables import read_survey_points
+from bifocal.model.doubts import check_scale, unit_of
 from bifocal.model.geotiff import (
     RasterReader,
     bytes_in_words,
@@ -27,7 +30,7 @@ from bifocal.model.pair import Pair
 from bifocal.model.photo_alone import PhotoAlone
 from bifocal.model.photo_set import PhotoSet
 from bifocal.model.photos_of_set import PhotosOfSet
-from bifocal.model.points import SurveyPoints
+from bifocal.model.points import Points
 from bifocal.model.relief_map import measured_part, told_pixels
 from bifocal.model.surface import EVERYWHERE, FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.compose import choose_grid, render
@@ -60,7 +63,7 @@ class OrthoTask:
     ----------
     relief : Path, optional
         Relief map; else ``points``, else the plane ``r = plane``.
-    points : Path or SurveyPoints, optional
+    points : Path or Points, optional
         Points, or the workbook or table that holds them.
     breaklines : sequence of sequences of str
         Ids of points along edges.
@@ -87,7 +90,7 @@ class OrthoTask:
     """
 
     relief: Path | None = None
-    points: Path | SurveyPoints | None = None
+    points: Path | Points | None = None
     breaklines: Sequence[Sequence[str]] = ()
     plane: float = 0.0
     faces: Faces | Path | None = None
@@ -136,9 +139,14 @@ def make_ortho(
     """
     check_ending(out, ORTHO_ENDING, ".tif", ".tiff")
     pair = PhotosOfSet.of(pair_path)
+    if task.scale:
+        check_scale(pair.extra, pair_path if isinstance(pair_path, Path) else "")
     check_not_input(out, task.relief, *pair.photo_files)
     check_writable(out, overwrite=overwrite)
     with open_surface(task, pair) as (surface, _, remarks):
+        faces, _ = given_faces(task.faces)
+        drawn = (faces or Faces()).digest
+        made_from = MadeFrom.of(photos_of(pair), faces=drawn, relief=task.relief)
         images, said = _images(pair, task)
         remarks += said
         numbers = tuple(images)
@@ -165,7 +173,7 @@ def make_ortho(
             colour=len(bands) == 3,
             dpi=dpi_at_scale(grid.gsd, task.scale) if task.scale else None,
             crs_name=str(pair.extra.get("name") or "Facade plane"),
-            tags=_tags(pair, task),
+            tags=_tags(pair, task) | made_from.tags(),
             overviews=total > PIXELS.overviews_from if task.overviews is None else task.overviews,
             world_file=world_file,
         ) as writer:
@@ -175,6 +183,8 @@ def make_ortho(
             )  # fmt: skip
             if counts[0] == total and not hidden:
                 raise InputError(remark("ortho.nothing_in_common"))
+            basis = _basis(counts, flat=isinstance(beneath(surface), FlatSurface))
+            writer.tag(BIFOCAL_BASIS=json.dumps({key: round(v, 4) for key, v in basis.items()}))
     shares = {source.name.lower(): float(counts[source]) / total for source in Source}
     if isinstance(pair, PhotosOfSet):
         for number, photo in enumerate(pair.photos, start=OF_SET + 1):
@@ -183,7 +193,6 @@ def make_ortho(
     for thing in moved:
         words = "ortho.moved" if thing.drawn_from_second else "ortho.occluder"
         notes.append(remark(words, x=thing.place[0], y=thing.place[1], area=thing.area))
-    basis = _basis(counts, flat=isinstance(beneath(surface), FlatSurface))
     if task.relief and basis["plane"] > PIXELS.rectified:
         notes.append(remark("ortho.rectified", share=basis["plane"]))
     notes += [] if isinstance(pair, PhotoAlone | PhotosOfSet) else _advice(shares, task)
@@ -263,6 +272,10 @@ def open_surface(
 ) -> Iterator[tuple[Surface, RasterReader | None, tuple[str, ...]]]:
     """Yield the relief asked for, checked against the cameras' distances, its map, and remarks."""
     faces, told = given_faces(task.faces)
+    told += check_faces(faces, photos_of(pair))
+    if task.relief is not None:
+        now = MadeFrom.of(photos_of(pair), faces=(faces or Faces()).digest)
+        told += check_maps(now, relief=task.relief)
     with ExitStack() as stack:
         surface: Surface = FlatSurface(task.plane)
         reader: RasterReader | None = None
@@ -289,7 +302,7 @@ def open_surface(
 
 
 def _triangles(
-    source: Path | SurveyPoints, breaklines: Sequence[Sequence[str]]
+    source: Path | Points, breaklines: Sequence[Sequence[str]]
 ) -> tuple[TriangleSurface, tuple[str, ...]]:
     """Return the surface through the useful points of a table, and remarks."""
     points, notes = survey_points_of(source)
@@ -317,9 +330,9 @@ def _triangles(
         return TriangleSurface(used.xyz, lines), tuple(remarks)
 
 
-def survey_points_of(source: Path | SurveyPoints) -> tuple[SurveyPoints, tuple[str, ...]]:
+def survey_points_of(source: Path | Points) -> tuple[Points, tuple[str, ...]]:
     """Return points as they are, or those of a table, and remarks."""
-    return (source, ()) if isinstance(source, SurveyPoints) else read_survey_points(source)
+    return (source, ()) if isinstance(source, Points) else read_survey_points(source)
 
 
 def planned_grid(pair: Pair, surface: Surface, task: OrthoTask) -> Grid:
@@ -392,6 +405,7 @@ def _tags(pair: Pair, task: OrthoTask) -> dict[str, str]:
     return {
         "BIFOCAL_IMAGE": "all" if isinstance(pair, PhotosOfSet) else task.photo_words,
         "BIFOCAL_RELIEF": relief.name if relief else f"plane r = {task.plane:g} m",
+        "BIFOCAL_UNIT": unit_of(pair.extra),
         "BIFOCAL_D1": f"{pair.image1.distance:.6g}",
         **({} if isinstance(pair, PhotoAlone) else {"BIFOCAL_D2": f"{pair.image2.distance:.6g}"}),
         **({} if task.options.measured_only else {"BIFOCAL_BOUND": bound}),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import compress
@@ -11,8 +12,10 @@ from typing import Any, ClassVar, Protocol
 import cv2
 import numpy as np
 
+from bifocal.files.made_from import MadeFrom, check_maps, photos_of
 from bifocal.files.photos import photo_infos
 from bifocal.files.strips import ROWS, colour_strips
+from bifocal.model.doubts import check_scale
 from bifocal.model.geotiff import RasterReader
 from bifocal.model.grid import Bounds
 from bifocal.model.pair import Pair
@@ -162,6 +165,9 @@ class PairContent:
     ortho : (picture, bounds) or None
     ortho_gsd : float
         Pixel of the orthophoto. [m]
+    ortho_basis : mapping of str to float
+        Parts of it on measured and interpolated relief, on the plane, and seen by neither photo;
+        empty where the file does not say.
     """
 
     task: ReportTask
@@ -173,6 +179,7 @@ class PairContent:
     relief: ReliefMap | None
     ortho: tuple[ByteArray, Bounds] | None
     ortho_gsd: float
+    ortho_basis: Mapping[str, float] = field(default_factory=dict)
     of_set: PhotoSet | None = None
 
     @property
@@ -260,6 +267,7 @@ def read_content(source: Path, task: ReportTask, *, pictures: bool = True) -> Pa
     """
     solution: SolvedSurvey | None = None
     of_set: PhotoSet | None = None
+    named: Pair | PhotoSet | None = None
     if source.suffix.lower() in _WORKBOOKS:
         if task.control or task.check:
             raise InputError(remark("report.own_check", of=source))
@@ -267,7 +275,8 @@ def read_content(source: Path, task: ReportTask, *, pictures: bool = True) -> Pa
         pair = solution.pair
         setup: Any = pair.extra.get("setup")
         if solution.pair_path is not None:
-            setup = Pair.read(solution.pair_path).extra.get("setup")
+            named = Pair.read(solution.pair_path)
+            setup = named.extra.get("setup")
             pair = _with_photos(pair, solution.pair_path)
     else:
         named = pair_or_set(source)
@@ -285,6 +294,11 @@ def read_content(source: Path, task: ReportTask, *, pictures: bool = True) -> Pa
                 photos=2 if of_set is None else len(of_set), language=task.language, unit=task.unit,
                 columns=task.columns,
             )  # fmt: skip
+    if named is not None:
+        if task.scale:
+            check_scale(named.extra, source)
+        remarks = check_maps(MadeFrom.of(photos_of(named)), relief=task.relief, ortho=task.ortho)
+        pair = replace(pair, remarks=(*pair.remarks, *remarks)) if remarks else pair
     ortho, gsd = (None, 0.0) if task.ortho is None else ortho_thumbnail(task.ortho)
     return PairContent(
         task=task,
@@ -297,6 +311,7 @@ def read_content(source: Path, task: ReportTask, *, pictures: bool = True) -> Pa
         relief=None if task.relief is None else _relief(task.relief),
         ortho=ortho,
         ortho_gsd=gsd,
+        ortho_basis={} if task.ortho is None else _basis(task.ortho),
     )
 
 
@@ -334,6 +349,13 @@ def _photos(source: Pair | PhotoSet) -> tuple[ReportedPhoto, ...]:
             ReportedPhoto(photo=photo, picture=picture, size=(width, height), reduction=reduction)
         )
     return tuple(photos)
+
+
+def _basis(path: Path) -> dict[str, float]:
+    """Return what parts of an orthophoto rest on; empty where the file does not say."""
+    with RasterReader(path) as reader:
+        basis: dict[str, float] = json.loads(reader.tags.get("BIFOCAL_BASIS", "{}"))
+        return basis
 
 
 def ortho_thumbnail(path: Path, *, side: int = SIDE) -> tuple[tuple[ByteArray, Bounds], float]:
