@@ -176,12 +176,14 @@ def align_photos(
         PhotoInput(grey=grey, interior=interior, name=info.path.name)
         for info, interior, grey in zip(infos, interiors, greys, strict=True)
     )
+    reading: tuple[str, ...] = ()
     if way == "as set up":
         oriented = pair_as_set_up((first, second), options.site, options.media)
     else:
         if way == "site" and not options.auto and options.length is None:
             _check_focal((first, second))
         control = control_of(options, (first.interior.image_size, second.interior.image_size))
+        reading = control.remarks
         oriented = orient_pair(
             (first, second), control=control, site=options.site, media=options.media
         )
@@ -189,6 +191,7 @@ def align_photos(
     if oriented.exchanged:
         paths, ordered = (near, far), (second, first)
     alignment = make_alignment(oriented, ordered, way=way, direction=options.direction)
+    alignment = replace(alignment, remarks=(*reading, *alignment.remarks))
     if picture is not None:
         images = [photo.grey for photo in ordered if photo.grey is not None]
         write_alignment_picture(picture, alignment, (images[0], images[1]), overwrite=overwrite)

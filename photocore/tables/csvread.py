@@ -25,6 +25,7 @@ from photocore.workbook.reading.grid import CellGrid, SheetFile, Value, cell_nam
 
 _DELIMITERS = (";", "\t", ",", "|", " ")
 #: The apostrophes of `photocore.tables.csvwrite.guarded`.
+_COMMENTED = re.compile(r"^[ \t]*(?:#|//)", re.M)
 _GUARDED = re.compile(r"(?:^|(?<=[;\r\n]))'(?='*[=+\-@\t\r])")
 _SAMPLE = 200
 _SAMPLE_TEXT = 2**18
@@ -215,6 +216,8 @@ def plain_rows(
     numeric = {key for key in match.columns if kinds[key] in ("number", "integer")}
     quick = sorted(numeric - careful)
     if all(plain_numbers([match.headings.get(key) or "x"]) for key in quick):
+        return None
+    if _COMMENTED.search(file.text):
         return None
     others = sorted(match.columns.keys() - quick)
     chunks: dict[str, list[FloatArray]] = {key: [] for key in quick}
