@@ -10,7 +10,6 @@ from photocore.tables.headings import Match, bare, is_summary
 from photocore.tables.model import Column
 from photocore.workbook.reading.grid import CellGrid, Value
 
-
 #: What a row begins with that is switched off.
 COMMENTS = ("#", "//")
 
