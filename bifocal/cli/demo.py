@@ -3,18 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from photocore.cli import print_result, progress_bar, remark, text_table
 from photocore.options import declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 if TYPE_CHECKING:
     from bifocal.demo.workflow import DemoResult
 
 
-@declared
-def command(out: Path, water: bool, overwrite: bool, as_json: bool) -> None:
+@dataclass(frozen=True, kw_only=True)
+class DemoCommand:
+    """The options of ``bifocal demo``, and examples.
+
+    bifocal demo
+    bifocal demo --out sample --overwrite
+    bifocal demo --water --out under-water
+    """
+
+    out: Path = Path("bifocal-demo")
+    """Folder for the results; it is made."""
+    water: bool = False
+    """A façade under water, through flat ports, from 3.5/1.9 m: bent rays, haze."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(DemoCommand)
+def command(options: DemoCommand) -> None:
     """Survey a sample façade from two photos, and compare with the exact truth.
 
     The photos, 35/19 mm from 17.5/9.5 m, come with the package; targets picked on them go through
@@ -24,15 +43,15 @@ def command(out: Path, water: bool, overwrite: bool, as_json: bool) -> None:
     from bifocal.demo.samples import FACADE, WATER
     from bifocal.demo.workflow import run_demo
 
-    with progress_bar("Demo", quiet=as_json) as bar:
+    with progress_bar("Demo", quiet=options.as_json) as bar:
 
         def tell(done: float, total: float, what: str = "") -> None:
             bar(done, total, what)
-            if what and not as_json:
+            if what and not options.as_json:
                 remark(f"... {what}")
 
-        sample = WATER if water else FACADE
-        result = run_demo(out, sample=sample, overwrite=overwrite, progress=tell)
+        sample = WATER if options.water else FACADE
+        result = run_demo(options.out, sample=sample, overwrite=options.overwrite, progress=tell)
     points = zip(result.ids, result.true, result.found, result.sigma, result.flags, strict=True)
     data = {
         "folder": result.folder, "rmse_targets": result.rmse,
@@ -45,7 +64,7 @@ def command(out: Path, water: bool, overwrite: bool, as_json: bool) -> None:
     }  # fmt: skip
     if result.neglect is not None:
         data["median_neglecting_refraction"] = result.neglect
-    print_result(data, _lines(result), as_json=as_json)
+    print_result(data, _lines(result), as_json=options.as_json)
 
 
 def _lines(result: DemoResult) -> Iterator[str]:

@@ -3,17 +3,52 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import click
 
 from photocore.cli import print_result, remark
-from photocore.options import declared
+from photocore.option_types import NEW_TABLE
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 
-@declared
-def command(pair: Path, out: Path, count: int, what: str, as_json: bool, **options: Any) -> None:
+@dataclass(frozen=True, kw_only=True)
+class MatchCommand:
+    """The options of ``bifocal match``, and examples.
+
+    bifocal match wall.pair.json --out survey.xlsx
+    bifocal match survey.xlsx --out matched.xlsx
+    bifocal match wall.pair.json --count 2000 --out points.csv
+    bifocal match wall.pair.json --what targets --out targets.xlsx
+    bifocal match porch.photos.json --out porch.csv
+
+    Then:
+      bifocal solve survey.xlsx --out result.xlsx
+      bifocal solve points.csv --pair wall.pair.json --json
+    """
+
+    pair: Annotated[Path, Argument()]
+    out: Annotated[Path, Typed(NEW_TABLE)]
+    """Survey workbook (.xlsx) or table (.csv) to write; - is a table on stdout."""
+    count: Annotated[int, Typed(click.IntRange(min=1, max=100000))] = 4000
+    """About so many feature points, spread evenly."""
+    what: Literal["all", "features", "targets"] = "all"
+    """Natural detail, survey targets, or both."""
+    relief_min: Annotated[float | None, Typed(unit="M")] = None
+    """Lowest relief looked for [m].  [default: -0.5 x near distance]"""
+    relief_max: Annotated[float | None, Typed(unit="M")] = None
+    """Highest relief looked for [m].  [default: 0.4 x near distance]"""
+    language: Annotated[Literal["en", "it", "de"], Typed(flag="--lang --language")] = "en"
+    """Language of the workbook."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(MatchCommand)
+def command(options: MatchCommand) -> None:
     """Find the same details of the wall in both photos of PAIR, a pair file or survey workbook.
 
     Of a set of photos (.photos.json) those of its best pair are found in all others too.
@@ -27,29 +62,42 @@ def command(pair: Path, out: Path, count: int, what: str, as_json: bool, **optio
     from bifocal.workbook.pair_workflow import is_workbook, read_pair
     from bifocal.workbook.sources import set_or_pair
 
-    low, high = options.pop("relief_min"), options.pop("relief_max")
+    low, high = options.relief_min, options.relief_max
     if low is not None and high is not None and low >= high:
         raise click.UsageError("--relief-min must be below --relief-max.")
-    photos, _ = set_or_pair(pair)
-    source = read_pair(pair) if photos is None else best_pair(photos)
+    photos, _ = set_or_pair(options.pair)
+    source = read_pair(options.pair) if photos is None else best_pair(photos)
     reliefs = None
     if low is not None or high is not None:
         near = source.image2.distance
         reliefs = (-0.5 * near if low is None else low, 0.4 * near if high is None else high)
     settings = MatchSettings(
-        count=count, relief_range=reliefs, features=what != "targets", targets=what != "features"
+        count=options.count,
+        relief_range=reliefs,
+        features=options.what != "targets",
+        targets=options.what != "features",
     )
     if photos is not None:
-        told = match_set_file(photos, out, settings, overwrite=options["overwrite"])
+        told = match_set_file(photos, options.out, settings, overwrite=options.overwrite)
         shown = _set_lines(told)
-        print_result({**told, "out": out}, shown, as_json=as_json, remarks=photos.remarks)
+        print_result(
+            {**told, "out": options.out}, shown, as_json=options.as_json, remarks=photos.remarks
+        )
         return
-    found = match_photos(source if is_workbook(pair) else pair, out, settings, **options)
+    found = match_photos(
+        source if is_workbook(options.pair) else options.pair,
+        options.out,
+        settings,
+        language=options.language,
+        overwrite=options.overwrite,
+    )
     summary = match_summary(*found)
-    notes = (*found[0].remarks, *_remarks(summary["kinds"], what))
-    print_result({**summary, "out": out}, _lines(summary), as_json=as_json, remarks=notes)
-    if not as_json:
-        remark(f"Points written to {out}")
+    notes = (*found[0].remarks, *_remarks(summary["kinds"], options.what))
+    print_result(
+        {**summary, "out": options.out}, _lines(summary), as_json=options.as_json, remarks=notes
+    )
+    if not options.as_json:
+        remark(f"Points written to {options.out}")
 
 
 def _remarks(kinds: dict[str, int], what: str) -> Iterator[str]:

@@ -2,15 +2,38 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
+from bifocal.options import LanguageOption
 from photocore.cli import tell_written
-from photocore.options import declared
+from photocore.options import Argument, declared
+from photocore.shared_options import OverwriteOption
 
 
-@declared
-def command(relief: Path, out: Path, **options: Any) -> None:
+@dataclass(frozen=True, kw_only=True)
+class ViewCommand:
+    """The options of ``bifocal view``, and examples.
+
+    bifocal view relief.tif --out wall.html
+    bifocal view relief.tif --ortho ortho.tif --title "Via Roma 12" --out wall.html
+    """
+
+    relief: Annotated[Path, Argument()]
+    ortho: Path | None = None
+    """Orthophoto that gives the colours."""
+    title: str = ""
+    """Title.  [default: the file's name]"""
+    language: LanguageOption = "en"
+    """Of the page."""
+    out: Path
+    """Page to write (.html)."""
+    overwrite: OverwriteOption = False
+
+
+@declared(ViewCommand)
+def command(options: ViewCommand) -> None:
     """Show a relief map in three dimensions, on a page that needs nothing else.
 
     RELIEF is a map of `bifocal relief`. It is thinned to 65 000 points, so that the page is small
@@ -18,5 +41,12 @@ def command(relief: Path, out: Path, **options: Any) -> None:
     """
     from bifocal.reports.view_workflow import view_relief
 
-    view_relief(relief, out, **options)
-    tell_written(out)
+    view_relief(
+        options.relief,
+        options.out,
+        ortho=options.ortho,
+        title=options.title,
+        language=options.language,
+        overwrite=options.overwrite,
+    )
+    tell_written(options.out)

@@ -220,6 +220,7 @@ def _with_words(pair: OrientedPair, given: Given, remarks: tuple[str, ...]) -> O
     validation.check_movement(pair.adjusted)
     told = (
         *model_remarks(pair, given.site),
+        *filter(None, [given.pick_verdict.words, *(i.doubt for i in given.interiors)]),
         *remarks,
         *pair.remarks,
         *wall_remarks(pair),
@@ -301,13 +302,17 @@ def _typed_right(
 
     def meant(typed: Typed) -> Given:
         lens = given.with_interiors(typed.interiors)
+        lens = lens.turned if typed.exchanged else lens
         return replace(lens, control=typed.control, site=typed.site)
 
     typed = Typed(interiors=given.interiors, control=given.control, site=given.site)
     slip = slip_of(typed, lambda one: fitted(meant(one)), by_control=by_control)
     if slip is not None and not slip.mended:
         raise GeometryError(slip.words)
-    return None if slip is None else _told(replace(meant(slip.meant), settled=True), slip.words)
+    if slip is None:
+        return None
+    pair = _told(replace(meant(slip.meant), settled=True), slip.words)
+    return replace(pair, exchanged=pair.exchanged != slip.meant.exchanged)
 
 
 def _told(given: Given, note: str) -> OrientedPair:
@@ -340,8 +345,11 @@ def _by_control(given: Given, ties: Ties | None) -> TrialOrientation | None:
     test = np.minimum(adjusted.control_test[given.control.positioned], SLIPS.most)
     square = float((test**2).mean()) + _pulled(pair) / (4 * len(test))
     if ties is not None:
-        off = contradiction(adjusted.cameras, ties) / (2 * ties.tolerance)
+        cameras = adjusted.cameras[::-1] if given.exchanged else adjusted.cameras
+        off = contradiction((cameras[0], cameras[1]), ties) / (2 * ties.tolerance)
         square += max(off - 1.0, 0.0) ** 2
+    if given.pick_verdict.slip is not None:
+        square += SLIPS.most**2
     return TrialOrientation(misfit=float(np.sqrt(square)), cameras=adjusted.cameras, lost=~used)
 
 
@@ -400,4 +408,4 @@ def _with_photos_exchanged(given: Given, *, typed_stay: bool = False) -> Oriente
     pair = _oriented(replace(turned, control=control, site=site, media=media))
     key = f"orientation.photos_exchanged{'_typed' if typed_stay else ''}"
     note = remark(key, near=near, far=far, number=its)
-    return replace(pair, exchanged=True, remarks=(note, *pair.remarks))
+    return replace(pair, exchanged=not pair.exchanged, remarks=(note, *pair.remarks))

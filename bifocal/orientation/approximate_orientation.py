@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bifocal.matching.features import Features, find_features
+from bifocal.matching.pick_evidence import PickVerdict, held_against_photos
 from bifocal.model.interior_orientation import Cameras, Interiors
 from bifocal.model.pair_media import PairMedia
 from bifocal.orientation import validation
@@ -35,13 +36,42 @@ from photocore.errors import GeometryError, located
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Given:
-    """What `orient_pair` is given; ``settled`` where no slip is to be looked for any more."""
+    """What `orient_pair` is given.
+
+    Attributes
+    ----------
+    photos, control, site, media
+    settled : bool
+        Where no slip is to be looked for any more.
+    exchanged : bool
+        Whether the photos are the other way round than they were named.
+    """
 
     photos: Photos
     control: Control
     site: SiteMeasures
     media: PairMedia = field(default_factory=PairMedia.none)
     settled: bool = False
+    exchanged: bool = False
+
+    @property
+    def pick_verdict(self) -> PickVerdict:
+        """What the photos say of the control points' picks; nothing where there are no photos."""
+        first, second = (photo.grey for photo in self.photos)
+        if first is None or second is None:
+            return PickVerdict(likeness=np.zeros(0))
+        picks = self.control.pixels1, self.control.pixels2
+        return held_against_photos((first, second), *picks)
+
+    @property
+    def turned(self) -> Given:
+        """The same with the photos' names, not what was typed, the other way round."""
+        first, second = self.photos
+        one, two = (
+            replace(photo, grey=of.grey, name=of.name)
+            for photo, of in ((first, second), (second, first))
+        )
+        return replace(self, photos=(one, two), exchanged=not self.exchanged)
 
     @property
     def names(self) -> tuple[str, str]:

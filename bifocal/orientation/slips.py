@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
+from bifocal.model.hypotheses import COORDINATES, picks_meant
 from bifocal.model.interior_orientation import Cameras, Interiors
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.tuning import SLIPS
@@ -19,11 +20,12 @@ FILM = 36.0  #: Width of 35-mm film. [mm]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Typed:
-    """What a pair is set up from."""
+    """What a pair is set up from; ``exchanged`` where the photos' names are the other way round."""
 
     interiors: Interiors
     control: Control
     site: SiteMeasures
+    exchanged: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -108,7 +110,10 @@ def _explaining(
             lying = sum(camera.rotation[0, 0] for camera in tried.cameras) < 0.7
             tilts = [np.rad2deg(np.arccos(-c.rotation[2, 2])) for c in tried.cameras]
             words = slip.words.replace("<tilts>", " and ".join(f"{tilt:.0f}" for tilt in tilts))
+            # Photos that are then in their order need no second exchange.
+            turned = tried.cameras[0].centre[2] < tried.cameras[1].centre[2]
             misfit = tried.misfit * slip.handicap * (SLIPS.clearly**2 if lying else 1.0)
+            misfit *= SLIPS.clearly if turned else 1.0
             found.append((misfit, replace(slip, words=words)))
     return found
 
@@ -132,6 +137,11 @@ def _of_lenses(typed: Typed, *, free: bool) -> Iterator[Slip]:
     ]  # fmt: skip
     for factor, words in rows:
         one, two = (replace(i, focal=i.focal * factor) for i in typed.interiors)
+        yield Slip(meant=replace(typed, interiors=(one, two)), words=words)
+    if first.is_typed and second.is_typed and np.ptp(focals):
+        one, two = (replace(i, focal=f) for i, f in
+                    zip(typed.interiors, (focals / pixels[::-1])[::-1], strict=True))  # fmt: skip
+        words = remark("slips.focals", first=focals[0], second=focals[1])
         yield Slip(meant=replace(typed, interiors=(one, two)), words=words)
     ratio, small = float(sizes[1] / sizes[0]), int(sizes[1] < sizes[0])
     if abs(ratio - 1) > 0.01 and abs(pixels[1] / pixels[0] * ratio - 1) < 0.01:
@@ -162,19 +172,23 @@ def _of_site(typed: Typed) -> Iterator[Slip]:
 def _of_control(typed: Typed, now: TrialOrientation | None) -> Iterator[Slip]:
     """Yield slips of the control table: how its axes count, which pick and which point is which."""
     control, count = typed.control, len(typed.control.ids)
-    xyz, picks = control.xyz, (control.pixels1, control.pixels2)
-    last = [interior.image_size[1] - 1.0 for interior in typed.interiors]
-    rows = [pixels * [1, -1] + [0, end] for pixels, end in zip(picks, last, strict=True)]
-    for words, meant in (
-        (remark("slips.control_rows"), replace(control, pixels1=rows[0], pixels2=rows[1])),
-        (remark("slips.control_y"), replace(control, xyz=xyz * [1, -1, 1])),
-        (remark("slips.control_x"), replace(control, xyz=xyz * [-1, 1, 1])),
-        (remark("slips.control_xy"), replace(control, xyz=xyz[:, [1, 0, 2]])),
-        (remark("slips.control_r"), replace(control, xyz=xyz * [1, 1, -1])),
-    ):
-        yield Slip(meant=replace(typed, control=meant), words=words, mended=False)
-    words = remark("slips.picks")
-    yield Slip(meant=replace(typed, control=control.exchanged()), words=words)
+    xyz, (first, second) = control.xyz, typed.interiors
+    same = first.image_size == second.image_size and typed.site.wall is None
+    if same and first.is_typed == second.is_typed:
+        # A focal length of the EXIF data goes with its file, one that was typed with its number.
+        by_number = first.is_typed or any(i.is_assumed or i.is_calibrated for i in typed.interiors)
+        lenses = typed.interiors if by_number else (second, first)
+        yield Slip(
+            meant=replace(typed, exchanged=True, interiors=lenses), words=remark("slips.photos")
+        )
+    sizes = first.image_size, second.image_size
+    for slip, (pixels1, pixels2) in picks_meant((control.pixels1, control.pixels2), sizes):
+        meant = replace(control, pixels1=pixels1, pixels2=pixels2)
+        words = remark(f"slips.{slip.key}")
+        yield Slip(meant=replace(typed, control=meant), words=words, mended=slip.mended)
+    for key, axes in COORDINATES.items():
+        meant = replace(control, xyz=axes(xyz))
+        yield Slip(meant=replace(typed, control=meant), words=remark(f"slips.{key}"), mended=False)
     few = list(range(count)) if now is None else np.flatnonzero(now.lost).tolist()
     for a, b in combinations(few, 2) if len(few) <= 7 else ():
         order = np.arange(count)

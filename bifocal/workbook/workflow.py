@@ -39,12 +39,12 @@ def solve(
 
     Parameters
     ----------
-    source : path, mapping, PointObservations, SurveyInput or tuple of two paths
+    source : path, mapping, Matches, PointObservations, SurveyInput or tuple of two paths
         A survey workbook or table (``.xlsx .xlsm .ods .csv``), or columns by key: ``id`` and
         ``x1 y1 x2 y2`` [mm or px], or ``s1 s2`` [mm] and ``theta`` [deg], or ``col1 row1 col2
         row2`` [px], of a set of photos more; each of shape (n,), NaN where blank. Two paths: the
         picks of photo 1 and of photo 2 (`bifocal.workbook.reading.pick_lists.read_picks`), joined
-        by name.
+        by name. What `bifocal.match` gives goes with its ``pair``.
     pair : Pair, PhotoSet or path, optional
         Pair, set of photos or the file of either, for raw pixels, or a survey workbook whose
         set-up, check and control points are taken; default the workbook's own set-up.
@@ -110,10 +110,22 @@ def solve(
     solved = solve_survey(
         survey, general, adjust=adjust_setup, scale_tolerance=scale_tolerance, rules=judged
     )
+    solved = replace(solved, remarks=(*_photos_contradict(solved, general), *solved.remarks))
     media = solved.media
     if general is not None and pair is not None:  # the cells of media take those of its file
         media = SurveyMedia.of_photos((general.image1, general.image2), media)
     return replace(solved, media=media, source=path, pair_path=pair_path, given=asked)
+
+
+def _photos_contradict(solved: SolvedSurvey, pair: Pair | None) -> tuple[str, ...]:
+    """Return what the pair's photos, where they are at hand, say against the picks."""
+    photos = () if pair is None else (pair.image1, pair.image2)
+    if pair is None or not all(photo.file and photo.path.is_file() for photo in photos):
+        return ()
+    # Only who has photos decodes them: OpenCV takes longer to load than a table to solve.
+    from bifocal.workbook.held_picks import photos_against_picks
+
+    return photos_against_picks(solved, pair)
 
 
 def _solved_of_set(

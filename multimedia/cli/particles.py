@@ -2,15 +2,43 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
+import click
+
+from multimedia.cli.tables import ProjectOption
 from photocore.cli import print_result, text_table
-from photocore.options import declared
+from photocore.option_types import POSITIVE
+from photocore.options import Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 
-@declared
-def command(project: Path, targets: tuple[Path, ...], as_json: bool, **options: Any) -> None:
+@dataclass(frozen=True, kw_only=True)
+class ParticlesCommand:
+    r"""The options of ``multimedia particles``, and examples.
+
+    multimedia particles tank.toml --targets img/cam1.10001_targets \
+      --targets img/cam2.10001_targets --targets img/cam3.10001_targets \
+      --targets img/cam4.10001_targets --out res/rt_is.10001
+    """
+
+    project: ProjectOption
+    targets: tuple[Path, ...]
+    """OpenPTV's _targets file of a camera; once per camera, in the order of PROJECT."""
+    tolerance: Annotated[float, Typed(POSITIVE, "PX")] = 2.0
+    """Farthest a target may lie from where its particle is seen [px]."""
+    fewest: Annotated[int, Typed(click.IntRange(min=2))] = 3
+    """Cameras that must have seen a particle; with 2, many are by chance."""
+    out: Path | None = None
+    """Write rt_is.FRAME as OpenPTV does, or .csv or .xlsx."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(ParticlesCommand)
+def command(options: ParticlesCommand) -> None:
     """Find the particles of one frame among the targets of all cameras of PROJECT, a .toml file.
 
     Targets belong together where their rays through glass and water meet: along each other's
@@ -22,7 +50,14 @@ def command(project: Path, targets: tuple[Path, ...], as_json: bool, **options: 
     """
     from multimedia.openptv.particles_workflow import find_particles
 
-    found = find_particles(project, targets, **options)
+    found = find_particles(
+        options.project,
+        options.targets,
+        tolerance=options.tolerance,
+        fewest=options.fewest,
+        out=options.out,
+        overwrite=options.overwrite,
+    )
     names = found.project.camera_names
     median = float(sorted(found.misfit)[len(found.misfit) // 2]) if len(found.misfit) else None
     data = {
@@ -32,7 +67,7 @@ def command(project: Path, targets: tuple[Path, ...], as_json: bool, **options: 
                 found.xyz.tolist(), found.numbers.tolist(), found.misfit.tolist(), strict=True
             )
         ],
-        "unit": found.project.unit, "median_misfit_px": median, "out": options["out"],
+        "unit": found.project.unit, "median_misfit_px": median, "out": options.out,
         "by_chance_at_most": float(found.chance.sum()),
     }  # fmt: skip
     rows = [
@@ -44,4 +79,4 @@ def command(project: Path, targets: tuple[Path, ...], as_json: bool, **options: 
         lines.append(f"{name}: {int((found.numbers[:, k] >= 0).sum())} of {count} targets used")
     if median is not None:
         lines.append(f"median misfit {median:.2f} px")
-    print_result(data, lines, as_json=as_json, remarks=())
+    print_result(data, lines, as_json=options.as_json, remarks=())

@@ -262,3 +262,52 @@ def test_a_distance_too_far_is_taken_for_the_nearest_unit(typed, unit) -> None:
     scale = float(cameras[0].centre[2]) / 9.43
     with pytest.raises(InputError, match=f"is it in {unit}"):
         check_units(cameras, SiteMeasures(distance1=typed * scale))
+
+
+def shown(pictures: tuple[PhotoInput, PhotoInput], points: Control) -> tuple[PhotoInput, ...]:
+    """Return photos of noise that show one thing in both at each of the points."""
+    rng = np.random.default_rng(3)
+    greys = [rng.integers(0, 255, SIZE[::-1]).astype(np.uint8) for _ in pictures]
+    for places in np.round(np.stack(points.picks, axis=1)).astype(int):
+        board = rng.integers(0, 255, (41, 41)).astype(np.uint8)
+        for grey, (column, row) in zip(greys, places, strict=True):
+            grey[row - 20 : row + 21, column - 20 : column + 21] = board
+    return tuple(replace(p, grey=g) for p, g in zip(pictures, greys, strict=True))
+
+
+def typed_focals(pictures: tuple[PhotoInput, ...], order: int = 1) -> tuple[PhotoInput, PhotoInput]:
+    """Return photos whose focal lengths were typed in this order, whatever the photos show."""
+    lenses = [replace(p.interior, is_typed=True) for p in photos(SQUARE)][::order]
+    first, second = (replace(p, interior=i) for p, i in zip(pictures, lenses, strict=True))
+    return first, second
+
+
+def sharp() -> Control:
+    """Return control picked without noise: what is shown there is at the pick."""
+    return control(SQUARE, noise=0.0)
+
+
+@pytest.mark.parametrize(
+    ("named", "focals", "turned", "said"),
+    [
+        (1, 1, False, ""),
+        (-1, 1, False, "named in the wrong order"),
+        (1, -1, False, "--focal1 16.37 and --focal2 29.1 are exchanged"),
+        (-1, 1, True, "--focal1"),
+        (1, 1, True, "col1, row1 of the control points belong to the second photo"),
+    ],
+)
+def test_what_the_photos_show_decides_between_slips_that_fit_alike(
+    named, focals, turned, said
+) -> None:
+    """Control and lenses fit inverted relief as well: one slip explains it, not two."""
+    points = sharp()
+    files = shown(photos(SQUARE), points)[::named]
+    given = points.exchanged() if turned else points
+    made = orient_pair(typed_focals(files, focals), control=given, site=SiteMeasures())
+    first = made.remarks[0]
+    assert said in first
+    assert bool(said) == ("exchanged" in first or "wrong order" in first)
+    assert off(made, SQUARE) < 0.03
+    near_first = named == -1
+    assert made.exchanged == near_first
