@@ -24,8 +24,8 @@ from photocore.textfile import readable
 from photocore.workbook.reading.grid import CellGrid, SheetFile, Value, cell_name
 
 _DELIMITERS = (";", "\t", ",", "|", " ")
-#: The apostrophes of `photocore.tables.csvwrite.guarded`.
 _COMMENTED = re.compile(r"^[ \t]*(?:#|//)", re.M)
+#: The apostrophes of `photocore.tables.csvwrite.guarded`.
 _GUARDED = re.compile(r"(?:^|(?<=[;\r\n]))'(?='*[=+\-@\t\r])")
 _SAMPLE = 200
 _SAMPLE_TEXT = 2**18

@@ -7,7 +7,11 @@ from pathlib import Path
 import openpyxl
 import pytest
 
+from bifocal import Pair
+from bifocal.networks.joint_control import named_positions
+from bifocal.networks.joint_workflow import JointResult
 from bifocal.orientation.control_points import read_control
+from bifocal.reports.control_survey import solve_control
 
 HEADINGS = ("id", "X", "Y", "r", "col1", "row1", "col2", "row2")
 ROWS = [(f"P{k}", k, 2 * k, 0, 10 * k, 20 * k, 11 * k, 21 * k) for k in range(1, 7)]
@@ -61,3 +65,27 @@ def test_hidden_rows_are_used_and_said(tmp_path):
     points = control(tmp_path / "control.xlsx")
     assert len(points.ids) == 6
     assert any("1 hidden or filtered rows are used too" in text for text in points.remarks)
+
+
+def with_p2_off(folder: Path) -> Path:
+    rows = [(*row, "no" if row[0] == "P2" else "yes") for row in ROWS]
+    return as_csv(folder, rows, (*HEADINGS, "use"))
+
+
+def test_the_joint_adjustment_says_which_rows_took_no_part(tmp_path):
+    named = named_positions(
+        [tmp_path / "a.json"], [Pair.ideal(d1=17.5, d2=9.5)], control=(with_p2_off(tmp_path),)
+    )
+    assert "P2" not in named.ids
+    assert any("left out: P2." in text for text in named.remarks)
+    result = JointResult(pairs=(), names=(), adjustment=None, points=(), remarks=named.remarks)
+    assert result.remarks == named.remarks
+
+
+def test_the_report_of_control_says_which_rows_took_no_part(tmp_path):
+    control = with_p2_off(tmp_path)
+    pair = tmp_path / "a.pair.json"
+    Pair.ideal(d1=17.5, d2=9.5, c1=35, c2=19, pixel_size=0.01).write(pair)
+    solved = solve_control(pair, control=control)
+    assert "P2" not in solved.points.ids
+    assert any("left out: P2." in text for text in solved.remarks)
