@@ -69,6 +69,11 @@ class ImageInfo:
         Pixel size from the EXIF focal-plane resolution. [mm]
     aperture, subject_distance : float or None
         f-number and distance in metres.
+    recorded_size : tuple of int or None
+        Width and height that the camera wrote down; the photo was resized or cropped since where
+        they are others. [px]
+    digital_zoom : float or None
+        How many times a part of the sensor was enlarged in the camera.
     """
 
     path: Path
@@ -83,6 +88,8 @@ class ImageInfo:
     focal_plane_pitch: float | None = None
     aperture: float | None = None
     subject_distance: float | None = None
+    recorded_size: tuple[int, int] | None = None
+    digital_zoom: float | None = None
 
     @property
     def focal_pixels(self) -> float | None:
@@ -316,6 +323,8 @@ def _info_from_exif(path: Path, size: tuple[int, int], bits: int, exif: Any) -> 
         focal_plane_pitch=_pitch(tags),
         aperture=_number(tags.get(33437)),
         subject_distance=_number(tags.get(37382)),
+        recorded_size=_recorded(tags),
+        digital_zoom=_number(tags.get(41988)),
     )
 
 
@@ -340,6 +349,12 @@ def _number(value: Any) -> float | None:
     except (TypeError, ValueError, ZeroDivisionError, IndexError):
         return None
     return float(number) if np.isfinite(number) and number > 0 else None
+
+
+def _recorded(tags: dict[int, Any]) -> tuple[int, int] | None:
+    """Return the size in pixels that the EXIF data state; None where they state none."""
+    width, height = _number(tags.get(40962)), _number(tags.get(40963))
+    return (round(width), round(height)) if width and height else None
 
 
 def _pitch(tags: dict[int, Any]) -> float | None:

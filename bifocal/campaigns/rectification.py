@@ -272,6 +272,7 @@ def _told(
             notes.append(remark("rectify.outlier", name=photo.ids[worst], error=error, times=times))
     if sigmas.max() > 1000 * UNCERTAIN * np.ptp(places, axis=0).max():
         notes.append(remark("rectify.uncertain", sigma=float(sigmas.max())))
+    notes.extend(filter(None, [photo.interior.doubt]))
     if not photo.interior.is_calibrated:
         notes.append(remark("rectify.no_lens"))
     return Rectification(

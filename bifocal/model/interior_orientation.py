@@ -64,6 +64,8 @@ class Interior:
         Whether the focal length was typed for the far or the near photo, and is not the file's own.
     is_sought : bool
         Whether the photos themselves are to tell the principal distance, one for both.
+    doubt : str
+        What contradicts it, for the user; empty: nothing.
     """
 
     focal: float
@@ -80,6 +82,7 @@ class Interior:
     is_calibrated: bool = False
     is_typed: bool = False
     is_sought: bool = False
+    doubt: str = ""
 
     def __post_init__(self) -> None:
         """Refuse what is no principal distance, and a standard deviation of it in pixels."""

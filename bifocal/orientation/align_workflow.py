@@ -20,6 +20,7 @@ from bifocal.orientation.alignment import Alignment, make_alignment, with_files
 from bifocal.orientation.alignment_picture import write_alignment_picture
 from bifocal.orientation.as_set_up import pair_as_set_up
 from bifocal.orientation.control_points import Control, SiteMeasures, read_control, read_lengths
+from bifocal.orientation.exif_judge import judged_focal
 from bifocal.orientation.media_options import media_of
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.tuning import CONTROL
@@ -303,7 +304,8 @@ def interior_of_photo(info: ImageInfo, data: KnownLens, number: int | str = "") 
     pitch = data.pixel_size
     if pitch is None and data.sensor_width is not None:
         pitch = data.sensor_width / max(info.size)
-    exif = pitch or info.focal_plane_pitch
+    judged = judged_focal(info)
+    exif = pitch or judged.pitch
     if data.focal is not None:
         pitch = exif
         if pitch is None and info.focal_length and info.focal_pixels:
@@ -314,18 +316,18 @@ def interior_of_photo(info: ImageInfo, data: KnownLens, number: int | str = "") 
             raise InputError(remark("refused.no_sensor", **about))
         focal, sigma = data.focal / pitch, CONTROL.sigma_nominal
         source = f"--focal{number} {data.focal:g} mm"
-    elif info.focal_length and exif:
-        pitch, sigma, source = exif, CONTROL.sigma_nominal, f"EXIF, {info.focal_length:g} mm"
-        focal = info.focal_length / pitch
-    elif info.focal_pixels:
-        focal, sigma, pitch = info.focal_pixels, CONTROL.sigma_equivalent, None
-        source = remark("orientation.exif_equivalent", focal=info.focal_length_35)
+    elif info.focal_length and pitch:
+        sigma, source = CONTROL.sigma_nominal, f"EXIF, {info.focal_length:g} mm"
+        focal = info.focal_length / pitch * (info.digital_zoom or 1.0)
+    elif judged.focal:
+        focal, sigma, pitch, source = judged.focal, judged.sigma, judged.pitch, judged.source
     else:
         return Interior.unknown(info.size)
     found = Interior.from_focal(
         focal, image_size=info.size, sigma=sigma, source=source, pixel_size=pitch
     )
-    return replace(found, is_typed=data.focal is not None)
+    typed = data.focal is not None
+    return replace(found, is_typed=typed, doubt="" if typed else judged.doubt)
 
 
 def control_of(options: AlignOptions, sizes: Sequence[tuple[int, int]]) -> Control:

@@ -11,10 +11,11 @@ import numpy as np
 
 from bifocal.files.photos import photo_info
 from bifocal.matching.pick_evidence import held_against_photos
+from bifocal.model.hypotheses import SCALE_TOLERANCE
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
 from bifocal.remarks import remark
-from bifocal.survey.setup import SCALE_TOLERANCE, Measuring, Taking, given_of
+from bifocal.survey.setup import Measuring, Taking, given_of
 from bifocal.survey.solved_survey import SolvedSurvey
 from bifocal.survey.solver import solve_survey, solve_survey_of_set
 from bifocal.survey.survey_input import SurveyInput

@@ -1,0 +1,98 @@
+"""What all EXIF data of a photo together say of its principal distance: judged, not believed.
+
+A photo that was resized keeps the focal plane's resolution of the larger one; bodies write wrong
+planes; digital zoom enlarges a part of the sensor. Each tag is held against the others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bifocal.orientation.tuning import CONTROL
+from bifocal.remarks import remark
+from photocore.images import ImageInfo
+
+#: Two tags that differ by less agree: equivalents are rounded, and by diagonal or longer side.
+AGREE = 0.12
+#: A principal distance between tags that contradict each other is never given worse than this.
+WORST = 0.14
+#: Sizes of one photo in two resolutions have the same proportions to this.
+SAME_SHAPE = 0.01
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JudgedFocal:
+    """A principal distance out of EXIF data.
+
+    Attributes
+    ----------
+    focal : float or None
+        None where they do not tell. [px]
+    sigma : float
+        Relative standard deviation; covers all that contradicts it.
+    pitch : float or None
+        Pixel size of the photo as it is. [mm]
+    source, doubt : str
+        Where it comes from; what contradicts it.
+    """
+
+    focal: float | None = None
+    sigma: float = CONTROL.sigma_equivalent
+    pitch: float | None = None
+    source: str = ""
+    doubt: str = ""
+
+
+def judged_focal(info: ImageInfo) -> JudgedFocal:
+    """Return the principal distance on which a photo's EXIF data agree, or what covers them.
+
+    Examples
+    --------
+    A photo of 3072 px at half its size; its focal plane is that of the whole:
+
+    >>> from pathlib import Path
+    >>> info = ImageInfo(path=Path("a.jpg"), size=(1536, 1024), focal_length=35,
+    ...                  focal_plane_pitch=22.7 / 3072, recorded_size=(3072, 2048))
+    >>> round(judged_focal(info).focal, 1)
+    2368.3
+    """
+    pitch, focal, zoom = info.focal_plane_pitch, info.focal_length, info.digital_zoom or 1.0
+    source = f"EXIF, {focal:g} mm" if focal else ""
+    wide, resized = max(info.size), 1.0
+    if info.recorded_size is not None and pitch:
+        resized = max(info.recorded_size) / wide
+        shape = max(info.recorded_size) / min(info.recorded_size) * min(info.size) / wide
+        if abs(resized - 1) > SAME_SHAPE > abs(shape - 1):
+            pitch *= resized
+            about = {"recorded": max(info.recorded_size), "width": wide}
+            source = remark("orientation.exif_resized", focal=focal or 0.0, **about)
+    plane = focal / pitch * zoom if focal and pitch else None
+    equivalent = info.focal_length_35
+    if not equivalent:
+        if plane is None:
+            return JudgedFocal(pitch=pitch)
+        return JudgedFocal(
+            focal=plane, sigma=CONTROL.sigma_nominal, pitch=pitch and pitch / zoom, source=source
+        )
+    # The equivalent refers to the diagonal of 36 x 24 mm, of some makers to the longer side.
+    by_size = [np.hypot(*info.size) / np.hypot(36, 24), wide / 36]
+    stated = float(equivalent * by_size[0])
+    if plane is not None and pitch:
+        other = [equivalent * by * z for by in by_size for z in (1.0, zoom)]
+        if min(abs(np.log(plane / one)) for one in other) < AGREE:
+            return JudgedFocal(
+                focal=plane, sigma=CONTROL.sigma_nominal, pitch=pitch / zoom, source=source
+            )
+    source = remark("orientation.exif_equivalent", focal=equivalent)
+    if plane is not None:
+        sigma = min(WORST, abs(float(np.log(plane / stated))) / 2)
+        about = {"plane": plane, "equivalent": stated, "share": 100 * sigma}
+        doubt = remark("orientation.exif_focal_plane", **about)
+        return JudgedFocal(focal=stated, sigma=sigma, source=source, doubt=doubt)
+    if zoom > 1 + AGREE:
+        sigma = min(WORST, float(np.log(zoom)) / 2)
+        doubt = remark("orientation.exif_zoomed", zoom=zoom, share=100 * sigma)
+        return JudgedFocal(focal=stated * np.sqrt(zoom), sigma=sigma, source=source, doubt=doubt)
+    return JudgedFocal(focal=stated, source=source)

@@ -1,0 +1,76 @@
+"""EXIF data of a photo held against each other: what agrees counts, what contradicts is said."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from bifocal.orientation.align_workflow import KnownLens, interior_of_photo
+from photocore.images import ImageInfo, image_info
+
+#: A 35 mm lens on a sensor 22.7 mm wide, 3072 px; and at half the size.
+PITCH = 22.7 / 3072
+WHOLE, HALF = 35 / PITCH, 35 / PITCH / 2
+
+
+def interior(width: int = 1536, **tags: object):
+    known = {"focal_length": 35.0, "focal_plane_pitch": PITCH} | tags
+    info = ImageInfo(path=Path("far.jpg"), size=(width, width * 2 // 3), **known)
+    return interior_of_photo(info, KnownLens())
+
+
+def test_a_resized_photo_keeps_the_lens_of_the_whole(tmp_path) -> None:
+    path = tmp_path / "small.jpg"
+    exif = Image.Exif()
+    exif.get_ifd(34665).update(
+        {37386: 35.0, 41486: 3072 / 22.7, 41488: 4, 40962: 3072, 40963: 2048}
+    )
+    Image.fromarray(np.zeros((1024, 1536, 3), np.uint8)).save(path, exif=exif)
+    made = interior_of_photo(image_info(path), KnownLens())
+    assert made.focal == pytest.approx(HALF, rel=1e-4)
+    assert made.sigma_focal == 0.02
+    assert "3072 px wide saved at 1536 px" in made.source
+    assert not made.doubt
+
+
+def test_a_whole_photo_is_as_its_focal_plane_says() -> None:
+    for more in ({}, {"recorded_size": (3072, 2048)}, {"focal_length_35": 55.5}):
+        made = interior(3072, **more)
+        assert made.focal == pytest.approx(WHOLE)
+        assert (made.sigma_focal, made.source, made.doubt) == (0.02, "EXIF, 35 mm", "")
+    # Cut to other proportions, nothing was enlarged.
+    assert interior(3000, recorded_size=(3072, 2304)).focal == pytest.approx(WHOLE)
+
+
+@pytest.mark.parametrize("wrong", [1.52, 0.5, 2.0])
+def test_a_focal_plane_that_the_equivalent_contradicts_is_said_and_covered(wrong) -> None:
+    made = interior(3072, focal_plane_pitch=PITCH / wrong, focal_length_35=55.5)
+    assert made.focal == pytest.approx(WHOLE, rel=0.02)
+    assert "contradict themselves" in made.doubt
+    off = min(abs(np.log(wrong)), 0.28)
+    assert made.sigma_focal == pytest.approx(off / 2, abs=0.012)
+
+
+def test_digital_zoom_lengthens_the_lens() -> None:
+    zoomed = interior(3072, digital_zoom=1.84)
+    assert zoomed.focal == pytest.approx(1.84 * WHOLE)
+    assert zoomed.focal * zoomed.pixel_size == pytest.approx(35)
+    for equivalent in (55.5, 55.5 * 1.84):  # some makers count it in, some do not
+        agreed = interior(3072, digital_zoom=1.84, focal_length_35=equivalent)
+        assert agreed.focal == pytest.approx(1.84 * WHOLE)
+        assert not agreed.doubt
+    alone = interior(3072, digital_zoom=1.3, focal_plane_pitch=None, focal_length_35=55.5)
+    assert "digital zoom 1.3" in alone.doubt
+    for true in (WHOLE, 1.3 * WHOLE):
+        assert abs(np.log(alone.focal / true)) < 1.2 * alone.sigma_focal
+
+
+def test_what_was_typed_is_not_doubted() -> None:
+    info = ImageInfo(
+        path=Path("far.jpg"), size=(3072, 2048), focal_length=35.0, focal_length_35=55.5,
+        focal_plane_pitch=PITCH / 2,
+    )  # fmt: skip
+    made = interior_of_photo(info, KnownLens(focal=35, sensor_width=22.7))
+    assert made.focal == pytest.approx(WHOLE)
+    assert not made.doubt
