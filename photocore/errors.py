@@ -12,6 +12,13 @@ LARGEST = 1e15
 class PhotogrammetryError(Exception):
     """Root of everything raised on purpose; the command line prints it without a traceback."""
 
+    def __new__(cls, *args: object, **_: object) -> PhotogrammetryError:
+        """Return the error; the remarks among what it says are of those that stop."""
+        for arg in args:
+            if stop := getattr(arg, "stop", None):  # a remark that now says why nothing was made
+                stop()
+        return super().__new__(cls, *args)
+
 
 class InputError(PhotogrammetryError, ValueError):
     """A file, option, cell or array that the user can mend."""

@@ -12,6 +12,7 @@ import numpy as np
 from photocore.errors import InputError
 from photocore.output import atomic_path
 from photocore.provenance import is_recorded, provenance
+from photocore.remarks import learn, with_keys
 from photocore.textfile import read_text
 
 
@@ -40,7 +41,9 @@ def read_json(path: Path | str, *, what: str) -> Any:
     """Return what a JSON file holds, whatever that is; raise as `read_object` does."""
     text = read_text(Path(path), what, form=" (JSON)")
     try:
-        return json.loads(text)
+        value = json.loads(text)
+        learn(value)
+        return value
     except json.JSONDecodeError as error:
         raise InputError(
             f"{path}: not valid JSON at line {error.lineno}, column {error.colno}: {error.msg}."
@@ -66,7 +69,11 @@ def write_object(
 
 
 def to_text(value: Any, *, indent: int | None = None) -> str:
-    """Return JSON text of a structure that may hold numpy values; NaN and infinity become null."""
+    """Return JSON text of a structure that may hold numpy values; NaN and infinity become null.
+
+    An object gets a key ``remark_keys`` where it holds remarks (`photocore.remarks.with_keys`).
+    """
+    value = with_keys(value) if isinstance(value, dict) else value
     return json.dumps(plain(value), indent=indent, ensure_ascii=False, allow_nan=False)
 
 

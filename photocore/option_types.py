@@ -202,6 +202,11 @@ class Number(click.ParamType):  # type: ignore[type-arg,unused-ignore]
         )
 
 
+def thousandth(value: float) -> float:
+    """Return metres of millimetres, or millimetres of micrometres."""
+    return value / 1000
+
+
 class Numbers(Number):
     """So many numbers with commas or semicolons between them; decimal points.
 
@@ -303,9 +308,16 @@ class Names(click.ParamType):  # type: ignore[type-arg,unused-ignore]
     """Names with commas between them."""
 
     name = "text"
+    is_single = False
 
     def convert(self, value: Any, *_: object) -> tuple[str, ...]:
         """Return the names; none for an empty text."""
         if isinstance(value, tuple):
             return value
         return tuple(part.strip() for part in value.split(",") if part.strip())
+
+
+POSITIVE, NOT_NEGATIVE = Number(above=0), Number(least=0)
+#: From a pinhole's to a telescope's. [mm]
+FOCAL = Number(least=0.1, most=1e5)
+TABLE, NEW_TABLE = TableFile(), TableFile(output=True)

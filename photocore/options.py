@@ -1,23 +1,72 @@
-"""The options of the commands, as ``options.toml`` of their package declares them.
+"""The options of the commands: the fields of a class, typed and with words.
 
-A row there is at once an option of the command line, a key of files and an argument in Python.
+A field is at once an option of the command line, a key of files, a field of the page and a value in
+Python. Its type and default say what it holds, the string below it what a user reads of it, and
+`Typed`, annotated to it, how it is typed: bounds, unit, flag.
 """
 
 from __future__ import annotations
 
+import ast
+import inspect
 import json
-import math
-import re
-import tomllib
-from collections.abc import Callable
-from functools import cache, partial
-from importlib import import_module
+import sys
+import types
+import typing
+from collections.abc import Callable, Sequence
+from dataclasses import MISSING, Field, fields, is_dataclass
+from functools import cache
+from inspect import cleandoc
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from textwrap import indent
+from typing import Annotated, Any
 
 import click
 
-from photocore.option_types import Length, Names, Number, Numbers, Scale, Size, TableFile
+from photocore.option_types import Names, Number, Scale
+
+
+class Typed:
+    """How the value of a field is typed; a string below the field says what it is.
+
+    Parameters
+    ----------
+    kind : click.ParamType, optional
+        Number with bounds, table, names ...; by default what the type of the field tells: flag or
+        switch, whole number, number, choice, file, text.
+    unit : str
+        What stands behind the option in the help, e.g. ``M``.
+    flag : str
+        What is typed where it is not the name, more of them behind spaces.
+    text : str
+        What the option is, where several classes have it; one of them may say it otherwise.
+    default : float, optional
+        The default in the unit that is typed, where that is not the unit of the program.
+    **more
+        What else `click.Option` takes.
+    """
+
+    def __init__(
+        self,
+        kind: click.ParamType | None = None,  # type: ignore[type-arg,unused-ignore]
+        unit: str = "",
+        *,
+        flag: str = "",
+        text: str = "",
+        default: float | None = None,
+        **more: Any,
+    ) -> None:
+        self.kind, self.unit, self.flag, self.text = kind, unit, flag, text
+        self.default, self.more = default, more
+
+
+class Argument(Typed):
+    """How a field is typed that stands on the command line without a flag."""
+
+
+#: Of a field that is a group: its options have no defaults here, their help still tells them.
+UNSET = "without defaults"
 
 
 class Option:
@@ -171,124 +220,101 @@ def _in_file(value: Any) -> str:
     return json.dumps(value.name if isinstance(value, Path) else str(value), ensure_ascii=False)
 
 
-def _enter_cog(ctx: click.Context, param: click.Parameter, value: bool) -> None:  # noqa: ARG001
-    if value:
-        from photocore.raster_places import cloud_optimised
-
-        ctx.with_resource(cloud_optimised())
-
-
-def _thousandth(value: float) -> float:
-    """Return metres of millimetres, or millimetres of micrometres."""
-    return value / 1000
-
-
-#: What a row's ``kind`` stands for, given the limits it states.
-KINDS: dict[str, Callable[..., Any]] = {
-    "choice": click.Choice,
-    "cog": partial(dict, is_flag=True, expose_value=False, callback=_enter_cog),
-    "degrees": partial(Number, to=math.radians),
-    "file": partial(click.Path, path_type=Path),
-    "flag": partial(dict, is_flag=True),
-    "focal": partial(Number, least=0.1, most=1e5),  # [mm] from a pinhole's to a telescope's
-    "integer": click.types.IntParamType,
-    "length": Length,
-    "names": Names,
-    "new table": partial(TableFile, output=True),
-    "not negative": partial(Number, least=0),
-    "number": Number,
-    "numbers": Numbers,
-    "positive": partial(Number, above=0),
-    "range": click.IntRange,
-    "scale": Scale,
-    "size": Size,
-    "switch": partial(dict, default=None),
-    "table": TableFile,
-    "text": click.types.StringParamType,
-    "thousandths": partial(Number, above=0, to=_thousandth),
-}
-#: Keys of a row that its kind takes.
-LIMITS = (
-    *("above", "below", "case_sensitive", "choices", "count", "finite", "least", "max", "min"),
-    *("most", "whole", "word"),
-)
+#: What ``X | None`` is at run time; the second of types such as Literal.
+UNIONS = (types.UnionType, typing.Union)
 
 
 @cache
-def _texts(package: str) -> tuple[str, ...]:
-    """Return the parts of a package's ``options.toml``: what commands share, and each command."""
-    path = Path(str(import_module(package).__file__)).with_name("options.toml")
-    return tuple(re.split(r"^(?=\[\w+\]$)", path.read_text("utf-8"), flags=re.MULTILINE))
+def _texts(module: str) -> dict[str, dict[str, str]]:
+    """Return what the strings below fields say, by class and field of a module."""
+    texts: dict[str, dict[str, str]] = {}
+    for node in ast.parse(inspect.getsource(sys.modules[module])).body:
+        if isinstance(node, ast.ClassDef):
+            texts[node.name] = {
+                field.target.id: " ".join(cleandoc(text.value.value).split("\n"))
+                for field, text in pairwise(node.body)
+                if isinstance(field, ast.AnnAssign)
+                and isinstance(field.target, ast.Name)
+                and isinstance(text, ast.Expr)
+                and isinstance(text.value, ast.Constant)
+                and isinstance(text.value.value, str)
+            }
+    return texts
+
+
+def _option(field: Field[Any], hint: Any, notes: Sequence[Typed], text: str) -> Option:
+    """Return the option of a field of a type; the last of the notes on it counts first."""
+    parts = typing.get_args(hint) if typing.get_origin(hint) in UNIONS else (hint,)
+    kind = next(part for part in parts if part is not types.NoneType)
+    type_ = next((note.kind for note in notes if note.kind), None)
+    several = typing.get_origin(kind) is tuple and getattr(type_, "is_single", True)
+    if several:
+        kind = typing.get_args(kind)[0]
+    required, default = field.default is MISSING, field.default
+    attributes: dict[str, Any] = {"type": type_ or _type_of(kind), "required": required}
+    if unit := next((note.unit for note in notes if note.unit), ""):
+        attributes["metavar"] = unit
+    if any(isinstance(note, Argument) for note in notes):
+        attributes["nargs"] = -1 if several else 1
+        return Option(field.name, field.name, argument=True, **attributes)
+    flags = next((note.flag for note in notes if note.flag), f"--{field.name.replace('_', '-')}")
+    attributes["help"] = text or next((note.text for note in notes if note.text), "")
+    attributes["multiple"] = several
+    if kind is bool:
+        del attributes["type"]
+    if kind is bool and default is False:
+        attributes["is_flag"] = True
+    elif kind is bool:
+        flags, attributes["default"] = f"{flags}/--no-{flags[2:]}", default
+    elif not (required or several or default is None):
+        value = next((note.default for note in notes if note.default is not None), default)
+        shown = f"1:{_shown(value)}" if isinstance(type_, Scale) else _shown(value)
+        as_text = isinstance(value, tuple) or isinstance(type_, Scale)
+        attributes["default"] = shown if as_text else value
+    attributes["show_default"] = attributes.get("default") not in (None, "")
+    for note in notes:
+        attributes |= note.more
+    return Option(field.name, flags, **attributes)
+
+
+def _type_of(kind: Any) -> click.ParamType:  # type: ignore[type-arg,unused-ignore]
+    """Return how values of a type are typed where nothing is noted."""
+    if typing.get_origin(kind) is typing.Literal:
+        return click.Choice(typing.get_args(kind))
+    plain = {Path: click.Path(path_type=Path), float: Number(), int: click.INT}
+    return plain.get(kind, click.STRING)
 
 
 @cache
-def _shared(package: str) -> dict[str, Any]:
-    """Return the tables that commands share, those of `photocore` among them."""
-    tables = tomllib.loads(_texts(package)[0])
-    if package != "photocore":
-        tables["shared"] = _shared("photocore")["shared"] | tables["shared"]
-    return tables
+def options_of(declaring: type) -> dict[str, Option]:
+    """Return the fields of a class as options, by their names.
 
-
-@cache
-def _table(package: str, name: str) -> dict[str, Any]:
-    """Return the table of a command, or one that several share; no other command's is parsed."""
-    text = next((part for part in _texts(package) if part.startswith(f"[{name}]\n")), None)
-    return dict((_shared(package) if text is None else tomllib.loads(text))[name])
-
-
-def program(package: str) -> dict[str, Any]:
-    """Return what the group of a package's commands says of itself and of each of them."""
-    return _table(package, "program")
-
-
-@cache
-def options_of(package: str, group: str) -> dict[str, Option]:
-    """Return the options of a command, or of a group that several take, by their names.
-
-    Parameters
-    ----------
-    package : str
-        Whose ``options.toml`` declares them.
-    group : str
-        The table. A row with ``all`` stands for all rows of another table (``unset``: without
-        their defaults). One without kind takes after the row that it is ``like``, or after the
-        row of its name in ``shared``.
+    A field that is such a class itself is a group: its options stand in its place, once each.
     """
+    hints = typing.get_type_hints(declaring, include_extras=True)
+    texts = _texts(declaring.__module__)[declaring.__name__]
     options: dict[str, Option] = {}
-    for name, row in _table(package, group).items():
-        if name == "epilog":
-            continue
-        if "all" in row:
-            for option in options_of(package, row["all"]).values():
-                options.setdefault(option.name, option.unset() if "unset" in row else option)
-            continue
-        if not {"kind", "choices"} & row.keys():
-            where, _, like = row.get("like", name).rpartition(".")
-            row = _table(package, where or "shared")[like] | row
-        options.setdefault(name, _option(name, row))
+    for field in fields(declaring):
+        hint, notes = hints[field.name], []
+        if typing.get_origin(hint) is Annotated:
+            hint, notes = hint.__origin__, hint.__metadata__[::-1]
+        if is_dataclass(hint):
+            for option in options_of(hint).values():  # type: ignore[arg-type]
+                options.setdefault(option.name, option.unset() if UNSET in notes else option)
+        else:
+            option = _option(field, hint, notes, texts.get(field.name, ""))
+            options.setdefault(field.name, option)
     return options
 
 
-def _option(name: str, row: dict[str, Any]) -> Option:
-    """Return the option of a row."""
-    limits = {key: value for key, value in row.items() if key in LIMITS}
-    attributes = {key: value for key, value in row.items() if key not in LIMITS}
-    attributes.pop("like", None)
-    flags = attributes.pop("flag", f"--{name.replace('_', '-')}")
-    made = KINDS[kind := attributes.pop("kind", "choice")](**limits)
-    if kind == "switch":
-        flags += f"/--no-{flags[2:]}"
-    if "unit" in attributes:
-        attributes["metavar"] = attributes.pop("unit")
-    if "argument" not in attributes:
-        attributes.setdefault("show_default", attributes.get("default", "") != "")
-    attributes = made | attributes if isinstance(made, dict) else {"type": made} | attributes
-    return Option(name, flags, **attributes)
+def declared(declaring: type) -> Callable[[Callable[..., Any]], click.Command]:
+    """Return what makes a command of a function, with the fields of a class as its options.
 
-
-def declared(function: Callable[..., Any]) -> click.Command:
-    """Return the command of a module ``PACKAGE.cli.NAME``, with the options of its table NAME."""
-    package, _, name = function.__module__.split(".")
-    parameters = [option.parameter() for option in options_of(package, name).values()]
-    return click.command(epilog=_table(package, name)["epilog"], params=parameters)(function)
+    The docstring of the class, but for its first line, ends the help: examples.
+    """
+    _, _, text = cleandoc(declaring.__doc__ or "").partition("\n\n")
+    examples, *more = text.split("\n\n")
+    parts = [f"\b\nExamples:\n{indent(examples, '  ')}"]
+    parts += [f"\b\n{part}" if "\n  " in part else part for part in more]
+    parameters = [option.parameter() for option in options_of(declaring).values()]
+    return click.command(epilog="\n\n".join(parts) + "\n", params=parameters)

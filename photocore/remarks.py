@@ -1,15 +1,17 @@
-"""Remarks with a key and values; their words lie in a package's `remarks.toml`, in 3 languages.
+"""Remarks with a key, values and a level; their words lie in `remarks.toml`, in 3 languages.
 
-A remark is a ``str``, its English words: files, JSON and the command line hold these. Reports and
-pages call `Remarks.in_language`, which knows a remark by its words wherever it stands, also in a
-text that was read from a file or put together from several.
+A remark is a ``str``, its English words: messages, files and the command line hold these. Each is
+remembered with its key and values as it is made, and files of JSON keep these beside the words
+(`with_keys`, `learn`), so that `Remarks.in_language` finds a remark wherever it stands, also in a
+text put together from several, by what was made and never by how it reads.
 """
 
 from __future__ import annotations
 
-import re
+import math
 from collections.abc import Iterator, Mapping
-from functools import cached_property, lru_cache, partial
+from functools import cached_property
+from numbers import Integral
 from string import Formatter
 from typing import Any
 
@@ -18,8 +20,10 @@ from photocore.workbook.making.words import LANGUAGES
 
 #: Entries of this section are single words: looked up only as values of blanks ``{...!s}``.
 WORDS = "word."
-#: What a blank with a number format may hold; any other holds any text.
-_NUMBER, _TEXT = r"[-+−\d.,:einfa%]+?", r"[^\n]+?"
+#: By this key JSON files hold what their remarks are made of.
+KEYS = "remark_keys"
+#: Remarks that are remembered, the latest; and the shortest text that may hold one.
+_REMEMBERED, _SHORTEST = 4_000, 5
 
 
 class Remark(str):
@@ -31,10 +35,95 @@ class Remark(str):
         Its section and name in `remarks.toml`.
     values : mapping
         What fills its blanks.
+    level : str
+        ``stop`` where nothing was made, ``doubt`` where what was made may be wrong, ``hint``.
     """
 
     key: str
     values: Mapping[str, Any]
+    level: str
+
+    def stop(self) -> None:
+        """Say that nothing was made."""
+        self.level = "stop"
+        for _, told in _within(self):
+            told.level = "stop"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _remembered, (str(self), self.key, dict(self.values), self.level)
+
+
+#: What was made, by its English words.
+_MADE: dict[str, Remark] = {}
+
+
+def _remembered(text: str, key: str, values: Mapping[str, Any], level: str) -> Remark:
+    told = Remark(text)
+    told.key, told.values, told.level = key, values, level
+    if len(text) >= _SHORTEST:
+        _MADE.pop(text, None)
+        _MADE[text] = told
+        if len(_MADE) > _REMEMBERED:
+            del _MADE[next(iter(_MADE))]
+    return told
+
+
+def _within(text: str) -> Iterator[tuple[int, Remark]]:
+    """Yield the remarks that a text holds and where, from left to right, none inside another."""
+    held = [_MADE[text]] if text in _MADE else []
+    if not held and len(text) >= _SHORTEST:
+        held = [told for words, told in _MADE.items() if words in text]
+    end = 0
+    while held:
+        places = [(text.find(told, end), -len(told), told) for told in held]
+        places = [found for found in places if found[0] >= 0]
+        if not places:
+            return
+        place, length, told = min(places)
+        yield place, told
+        end, held = place - length, [found[2] for found in places]
+
+
+def with_keys(value: dict[str, Any]) -> dict[str, Any]:
+    """Return an object for JSON with keys, values and levels of all remarks that its texts hold."""
+    held: dict[str, Any] = {}
+
+    def collect(part: Any) -> None:
+        if isinstance(part, str):
+            for _, told in _within(part):
+                if told not in held:
+                    values = {name: _plain(one) for name, one in told.values.items()}
+                    held[str(told)] = {"key": told.key, "values": values, "level": told.level}
+                    collect([one for one in values.values() if isinstance(one, str)])
+        elif isinstance(part, Mapping):
+            for one in part.values():
+                collect(one)
+        elif isinstance(part, list | tuple):
+            for one in part:
+                collect(one)
+
+    collect({name: part for name, part in value.items() if name != KEYS})
+    rest = {name: part for name, part in value.items() if name != KEYS}
+    return {**rest, KEYS: held} if held else rest
+
+
+def learn(value: Any) -> None:
+    """Remember the remarks of an object read from JSON."""
+    held = value.get(KEYS) if isinstance(value, dict) else None
+    for text, told in (held if isinstance(held, dict) else {}).items():
+        if isinstance(told, dict) and isinstance(told.get("values"), dict):
+            _remembered(text, str(told.get("key")), told["values"], str(told.get("level")))
+
+
+def _plain(value: Any) -> Any:
+    """Return a value of a blank as JSON can hold it; a number that is none as its text."""
+    if isinstance(value, str | bool | Integral):
+        return str(value) if isinstance(value, str) else int(value)
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        return str(value)
+    return number if math.isfinite(number) else str(number)
 
 
 class Remarks:
@@ -45,7 +134,7 @@ class Remarks:
     *packages : str
         Each with a file `remarks.toml` of tables ``[section.name]``, each of which holds one text
         with blanks a language. A blank is a format field; ``!s`` says that its value is itself
-        looked up.
+        looked up. A table ``[hints]`` lists the keys of those that are no more than hints.
 
     Examples
     --------
@@ -59,7 +148,6 @@ class Remarks:
 
     def __init__(self, *packages: str) -> None:
         self.packages = packages
-        self.in_language = lru_cache(4096)(self._in_language)
 
     @cached_property
     def texts(self) -> dict[str, dict[str, str]]:
@@ -67,74 +155,71 @@ class Remarks:
         found: dict[str, dict[str, str]] = {}
         for package in self.packages:
             for section, entries in packaged(package, "remarks").items():
-                found |= {f"{section}.{name}": words for name, words in entries.items()}
+                if section != "hints":
+                    found |= {f"{section}.{name}": words for name, words in entries.items()}
         return found
+
+    @cached_property
+    def hints(self) -> set[str]:
+        """Keys of remarks that are no more than hints."""
+        listed = (packaged(package, "remarks").get("hints", {}) for package in self.packages)
+        return {key for table in listed for key in table.get("keys", ())}
 
     def __call__(self, key: str, /, *, of: object = "", **values: Any) -> Remark:
         """Return a remark by its key, its blanks filled, behind the place that it is about."""
-        told = Remark((f"{of}: " if of else "") + self.texts[key]["en"].format(**values))
-        told.key, told.values = key, values
-        return told
+        words = self.texts[key]["en"].format(**values)
+        level = "hint" if key in self.hints else "doubt"
+        told = _remembered(words, key, values, level)
+        if not of:
+            return told
+        placed = Remark(f"{of}: {words}")
+        placed.key, placed.values, placed.level = told.key, told.values, told.level
+        return placed
 
-    def _in_language(self, text: str, language: str) -> str:
-        """Return a text with all remarks known in it in another of `LANGUAGES`.
+    def in_language(self, text: str, language: str) -> str:
+        """Return a text with all remarks that it holds in another of `LANGUAGES`.
 
         Parameters
         ----------
         text : str
-            A `Remark`, or any text that holds some: their words tell which.
+            A `Remark`, or any text that holds some.
         language : str
         """
         if language == LANGUAGES[0]:
             return str(text)
-        for entry in self._entries:
-            # The longest alone first: it tells nearly all of them apart.
-            if entry.literals[0] in text and all(part in text for part in entry.literals):
-                text = entry.pattern.sub(partial(self._worded, entry, language), text)
-        return str(text)
+        parts, end = "", 0
+        for place, told in _within(text):
+            parts += text[end:place] + self._worded(told, language)
+            end = place + len(told)
+        return parts + text[end:]
 
-    def _worded(self, entry: _Entry, language: str, match: re.Match[str]) -> str:
-        blanks = match.groupdict()
-        for name in entry.nested & blanks.keys():
-            words = (self._words.get(word, {language: word}) for word in blanks[name].split(", "))
-            listed = ", ".join(word[language] for word in words)
-            blanks[name] = self.in_language(listed, language)
-        return entry.texts[language].format(**blanks)
+    def _worded(self, told: Remark, language: str) -> str:
+        if told.key not in self.texts:
+            return str(told)
+        parts = ""
+        for literal, name, form, mark in Formatter().parse(self.texts[told.key][language]):
+            parts += literal
+            if name is not None:
+                value = told.values.get(name, "")
+                value = repr(value) if mark == "r" else value
+                parts += self._blank(value, form or "", language, is_word=mark == "s")
+        return parts
+
+    def _blank(self, value: Any, form: str, language: str, *, is_word: bool) -> str:
+        """Return what fills a blank: numbers in their form, remarks among texts translated."""
+        if not isinstance(value, str):
+            try:
+                return format(value, form)
+            except (TypeError, ValueError):  # of a file that somebody changed
+                return str(value)
+        if is_word:
+            words = (self._words.get(word, {language: word}) for word in value.split(", "))
+            value = ", ".join(word[language] for word in words)
+        return self.in_language(value, language)
 
     @cached_property
     def _words(self) -> dict[str, dict[str, str]]:
         return {text["en"]: text for key, text in self.texts.items() if key.startswith(WORDS)}
-
-    @cached_property
-    def _entries(self) -> list[_Entry]:
-        """What is searched for, longest first."""
-        found = [_Entry(text) for key, text in self.texts.items() if not key.startswith(WORDS)]
-        return sorted(found, key=lambda entry: -sum(map(len, entry.literals)))
-
-
-class _Entry:
-    """A text of `remarks.toml`: how to know it, and its other languages without formats."""
-
-    def __init__(self, texts: Mapping[str, str]) -> None:
-        parts = list(Formatter().parse(texts["en"]))
-        self.literals = sorted((text for text, *_ in parts if text), key=len, reverse=True)
-        self.nested = {name for _, name, _, mark in parts if name and mark == "s"}
-        self.pattern = re.compile("".join(_patterns(parts)))
-        self.texts = {key: re.sub(r"(?<=\w)[:!][^{}]*}", "}", text) for key, text in texts.items()}
-
-
-def _patterns(parts: list[Any]) -> Iterator[str]:
-    """Yield the parts of the regular expression that knows a text."""
-    known: set[str] = set()
-    for place, (literal, name, form, _) in enumerate(parts):
-        yield re.escape(literal)
-        if name is None:
-            continue
-        kind = _NUMBER if form else _TEXT
-        if place == len(parts) - 1:
-            kind = kind[:-1]  # at the end as much as there is
-        yield f"(?P={name})" if name in known else f"(?P<{name}>{kind})"
-        known.add(name)
 
 
 remark = Remarks("photocore")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import shutil
 import signal
 import subprocess
@@ -15,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import pytest
+from tests import equipment
 
 SAMPLE = Path(__file__).parents[1] / "bifocal" / "demo" / "sample"
 #: Of the sample: metres a pixel on the wall, principal point, distances. (tests/scenes/make_sample)
@@ -36,17 +35,6 @@ def true_pixel(image: int, place: tuple[float, float, float]) -> tuple[float, fl
     return CENTRE[0] + place[0] * stretched, CENTRE[1] - place[1] * stretched
 
 
-def chromium() -> str:
-    """Return Debian's or the user's Chromium; skip where there is none, except in CI."""
-    pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
-    for name in ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"):
-        if found := shutil.which(name):
-            return found
-    if os.environ.get("CI"):
-        pytest.fail("Chromium is not installed, but CI is set")
-    pytest.skip("Chromium is not installed")
-
-
 #: The Playwright of this process, while a browser is open.
 _running: list[Any] = []
 
@@ -56,6 +44,13 @@ WATCH = """() => {
   let last = performance.now();
   const next = (now) => { frames_seen.push(now - last); last = now; requestAnimationFrame(next); };
   requestAnimationFrame(next);
+}"""
+#: Send a command; return whether it was taken, and the answer.
+SEND = """async (body) => {
+  const headers = { "Content-Type": "application/json" };
+  const sent = { method: "POST", headers, body: JSON.stringify(body) };
+  const answer = await fetch("api/command", sent);
+  return [answer.ok, await answer.text()];
 }"""
 
 
@@ -136,7 +131,7 @@ def _driver() -> Iterator[Any]:
 @contextlib.contextmanager
 def launched(*more: str) -> Iterator[Any]:
     """Return a headless browser, with more arguments; another one may be open."""
-    program = chromium()
+    program = equipment.place("browser")
     with _driver() as playwright:
         arguments = ["--no-sandbox", *(more or ("--disable-gpu",))]
         browser = playwright.chromium.launch(executable_path=program, args=arguments)
@@ -221,15 +216,17 @@ class Driver:
     def command(self, op: str, **fields: Any) -> Any:
         """Send a command past the page, as another tab would."""
         body = {"id": uuid.uuid4().hex, "op": op, **fields}
-        answer = self.context.request.post(self.server.origin + "/api/command", data=body)
-        assert answer.ok, answer.text()
-        return answer.json()["result"]
+        # By the page's own fetch: Chromium sends again what met a connection closed for idleness.
+        well, answer = self.tab.evaluate(SEND, body)
+        assert well, answer
+        return json.loads(answer)["result"]
 
     def empty(self) -> None:
-        """Delete all points and let go of everything: the next test begins afresh."""
-        for point in self.state["points"]:
-            self.command("point.delete", name=point["name"])
-        self.settled("state.points.length === 0")
+        """Delete all points and control and let go of everything: a test begins afresh."""
+        for kind, listed in (("point", "points"), ("control", "control")):
+            for one in self.state[listed]:
+                self.command(f"{kind}.delete", name=one["name"])
+        self.settled("state.points.length === 0 && state.control.length === 0")
         self.click("mode-points")
         self.pane.focus()
         self.keys("Escape", "Escape", "n", "v", "0")

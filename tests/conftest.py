@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import random
 import signal
 import subprocess
 import sys
@@ -26,19 +27,42 @@ import pytest  # noqa: E402
 from hypothesis import settings  # noqa: E402
 
 from photocore import cli  # noqa: E402
+from tests import equipment  # noqa: E402
 
 # The same examples on every machine and in every run: a red test is then a change of the code.
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.load_profile("same")
 
 
+@pytest.hookimpl(tryfirst=True)  # before -m chooses
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what fixtures want; order tests as ``TEST_ORDER`` says: reversed, or a seed."""
+    equipment.mark(items)
+    order = os.environ.get("TEST_ORDER")
+    if order == "reversed":
+        items.reverse()
+    elif order:
+        random.Random(order).shuffle(items)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Skip what wants LibreOffice, Chromium or data where they are not (office, browser, data)."""
+    equipment.check(item)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Tell the skips in one line."""
+    skipped = terminalreporter.stats.get("skipped", [])
+    reasons = [str(report.longrepr[2]).removeprefix("Skipped: ") for report in skipped]
+    if line := equipment.summary(reasons):
+        terminalreporter.write_line(line)
+
+
 @pytest.fixture(scope="session")
 def data_dir() -> Path:
-    """Return the folder of real example data; skip where it is not set."""
-    folder = os.environ.get("BIFOCAL_DATA")
-    if not folder:
-        pytest.skip("BIFOCAL_DATA is not set")
-    return Path(folder)
+    """Return the folder of real example data."""
+    return Path(equipment.place("data"))
 
 
 @pytest.fixture(scope="session", autouse=True)

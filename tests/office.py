@@ -5,7 +5,6 @@ from __future__ import annotations
 import atexit
 import functools
 import hashlib
-import os
 import re
 import shutil
 import subprocess
@@ -20,6 +19,7 @@ from photocore.workbook.changing.changes import SheetChanges
 from photocore.workbook.changing.splice import splice_sheet
 from photocore.workbook.reading.package import open_package, read_part, rewrite_package
 from photocore.workbook.reading.xlsx import read_directory
+from tests.equipment import place
 
 
 def strip_results(source: Path, target: Path) -> Path:
@@ -52,12 +52,8 @@ def convert(source: Path, folder: Path, ending: str = "xlsx") -> Path:
 
 
 def _converted(source: Path, folder: Path, ending: str, names: list[str]) -> list[Path]:
-    """Convert a file into files of these names; skip where LibreOffice is missing, except in CI."""
-    program = shutil.which("soffice") or shutil.which("libreoffice")
-    if program is None:
-        if os.environ.get("CI"):
-            pytest.fail("LibreOffice (soffice) is not installed, but CI is set")
-        pytest.skip("LibreOffice (soffice) is not installed")
+    """Convert a file into files of these names."""
+    program = place("office")
     out = folder / "office-out"
     out.mkdir(parents=True, exist_ok=True)
     results = [out / name for name in names]

@@ -50,6 +50,8 @@ def opened(*sources: Path, **options: Any) -> Iterator[Session]:
     finally:
         session.jobs.stop()
         session.journal.close()
+    alive = [thread.name for thread in session.jobs.threads if thread.is_alive()]
+    assert not alive, f"threads outlive their survey: {alive}"
 
 
 def client_of(session: Session, **headers: str) -> TestClient:

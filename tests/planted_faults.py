@@ -78,7 +78,8 @@ def first_failure(tree: Path, tests: list[str], seconds: float | None = None) ->
         [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider",
          *(["-n", "0"] if tests else []), *tests],
         cwd=tree, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True,
-        env={**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"},
+        env={name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
+        | {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"},
     ) as run:  # fmt: skip
         try:
             said = run.communicate(timeout=seconds)[0].decode(errors="replace")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from tests.equipment import place
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -45,14 +46,15 @@ def test_every_script_is_run() -> None:
     assert {path.stem for path in EXAMPLES.glob("*.py")} == set(PRINTED)
 
 
-@pytest.mark.parametrize("name", PRINTED)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.data) if name == "pair_from_geometry" else name
+     for name in PRINTED],
+)  # fmt: skip
 def test_a_script_prints_what_it_should(name: str, tmp_path: Path) -> None:
     words = []
     if name == "pair_from_geometry":
-        data = Path(os.environ.get("BIFOCAL_DATA", "absent")) / "facade_pairs" / "church_1"
-        if not data.is_dir():
-            pytest.skip("BIFOCAL_DATA is not set")
-        words = [str(data), "church_1"]
+        words = [str(Path(place("data")) / "facade_pairs" / "church_1"), "church_1"]
     script = EXAMPLES / f"{name}.py"
     done = subprocess.run(
         [sys.executable, str(script), *words], capture_output=True, text=True, cwd=tmp_path,

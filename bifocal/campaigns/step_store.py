@@ -32,6 +32,7 @@ from photocore.errors import InputError
 from photocore.jsonfile import to_text
 from photocore.output import check_not_open, told_as
 from photocore.provenance import FileHashes, file_hash, program, today
+from photocore.remarks import learn
 from photocore.textfile import check_file
 
 FORMAT = "bifocal-step/1"
@@ -145,6 +146,7 @@ def read_whole_record(folder: Path) -> dict[str, Any]:
     with suppress(OSError, ValueError, KeyError, TypeError):
         data = json.loads((folder / RECORD).read_text(encoding="utf-8"))
         if data["format"] == FORMAT:
+            learn(data)
             return dict(data)
     return {}
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from bifocal.campaigns.pair_steps import PRODUCTS, PairJob, tables_of
 from bifocal.options import FILES, JOINT, OF_PAIR
+from bifocal.options.commands import MosaicCommand
 from bifocal.remarks import remark
 from photocore.errors import InputError
 from photocore.options import options_of
@@ -38,7 +39,7 @@ def mosaic_wanted(path: Path) -> dict[str, Any] | None:
 
 def _options_of_mosaic(said: Mapping[str, Any], faults: list[str]) -> dict[str, Any]:
     """Return what is said of the mosaic, noting what is wrong."""
-    known, found = options_of("bifocal", "mosaic"), {}
+    known, found = options_of(MosaicCommand), {}
     for key, value in said.items():
         try:
             if key not in OF_MOSAIC:

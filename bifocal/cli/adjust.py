@@ -2,14 +2,39 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from bifocal.options import JointOptions
 from photocore.cli import print_result, progress_bar, tell_written
-from photocore.options import declared
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class AdjustCommand:
+    """The options of ``bifocal adjust``, and examples.
+
+    bifocal adjust left.pair.json right.pair.json --control left.csv --control right.csv --out joint
+    bifocal adjust a.pair.json b.pair.json c.pair.json --control a.csv --control none
+                   --control c.csv --out joint
+    """
+
+    pairs: Annotated[tuple[Path, ...], Argument(unit="PAIR.pair.json...")]
+    out: Annotated[Path, Typed(unit="DIR")]
+    """Folder of the adjusted pairs."""
+    control: tuple[Path, ...] = ()
+    """Table of control points of a pair, as for `bifocal align`, or none; repeat it, one for each
+    PAIR. Points of one name are one point."""
+    check: tuple[Path, ...] = ()
+    """The same for independent check points: they are compared, and hold nothing."""
+    joint: JointOptions = field(default_factory=JointOptions)
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(AdjustCommand)
 def command(
     pairs: tuple[Path, ...], out: Path, overwrite: bool, as_json: bool, **options: Any
 ) -> None:

@@ -3,20 +3,61 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import click
 from click.core import ParameterSource
 
+from bifocal.options import ColumnsOption, SetUpOptions
 from photocore.cli import print_result, progress_bar, remark
-from photocore.options import declared
+from photocore.option_types import TABLE
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 if TYPE_CHECKING:
     from bifocal.orientation.alignment import Alignment
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class AlignCommand:
+    """The options of ``bifocal align``, and examples.
+
+    bifocal align far.jpg near.jpg --control points.csv --out wall.pair.json
+    bifocal align far.jpg near.jpg --distance1 17.5 --distance2 9.5 --focal1 35 --focal2 19
+                 --sensor-width 22.7 --out wall.pair.json
+    bifocal align far.jpg near.jpg --as-set-up --distance1 17.5 --distance2 9.5 --focal1 35
+                 --focal2 19 --sensor-width 22.7 --out wall.pair.json
+    bifocal align far.jpg near.jpg --auto --distance1 17.5 --wall 612,433 --out wall.pair.json
+    bifocal align reef_far.jpg reef_near.jpg --control reef.csv --indices 1,1.49,1.337
+                 --thicknesses 0.01 --port 0.05 --prior index3=0.003 --out reef.pair.json
+    bifocal align survey.xlsx --out wall.pair.json
+    bifocal align far.jpg mid.jpg near.jpg --control set.csv --out wall.photos.json
+
+    points.csv, one line per control point; r blank = on the wall; pixels in both photos:
+      id,X [m],Y [m],r [m],col1 [px],row1 [px],col2 [px],row2 [px]
+      P1,0.000,0.000,,512.3,1700.8,498.1,1741.0
+    """
+
+    far: Annotated[Path, Argument()]
+    near: Annotated[Path | None, Argument()] = None
+    more: Annotated[tuple[Path, ...], Argument()] = ()
+    out: Path
+    """Pair file to write (*.pair.json), of three photos and more a set (*.photos.json)."""
+    control: Annotated[Path | None, Typed(TABLE)] = None
+    """Table of control points: id, X, Y, r [m] and pixels."""
+    columns: ColumnsOption = None
+    set_up: SetUpOptions = field(default_factory=SetUpOptions)
+    picture: Path | None = None
+    """Picture of the set-up.  [default: beside OUT, .png]"""
+    no_picture: bool = False
+    """Do not draw the picture."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(AlignCommand)
 def command(
     far: Path, near: Path | None, more: tuple[Path, ...], out: Path, overwrite: bool,
     as_json: bool, **given: Any,

@@ -2,19 +2,58 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import click
 
+from bifocal.options import LensDatabaseOptions
 from photocore.cli import print_result, progress_bar, remark, text_table
-from photocore.options import declared
+from photocore.option_types import POSITIVE, Size
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption, PatternOption
 
 if TYPE_CHECKING:
     from bifocal.calibration.board_calibration import Calibration
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class CalibrateCommand:
+    """The options of ``bifocal calibrate``, and examples.
+
+    bifocal calibrate board*.jpg --out lens35.json
+    bifocal calibrate charuco*.jpg --pattern charuco --board 8x11 --out lens35.json
+    bifocal calibrate facade.jpg --straight-edges --focal-px 4740 --out lens35.json
+    bifocal calibrate facade.jpg --lines lines.csv --out lens35.json
+    bifocal calibrate facade.jpg --database --out lens35.json
+
+    One lens file holds for one lens at one focus and one zoom mark.
+    """
+
+    images: Annotated[tuple[Path, ...], Argument(unit="IMAGE...")]
+    out: Path
+    """The lens file."""
+    pattern: PatternOption = "chessboard"
+    board: Annotated[tuple[int, int] | None, Typed(Size(least=1, whole=True))] = None
+    """Inner corners of a chessboard, circles of a grid, squares of a ChArUco board, across x
+    up.  [default: chessboard recognised by itself]"""
+    model: Literal["auto", "k1", "k1k2", "k1k2p", "k1k2pk3", "fisheye"] = "auto"
+    """Distortion terms; auto takes in what an F test at 1 % asks for."""
+    straight_edges: bool = False
+    """No board: use the straight edges of a façade (radial terms only)."""
+    lines: Path | None = None
+    """No board: points picked along straight lines; headings line, col [px], row [px]."""
+    focal_px: Annotated[float | None, Typed(POSITIVE, "PX")] = None
+    """With lines: principal distance [px]."""
+    database: bool = False
+    """Take the lens database's data for this photo."""
+    lens_database: LensDatabaseOptions = field(default_factory=LensDatabaseOptions)
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(CalibrateCommand)
 def command(
     images: tuple[Path, ...], out: Path, straight_edges: bool, lines: Path | None, database: bool,
     focal_px: float | None, overwrite: bool, as_json: bool, **options: Any,

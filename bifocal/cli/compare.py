@@ -2,14 +2,45 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from bifocal.options import LanguageOption
 from photocore.cli import print_result, progress_bar
-from photocore.options import declared
+from photocore.option_types import POSITIVE
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class CompareCommand:
+    """The options of ``bifocal compare``, and examples.
+
+    bifocal compare relief2019.tif relief2024.tif --out changed
+    bifocal compare relief2019.tif relief2024.tif --fit --language de --out moved
+    bifocal compare relief2019.tif relief2024.tif --stable still.geojson --out bulge
+
+    Positive: the wall came forward. A region is only told where chance alone would make any on the
+    whole wall with a probability below 1 %.
+    """
+
+    before: Annotated[Path, Argument()]
+    after: Annotated[Path, Argument()]
+    out: Annotated[Path, Typed(unit="DIR")]
+    """Folder to write."""
+    stable: Path | None = None
+    """GeoJSON polygons (X, Y) of parts that did not move: offset and tilt are found there."""
+    fit: bool = False
+    """Find offset and tilt on the whole wall, robustly: most of it did not move."""
+    smallest: Annotated[float, Typed(POSITIVE, "M2")] = 0.02
+    """Area of the smallest patch that is tested [m2]."""
+    language: LanguageOption = "en"
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(CompareCommand)
 def command(before: Path, after: Path, out: Path, as_json: bool, **options: Any) -> None:
     """Find what has changed on a wall between two dates.
 

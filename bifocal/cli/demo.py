@@ -3,17 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from photocore.cli import print_result, progress_bar, remark, text_table
 from photocore.options import declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 if TYPE_CHECKING:
     from bifocal.demo.workflow import DemoResult
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class DemoCommand:
+    """The options of ``bifocal demo``, and examples.
+
+    bifocal demo
+    bifocal demo --out sample --overwrite
+    bifocal demo --water --out under-water
+    """
+
+    out: Path = Path("bifocal-demo")
+    """Folder for the results; it is made."""
+    water: bool = False
+    """A façade under water, through flat ports, from 3.5/1.9 m: bent rays, haze."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(DemoCommand)
 def command(out: Path, water: bool, overwrite: bool, as_json: bool) -> None:
     """Survey a sample façade from two photos, and compare with the exact truth.
 

@@ -2,14 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 from photocore.cli import print_result
 from photocore.errors import InputError
-from photocore.options import declared
+from photocore.options import Argument, declared
+from photocore.shared_options import JsonOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class DoctorCommand:
+    """The options of ``bifocal doctor``, and examples.
+
+    bifocal doctor
+    bifocal doctor --json
+    bifocal doctor survey.xlsx
+    """
+
+    book: Annotated[Path | None, Argument(unit="[BOOK.xlsx]")] = None
+    as_json: JsonOption = False
+
+
+@declared(DoctorCommand)
 def command(book: Path | None, as_json: bool) -> None:
     """Print versions, extras, LibreOffice, cores, memory and disk: what a fault report needs.
 

@@ -2,11 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+from bifocal.options import (
+    CheckOption,
+    ColumnsOption,
+    ControlOption,
+    DrawingOptions,
+    FacesOption,
+    GsdOption,
+    LanguageOption,
+    MapOptions,
+    PictureOptions,
+    ScaleOption,
+    SetUpOptions,
+    SurveyOptions,
+)
 from photocore.cli import print_result, progress_bar
-from photocore.options import declared
+from photocore.option_types import Names
+from photocore.options import UNSET, Argument, Typed, declared
+from photocore.shared_options import CogOption, JsonOption, OverwriteOption
 
 if TYPE_CHECKING:
     from bifocal.campaigns.pair_job import PairOutcome
@@ -16,7 +33,47 @@ if TYPE_CHECKING:
 _TO_OPEN = ("report/*.html", "drawing/*.pdf", "points/*.xlsx", "relief/*.png", "ortho/*.tif")
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class FacadeCommand:
+    """The options of ``bifocal facade``, and examples.
+
+    bifocal facade far.jpg near.jpg --control points.csv --scale 1:50 --out DIR
+    bifocal facade far.jpg near.jpg --control points.csv --check check.csv --scale 1:20 --out wall
+    bifocal facade far.jpg near.jpg --auto --distance1 17.5 --scale 1:100 --language de --out wall
+    bifocal facade far.jpg mid.jpg near.jpg --control set.csv --scale 1:50 --out porch
+    bifocal facade reef_far.jpg reef_near.jpg --control reef.csv --indices 1,1.49,1.337
+                   --thicknesses 0.01 --port 0.05 --prior index3=0.003 --out reef
+    """
+
+    far: Annotated[Path, Argument()]
+    near: Annotated[Path, Argument()]
+    more: Annotated[tuple[Path, ...], Argument()] = ()
+    out: Annotated[Path, Typed(unit="DIR")]
+    """Folder of the results."""
+    control: ControlOption = None
+    check: CheckOption = None
+    columns: ColumnsOption = None
+    scale: ScaleOption = 50.0
+    name: str = ""
+    """Title.  [default: the folder's name]"""
+    language: LanguageOption = "en"
+    set_up: Annotated[SetUpOptions, UNSET] = field(default_factory=SetUpOptions)
+    faces: FacesOption = None
+    map: Annotated[MapOptions, UNSET] = field(default_factory=MapOptions)
+    picture: Annotated[PictureOptions, UNSET] = field(default_factory=PictureOptions)
+    gsd: GsdOption = None
+    """Pixel of the product ortho [m].  [default: that of the relief map]"""
+    drawing: Annotated[DrawingOptions, UNSET] = field(default_factory=DrawingOptions)
+    project: SurveyOptions = field(default_factory=SurveyOptions)
+    products: Annotated[tuple[str, ...] | None, Typed(Names(), "NAME,NAME,...")] = None
+    """Of relief, points, ortho, drawing, view, report.  [default: all but ortho, which the drawing
+    has]"""
+    cog: CogOption = False
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(FacadeCommand)
 def command(
     far: Path, near: Path, more: tuple[Path, ...], out: Path, as_json: bool, **given: Any
 ) -> None:

@@ -2,14 +2,43 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from bifocal.options import LanguageOption
 from photocore.cli import print_result
-from photocore.options import declared
+from photocore.options import Argument, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class HandoverCommand:
+    """The options of ``bifocal handover``, and examples.
+
+    bifocal handover wall.pair.json --ortho ortho.tif --relief relief.tif --out wall.html
+    bifocal handover wall.pair.json --ortho ortho.tif --points result.xlsx --title "Via Roma 12"
+                     --out wall.html
+    """
+
+    pair: Annotated[Path, Argument()]
+    ortho: Path | None = None
+    """Orthophoto to measure on."""
+    relief: Path | None = None
+    """Relief map: heights under the pointer, true distances."""
+    points: Path | None = None
+    """Solved workbook or table of points."""
+    title: str = ""
+    """Title.  [default: the file's name]"""
+    language: LanguageOption = "en"
+    """Of the page."""
+    out: Path
+    """Page to write (.html), 24 MB at most."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(HandoverCommand)
 def command(pair: Path, out: Path, overwrite: bool, as_json: bool, **given: Any) -> None:
     """Write one file for the client: photos, orthophoto, relief and points, to look at and measure.
 

@@ -3,16 +3,51 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import click
 
 from photocore.cli import print_result, remark
-from photocore.options import declared
+from photocore.option_types import NEW_TABLE
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class MatchCommand:
+    """The options of ``bifocal match``, and examples.
+
+    bifocal match wall.pair.json --out survey.xlsx
+    bifocal match survey.xlsx --out matched.xlsx
+    bifocal match wall.pair.json --count 2000 --out points.csv
+    bifocal match wall.pair.json --what targets --out targets.xlsx
+    bifocal match porch.photos.json --out porch.csv
+
+    Then:
+      bifocal solve survey.xlsx --out result.xlsx
+      bifocal solve points.csv --pair wall.pair.json --json
+    """
+
+    pair: Annotated[Path, Argument()]
+    out: Annotated[Path, Typed(NEW_TABLE)]
+    """Survey workbook (.xlsx) or table (.csv) to write; - is a table on stdout."""
+    count: Annotated[int, Typed(click.IntRange(min=1, max=100000))] = 4000
+    """About so many feature points, spread evenly."""
+    what: Literal["all", "features", "targets"] = "all"
+    """Natural detail, survey targets, or both."""
+    relief_min: Annotated[float | None, Typed(unit="M")] = None
+    """Lowest relief looked for [m].  [default: -0.5 x near distance]"""
+    relief_max: Annotated[float | None, Typed(unit="M")] = None
+    """Highest relief looked for [m].  [default: 0.4 x near distance]"""
+    language: Annotated[Literal["en", "it", "de"], Typed(flag="--lang --language")] = "en"
+    """Language of the workbook."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(MatchCommand)
 def command(pair: Path, out: Path, count: int, what: str, as_json: bool, **options: Any) -> None:
     """Find the same details of the wall in both photos of PAIR, a pair file or survey workbook.
 

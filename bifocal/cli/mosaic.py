@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from bifocal.options.commands import MosaicCommand
 from photocore.cli import print_result, progress_bar
 from photocore.options import declared
 
 
-@declared
+@declared(MosaicCommand)
 def command(rasters: tuple[Path, ...], out: Path, as_json: bool, **options: Any) -> None:
     """Join orthophotos, or relief maps, of one wall.
 

@@ -2,20 +2,77 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import click
 
-from bifocal.options import DRAWING, OF_PAIR
+from bifocal.options import (
+    DRAWING,
+    OF_PAIR,
+    DrawingOptions,
+    FacesOption,
+    GsdOption,
+    LanguageOption,
+    PictureOptions,
+)
 from photocore.cli import print_result, progress_bar, remark
-from photocore.options import declared
+from photocore.option_types import Length
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption, RasterCogOption
 
 if TYPE_CHECKING:
     from bifocal.model.points import SurveyPoints
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class OrthoCommand:
+    """The options of ``bifocal ortho``, and examples.
+
+    bifocal ortho wall.pair.json --relief relief.tif --out ortho.tif
+    bifocal ortho porch.photos.json --relief relief.tif --out ortho.tif
+    bifocal ortho wall.pair.json --points result.xlsx --breakline P7,P8,P9 --out ortho.tif
+    bifocal ortho result.xlsx --out ortho.tif
+    bifocal ortho wall.pair.json --plane --gsd 5mm --bounds -4,0,4,7.5 --out flat.tif
+    bifocal ortho wall.pair.json --relief relief.tif --faces doors.dxf --out ortho.tif
+    bifocal ortho wall.pair.json --relief relief.tif --measured-only --out measured.tif
+    bifocal ortho wall.pair.json --relief relief.tif --deliver drawing --scale 1:50 --dpi 254
+                  --control control.csv --mark result.xlsx --section x=1.5
+                  --section y=2 --contours 0.05
+    """
+
+    pair: Annotated[Path, Argument()]
+    out: Path | None = None
+    """GeoTIFF to write."""
+    relief: Path | None = None
+    """Relief map of `bifocal relief`."""
+    points: Path | None = None
+    """Result of `bifocal solve`: relief between its points."""
+    breaklines: Annotated[tuple[str, ...], Typed(unit="ID,ID,...", flag="--breakline")] = ()
+    """Points along an edge that no triangle may cross; repeat it. With --points."""
+    plane: Annotated[float | None, Typed(Length(), "[M]", flag_value="0", is_flag=False)] = None
+    """No relief: the reference plane, or one so many metres before it."""
+    faces: FacesOption = None
+    gsd: GsdOption = None
+    picture: PictureOptions = field(default_factory=PictureOptions)
+    folder: Annotated[Path | None, Typed(unit="DIR", flag="--deliver")] = None
+    """Write GeoTIFF, PNG, DXF and PDF, of the relief too, into a folder. Needs --scale."""
+    drawing: DrawingOptions = field(default_factory=DrawingOptions)
+    control: Path | None = None
+    """Table of control points to draw."""
+    language: LanguageOption = "en"
+    """Of sheets and sections."""
+    title: str = ""
+    """Title of the drawing.  [default: the pair's name]"""
+    tfw: bool = False
+    """Also write the world file beside it."""
+    cog: RasterCogOption = False
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(OrthoCommand)
 def command(
     pair: Path, out: Path | None, relief: Path | None, points: Path | None, plane: float | None,
     folder: Path | None, title: str, tfw: bool, overwrite: bool, as_json: bool, **given: Any,
@@ -26,12 +83,13 @@ def command(
     map, from measured points, or is none (--plane); by default from the points of the workbook,
     if PAIR is one: its set-up is then taken as typed. What the camera cannot see stays empty; the
     last band says where each pixel comes from (0 nothing, 1 and 2 the photos, 3 both, 4 filled,
-    5 a photo on interpolated relief, 6 a photo on the plane). Of a set each pixel is taken from
-    the photo that sees it best: 11 is its first photo, 12 the second, 3 a transition.
+    5 a photo on interpolated relief, 6 a photo on the plane, 7 seen by no photo). Of a set each
+    pixel is taken from the photo that sees it best: 11 is its first photo, 12 the second, 3 a
+    transition.
     """
     from bifocal.faces.faces_files import faces_path, keep_faces
     from bifocal.orthophotos.deliver_workflow import DeliverTask, default_title, deliver
-    from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho, not_measured
+    from bifocal.orthophotos.ortho_workflow import OrthoTask, basis_in_words, make_ortho
     from bifocal.workbook.pair_workflow import is_workbook, points_of, read_photos
 
     if out is None and folder is None:
@@ -81,8 +139,8 @@ def command(
         f"{result.path}: {grid.width} x {grid.height} px of {grid.gsd * 1000:g} mm; "
         f"{100 * (1 - shares['none']):.1f} % covered, {100 * shares['hidden']:.1f} % hidden"
     ]
-    if told := not_measured(shares):
-        lines.append(f"Not measured: {told}")
+    if told := basis_in_words(result.basis):
+        lines.append(f"Of the picture {told}")
     if files:
         lines.append(f"{folder}: {', '.join(done.files)} (sheet {done.sheet})")
     print_result(result.to_dict() | files, lines, as_json=as_json, remarks=remarks)

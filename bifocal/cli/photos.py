@@ -3,19 +3,67 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import click
 
+from bifocal.options import SigmaControlOption, UnitOption
 from photocore.cli import print_result, remark
-from photocore.options import declared
+from photocore.option_types import POSITIVE, TABLE, Names
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 if TYPE_CHECKING:
     from bifocal.projects.photos_workflow import ProjectPhotos
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class PhotosCommand:
+    """The options of ``bifocal photos``, and examples.
+
+    bifocal photos colmap --out wall.photos.json
+    bifocal photos reconstruction.json --points picks.csv --length A,B,4.20
+                 --out wall.photos.json
+    bifocal photos cameras.xml --points picks.csv --control control.csv --out wall.pair.json
+    bifocal photos wall.photos.json --to colmap --out model
+
+    picks.csv, a row for each photo that shows the point, in two photos or more:
+      id,photo,col [px],row [px]
+      A,DSC_0101.jpg,512.3,1700.8
+    """
+
+    project: Annotated[Path, Argument(unit="PROJECT")]
+    out: Path
+    """File of the set to write (*.photos.json), or of its best two photos (*.pair.json); with --to
+    a folder."""
+    images: Path | None = None
+    """Folder of the photos.  [default: searched about the project]"""
+    cloud: Path | None = None
+    """Point cloud in the project's frame, where its file holds no points (.ply, .las, .xyz)."""
+    points: Annotated[Path | None, Typed(TABLE)] = None
+    """Named points: id, photo, col, row in two photos or more; or id, x, y, z of the project."""
+    wall: Annotated[tuple[str, ...] | None, Typed(Names(), "A,B,C,...")] = None
+    """Three points of the wall or more.  [default: the largest façade]"""
+    horizontal: Annotated[tuple[str, ...] | None, Typed(Names(), "A,B")] = None
+    """Two points on a level line.  [default: up as the project or its photos say]"""
+    control: Annotated[Path | None, Typed(TABLE)] = None
+    """Control points: id, X, Y, r [m], named as in --points; they give frame and scale."""
+    length: Annotated[tuple[str, ...] | None, Typed(Names(), "A,B,M")] = None
+    """A length measured on site: two points and metres."""
+    sigma_length: Annotated[float, Typed(POSITIVE, "M")] = 0.003
+    """Precision of that length [m]."""
+    sigma_control: SigmaControlOption = 0.003
+    unit: UnitOption = None
+    """Unit of the project's lengths, where it has been scaled.  [default: as it says]"""
+    to: Literal["colmap"] | None = None
+    """Write a set of photos for another program, as a text model of COLMAP."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(PhotosCommand)
 def command(
     project: Path, out: Path, to: str | None, overwrite: bool, as_json: bool, **given: Any
 ) -> None:

@@ -2,16 +2,43 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import click
 
 from photocore.cli import print_json, remark
-from photocore.options import declared
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class PickCommand:
+    """The options of ``bifocal pick``, and examples.
+
+    bifocal pick wall.pair.json
+    bifocal pick far.jpg near.jpg --workbook wall.xlsx
+    bifocal pick far.jpg near.jpg third.jpg
+    bifocal pick survey.xlsx --lang it
+    bifocal pick .
+    """
+
+    sources: Annotated[
+        tuple[Path, ...], Argument(unit="[PAIR|SET|SURVEY.xlsx|FOLDER|FAR NEAR [MORE]...]")
+    ] = ()
+    workbook: Annotated[Path | None, Typed(unit="SURVEY.xlsx")] = None
+    """Survey workbook the points go into.  [default: named after the pair]"""
+    port: Annotated[int, Typed(click.IntRange(min=0, max=65535))] = 0
+    """Port; 0: one that is free."""
+    no_browser: bool = False
+    """Print the address only."""
+    language: Annotated[Literal["en", "it", "de"], Typed(flag="--lang --language")] = "en"
+    """Language of the page."""
+    as_json: JsonOption = False
+
+
+@declared(PickCommand)
 def command(sources: tuple[Path, ...], no_browser: bool, as_json: bool, **options: Any) -> None:
     """Open the page: orient two photos, pick points, relief, orthophoto, drawing.
 

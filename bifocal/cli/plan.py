@@ -3,19 +3,69 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import click
 
+from bifocal.options import LanguageOption, MediaOptions
 from photocore.cli import print_result, remark, text_table
-from photocore.options import declared, options_of
+from photocore.option_types import POSITIVE, Number, Scale, Size, thousandth
+from photocore.options import Typed, declared, options_of
+from photocore.shared_options import JsonOption, OverwriteOption
 
 if TYPE_CHECKING:
     from bifocal.planning.camera_plan import Plan
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class PlanCommand:
+    """The options of ``bifocal plan``, and examples.
+
+    bifocal plan --focal 35 --focal 28 --focal 19 --sensor 22.7x15.1 --pixels 3072x2048 --scale
+                 1:500
+    bifocal plan --focal 35 --focal 18 --sensor 23.5x15.6 --pixels 6000x4000 --object 12x8
+                 --free-space 20 --out plan.xlsx
+    bifocal plan --focal 35 --focal 19 --sensor 22.7x15.1 --pixels 3072x2048 --scale 1:100
+                 --indices 1,1.49,1.337 --thicknesses 0.01 --depth 0.9
+    bifocal plan --equivalent 77 --equivalent 24 --pixels 4000x3000 --object 6x4
+    """
+
+    focal_lengths: Annotated[tuple[float, ...], Typed(POSITIVE, "MM", flag="--focal")] = ()
+    """A focal length at hand [mm]; repeat it for every lens or zoom mark."""
+    equivalents: Annotated[tuple[float, ...], Typed(POSITIVE, "MM", flag="--equivalent")] = ()
+    """A 35 mm equivalent, as phones state it, in place of --focal and --sensor [mm]; repeat it for
+    every camera of the phone."""
+    sensor: Annotated[tuple[float, float] | None, Typed(Size(above=0))] = None
+    """Width x height of the sensor [mm]."""
+    pixels: Annotated[tuple[int, int], Typed(Size(least=1, whole=True))]
+    """Columns x rows of the photo [px]."""
+    object_size: Annotated[tuple[float, float] | None, Typed(Size(above=0), flag="--object")] = None
+    """Width x height of the wall [m]."""
+    scale_number: Annotated[float | None, Typed(Scale(), flag="--scale")] = None
+    """Wanted scale of the photo, 1:N."""
+    gsd: Annotated[float | None, Typed(Number(above=0, to=thousandth), "MM")] = None
+    """Wanted pixel on the wall [mm]."""
+    sigma_r: Annotated[float | None, Typed(Number(above=0, to=thousandth), "MM")] = None
+    """Wanted sigma of the relief at the RMS radius of the photo [mm]."""
+    sigma_px: Annotated[float, Typed(POSITIVE, "PX")] = 0.5
+    """Precision of a pick [px]."""
+    sigma_r_max: Annotated[float | None, Typed(Number(above=0, to=thousandth), "MM")] = None
+    """Area of uncertainty: sigma of the relief above this [mm].  [default: 3 x that of the best
+    pair]"""
+    free_space: Annotated[float | None, Typed(POSITIVE, "M")] = None
+    """Room in front of the wall [m]."""
+    media: MediaOptions = field(default_factory=MediaOptions)
+    out: Path | None = None
+    """Also write the plan as .xlsx, live: change distances or lenses in it, the rest follows."""
+    language: LanguageOption = "en"
+    """Of the workbook."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(PlanCommand)
 def command(
     focal_lengths: tuple[float, ...], equivalents: tuple[float, ...], pixels: tuple[int, int],
     out: Path | None, as_json: bool, **wishes: Any,
@@ -30,7 +80,7 @@ def command(
     from bifocal.planning.workflow import make_plan, plan_as_dict
 
     sensor = wishes.pop("sensor")
-    media = {name: wishes.pop(name) for name in options_of("bifocal", "media")}
+    media = {name: wishes.pop(name) for name in options_of(MediaOptions)}
     if equivalents and (focal_lengths or sensor):
         raise click.UsageError("Give --equivalent, or --focal with --sensor, not both.")
     if equivalents:

@@ -7,11 +7,12 @@ from typing import Any
 
 import click
 
+from bifocal.options.commands import RectifyCommand
 from photocore.cli import print_result, progress_bar, remark
 from photocore.options import declared
 
 
-@declared
+@declared(RectifyCommand)
 def command(
     photo: Path, out: Path | None, folder: Path | None, lines: bool, tfw: bool, overwrite: bool,
     as_json: bool, **given: Any,

@@ -3,14 +3,58 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from bifocal.options import (
+    BoundsOption,
+    FacesOption,
+    QualityOption,
+    ReliefGsdOption,
+    ReliefRangeOption,
+)
 from photocore.cli import print_result, progress_bar
-from photocore.options import declared
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption, RasterCogOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class ReliefCommand:
+    """The options of ``bifocal relief``, and examples.
+
+    bifocal relief wall.pair.json --out relief.tif --preview relief.png
+    bifocal relief wall.pair.json --out relief.tif --gsd 0.005 --bounds -5,-3,5,3 --cloud wall.laz
+    bifocal relief survey.xlsx --out relief.tif
+    bifocal relief porch.photos.json --out relief.tif
+    bifocal relief wall.pair.json --out quick.tif --quality fast --json
+
+    Bands of the GeoTIFF: relief [m], NaN where unknown; its sigma [m]; quality (1 measured in both
+    photos, 2 interpolated, 3 hidden from a camera, 4 drawn, 0 unknown; of a set 1 in two photos or
+    more, 3 seen by fewer than two).
+    """
+
+    pair_file: Annotated[Path, Argument(unit="PAIR.pair.json")]
+    out: Path
+    """Relief map to write (.tif)."""
+    gsd: ReliefGsdOption = None
+    bounds: BoundsOption = None
+    """Part of the wall [m].  [default: all that both photos see]"""
+    quality: QualityOption = "standard"
+    relief_range: ReliefRangeOption = None
+    faces: FacesOption = None
+    suggested: Annotated[Path | None, Typed(flag="--suggest-faces")] = None
+    """Also faces that would mend what is not measured, to be looked at (.geojson)."""
+    preview: Path | None = None
+    """Also a shaded picture (.png)."""
+    cloud: Path | None = None
+    """Also a coloured point cloud (.ply, .las, .laz)."""
+    cog: RasterCogOption = False
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(ReliefCommand)
 def command(pair_file: Path, as_json: bool, **wishes: Any) -> None:
     """Measure the relief of the whole wall from the photos of a pair, a set or survey workbook.
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from bifocal.options.commands import SolveCommand
 from photocore.cli import print_json, remark, text_table
 from photocore.options import declared
 
@@ -15,7 +16,7 @@ from photocore.options import declared
 SHOWN = 40
 
 
-@declared
+@declared(SolveCommand)
 def command(survey: tuple[Path, ...], out: Path | None, as_json: bool, **options: Any) -> None:
     """Solve measured points: relief r, displacements, coordinates, precision, check points.
 

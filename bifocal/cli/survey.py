@@ -2,16 +2,49 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import click
 
 from photocore.cli import print_json, print_result, progress_bar, remark, tell_written, text_table
-from photocore.options import declared
+from photocore.option_types import POSITIVE, Number
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class SurveyCommand:
+    """The options of ``bifocal survey``, and examples.
+
+    bifocal survey --init photos street.toml
+    bifocal survey street.toml --dry-run
+    bifocal survey street.toml --jobs 4 --memory 12
+    bifocal survey street.toml --scheduler tcp://192.168.0.10:8786
+    """
+
+    survey: Annotated[Path | None, Argument()] = None
+    folder: Annotated[Path | None, Typed(unit="DIR", flag="--init")] = None
+    """Write SURVEY from a folder of photos.  [default: survey.toml in it]"""
+    dry_run: bool = False
+    """Show what would be made and what is kept."""
+    out: Annotated[Path | None, Typed(unit="DIR")] = None
+    """Folder of the results.  [default: the file's]"""
+    jobs: Annotated[int | None, Typed(Number(least=1, whole=True), "N")] = None
+    """Pairs at once.  [default: cores]"""
+    memory: Annotated[float | None, Typed(POSITIVE, "GIB")] = None
+    """For all pairs at work.  [default: 80 % of what is free]"""
+    scheduler: Annotated[str, Typed(unit="tcp://...")] = ""
+    """Address of a Dask scheduler."""
+    ship: bool = False
+    """Send photos to its workers and products back.  [default: only where a worker does not see the
+    folders]"""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(SurveyCommand)
 def command(
     survey: Path | None, folder: Path | None, dry_run: bool, as_json: bool, **machines: Any
 ) -> None:

@@ -2,16 +2,41 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import click
 
+from bifocal.options import LensDatabaseOptions
 from photocore.cli import print_result, progress_bar
-from photocore.options import declared
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class UndistortCommand:
+    """The options of ``bifocal undistort``, and examples.
+
+    bifocal undistort far.jpg --lens lens35.json --out-dir corrected
+    bifocal undistort far.jpg near.jpg --lens exif
+
+    All other commands take the original photos together with a lens file and resample once; correct
+    photos beforehand only for other programs.
+    """
+
+    images: Annotated[tuple[Path, ...], Argument(unit="IMAGE...")]
+    lens: Annotated[str, Typed(unit="FILE|exif")]
+    """Lens file (lens.json, COLMAP cameras.txt, Metashape .xml, OpenCV .yml), or exif for the lens
+    database."""
+    out_dir: Path | None = None
+    """Existing folder to write to.  [default: the photo's]"""
+    lens_database: LensDatabaseOptions = field(default_factory=LensDatabaseOptions)
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(UndistortCommand)
 def command(
     images: tuple[Path, ...], lens: str, out_dir: Path | None, as_json: bool, **options: Any
 ) -> None:

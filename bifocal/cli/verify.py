@@ -2,14 +2,33 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 from photocore.cli import print_result, progress_bar
 from photocore.errors import InputError
-from photocore.options import declared
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class VerifyCommand:
+    """The options of ``bifocal verify``, and examples.
+
+    bifocal verify DIR
+    bifocal verify DIR --remake
+    """
+
+    delivery: Annotated[Path, Argument(unit="DIR|ZIP")]
+    remake: bool = False
+    """Make the products anew in a folder that only passes, and compare them."""
+    sources: Annotated[Path | None, Typed(unit="DIR")] = None
+    """Photos and tables for --remake.  [default: where they were, or in the delivery]"""
+    as_json: JsonOption = False
+
+
+@declared(VerifyCommand)
 def command(delivery: Path, remake: bool, sources: Path | None, as_json: bool) -> None:
     """Check that a delivery is what was made: one line a file, exit status 1 if anything differs.
 

@@ -2,14 +2,37 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from bifocal.options import LanguageOption
 from photocore.cli import tell_written
-from photocore.options import declared
+from photocore.options import Argument, declared
+from photocore.shared_options import OverwriteOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class ViewCommand:
+    """The options of ``bifocal view``, and examples.
+
+    bifocal view relief.tif --out wall.html
+    bifocal view relief.tif --ortho ortho.tif --title "Via Roma 12" --out wall.html
+    """
+
+    relief: Annotated[Path, Argument()]
+    ortho: Path | None = None
+    """Orthophoto that gives the colours."""
+    title: str = ""
+    """Title.  [default: the file's name]"""
+    language: LanguageOption = "en"
+    """Of the page."""
+    out: Path
+    """Page to write (.html)."""
+    overwrite: OverwriteOption = False
+
+
+@declared(ViewCommand)
 def command(relief: Path, out: Path, **options: Any) -> None:
     """Show a relief map in three dimensions, on a page that needs nothing else.
 

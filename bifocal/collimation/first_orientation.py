@@ -5,12 +5,14 @@ Further photos of the wall join it as soon as it is accepted.
 
 from __future__ import annotations
 
+import logging
 import queue
-import threading
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
+from bifocal.collimation.background import in_background
 from bifocal.collimation.job_tasks import start_job
 from bifocal.collimation.live_orientation import control_of, lenses_of
 from bifocal.collimation.session import Session
@@ -37,7 +39,8 @@ class FirstOrientation:
     def start(self) -> None:
         """Watch from now on, until the session ends."""
         events, self._leave = self._session.listen()
-        threading.Thread(target=self._watch, args=(events,), daemon=True).start()
+        watch = partial(self._watch, events)
+        in_background("the first orientation", watch, logging.getLogger(__name__).error).start()
 
     def _watch(self, events: queue.SimpleQueue[dict[str, Any] | None]) -> None:
         while True:

@@ -25,6 +25,7 @@ from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
 from bifocal.model.relief_map import ReliefMap
 from bifocal.networks.set_workflow import align_photo_set
+from bifocal.options.commands import RectifyCommand
 from bifocal.orientation.align_workflow import (
     AlignOptions,
     KnownLens,
@@ -47,6 +48,7 @@ from photocore.images import image_info, read_grey
 from photocore.interrupts import end_on_signals
 from photocore.jsonfile import plain
 from photocore.options import options_of
+from photocore.remarks import with_keys
 from photocore.tables import write_csv
 
 Task = Mapping[str, Any]
@@ -71,8 +73,8 @@ def main() -> int:
             share = min(max(done / total, 0.0), 1.0) if total > 0 else 0.0
             tell({"progress": share, "message": what})
 
-    def tell(line: Mapping[str, Any]) -> None:
-        out.write(json.dumps(line) + "\n")
+    def tell(line: dict[str, Any]) -> None:
+        out.write(json.dumps(with_keys(plain(line))) + "\n")
         out.flush()
 
     try:
@@ -83,7 +85,7 @@ def main() -> int:
     except MemoryError:
         tell({"error": "there is not enough memory; choose a coarser pixel."})
         return 1
-    tell({"result": plain(result)})
+    tell({"result": result})
     return 0
 
 
@@ -163,7 +165,7 @@ def _frame(pair: Pair, table: Path, photos: int) -> float:
 
 def _rectify(task: Task, progress: Progress) -> dict[str, Any]:
     """Bring one photo alone to scale, with drawings."""
-    given = {name: one.fixed_default for name, one in options_of("bifocal", "rectify").items()}
+    given = {name: one.fixed_default for name, one in options_of(RectifyCommand).items()}
     given |= {"scale": 50.0, **task, "corners": np.ravel(task["corners"])}
     done = rectify_photo(
         Path(task["photo"]), Path(task["out"]), given, folder=Path(task["folder"]),

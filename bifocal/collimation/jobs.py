@@ -12,14 +12,18 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from bifocal.collimation.background import in_background
 from bifocal.collimation.wording import without_options
 from bifocal.remarks import remark
 from photocore.errors import InputError, PhotogrammetryError
+from photocore.remarks import learn
 
 #: Plain data, as it goes to the worker and comes back.
 Task = dict[str, Any]
 #: Jobs that are remembered; older ones are forgotten once they have ended.
 MOST_JOBS = 20
+#: A worker that was asked to end has this long. [s]
+TO_END = 10.0
 
 
 @dataclass(slots=True)
@@ -93,7 +97,7 @@ class JobRunner:
         self._revision = revision
         self.jobs: dict[str, PageJob] = {}
         self._count = 0
-        self._threads: list[threading.Thread] = []
+        self.threads: list[threading.Thread] = []
 
     def start(
         self,
@@ -135,10 +139,12 @@ class JobRunner:
             self.jobs[job.number] = job
             for number in list(self.jobs)[:-MOST_JOBS]:
                 del self.jobs[number]
-            thread = threading.Thread(
-                target=self._run, args=(job, task, finish, first), daemon=True
+            thread = in_background(
+                f"the job {kind}",
+                partial(self._run, job, task, finish, first),
+                partial(self._fail, job),
             )
-            self._threads = [t for t in self._threads if t.is_alive()] + [thread]
+            self.threads = [t for t in self.threads if t.is_alive()] + [thread]
         thread.start()
         self._changed()
         return job
@@ -162,17 +168,26 @@ class JobRunner:
         self._tell(job)
 
     def stop(self) -> None:
-        """End all jobs."""
+        """End all jobs; workers that do not end by themselves are killed."""
         for number in list(self.jobs):
             self.cancel(number)
-        for thread in self._threads:
-            thread.join(timeout=10)
+        for thread in self.threads:
+            thread.join(timeout=TO_END)
+        for process in [job.process for job in self.jobs.values()]:
+            if process is not None:
+                process.kill()
+        for thread in self.threads:
+            thread.join(timeout=TO_END)
 
     def _run(
         self, job: PageJob, task: Task, finish: Callable[[Task, Task], str],
         first: Callable[[], object],
     ) -> None:  # fmt: skip
-        first()
+        if job.state == "running":
+            first()
+        if job.state != "running":  # cancelled before it had begun
+            self._tell(job)
+            return
         command = [sys.executable, "-m", "bifocal.collimation.job_process"]
         try:
             process = subprocess.Popen(
@@ -209,6 +224,7 @@ class JobRunner:
         for line in process.stdout:
             try:
                 told = json.loads(line)
+                learn(told)
             except ValueError:
                 continue
             if "progress" in told and job.state == "running":

@@ -177,7 +177,7 @@ def _face_of(
         score > max(rivals.max(), SUGGESTIONS.alone - SUGGESTIONS.clearly) + SUGGESTIONS.clearly
     )
     certain &= 0 < best < len(levels) - 1
-    if not certain and len(known) >= SUGGESTIONS.told:  # else what was measured, if they agree
+    if not certain and len(known) >= SUGGESTIONS.support:  # else what was measured, if they agree
         xyr = np.column_stack([column * grid.gsd, -row * grid.gsd, known])
         plane, _ = robust_plane(xyr, grid.gsd)
         level = float(plane @ [1, (right - left) * grid.gsd / 2, (top - bottom) * grid.gsd / 2])

@@ -74,12 +74,17 @@ ANGLES = {"rad": 180 / np.pi, "gon": 0.9}
 
 
 def picks_meant(picks: Picks, sizes: Sizes) -> Iterator[tuple[PickSlip, Picks]]:
-    """Yield what picks may have been meant as, where that lies in both photos."""
+    """Yield what picks may have been meant as, where that puts no more of them outside a photo."""
     for slip in PICKS:
         meant = slip.meant(picks, sizes)
-        far = (np.nanmax(p, axis=0, initial=0) > size for p, size in zip(meant, sizes, strict=True))
-        if not any(outside.any() for outside in far):
+        if _outside(meant, sizes) <= _outside(picks, sizes):
             yield slip, meant
+
+
+def _outside(picks: Picks, sizes: Sizes) -> int:
+    """Return how many picks lie outside the photos."""
+    pairs = zip(picks, sizes, strict=True)
+    return sum(int(((p < -0.5) | (p > size)).any(axis=1).sum()) for p, size in pairs)
 
 
 def unit_of(ratio: float, within: float = 0.03) -> str:

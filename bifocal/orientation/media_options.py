@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.model.pair_media import LEANS, Normal, PairMedia
+from bifocal.options import PairMediaOptions
 from bifocal.remarks import remark
 from photocore.adjustment.priors import parse_prior
 from photocore.errors import InputError
@@ -23,7 +24,7 @@ def media_of(given: Mapping[str, Any]) -> PairMedia:
         If they do not describe media.
     """
     if given.get("indices") is None:
-        media = options_of("bifocal", "media_of_pair").values()
+        media = options_of(PairMediaOptions).values()
         lost = [option for option in media if given.get(option.name) not in (None, ())]
         if lost:
             raise InputError(remark("media.without_indices", flag=lost[0].flag))

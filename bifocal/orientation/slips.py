@@ -193,8 +193,9 @@ def _of_control(typed: Typed, now: TrialOrientation | None) -> Iterator[Slip]:
         # A focal length of the EXIF data goes with its file, one that was typed with its number.
         by_number = first.is_typed or any(i.is_assumed or i.is_calibrated for i in typed.interiors)
         lenses = typed.interiors if by_number else (second, first)
-        meant = replace(typed, exchanged=True, interiors=lenses)
-        yield Slip(meant=meant, words=remark("slips.photos"))
+        yield Slip(
+            meant=replace(typed, exchanged=True, interiors=lenses), words=remark("slips.photos")
+        )
     sizes = first.image_size, second.image_size
     for slip, (pixels1, pixels2) in picks_meant((control.pixels1, control.pixels2), sizes):
         meant = replace(control, pixels1=pixels1, pixels2=pixels2)

@@ -1,4 +1,4 @@
-"""A window of the orthophoto from one or both photos: visibility, choice, feathering, filling."""
+"""A window of the orthophoto from one or more photos: visibility, choice, feathering, holes."""
 
 from __future__ import annotations
 
@@ -18,14 +18,16 @@ from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
 from bifocal.model.photos_of_set import PhotosOfSet
 from bifocal.model.relief_map import Quality, ReliefMap
-from bifocal.model.surface import FlatSurface, MapSurface, Surface
+from bifocal.model.surface import FlatSurface, MapSurface, Surface, measured_on
 from bifocal.orthophotos.best_view import chosen
+from bifocal.orthophotos.holes import close_holes, grown
+from bifocal.orthophotos.moved_things import MovedThing, moved_things
 from bifocal.orthophotos.ortho_image import OrthoOptions, Orthophoto, Source
 from bifocal.orthophotos.pull_push import fill_holes
 from bifocal.orthophotos.rectify import SourcePhoto, footprint
-from bifocal.orthophotos.tuning import COMPOSE, TIDYING
+from bifocal.orthophotos.tuning import COMPOSE, GAPS, HOLES, TIDYING
 from bifocal.orthophotos.visibility import hidden_from, tidied
-from bifocal.orthophotos.whole_picture import CompletedSurface
+from bifocal.orthophotos.whole_picture import CompletedSurface, completed
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, ByteArray, Float32Array
 from photocore.errors import InputError
@@ -45,6 +47,8 @@ class _Look(NamedTuple):
     image: ImageArray
     inside: BoolArray
     hidden: BoolArray
+    #: Of a second photo, what is taken from it.
+    taken: BoolArray = np.zeros(0, bool)
 
 
 def orthophoto(
@@ -69,8 +73,9 @@ def orthophoto(
     pair : Pair or PhotoSet
     image : ndarray, shape (h, w, 3) or (h, w), uint8 or uint16
         The photo, RGB. A sequence (image 1, image 2) renders from both: from the far photo
-        wherever it sees the wall, else from the near one. Of a set all its photos, in its order:
-        each pixel from the one that sees it best.
+        wherever it sees the wall; the near one closes gaps beside which relief was measured and
+        both photos agree. Of a set all its photos, in its order: each pixel from the one that
+        sees it best.
     relief : ReliefMap, Surface or float, optional
         Where the wall is; a number is a parallel plane, None the reference plane. [m]
     faces : Faces, optional
@@ -205,18 +210,28 @@ def choose_grid(
 
 
 def render(
-    views: Sequence[SourcePhoto], surface: Surface, grid: Grid, options: OrthoOptions
-) -> Iterator[tuple[int, int, Tile]]:
-    """Yield (column, row, tile) of an orthophoto, each in memory that does not grow with it."""
+    views: Sequence[SourcePhoto], surface: Surface, grid: Grid, options: OrthoOptions,
+    moved: list[MovedThing] | None = None,
+) -> Iterator[tuple[int, int, Tile]]:  # fmt: skip
+    """Yield (column, row, tile) of an orthophoto, each in memory that does not grow with it.
+
+    What moved between two photos is listed in ``moved`` before the first.
+    """
+    things: tuple[MovedThing, ...] = ()
     if not options.measured_only:
-        surface = CompletedSurface(surface, grid)
+        surface = completed(surface, grid, views[0].photo, views[0].photo.gsd(views[0].size))
+        if len(views) == 2 and not isinstance(surface, FlatSurface):
+            things = moved_things(views, surface, grid)
+    if moved is not None:
+        moved.extend(things)
     for column, row, window in grid.tiles(COMPOSE.tile):
-        yield column, row, render_window(views, surface, window, options)
+        yield column, row, render_window(views, surface, window, options, things)
 
 
 def render_window(
-    views: Sequence[SourcePhoto], surface: Surface, window: Grid, options: OrthoOptions
-) -> Tile:
+    views: Sequence[SourcePhoto], surface: Surface, window: Grid, options: OrthoOptions,
+    moved: Sequence[MovedThing] = (),
+) -> Tile:  # fmt: skip
     """Return one window of an orthophoto."""
     close = options.fill or not options.measured_only
     margin = COMPOSE.fill_reach if close else 0
@@ -234,8 +249,11 @@ def render_window(
     if options.fill and unknown.any():
         # Where relief is unknown that of the surroundings shows the photo itself, slightly off.
         relief, _ = fill_holes(relief, ~unknown, unknown)
-    looks = _looks(views, surface, wide, relief, options)
-    looks = _past_occluders(views, looks, surface, wide)
+    place = _Place(surface, wide, relief)
+    alone = views[:1] if len(views) == 2 else views
+    looks = [place.look(view, options, views[0]) for view in alone]
+    if len(views) == 2:
+        looks.append(_closing_gaps(views, looks[0], place, options, moved))
     image, source = _choose(views, looks, wide, options)
     hidden: BoolArray = (source == Source.NONE) & np.logical_or.reduce([o.hidden for o in looks])
     if isinstance(surface, CompletedSurface):
@@ -245,81 +263,125 @@ def render_window(
     if close:
         source[unknown & (source > 0)] = Source.FILLED
         # Holes lie within the photos' own area: the rim of the orthophoto is not extended.
-        area = np.logical_or.reduce([look.inside for look in looks])
-        image, source = _fill(image, source, area, relief)
+        holes = (source == Source.NONE) & np.logical_or.reduce([look.inside for look in looks])
+        largest = math.inf if options.fill else HOLES.largest
+        if holes.any():
+            image = np.array(image)
+            close_holes(image, source, holes, relief, wide.gsd, largest=largest)
     if margin:
         core = np.s_[margin : margin + window.height, margin : margin + window.width]
         image, source, hidden = image[core], source[core], hidden[core]
     return Tile(image, source, hidden)
 
 
-def _looks(
-    views: Sequence[SourcePhoto], surface: Surface, grid: Grid, relief: Float32Array,
-    options: OrthoOptions,
-) -> list[_Look]:  # fmt: skip
-    """Return how photos see a window; of a pair the second only around what the first does not."""
-    first = _look(views[0], surface, grid, relief, options)
-    under = surface.surface if isinstance(surface, CompletedSurface) else surface
-    drawn = isinstance(under, FacedSurface) and under.faces.occluders
-    if len(views) != 2 or drawn or _second_is_finer(views, grid):
-        return [first, *(_look(view, surface, grid, relief, options) for view in views[1:])]
-    none = np.zeros(grid.shape, bool)
-    second = _Look(np.zeros_like(first.image), none, none.copy())
-    row, column = np.nonzero(~first.inside | first.hidden)
-    if len(row):
-        margin = TIDYING.margin + math.ceil(2 * options.feather)
-        top, left = max(int(row.min()) - margin, 0), max(int(column.min()) - margin, 0)
-        bottom, right = int(row.max()) + margin + 1, int(column.max()) + margin + 1
-        cut = np.s_[top:bottom, left:right]
-        height, width = relief[cut].shape
-        part = grid.window(left, top, width, height)
-        seen = _look(views[1], surface, part, np.ascontiguousarray(relief[cut]), options)
-        second.image[cut], second.inside[cut], second.hidden[cut] = seen
-    return [first, second]
+class _Place(NamedTuple):
+    """A window of the wall."""
+
+    surface: Surface
+    grid: Grid
+    relief: Float32Array
+
+    def part(self, box: tuple[slice, slice]) -> _Place:
+        """Return a part of it, by rows and columns."""
+        rows, columns = box
+        width, height = columns.stop - columns.start, rows.stop - rows.start
+        grid = self.grid.window(columns.start, rows.start, width, height)
+        return _Place(self.surface, grid, np.ascontiguousarray(self.relief[box]))
+
+    def look(self, view: SourcePhoto, options: OrthoOptions, first: SourcePhoto) -> _Look:
+        """Return how a photo sees it; what occluders cover is hidden."""
+        column, row = view.pixel_map(self.grid, self.relief)
+        inside = view.inside(column, row)
+        hidden = np.zeros(self.grid.shape, bool)
+        if not inside.any():
+            shape = (*self.grid.shape, *view.image.shape[2:])
+            return _Look(np.zeros(shape, view.image.dtype), inside, hidden)
+        if options.mask_hidden:
+            hidden = hidden_from(self.surface, self.grid, view.photo.foot, self.relief)
+            # Of a whole picture a shadow narrower than this is drawn, a little stretched.
+            widest = 0.0 if options.measured_only else TIDYING.sliver * view.photo.gsd(view.size)
+            hidden = tidied(hidden, max(3, int(widest / self.grid.gsd) | 1)) & inside
+        if (covered := self.covered(view, first)) is not None:
+            hidden = hidden | (covered & inside)
+        return _Look(view.sample(column, row, options.interpolation), inside, hidden)
+
+    def covered(self, view: SourcePhoto, first: SourcePhoto) -> BoolArray | None:
+        """Return what drawn occluders cover in a photo; None without any."""
+        surface = self.surface
+        under = surface.surface if isinstance(surface, CompletedSurface) else surface
+        if not isinstance(under, FacedSurface) or not under.faces.occluders:
+            return None
+        if view.number == 1:
+            return under.occluded(self.grid)
+        if first.number != 1:
+            return None
+        return under.occluded_in(self.grid, view.photo.foot, first.photo.foot)
 
 
-def _second_is_finer(views: Sequence[SourcePhoto], grid: Grid) -> bool:
-    """Return whether the second of two photos shows a window so much finer that it goes first."""
-    middle = np.array([[grid.x0 + grid.gsd * grid.width / 2, grid.y0 - grid.gsd * grid.height / 2]])
-    sizes = []
-    for view in views:
-        pixel = view.photo.pixels_from_plane(middle)
-        sizes.append(math.sqrt(abs(float(np.linalg.det(view.photo.metres_per_pixel(pixel)[0])))))
-    return sizes[1] < COMPOSE.finer * sizes[0]
+def _closing_gaps(
+    views: Sequence[SourcePhoto], first: _Look, place: _Place, options: OrthoOptions,
+    moved: Sequence[MovedThing],
+) -> _Look:  # fmt: skip
+    """Return what the second of two photos shows of a window where it closes gaps of the first.
+
+    A gap within the first photo is closed if at least half of its rim was measured, and both
+    photos look alike there. Relief behind a step is a guess, and so is whether the second photo
+    sees it: not backed by a rim, most of what it would show is wrong. Beyond the first photo's
+    own edge the second goes on; behind drawn occluders it is what was asked for, as where
+    something stood in the first photo only.
+    """
+    surface, grid, relief = place
+    empty = np.zeros(grid.shape, bool)
+    second = _Look(np.zeros_like(first.image), empty, empty.copy(), empty.copy())
+    gaps, free = ~first.inside | first.hidden, ~first.inside
+    if (covered := place.covered(views[0], views[0])) is not None:
+        free |= covered
+    for thing in moved:
+        if thing.drawn_from_second and (mask := thing.on(grid)) is not None:
+            gaps, free = gaps | mask, free | mask
+    if not gaps.any():
+        return second
+    measured = measured_on(surface, grid)
+    usable = first.inside & ~first.hidden
+    # What lies beyond the first photo is one part, lest it join the gaps that reach its edge.
+    inner = (gaps & first.inside).astype(np.uint8)
+    _, label, stats, _ = cv2.connectedComponentsWithStats(inner, connectivity=8)
+    boxes = [(int(c), int(r), int(wide), int(high)) for c, r, wide, high, _ in stats[1:]]
+    if not first.inside.all():
+        label[~first.inside] = len(stats)
+        column, row, wide, high = cv2.boundingRect((~first.inside).astype(np.uint8))
+        boxes.append((column, row, wide, high))
+    ring = np.ones((2 * GAPS.rim + 1,) * 2, np.uint8)
+    for number, bounds in enumerate(boxes, start=1):
+        box = grown(bounds, TIDYING.margin, grid.shape)
+        gap = label[box] == number
+        wanted = gap & free[box]
+        level = np.nanmedian(relief[box][gap]) + np.float32(GAPS.before)
+        rim = (cv2.dilate(gap.astype(np.uint8), ring) > 0) & usable[box] & (relief[box] < level)
+        backed = rim if measured is None else rim & measured[box]
+        anchored = backed.any() and backed.sum() >= GAPS.measured * rim.sum()
+        if not (anchored or wanted.any()):
+            continue
+        seen = place.part(box).look(views[1], options, views[0])
+        sees = seen.inside & ~seen.hidden
+        if anchored and _alike(first.image[box], seen.image, backed & sees, views[0], grid.gsd):
+            wanted = gap
+        second.image[box], second.inside[box] = seen.image, second.inside[box] | seen.inside
+        second.hidden[box] |= seen.hidden
+        second.taken[box] |= wanted & sees
+    return second
 
 
-def _look(
-    view: SourcePhoto, surface: Surface, grid: Grid, relief: Float32Array, options: OrthoOptions
-) -> _Look:
-    column, row = view.pixel_map(grid, relief)
-    inside = view.inside(column, row)
-    if not inside.any():
-        shape = (*grid.shape, *view.image.shape[2:])
-        return _Look(np.zeros(shape, view.image.dtype), inside, np.zeros(grid.shape, bool))
-    hidden = np.zeros(grid.shape, bool)
-    if options.mask_hidden:
-        hidden = tidied(hidden_from(surface, grid, view.photo.foot, relief)) & inside
-    return _Look(view.sample(column, row, options.interpolation), inside, hidden)
-
-
-def _past_occluders(
-    views: Sequence[SourcePhoto], looks: list[_Look], surface: Surface, grid: Grid
-) -> list[_Look]:
-    """Return how photos see a window with what occluders cover hidden."""
-    under = surface.surface if isinstance(surface, CompletedSurface) else surface
-    if not isinstance(under, FacedSurface) or not under.faces.occluders:
-        return looks
-    covered = under.occluded(grid)
-    first = next((view.photo.foot for view in views if view.number == 1), None)
-    passed = []
-    for view, look in zip(views, looks, strict=True):
-        own = covered
-        if view.number != 1:
-            own = np.zeros(grid.shape, bool)
-            if first is not None:
-                own = under.occluded_in(grid, view.photo.foot, first)
-        passed.append(look._replace(hidden=look.hidden | (own & look.inside)))
-    return passed
+def _alike(
+    one: ImageArray, other: ImageArray, where: BoolArray, view: SourcePhoto, gsd: float
+) -> bool:
+    """Return whether two photos show one surface at some pixels, beyond noise and half a pixel."""
+    if not where.any():
+        return False
+    blur = GAPS.blur * max(view.photo.gsd(view.size) / gsd, 1.0)
+    smooth = [cv2.GaussianBlur(image.astype(np.float32), (0, 0), blur) for image in (one, other)]
+    away = np.abs(smooth[0] - smooth[1])[where]
+    return float(np.median(away)) < GAPS.differ * np.iinfo(one.dtype).max
 
 
 def _choose(
@@ -329,59 +391,24 @@ def _choose(
     usable = [look.inside & ~look.hidden for look in looks]
     if len(views) > 2:
         return chosen(views, [look.image for look in looks], usable, grid, options.feather)
-    if len(views) == 1:
-        source = np.where(usable[0], np.uint8(views[0].number), np.uint8(0))
+    source = np.where(usable[0], np.uint8(views[0].number), np.uint8(0))
+    if len(views) == 1 or not looks[1].taken.any():
         return _masked(looks[0].image, usable[0]), source
-    share = _share_of_first(views, usable, grid, options.feather)
-    source = np.where(share >= 1, np.uint8(Source.IMAGE_1), np.uint8(Source.BOTH))
-    source[share <= 0] = Source.IMAGE_2
-    source[~(usable[0] | usable[1])] = Source.NONE
-    if not (source == Source.BOTH).any() and not (source == Source.IMAGE_2).any():
-        return _masked(looks[0].image, usable[0]), source
+    taken = looks[1].taken
+    share = taken.astype(np.float32)
+    if options.feather:
+        # The second fades in towards what it alone shows, where both see the wall.
+        depth = cv2.distanceTransform((~taken).astype(np.uint8), cv2.DIST_L2, 3)
+        near = np.clip(1 - depth / np.float32(options.feather), 0, 1)
+        share = np.where(usable[0] & usable[1], near, share)
+    source[share > 0] = Source.BOTH
+    source[share >= 1] = Source.IMAGE_2
     first, second = (look.image.astype(np.float32) for look in looks)
     weight = share.reshape(share.shape + (1,) * (first.ndim - 2)).astype(np.float32)
-    mixed = second + (first - second) * weight
-    image = np.rint(mixed).astype(looks[0].image.dtype)
+    image = np.rint(first + (second - first) * weight).astype(looks[0].image.dtype)
     return _masked(image, source > 0), source
-
-
-def _share_of_first(
-    views: Sequence[SourcePhoto], usable: Sequence[BoolArray], grid: Grid, feather: float
-) -> Float32Array:
-    """Return the weight of the first view, 0..1."""
-    first, second = usable
-    if _second_is_finer(views, grid):
-        return np.where(second, np.float32(0), np.float32(1))
-    if feather == 0:
-        return first.astype(np.float32)
-    # The second fades in towards where it alone sees the wall, not towards any other rim.
-    alone = second & ~first
-    if not alone.any():
-        return first.astype(np.float32)
-    depth = cv2.distanceTransform((~alone).astype(np.uint8), cv2.DIST_L2, 3)
-    share = np.clip(depth / np.float32(feather), 0, 1)
-    return np.where(second & first, share, first.astype(np.float32)).astype(np.float32)
 
 
 def _masked(image: ImageArray, keep: BoolArray) -> ImageArray:
     """Return the image with 0 where it is not to be kept."""
     return image if keep.all() else cv2.copyTo(image, keep.astype(np.uint8))
-
-
-def _fill(
-    image: ImageArray, source: ByteArray, area: BoolArray, relief: Float32Array
-) -> tuple[ImageArray, ByteArray]:
-    """Close holes within an area, with the colours of the surface behind, not of what hides it."""
-    holes = (source == Source.NONE) & area
-    if not holes.any():
-        return image, source
-    known = source > 0
-    depth = np.where(holes & ~np.isnan(relief), relief, np.float32(-1e6))
-    around = cv2.dilate(depth, np.ones((COMPOSE.fill_side, COMPOSE.fill_side), np.uint8))
-    before = (around > -1e6) & (relief > around + np.float32(COMPOSE.before))
-    image, done = fill_holes(image, known & ~before, holes)
-    if (holes & ~done).any():
-        # Nothing of the surface behind is in sight: better the colours of what hides it than none.
-        image, rest = fill_holes(image, known | done, holes & ~done)
-        done |= rest
-    return image, np.where(done, np.uint8(Source.FILLED), source)

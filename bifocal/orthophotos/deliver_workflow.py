@@ -36,8 +36,8 @@ from bifocal.orthophotos.hatching import DIRECTIONS, hatched_strips
 from bifocal.orthophotos.ortho_workflow import (
     ORTHO_ENDING,
     OrthoTask,
+    basis_in_words,
     make_ortho,
-    not_measured,
     open_surface,
     photo_pixel,
     planned_grid,
@@ -49,7 +49,7 @@ from bifocal.orthophotos.sections import section, section_letter
 from bifocal.orthophotos.shading import colour_limits, shaded, tints, unmeasured
 from bifocal.orthophotos.spot_heights import spot_heights
 from bifocal.orthophotos.tiles import RasterResult
-from bifocal.orthophotos.tuning import COMPOSE, CONTOURS, SHEET
+from bifocal.orthophotos.tuning import COMPOSE, CONTOURS, PIXELS, SHEET
 from bifocal.remarks import remark
 from photocore.arrays import Float32Array, FloatArray, positive
 from photocore.cli import Progress, no_progress
@@ -212,7 +212,7 @@ def deliver(
         result = make_ortho(
             pair_path, place / f"{name}.tif", task, world_file=True, progress=progress
         )
-        picture = _with_shares(drawing, result.shares, hatch=wish.hatch)
+        picture = _with_shares(drawing, result.basis, hatch=wish.hatch)
         missing = _pictures(place, name, picture, sheet, relief, hatch=wish.hatch)
         if missing.names:
             remarks += (remark("drawing.without_name", count=missing.names),)
@@ -290,12 +290,14 @@ def default_title(source: Pair | PhotoSet | Path, path: Path | None = None) -> s
     return folder if len(folder) >= _SHORT else "wall"
 
 
-def _with_shares(drawing: Drawing, shares: dict[str, float], *, hatch: bool) -> Drawing:
-    """Return a drawing that says how much of its picture is not measured: by hatches, or a note."""
+def _with_shares(drawing: Drawing, basis: Mapping[str, float], *, hatch: bool) -> Drawing:
+    """Return a drawing that says what parts of its picture rest on: by hatches, or a note."""
+    if basis["plane"] > PIXELS.rectified:
+        drawing = replace(drawing, kind="rectified")
     if hatch:
-        parts = ((source, shares[source.name.lower()]) for source in DIRECTIONS)
+        parts = ((source, basis.get(source.name.lower())) for source in DIRECTIONS)
         return replace(drawing, hatched=tuple((source, share) for source, share in parts if share))
-    guess = not_measured(shares, drawing.language)
+    guess = basis_in_words(basis, drawing.language)
     told = (drawing.say("guessed", shares=guess),) if guess else ()
     return replace(drawing, notes=(*told, *drawing.notes))
 

@@ -14,7 +14,10 @@ from bifocal.orthophotos.tuning import HATCH, SHADING
 from photocore.arrays import BoolArray, ByteArray
 
 #: Directions of the lines of each source: 1 rises, -1 falls, both cross.
-DIRECTIONS = {Source.INTERPOLATED: (1,), Source.PLANE: (-1,), Source.FILLED: (1, -1)}
+DIRECTIONS = {
+    Source.INTERPOLATED: (1,), Source.PLANE: (-1,), Source.FILLED: (1, -1),
+    Source.NEITHER: (1, -1),
+}  # fmt: skip
 
 
 def hatched_strips(
@@ -42,13 +45,22 @@ def hatched_strips(
         size = (0, top - least, reader.grid.width, rows + 2 * least)
         source = reader.read(*size, bands=[reader.bands])[:, :, 0]
         lines = _lines(source, least, pixel, top - least)[least:-least]
-        picture = np.array(colours)
+        picture, valid = np.array(colours), np.array(valid)
         # Light lines on what is dark, dark ones on what is light.
         light = picture[lines].mean(axis=1, keepdims=True) < HATCH.dark
         tone = np.where(light, 255, 0)
         picture[lines] = np.rint(picture[lines] * (1 - HATCH.share) + tone * HATCH.share)
+        rim = _rim(source == Source.NEITHER, pixel)[least:-least]
+        picture[rim], valid[rim | lines] = 0, 255
         yield picture, valid
         top += rows
+
+
+def _rim(white: BoolArray, pixel: float) -> BoolArray:
+    """Return the outline of what is left white."""
+    side = 2 * max(1, round(SHADING.stroke / pixel)) + 1
+    inner = cv2.erode(white.astype(np.uint8), np.ones((side, side), np.uint8))
+    return white & (inner == 0)
 
 
 def _lines(source: ByteArray, least: int, pixel: float, first: int) -> BoolArray:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bifocal.model.geotiff import create_raster
 from bifocal.model.grid import Gridded
@@ -35,6 +36,13 @@ class Source(IntEnum):
     #: Seen by a photo, but put where it is by relief interpolated from around, or by the plane.
     INTERPOLATED = 5
     PLANE = 6
+    #: No photo sees it: paper white, empty to the file's mask.
+    NEITHER = 7
+
+
+def shows(source: NDArray[np.integer]) -> BoolArray:
+    """Return which pixels show something of the wall."""
+    return (source != Source.NONE) & (source != Source.NEITHER)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,10 +58,11 @@ class OrthoOptions:
     measured_only : bool
         Leave empty what has no known relief or is hidden. Otherwise the picture is whole: where
         relief is unknown a photo is shown on relief interpolated from around
-        (`Source.INTERPOLATED`), far from all of it on the plane (`Source.PLANE`), and what no
-        photo sees takes the colours around it (`Source.FILLED`).
+        (`Source.INTERPOLATED`), far from all of it on the plane (`Source.PLANE`); what no photo
+        sees takes texture from beside it (`Source.FILLED`), above 0.05 m2 it stays white
+        (`Source.NEITHER`).
     fill : bool
-        Of a picture of what is measured only, close holes with the colours around them.
+        Of a picture of what is measured only, close holes of any size with texture from beside.
     feather : float
         Width of the transition between two photos. [px]
     """
@@ -62,7 +71,7 @@ class OrthoOptions:
     mask_hidden: bool = True
     measured_only: bool = False
     fill: bool = False
-    feather: float = 8.0
+    feather: float = 4.0
 
     def __post_init__(self) -> None:
         if self.interpolation not in INTERPOLATIONS:
@@ -102,8 +111,7 @@ class Orthophoto(Gridded):
     @property
     def valid(self) -> BoolArray:
         """Pixels that show something, shape (height, width)."""
-        valid: BoolArray = self.source > 0
-        return valid
+        return shows(self.source)
 
     def write(self, path: Path | str, *, overwrite: bool = False) -> None:
         """Write a GeoTIFF of the plane frame: colours, then the `Source` of each pixel.

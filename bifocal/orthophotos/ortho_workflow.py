@@ -31,14 +31,15 @@ from bifocal.model.points import SurveyPoints
 from bifocal.model.relief_map import measured_part, told_pixels
 from bifocal.model.surface import EVERYWHERE, FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.compose import choose_grid, render
+from bifocal.orthophotos.moved_things import MovedThing
 from bifocal.orthophotos.ortho_image import OF_SET, OrthoOptions, Source
 from bifocal.orthophotos.radiometry import corrected_photo, match_exposure
 from bifocal.orthophotos.rectify import SourcePhoto
 from bifocal.orthophotos.tiles import RasterResult, write_tiles
 from bifocal.orthophotos.triangles import TriangleSurface
-from bifocal.orthophotos.tuning import PIXELS
+from bifocal.orthophotos.tuning import PIXELS, WHOLE
 from bifocal.remarks import remark
-from photocore.arrays import ByteArray
+from photocore.arrays import ByteArray, IntArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
 from photocore.images import ImageArray, read_image
@@ -144,11 +145,11 @@ def make_ortho(
         height, width = images[numbers[0]].shape[:2]
         grid = _grid(pair, numbers[0], (width, height), surface, task)
         photos, notes = _sources(pair, images, surface, grid, task)
-        hidden = 0
+        hidden, moved = 0, list[MovedThing]()
 
         def tiles() -> Iterator[tuple[int, int, ImageArray, ByteArray]]:
             nonlocal hidden
-            for column, row, tile in render(photos, surface, grid, task.options):
+            for column, row, tile in render(photos, surface, grid, task.options, moved):
                 hidden += int(np.count_nonzero(tile.hidden))
                 yield column, row, tile.image, tile.source
 
@@ -170,7 +171,7 @@ def make_ortho(
         ) as writer:
             counts = write_tiles(
                 writer, tiles(), sources=OF_SET + len(numbers) + 1, masked=True, progress=progress,
-                what="orthophoto",
+                what="orthophoto", empty=(Source.NONE, Source.NEITHER),
             )  # fmt: skip
             if counts[0] == total and not hidden:
                 raise InputError(remark("ortho.nothing_in_common"))
@@ -179,13 +180,34 @@ def make_ortho(
         for number, photo in enumerate(pair.photos, start=OF_SET + 1):
             shares[photo.name] = float(counts[number]) / total
     shares["hidden"] = hidden / total
+    for thing in moved:
+        words = "ortho.moved" if thing.drawn_from_second else "ortho.occluder"
+        notes.append(remark(words, x=thing.place[0], y=thing.place[1], area=thing.area))
+    basis = _basis(counts, flat=isinstance(beneath(surface), FlatSurface))
+    if task.relief and basis["plane"] > PIXELS.rectified:
+        notes.append(remark("ortho.rectified", share=basis["plane"]))
     notes += [] if isinstance(pair, PhotoAlone | PhotosOfSet) else _advice(shares, task)
     own = photo_pixel(pair, task)
     if grid.gsd < PIXELS.said * own:
         notes.append(remark("ortho.finer_than_photo", size=1000 * grid.gsd, own=1000 * own))
     return RasterResult(
-        path=out, grid=grid, shares=shares, remarks=(*pair.remarks, *remarks, *notes)
+        path=out, grid=grid, shares=shares, remarks=(*pair.remarks, *remarks, *notes), basis=basis
     )
+
+
+def _basis(counts: IntArray, *, flat: bool) -> dict[str, float]:
+    """Return what parts of what is shown, or should be, rest on, of pixels by source."""
+    total = max(int(counts.sum() - counts[Source.NONE]), 1)
+    of = {
+        "interpolated": counts[Source.INTERPOLATED],
+        "plane": counts[Source.PLANE],
+        "neither": counts[Source.FILLED] + counts[Source.NEITHER],
+    }
+    shares = {name: float(count) / total for name, count in of.items()}
+    rest = 1.0 - sum(shares.values())
+    if flat:
+        return {"measured": 0.0, **shares, "plane": shares["plane"] + rest}
+    return {"measured": rest, **shares}
 
 
 def _images(pair: Pair, task: OrthoTask) -> tuple[dict[int, ImageArray], tuple[str, ...]]:
@@ -214,10 +236,12 @@ def _images(pair: Pair, task: OrthoTask) -> tuple[dict[int, ImageArray], tuple[s
     return images, ()
 
 
-def not_measured(shares: dict[str, float], language: str = "en") -> str:
-    """Return in words how much of a picture was not measured; empty if all that is seen was."""
-    say, parts = words_of("bifocal.orthophotos", language), ("interpolated", "plane", "filled")
-    return ", ".join(say(key, share=100 * shares[key]) for key in parts if shares[key])
+def basis_in_words(basis: Mapping[str, float], language: str = "en") -> str:
+    """Return in words what parts of a picture rest on; empty if all was measured."""
+    if basis["measured"] == 1.0:
+        return ""
+    say = words_of("bifocal.orthophotos", language)
+    return ", ".join(say(key, share=100 * share) for key, share in basis.items() if share)
 
 
 def _advice(shares: dict[str, float], task: OrthoTask) -> list[str]:
@@ -363,10 +387,13 @@ def _sources(
 def _tags(pair: Pair, task: OrthoTask) -> dict[str, str]:
     """Return what the file should remember of its making."""
     relief = task.relief or task.points
+    # Crumbs of interpolated relief were left out where that moves the picture by less.
+    bound = f"{WHOLE.bound * photo_pixel(pair, task):.4f} m"
     return {
         "BIFOCAL_IMAGE": "all" if isinstance(pair, PhotosOfSet) else task.photo_words,
         "BIFOCAL_RELIEF": relief.name if relief else f"plane r = {task.plane:g} m",
         "BIFOCAL_D1": f"{pair.image1.distance:.6g}",
         **({} if isinstance(pair, PhotoAlone) else {"BIFOCAL_D2": f"{pair.image2.distance:.6g}"}),
+        **({} if task.options.measured_only else {"BIFOCAL_BOUND": bound}),
         **({"BIFOCAL_SCALE": f"1:{task.scale:g}"} if task.scale else {}),
     }

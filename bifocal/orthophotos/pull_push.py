@@ -1,4 +1,4 @@
-"""Close holes in a picture with the colours around them, smoothly, by a pyramid of averages."""
+"""Close holes smoothly with what is around them, by a pyramid of averages."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.orthophotos.tuning import COLOURS
+from bifocal.orthophotos.tuning import COLOURS, WHOLE
 from photocore.arrays import BoolArray, Float32Array
 
 
@@ -30,24 +30,7 @@ def fill_holes(
     Pull: known colours are averaged over 2 x 2 pixels again and again until averages reach into
     the holes. Push: each level takes its unknown pixels from the next coarser one.
     """
-    weight = known.astype(np.float32)
-    colour: NDArray[Any] = image.astype(np.float32)
-    colour[~known] = 0
-    levels = [(colour, weight)]
-    for _ in range(COLOURS.halvings):
-        if min(weight.shape) < 2:
-            break
-        size = ((weight.shape[1] + 1) // 2, (weight.shape[0] + 1) // 2)
-        colour = cv2.resize(colour, size, interpolation=cv2.INTER_AREA)
-        weight = cv2.resize(weight, size, interpolation=cv2.INTER_AREA)
-        levels.append((colour, weight))
-    filled = _plain(*levels[-1])
-    for colour, weight in reversed(levels[:-1]):
-        height, width = weight.shape
-        coarse = cv2.resize(filled, (width, height), interpolation=cv2.INTER_LINEAR)
-        missing = weight <= 0
-        filled = _plain(colour, weight)
-        filled[missing] = coarse[missing]
+    filled = _pushed(image, known, COLOURS.halvings)
     done: BoolArray = holes & np.isfinite(filled.reshape(*known.shape, -1)).all(axis=-1)
     out = image.copy()
     if image.dtype.kind == "f":
@@ -56,6 +39,42 @@ def fill_holes(
         limit = np.iinfo(image.dtype).max
         out[done] = np.clip(np.rint(filled[done]), 0, limit).astype(image.dtype)
     return out, done
+
+
+def membrane(values: Float32Array, known: BoolArray) -> Float32Array:
+    """Return a smooth sheet through known values, where each other is the mean of those around.
+
+    Laplace's equation, relaxed at every level of the pyramid; the rim of the picture is free.
+    """
+    return _pushed(values, known, 16, WHOLE.sweeps)
+
+
+def _pushed(image: NDArray[Any], known: BoolArray, halvings: int, sweeps: int = 0) -> Float32Array:
+    """Return the image with what is unknown from coarser levels, relaxed so many times at each."""
+    weight = known.astype(np.float32)
+    colour: NDArray[Any] = image.astype(np.float32)
+    colour[~known] = 0
+    levels = [(colour, weight)]
+    for _ in range(halvings):
+        if min(weight.shape) < 2:
+            break
+        size = ((weight.shape[1] + 1) // 2, (weight.shape[0] + 1) // 2)
+        colour = cv2.resize(colour, size, interpolation=cv2.INTER_AREA)
+        weight = cv2.resize(weight, size, interpolation=cv2.INTER_AREA)
+        levels.append((colour, weight))
+    filled = _plain(*levels[-1])
+    for level in range(len(levels) - 2, -1, -1):
+        colour, weight = levels[level]
+        height, width = weight.shape
+        coarse = cv2.resize(filled, (width, height), interpolation=cv2.INTER_LINEAR)
+        missing = weight <= 0
+        filled = _plain(colour, weight)
+        filled[missing] = coarse[missing]
+        # On the finest levels the coarser ones have done the work.
+        for _ in range(sweeps if level > 1 else sweeps // 3):
+            mean = cv2.blur(filled, (3, 3), borderType=cv2.BORDER_REPLICATE)
+            filled[missing] = mean[missing]
+    return filled
 
 
 def _plain(colour: Float32Array, weight: Float32Array) -> Float32Array:

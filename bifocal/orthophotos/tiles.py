@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -27,12 +27,16 @@ class RasterResult:
     shares : dict of str to float
         Part of the pixels by source, ``none`` for empty ones; of an orthophoto also ``hidden``.
     remarks : tuple of str
+    basis : mapping of str to float
+        Of what an orthophoto shows, the parts on ``measured`` and ``interpolated`` relief, on the
+        ``plane``, and what ``neither`` photo sees; they make up one.
     """
 
     path: Path
     grid: Grid
     shares: dict[str, float]
     remarks: tuple[str, ...]
+    basis: Mapping[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result for ``--json``."""
@@ -43,6 +47,7 @@ class RasterResult:
             "height": self.grid.height,
             "bounds": list(self.grid.bounds),
             "shares": self.shares,
+            **({"basis": dict(self.basis)} if self.basis else {}),
             "remarks": list(self.remarks),
         }
 
@@ -53,6 +58,7 @@ def write_tiles(
     *,
     sources: int,
     masked: bool,
+    empty: Sequence[int] = (0,),
     progress: Progress,
     what: str,
 ) -> IntArray:
@@ -67,10 +73,12 @@ def write_tiles(
         Number of sources, the empty one included.
     masked : bool
         Write a validity mask; relief maps say by NaN where they are empty.
+    empty : sequence of int
+        Sources of pixels that the mask calls empty.
     """
     counts = np.zeros(sources, np.int64)
     for column, row, image, source in tiles:
-        mask = source > 0 if masked else None
+        mask = ~np.isin(source, empty) if masked else None
         writer.write(with_band(image, source), column=column, row=row, mask=mask)
         counts += np.bincount(source.ravel(), minlength=sources)
         progress(int(counts.sum()), writer.pixels, what)

@@ -470,15 +470,16 @@ def _followed(  # type: ignore[no-untyped-def]
     return hidden
 
 
-def tidied(hidden: BoolArray) -> BoolArray:
+def tidied(hidden: BoolArray, side: int = 3) -> BoolArray:
     """Return a mask of hidden pixels without parts too small or too thin to be a shadow.
 
-    A shadow that is nowhere 3 x 3 px wide is what half a pixel of doubt about a step makes; a part
-    of fewer than `least_area` pixels cannot be told. Pinholes in the mask are closed likewise.
+    A shadow that is nowhere ``side`` pixels wide, three by default, is what half a pixel of doubt
+    about a step makes; a part of fewer than `least_area` pixels cannot be told. Pinholes in the
+    mask are closed likewise.
     """
     if not hidden.any():
         return hidden
-    core = cv2.erode(hidden.astype(np.uint8), np.ones((3, 3), np.uint8), borderValue=1) > 0
+    core = cv2.erode(hidden.astype(np.uint8), np.ones((side, side), np.uint8), borderValue=1) > 0
     _, label, stats, _ = cv2.connectedComponentsWithStats(hidden.astype(np.uint8), connectivity=8)
     keep = np.zeros(len(stats), dtype=bool)
     keep[np.unique(label[core & hidden])] = True

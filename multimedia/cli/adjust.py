@@ -3,21 +3,84 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import click
 
+from multimedia.cli.tables import ProjectOption
 from photocore.cli import print_result, tell_written, text_table
-from photocore.options import declared
+from photocore.option_types import POSITIVE, Names
+from photocore.options import Typed, declared
+from photocore.shared_options import JsonOption, LanguageOption, OverwriteOption
 
 if TYPE_CHECKING:
     from multimedia.adjustment.extensions import Extension
     from multimedia.adjustment.unknowns import Adjustment
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class AdjustCommand:
+    """The options of ``multimedia adjust``, and examples.
+
+    multimedia adjust tank.toml --interior c,xh,yh,k1 --media index3 --out tank2.toml
+               --report tank.html
+    multimedia adjust tank.toml --interior auto --media index3 --prior index3=0.0005
+               --report rapporto.pdf --language it
+    multimedia adjust boards.toml --plate all --fix-camera cam1 --interior c,xh,yh,k1 --media index3
+               --out housing.toml
+    multimedia adjust reef.toml --control free --scale-bar A,B,0.5,0.0001 --out reef2.toml
+    multimedia adjust wand.toml --control free --scale-bar @a,@b,80,0.02 --out tank2.toml
+    multimedia adjust tank.toml --media index3 --wavelength 520 --temperature 20 --depth 0.1
+
+    Unknowns of the media: offset, tilt1, tilt2, thickness1..., index1... counted from the camera;
+    radius, centreX, centreY, centreZ of a dome; radius, shift1, shift2, tilt1, tilt2 of a tube;
+    gradient of the index with depth; NAME:index3 for one media of several. Labels for --prior are
+    those of the result; c alone means that of every camera.
+    """
+
+    project: ProjectOption
+    interior: Annotated[tuple[str, ...], Typed(Names(), "LIST")] = ()
+    """Interior parameters to estimate, of c,xh,yh,k1,k2,k3,p1,p2,scale,shear, of a fisheye
+    c,xh,yh,k1,k2,k3,k4,scale; or auto: those that the data carry.  [default: none]"""
+    shared_interior: bool = False
+    """One set of interior parameters for all cameras."""
+    media: Annotated[tuple[str, ...], Typed(Names(), "LIST")] = ()
+    """Unknowns of the media, e.g. index3,offset,tilt1,tilt2.  [default: none]"""
+    fixed_cameras: Annotated[tuple[str, ...], Typed(unit="NAME", flag="--fix-camera")] = ()
+    """Keep this camera's orientation; repeat it."""
+    control: Literal["fixed", "weighted", "free"] = "fixed"
+    """Control points: error-free unless they have a sigma, all weighted, or a free network."""
+    plates: Annotated[tuple[str, ...], Typed(unit="GROUP", flag="--plate")] = ()
+    """Group of object points that is a rigid plate of unknown pose; repeat it, or say all."""
+    scale_bars: Annotated[tuple[str, ...], Typed(unit="A,B,LENGTH,SIGMA", flag="--scale-bar")] = ()
+    """Known distance between two points [object unit]; repeat it. @a,@b: a wand in many places, its
+    ends named 1a, 1b, 2a, 2b..."""
+    priors: Annotated[tuple[str, ...], Typed(unit="LABEL=SIGMA", flag="--prior")] = ()
+    """Standard deviation of an unknown's start value [its unit]; inf: not known at all; repeat
+    it.  [default: indices 0.005, thicknesses and radii a tenth, centres a tenth of the radius,
+    gradients 0.005 over the depth of the points, others inf]"""
+    robust: Annotated[float | None, Typed(POSITIVE, "K")] = None
+    """Huber weights beyond K standard deviations.  [default: plain least squares]"""
+    diagnose: bool = False
+    """Also try every extension of the model by one step and rank what would lower sigma0 most."""
+    wavelength: Annotated[float | None, Typed(POSITIVE, "NM")] = None
+    """For the salinity: light [nm]."""
+    temperature: Annotated[float | None, Typed(unit="C")] = None
+    """For the salinity: water temperature [deg C]."""
+    depth: Annotated[float, Typed(unit="M")] = 0.0
+    """Its depth [m]."""
+    out: Path | None = None
+    """Write the adjusted project (.toml)."""
+    report: Path | None = None
+    """Write a report (.html, .pdf)."""
+    language: LanguageOption = "en"
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(AdjustCommand)
 def command(
     project: Path, wavelength: float | None, temperature: float | None, depth: float,
     out: Path | None, report: Path | None, diagnose: bool, as_json: bool, **choices: Any,

@@ -2,16 +2,98 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import click
 
 from photocore.cli import print_result, progress_bar
-from photocore.options import declared
+from photocore.option_types import NEW_TABLE, NOT_NEGATIVE, POSITIVE, TABLE, Number, Numbers
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption, RasterCogOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class BathymetryCommand:
+    r"""The options of ``multimedia bathymetry``, and examples.
+
+    a DEM, seen from about straight above:
+      multimedia bathymetry dem.tif --water-level 1.8075 --index 1.33575 --out bed.tif
+    a point cloud, rigorously, with the cameras (id,X,Y,Z) that saw it within 40 degrees:
+      multimedia bathymetry cloud.las --water-level 102.4 --index 1.337 \
+          --cameras cameras.csv --max-angle 40 --out bed.las
+    with the precision that follows from index and level:
+      multimedia bathymetry cloud.csv --water-level water.json --index 1.337 \
+          --sigma-index 0.001 --sigma-level 0.01 --out bed.csv
+    the same under a swell of 5 cm, 4 m long, that runs to the north-east:
+      multimedia bathymetry cloud.las --water-level 102.4 --wave 0.05,4,45 --index 1.337 \
+          --cameras cameras.csv --max-angle 40 --out waves.las
+    the tide while the photos were taken: tide.csv (time,level), cameras.csv with a column time:
+      multimedia bathymetry cloud.las --water-level tide.csv --index 1.337 \
+          --cameras cameras.csv --max-angle 40 --out tide.las
+    lidar echoes with the positions of the sensor:
+      multimedia bathymetry echoes.las --water-level 102.4 --index 1.337 --group-index 1.36 \
+          --beams --trajectory flight.csv --out bed.las
+    measured rays (id,X0,Y0,Z0,DX,DY,DZ, one row per ray):
+      multimedia bathymetry rays.csv --rays --water-level 0 --index 1.337 --out points.csv
+    """
+
+    source: Annotated[Path, Argument(TABLE, "IN")]
+    water_level: Annotated[str, Typed(unit="Z|FILE")]
+    """Height of the water [m]; its surface as a .tif or .asc raster, a .ply or .obj triangle mesh
+    or the .json of `multimedia waterlevel`; or a table (.csv, .xlsx) of levels over time or by
+    photo: time,level or camera,level."""
+    waves: Annotated[tuple[str, ...], Typed(unit="A,L[,DIR[,PHASE]]", flag="--wave")] = ()
+    """A wave upon the height: amplitude and length [m], direction of travel clockwise from +Y and
+    phase at X = Y = 0 [deg]; repeat it. [default: none, flat water]"""
+    index: Annotated[float, Typed(POSITIVE, "N")]
+    """Refractive index of the water relative to the air [-], about 1.33 to 1.35."""
+    target: Annotated[Path, Typed(NEW_TABLE, flag="--out")]
+    """Corrected file, same kind as IN; - is a .csv on stdout."""
+    cameras: Annotated[Path | None, Typed(unit="FILE")] = None
+    """Table id,X,Y,Z of projection centres [m], or a project .toml: rigorous correction of X, Y and
+    Z. [default: none, every point as if seen from straight above]"""
+    visibility: Annotated[Path | None, Typed(unit="FILE")] = None
+    """Table point,camera: which camera saw which point (the cloud needs a column id; a column
+    'cameras' with their names does the same). [default: none, all cameras]"""
+    max_angle: Annotated[
+        float | None, Typed(Number(to=math.radians, above=0, most=89.9), "DEG")
+    ] = None
+    """A camera sees only points within this angle from its vertical [deg]. [default: any]"""
+    sigma_index: Annotated[float, Typed(NOT_NEGATIVE, "N")] = 0.0
+    """Standard deviation of the index [-]."""
+    sigma_level: Annotated[float, Typed(NOT_NEGATIVE, "M")] = 0.0
+    """Standard deviation of the water level [m]."""
+    sigma_point: Annotated[float, Typed(NOT_NEGATIVE, "M")] = 0.0
+    """Standard deviation of the coordinates in IN [m]. Any sigma adds sigma columns or a second
+    band."""
+    beams: bool = False
+    """IN holds lidar echoes with columns X0, Y0, Z0. [off]"""
+    trajectory: Annotated[Path | None, Typed(unit="FILE")] = None
+    """Table time,X,Y,Z of the lidar sensor [s, m], for echoes with gps_time; implies --beams.
+    [default: none]"""
+    group_index: Annotated[float | None, Typed(POSITIVE, "N")] = None
+    """Index that slows the laser pulse [-]. [default: as --index]"""
+    rays: bool = False
+    """IN is a table of measured rays. [off]"""
+    sigma_direction: Annotated[float | None, Typed(Number(to=math.radians, above=0), "DEG")] = None
+    """Standard deviation of a ray of the photos, or of a measured one [deg]: precision of the
+    network. [default: none; of measured rays 0.0057]"""
+    sigma_wave: Annotated[tuple[float, float] | None, Typed(Numbers(2), "A,L")] = None
+    """Amplitude and length [m] of waves that differ from photo to photo, for the sigmas. [default:
+    none]"""
+    nodata: Annotated[float | None, Typed(Number(finite=False), "VALUE")] = None
+    """Height that marks empty cells of a DEM [m]. [default: as the file says]"""
+    allow_dry: bool = False
+    """Accept data without a point under water. [off]"""
+    cog: RasterCogOption = False
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(BathymetryCommand)
 def command(source: Path, target: Path, beams: bool, as_json: bool, **wishes: Any) -> None:
     """Correct a DEM or point cloud for the refraction at the water surface.
 

@@ -2,17 +2,45 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+from multimedia.cli.tables import ProjectOption
 from photocore.cli import print_result, progress_bar, text_table
-from photocore.options import declared
+from photocore.option_types import POSITIVE
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import BoardOption, JsonOption, OverwriteOption, PatternOption
 
 if TYPE_CHECKING:
     from multimedia.boards.workflow import DetectedBoards
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class BoardsCommand:
+    """The options of ``multimedia boards``, and examples.
+
+    multimedia boards housing.toml dive*.png --board 9x6 --square 24 --out boards.toml
+    multimedia adjust boards.toml --plate all --fix-camera cam1 --interior c,xh,yh,k1
+               --media index3,offset --out calibrated.toml --report calibrated.html
+
+    The photos of several cameras are told apart by their names (left_003.png) or folders
+    (left/003.png); 003 is then the pose of the board that they share.
+    """
+
+    project: ProjectOption
+    photos: Annotated[tuple[Path, ...], Argument()]
+    pattern: PatternOption = "chessboard"
+    board: BoardOption
+    square: Annotated[float, Typed(POSITIVE, "L")]
+    """Side of a square, or distance of neighbouring circles [object unit]."""
+    out: Path
+    """Project with the points (.toml)."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(BoardsCommand)
 def command(
     project: Path, photos: tuple[Path, ...], out: Path, as_json: bool, **options: Any
 ) -> None:

@@ -2,14 +2,43 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 from photocore.cli import print_result, text_table
-from photocore.options import declared
+from photocore.option_types import POSITIVE
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class ConvertCommand:
+    """The options of ``multimedia convert``, and examples.
+
+    multimedia convert sparse/0 tank.toml --unit mm --pitch 0.00345
+    multimedia convert tank.toml model --to colmap
+    multimedia convert tank.toml cameras.xml
+    multimedia convert calibration.json rig.toml
+    multimedia convert rig.toml calibration.json --to aquacal
+    """
+
+    source: Annotated[Path, Argument()]
+    target: Annotated[Path, Argument()]
+    form: Annotated[
+        Literal["colmap", "metashape", "opencv", "aquacal"] | None, Typed(flag="--to")
+    ] = None
+    """Format of TARGET.  [default: by its ending: .toml a project, .xml metashape, .yml opencv,
+    none colmap]"""
+    pixel_size: Annotated[float, Typed(POSITIVE, "MM", flag="--pitch")] = 0.005
+    """Width of a pixel, which the other programs do not know [mm]."""
+    unit: Literal["m", "cm", "mm", "um", "km"] = "m"
+    """Unit of their lengths, which all but AquaCal leave open."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(ConvertCommand)
 def command(source: Path, target: Path, as_json: bool, **options: Any) -> None:
     """Convert SOURCE, a project or the cameras of another program, into TARGET.
 

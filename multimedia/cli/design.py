@@ -2,22 +2,75 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from math import degrees
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import click
 
 from photocore.cli import print_result, tell_written, text_table
-from photocore.options import declared, options_of
+from photocore.option_types import FOCAL, POSITIVE, Number, Numbers, Size
+from photocore.options import Argument, Typed, declared, options_of
+from photocore.shared_options import JsonOption, OverwriteOption
 
 if TYPE_CHECKING:
     from multimedia.bathymetry.wave_statistics import WaveCase
     from multimedia.design.studies import Design
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class DesignCommand:
+    """The options of ``multimedia design``, and examples.
+
+    multimedia design --cameras 4 --distance 0.6 --half-angle 30 --c 25 --extent 0.3x0.3
+               --depths 0.02x0.2 --indices 1,1.5,1.337 --thicknesses 0.01 --sigma 0.0012
+    multimedia design tank.toml --out design.xlsx --plot design.png --flatness
+    multimedia design --cameras 2 --distance 20 --half-angle 14 --c 25 --extent 6x4
+               --depths 1x3 --waves 0.01,1,4
+    """
+
+    project: Annotated[Path | None, Argument()] = None
+    count: Annotated[int, Typed(click.IntRange(min=1, max=100), flag="--cameras")] = 4
+    """Cameras on the cone."""
+    distance: Annotated[float | None, Typed(POSITIVE, "M")] = None
+    """From the last face to each camera [m]."""
+    half_angle: Annotated[
+        float, Typed(Number(to=math.radians, above=0, below=90), default=30.0)
+    ] = math.radians(30.0)
+    """Half opening of the cone of cameras, in air [deg]."""
+    principal_distance: Annotated[float | None, Typed(FOCAL, flag="--c")] = None
+    """Principal distance [mm]."""
+    indices: Annotated[tuple[float, ...], Typed(Numbers(above=0))] = (1.0, 1.337)
+    """Refractive indices from camera to object."""
+    thicknesses: Annotated[tuple[float, ...], Typed(Numbers(least=0))] = ()
+    """Of media between [m].  [default: none]"""
+    extent: Annotated[tuple[float, float] | None, Typed(Size(above=0))] = None
+    """Width x height of the object space [m]."""
+    depths: Annotated[tuple[float, float] | None, Typed(Size(), "LEASTxLARGEST")] = None
+    """Depths of the object space [m]."""
+    sigma_image: Annotated[float, Typed(Number(above=0, most=1), flag="--sigma")] = 0.001
+    """Precision of an image coordinate [mm]."""
+    seed: Annotated[int, Typed(click.IntRange(min=0))] = 1
+    """Of the simulated noise."""
+    flatness: bool = False
+    """Also study how plane and parallel the faces must be (bent, wedged, wavy ones)."""
+    waves: Annotated[tuple[float, ...] | None, Typed(Numbers(above=0), "AMPLITUDE,LENGTH,...")] = (
+        None
+    )
+    """Also say what waves of an amplitude and some lengths cost [m], and how many frames take it
+    away; for cameras above open water."""
+    out: Path | None = None
+    """Write the tables (.xlsx)."""
+    plot: Path | None = None
+    """Draw them (.png, .svg, .pdf)."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(DesignCommand)
 def command(
     project: Path | None, out: Path | None, plot: Path | None, as_json: bool, **ring: Any
 ) -> None:
@@ -41,7 +94,7 @@ def command(
                 )
         result = design.design_project(project, **study)
     else:
-        options = options_of("multimedia", "design")
+        options = options_of(DesignCommand)
         missing = [options[name].flag for name, value in ring.items() if value is None]
         if missing:
             raise click.UsageError(f"give a PROJECT file, or {', '.join(missing)} as well.")

@@ -3,19 +3,62 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import click
 
+from multimedia.cli.tables import ProjectOption
 from photocore.cli import print_result, tell_written, text_table
-from photocore.options import declared
+from photocore.option_types import NEW_TABLE, Number, Numbers, thousandth
+from photocore.options import Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 if TYPE_CHECKING:
     from multimedia.orientation.epipolar_workflow import EpipolarResult
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class EpipolarCommand:
+    """The options of ``multimedia epipolar``, and examples.
+
+    multimedia epipolar tank.toml --camera cam1 --to cam2 --point 12
+    multimedia epipolar tank.toml --camera cam1 --to cam3 --at 640.5,371.2 --z-range -20,20
+    multimedia epipolar tank.toml --camera cam1 --to cam2 --picture curves.png --photo cam2.tif
+    """
+
+    project: ProjectOption
+    camera: str
+    """Camera of the image points."""
+    other: Annotated[str, Typed(flag="--to")]
+    """Camera in whose image the curves run."""
+    ids: Annotated[tuple[str, ...], Typed(unit="ID", flag="--point")] = ()
+    """Image point of --camera; repeatable.  [default: all of them]"""
+    at: Annotated[tuple[float, float] | None, Typed(Numbers(2), "A,B")] = None
+    """Column, row of a point instead [px]."""
+    z_range: Annotated[tuple[float, float] | None, Typed(Numbers(2), "A,B")] = None
+    """Depth range of the object, Z from and to [unit of the project].  [default: that of the object
+    points and a quarter more]"""
+    chord_error: Annotated[
+        float, Typed(Number(above=0, to=thousandth, least=0.001), "UM", flag="--chord", default=0.5)
+    ] = 0.0005
+    """Largest distance between curve and polygon [um]."""
+    vertices: int | None = None
+    """Fixed number of vertices instead of --chord.  [default: as needed]"""
+    tolerance: Annotated[float, Typed(Number(above=0, to=thousandth), "UM", default=10.0)] = 0.01
+    """Half width of the band in which candidates are looked for [um]."""
+    out: Annotated[Path | None, Typed(NEW_TABLE)] = None
+    """Vertices as .csv or .xlsx; - is stdout."""
+    picture: Path | None = None
+    """Picture of the curves: .png, .svg or .pdf."""
+    photo: Path | None = None
+    """Image of --to, under the picture."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(EpipolarCommand)
 def command(
     project: Path, out: Path | None, picture: Path | None, as_json: bool, **options: Any
 ) -> None:

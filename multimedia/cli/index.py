@@ -2,13 +2,59 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
 import click
 
 from photocore.cli import print_result, remark
-from photocore.options import declared
+from photocore.option_types import NOT_NEGATIVE, POSITIVE
+from photocore.options import Typed, declared
+from photocore.shared_options import JsonOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class IndexCommand:
+    """The options of ``multimedia index``, and examples.
+
+    multimedia index --wavelength 520 --temperature 22.2 --salinity 0 --depth 0.15
+    multimedia index --wavelength 532 --temperature 18 --salinity 3.5 --formula quan-fry
+    multimedia index --temperature 20 --sigma-temperature 0.5 --salinity 3.5 --sigma-salinity 0.1
+    multimedia index --from-index 1.3412 --sigma-index 0.00015 --find salinity --temperature 20
+    """
+
+    wavelength_nm: Annotated[float, Typed(POSITIVE, "NM", flag="--wavelength")] = 550.0
+    """Wavelength of the light [nm]; blue 460, green 550, red 620."""
+    temperature_c: Annotated[float, Typed(unit="C", flag="--temperature")] = 20.0
+    """Water temperature [°C]."""
+    salinity_percent: Annotated[float, Typed(unit="PERCENT", flag="--salinity")] = 0.0
+    """Salinity [%]; sea water has 3.5."""
+    depth: Annotated[float, Typed(unit="M")] = 0.0
+    """Water depth [m]."""
+    formula: Literal["hoehle", "quan-fry", "parrish"] = "hoehle"
+    """Published formula; hoehle is that of the multimedia papers."""
+    sigma_wavelength_nm: Annotated[float, Typed(NOT_NEGATIVE, "NM", flag="--sigma-wavelength")] = (
+        0.0
+    )
+    """Standard deviation of the wavelength [nm]."""
+    sigma_temperature_c: Annotated[float, Typed(NOT_NEGATIVE, "C", flag="--sigma-temperature")] = (
+        0.0
+    )
+    """Standard deviation of the temperature [°C]."""
+    sigma_salinity_percent: Annotated[
+        float, Typed(NOT_NEGATIVE, "PERCENT", flag="--sigma-salinity")
+    ] = 0.0
+    """Standard deviation of the salinity [%]."""
+    from_index: Annotated[float | None, Typed(POSITIVE, "N")] = None
+    """A measured refractive index: the inverse; needs --find."""
+    sigma_index: Annotated[float, Typed(NOT_NEGATIVE, "N")] = 0.0
+    """Standard deviation of the measured index."""
+    find: Literal["salinity", "temperature"] | None = None
+    """What to find from --from-index; the others are given."""
+    as_json: JsonOption = False
+
+
+@declared(IndexCommand)
 def command(
     formula: str, from_index: float | None, find: str | None, as_json: bool, **given: float
 ) -> None:

@@ -2,13 +2,39 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from photocore.options import declared
+from multimedia.cli.tables import ProjectOption
+from photocore.option_types import NEW_TABLE
+from photocore.options import Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class IntersectCommand:
+    """The options of ``multimedia intersect``, and examples.
+
+    multimedia intersect tank.toml
+    multimedia intersect tank.toml --points frame.csv --out particles.xlsx
+    multimedia intersect tank.toml --method pairs
+    """
+
+    project: ProjectOption
+    points: Path | None = None
+    """Table of image points: camera, id, and col, row [px] or x, y [mm]; or one row per point with
+    columns such as 'cam1 col', 'cam1 row'.  [default: the project's own]"""
+    method: Literal["rigorous", "rays", "pairs"] = "rigorous"
+    """Least squares of the image residuals; of the distances to the rays; or the mean of the
+    midpoints of all pairs of rays, as OpenPTV does."""
+    out: Annotated[Path | None, Typed(NEW_TABLE)] = None
+    """Also write a .csv or .xlsx table; - is stdout."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(IntersectCommand)
 def command(project: Path, out: Path | None, as_json: bool, **options: Any) -> None:
     """Intersect the rays of every point that two or more cameras of PROJECT (.toml) saw.
 

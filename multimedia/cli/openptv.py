@@ -2,14 +2,44 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import click
 
 from photocore.cli import print_json, print_result, remark, text_table
-from photocore.options import declared
+from photocore.option_types import POSITIVE
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class OpenptvCommand:
+    """The options of ``multimedia openptv``, and examples.
+
+    multimedia openptv test_cavity --out cavity.toml
+    multimedia openptv test_cavity --swap-indices --out cavity.toml
+    multimedia openptv cavity.toml --export folder_for_openptv
+    """
+
+    source: Annotated[Path, Argument(unit="DIR")]
+    out: Path | None = None
+    """Project file to write (.toml), tables beside it.  [default: name of the folder + .toml,
+    here]"""
+    swap_indices: bool = False
+    """Exchange the indices of glass and water."""
+    least_pixels: Annotated[int, Typed(click.IntRange(min=1), flag="--min-pixels")] = 15
+    """Smaller targets are no dots of the calibration body [px]."""
+    radius: Annotated[float, Typed(POSITIVE, "PX")] = 25.0
+    """Farthest a target may lie from where the stored orientation expects it [px]."""
+    export: Path | None = None
+    """The other way: DIR is a project file; write it as an OpenPTV folder."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(OpenptvCommand)
 def command(
     source: Path, out: Path | None, export: Path | None, as_json: bool, **options: Any
 ) -> None:

@@ -2,14 +2,42 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import click
+
+from multimedia.cli.tables import ProjectOption
 from photocore.cli import print_result, text_table
-from photocore.options import declared
+from photocore.option_types import POSITIVE
+from photocore.options import Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class ParticlesCommand:
+    r"""The options of ``multimedia particles``, and examples.
+
+    multimedia particles tank.toml --targets img/cam1.10001_targets \
+      --targets img/cam2.10001_targets --targets img/cam3.10001_targets \
+      --targets img/cam4.10001_targets --out res/rt_is.10001
+    """
+
+    project: ProjectOption
+    targets: tuple[Path, ...]
+    """OpenPTV's _targets file of a camera; once per camera, in the order of PROJECT."""
+    tolerance: Annotated[float, Typed(POSITIVE, "PX")] = 2.0
+    """Farthest a target may lie from where its particle is seen [px]."""
+    fewest: Annotated[int, Typed(click.IntRange(min=2))] = 3
+    """Cameras that must have seen a particle; with 2, many are by chance."""
+    out: Path | None = None
+    """Write rt_is.FRAME as OpenPTV does, or .csv or .xlsx."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(ParticlesCommand)
 def command(project: Path, targets: tuple[Path, ...], as_json: bool, **options: Any) -> None:
     """Find the particles of one frame among the targets of all cameras of PROJECT, a .toml file.
 

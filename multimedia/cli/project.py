@@ -2,13 +2,34 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from photocore.options import declared
+from multimedia.cli.tables import ProjectOption
+from photocore.option_types import NEW_TABLE
+from photocore.options import Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class ProjectCommand:
+    """The options of ``multimedia project``, and examples.
+
+    multimedia project tank.toml
+    multimedia project tank.toml --points wand.csv --out images.csv
+    """
+
+    project: ProjectOption
+    points: Path | None = None
+    """Table of object points: id, X, Y, Z.  [default: the project's own]"""
+    out: Annotated[Path | None, Typed(NEW_TABLE)] = None
+    """Also write a .csv or .xlsx table; - is stdout."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(ProjectCommand)
 def command(project: Path, out: Path | None, as_json: bool, **options: Any) -> None:
     """Project object points into every camera of PROJECT, a .toml file.
 

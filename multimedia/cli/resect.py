@@ -3,14 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from multimedia.cli.tables import ProjectOption
 from photocore.cli import print_result, remark, text_table
-from photocore.options import declared
+from photocore.option_types import Names
+from photocore.options import Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class ResectCommand:
+    """The options of ``multimedia resect``, and examples.
+
+    multimedia resect tank.toml --out oriented.toml
+    multimedia resect tank.toml --estimate c,xh,yh,k1,p1,p2,scale --out calibrated.toml
+    multimedia resect tank.toml --camera cam2 --residuals cam2_residuals.csv
+    """
+
+    project: ProjectOption
+    estimate: Annotated[tuple[str, ...], Typed(Names(), "NAMES")] = ()
+    """Interior parameters to determine beside the exterior orientation, with commas: c, xh, yh
+    [mm], k1, k2, k3, p1, p2, scale, shear (fisheye: k1 to k4, scale); or 'all'.  [default: none]"""
+    cameras: Annotated[tuple[str, ...], Typed(flag="--camera")] = ()
+    """Only this camera; repeatable."""
+    out: Path | None = None
+    """Write the project with the new orientations."""
+    residuals: Path | None = None
+    """Write the residuals [mm] of all image points as .csv or .xlsx."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(ResectCommand)
 def command(project: Path, as_json: bool, **options: Any) -> None:
     """Orient, and with --estimate calibrate, each camera of PROJECT (.toml) on its own.
 

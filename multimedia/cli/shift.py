@@ -2,16 +2,53 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import click
 
 from photocore.cli import print_json, remark
-from photocore.options import declared
+from photocore.option_types import NEW_TABLE, TABLE, Numbers
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class ShiftCommand:
+    """The options of ``multimedia shift``, and examples.
+
+    multimedia shift points.csv --out shifted.csv --camera 0.2,0.1,0.75
+                     --indices 1,1.5,1.337 --thicknesses 0.01
+    multimedia shift points.xlsx --out shifted.xlsx --z0 500 --indices 1,1.337
+    multimedia shift tank.xlsx --json       set-up taken from the workbook's cells n_1 ... z_0
+    """
+
+    source: Annotated[Path, Argument(TABLE, "IN")]
+    out: Annotated[Path | None, Typed(NEW_TABLE)] = None
+    """Result, .xlsx or .csv; - is a .csv on stdout."""
+    camera: Annotated[tuple[float, float, float] | None, Typed(Numbers(3), "X,Y,Z")] = None
+    """Camera, in the unit of the points; Z = 0 is the interface on the water side."""
+    z0: Annotated[float | None, Typed(unit="LENGTH")] = None
+    """Instead of --camera: its distance from the first interface, nadir at X = Y = 0."""
+    indices: Annotated[tuple[float, ...] | None, Typed(Numbers(), "N,N,...")] = None
+    """Refractive indices from the camera to the object.  [default: the workbook's]"""
+    thicknesses: Annotated[tuple[float, ...] | None, Typed(Numbers(), "T,...")] = None
+    """Thicknesses of the media between the first and the last, in the unit of the
+    points.  [default: the workbook's; none for two media]"""
+    sheet: str | None = None
+    """The only sheet to look at.  [default: all]"""
+    decimal: Literal["point", "comma"] | None = None
+    """Decimal separator of numbers typed as text.  [default: detected]"""
+    flavour: Annotated[Literal["plain", "excel-it", "excel-de"], Typed(flag="--csv")] = "plain"
+    """How to write .csv: comma and point, or semicolon and comma."""
+    new: bool = False
+    """Write a new workbook with live formulas, not the table's own."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(ShiftCommand)
 def command(source: Path, out: Path | None, as_json: bool, **options: Any) -> None:
     """Shift points so that straight rays see them where they are seen through the media.
 

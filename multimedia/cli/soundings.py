@@ -2,15 +2,40 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from photocore.cli import print_result, tell_written, text_table
-from photocore.options import declared
+from photocore.option_types import NOT_NEGATIVE, TABLE, Numbers
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class SoundingsCommand:
+    """The options of ``multimedia soundings``, and examples.
+
+    multimedia soundings bed.tif multibeam.xyz --water-level 102.4
+    multimedia soundings cloud.las check.xlsx --water-level 102.4 --classes 0,1,2,4
+                         --out offsets.csv
+    """
+
+    surface: Annotated[Path, Argument(TABLE)]
+    soundings: Annotated[Path, Argument(TABLE)]
+    water_level: Annotated[str, Typed(unit="Z|FILE")]
+    """Height of the water from which depths count [m], or its surface, as for bathymetry."""
+    edges: Annotated[tuple[float, ...] | None, Typed(Numbers(), "D,D,...", flag="--classes")] = None
+    """Bounds of the classes of depth [m].  [default: up to eight of a round width]"""
+    sigma: Annotated[float, Typed(NOT_NEGATIVE, "M")] = 0.0
+    """Standard deviation of a sounding without a sigma_Z of its own [m]."""
+    target: Annotated[Path | None, Typed(flag="--out")] = None
+    """Table (.csv) of every sounding with its offset and sigma.  [default: none]"""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(SoundingsCommand)
 def command(surface: Path, soundings: Path, as_json: bool, **options: Any) -> None:
     """Hold a corrected DEM or point cloud against soundings or check points, by depth.
 

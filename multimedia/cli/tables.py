@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from photocore.cli import print_result, remark, text_table
+from photocore.options import Argument
 
 if TYPE_CHECKING:
     from multimedia.orientation.workflow import PointTable
 
+ProjectOption = Annotated[Path, Argument()]
 #: Rows printed when the table also goes into a file.
 _SHOWN = 10
 

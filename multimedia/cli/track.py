@@ -2,16 +2,65 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import click
 import numpy as np
 
+from multimedia.cli.tables import ProjectOption
 from photocore.cli import print_result, text_table
-from photocore.options import declared
+from photocore.option_types import POSITIVE
+from photocore.options import Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class TrackCommand:
+    r"""The options of ``multimedia track``, and examples.
+
+    multimedia track tank.toml --targets img/cam1. --targets img/cam2. \
+      --targets img/cam3. --targets img/cam4. --first 10001 --rate 50 \
+      --out tracks.csv
+    multimedia track tank.toml --targets img/cam1. --targets img/cam2. \
+      --targets img/cam3. --targets img/cam4. --first 10001 \
+      --out tracks.h5 --folder res
+    """
+
+    project: ProjectOption
+    targets: tuple[Path, ...]
+    """What the _targets files of a camera begin with, up to the number of the frame; once per
+    camera, in the order of PROJECT."""
+    first: Annotated[int | None, Typed(click.IntRange(min=0))] = None
+    """First frame.  [default: the first of all cameras]"""
+    last: Annotated[int | None, Typed(click.IntRange(min=0))] = None
+    """Last frame.  [default: the last of all cameras]"""
+    rate: Annotated[float | None, Typed(POSITIVE, "HZ")] = None
+    """Frames per second [1/s]; without it velocities are per frame."""
+    tolerance: Annotated[float, Typed(POSITIVE, "PX")] = 2.0
+    """Farthest a target may lie from where its particle is seen [px]."""
+    fewest: Annotated[int, Typed(click.IntRange(min=2))] = 3
+    """Cameras that must have seen a particle; with 2, many are by chance."""
+    step: Annotated[float | None, Typed(POSITIVE)] = None
+    """Largest displacement between frames where nothing is known of a velocity [unit of the
+    project]. [default: half the mean distance between particles]"""
+    change: Annotated[float | None, Typed(POSITIVE)] = None
+    """Largest distance from where its velocity predicts a particle [unit of the
+    project].  [default: 3.5 times the median of those found]"""
+    gap: Annotated[int, Typed(click.IntRange(min=0))] = 2
+    """Frames for which a particle may be missing."""
+    shortest: Annotated[int, Typed(click.IntRange(min=3))] = 4
+    """Points of the shortest track."""
+    out: Path | None = None
+    """Write the points of all tracks: .csv, .xlsx, or .h5 (extra hdf)."""
+    folder: Path | None = None
+    """Write rt_is and ptv_is of every frame there, as OpenPTV does [mm]."""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(TrackCommand)
 def command(project: Path, targets: tuple[Path, ...], as_json: bool, **options: Any) -> None:
     """Follow particles through frames: targets of all cameras of PROJECT in, tracks out.
 

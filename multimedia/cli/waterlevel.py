@@ -2,14 +2,38 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from photocore.cli import print_result
-from photocore.options import declared
+from photocore.option_types import POSITIVE, TABLE
+from photocore.options import Argument, Typed, declared
+from photocore.shared_options import JsonOption, OverwriteOption
 
 
-@declared
+@dataclass(frozen=True, kw_only=True)
+class WaterlevelCommand:
+    """The options of ``multimedia waterlevel``, and examples.
+
+    multimedia waterlevel tiepoints.csv
+    multimedia waterlevel tiepoints.ply --tilted --out water.json
+    multimedia bathymetry dem.tif --water-level water.json --index 1.337 --out bed.tif
+    """
+
+    source: Annotated[Path, Argument(TABLE, "POINTS")]
+    tilted: bool = False
+    """Fit a tilted plane instead of a height. [off]"""
+    spread: Annotated[float | None, Typed(POSITIVE, "M")] = None
+    """Expected standard deviation of a surface point, waves included [m]. [default: from the
+    data]"""
+    target: Annotated[Path | None, Typed(flag="--out")] = None
+    """Write the level as .json, for `multimedia bathymetry`. [default: none]"""
+    overwrite: OverwriteOption = False
+    as_json: JsonOption = False
+
+
+@declared(WaterlevelCommand)
 def command(source: Path, tilted: bool, as_json: bool, **options: Any) -> None:
     """Estimate the mean water height from tie points, some of them on the water surface.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,8 +14,10 @@ from multimedia.workbook.shift_points import ShiftPoints, ShiftSetup
 from photocore.errors import CellError, InputError, WorkbookError, located
 from photocore.tables import Column, Table, open_tables, read_named_values, read_table
 from photocore.tables.csvread import CsvFile
-from photocore.workbook.reading.grid import SheetFile
+from photocore.workbook.reading.grid import SheetFile, cell_name
 
+#: Name of the first value on the sheet of camera and media in a workbook of the user's own.
+MEDIA = "multimedia_media"
 #: Most layers a workbook is searched for.
 MOST_LAYERS = 9
 
@@ -95,8 +97,9 @@ def read_shift_input(
     names += [Column(f"t_{i}") for i in range(1, MOST_LAYERS - 1)]
     names += [Column("z_0"), Column("X_0"), Column("Y_0")]
     errors: list[CellError] = []
-    values = read_named_values(book, names, sheet="Multimedia", errors=errors, several=True)
     given = given or {}
+    table.remarks += _settle_names(book, {column.key for column in names} - given.keys())
+    values = read_named_values(book, names, sheet="Multimedia", errors=errors, several=True)
     if errors := [error for error in errors if error.column not in given]:
         raise WorkbookError(errors)
     numbers = {column.key: values.number(column.key) for column in names}
@@ -120,6 +123,39 @@ def read_shift_input(
             nadir=(float(np.nan_to_num(numbers["X_0"])), float(np.nan_to_num(numbers["Y_0"]))),
         )
     return ShiftInput(table=table, setup=setup, places=values.places)
+
+
+def _settle_names(book: SheetFile | CsvFile, wanted: Collection[str]) -> list[str]:
+    """Leave of a workbook's names those of camera and media; return which the user's own are.
+
+    In a workbook of the user's own they are the cells of the sheet that we put there, by their
+    labels; without that sheet, names of the user's if two of what makes a set-up have one.
+    """
+    if not isinstance(book, SheetFile) or any(area.name == "tblMM" for area in book.tables):
+        return []
+    title, first, column = book.names.get(MEDIA, ("", 0, 0))
+    if title in book.titles:
+        rows = book.grid(title).rows
+        labels = {
+            str(cells.get(column - 1, "")): row for row, cells in rows.items() if row >= first
+        }
+        book.names.clear()
+        book.names.update({key.casefold(): (title, row, column) for key, row in labels.items()})
+        return []
+    places = {key: book.names[key.casefold()] for key in wanted if key.casefold() in book.names}
+    values = {
+        key: book.grid(sheet).rows.get(row, {}).get(column)
+        for key, (sheet, row, column) in sorted(places.items())
+        if sheet in book.titles
+    }
+    numbers = {key: value for key, value in values.items() if isinstance(value, float)}
+    book.names.clear()
+    if len(numbers.keys() & {"n_1", "n_2", "z_0"}) < 2:
+        return []
+    book.names.update({key.casefold(): places[key] for key in numbers})
+    told = (f"{k} = {v:.15g} ({places[k][0]}!{cell_name(*places[k][1:])})"
+            for k, v in numbers.items())  # fmt: skip
+    return [remark("table.beside_names", values=", ".join(told))]
 
 
 def _refuse_survey(book: SheetFile | CsvFile) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from multimedia.refraction.unrolled import STEPS
 from multimedia.remarks import remark
-from multimedia.workbook.shift_files import ShiftInput
+from multimedia.workbook.shift_files import MEDIA, ShiftInput
 from multimedia.workbook.shift_points import ShiftPoints, ShiftSetup
 from multimedia.workbook.shift_workbook import (
     CHART_DATA,
@@ -42,8 +42,6 @@ from photocore.workbook.reading.grid import (
 ADDED = ("Rbar", "dR", "Xbar", "Ybar", "flag")
 #: Name of the headings of the results in a workbook of the user's own.
 MARK = "multimedia_results"
-#: Name of the first value on the sheet of camera and media that such a workbook gets.
-MEDIA = "multimedia_media"
 
 
 def is_template(path: Path | str) -> bool:
@@ -197,6 +195,7 @@ def _media_sheet(editor: WorkbookEditor, given: ShiftInput, setup: ShiftSetup) -
     """Return the title of the sheet of camera and media, made or brought up to date."""
     place = place_of(editor, MEDIA)
     values = _named(setup)
+    editor.home = "" if place is None else place[0]
     if place is not None:
         title = place[0]
         count = sum(
@@ -205,22 +204,15 @@ def _media_sheet(editor: WorkbookEditor, given: ShiftInput, setup: ShiftSetup) -
         _check_count(editor, count, setup)
         places = {name: (title, *at) for name, at in media_places(count).items()}
         for name, value in values.items():
-            typed = place_of(editor, name) or places[name]
-            if editor.value_at(*typed) != value:
-                editor.put(*typed, value)
-            if typed != places[name]:
-                editor.set_result(*places[name], value)
+            if editor.value_at(*places[name]) != value:
+                editor.put(*places[name], value)
         _store_ratios(editor, setup, places)
         return title
     links = {}
     for name, (sheet, cell) in given.places.items():
         own = (sheet, *split_cell(cell))
-        stands = editor.value_at(*own)
-        if name not in values or (stands != values[name] and place_of(editor, name) != own):
-            continue
-        if stands != values[name]:
-            editor.put(*own, values[name])
-        links[name] = _reference(*own)
+        if name in values and editor.value_at(*own) == values[name]:
+            links[name] = _reference(*own)
     book = BookBuilder(language="en", words=WORDS)
     media = media_cells(book, setup, links=links)
     media.finish(landscape=True, guarded=False)

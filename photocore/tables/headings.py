@@ -31,7 +31,13 @@ _FOREIGN = frozenset(
 #: What may stand in square brackets besides lengths, angles and pixels.
 _NO_LENGTHS = frozenset(("1", "–", "s", "‰"))
 _DROPPED = re.compile(r"[\s_.\-:/'\"`´]+")
-_PHOTO = re.compile(r"(?:image|photo|picture|foto|bild|immagine|aufnahme)\s*([12])$")
+_PHOTO = re.compile(
+    r"\b(?:image|photo|picture|foto|bild|immagine|aufnahme|camera|kamera|fotocamera)\s*([12])\b"
+)
+#: Words above the columns of the photo with the long lens, and of the other one.
+_FAR_WORDS = re.compile(r"\b(a|far(ther)?|distant|lontan[aoe]|fern\w*|long|tele\w*|lunga)\b")
+_NEAR_WORDS = re.compile(r"\b(b|near(er)?|close|vicin[aoe]|nah\w*|short|wide|corta|weitwinkel)\b")
+_FOCAL = re.compile(r"(\d+(?:[.,]\d+)?)\s*mm\b")
 #: Headings of point names that are believed where each name stands once.
 _OF_POINTS = re.compile(
     "(id|n|nr|no|n°|num|numero|nome|codice)?"
@@ -169,7 +175,26 @@ def find_columns(
                 best = match
     if best is not None and "id" not in (column_map or {}):
         _take_names(grid, best, wanted, span or (1, 10**6))
+    if best is not None:
+        best.remarks += _assumed_order(grid, best, span)
     return best
+
+
+def _assumed_order(grid: CellGrid, match: Match, span: tuple[int, int] | None) -> list[str]:
+    """Return what is said where headings above x, y alone tell photos apart, and no word which."""
+    row = match.header - 1
+    doubles = _heading_texts(grid, row, span) if row in grid.rows else []
+    texts = next((texts for texts, header in doubles if header > row), {})
+    for key in ("x", "col", "s"):
+        places = [match.columns.get(f"{key}{k}", 0) for k in "12"]
+        above = []
+        for place in places:
+            lower = str(grid.rows[match.header].get(place, "")).strip()
+            text = texts.get(place, [""])[0]
+            above += [f'"{text.removesuffix(lower).strip()}"'] if text.endswith(f" {lower}") else []
+        if len(set(above)) == 2:
+            return [remark("table.first_is_far", first=above[0], second=above[1])]
+    return []
 
 
 def _apply_map(
@@ -231,16 +256,36 @@ def _heading_texts(
     if lower and len(lower) >= 2:
         groups = _filled_right(grid, row, upper, lower)
         double: dict[int, list[str]] = {}
+        digits = _photo_digits([groups.get(column, "") for column in sorted(lower)])
         for column in sorted(set(lower) | set(single)):
             group, own = groups.get(column, ""), lower.get(column, "")
             if own:
-                digit = _PHOTO.search(group.strip().casefold())
-                numbered = [_numbered(own, digit[1])] if digit else []
+                numbered = [_numbered(own, digits[group])] if group in digits else []
                 double[column] = [*numbered, f"{group} {own}".strip(), own]
             else:
                 double[column] = [upper[column]]
         headings.append((double, row + 1))
     return headings
+
+
+def _photo_digits(groups: Sequence[str]) -> dict[str, str]:
+    """Return which headings above others are of photo 1, the far one, and which of photo 2.
+
+    They say so by a number, by a word for far or near, or by the focal lengths of both.
+    """
+    digits: dict[str, str] = {}
+    focal: dict[str, float] = {}
+    for group in dict.fromkeys(groups):
+        text = group.strip().casefold()
+        number, length = _PHOTO.search(text), _FOCAL.search(text)
+        far, near = _FAR_WORDS.search(text), _NEAR_WORDS.search(text)
+        if number or (far is None) != (near is None):
+            digits[group] = number[1] if number else "1" if far else "2"
+        elif length:
+            focal[group] = float(length[1].replace(",", "."))
+    if not digits and len(set(focal.values())) == len(focal) == 2:
+        return {group: "12"[length == min(focal.values())] for group, length in focal.items()}
+    return digits
 
 
 def _numbered(text: str, digit: str) -> str:

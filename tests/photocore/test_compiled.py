@@ -48,6 +48,9 @@ def _run(folder: Path, code: str, **environment: str) -> str:
     return done.stdout.strip()
 
 
+@pytest.mark.skipif(
+    os.environ.get("NUMBA_DISABLE_JIT", "0") != "0", reason="NUMBA_DISABLE_JIT is set"
+)
 def test_kernels_call_each_other_and_are_kept_on_the_disk(tmp_path: Path) -> None:
     pytest.importorskip("numba")
     cache = tmp_path / "cache"

@@ -24,12 +24,15 @@ class SceneCamera:
         C in the plane frame. [m]
     size : tuple of int
         Width and height. [px]
+    residual : float
+        RMS of the lens distortion that the pair file does not know. [px]
     """
 
     matrix: FloatArray
     rotation: FloatArray
     centre: FloatArray
     size: tuple[int, int]
+    residual: float = 0.0
 
     def rays(self, pixels: FloatArray) -> FloatArray:
         """Return the directions of pixels in the plane frame, shape (..., 3)."""
@@ -39,12 +42,18 @@ class SceneCamera:
     @property
     def bulge(self) -> float:
         """How far the outline of a body bends out of its corners' box. [px]"""
-        return 0.0
+        return 4 * abs(self.residual)
 
     def emitted(self, pixels: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return where rays of pixels begin and their directions, each of shape (n, 3)."""
-        rays = self.rays(pixels)
+        rays = self.rays(pixels + self.residual * self._unknown_distortion(pixels))
         return np.broadcast_to(self.centre, rays.shape), rays
+
+    def _unknown_distortion(self, pixels: FloatArray) -> FloatArray:
+        """Return a wavy radial distortion and a decentring one, of RMS 1 together. [px]"""
+        away = (pixels - np.subtract(self.size, 1) / 2) / (0.5 * np.hypot(*self.size))
+        square = (away * away).sum(-1, keepdims=True)
+        return 9.0 * away * (square - 0.5) + 1.1 * (square - 0.4)
 
     def aimed(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return where the rays to points begin and the way from there to them."""

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from bifocal import Pair, ReliefMap
 from tests.scenes.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from tests.scenes.cameras import CameraPair, SceneCamera
-from tests.scenes.shapes import Scene
+from tests.scenes.shapes import Convex, Scene
 from tests.scenes.texture import Painter
 from tests.scenes.tracing import Faces, Parallel, Tracer
 from tests.scenes.truth import look_square_on, relief_truth, sees, visible_from
@@ -31,12 +32,15 @@ class Exposure:
         Share of the light lost in the corners.
     noise : float
         Standard deviation per channel. [grey levels]
+    jpeg : int, optional
+        Quality at which the photo is compressed.
     """
 
     gain: float = 1.0
     gamma: float = 1.0
     vignetting: float = 0.0
     noise: float = 1.5
+    jpeg: int | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,6 +125,7 @@ def render(
     exposures: tuple[Exposure, Exposure] = (Exposure(), Exposure()),
     gsd: float | None = None,
     haze: Haze | None = None,
+    passing: tuple[Sequence[Convex], Sequence[Convex]] = ((), ()),
 ) -> Rendering:
     """Photograph a scene with a bifocal pair.
 
@@ -136,12 +141,16 @@ def render(
         Pixel of the truth; by default that of the nominal far photo. [m]
     haze : Haze, optional
         Of the water behind the last interface.
+    passing : tuple of sequences of Convex
+        What stands before the scene in the far and in the near photo, as many bodies in each; it
+        hides, and is no part of the truth.
     """
     tracer = Tracer(scene)
-    painter = Painter(scene, tracer)
+    shown = [Tracer(replace(scene, solids=[*scene.solids, *bodies])) for bodies in passing]
+    takings = list(zip(shown, (cameras.far, cameras.near), strict=True))
     images = [
-        expose(photograph(tracer, painter, camera, haze), exposure, rng)
-        for camera, exposure in zip((cameras.far, cameras.near), exposures, strict=True)
+        expose(photograph(one, Painter(one.scene, one), camera, haze), exposure, rng)
+        for (one, camera), exposure in zip(takings, exposures, strict=True)
     ]
     nominal = cameras.nominal
     width, height = cameras.far.size
@@ -161,8 +170,8 @@ def render(
         pair=cameras.exact,
         nominal=nominal,
         truth=truth,
-        visible1=visible_from(tracer, cameras.far, truth),
-        visible2=visible_from(tracer, cameras.near, truth),
+        visible1=visible_from(*takings[0], truth),
+        visible2=visible_from(*takings[1], truth),
         targets=_named(named, tracer, cameras),
         corners=_named(scene.corners, tracer, cameras),
     )
@@ -185,12 +194,11 @@ def photograph(
         origins, rays = camera.emitted(pixels)
         distance, face = tracer.cast(origins, rays, pixels, bounds)
         points = origins + rays * distance[:, None]
-        way = distance * np.linalg.norm(rays, axis=1)
-        return points, face, tracer.lit(points, shadows, sun), way
+        return points, face, tracer.lit(points, shadows, sun), rays * distance[:, None]
 
     def colours(points: FloatArray, face: Faces, lit: BoolArray, way: FloatArray) -> FloatArray:
-        light = painter.colours(points, face, lit)
-        return light if haze is None else haze.seen(light, way)
+        light = painter.colours(points, face, lit, way)
+        return light if haze is None else haze.seen(light, np.linalg.norm(way, axis=1))
 
     for top in range(0, height, _TILE):
         for left in range(0, width, _TILE):
@@ -216,14 +224,20 @@ def photograph(
 
 
 def expose(light: FloatArray, exposure: Exposure, rng: np.random.Generator) -> ByteArray:
-    """Return the photo of given light: vignetting, gain, gamma, noise, 8 bits."""
+    """Return the photo of given light: vignetting, gain, gamma, noise, 8 bits, JPEG."""
     height, width = light.shape[:2]
     x = (np.arange(width) - (width - 1) / 2)[None, :]
     y = (np.arange(height) - (height - 1) / 2)[:, None]
     fall = 1 - exposure.vignetting * (x * x + y * y) * 4 / (width**2 + height**2)
     value = np.clip(light * (exposure.gain * fall[..., None]), 0, None) ** exposure.gamma * 255
     value += exposure.noise * rng.standard_normal(value.shape, dtype=np.float32)
-    return np.clip(np.rint(value), 0, 255).astype(np.uint8)
+    photo = np.clip(np.rint(value), 0, 255).astype(np.uint8)
+    if exposure.jpeg is None:
+        return photo
+    import cv2
+
+    coded = cv2.imencode(".jpg", photo[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, exposure.jpeg])[1]
+    return np.ascontiguousarray(cv2.imdecode(coded, cv2.IMREAD_COLOR)[..., ::-1])
 
 
 def _mixed(kind: Faces) -> BoolArray:

@@ -24,12 +24,15 @@ class Material:
         Height, length and joint width of blocks laid in courses. [m]
     tint : float
         Standard deviation of the blocks' brightness.
+    mirror : float
+        Share of the light that comes mirrored from the other side of the street.
     """
 
     colour: tuple[float, float, float]
     contrast: float = 0.1
     courses: tuple[float, float, float] | None = None
     tint: float = 0.05
+    mirror: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -11,6 +11,8 @@ from tests.scenes.tracing import Faces, Tracer
 
 #: Side of the noise tile; it repeats after this many texels (several metres). [texel]
 TILE = 2048
+#: How far before the wall the houses on the other side of the street stand. [m]
+OPPOSITE = 24.0
 
 
 def noise_tile(rng: np.random.Generator) -> NDArray[np.float32]:
@@ -53,8 +55,10 @@ class Painter:
         )
         return face
 
-    def colours(self, points: FloatArray, face: Faces, lit: BoolArray) -> FloatArray:
-        """Return red, green and blue of hits, shape (n, 3), about 0..1."""
+    def colours(
+        self, points: FloatArray, face: Faces, lit: BoolArray, rays: FloatArray | None = None
+    ) -> FloatArray:
+        """Return red, green and blue of hits, shape (n, 3), about 0..1; rays are for mirrors."""
         normals = self.tracer.normals_at(points, face)
         uv = _surface_coordinates(points, normals)
         offset = self.offsets[self.tracer.table.bodies[face] + 1]
@@ -73,7 +77,20 @@ class Painter:
         shade = np.clip(normals @ self.scene.sun, 0, None) * lit
         deep = np.clip(-points[:, 2] / 0.6, 0, 1)
         light = self.scene.ambient * (1 - 0.35 * deep) + (1.35 - self.scene.ambient) * shade
-        return colour * light[:, None]
+        seen = colour * light[:, None]
+        for material, on in self._by_material(face) if rays is not None else ():
+            if material.mirror and len(on):
+                mirrored = self._mirrored(points[on], normals[on], rays[on])
+                seen[on] = (1 - material.mirror) * seen[on] + material.mirror * mirrored[:, None]
+        return seen
+
+    def _mirrored(self, points: FloatArray, normals: FloatArray, rays: FloatArray) -> FloatArray:
+        """Return the light of the houses opposite, or of the sky, that mirrors show, shape (n,)."""
+        back = rays - 2 * (rays * normals).sum(1, keepdims=True) * normals
+        far = (OPPOSITE - points[:, 2]) / np.maximum(back[:, 2], 0.05)
+        place = points[:, :2] + far[:, None] * back[:, :2]
+        houses = 0.35 + 0.15 * self._noise(place / (10 * self.scene.texel))
+        return np.asarray(np.where(place[:, 1] > 6.0, 0.9, np.clip(houses, 0.02, 1)))
 
     def _by_material(self, face: Faces) -> list[tuple[Material, NDArray[np.int64]]]:
         """Group hits by material."""

@@ -16,6 +16,7 @@ from bifocal.collimation.workbook.rows import change_rows, read_rows
 from bifocal.remarks import remark
 from bifocal.workbook.pair_workflow import read_pair
 from photocore.errors import InputError, PhotogrammetryError
+from photocore.remarks import learn, with_keys
 
 #: From so many points on a process of its own pays.
 FROM = 100
@@ -47,6 +48,7 @@ def change_in_process(
             timeout=_LONGEST, check=False,
         )  # fmt: skip
         answer = json.loads(done.stdout)
+        learn(answer)
     except (OSError, ValueError, subprocess.TimeoutExpired):
         raise InputError(remark("page.book_not_written", name=path.name)) from None
     if "error" in answer:
@@ -61,7 +63,7 @@ def main() -> int:
         points = [_point(entry) for entry in task["points"]]
         change_rows(path, read_rows(path), points, read_pair(pair_path), pair_path, **task["more"])
     except (PhotogrammetryError, OSError) as error:
-        sys.stdout.write(json.dumps({"error": str(error)}))
+        sys.stdout.write(json.dumps(with_keys({"error": str(error)})))
         return 1
     sys.stdout.write("{}")
     return 0

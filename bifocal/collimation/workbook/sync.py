@@ -6,6 +6,7 @@ import threading
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
+from bifocal.collimation.background import in_background
 from bifocal.collimation.project import SurveyFiles
 from bifocal.collimation.records import SurveyState
 from bifocal.collimation.shapes import outlines_of
@@ -94,7 +95,7 @@ class WorkbookSync:
 
     def start(self) -> None:
         """Begin to write in the background."""
-        self._thread = threading.Thread(target=self._run, name="workbook", daemon=True)
+        self._thread = in_background("the page's workbook", self._run, self._fault)
         self._thread.start()
 
     def touch(self) -> None:
@@ -118,6 +119,10 @@ class WorkbookSync:
                 touched = self._wake.wait(QUIET)
             if not self._stopping:
                 self.step()
+
+    def _fault(self, message: str) -> None:
+        self.waiting = message
+        self.survey.changed()
 
     def step(self) -> None:
         """Bring in what others changed in the workbook, then write what changed on the page."""

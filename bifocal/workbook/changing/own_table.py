@@ -23,12 +23,14 @@ from bifocal.workbook.formulas.placed_formulas import added_covariance
 from bifocal.workbook.formulas.setup_cells import TITLE_BLOCK, cells_of
 from bifocal.workbook.making.book import build
 from bifocal.workbook.reading.reader import TO_DEGREES, TO_MM
+from bifocal.workbook.reading.setup_reader import home_of
 from bifocal.workbook.words import term, word
 from photocore.errors import InputError
 from photocore.tables import Table
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.changing.editor import WorkbookEditor
 from photocore.workbook.changing.named_cells import make_numbers, place_of
+from photocore.workbook.changing.plain import PlainFormulas
 from photocore.workbook.changing.result_columns import (
     OwnTable,
     ResultColumn,
@@ -44,6 +46,10 @@ MARK = "bifocal_results"
 _RESULTS = ("r", "X", "Y", "sigma_r", "flag", "E", "N", "H")
 #: Under which headings raw pixels stand, where an ideal pair takes them for coordinates.
 _RAW = {"x1": "col1", "y1": "row1", "x2": "col2", "y2": "row2"}
+
+
+#: The sheet of the set-up in a workbook of ours.
+_SETUP = "'Setup'"
 
 
 def add_results(
@@ -84,15 +90,22 @@ def add_results(
         raise InputError(remark("survey.into_itself", of=target, name=source.name))
     refuse_earlier(source, survey)
     editor = WorkbookEditor(source, survey.book)
+    editor.home = "" if survey.book is None else home_of(survey.book)
     content = replace(content, links=_links(editor, survey, given))
     built = build(content)
-    needed = [
-        name
+    cells = {
+        name: defined.attr_text
         for name, defined in built.book.defined_names.items()
-        if defined.attr_text.startswith("'Setup'!") and name not in TITLE_BLOCK
-    ]
-    if any(place_of(editor, name) is None for name in needed if not name.startswith("a")):
-        add_sheets(editor, built, {"Setup": word("own_setup", content.language)})
+        if defined.attr_text.startswith(_SETUP)
+    }
+    needed = [name for name in cells if name not in TITLE_BLOCK and not name.startswith("a")]
+    if any(place_of(editor, name) is None for name in needed):
+        editor.home = ""
+        title = editor.free_title(word("own_setup", content.language))
+        add_sheets(editor, built, {"Setup": title})
+        named = {n: f"{quoted_title(title)}{at.removeprefix(_SETUP)}" for n, at in cells.items()}
+    else:
+        named = dict(editor.named)
     store_named_cells(editor, built, content)
     write_options(editor, content, given)
     write_corrections(editor, content)
@@ -111,6 +124,9 @@ def add_results(
     columns = sorted(
         _columns(own, content), key=lambda column: (*_RESULTS, column.key).index(column.key)
     )
+    # Names may mean something else to the user: formulas on their sheets hold addresses alone.
+    plain = PlainFormulas((), named)
+    columns = [replace(column, formula=plain.plain(column.formula, "")) for column in columns]
     put_result_columns(editor, own, columns, mark=MARK)
     return editor.save(target, overwrite=overwrite)
 

@@ -56,8 +56,7 @@ def chart_sheet(editor: WorkbookEditor) -> str | None:
 
 def add_sheets(editor: WorkbookEditor, built: BookBuilder, titles: Mapping[str, str]) -> None:
     """Add sheets of a survey workbook behind all others; by their titles, what to call them."""
-    called = {title: editor.free_title(wanted) for title, wanted in titles.items()}
-    editor.add_sheets(built.parts(), called)
+    editor.add_sheets(built.parts(), {t: editor.free_title(w) for t, w in titles.items()})
 
 
 def write_options(editor: WorkbookEditor, content: SurveyContent, given: Mapping[str, Any]) -> None:

@@ -7,7 +7,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from bifocal.model.flags import SIGMA_PIXEL, UNCERTAIN_SHARE
 from bifocal.model.hypotheses import SCALE_TOLERANCE
 from bifocal.model.photo import LEAST_COSINE
+<<<<<<< HEAD
 from bifocal.survey.setup import SIGMA_PRINT, SIGMA_RADIAL
+=======
+from bifocal.options.commands import SolveCommand
+from bifocal.survey.setup import SCALE_TOLERANCE, SIGMA_PRINT, SIGMA_RADIAL
+>>>>>>> orient
 from bifocal.survey.survey_media import HEIGHTS, index_names, media_names, thickness_names
 from bifocal.workbook.formulas.columns import FORMULAS, other_numbers
 from bifocal.workbook.formulas.media_formulas import calculated_names
@@ -234,7 +239,7 @@ def is_text(name: str) -> bool:
 
 def is_above_zero(name: str) -> bool:
     """Tell whether a cell must hold a number above zero, as the option in its place must."""
-    options = options_of("bifocal", "solve").values()
+    options = options_of(SolveCommand).values()
     stated = (o.name for o in options if isinstance(o.attributes.get("type"), Number))
     return name in cells_of(stated)
 

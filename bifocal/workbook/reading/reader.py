@@ -21,6 +21,7 @@ from bifocal.workbook.reading.setup_reader import (
     is_general,
     other_count,
     read_setup,
+    settle_names,
 )
 from bifocal.workbook.words import LANGUAGES, headings, word
 from photocore.errors import CellError, InputError, WorkbookError
@@ -167,6 +168,8 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
     options = options or ReadOptions()
     survey = OpenSurvey(open_tables(path), options.decimal, options.given)
     book, errors = survey.book, survey.errors
+    if isinstance(book, SheetFile):
+        settle_names(book, options.given)
     table = _read_points(survey, options)
     if options.photos > 2:
         _require_photos(table, options.photos)
@@ -376,7 +379,7 @@ def _observations(
         keys = other_keys(max(others) - 2)
         errors += table.too_large(keys, LARGEST)
         typed = np.stack([table.numbers(key) * factor for key in keys], axis=-1)
-        points = replace(points, other_xy=typed.reshape(len(table), -1, 2))
+        points = replace(points, other_xy=typed.reshape(len(table), len(keys) // 2, 2))
     check_rows(table, points, faulty, errors)
     return points, unit
 

@@ -46,13 +46,22 @@ from photocore.tables import Column, NamedValues, read_named_values
 from photocore.tables.csvread import CsvFile
 from photocore.tables.model import Kind
 from photocore.tables.numbers import Decimal
-from photocore.workbook.reading.grid import SheetFile, column_letters, quoted_title, with_names
+from photocore.workbook.reading.grid import (
+    SheetFile,
+    cell_name,
+    column_letters,
+    quoted_title,
+    split_cell,
+    with_names,
+)
 
 _TEXTS = ("input_unit", "pair_file", *PHOTOS)
 #: No coordinate of a photo or a map is larger.
 LARGEST = 1e9
 #: d_1 typed and d_2 + delta_d may differ by this much: a tape's millimetre.
 _AGREE = 0.0015
+#: Names that make a set-up: two of them are believed wherever they lead.
+_BELIEVED = {"d_1", "d_2", "delta_d", "c_1", "c_2"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +84,46 @@ class OpenSurvey:
     decimal: Decimal | None = None
     given: Collection[str] = ()
     errors: list[CellError] = field(default_factory=list)
+
+
+def home_of(book: SheetFile) -> str | None:
+    """Return the sheet whose names are those of the set-up.
+
+    None where all names are: in a survey workbook, and in files that tell no formulas. Empty where
+    no sheet of ours stands in a workbook of the user's own: its names may mean anything.
+    """
+    titles = book.titles
+    if any(area.name == "tblPoints" for area in book.tables) or not book.text(titles[0]):
+        return None
+    for title in titles:
+        sheet, row, column = book.names_on(title).get("check_order", ("", 0, 0))
+        if sheet == title and '"CHECK"' in book.formula(sheet, row, column):
+            return title
+    return ""
+
+
+def settle_names(book: SheetFile, given: Collection[str]) -> None:
+    """Leave of a workbook's names those that are of a set-up.
+
+    Where no sheet of ours stands, names of the user's own are believed if two of the values that
+    make a set-up have one, and options replace neither; which were read is then a remark.
+    """
+    home = home_of(book)
+    if home is None:
+        return
+    names = book.names_on(home) if home else {}
+    if not home:
+        stated = {n: p for n, p in book.names.items() if n in numbers() and n not in given}
+        values = {n: book.grid(t).rows.get(row, {}).get(c) for n, (t, row, c) in stated.items()
+                  if t in book.titles}  # fmt: skip
+        read = {n: v for n, v in values.items() if isinstance(v, float)}
+        if len(read.keys() & _BELIEVED) > 1:
+            names = {name: stated[name] for name in read}
+            said = (f"{n} = {v:.15g} ({names[n][0]}!{cell_name(*names[n][1:])})"
+                    for n, v in read.items())  # fmt: skip
+            book.remarks.append(remark("table.beside_names", values=", ".join(said)))
+    book.names.clear()
+    book.names.update(names)
 
 
 def read_setup(survey: OpenSurvey) -> SurveySetup:
@@ -278,10 +327,8 @@ def _formulas(book: SheetFile, values: NamedValues) -> set[str]:
     }
     for key in values.places.keys() & set(TYPED_FORMULAS):
         sheet, cell = values.places[key]
-        cell_at = rf'<(?:\w+:)?c r="{cell}"[^>]*><(?:\w+:)?f[^>]*>([^<]*)<'
-        match = re.search(cell_at, book.text(sheet))
         # Those of older versions are a part of today's.
-        stands = _plain(with_names(match[1], places)) if match else ""
+        stands = _plain(with_names(book.formula(sheet, *split_cell(cell)), places))
         if stands.startswith("if(") and stands in _plain(formulas()[key]):
             own.add(key)
     return own
@@ -289,8 +336,7 @@ def _formulas(book: SheetFile, values: NamedValues) -> set[str]:
 
 def _plain(formula: str) -> str:
     """Return a formula without blanks, case and sheet-name noise."""
-    text = formula.replace("&quot;", '"').replace("&lt;", "<").replace("&gt;", ">")
-    return re.sub(r"[\s$]", "", text).casefold()
+    return re.sub(r"[\s$]", "", formula).casefold()
 
 
 def _check_positive(

@@ -78,6 +78,7 @@ class WorkbookEditor:
     changes: dict[str, SheetChanges] = field(init=False, default_factory=dict)
     grown: dict[str, tuple[TableArea, int]] = field(init=False, default_factory=dict)
     names: dict[str, str] = field(init=False, default_factory=dict)
+    home: str | None = field(init=False, default=None)
     grafts: list[tuple[Mapping[str, bytes], Mapping[str, str]]] = field(
         init=False, default_factory=list
     )
@@ -192,6 +193,13 @@ class WorkbookEditor:
     def style_like(self, style: str, number_format: str) -> str:
         """Return a format like another one, that shows numbers in another way."""
         return self._style_sheet().like(style, number_format)
+
+    @property
+    def named(self) -> Mapping[str, str]:
+        """The names that count: in a workbook of somebody else's those of the sheet `home`."""
+        if self.home is None:
+            return self.book.names
+        return self.book.names_on(self.home) if self.home else {}
 
     def define(self, name: str, reference: str) -> None:
         """Let a defined name lead to a place, e.g. ``'Sheet 1'!$B$3``."""
@@ -376,7 +384,7 @@ class WorkbookEditor:
         if self.grafts or self.names:
             graft = Graft(self.path, package, self.book, parts, self._style_sheet())
             for content, titles in self.grafts:
-                graft.add_sheets(content, titles)
+                graft.add_sheets(content, titles, local=self.home is not None)
             for name, reference in self.names.items():
                 graft.define(name, reference, anew=True)
         if self._styles is not None and self._styles.added:

@@ -58,7 +58,9 @@ class Graft:
     def __post_init__(self) -> None:
         self._names = {*self.package.namelist(), *self.parts}
 
-    def add_sheets(self, content: Mapping[str, bytes], titles: Mapping[str, str]) -> None:
+    def add_sheets(
+        self, content: Mapping[str, bytes], titles: Mapping[str, str], *, local: bool = False
+    ) -> None:
         """Add sheets with their tables, charts and formats, and the names that lead to them.
 
         Parameters
@@ -67,16 +69,20 @@ class Graft:
             The parts of the package that holds them, as `making.newbook` makes it.
         titles : mapping
             Which, and their titles here. Formulas find other sheets by names and tables.
+        local : bool
+            Whether a name that leads elsewhere already is defined anew for the sheet alone.
         """
         other = _directory(self.path, content)
         renumbered, conditional = self.styles.take_in(StyleSheet(content["xl/styles.xml"]))
         count = len(re.findall(rb"<(?:\w+:)?sheet\s", self._book()))
+        places: dict[str, int] = {}
         for sheet in other.sheets:
             if sheet.title in titles:
                 data = _restyled(content[sheet.part], renumbered, conditional)
                 part = self._add_part(sheet.part, {**content, sheet.part: data})
                 self._add_sheet(titles[sheet.title], part)
                 self._local_names(content[other.part], other, sheet, count, titles[sheet.title])
+                places[sheet.title] = count
                 count += 1
         for name, reference in other.names.items():
             written, _, place = reference.rpartition("!")
@@ -85,10 +91,16 @@ class Graft:
                 own = plain_title(self.book.names.get(name, "").rpartition("!")[0])
                 # Where another sheet has the title by now, the name led to what was ours there.
                 lost = own == title != titles[title]
-                self.define(name, f"{quoted_title(titles[title])}!{place}", anew=lost)
+                home = places[title] if local else None
+                self.define(name, f"{quoted_title(titles[title])}!{place}", anew=lost, home=home)
 
-    def define(self, name: str, reference: str, *, anew: bool = False) -> None:
-        """Define a name; one that leads anywhere already stays, unless it is defined anew."""
+    def define(
+        self, name: str, reference: str, *, anew: bool = False, home: int | None = None
+    ) -> None:
+        """Define a name; one that leads anywhere already stays, unless it is defined anew.
+
+        ``home`` is the number of the sheet for which it then counts alone.
+        """
         data = self._book()
         pattern = re.compile(
             rb"<(?:\w+:)?definedName\s(?![^>]*localSheetId)[^>]*\bname=[\"']%s[\"'][^>]*>([^<]*)</"
@@ -101,6 +113,8 @@ class Graft:
         elif anew or b"#REF!" in stands[1]:
             start, end = stands.span(1)
             self._put(self.book.part, data[:start] + escaped(reference).encode() + data[end:])
+        elif home is not None:
+            self._add_name(f' name={quoted(name)} localSheetId="{home}"', reference)
 
     def _local_names(
         self, data: bytes, other: Workbook, sheet: SheetPart, index: int, title: str

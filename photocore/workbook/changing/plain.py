@@ -37,7 +37,7 @@ class PlainFormulas:
         self._places = {n: text for n, text in self.names.items() if _PLACE.fullmatch(text)}
         words = "|".join(map(re.escape, self._places)) or r"(?!)"
         self._reference = re.compile(
-            rf'"[^"]*"|{_COLUMN}|(?<![\w.!\'])(?P<name>{words})(?![\w.(!])'
+            rf'"[^"]*"|{_COLUMN}|(?<![\w.!\'@])(?P<name>{words})(?![\w.(!])'
         )
 
     def plain(self, text: str, row: int | str) -> str:

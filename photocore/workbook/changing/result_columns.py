@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
+from photocore.errors import InputError
+from photocore.remarks import remark
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.changing.changes import SheetChanges
 from photocore.workbook.changing.editor import WorkbookEditor
 from photocore.workbook.reading.grid import (
+    LAST_COLUMN,
     Value,
     cell_name,
     column_letters,
@@ -109,7 +112,7 @@ def put_result_columns(
     mark: str,
     adopted: Sequence[str] = (),
 ) -> None:
-    """Put columns to the right of everything on the sheet, or where they stand from last time.
+    """Put columns beside a table, where the sheet has as many free ones, or where they stand.
 
     Parameters
     ----------
@@ -124,10 +127,10 @@ def put_result_columns(
     adopted : sequence of str
         Headings of columns that are taken over although they bear no mark.
     """
-    grid = editor.grid(table.sheet).rows
     head = table.head or min(table.rows)
     places = _known(editor, table, columns, mark, adopted)
-    last = max([0, *(max(cells, default=0) for cells in grid.values())])
+    count = sum(column.key not in places for column in columns)
+    last = _free_columns(editor, table, {*table.columns.values(), *places.values()}, count) - 1
     widths = editor.changes.setdefault(table.sheet, SheetChanges()).columns
     for column in columns:
         if column.key not in places:
@@ -153,6 +156,25 @@ def put_result_columns(
     span = [places[column.key] for column in columns]
     area = ":".join(_absolute(head, number) for number in (min(span), max(span)))
     editor.define(mark, f"{quoted_title(table.sheet)}!{area}")
+
+
+def _free_columns(
+    editor: WorkbookEditor, table: OwnTable, taken: Collection[int], count: int
+) -> int:
+    """Return the first of so many free columns that stand together, right of those that are taken.
+
+    Free of all cells, not of those of the table alone: some columns of results are folded away.
+    """
+    used = {column for cells in editor.grid(table.sheet).rows.values() for column in cells}
+    first = max(taken, default=0) + 1
+    for column in sorted(column for column in used if column >= first):
+        if column - first >= count:
+            break
+        first = column + 1
+    if first + count - 1 > LAST_COLUMN:
+        raise InputError(remark("book.no_free_columns", of=editor.path, sheet=table.sheet,
+                                count=count))  # fmt: skip
+    return first
 
 
 def _known(

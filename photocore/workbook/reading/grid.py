@@ -8,6 +8,11 @@ from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from functools import lru_cache
 
+from photocore.errors import InputError
+
+#: Where every sheet ends.
+LAST_ROW, LAST_COLUMN = 2**20, 2**14
+
 
 @dataclass(frozen=True, slots=True)
 class CellDate:
@@ -138,6 +143,8 @@ class SheetFile:
         What the user should know about the file as a whole.
     text : callable
         Returns the XML of one sheet by its name; empty where formulas are not told.
+    names_on : callable
+        Returns the names of single cells of one sheet.
     """
 
     label: str
@@ -147,6 +154,7 @@ class SheetFile:
     names: dict[str, tuple[str, int, int]] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
     text: Callable[[str], str] = lambda _: ""
+    names_on: Callable[[str], dict[str, tuple[str, int, int]]] = lambda _: {}
     _grids: dict[str, CellGrid] = field(default_factory=dict)
 
     def grid(self, title: str) -> CellGrid:
@@ -154,6 +162,16 @@ class SheetFile:
         if title not in self._grids:
             self._grids[title] = self.load(title)
         return self._grids[title]
+
+    def formula(self, title: str, row: int, column: int) -> str:
+        """Return the formula of a cell as it stands in the file; empty where there is none."""
+        cell_at = rf'<(?:\w+:)?c r="{cell_name(row, column)}"[^>]*><(?:\w+:)?f[^>]*>([^<]*)<'
+        match = re.search(cell_at, self.text(title))
+        return (
+            match[1].replace("&quot;", '"').replace("&lt;", "<").replace("&gt;", ">")
+            if match
+            else ""
+        )
 
 
 @lru_cache(maxsize=2**15)
@@ -186,9 +204,18 @@ def column_number(letters: str) -> int:
 def cell_name(row: int, column: int) -> str:
     """Return a cell's name.
 
+    Raises
+    ------
+    InputError
+        If no spreadsheet has such a row or column.
+
+    Examples
+    --------
     >>> cell_name(3, 2)
     'B3'
     """
+    if not (0 < row <= LAST_ROW and 0 < column <= LAST_COLUMN):
+        raise InputError(f"row {row}, column {column}: a sheet ends at {LAST_ROW}, {LAST_COLUMN}.")
     return f"{column_letters(column)}{row}"
 
 

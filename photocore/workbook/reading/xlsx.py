@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cache, lru_cache, partial
@@ -82,6 +82,16 @@ class Workbook:
     names: dict[str, str]
     relations: dict[str, tuple[str, str]]
     since_1904: bool = False
+    #: Names that count on one sheet only, by the number of the sheet in the list of all.
+    local_names: dict[int, dict[str, str]] = field(default_factory=dict)
+    #: Titles of all sheets in order, those without cells too.
+    listed: list[str] = field(default_factory=list)
+
+    def names_on(self, title: str) -> dict[str, str]:
+        """Return the names that lead to a sheet, those that count there alone first."""
+        local = self.local_names.get(self.listed.index(title), {}) if title in self.listed else {}
+        names = {name: place for name, place in self.names.items() if name not in local} | local
+        return {n: v for n, v in names.items() if plain_title(v.rpartition("!")[0]) == title}
 
 
 def open_xlsx(path: Path, *, max_rows: int) -> SheetFile:
@@ -122,7 +132,8 @@ def open_xlsx(path: Path, *, max_rows: int) -> SheetFile:
         titles=[sheet.title for sheet in visible_first],
         load=load,
         tables=tables,
-        names=_single_cells(book),
+        names=_single_cells(book.names),
+        names_on=lambda title: _single_cells(book.names_on(title)),
         remarks=_remarks(book),
         text=text,
     )
@@ -165,13 +176,16 @@ def read_directory(path: Path, package: zipfile.ZipFile) -> Workbook:
             book.since_1904 = element.get("date1904", "0") in _YES
         elif kind == "sheet":
             key = next((v for k, v in element.items() if local(k) == "id"), "")
+            book.listed.append(element.get("name", ""))
             kind, target = relations.get(key, ("", ""))
             if kind == "worksheet" and target in names:
                 hidden = element.get("state", "visible") != "visible"
                 parts = read_relations(path, package, target)
                 book.sheets.append(SheetPart(element.get("name", ""), target, hidden, parts))
-        elif kind == "definedName" and "localSheetId" not in element.attrib:
-            book.names[element.get("name", "")] = element.text or ""
+        elif kind == "definedName":
+            sheet = element.get("localSheetId", "")
+            home = book.local_names.setdefault(int(sheet), {}) if sheet.isdigit() else book.names
+            home[element.get("name", "")] = element.text or ""
     if not book.sheets:
         raise InputError(f"{path}: the workbook has no sheet with cells.")
     return book
@@ -271,10 +285,10 @@ def unescape(text: str) -> str:
     return _ESCAPED.sub(lambda match: chr(int(match[1], 16)), text)
 
 
-def _single_cells(book: Workbook) -> dict[str, tuple[str, int, int]]:
+def _single_cells(names: Mapping[str, str]) -> dict[str, tuple[str, int, int]]:
     """Return the defined names that stand for one cell."""
     places = {}
-    for name, reference in book.names.items():
+    for name, reference in names.items():
         match = re.fullmatch(r"('(?:[^']|'')+'|[^'!:]+)!(\$?[A-Z]{1,3}\$?\d+)", reference)
         if match:
             places[name.casefold()] = (plain_title(match[1]), *split_cell(match[2]))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 from pathlib import Path
 
 import cv2
@@ -28,8 +27,6 @@ from tests.bifocal.orientation.test_facade_lines import MATRIX, SIZE, drawn, vie
 from tests.bifocal.orthophotos.ortho_command import page_of
 from tests.builders.commands import bifocal_command
 from tests.builders.pinholes import project
-
-DATA = Path(os.environ.get("BIFOCAL_DATA", "absent")) / "facade_pairs"
 
 
 def looking(*turn_deg: float) -> Pinhole:
@@ -218,11 +215,9 @@ def test_lines_and_one_length_set_a_photo_up(turn) -> None:
 
 
 @pytest.fixture
-def church(tmp_path: Path) -> Path:
+def church(tmp_path: Path, data_dir: Path) -> Path:
     """Return a table of twelve points of a real wall within 2 cm of its plane, spread over it."""
-    if not DATA.is_dir():
-        pytest.skip("BIFOCAL_DATA is not set")
-    with (DATA / "church_2" / "points.csv").open(encoding="utf-8") as file:
+    with (data_dir / "facade_pairs" / "church_2" / "points.csv").open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if abs(float(row["relief_m"])) < 0.02
                 and float(row["res_far_px"]) < 1 and int(row["n_images"]) > 5]  # fmt: skip
     xy = np.array([[float(row["X_m"]), float(row["Y_m"])] for row in rows])
@@ -235,14 +230,15 @@ def church(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_real_wall_is_rectified_within_its_sigmas(church: Path) -> None:
-    line = f"rectify {DATA / 'church_2' / 'far.jpg'} --control points.csv --gsd 2cm --json"
+def test_a_real_wall_is_rectified_within_its_sigmas(church: Path, data_dir: Path) -> None:
+    folder = data_dir / "facade_pairs" / "church_2"
+    line = f"rectify {folder / 'far.jpg'} --control points.csv --gsd 2cm --json"
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(church)
         done = CliRunner().invoke(bifocal_command, [*line.split(), "--out", "ortho.tif"])
     assert done.exit_code == 0, done.output
     told = json.loads(done.stdout)
-    truth = json.loads((DATA / "church_2" / "geometry.json").read_text())["far"]
+    truth = json.loads((folder / "geometry.json").read_text())["far"]
     assert told["distance"] == pytest.approx(truth["height_over_plane_m"], rel=0.06)
     errors = np.array([point["error"] for point in told["left_out"]])
     assert 0.001 < np.sqrt(np.mean(errors**2)) < 0.004
@@ -250,8 +246,8 @@ def test_a_real_wall_is_rectified_within_its_sigmas(church: Path) -> None:
     assert told["words"][0].startswith("What stands out by 20 cm is displaced by up to 2")
 
 
-def test_a_drawing_says_what_relief_does(church: Path) -> None:
-    photo = DATA / "church_2" / "far.jpg"
+def test_a_drawing_says_what_relief_does(church: Path, data_dir: Path) -> None:
+    photo = data_dir / "facade_pairs" / "church_2" / "far.jpg"
     line = (f"rectify {photo} --control points.csv --scale 1:50 --dpi 100 --language it --mark "
             "points.csv --deliver drawing")  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:
@@ -297,11 +293,8 @@ def test_a_gross_point_is_left_out_and_moves_nothing() -> None:
 
 def test_a_side_that_was_measured_wrongly_is_no_crop() -> None:
     """A rectangle 5 m wide taken for 5.5 m; the photo has the proportions of a camera."""
-    size = (1200, 800)
-    lens = Interior.from_focal(1500.0, image_size=SIZE, sigma=0.01, source="test")
-    assert SIZE == size
     done = rectify(
-        np.zeros(size[::-1], np.uint8), rectangle=((5.5, 4.0), seen(CORNERS)), interior=lens
+        np.zeros(SIZE[::-1], np.uint8), rectangle=((5.5, 4.0), seen(CORNERS)), interior=LENS
     )
     (words,) = [note for note in done.remarks if note.startswith("The corners do not fit")]
     assert "5.5 m wide and 4 m high; they fit one 5.0" in words

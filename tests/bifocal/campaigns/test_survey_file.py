@@ -15,7 +15,7 @@ from bifocal.campaigns import photo_pairing
 from bifocal.campaigns.pair_steps import refusal, steps_of
 from bifocal.campaigns.survey_file import in_survey_words, read_survey_file
 from bifocal.campaigns.workflow import facade_job
-from bifocal.options import OF_PAIR
+from bifocal.options import OF_PAIR, PairMediaOptions
 from bifocal.orientation.align_workflow import AlignOptions
 from bifocal.orthophotos.ortho_workflow import OrthoTask
 from multimedia import Layers
@@ -135,7 +135,7 @@ def test_media_are_keys_of_the_file_and_reach_the_set_up(tmp_path):
     assert 'control = "FILE"' in told
     assert "as_set_up = true" in told
     assert not re.search(r"--[a-z]", told)
-    for key in (*options_of("bifocal", "media_of_pair"), "as_set_up"):
+    for key in (*options_of(PairMediaOptions), "as_set_up"):
         assert key in OF_PAIR
         for command in ("align", "facade"):
             assert key in {p.name for p in main.get_command(None, command).params}

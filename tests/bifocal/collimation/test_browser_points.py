@@ -17,17 +17,12 @@ SHADED = (2.10, 2.25, 0.0)
 TENTHS = 0.05
 
 
-@pytest.fixture(scope="module")
-def tab(browser: Any, server: Served) -> Iterator[Driver]:
-    with tab_of(browser, server) as driver:
-        yield driver
-
-
 @pytest.fixture
-def page(tab: Driver) -> Driver:
-    """Return the page with no points, both photos whole and superimposed."""
-    tab.empty()
-    return tab
+def page(browser: Any, server: Served) -> Iterator[Driver]:
+    """Yield the page with no points, both photos whole and superimposed."""
+    with tab_of(browser, server) as driver:
+        driver.empty()
+        yield driver
 
 
 def distance(a: Any, b: Any) -> float:

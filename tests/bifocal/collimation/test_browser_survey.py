@@ -17,17 +17,12 @@ from tests.browser import Driver, Served, sample_survey, tab_of
 PICKS = [((300.0, 330.0), (293.0, 325.0)), ((1190.0, 700.0), (1196.0, 703.0))]
 
 
-@pytest.fixture(scope="module")
-def tab(browser: Any, server: Served) -> Iterator[Driver]:
-    with tab_of(browser, server) as driver:
-        yield driver
-
-
 @pytest.fixture
-def page(tab: Driver) -> Driver:
-    """Return the page with no points."""
-    tab.empty()
-    return tab
+def page(browser: Any, server: Served) -> Iterator[Driver]:
+    """Yield the page with no points."""
+    with tab_of(browser, server) as driver:
+        driver.empty()
+        yield driver
 
 
 def pick_both(page: Driver, count: int, first: Any, second: Any) -> dict[str, Any]:

@@ -137,8 +137,11 @@ def test_the_png_is_the_geotiff(wall: Path) -> None:
     with Image.open(wall / "d" / "Torre_est.png") as png:
         pixels = np.asarray(png)
     with rasterio.open(wall / "d" / "Torre_est.tif") as file:
-        np.testing.assert_array_equal(pixels[:, :, :3], file.read([1, 2, 3]).transpose(1, 2, 0))
-        np.testing.assert_array_equal(pixels[:, :, 3], file.dataset_mask())
+        # What no photo sees bears outline and lines on the picture for paper only.
+        plain = file.read(4) != 7
+        colours = file.read([1, 2, 3]).transpose(1, 2, 0)
+        np.testing.assert_array_equal(pixels[plain, :3], colours[plain])
+        np.testing.assert_array_equal(pixels[plain, 3], file.dataset_mask()[plain])
 
 
 @pytest.mark.parametrize(

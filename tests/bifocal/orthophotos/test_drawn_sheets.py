@@ -206,7 +206,8 @@ def test_the_sheet_of_a_whole_picture_says_what_was_not_measured(wall: Path) -> 
     )  # fmt: skip
     assert done.exit_code == 0, done.output
     page = page_of(wall / "d" / "Torre_est.pdf")
-    (told,) = re.findall(r"\((\S+ % on interpolated relief)\)", page)
+    bound = ", smoothed by up to half a photo pixel"
+    (told,) = re.findall(rf"\((\S+ % on interpolated relief{bound})\)", page)
     assert told in done.stdout
     (own,) = re.findall(r"\(photo pixel (\S+) mm on the wall;.* in position", page)
     assert own == "10"
@@ -214,7 +215,9 @@ def test_the_sheet_of_a_whole_picture_says_what_was_not_measured(wall: Path) -> 
     plain = run(
         wall, "--relief", "relief.tif", "--deliver", "e", "--scale", "1:50", "--no-hatch",
     )  # fmt: skip
-    assert f"(not measured: {told}" in page_of(wall / "e" / "Torre_est.pdf")
+    (note,) = re.findall(r"\((of the picture .*)\)", page_of(wall / "e" / "Torre_est.pdf"))
+    assert " % on measured relief, " in note
+    assert told in note
     assert "finer than the photo's, 10 mm" in plain.stderr
     pictures = [np.asarray(Image.open(wall / name / "Torre_est.png")).astype(int) for name in "de"]
     lined = (pictures[0] != pictures[1]).any(axis=2)

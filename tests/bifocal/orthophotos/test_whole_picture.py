@@ -39,7 +39,7 @@ def test_specks_and_hair_lines_are_no_shadows_and_pinholes_are_closed():
 
 def test_a_completed_surface_goes_on_from_the_known_to_the_plane():
     relief = wall_with_a_gap()
-    whole = CompletedSurface(MapSurface.of_array(relief.r, GRID), GRID)
+    whole = CompletedSurface(MapSurface.of_array(relief.r, GRID), GRID, PAIR.image1, 0.01)
     r, source = whole.window(GRID), whole.source(GRID)
     known = relief.known
     np.testing.assert_array_equal(r[known], relief.r[known])
@@ -53,6 +53,28 @@ def test_a_completed_surface_goes_on_from_the_known_to_the_plane():
     low, high = whole.extremes((-2.0, -2.0, 2.0, 2.0))
     assert low <= r.min()
     assert high >= r.max()
+
+
+def test_interpolated_relief_is_left_out_only_where_that_moves_the_picture_little():
+    # Crumbs of nothing measured: near the nadir, far from it; a broad pane; a single thin rail.
+    relief = np.zeros(GRID.shape, np.float32)
+    told = np.ones(GRID.shape, bool)
+    near, far, pane, rail = (
+        np.s_[195:201, 215:221], np.s_[20:30, 20:30], np.s_[180:220, 260:300], np.s_[60:64, 100:200]
+    )  # fmt: skip
+    for part, r in ((near, -0.1), (far, -0.2), (pane, -0.03), (rail, 0.4)):
+        relief[part], told[part] = r, False
+    surface = MapSurface.of_array(relief, GRID, told)
+    whole = CompletedSurface(surface, GRID, PAIR.image1, 0.01)
+    r, source = whole.window(GRID), whole.source(GRID)
+    np.testing.assert_array_equal(r[told], relief[told])
+    assert np.abs(r[near]).max() < 1e-3  # so near the nadir 1 mm on the picture, of 5
+    np.testing.assert_allclose(r[22:28, 22:28], -0.2)  # 0.2 m x 2.5 m / 17.5 m: 29 mm
+    np.testing.assert_allclose(r[182:218, 262:298], -0.03)  # broad
+    np.testing.assert_allclose(r[62, 105:195], 0.4)
+    for part in (near, far, pane, rail):
+        assert (source[part] == Source.INTERPOLATED).all()
+    assert (source[told] == Source.NONE).all()
 
 
 def test_a_complete_orthophoto_has_no_gap_and_lists_what_is_not_measured():

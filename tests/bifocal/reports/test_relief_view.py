@@ -128,6 +128,7 @@ def test_what_cannot_be_shown_is_refused(tmp_path, monkeypatch, options, said):
 
 
 @pytest.mark.acceptance
+@pytest.mark.browser
 def test_a_browser_draws_it_and_turns_it(pages):
     with launched(
         "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"

@@ -6,7 +6,6 @@ import csv
 import functools
 import io
 import json
-import os
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -398,9 +397,8 @@ def test_two_heading_rows_and_shared_headings_are_understood(tmp_path):
     assert by_id(answer)["P2"]["r"] == pytest.approx(0.5, abs=1e-9)
 
 
-@pytest.mark.skipif("BIFOCAL_DATA" not in os.environ, reason="BIFOCAL_DATA is not set")
-def test_workbooks_as_found_are_read(tmp_path):
-    folder = Path(os.environ["BIFOCAL_DATA"]) / "spreadsheets"
+def test_workbooks_as_found_are_read(tmp_path, data_dir):
+    folder = data_dir / "spreadsheets"
     pair = write_pair(tmp_path / "wall.pair.json")
     two_rows, _ = solved(folder / "two_row_header_empty_sheets.xlsx", "--pair", pair)
     assert len(two_rows["points"]) == 230
@@ -436,13 +434,14 @@ def test_usage_errors_are_status_two():
     assert run("template").exit_code == 2
 
 
-@pytest.mark.skipif("BIFOCAL_DATA" not in os.environ, reason="BIFOCAL_DATA is not set")
 @pytest.mark.parametrize(
     ("name", "median", "rms", "sigma_px"),
     [("church_1", 0.0042, 0.0078, 0.45), ("church_2", 0.0105, 0.020, 0.44)],
 )
-def test_real_church_points_reach_the_accuracy_of_the_pair(name, median, rms, sigma_px, tmp_path):
-    folder = Path(os.environ["BIFOCAL_DATA"]) / "facade_pairs" / name
+def test_real_church_points_reach_the_accuracy_of_the_pair(
+    name, median, rms, sigma_px, tmp_path, data_dir
+):
+    folder = data_dir / "facade_pairs" / name
     geometry = json.loads((folder / "geometry.json").read_text())
     data = {"format": "bifocal-pair/1"}
     for key, camera in (("image1", "far"), ("image2", "near")):

@@ -92,7 +92,7 @@ export class PointList {
     const cells = COLUMNS.map(([key, value]) => {
       if (key === "name") {
         return h("th", { scope: "row" }, h("button", { type: "button", class: "link",
-          "aria-label": t("list.flyTo", { name }), onclick: () => this.#take(name) }, name));
+          "aria-label": t("list.flyTo", { name }), title: name, onclick: () => this.#take(name) }, name));
       }
       const content = value(item);
       if (key in DIGITS) return h("td", { class: "number" }, number(content, DIGITS[key]));

@@ -1,0 +1,87 @@
+"""What no photo sees: small holes take texture from beside them, large ones stay paper white."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from bifocal.model.image import ImageArray
+from bifocal.orthophotos.ortho_image import Source
+from bifocal.orthophotos.pull_push import fill_holes
+from bifocal.orthophotos.tuning import HOLES
+from photocore.arrays import BoolArray, ByteArray, Float32Array, IntArray
+
+
+def close_holes(
+    image: ImageArray, source: ByteArray, holes: BoolArray, relief: Float32Array, gsd: float, *,
+    largest: float,
+) -> None:  # fmt: skip
+    """Fill holes of a window with texture, in place; those of more than ``largest`` [m2] white.
+
+    Texture is a copy of what lies beside, shifted to where the rim fits best, and levelled along
+    the rim. It comes from what lies no farther out than the hole: that is what goes on behind.
+    """
+    _, label, stats, _ = cv2.connectedComponentsWithStats(holes.astype(np.uint8), connectivity=8)
+    for number in range(1, len(stats)):
+        left, top, width, height, area = stats[number]
+        if area * gsd**2 > largest:
+            part = np.s_[top : top + height, left : left + width]
+            inside = label[part] == number
+            image[part][inside] = np.iinfo(image.dtype).max
+            source[part][inside] = Source.NEITHER
+            continue
+        _copy_texture(image, source, label, number, (left, top, width, height), relief, gsd)
+
+
+def _copy_texture(
+    image: ImageArray, source: ByteArray, label: IntArray, number: int,
+    box: tuple[int, int, int, int], relief: Float32Array, gsd: float,
+) -> None:  # fmt: skip
+    """Fill one hole, in place; where nothing around fits in, with the colours at its rim."""
+    part = grown(box, HOLES.rim, label.shape)
+    hole = label[part] == number
+    known = (source[part] > Source.NONE) & (source[part] != Source.NEITHER)
+    # A hole that goes on as another part is no rim.
+    rim = known & (relief[part] < np.median(relief[part][hole]) + np.float32(HOLES.before))
+    if np.count_nonzero(rim) < HOLES.fewest:
+        rim = known
+    if not rim.any():
+        return
+    colours = image[part]
+    reach = int(max(HOLES.reach / gsd, max(box[2:])))
+    around = grown(box, HOLES.rim + reach, label.shape)
+    copied = None
+    if hole.size < HOLES.most:
+        copied = _best_copy(image[around], source[around] > Source.NONE, colours, hole, rim)
+    level = colours.astype(np.float32) - (0 if copied is None else copied)
+    filled = fill_holes(level, rim, hole)[0] + (0 if copied is None else copied)
+    limit = np.iinfo(image.dtype).max
+    colours[hole] = np.clip(np.rint(filled[hole]), 0, limit).astype(image.dtype)
+    source[part][hole] = Source.FILLED
+
+
+def _best_copy(
+    around: ImageArray, known: BoolArray, colours: ImageArray, hole: BoolArray, rim: BoolArray
+) -> Float32Array | None:
+    """Return the part of the surroundings whose rim fits best; None if none is whole."""
+    if around.shape[0] <= colours.shape[0] or around.shape[1] <= colours.shape[1]:
+        return None
+    wide = around.astype(np.float32)
+    mask = np.repeat(rim[..., None], 3, axis=2) if colours.ndim == 3 else rim
+    patch, weight, unknown, wanted = (
+        np.asarray(part, np.float32) for part in (colours, mask, ~known, hole)
+    )
+    off = cv2.matchTemplate(wide, patch, cv2.TM_SQDIFF, mask=weight)
+    empty = cv2.matchTemplate(unknown, wanted, cv2.TM_CCORR)
+    off[(empty > 0.5) | ~np.isfinite(off)] = np.inf
+    row, column = np.unravel_index(int(np.argmin(off)), off.shape)
+    if not np.isfinite(off[row, column]):
+        return None
+    return wide[row : row + colours.shape[0], column : column + colours.shape[1]]
+
+
+def grown(box: tuple[int, int, int, int], by: int, shape: tuple[int, ...]) -> tuple[slice, slice]:
+    """Return a box (left, top, width, height) grown on all sides, within a window."""
+    left, top, width, height = box
+    rows = slice(max(top - by, 0), min(top + height + by, shape[0]))
+    return rows, slice(max(left - by, 0), min(left + width + by, shape[1]))

@@ -1,0 +1,138 @@
+"""Which photo shows a place: the far one first, the near one for gaps that their rims vouch for."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from bifocal import Grid, OrthoOptions, Pair, Photo, ReliefMap, Source, orthophoto
+
+GSD = 0.01
+GRID = Grid.from_bounds((-2.0, -2.0, 2.0, 2.0), gsd=GSD)
+#: A buttress, and the near camera to its right: it sees what the buttress hides from the far one.
+BUTTRESS, OUT = (0.4, 0.7), 0.6
+
+
+def paint(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return 120 + 60 * np.sin(9 * x + 2 * np.sin(5 * y)) * np.cos(8 * y - np.sin(4 * x))
+
+
+def camera(x: float, distance: float) -> Photo:
+    return Photo(
+        plane_from_pixel=[[GSD, 0, -2.495], [0, -GSD, 2.495], [0, 0, 1]],
+        nadir=(x, 0.0),
+        distance=distance,
+    )
+
+
+def photo_of(photo: Photo, thing: tuple[float, float, float, float] | None = None) -> np.ndarray:
+    """Photograph the wall and its buttress; a dark thing stands before both if there is one."""
+    columns, rows = np.meshgrid(np.arange(500.0), np.arange(500.0))
+    q = photo.plane_from_pixels(np.stack([columns, rows], axis=-1))
+    front = photo.nadir + (q - photo.nadir) * (1 - OUT / photo.distance)
+    image = paint(q[..., 0], q[..., 1])
+    (low, high), x = BUTTRESS, front[..., 0]
+    image = np.where((x > low) & (x < high), paint(x + 7, front[..., 1]), image)
+    # Its flank is seen between its front and its foot.
+    flank = np.minimum(x, q[..., 0]) < low, np.maximum(x, q[..., 0]) > high
+    side = ((x < low) & (q[..., 0] > low)) | ((x > high) & (q[..., 0] < high))
+    image = np.where(side & np.logical_or(*flank), 30, image)
+    if thing is not None:
+        left, bottom, right, top = thing
+        inside = (q[..., 0] > left) & (q[..., 0] < right)
+        image[inside & (q[..., 1] > bottom) & (q[..., 1] < top)] = 15
+    return np.repeat(np.rint(image).astype(np.uint8)[..., None], 3, axis=2)
+
+
+PAIR = Pair(image1=camera(-1.5, 9.0), image2=camera(1.9, 5.0))
+
+
+def relief_with(told: np.ndarray) -> ReliefMap:
+    """Return the exact relief, of which a part is told as measured."""
+    low, high = BUTTRESS
+    step = (GRID.columns_x > low) & (GRID.columns_x < high)
+    r = np.broadcast_to(np.where(step, OUT, 0.0), GRID.shape).astype(np.float32)
+    quality = np.where(told, 1, 2).astype(np.uint8)
+    sigma = np.full(GRID.shape, 0.002, np.float32)
+    return ReliefMap(r=r, sigma=sigma, quality=quality, plane_from_pixel=GRID.plane_from_pixel)
+
+
+@pytest.fixture(scope="module")
+def photos() -> tuple[np.ndarray, np.ndarray]:
+    return photo_of(PAIR.image1), photo_of(PAIR.image2)
+
+
+def hidden_strip() -> np.ndarray:
+    """Return the middle of what the buttress hides from the far camera."""
+    high = BUTTRESS[1]
+    end = PAIR.image1.nadir[0] + (high - PAIR.image1.nadir[0]) / (1 - OUT / 9.0)
+    strip = np.zeros(GRID.shape, bool)
+    strip[40:360, (GRID.columns_x > high + 0.03) & (GRID.columns_x < end - 0.03)] = True
+    assert strip.sum() > 320 * 5
+    return strip
+
+
+def test_a_gap_with_a_measured_rim_on_which_both_agree_is_of_the_near_photo(photos):
+    picture = orthophoto(PAIR, photos, relief_with(np.ones(GRID.shape, bool)))
+    strip = hidden_strip()
+    assert (picture.source[strip] == Source.IMAGE_2).mean() > 0.95
+    wanted = paint(*np.meshgrid(GRID.columns_x, GRID.rows_y))
+    assert np.median(np.abs(picture.image[strip][:, 0] - wanted[strip])) < 4
+
+
+@pytest.mark.parametrize("case", ["not measured", "not alike"])
+def test_a_gap_that_its_rim_does_not_vouch_for_stays_white(photos, case):
+    strip, told, (far, near) = hidden_strip(), np.ones(GRID.shape, bool), photos
+    if case == "not measured":
+        told[:, GRID.columns_x > BUTTRESS[0]] = False
+    else:
+        near = 255 - near
+    picture = orthophoto(PAIR, (far, near), relief_with(told))
+    assert (picture.source[strip] == Source.NEITHER).mean() > 0.95
+    assert (picture.image[strip & (picture.source == Source.NEITHER)] == 255).all()
+    assert not picture.valid[picture.source == Source.NEITHER].any()
+
+
+def test_the_far_photo_goes_first_however_fine_the_near_one_is(photos):
+    # Of the near photo every second pixel would do: its pixels are made three times finer.
+    size = (1500, 1500)
+    near = cv2.resize(photos[1], size, interpolation=cv2.INTER_CUBIC)
+    fine = np.array(PAIR.image2.plane_from_pixel) @ [
+        [1 / 3, 0, -1 / 3],
+        [0, 1 / 3, -1 / 3],
+        [0, 0, 1],
+    ]
+    second = Photo(plane_from_pixel=fine, nadir=PAIR.image2.nadir, distance=5.0)
+    told = np.ones(GRID.shape, bool)
+    both = Pair(image1=PAIR.image1, image2=second)
+    picture = orthophoto(both, (photos[0], near), relief_with(told))
+    assert (picture.source == Source.IMAGE_1).mean() > 0.9
+
+
+def test_what_stood_before_the_wall_in_photo_1_only_is_drawn_from_photo_2(photos):
+    thing = (-1.5, -1.2, -0.9, -0.3)
+    told = np.ones(GRID.shape, bool)
+    x, y = np.meshgrid(GRID.columns_x, GRID.rows_y)
+    place = (x > thing[0]) & (x < thing[2]) & (y > thing[1]) & (y < thing[3])
+    told[cv2.dilate(place.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0] = False
+    relief, wanted = relief_with(told), paint(x, y)
+    picture = orthophoto(PAIR, (photo_of(PAIR.image1, thing), photos[1]), relief)
+    assert np.abs(picture.image[place][:, 0] - wanted[place]).mean() < 6
+    # Of photo 2 alone it is no matter: photo 1 is drawn, as ever.
+    other = orthophoto(PAIR, (photos[0], photo_of(PAIR.image2, thing)), relief)
+    assert np.abs(other.image[place][:, 0] - wanted[place]).mean() < 3
+
+
+def test_a_small_hole_takes_texture_from_beside_it_not_fog():
+    rng = np.random.default_rng(5)
+    photo = np.tile(rng.integers(60, 200, (40, 40), dtype=np.uint8), (13, 13))[:500, :500]
+    photo = np.repeat(photo[..., None], 3, axis=2)
+    alone = Pair(image1=camera(-1.5, 9.0), image2=camera(-1.5, 5.0))
+    r = np.zeros(GRID.shape, np.float32)
+    r[180:200, 250:262] = OUT  # a bracket 20 cm high: its shadow is 0.03 m2
+    relief = ReliefMap.from_relief(r, plane_from_pixel=GRID.plane_from_pixel)
+    picture = orthophoto(alone, photo, relief, options=OrthoOptions())
+    filled = picture.source == Source.FILLED
+    assert 100 < filled.sum() < 0.05 / GSD**2
+    assert picture.image[filled].std() > 0.7 * photo.std()
