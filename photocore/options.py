@@ -13,9 +13,9 @@ import json
 import sys
 import types
 import typing
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, fields, is_dataclass
-from functools import cache
+from functools import cache, wraps
 from inspect import cleandoc
 from itertools import pairwise
 from pathlib import Path
@@ -307,14 +307,34 @@ def options_of(declaring: type) -> dict[str, Option]:
     return options
 
 
+def _made(declaring: type, values: Mapping[str, Any]) -> Any:
+    """Return an object of a class of options with values by their names, groups filled as well."""
+    hints = typing.get_type_hints(declaring, include_extras=True)
+    held = {name: values[name] for name in hints if name in values}
+    groups = {name: kind for name, kind in hints.items() if is_dataclass(kind)}
+    return declaring(**held, **{name: _made(kind, values) for name, kind in groups.items()})  # type: ignore[arg-type]
+
+
 def declared(declaring: type) -> Callable[[Callable[..., Any]], click.Command]:
     """Return what makes a command of a function, with the fields of a class as its options.
 
-    The docstring of the class, but for its first line, ends the help: examples.
+    The function takes an object of the class as `options`; or, if it has other arguments, the
+    values by their names. The docstring of the class, but for its first line, ends the help:
+    examples.
     """
     _, _, text = cleandoc(declaring.__doc__ or "").partition("\n\n")
     examples, *more = text.split("\n\n")
     parts = [f"\b\nExamples:\n{indent(examples, '  ')}"]
     parts += [f"\b\n{part}" if "\n  " in part else part for part in more]
     parameters = [option.parameter() for option in options_of(declaring).values()]
-    return click.command(epilog="\n\n".join(parts) + "\n", params=parameters)
+
+    def command_of(function: Callable[..., Any]) -> click.Command:
+        @wraps(function)
+        def work(**values: Any) -> Any:
+            return function(_made(declaring, values))
+
+        arguments = str(inspect.signature(function))
+        callback = work if arguments.startswith("(options:") else function
+        return click.command(epilog="\n\n".join(parts) + "\n", params=parameters)(callback)
+
+    return command_of

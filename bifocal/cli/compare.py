@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from bifocal.options import LanguageOption
 from photocore.cli import print_result, progress_bar
@@ -41,7 +41,7 @@ class CompareCommand:
 
 
 @declared(CompareCommand)
-def command(before: Path, after: Path, out: Path, as_json: bool, **options: Any) -> None:
+def command(options: CompareCommand) -> None:
     """Find what has changed on a wall between two dates.
 
     BEFORE and AFTER are relief maps of one wall, oriented on the same control, or files of pairs
@@ -50,6 +50,16 @@ def command(before: Path, after: Path, out: Path, as_json: bool, **options: Any)
     """
     from bifocal.comparison.workflow import compare_files
 
-    with progress_bar("comparison", quiet=as_json) as progress:
-        done = compare_files(before, after, out, progress=progress, **options)
-    print_result(done.to_dict(), done.lines(), as_json=as_json, remarks=done.remarks)
+    with progress_bar("comparison", quiet=options.as_json) as progress:
+        done = compare_files(
+            options.before,
+            options.after,
+            options.out,
+            progress=progress,
+            stable=options.stable,
+            fit=options.fit,
+            smallest=options.smallest,
+            language=options.language,
+            overwrite=options.overwrite,
+        )
+    print_result(done.to_dict(), done.lines(), as_json=options.as_json, remarks=done.remarks)

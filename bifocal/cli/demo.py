@@ -33,7 +33,7 @@ class DemoCommand:
 
 
 @declared(DemoCommand)
-def command(out: Path, water: bool, overwrite: bool, as_json: bool) -> None:
+def command(options: DemoCommand) -> None:
     """Survey a sample façade from two photos, and compare with the exact truth.
 
     The photos, 35/19 mm from 17.5/9.5 m, come with the package; targets picked on them go through
@@ -43,15 +43,15 @@ def command(out: Path, water: bool, overwrite: bool, as_json: bool) -> None:
     from bifocal.demo.samples import FACADE, WATER
     from bifocal.demo.workflow import run_demo
 
-    with progress_bar("Demo", quiet=as_json) as bar:
+    with progress_bar("Demo", quiet=options.as_json) as bar:
 
         def tell(done: float, total: float, what: str = "") -> None:
             bar(done, total, what)
-            if what and not as_json:
+            if what and not options.as_json:
                 remark(f"... {what}")
 
-        sample = WATER if water else FACADE
-        result = run_demo(out, sample=sample, overwrite=overwrite, progress=tell)
+        sample = WATER if options.water else FACADE
+        result = run_demo(options.out, sample=sample, overwrite=options.overwrite, progress=tell)
     points = zip(result.ids, result.true, result.found, result.sigma, result.flags, strict=True)
     data = {
         "folder": result.folder, "rmse_targets": result.rmse,
@@ -64,7 +64,7 @@ def command(out: Path, water: bool, overwrite: bool, as_json: bool) -> None:
     }  # fmt: skip
     if result.neglect is not None:
         data["median_neglecting_refraction"] = result.neglect
-    print_result(data, _lines(result), as_json=as_json)
+    print_result(data, _lines(result), as_json=options.as_json)
 
 
 def _lines(result: DemoResult) -> Iterator[str]:

@@ -26,7 +26,7 @@ class DoctorCommand:
 
 
 @declared(DoctorCommand)
-def command(book: Path | None, as_json: bool) -> None:
+def command(options: DoctorCommand) -> None:
     """Print versions, extras, LibreOffice, cores, memory and disk: what a fault report needs.
 
     Of a workbook BOOK.xlsx: what in its package no program would read, and, where LibreOffice is
@@ -35,14 +35,14 @@ def command(book: Path | None, as_json: bool) -> None:
     from photocore.machine import diagnosis, diagnosis_lines, office
     from photocore.workbook.changing.recalculation import examination_lines, examine
 
-    if book is None:
+    if options.book is None:
         found = diagnosis()
-        print_result(found, diagnosis_lines(found), as_json=as_json)
+        print_result(found, diagnosis_lines(found), as_json=options.as_json)
         return
-    found = examine(book, office())
-    print_result(found, examination_lines(found, office()), as_json=as_json)
+    found = examine(options.book, office())
+    print_result(found, examination_lines(found, office()), as_json=options.as_json)
     if found["faults"] or found["differ"]:
-        raise InputError(f"{book}: not as a spreadsheet program would leave it; {_MENDED}")
+        raise InputError(f"{options.book}: not as a spreadsheet program would leave it; {_MENDED}")
 
 
 _MENDED = "open it in one, let it calculate, save it there, or solve it again."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import click
 
@@ -42,10 +42,18 @@ class ExportCommand:
 
 
 @declared(ExportCommand)
-def command(result: Path, out: Path, **options: Any) -> None:
+def command(options: ExportCommand) -> None:
     """Write the points of a solved survey (RESULT: .xlsx, .ods or .csv) for other programs."""
     from bifocal.workbook.export_workflow import export
 
-    for note in export(result, out, **options):
+    for note in export(
+        options.result,
+        options.out,
+        world=options.world,
+        order=options.order,
+        flavour=options.flavour,
+        ellipses=options.ellipses,
+        overwrite=options.overwrite,
+    ):
         remark(note)
-    click.echo(out)
+    click.echo(options.out)

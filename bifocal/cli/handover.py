@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from bifocal.options import LanguageOption
 from photocore.cli import print_result
@@ -39,7 +39,7 @@ class HandoverCommand:
 
 
 @declared(HandoverCommand)
-def command(pair: Path, out: Path, overwrite: bool, as_json: bool, **given: Any) -> None:
+def command(options: HandoverCommand) -> None:
     """Write one file for the client: photos, orthophoto, relief and points, to look at and measure.
 
     PAIR is a pair file. The page needs neither network nor program; distances and heights are
@@ -47,6 +47,17 @@ def command(pair: Path, out: Path, overwrite: bool, as_json: bool, **given: Any)
     """
     from bifocal.reports.handover import HandoverTask, write_handover
 
-    told = write_handover(pair, out, HandoverTask(**given), overwrite=overwrite)
-    line = f"{out} written, {told['bytes'] / 1e6:.1f} MB."
-    print_result(told, (line,), as_json=as_json)
+    told = write_handover(
+        options.pair,
+        options.out,
+        HandoverTask(
+            ortho=options.ortho,
+            relief=options.relief,
+            points=options.points,
+            title=options.title,
+            language=options.language,
+        ),
+        overwrite=options.overwrite,
+    )
+    line = f"{options.out} written, {told['bytes'] / 1e6:.1f} MB."
+    print_result(told, (line,), as_json=options.as_json)

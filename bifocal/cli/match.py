@@ -48,7 +48,7 @@ class MatchCommand:
 
 
 @declared(MatchCommand)
-def command(pair: Path, out: Path, count: int, what: str, as_json: bool, **options: Any) -> None:
+def command(options: MatchCommand) -> None:
     """Find the same details of the wall in both photos of PAIR, a pair file or survey workbook.
 
     Of a set of photos (.photos.json) those of its best pair are found in all others too.
@@ -62,29 +62,42 @@ def command(pair: Path, out: Path, count: int, what: str, as_json: bool, **optio
     from bifocal.workbook.pair_workflow import is_workbook, read_pair
     from bifocal.workbook.sources import set_or_pair
 
-    low, high = options.pop("relief_min"), options.pop("relief_max")
+    low, high = options.relief_min, options.relief_max
     if low is not None and high is not None and low >= high:
         raise click.UsageError("--relief-min must be below --relief-max.")
-    photos, _ = set_or_pair(pair)
-    source = read_pair(pair) if photos is None else best_pair(photos)
+    photos, _ = set_or_pair(options.pair)
+    source = read_pair(options.pair) if photos is None else best_pair(photos)
     reliefs = None
     if low is not None or high is not None:
         near = source.image2.distance
         reliefs = (-0.5 * near if low is None else low, 0.4 * near if high is None else high)
     settings = MatchSettings(
-        count=count, relief_range=reliefs, features=what != "targets", targets=what != "features"
+        count=options.count,
+        relief_range=reliefs,
+        features=options.what != "targets",
+        targets=options.what != "features",
     )
     if photos is not None:
-        told = match_set_file(photos, out, settings, overwrite=options["overwrite"])
+        told = match_set_file(photos, options.out, settings, overwrite=options.overwrite)
         shown = _set_lines(told)
-        print_result({**told, "out": out}, shown, as_json=as_json, remarks=photos.remarks)
+        print_result(
+            {**told, "out": options.out}, shown, as_json=options.as_json, remarks=photos.remarks
+        )
         return
-    found = match_photos(source if is_workbook(pair) else pair, out, settings, **options)
+    found = match_photos(
+        source if is_workbook(options.pair) else options.pair,
+        options.out,
+        settings,
+        language=options.language,
+        overwrite=options.overwrite,
+    )
     summary = match_summary(*found)
-    notes = (*found[0].remarks, *_remarks(summary["kinds"], what))
-    print_result({**summary, "out": out}, _lines(summary), as_json=as_json, remarks=notes)
-    if not as_json:
-        remark(f"Points written to {out}")
+    notes = (*found[0].remarks, *_remarks(summary["kinds"], options.what))
+    print_result(
+        {**summary, "out": options.out}, _lines(summary), as_json=options.as_json, remarks=notes
+    )
+    if not options.as_json:
+        remark(f"Points written to {options.out}")
 
 
 def _remarks(kinds: dict[str, int], what: str) -> Iterator[str]:

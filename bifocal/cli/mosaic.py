@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
-
 from bifocal.options.commands import MosaicCommand
 from photocore.cli import print_result, progress_bar
 from photocore.options import declared
 
 
 @declared(MosaicCommand)
-def command(rasters: tuple[Path, ...], out: Path, as_json: bool, **options: Any) -> None:
+def command(options: MosaicCommand) -> None:
     """Join orthophotos, or relief maps, of one wall.
 
     Seams run where the rasters agree, away from edges of the relief and from hidden places;
@@ -19,9 +16,21 @@ def command(rasters: tuple[Path, ...], out: Path, as_json: bool, **options: Any)
     """
     from bifocal.orthophotos.mosaic_workflow import make_mosaic
 
-    with progress_bar("mosaic", quiet=as_json) as progress:
-        result = make_mosaic(rasters, out, progress=progress, **options)
+    with progress_bar("mosaic", quiet=options.as_json) as progress:
+        result = make_mosaic(
+            options.rasters,
+            options.out,
+            progress=progress,
+            gsd=options.gsd,
+            bounds=options.bounds,
+            relief=options.relief,
+            priority=options.priority,
+            gain=options.gain,
+            blend=options.blend,
+            overviews=options.overviews,
+            overwrite=options.overwrite,
+        )
     grid = result.grid
-    lines = [f"{out}: {grid.width} x {grid.height} px of {grid.gsd * 1000:g} mm"]
+    lines = [f"{options.out}: {grid.width} x {grid.height} px of {grid.gsd * 1000:g} mm"]
     lines += [f"  {100 * share:5.1f} %  {name}" for name, share in result.shares.items()]
-    print_result(result.to_dict(), lines, as_json=as_json, remarks=result.remarks)
+    print_result(result.to_dict(), lines, as_json=options.as_json, remarks=result.remarks)

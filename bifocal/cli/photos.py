@@ -57,6 +57,8 @@ class PhotosCommand:
     sigma_control: SigmaControlOption = 0.003
     unit: UnitOption = None
     """Unit of the project's lengths, where it has been scaled.  [default: as it says]"""
+    part: Annotated[str | None, Typed(unit="NAME")] = None
+    """Which of the project's models, chunks or components.  [default: the largest]"""
     to: Literal["colmap"] | None = None
     """Write a set of photos for another program, as a text model of COLMAP."""
     overwrite: OverwriteOption = False

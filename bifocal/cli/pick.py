@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import click
 
@@ -39,7 +39,7 @@ class PickCommand:
 
 
 @declared(PickCommand)
-def command(sources: tuple[Path, ...], no_browser: bool, as_json: bool, **options: Any) -> None:
+def command(options: PickCommand) -> None:
     """Open the page: orient two photos, pick points, relief, orthophoto, drawing.
 
     Starts from the file of a pair or a set, a survey workbook, photos, or the folder of a survey
@@ -49,15 +49,17 @@ def command(sources: tuple[Path, ...], no_browser: bool, as_json: bool, **option
     """
     from bifocal.collimation.workflow import page_server
 
-    with page_server(*sources, **options) as server:
+    with page_server(
+        *options.sources, workbook=options.workbook, port=options.port, language=options.language
+    ) as server:
         files = server.session.files
         if files.photo_set is not None and files.pair is not None:
             remark(f"Of the set its best pair is opened: {files.pair.name}.")
-        if as_json:
+        if options.as_json:
             print_json({"url": server.url, "token": server.token})
         else:
             click.echo(server.url)
             remark("Open this address in a browser on this computer; Ctrl-C ends the page.")
-        if not no_browser:
+        if not options.no_browser:
             server.open_browser()
         server.serve()

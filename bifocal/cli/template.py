@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from bifocal.options import LanguageOption
 from photocore.cli import remark
@@ -54,12 +54,26 @@ class TemplateCommand:
 
 
 @declared(TemplateCommand)
-def command(out: Path, **options: Any) -> None:
+def command(options: TemplateCommand) -> None:
     """Write an empty survey workbook: type what you measured, relief appears beside it.
 
     Every result is a live formula; the workbook needs neither this program nor macros.
     """
     from bifocal.workbook.template_workflow import write_template
 
-    write_template(out, **options)
-    remark(f"{out}: fill in Setup and Points; then: bifocal solve {out} --out result.xlsx")
+    write_template(
+        options.out,
+        language=options.language,
+        rows=options.rows,
+        media=options.media,
+        lens=options.lens,
+        photos=options.photos,
+        what_if=options.what_if,
+        functions=options.functions,
+        plain=options.plain,
+        overwrite=options.overwrite,
+    )
+    remark(
+        f"{options.out}: fill in Setup and Points; then: bifocal solve {options.out} "
+        "--out result.xlsx"
+    )

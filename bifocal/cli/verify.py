@@ -29,7 +29,7 @@ class VerifyCommand:
 
 
 @declared(VerifyCommand)
-def command(delivery: Path, remake: bool, sources: Path | None, as_json: bool) -> None:
+def command(options: VerifyCommand) -> None:
     """Check that a delivery is what was made: one line a file, exit status 1 if anything differs.
 
     DIR is a folder of facade or survey, ZIP an archive of it or the page's download. Every file is
@@ -39,8 +39,10 @@ def command(delivery: Path, remake: bool, sources: Path | None, as_json: bool) -
     """
     from bifocal.campaigns.verification import verify
 
-    with progress_bar("verify", quiet=as_json) as progress:
-        found = verify(delivery, remake=remake, sources=sources, progress=progress)
-    print_result(found.to_dict(), found.lines(), as_json=as_json)
+    with progress_bar("verify", quiet=options.as_json) as progress:
+        found = verify(
+            options.delivery, remake=options.remake, sources=options.sources, progress=progress
+        )
+    print_result(found.to_dict(), found.lines(), as_json=options.as_json)
     if not found.same:
-        raise InputError(f"{delivery}: is not what was made: {found.summary()}.")
+        raise InputError(f"{options.delivery}: is not what was made: {found.summary()}.")

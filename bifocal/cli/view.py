@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from bifocal.options import LanguageOption
 from photocore.cli import tell_written
@@ -33,7 +33,7 @@ class ViewCommand:
 
 
 @declared(ViewCommand)
-def command(relief: Path, out: Path, **options: Any) -> None:
+def command(options: ViewCommand) -> None:
     """Show a relief map in three dimensions, on a page that needs nothing else.
 
     RELIEF is a map of `bifocal relief`. It is thinned to 65 000 points, so that the page is small
@@ -41,5 +41,12 @@ def command(relief: Path, out: Path, **options: Any) -> None:
     """
     from bifocal.reports.view_workflow import view_relief
 
-    view_relief(relief, out, **options)
-    tell_written(out)
+    view_relief(
+        options.relief,
+        options.out,
+        ortho=options.ortho,
+        title=options.title,
+        language=options.language,
+        overwrite=options.overwrite,
+    )
+    tell_written(options.out)

@@ -24,6 +24,7 @@ class GroupTest:
     fewest: int = 6  #: Fewer points tell no variance.
     believed: float = 1.5  #: Misfits up to so many times their sigma are chance: 12 degrees of it.
     told: float = 2.0  #: A sentence from here on.
+    searched: float = 3.0  #: Groups are looked for where a point misses by so many times its sigma.
     apart: float = 5.0  #: Groups are apart by so many times the sigma of the offset.
     explains: float = 2.0  #: And leave a misfit so many times smaller.
 
@@ -43,10 +44,10 @@ def weighed_by_control(pair: OrientedPair) -> OrientedPair:
         return pair
     times = float(np.sqrt(np.mean(tests**2)))
     many = int((~used).sum()) > max(2, len(used) // 4)
-    words = _groups_in_words(pair) if times >= GROUPS.told or many else ""
-    if times >= GROUPS.believed:
-        control = observations.control
-        control = replace(control, sigma=control.sigma * times)
+    words, apart = _groups(pair) if tests.max() >= GROUPS.searched or many else ("", 0.0)
+    if times >= GROUPS.believed or words:
+        times, control = max(times, 1.0), observations.control
+        control = replace(control, sigma=np.maximum(control.sigma * times, apart / 2))
         sigma = observations.sigma_pick * times
         pair = pair.readjusted(control=control, sigma_pick=sigma)
     if times >= GROUPS.told or words:
@@ -54,12 +55,15 @@ def weighed_by_control(pair: OrientedPair) -> OrientedPair:
     return pair
 
 
-def _groups_in_words(pair: OrientedPair) -> str:
-    """Return where control falls into two groups, each of which fits by itself; empty: nowhere."""
+def _groups(pair: OrientedPair) -> tuple[str, float]:
+    """Return where control falls into two groups that fit by themselves, and how far apart [m].
+
+    Nowhere: nothing and zero.
+    """
     control = pair.observations.control
     seen = np.isfinite(np.hstack([control.pixels1, control.pixels2])).all(axis=1)
     points = np.flatnonzero(control.positioned & seen)
-    best, words = np.inf, ""
+    best, words, apart = np.inf, "", 0.0
     for axis, at, first in _splits(control.xyz[:, :2], points):
         second = np.isin(np.arange(len(first)), points) & ~first
         try:
@@ -76,7 +80,7 @@ def _groups_in_words(pair: OrientedPair) -> str:
         if size < GROUPS.apart * max(spread, 1e-4) * np.sqrt(2 / count):
             continue
         if whole > GROUPS.explains * spread and spread < best:
-            best = spread
+            best, apart = spread, size
             about = {
                 "axis": "XY"[axis],
                 "at": at,
@@ -84,7 +88,7 @@ def _groups_in_words(pair: OrientedPair) -> str:
                 "up": 1000 * offset[1],
             }
             words = remark("orientation.control_groups", **about)
-    return words
+    return words, apart
 
 
 def _splits(xy: FloatArray, points: np.ndarray) -> Iterator[tuple[int, float, BoolArray]]:

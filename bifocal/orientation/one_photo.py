@@ -149,15 +149,23 @@ def by_rectangle(
     width, height = (positive(side, "--rectangle", unit="m") for side in sides)
     if misfit(height, width) < min(SLIPS.fits, misfit(width, height) / SLIPS.better):
         raise GeometryError(remark("rectify.sides", width=width, height=height))
-    photo = fitted(width, height)
-    if photo.sigma0 > SLIPS.doubted:
+
+    def proportions() -> str:
         near = np.exp(np.linspace(-0.5, 0.5, 81))
         best = float(near[int(np.argmin([misfit(width * k, height) for k in near]))])
+        if misfit(width * best, height) > SLIPS.doubted:
+            return ""
         about = {"width": width * best, "height": height / best, "at": height, "by": width}
-        if misfit(width * best, height) < SLIPS.doubted:
-            words = remark("rectify.proportions", **about)
-            photo = replace(photo, remarks=(words, *photo.remarks))
-    return photo
+        return remark("rectify.proportions", **about)
+
+    try:
+        photo = fitted(width, height)
+    except GeometryError:
+        if words := proportions():
+            raise GeometryError(words) from None
+        raise
+    words = proportions() if photo.sigma0 > SLIPS.doubted else ""
+    return replace(photo, remarks=(words, *photo.remarks)) if words else photo
 
 
 def by_control(control: Control, interior: Interior, *, sigma_pick: float) -> OrientedPhoto:

@@ -61,6 +61,8 @@ class ProjectOptions:
         Standard deviations. [m]
     unit : str, optional
         Of the project's lengths, a key of `UNITS`.
+    part : str, optional
+        Which of the project's models, chunks, components.  [default: the largest]
     """
 
     images: Path | None = None
@@ -73,6 +75,7 @@ class ProjectOptions:
     sigma_length: float = 0.003
     sigma_control: float = 0.003
     unit: str | None = None
+    part: str | None = None
 
     def __post_init__(self) -> None:
         if self.wall and len(self.wall) < 3:
@@ -145,7 +148,7 @@ def photos_from_project(
     check_not_input(out, project, options.points, options.control)
     check_writable(out, overwrite=overwrite)
     finder = PhotoFinder(project, options.images)
-    read = read_foreign_project(project, finder)
+    read = read_foreign_project(project, finder, options.part)
     files = {view.name: finder.find(view.name) for view in read.views}
     upright = [_upright(view, files[view.name]) for view in read.views]
     read = read._replace(views=tuple(upright))

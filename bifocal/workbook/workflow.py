@@ -7,10 +7,6 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from bifocal.files.photos import photo_info
-from bifocal.matching.pick_evidence import held_against_photos
 from bifocal.model.hypotheses import SCALE_TOLERANCE
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
@@ -26,10 +22,6 @@ from bifocal.workbook.formulas.setup_cells import cells_of
 from bifocal.workbook.reading.reader import ReadOptions
 from bifocal.workbook.sources import Source, given_pair, measured, set_or_pair, set_up
 from photocore.errors import InputError
-from photocore.images import read_grey
-
-#: So many picks at most are held against the photos.
-MOST_HELD = 100
 
 
 def solve(
@@ -119,38 +111,22 @@ def solve(
     solved = solve_survey(
         survey, general, adjust=adjust_setup, scale_tolerance=scale_tolerance, rules=judged
     )
-    solved = replace(
-        solved, remarks=(*_photos_contradict(solved, general, survey.where), *solved.remarks)
-    )
+    solved = replace(solved, remarks=(*_photos_contradict(solved, general), *solved.remarks))
     media = solved.media
     if general is not None and pair is not None:  # the cells of media take those of its file
         media = SurveyMedia.of_photos((general.image1, general.image2), media)
     return replace(solved, media=media, source=path, pair_path=pair_path, given=asked)
 
 
-def _photos_contradict(solved: SolvedSurvey, pair: Pair | None, where: str) -> tuple[str, ...]:
-    """Return what the pair's photos, where they are at hand, say against the picks.
-
-    Raises
-    ------
-    InputError
-        If they agree with the picks read in another way: exchanged, from the bottom, of copies.
-    """
+def _photos_contradict(solved: SolvedSurvey, pair: Pair | None) -> tuple[str, ...]:
+    """Return what the pair's photos, where they are at hand, say against the picks."""
     photos = () if pair is None else (pair.image1, pair.image2)
     if pair is None or not all(photo.file and photo.path.is_file() for photo in photos):
         return ()
-    picks = solved.points.pixels1, solved.points.pixels2
-    rows = np.flatnonzero(np.isfinite(np.hstack(picks)).all(axis=1) & solved.points.use)
-    rows = rows[:: max(1, len(rows) // MOST_HELD)]
-    try:
-        first, second = (read_grey(photo_info(pair, number).path) for number in (1, 2))
-    except InputError:  # what is wrong with a photo says who needs it
-        return ()
-    transfer = np.linalg.solve(pair.image2.plane_from_pixel, pair.image1.plane_from_pixel)
-    verdict = held_against_photos((first, second), picks[0][rows], picks[1][rows], transfer)
-    if verdict.slip is not None:
-        raise InputError(f"{where}: {verdict.words}")
-    return (verdict.words,) if verdict.words else ()
+    # Only who has photos decodes them: OpenCV takes longer to load than a table to solve.
+    from bifocal.workbook.held_picks import photos_against_picks
+
+    return photos_against_picks(solved, pair)
 
 
 def _solved_of_set(

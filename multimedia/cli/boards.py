@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from multimedia.cli.tables import ProjectOption
 from photocore.cli import print_result, progress_bar, text_table
@@ -41,9 +41,7 @@ class BoardsCommand:
 
 
 @declared(BoardsCommand)
-def command(
-    project: Path, photos: tuple[Path, ...], out: Path, as_json: bool, **options: Any
-) -> None:
+def command(options: BoardsCommand) -> None:
     """Find a flat board in PHOTOS taken through the media and add its points to PROJECT (.toml).
 
     Each pose of the board becomes a group of object points in the board's own frame, which
@@ -52,20 +50,29 @@ def command(
     """
     from multimedia.boards.workflow import find_boards
 
-    with progress_bar("Boards", quiet=as_json) as progress:
-        found = find_boards(project, photos, out, progress=progress, **options)
+    with progress_bar("Boards", quiet=options.as_json) as progress:
+        found = find_boards(
+            options.project,
+            options.photos,
+            options.out,
+            progress=progress,
+            pattern=options.pattern,
+            board=options.board,
+            square=options.square,
+            overwrite=options.overwrite,
+        )
     counts = _counts(found)
     data = {
-        "file": out, "photos": len(photos), "found": len(found.views), "cameras": counts,
-        "left_out": list(found.without), "adjust": found.next_command,
+        "file": options.out, "photos": len(options.photos), "found": len(found.views),
+        "cameras": counts, "left_out": list(found.without), "adjust": found.next_command,
     }  # fmt: skip
     rows = [(name, boards, points) for name, (boards, points) in counts.items()]
     lines = [
         text_table(("camera", "boards", "points"), rows),
-        f"Written: {out}\nNext: multimedia adjust {out} {found.next_command}",
+        f"Written: {options.out}\nNext: multimedia adjust {options.out} {found.next_command}",
     ]
     notes = [f"Left out: {line}" for line in found.without]
-    print_result(data, lines, as_json=as_json, remarks=notes)
+    print_result(data, lines, as_json=options.as_json, remarks=notes)
 
 
 def _counts(found: DetectedBoards) -> dict[str, tuple[int, int]]:

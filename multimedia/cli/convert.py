@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from photocore.cli import print_result, text_table
 from photocore.option_types import POSITIVE
@@ -39,7 +39,7 @@ class ConvertCommand:
 
 
 @declared(ConvertCommand)
-def command(source: Path, target: Path, as_json: bool, **options: Any) -> None:
+def command(options: ConvertCommand) -> None:
     """Convert SOURCE, a project or the cameras of another program, into TARGET.
 
     Known are project files (.toml), COLMAP text models with their refractive cameras (a folder),
@@ -49,10 +49,17 @@ def command(source: Path, target: Path, as_json: bool, **options: Any) -> None:
     """
     from multimedia.exchange.workflow import convert
 
-    done = convert(source, target, **options)
+    done = convert(
+        options.source,
+        options.target,
+        form=options.form,
+        pixel_size=options.pixel_size,
+        unit=options.unit,
+        overwrite=options.overwrite,
+    )
     project = done.project
     data = {
-        "source": source, "from": done.source, "target": target, "to": done.target,
+        "source": options.source, "from": done.source, "target": options.target, "to": done.target,
         "cameras": list(project.camera_names), "object_points": len(project.object_points.ids),
         "image_points": len(project.image_points.ids), "remarks": list(done.remarks),
     }  # fmt: skip
@@ -62,5 +69,5 @@ def command(source: Path, target: Path, as_json: bool, **options: Any) -> None:
         for camera, media in pairs
     ]
     lines = [text_table(("camera", "looks through", "image points"), rows)]
-    lines.append(f"Written: {target} ({done.target})")
-    print_result(data, lines, as_json=as_json, notes=done.remarks)
+    lines.append(f"Written: {options.target} ({done.target})")
+    print_result(data, lines, as_json=options.as_json, notes=done.remarks)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import click
 
@@ -59,23 +59,35 @@ class EpipolarCommand:
 
 
 @declared(EpipolarCommand)
-def command(
-    project: Path, out: Path | None, picture: Path | None, as_json: bool, **options: Any
-) -> None:
+def command(options: EpipolarCommand) -> None:
     """Draw where the ray of an image point of one camera runs in the image of another.
 
     Through refracting media that is a curve; it is given as a polygon whose vertices are exact and
     whose chords stay within --chord. The image points of the other camera near it are listed with
     the object point each of them would give.
     """
-    if options["photo"] is not None and picture is None:
+    if options.photo is not None and options.picture is None:
         raise click.UsageError("--photo goes under a picture; give --picture as well.")
     from multimedia.orientation.epipolar_workflow import epipolar_project
 
-    result = epipolar_project(project, out=out, picture=picture, **options)
+    result = epipolar_project(
+        options.project,
+        out=options.out,
+        picture=options.picture,
+        camera=options.camera,
+        other=options.other,
+        ids=options.ids,
+        at=options.at,
+        z_range=options.z_range,
+        chord_error=options.chord_error,
+        vertices=options.vertices,
+        tolerance=options.tolerance,
+        photo=options.photo,
+        overwrite=options.overwrite,
+    )
     data = {name: getattr(result, name) for name in ("unit", "z_range", "curves", "candidates")}
-    print_result(data, _lines(result), as_json=as_json, notes=result.remarks)
-    tell_written(out, picture)
+    print_result(data, _lines(result), as_json=options.as_json, notes=result.remarks)
+    tell_written(options.out, options.picture)
 
 
 def _lines(result: EpipolarResult) -> Iterator[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from multimedia.cli.tables import ProjectOption
 from photocore.option_types import NEW_TABLE
@@ -35,7 +35,7 @@ class IntersectCommand:
 
 
 @declared(IntersectCommand)
-def command(project: Path, out: Path | None, as_json: bool, **options: Any) -> None:
+def command(options: IntersectCommand) -> None:
     """Intersect the rays of every point that two or more cameras of PROJECT (.toml) saw.
 
     Gives X, Y, Z with standard deviations [unit of the project], the number of rays, the largest
@@ -45,6 +45,12 @@ def command(project: Path, out: Path | None, as_json: bool, **options: Any) -> N
     from multimedia.cli.tables import show
     from multimedia.orientation.workflow import intersect_project
 
-    table = intersect_project(project, out=out, **options)
+    table = intersect_project(
+        options.project,
+        out=options.out,
+        points=options.points,
+        method=options.method,
+        overwrite=options.overwrite,
+    )
     places = dict.fromkeys(("X", "Y", "Z"), 4) | {"angle": 1, "sigma0": 2}
-    show(table, as_json=as_json, out=out, digits=places)
+    show(table, as_json=options.as_json, out=options.out, digits=places)

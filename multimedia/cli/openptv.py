@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import click
 
@@ -40,9 +40,7 @@ class OpenptvCommand:
 
 
 @declared(OpenptvCommand)
-def command(
-    source: Path, out: Path | None, export: Path | None, as_json: bool, **options: Any
-) -> None:
+def command(options: OpenptvCommand) -> None:
     """Read an OpenPTV experiment folder DIR into a project file.
 
     Reads ptv.par, .ori, .addpar, _targets, the calibration body and the first rt_is frame; finds
@@ -55,17 +53,28 @@ def command(
     """
     from multimedia.openptv.workflow import export_openptv, import_openptv
 
-    if export is not None:
-        written, inexact = export_openptv(source, export, overwrite=options["overwrite"])
+    if options.export is not None:
+        written, inexact = export_openptv(
+            options.source, options.export, overwrite=options.overwrite
+        )
         for line in inexact:
             remark(f"Note: {line}")
-        remark(f"OpenPTV folder written to {export}")
-        if as_json:
+        remark(f"OpenPTV folder written to {options.export}")
+        if options.as_json:
             names = list(written.camera_names)
-            print_json({"folder": export, "cameras": names, "remarks": list(inexact)})
+            print_json({"folder": options.export, "cameras": names, "remarks": list(inexact)})
         return
-    target = out if out is not None else Path(f"{source.resolve().name}.toml")
-    imported = import_openptv(source, out=target, **options)
+    target = (
+        options.out if options.out is not None else Path(f"{options.source.resolve().name}.toml")
+    )
+    imported = import_openptv(
+        options.source,
+        out=target,
+        swap_indices=options.swap_indices,
+        least_pixels=options.least_pixels,
+        radius=options.radius,
+        overwrite=options.overwrite,
+    )
     project = imported.project
     total = len(project.object_points.ids)
     cameras = list(zip(project.cameras, imported.matched, project.media_of, strict=True))
@@ -82,4 +91,4 @@ def command(
     if imported.particles:
         lines.append(f"{imported.particles} particles of the stored frame")
     lines += [f"Written: {file}" for file in imported.files]
-    print_result(data, lines, as_json=as_json, notes=project.remarks)
+    print_result(data, lines, as_json=options.as_json, notes=project.remarks)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import click
 
@@ -38,7 +38,7 @@ class ParticlesCommand:
 
 
 @declared(ParticlesCommand)
-def command(project: Path, targets: tuple[Path, ...], as_json: bool, **options: Any) -> None:
+def command(options: ParticlesCommand) -> None:
     """Find the particles of one frame among the targets of all cameras of PROJECT, a .toml file.
 
     Targets belong together where their rays through glass and water meet: along each other's
@@ -50,7 +50,14 @@ def command(project: Path, targets: tuple[Path, ...], as_json: bool, **options: 
     """
     from multimedia.openptv.particles_workflow import find_particles
 
-    found = find_particles(project, targets, **options)
+    found = find_particles(
+        options.project,
+        options.targets,
+        tolerance=options.tolerance,
+        fewest=options.fewest,
+        out=options.out,
+        overwrite=options.overwrite,
+    )
     names = found.project.camera_names
     median = float(sorted(found.misfit)[len(found.misfit) // 2]) if len(found.misfit) else None
     data = {
@@ -60,7 +67,7 @@ def command(project: Path, targets: tuple[Path, ...], as_json: bool, **options: 
                 found.xyz.tolist(), found.numbers.tolist(), found.misfit.tolist(), strict=True
             )
         ],
-        "unit": found.project.unit, "median_misfit_px": median, "out": options["out"],
+        "unit": found.project.unit, "median_misfit_px": median, "out": options.out,
         "by_chance_at_most": float(found.chance.sum()),
     }  # fmt: skip
     rows = [
@@ -72,4 +79,4 @@ def command(project: Path, targets: tuple[Path, ...], as_json: bool, **options: 
         lines.append(f"{name}: {int((found.numbers[:, k] >= 0).sum())} of {count} targets used")
     if median is not None:
         lines.append(f"median misfit {median:.2f} px")
-    print_result(data, lines, as_json=as_json, remarks=())
+    print_result(data, lines, as_json=options.as_json, remarks=())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from multimedia.cli.tables import ProjectOption
 from photocore.option_types import NEW_TABLE
@@ -30,7 +30,7 @@ class ProjectCommand:
 
 
 @declared(ProjectCommand)
-def command(project: Path, out: Path | None, as_json: bool, **options: Any) -> None:
+def command(options: ProjectCommand) -> None:
     """Project object points into every camera of PROJECT, a .toml file.
 
     Prints image coordinates x, y [mm], x to the right and y up from the centre of the sensor, and
@@ -40,5 +40,9 @@ def command(project: Path, out: Path | None, as_json: bool, **options: Any) -> N
     from multimedia.cli.tables import show
     from multimedia.orientation.workflow import project_project
 
-    table = project_project(project, out=out, **options)
-    show(table, as_json=as_json, out=out, digits={"x": 6, "y": 6, "col": 4, "row": 4})
+    table = project_project(
+        options.project, out=options.out, points=options.points, overwrite=options.overwrite
+    )
+    show(
+        table, as_json=options.as_json, out=options.out, digits={"x": 6, "y": 6, "col": 4, "row": 4}
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import click
 
@@ -49,7 +49,7 @@ class ShiftCommand:
 
 
 @declared(ShiftCommand)
-def command(source: Path, out: Path | None, as_json: bool, **options: Any) -> None:
+def command(options: ShiftCommand) -> None:
     """Shift points so that straight rays see them where they are seen through the media.
 
     IN is a table (.xlsx, .xlsm, .ods, .csv; - for stdin) with X, Y, Z (points in water have Z
@@ -57,16 +57,28 @@ def command(source: Path, out: Path | None, as_json: bool, **options: Any) -> No
     comes back with the results put in and everything else as it was; a text table becomes .csv, or
     a workbook with live formulas.
     """
-    if out is None and not as_json:
+    if options.out is None and not options.as_json:
         raise click.UsageError("give --out FILE, --json, or both.")
-    if None not in (options["camera"], options["z0"]):
+    if None not in (options.camera, options.z0):
         raise click.UsageError("give --camera or --z0, not both.")
     from multimedia.workbook.workflow import shift_file
 
-    report = shift_file(source, out, **options)
+    report = shift_file(
+        options.source,
+        options.out,
+        camera=options.camera,
+        z0=options.z0,
+        indices=options.indices,
+        thicknesses=options.thicknesses,
+        sheet=options.sheet,
+        decimal=options.decimal,
+        flavour=options.flavour,
+        new=options.new,
+        overwrite=options.overwrite,
+    )
     for text in report.remarks:
         remark(f"Note: {text}")
-    if as_json:
+    if options.as_json:
         print_json(report.as_dict())
-    if out is not None:
-        remark(f"{len(report.points.ids)} points written to {out}")
+    if options.out is not None:
+        remark(f"{len(report.points.ids)} points written to {options.out}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from photocore.cli import print_result, tell_written, text_table
 from photocore.option_types import NOT_NEGATIVE, TABLE, Numbers
@@ -36,7 +36,7 @@ class SoundingsCommand:
 
 
 @declared(SoundingsCommand)
-def command(surface: Path, soundings: Path, as_json: bool, **options: Any) -> None:
+def command(options: SoundingsCommand) -> None:
     """Hold a corrected DEM or point cloud against soundings or check points, by depth.
 
     SURFACE is a .tif or a point cloud (.csv .txt .xyz .ply .las .laz), best the result of
@@ -45,7 +45,15 @@ def command(surface: Path, soundings: Path, as_json: bool, **options: Any) -> No
     """
     from multimedia.bathymetry.soundings_workflow import check_soundings
 
-    check = check_soundings(surface, soundings, **options)
+    check = check_soundings(
+        options.surface,
+        options.soundings,
+        water_level=options.water_level,
+        edges=options.edges,
+        sigma=options.sigma,
+        target=options.target,
+        overwrite=options.overwrite,
+    )
     found = check.offsets
     columns = {
         "mean": "mean [m]", "mean_sigma": "its sigma", "median": "median", "spread": "spread",
@@ -70,5 +78,5 @@ def command(surface: Path, soundings: Path, as_json: bool, **options: Any) -> No
         "trend": None if trend is None else asdict(trend),
         "soundings": check.count, "outside": check.outside,
     }  # fmt: skip
-    print_result(data, lines, as_json=as_json, remarks=check.remarks)
-    tell_written(options["target"])
+    print_result(data, lines, as_json=options.as_json, remarks=check.remarks)
+    tell_written(options.target)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from photocore.cli import remark
 from photocore.options import Argument, Typed, declared
@@ -31,12 +31,18 @@ class TemplateCommand:
 
 
 @declared(TemplateCommand)
-def command(out: Path, **options: Any) -> None:
+def command(options: TemplateCommand) -> None:
     """Write a workbook that shifts points and gives the refractive index of water by itself.
 
     No macros, no circular references: Excel, LibreOffice and others calculate it.
     """
     from multimedia.workbook.workflow import write_template
 
-    write_template(out, **options)
-    remark(f"Workbook written to {out}")
+    write_template(
+        options.out,
+        rows=options.rows,
+        steps=options.steps,
+        language=options.language,
+        overwrite=options.overwrite,
+    )
+    remark(f"Workbook written to {options.out}")

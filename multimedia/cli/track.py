@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import click
 import numpy as np
@@ -61,7 +61,7 @@ class TrackCommand:
 
 
 @declared(TrackCommand)
-def command(project: Path, targets: tuple[Path, ...], as_json: bool, **options: Any) -> None:
+def command(options: TrackCommand) -> None:
     """Follow particles through frames: targets of all cameras of PROJECT in, tracks out.
 
     In every frame targets belong together where their rays through glass and water meet, as for
@@ -75,7 +75,22 @@ def command(project: Path, targets: tuple[Path, ...], as_json: bool, **options: 
     """
     from multimedia.tracking.workflow import find_tracks
 
-    found = find_tracks(project, targets, **options)
+    found = find_tracks(
+        options.project,
+        options.targets,
+        first=options.first,
+        last=options.last,
+        rate=options.rate,
+        tolerance=options.tolerance,
+        fewest=options.fewest,
+        step=options.step,
+        change=options.change,
+        gap=options.gap,
+        shortest=options.shortest,
+        out=options.out,
+        folder=options.folder,
+        overwrite=options.overwrite,
+    )
     tracks, (length, speed_unit) = found.tracks, found.units
     speed = np.linalg.norm(tracks.velocity, axis=1)
     sizes = np.bincount(tracks.track)
@@ -88,7 +103,7 @@ def command(project: Path, targets: tuple[Path, ...], as_json: bool, **options: 
         "median_speed": float(np.nanmedian(speed)), "speed_unit": speed_unit,
         "median_sigma": sigma.tolist(), "median_velocity_sigma": own.tolist(),
         "differ": int(tracks.outlier.sum()), "particles_tested": found.found,
-        "by_chance_at_most": found.chance, "out": options["out"], "folder": options["folder"],
+        "by_chance_at_most": found.chance, "out": options.out, "folder": options.folder,
     }  # fmt: skip
     rows = [
         ("frames", f"{found.frames[0]} to {found.frames[-1]}"),
@@ -104,4 +119,4 @@ def command(project: Path, targets: tuple[Path, ...], as_json: bool, **options: 
                                   + ", ".join(f"{v:.2g}" for v in own)),
         ("differ from those around", f"{int(tracks.outlier.sum())} vectors"),
     ]  # fmt: skip
-    print_result(data, [text_table(("", ""), rows)], as_json=as_json, remarks=())
+    print_result(data, [text_table(("", ""), rows)], as_json=options.as_json, remarks=())

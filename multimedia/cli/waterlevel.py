@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from photocore.cli import print_result
 from photocore.option_types import POSITIVE, TABLE
@@ -34,7 +34,7 @@ class WaterlevelCommand:
 
 
 @declared(WaterlevelCommand)
-def command(source: Path, tilted: bool, as_json: bool, **options: Any) -> None:
+def command(options: WaterlevelCommand) -> None:
     """Estimate the mean water height from tie points, some of them on the water surface.
 
     POINTS is a table or point cloud (.csv .txt .xyz .ply .las .laz). The surface is the highest
@@ -42,7 +42,13 @@ def command(source: Path, tilted: bool, as_json: bool, **options: Any) -> None:
     """
     from multimedia.bathymetry.waterlevel_workflow import fit_water_level
 
-    fitted = fit_water_level(source, tilted=tilted, **options)
+    fitted = fit_water_level(
+        options.source,
+        tilted=options.tilted,
+        spread=options.spread,
+        target=options.target,
+        overwrite=options.overwrite,
+    )
     water = fitted.water
     lines = [
         f"water level   {water.level:.5f} m, standard deviation {water.sigma:.2g} m",
@@ -50,9 +56,9 @@ def command(source: Path, tilted: bool, as_json: bool, **options: Any) -> None:
         f"points        {int(water.used.sum())} on the surface, {water.below} below and "
         f"{water.above} above rejected",
     ]
-    if tilted:
+    if options.tilted:
         lines.append(
             f"slope         {1000 * water.slope[0]:+.4g} mm/m in X, {1000 * water.slope[1]:+.4g} "
             f"mm/m in Y (sd {1000 * water.slope_sigma[0]:.2g}, {1000 * water.slope_sigma[1]:.2g})"
         )
-    print_result(fitted.as_dict(), lines, as_json=as_json, remarks=fitted.remarks)
+    print_result(fitted.as_dict(), lines, as_json=options.as_json, remarks=fitted.remarks)

@@ -53,6 +53,14 @@ def is_colmap(folder: Path, ending: str = ".txt") -> bool:
     return all((folder / f"{name}{ending}").is_file() for name in ("cameras", "images"))
 
 
+def count_images(folder: Path) -> int:
+    """Return how many images a model holds, without reading them."""
+    if not is_colmap(folder):
+        return _Bytes(folder / "images.bin").count()
+    words = (line.split(maxsplit=9) for line in _lines(folder / "images.txt"))
+    return sum(len(word) == 10 and word[0].isdecimal() for word in words)
+
+
 def read_colmap_project(folder: Path) -> ForeignProject:
     """Return photos and points of a model.
 

@@ -16,7 +16,8 @@ from photocore.arrays import FloatArray, floats_of_words
 from photocore.camera.lensformats import LensData, metashape_lens, xml_root
 from photocore.camera.rotation import checked_rotation, nearest_rotation
 from photocore.errors import InputError
-from photocore.programs.model import ForeignProject, ForeignView
+from photocore.programs.model import ForeignProject, ForeignView, chosen_part
+from photocore.remarks import remark
 from photocore.textfile import read_text
 
 #: The chunk's transform where it has none: its frame is the world's.
@@ -25,8 +26,11 @@ FRAME = dict[str, FloatArray](rotation=np.eye(3), translation=np.zeros(3), scale
 _PRINTED = 1e-5
 
 
-def read_metashape_project(path: Path) -> ForeignProject:
-    """Return the aligned cameras of the first chunk; no points.
+def read_metashape_project(path: Path, part: str | None = None) -> ForeignProject:
+    """Return the aligned and enabled cameras of one component of a chunk; no points.
+
+    Cameras of two components share no frame: the largest component of the largest chunk is taken
+    unless another is named, by chunk, component or both (``chunk 2/1``).
 
     Raises
     ------
@@ -34,32 +38,81 @@ def read_metashape_project(path: Path) -> ForeignProject:
         Naming what is missing or cannot be used.
     """
     root = xml_root(path, read_text(path, "Metashape file", form=" (XML)"))
-    chunk = root if root.tag == "chunk" else root.find(".//chunk")
-    if chunk is None:
+    chunks = [root] if root.tag == "chunk" else root.findall(".//chunk")
+    if not chunks:
         raise InputError(f"{path}: holds no chunk; export the cameras as Agisoft XML.")
+    parts: dict[str, tuple[ElementTree.Element, str | None]] = {}
+    for number, chunk in enumerate(chunks, start=1):
+        name = chunk.get("label") or f"chunk {number}"
+        held = {node.get("component_id") for node in chunk.findall("./cameras//camera")}
+        ids = [node.get("id", "") for node in chunk.findall("./components/component")]
+        ids = [key for key in ids if key in held]
+        parts |= (
+            {f"{name}/{key}": (chunk, key) for key in ids} if ids[1:] else {name: (chunk, None)}
+        )
+    sizes = {name: len(_aligned(chunk, key)) for name, (chunk, key) in parts.items()}
+    if not any(sizes.values()):
+        raise InputError(f"{path}: holds no aligned camera.")
+    best, remarks = chosen_part(sizes, part, path)
+    chunk, component = parts[best]
     sensors = chunk.findall("./sensors/sensor")
+    rolling = {sensor.get("id", "") for sensor in sensors if _is_rolling(sensor)}
     lenses = {sensor.get("id", ""): _lens(sensor, path) for sensor in sensors}
-    rotation, translation, scale = _world_from_chunk(chunk, path)
+    rotation, translation, scale = _world_from_chunk(chunk, component, path)
     views: list[ForeignView] = []
-    remarks: list[str] = []
-    for node in chunk.findall("./cameras//camera"):
-        name = node.get("label") or f"camera {node.get('id', '')}"
-        text = node.findtext("transform")
-        if text is None:
-            remarks.append(f"{name}: is not aligned; left out.")
-            continue
+    for node in _aligned(chunk, component):
+        name = _name(node)
         lens = lenses.get(node.get("sensor_id", ""), "has no calibration")
         if isinstance(lens, str):
             raise InputError(f"{path}: the sensor of camera {name} {lens}.")
-        matrix = _numbers(text, 16, path, f"transform of camera {name}").reshape(4, 4)
+        text = f"transform of camera {name}"
+        matrix = _numbers(node.findtext("transform", ""), 16, path, text).reshape(4, 4)
         turn = checked_rotation(matrix[:3, :3], f"{path}: transform of {name}", tolerance=_PRINTED)
         world = rotation @ nearest_rotation(turn)
         centre = scale * (rotation @ matrix[:3, 3]) + translation
         views.append(ForeignView(name, lens, world.T, centre))
-    if not views:
-        raise InputError(f"{path}: holds no aligned camera.")
+    cameras = chunk.findall("./cameras//camera")
+    off = [_name(node) for node in cameras if not _is_enabled(node)]
+    if off:
+        remarks += (remark("programs.disabled", count=len(off), names=", ".join(off[:5])),)
+    lost = [node for node in cameras if _is_enabled(node) and node.find("transform") is None]
+    remarks += tuple(f"{_name(node)}: is not aligned; left out." for node in lost)
+    moving = [_name(node) for node in _aligned(chunk, component)
+              if node.get("sensor_id", "") in rolling or _is_rolling(node)]  # fmt: skip
+    if moving:
+        about = {"count": len(moving), "names": ", ".join(moving[:5])}
+        remarks += (remark("programs.rolling_shutter", **about),)
     scaled = "the chunk's transform" if chunk.find("./transform/scale") is not None else ""
-    return ForeignProject("Metashape", tuple(views), metres=scaled, remarks=tuple(remarks))
+    return ForeignProject("Metashape", tuple(views), metres=scaled, remarks=remarks)
+
+
+def _name(camera: ElementTree.Element) -> str:
+    return camera.get("label") or f"camera {camera.get('id', '')}"
+
+
+def _is_enabled(camera: ElementTree.Element) -> bool:
+    return camera.get("enabled", "true").strip().lower() not in ("false", "0", "no")
+
+
+def _is_rolling(node: ElementTree.Element) -> bool:
+    """Whether a sensor or camera was adjusted with a rolling shutter."""
+    none = ("", "0", "false", "none", "disabled")
+    return any(
+        child.tag.startswith("rolling_shutter")
+        and (len(child) > 0 or (child.text or "").strip().lower() not in none)
+        for child in node
+    )
+
+
+def _aligned(chunk: ElementTree.Element, component: str | None) -> list[ElementTree.Element]:
+    """Return the cameras of a chunk, or of a component of it, that have a place."""
+    return [
+        camera
+        for camera in chunk.findall("./cameras//camera")
+        if _is_enabled(camera)
+        and camera.find("transform") is not None
+        and component in (None, camera.get("component_id"))
+    ]
 
 
 def _lens(sensor: ElementTree.Element, path: Path) -> LensData | str:
@@ -75,13 +128,14 @@ def _lens(sensor: ElementTree.Element, path: Path) -> LensData | str:
 
 
 def _world_from_chunk(
-    chunk: ElementTree.Element, path: Path
+    chunk: ElementTree.Element, component: str | None, path: Path
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Return rotation, translation and scale of the chunk, or of its only component."""
-    node = chunk.find("./transform")
+    """Return rotation, translation and scale of the chunk, or of a component of it."""
+    node = None if component else chunk.find("./transform")
     if node is None or node.find("scale") is None:
-        found = chunk.findall("./components/component/transform")
-        node = found[0] if len(found) == 1 else None
+        nodes = chunk.findall("./components/component")
+        nodes = [part for part in nodes if component in (None, part.get("id"))]
+        node = nodes[0].find("./transform") if len(nodes) == 1 else None
     if node is None:
         return np.eye(3), np.zeros(3), 1.0
     parts = dict(FRAME)

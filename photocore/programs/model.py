@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from photocore.arrays import FloatArray
 from photocore.camera.lensformats import LensData
+from photocore.errors import InputError
+from photocore.remarks import remark
 
 
 class ForeignView(NamedTuple):
@@ -51,3 +55,34 @@ class ForeignProject(NamedTuple):
     points: FloatArray = np.empty((0, 3))
     metres: str = ""
     remarks: tuple[str, ...] = ()
+
+
+def chosen_part(
+    sizes: Mapping[str, int], part: str | None, project: Path
+) -> tuple[str, tuple[str, ...]]:
+    """Return which part of a project to take, and what to say of the rest.
+
+    Parts (models, chunks, components) do not share a frame: one is taken, the largest unless the
+    user names one.
+
+    Parameters
+    ----------
+    sizes : mapping of str to int
+        How many photos each part holds.
+    part : str, optional
+        The one that the user wants.
+    project : path
+
+    Raises
+    ------
+    InputError
+        If there is no such part.
+    """
+    listed = ", ".join(f"{name} ({size})" for name, size in sizes.items())
+    if part is not None and part not in sizes:
+        raise InputError(remark("programs.no_part", of=project, part=part, parts=listed))
+    best = part or max(sizes, key=lambda name: sizes[name])
+    if part is not None or len(sizes) == 1:
+        return best, ()
+    rest = ", ".join(f"{name} ({size})" for name, size in sizes.items() if name != best)
+    return best, (remark("programs.parts", part=best, count=sizes[best], rest=rest),)

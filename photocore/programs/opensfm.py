@@ -16,7 +16,7 @@ from photocore.camera.lensformats import LensData, lens_data
 from photocore.camera.rotation import rotation_from_vector
 from photocore.errors import InputError
 from photocore.programs.json_values import JsonValue
-from photocore.programs.model import ForeignProject, ForeignView
+from photocore.programs.model import ForeignProject, ForeignView, chosen_part
 
 #: Distortion terms of each model in OpenCV's order; of fisheyes in that of OpenCV's fisheye.
 _TERMS = {
@@ -29,18 +29,20 @@ _TERMS = {
 }
 
 
-def read_opensfm(path: Path, value: JsonValue) -> ForeignProject:
-    """Return the largest of the reconstructions that a file holds.
+def read_opensfm(path: Path, value: JsonValue, part: str | None = None) -> ForeignProject:
+    """Return one of the reconstructions that a file holds, the largest unless another is named.
 
     Raises
     ------
     InputError
         Naming the key that is missing or wrong.
     """
-    parts = sorted(value.each(), key=lambda part: -len(dict(part["shots"].items())))
-    if not parts or not dict(parts[0]["shots"].items()):
+    parts = {str(number): one for number, one in enumerate(value.each(), start=1)}
+    sizes = {name: len(dict(one["shots"].items())) for name, one in parts.items()}
+    if not any(sizes.values()):
         raise InputError(f"{path}: holds no reconstruction with photos.")
-    best, *others = parts
+    name, remarks = chosen_part(sizes, part, path)
+    best = parts[name]
     lenses = {key: _lens(camera, path) for key, camera in best["cameras"].items()}
     views = []
     for name, shot in best["shots"].items():
@@ -53,11 +55,10 @@ def read_opensfm(path: Path, value: JsonValue) -> ForeignProject:
     points = [point["coordinates"].numbers(3) for _, point in best.get("points", {}).items()]
     place = best.get("reference_lla", {})
     known = any(place.get(key, 0.0).number() for key in ("latitude", "longitude"))
-    left = sum(len(dict(part["shots"].items())) for part in others)
     return ForeignProject(
         "OpenSfM", tuple(views), np.array(points).reshape(-1, 3),
         metres="the positions of the photos or ground control" if known else "",
-        remarks=(f"{left} photos of smaller reconstructions left out.",) if left else (),
+        remarks=remarks,
     )  # fmt: skip
 
 

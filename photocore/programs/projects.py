@@ -7,17 +7,17 @@ from pathlib import Path
 from photocore.errors import InputError
 from photocore.programs.alicevision import read_alicevision, read_openmvg
 from photocore.programs.bundler import read_bundler
-from photocore.programs.colmap import is_colmap, read_colmap_project
+from photocore.programs.colmap import count_images, is_colmap, read_colmap_project
 from photocore.programs.json_values import JsonValue
 from photocore.programs.metashape import read_metashape_project
-from photocore.programs.model import ForeignProject
+from photocore.programs.model import ForeignProject, chosen_part
 from photocore.programs.opensfm import read_opensfm
 from photocore.programs.photos import PhotoFinder
 from photocore.textfile import check_file, check_name
 
 #: Where programs leave their results below a project's folder.
 _PLACES = (
-    ".", "sparse/0", "sparse", "reconstruction.json", "opensfm/reconstruction.json",
+    ".", "sparse", "reconstruction.json", "opensfm/reconstruction.json",
     "sfm_data.json", "cameras.sfm", "sfm.sfm", "bundle.out", "bundle/bundle.out",
 )  # fmt: skip
 _KNOWN = (
@@ -34,7 +34,9 @@ _EXPORT = {
 }
 
 
-def read_foreign_project(path: Path, photos: PhotoFinder) -> ForeignProject:
+def read_foreign_project(
+    path: Path, photos: PhotoFinder, part: str | None = None
+) -> ForeignProject:
     """Return cameras and points of a project, told by its name and content.
 
     Parameters
@@ -43,6 +45,8 @@ def read_foreign_project(path: Path, photos: PhotoFinder) -> ForeignProject:
         File or folder.
     photos : PhotoFinder
         Of this project.
+    part : str, optional
+        Which of its models, chunks, components.  [default: the largest]
 
     Raises
     ------
@@ -51,6 +55,11 @@ def read_foreign_project(path: Path, photos: PhotoFinder) -> ForeignProject:
     """
     check_name(path)
     if path.is_dir():
+        if models := _models(path):
+            name, remarks = chosen_part(
+                {name: count_images(place) for name, place in models.items()}, part, path
+            )
+            return read_colmap_project(models[name])._replace(remarks=remarks)
         found = [place for place in map(path.joinpath, _PLACES) if _is_model(place)]
         if not found:
             raise InputError(f"{path}: holds no project known here: {_KNOWN}.")
@@ -62,18 +71,28 @@ def read_foreign_project(path: Path, photos: PhotoFinder) -> ForeignProject:
     if ending in (".txt", ".bin") and (is_colmap(path.parent) or is_colmap(path.parent, ".bin")):
         return read_colmap_project(path.parent)
     if ending == ".xml":
-        return read_metashape_project(path)
+        return read_metashape_project(path, part)
     if ending == ".out":
         return read_bundler(path, photos.size)
     if ending in (".json", ".sfm"):
         value = JsonValue.read(path)
         if isinstance(value.value, list):
-            return read_opensfm(path, value)
+            return read_opensfm(path, value, part)
         if "sfm_data_version" in value or "extrinsics" in value:
             return read_openmvg(path, value)
         if "views" in value:
             return read_alicevision(path, value)
     raise InputError(f"{path}: is no project known here: {_EXPORT.get(ending, _KNOWN + '.')}")
+
+
+def _models(path: Path) -> dict[str, Path]:
+    """Return the numbered models of a COLMAP project's folder."""
+    folder = path / "sparse" if (path / "sparse").is_dir() else path
+    return {
+        place.relative_to(path).as_posix(): place
+        for place in sorted(folder.iterdir())
+        if place.name.isdigit() and (is_colmap(place) or is_colmap(place, ".bin"))
+    }
 
 
 def _is_model(place: Path) -> bool:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -21,6 +24,7 @@ from bifocal import (
     write_colmap,
 )
 from bifocal.model.basis import rests_on
+from photocore.programs.model import ForeignProject
 from photocore.programs.photos import PhotoFinder
 from photocore.programs.projects import read_foreign_project
 from tests.builders import foreign_projects as made
@@ -172,6 +176,86 @@ def test_a_scaled_metashape_chunk_is_metric(tmp_path: Path) -> None:
     assert "chunk's transform" in result.scale
     assert result.photos.photos[0].distance == pytest.approx(12 * made.UNIT, rel=2e-3)
     assert any("lost" in text for text in result.remarks)
+
+
+def metashape(path: Path) -> ElementTree.ElementTree:
+    """Return a chunk of five aligned cameras of the scene, to be changed."""
+    made.write_metashape(path, made.make_shots(**PROJECTS["metashape"][2]))
+    return ElementTree.parse(path)
+
+
+def read_again(
+    path: Path, tree: ElementTree.ElementTree, part: str | None = None
+) -> ForeignProject:
+    tree.write(path)
+    return read_foreign_project(path, PhotoFinder(path), part)
+
+
+def test_components_of_metashape_share_no_frame_the_largest_is_taken(tmp_path: Path) -> None:
+    path = tmp_path / "cameras.xml"
+    tree = metashape(path)
+    whole = read_foreign_project(path, PhotoFinder(path))
+    chunk = tree.getroot().find("chunk")
+    cameras = chunk.findall("./cameras/camera")[:-1]  # the last is not aligned
+    for k, camera in enumerate(cameras):
+        camera.set("component_id", "0" if k < 1 else "1")
+    chunk.append(ElementTree.fromstring(
+        '<components><component id="0"><transform><rotation>1 0 0 0 1 0 0 0 1</rotation>'
+        "<translation>5 0 0</translation><scale>2</scale></transform></component>"
+        '<component id="1"><transform><rotation>0 -1 0 1 0 0 0 0 1</rotation><translation>0 0 7'
+        "</translation><scale>3</scale></transform></component></components>"))  # fmt: skip
+    read = read_again(path, tree)
+    assert [view.name for view in read.views] == [view.name for view in whole.views[1:]]
+    assert "chunk 1/0 (1)" in " ".join(read.remarks)
+    # x' = -3 y, y' = 3 x, z' = 3 z + 7, by hand.
+    x, y, z = whole.views[1].centre
+    np.testing.assert_allclose(read.views[0].centre, [-3 * y, 3 * x, 3 * z + 7], atol=1e-9)
+    other = read_again(path, tree, "chunk 1/0")
+    np.testing.assert_allclose(other.views[0].centre, 2 * whole.views[0].centre + [5, 0, 0])
+    with pytest.raises(InputError, match=r"no part middle; it has chunk 1/0 \(1\), chunk 1/1"):
+        read_again(path, tree, "middle")
+
+
+def test_of_two_chunks_the_one_with_more_photos_is_taken(tmp_path: Path) -> None:
+    path = tmp_path / "cameras.xml"
+    tree = metashape(path)
+    root = tree.getroot()
+    small = copy.deepcopy(root.find("chunk"))
+    small.set("label", "trial")
+    for camera in small.findall("./cameras/camera")[1:]:
+        small.find("cameras").remove(camera)
+    root.insert(0, small)
+    read = read_again(path, tree)
+    assert len(read.views) > 1
+    assert "trial (1)" in " ".join(read.remarks)
+    assert len(read_again(path, tree, "trial").views) == 1
+
+
+def test_cameras_switched_off_stay_out_and_a_rolling_shutter_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "cameras.xml"
+    tree = metashape(path)
+    cameras = tree.getroot().findall(".//camera")
+    names = [camera.get("label") for camera in cameras]
+    cameras[0].set("enabled", "false")
+    cameras[1].set("enabled", "0")
+    ElementTree.SubElement(cameras[2], "rolling_shutter").text = "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"
+    read = read_again(path, tree)
+    assert [view.name for view in read.views] == names[2:-1]
+    said = " ".join(read.remarks)
+    assert f"2 cameras are switched off in the project and left out: {names[0]}, {names[1]}" in said
+    assert "1 cameras were adjusted with a rolling shutter" in said
+
+
+@pytest.mark.parametrize("write", [made.write_colmap_text, made.write_colmap_binary])
+def test_of_two_models_of_colmap_the_larger_is_taken(tmp_path: Path, write: Callable) -> None:
+    shots, xyz = made.make_shots(**BROWN), made.to_world(made.wall_points())
+    (tmp_path / "sparse").mkdir()
+    write(tmp_path / "sparse" / "0", shots[:2], xyz)
+    write(tmp_path / "sparse" / "1", shots, xyz)
+    read = read_foreign_project(tmp_path, PhotoFinder(tmp_path))
+    assert len(read.views) == len(shots)
+    assert "sparse/0 (2)" in " ".join(read.remarks)
+    assert len(read_foreign_project(tmp_path, PhotoFinder(tmp_path), "sparse/0").views) == 2
 
 
 def test_sigmas_hold_what_the_length_and_the_control_are_worth(tmp_path: Path) -> None:

@@ -1,0 +1,37 @@
+"""Picks of a survey held against the photos of its pair, which are decoded for that alone."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bifocal.files.photos import photo_info
+from bifocal.matching.pick_evidence import held_against_photos
+from bifocal.model.pair import Pair
+from bifocal.survey.solved_survey import SolvedSurvey
+from photocore.errors import InputError
+from photocore.images import read_grey
+
+#: So many picks at most are held against the photos.
+MOST_HELD = 100
+
+
+def photos_against_picks(solved: SolvedSurvey, pair: Pair) -> tuple[str, ...]:
+    """Return what the pair's photos say against the picks of a survey; nothing where they agree.
+
+    Raises
+    ------
+    InputError
+        If they agree with the picks read in another way: exchanged, from the bottom, of copies.
+    """
+    picks = solved.points.pixels1, solved.points.pixels2
+    rows = np.flatnonzero(np.isfinite(np.hstack(picks)).all(axis=1) & solved.points.use)
+    rows = rows[:: max(1, len(rows) // MOST_HELD)]
+    try:
+        first, second = (read_grey(photo_info(pair, number).path) for number in (1, 2))
+    except InputError:  # what is wrong with a photo says who needs it
+        return ()
+    transfer = np.linalg.solve(pair.image2.plane_from_pixel, pair.image1.plane_from_pixel)
+    verdict = held_against_photos((first, second), picks[0][rows], picks[1][rows], transfer)
+    if verdict.slip is not None:
+        raise InputError(f"{solved.survey.where}: {verdict.words}")
+    return (verdict.words,) if verdict.words else ()
