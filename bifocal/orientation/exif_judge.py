@@ -88,8 +88,8 @@ def judged_focal(info: ImageInfo) -> JudgedFocal:
     source = remark("orientation.exif_equivalent", focal=equivalent)
     if plane is not None:
         sigma = min(WORST, abs(float(np.log(plane / stated))) / 2)
-        about = {"plane": plane, "equivalent": stated, "share": 100 * sigma}
-        doubt = remark("orientation.exif_focal_plane", **about)
+        shares = {"plane": plane, "equivalent": stated, "share": 100 * sigma}
+        doubt = remark("orientation.exif_focal_plane", **shares)
         return JudgedFocal(focal=stated, sigma=sigma, source=source, doubt=doubt)
     if zoom > 1 + AGREE:
         sigma = min(WORST, float(np.log(zoom)) / 2)
