@@ -48,8 +48,8 @@ def pair_as_set_up(photos: Photos, site: SiteMeasures, media: PairMedia) -> Orie
         if photo.interior.is_assumed:
             raise InputError(remark("refused.typed_focal", name=photo.name, number=number))
     scales = [p.interior.focal / d for p, d in zip(photos, (d1, d2), strict=True)]
-    pitches = [photo.interior.pixel_size for photo in photos]
-    if None not in pitches:  # as sensors show it, of whatever size the photos were saved
+    pitches = [p.interior.pixel_size for p in photos if p.interior.pixel_size is not None]
+    if len(pitches) == 2:  # as sensors show it, of whatever size the photos were saved
         scales = [s * pitch for s, pitch in zip(scales, pitches, strict=True)]
     apart = scales[0] / scales[1] - 1.0
     if abs(apart) > SCALE_TOLERANCE and not media:

@@ -132,13 +132,15 @@ def by_rectangle(
     if len(corners) != 4:
         raise InputError(f"--rectangle: {len(corners)} corners; a rectangle has four.")
 
-    def fitted(width: float, height: float) -> OrientedPhoto:
+    def cornered(width: float, height: float) -> Control:
         xyz = np.array([[0, height, 0], [width, height, 0], [width, 0, 0], [0.0, 0, 0]])
-        control = Control(
+        return Control(
             ids=("upper left", "upper right", "lower right", "lower left"), xyz=xyz,
             sigma=np.full((4, 3), sigma), pixels1=corners, pixels2=np.full((4, 2), np.nan),
         )  # fmt: skip
-        return by_control(control, interior, sigma_pick=sigma_pick)
+
+    def fitted(width: float, height: float) -> OrientedPhoto:
+        return by_control(cornered(width, height), interior, sigma_pick=sigma_pick)
 
     def misfit(width: float, height: float) -> float:
         try:
@@ -151,10 +153,16 @@ def by_rectangle(
         raise GeometryError(remark("rectify.sides", width=width, height=height))
 
     def proportions() -> str:
-        near = np.exp(np.linspace(-0.5, 0.5, 81))
-        best = float(near[int(np.argmin([misfit(width * k, height) for k in near]))])
-        if misfit(width * best, height) > SLIPS.doubted:
+        near, left = np.exp(np.linspace(-0.5, 0.5, 41)), []
+        for times in near:
+            control = replace(cornered(width * times, height), pixels1=interior.ideal(corners))
+            try:
+                left.append(_by_points(control, interior, sigma_pick).sigma0)
+            except (GeometryError, ConvergenceError):
+                left.append(SLIPS.most)
+        if min(left) > SLIPS.doubted:
             return ""
+        best = float(near[int(np.argmin(left))])
         about = {"width": width * best, "height": height / best, "at": height, "by": width}
         return remark("rectify.proportions", **about)
 
