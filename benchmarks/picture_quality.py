@@ -50,7 +50,7 @@ def drawn(pair: Pair, images, relief: ReliefMap, grid: Grid):
         away = np.abs(view.sample(column, row, "cubic").astype(np.float32) - picture.image)
         off.append(np.where(view.inside(column, row), away.max(axis=-1), np.inf))
     # On relief that is not measured the source does not name the photo; its colours do.
-    second = cv2.medianBlur(((off[0] > 6) & (off[1] < off[0])).astype(np.uint8), 5)
+    second = cv2.medianBlur((off[1] < off[0]).astype(np.uint8), 5)
     photo = np.where(picture.source == Source.IMAGE_2, 2, 1 + second)
     photo[picture.source == Source.IMAGE_1] = 1
     photo[~picture.valid | (picture.source == Source.FILLED)] = 0

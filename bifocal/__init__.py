@@ -18,7 +18,7 @@ The pair
     align, align_set          a pair, or a set of photos, from them and what was measured on site
     Control, Interior, SiteMeasures, PairMedia, read_control   what `align` is told
 Points
-    solve, SolvedSurvey       relief, coordinates, precision, check of measured points
+    solve, SolvedSurvey, Points   relief, coordinates, precision, check of measured points
     Taking, Measuring, ReadOptions   lenses, distances, precision, columns that `solve` is told
     georeference, Georeference   wall coordinates to world coordinates by control points
     match, Matches, MatchSettings   homologous points found automatically, with their precision

@@ -44,6 +44,7 @@ from .model.pair import Pair
 from .model.pair_media import PairMedia
 from .model.photo import Photo
 from .model.photo_set import PhotoSet, RankedPair
+from .model.points import Points
 from .model.relief_map import Quality, ReliefMap
 from .model.set_intersection import SetIntersection
 from .model.surface import FlatSurface, MapSurface, Surface
@@ -128,6 +129,7 @@ __all__ = [
     "Pinhole",
     "PlanePicks",
     "PointObservations",
+    "Points",
     "Progress",
     "ProjectOptions",
     "ProjectPhotos",

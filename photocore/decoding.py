@@ -26,6 +26,8 @@ _DAMAGE = re.compile(
     r"(JPEG data: (?!\d+ extraneous bytes before marker 0x(?!d\d))|Premature end"
     r"|TIFF_Error .*(?:scanline|strip|tile)).*"
 )
+#: What ends the data of a scan: no stuffed byte, no restart.
+_MARKER = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")
 #: So many zeros in a row are a hole in the data. [bytes]
 _LOST = 16
 #: A step in brightness of so many levels [0..255] where decoding resumed after so many groups of
@@ -44,10 +46,12 @@ def decoded(path: Path | str, data: ByteArray, flags: int) -> NDArray[Any]:
     """
     hole, cell = "", (0, 0)
     if _is_jpeg(data):
-        if data.tobytes().rfind(b"\xff\xd9") < len(data) // 2:
+        packed = data.tobytes()
+        # A film or zeros may follow the picture; its own end is where the markers lead.
+        if packed.rfind(b"\xff\xd9") < len(data) // 2 and not _has_end(packed):
             # OpenCV fills the rest with grey, silently.
             raise InputError(f"{path}: the photo is cut off (no end of image); copy it again.")
-        hole, cell = _hole(data.tobytes())
+        hole, cell = _hole(packed)
     with decoders_words() as words:
         try:
             image = cv2.imdecode(data, flags)
@@ -77,6 +81,20 @@ def refuse_damaged_jpeg(path: Path) -> None:
 
 def _is_jpeg(data: ByteArray) -> bool:
     return data[:2].tobytes() == b"\xff\xd8"
+
+
+def _has_end(data: bytes) -> bool:
+    """Whether the segments and scans of a JPEG lead to its end of image."""
+    at = 2
+    while data[at : at + 1] == b"\xff":
+        if data[at + 1 : at + 2] == b"\xd9":
+            return True
+        scan = data[at + 1 : at + 2] == b"\xda"
+        at += 2 + int.from_bytes(data[at + 2 : at + 4])
+        if scan:
+            marker = _MARKER.search(data, at)
+            at = marker.start() if marker else len(data)
+    return False
 
 
 def _shifted(image: NDArray[Any], cell: tuple[int, int]) -> str:

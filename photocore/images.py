@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photocore.arrays import ByteArray
+from photocore.colours import in_srgb
 from photocore.decoding import decoded, decoders_words, refuse_damaged_jpeg
 from photocore.errors import InputError
 from photocore.optional_photos import (
@@ -33,6 +34,7 @@ from photocore.output import atomic_path, check_ending
 from photocore.png_text import with_provenance
 from photocore.provenance import note
 from photocore.raster import RasterFile
+from photocore.remarks import remark
 from photocore.textfile import check_file
 
 ImageArray = NDArray[np.uint8] | NDArray[np.uint16]
@@ -41,9 +43,12 @@ ImageArray = NDArray[np.uint8] | NDArray[np.uint16]
 MAX_PIXELS = 400_000_000
 #: Larger photos are decoded some rows at a time, to hold them in memory once only.
 _BY_STRIPS = 60_000_000
+#: A 16-bit photo of no larger number holds 14 bits or fewer: industrial cameras, developed raw.
+_SHALLOW = 1 << 14
 #: Endings of the images that are written.
 WRITTEN = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
-_KNOWN = frozenset({"JPEG", "PNG", "TIFF", "MPO", "BMP", "WEBP", "HEIF", "AVIF"})
+#: What Pillow may take a file for (MPO as JPEG), whatever it is called: no other reader of its own.
+FORMATS = ("JPEG", "PNG", "TIFF", "BMP", "WEBP", "AVIF")
 #: Endings of photos that are read.
 READ = frozenset({*WRITTEN, ".webp", *HEIF_ENDINGS, *AVIF_ENDINGS, *RAW_ENDINGS})
 
@@ -119,16 +124,14 @@ def image_info(path: Path | str) -> ImageInfo:
     if path.suffix.lower() in RAW_ENDINGS:
         size, exif = raw_info(path)
         return _info_from_exif(path, size, 16, exif)
+    formats: tuple[str, ...] = FORMATS
     if path.suffix.lower() in HEIF_ENDINGS:
         open_heif(path)
+        formats = (*FORMATS, "HEIF")
     from PIL import Image, UnidentifiedImageError
 
     try:
-        with _pillow_without_size_limit(), Image.open(path) as image:
-            if image.format not in _KNOWN:
-                raise InputError(
-                    f"{path}: {image.format} images are not read; save it as JPEG, PNG or TIFF."
-                )
+        with _pillow_without_size_limit(), Image.open(path, formats=formats) as image:
             _check_mode(path, image.mode)
             bits = 16 if image.mode.startswith("I") else 8
             _check_size(path, image.size)  # Pillow decodes a PNG to look for its EXIF data
@@ -154,7 +157,9 @@ def read_image(path: Path | str, *, grey: bool = False) -> ImageArray:
     Returns
     -------
     image : ndarray, shape (h, w, 3) RGB or (h, w), uint8 or uint16
-        Alpha is dropped; 16 bit stays 16 bit.
+        Alpha is dropped; 16 bit stays 16 bit. Of 10, 12 or 14 bits in 16 the numbers are
+        multiplied by a power of two to fill them; 8-bit colours of another space (Display P3,
+        Adobe RGB) become those of sRGB.
 
     Raises
     ------
@@ -165,17 +170,24 @@ def read_image(path: Path | str, *, grey: bool = False) -> ImageArray:
     ending = info.path.suffix.lower()
     if ending in RAW_ENDINGS | HEIF_ENDINGS | AVIF_ENDINGS:
         stored = raw_pixels(info.path) if ending in RAW_ENDINGS else pillow_pixels(info.path)
+        stored = in_srgb(info.path, stored)
         image = cv2.cvtColor(stored, cv2.COLOR_RGB2GRAY) if grey and stored.ndim == 3 else stored
         return turn_upright(image, info.orientation)
-    if info.size[0] * info.size[1] > _BY_STRIPS and not grey:
+    tiff = ending in {".tif", ".tiff"}
+    of_bands = tiff and _is_of_bands(info.path)
+    if of_bands or (info.size[0] * info.size[1] > _BY_STRIPS and not grey):
         refuse_damaged_jpeg(info.path)
-        large = _read_by_strips(info)
-        if large is not None:
-            return turn_upright(large, info.orientation)
+        whole = _read_by_strips(info)
+        if of_bands and whole is None:
+            raise InputError(remark("photo.planar", of=path))
+        if whole is not None:
+            whole = _full_range(in_srgb(info.path, whole))
+            whole = cv2.cvtColor(whole, cv2.COLOR_RGB2GRAY) if grey else whole
+            return turn_upright(whole, info.orientation)
     flags = cv2.IMREAD_IGNORE_ORIENTATION | cv2.IMREAD_ANYDEPTH
     flags |= cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_ANYCOLOR
     data = np.fromfile(info.path, dtype=np.uint8)  # imread itself fails on some Windows paths
-    if info.path.suffix.lower() in {".tif", ".tiff"}:
+    if tiff:
         _hide_tiff_orientation(info.path, data)
     image = decoded(path, data, flags)
     if image.dtype not in (np.uint8, np.uint16):
@@ -186,7 +198,24 @@ def read_image(path: Path | str, *, grey: bool = False) -> ImageArray:
         for top in range(0, len(image), 512):
             part = image[top : top + 512]
             part[:] = cv2.cvtColor(part, cv2.COLOR_BGR2RGB)
-    return turn_upright(image, info.orientation)
+    return turn_upright(_full_range(in_srgb(info.path, image)), info.orientation)
+
+
+def _full_range(image: ImageArray) -> ImageArray:
+    """Multiply 10, 12 or 14 bits in 16 by a power of two: eight bits of them would be few greys."""
+    if image.dtype == np.uint16 and 0 < (top := int(image.max(initial=0))) < _SHALLOW:
+        image <<= np.uint16(16 - max(top.bit_length() + top.bit_length() % 2, 10))
+    return image
+
+
+def _is_of_bands(path: Path) -> bool:
+    """Whether OpenCV mixes the colours of a TIFF: one plane after the other, or times the alpha."""
+    import tifffile
+
+    with decoders_words(), tifffile.TiffFile(path) as tiff:
+        page: Any = tiff.pages[0]
+        planar = int(page.samplesperpixel) > 1 and int(page.planarconfig) == 2
+        return planar or (int(page.samplesperpixel) == 4 and int(page.photometric) == 2)
 
 
 def _read_by_strips(info: ImageInfo) -> ImageArray | None:

@@ -47,9 +47,10 @@ def pillow_pixels(path: Path) -> NDArray[np.uint8]:
     """Return the stored pixels of an image that Pillow decodes, RGB or grey."""
     from PIL import Image
 
-    with Image.open(path) as image:
+    kind = "HEIF" if path.suffix.lower() in HEIF_ENDINGS else "AVIF"
+    with Image.open(path, formats=(kind,)) as image:
         grey = image.mode in ("L", "1", "LA")
-        return np.asarray(image.convert("L" if grey else "RGB"))
+        return np.array(image.convert("L" if grey else "RGB"))
 
 
 def raw_info(path: Path) -> tuple[tuple[int, int], Any]:
@@ -73,7 +74,7 @@ def raw_info(path: Path) -> tuple[tuple[int, int], Any]:
         try:
             preview = raw.extract_thumb()
             if isinstance(preview.data, bytes):
-                exif = Image.open(io.BytesIO(preview.data)).getexif()
+                exif = Image.open(io.BytesIO(preview.data), formats=("JPEG",)).getexif()
                 exif.pop(274, None)  # it is developed upright
         except (rawpy.LibRawError, *NO_PREVIEW):
             exif = {}

@@ -236,6 +236,10 @@ class RasterWriter:
         if mask is not None:
             self._file.write_mask(np.asarray(mask, dtype=bool), window=window)
 
+    def tag(self, **tags: str) -> None:
+        """Add metadata that is known only when all is written."""
+        self._file.update_tags(**tags)
+
 
 @contextmanager
 def create_geotiff(

@@ -27,17 +27,23 @@ import pytest  # noqa: E402
 from hypothesis import settings  # noqa: E402
 
 from photocore import cli  # noqa: E402
-from tests import equipment  # noqa: E402
+from tests import equipment, turns  # noqa: E402
 
 # The same examples on every machine and in every run: a red test is then a change of the code.
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.load_profile("same")
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Choose which third of the slow tests is run."""
+    turns.choose(config)
+
+
 @pytest.hookimpl(tryfirst=True)  # before -m chooses
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what fixtures want; order tests as ``TEST_ORDER`` says: reversed, or a seed."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark what fixtures want, take turns; order as ``TEST_ORDER`` says: reversed, or a seed."""
     equipment.mark(items)
+    turns.leave_out(config, items)
     order = os.environ.get("TEST_ORDER")
     if order == "reversed":
         items.reverse()

@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from tests.page_commands import IN_PART, command_maker, shown_commands
+from tests.tables import each
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -32,7 +33,7 @@ def test_the_page_of_commands_is_up_to_date():
     assert written == command_maker().page(), "run: python docs/make_cli.py"
 
 
-@pytest.mark.parametrize(("program", "name", "command"), COMMANDS)
+@each(("program", "name", "command"), COMMANDS)
 def test_every_command_has_a_summary_an_example_and_described_options(program, name, command):
     assert command.short_help == GROUPS[program].summaries[name]
     assert f"{program} {name}" in (command.epilog or ""), "the epilog needs an example"
@@ -41,7 +42,7 @@ def test_every_command_has_a_summary_an_example_and_described_options(program, n
             assert parameter.help, f"{program} {name} {parameter.opts[0]} has no help"
 
 
-@pytest.mark.parametrize(("program", "name", "command"), COMMANDS)
+@each(("program", "name", "command"), COMMANDS)
 def test_every_command_explains_itself_outside_its_own_page(program, name, command):  # noqa: ARG001
     text = "".join(p.read_text(encoding="utf-8") for p in PAGES if p.name != "cli.md")
     assert f"{program} {name}" in text, f"no page but cli.md mentions {program} {name}"
@@ -69,7 +70,7 @@ def lines_shown():
     return found
 
 
-@pytest.mark.parametrize(("program", "name", "words"), lines_shown())
+@each(("program", "name", "words"), lines_shown())
 def test_command_lines_in_the_docs_are_understood(program, name, words, monkeypatch):
     """The program's own parser takes them: names, values and number of what is given."""
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"id\n1\n")))
@@ -83,7 +84,7 @@ def test_command_lines_in_the_docs_are_understood(program, name, words, monkeypa
         assert context.params
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+@each("page", PAGES, ids=lambda p: p.name)
 def test_links_between_pages_lead_somewhere(page):
     text = page.read_text(encoding="utf-8")
     for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text):

@@ -5,16 +5,15 @@ from __future__ import annotations
 import ast
 import tomllib
 
-import pytest
-
 from tests.planted_faults import FAULTS, ROOT
+from tests.tables import each
 
 
 def test_there_are_sixty_faults_and_none_is_named_twice():
     assert len({(fault.file, fault.right, fault.wrong) for fault in FAULTS}) == len(FAULTS) >= 60
 
 
-@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: f"{fault.file}: {fault.right}")
+@each("fault", FAULTS, ids=lambda fault: f"{fault.file}: {fault.right}")
 def test_a_fault_fits_the_code_once_and_leaves_what_can_be_read(fault):
     text = (ROOT / fault.file).read_text(encoding="utf-8")
     read = tomllib.loads if fault.file.endswith(".toml") else lambda code: ast.dump(ast.parse(code))

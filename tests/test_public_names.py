@@ -16,6 +16,7 @@ import pytest
 
 import bifocal
 import multimedia
+from tests.tables import each
 
 PACKAGES = [bifocal, multimedia]
 NAMES = [
@@ -50,7 +51,7 @@ def test_the_prompt_completes_public_names() -> None:
     assert prompt.complete("multimedia.radial_shift_r", 0) == "multimedia.radial_shift_ratio("
 
 
-@pytest.mark.parametrize(("package", "name"), NAMES)
+@each(("package", "name"), NAMES)
 def test_every_name_stands_in_the_table_of_contents(package, name: str) -> None:
     assert re.search(rf"\b{name}\b", package.__doc__)
     assert getattr(package, name).__doc__
@@ -65,7 +66,7 @@ def _types_in(hint: object) -> set[type]:
     return own.union(*map(_types_in, inside))
 
 
-@pytest.mark.parametrize(("package", "name"), NAMES)
+@each(("package", "name"), NAMES)
 def test_every_type_in_the_signature_of_a_name_of_the_contents_is_importable(package, name) -> None:
     value = getattr(package, name)
     topics = package.__doc__.split("What they take and give")[0]
@@ -118,7 +119,7 @@ def _described(text: str, name: str) -> bool:
     return re.search(rf"^(.*, )?\**{name}(,.*)?( : .*)?$", text, re.M) is not None
 
 
-@pytest.mark.parametrize(("package", "name"), NAMES)
+@each(("package", "name"), NAMES)
 def test_every_name_says_what_it_takes_and_gives(package, name: str) -> None:
     value = getattr(package, name)
     text = inspect.getdoc(value) or ""

@@ -10,12 +10,11 @@ from itertools import groupby
 from pathlib import Path
 from string import Formatter
 
-import pytest
-
 from bifocal.remarks import in_language, remark
 from photocore.errors import InputError
 from photocore.jsonfile import write_object
 from photocore.workbook.making.words import LANGUAGES
+from tests.tables import each
 
 CODE = {
     path: path.read_text(encoding="utf-8")
@@ -45,7 +44,7 @@ def said_of(section):
     return {one for text in CODE.values() for one in re.findall(rf"{stem}([\w{{}}' .]*)", text)}
 
 
-@pytest.mark.parametrize("section", SECTIONS)
+@each("section", SECTIONS)
 def test_a_remark_has_its_words_in_three_languages_with_the_same_blanks(section):
     for key in SECTIONS[section]:
         texts = remark.texts[key]
@@ -53,7 +52,7 @@ def test_a_remark_has_its_words_in_three_languages_with_the_same_blanks(section)
         assert all(blanks(texts[language]) == blanks(texts["en"]) for language in LANGUAGES), key
 
 
-@pytest.mark.parametrize("section", [section for section in SECTIONS if section != "word"])
+@each("section", [section for section in SECTIONS if section != "word"])
 def test_a_remark_is_known_wherever_it_stands(section):
     for key in SECTIONS[section]:
         texts, values = remark.texts[key], sample(remark.texts[key]["en"])
@@ -65,7 +64,7 @@ def test_a_remark_is_known_wherever_it_stands(section):
             assert in_language(f"pair.json: {told}", language) == f"pair.json: {words}"
 
 
-@pytest.mark.parametrize("section", [section for section in SECTIONS if section != "word"])
+@each("section", [section for section in SECTIONS if section != "word"])
 def test_a_remark_is_used(section):
     said = [re.split("[{']", one)[0] for one in said_of(section)]
     unused = [key for key in SECTIONS[section] if not key.split(".")[1].startswith(tuple(said))]
@@ -85,8 +84,8 @@ def test_what_holds_no_remark_stays_as_it_is():
     assert in_language(like_one, "de") == like_one
 
 
-@pytest.mark.parametrize("language", LANGUAGES)
-@pytest.mark.parametrize("section", [section for section in SECTIONS if section != "word"])
+@each("language", LANGUAGES)
+@each("section", [section for section in SECTIONS if section != "word"])
 def test_names_that_read_like_words_of_a_remark_stay_whole(section, language):
     for key in SECTIONS[section]:
         texts = remark.texts[key]

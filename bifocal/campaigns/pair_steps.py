@@ -19,7 +19,7 @@ from photocore.errors import InputError
 from photocore.textfile import file_name
 
 if TYPE_CHECKING:
-    from bifocal.model.points import SurveyPoints
+    from bifocal.model.points import Points
     from bifocal.orthophotos.ortho_workflow import OrthoTask
     from bifocal.survey.solved_survey import SolvedSurvey
 
@@ -364,7 +364,7 @@ def _drawing_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
     )  # fmt: skip
 
 
-def known_of(job: PairJob) -> dict[str, SurveyPoints]:
+def known_of(job: PairJob) -> dict[str, Points]:
     """Return the coordinates that the tables of a pair hold."""
     from bifocal.orientation.control_points import known_points
 
@@ -375,7 +375,7 @@ def known_of(job: PairJob) -> dict[str, SurveyPoints]:
     }
 
 
-def _points_to_draw(job: PairJob, *, solved: bool) -> dict[str, SurveyPoints]:
+def _points_to_draw(job: PairJob, *, solved: bool) -> dict[str, Points]:
     """Return what a drawing for CAD holds: known points where they are, and as they were solved."""
     from bifocal.files.point_tables import read_survey_points
 

@@ -14,7 +14,7 @@ from bifocal.model.grid import Bounds, Grid
 from bifocal.model.image import as_grey, as_photo
 from bifocal.model.interior_orientation import Interior
 from bifocal.model.photo_alone import PhotoAlone
-from bifocal.model.points import SurveyPoints
+from bifocal.model.points import Points
 from bifocal.model.surface import FlatSurface
 from bifocal.orientation import one_photo
 from bifocal.orientation.align_workflow import KnownLens, check_inside, interior_of_photo
@@ -218,12 +218,12 @@ def rectify_photo(
     return replace(_told(photo, ortho, relief, scale), delivery=done)
 
 
-def _drawn(control: Control | None) -> SurveyPoints | None:
+def _drawn(control: Control | None) -> Points | None:
     """Return control points as a drawing takes them."""
     if control is None:
         return None
     blank, sigma = ("",) * len(control.ids), control.sigma[:, 2]
-    return SurveyPoints(ids=control.ids, xyz=control.xyz, sigma_r=sigma, flags=blank, notes=blank)
+    return Points(ids=control.ids, xyz=control.xyz, sigma_r=sigma, flags=blank, notes=blank)
 
 
 def _oriented(

@@ -23,7 +23,7 @@ from photocore.options import Argument, Typed, declared
 from photocore.shared_options import JsonOption, OverwriteOption, RasterCogOption
 
 if TYPE_CHECKING:
-    from bifocal.model.points import SurveyPoints
+    from bifocal.model.points import Points
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +103,7 @@ def command(
     source = read_photos(pair)
     drawn = given["faces"]
     given["faces"] = faces_path(drawn, pair)
-    own: Path | SurveyPoints | None = points
+    own: Path | Points | None = points
     if relief is None and points is None and plane is None and is_workbook(pair):
         own = points_of(pair)
     breaklines = [line.split(",") for line in given.pop("breaklines")]

@@ -12,14 +12,14 @@ from bifocal.collimation.records import SurveyState
 from bifocal.collimation.shapes import OUTLINES, places_of
 from bifocal.files.exports import export_points
 from bifocal.model.pair import Pair
-from bifocal.model.points import PointLine, SurveyPoints
+from bifocal.model.points import PointLine, Points
 from bifocal.remarks import remark
 from photocore.errors import InputError
 
 
 def drawn_points(
     state: SurveyState, results: LiveResults | None, pair: Pair | None = None
-) -> tuple[SurveyPoints, tuple[PointLine, ...]]:
+) -> tuple[Points, tuple[PointLine, ...]]:
     """Return the solved points and the lines of a survey.
 
     Raises
@@ -49,7 +49,7 @@ def drawn_points(
     def number(value: float | None) -> float:
         return nan if value is None else value
 
-    return SurveyPoints(
+    return Points(
         ids=tuple(point.name for point, _ in solved),
         xyz=np.array([[number(row[key]) for key in ("X", "Y", "r")] for _, row in solved]),
         sigma_r=np.array([number(row["sigma_r"]) for _, row in solved]),

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bifocal.files.dxf import add_ellipse, add_text, layer_name, new_drawing, save_drawing
-from bifocal.model.points import PointLine, SurveyPoints
+from bifocal.model.points import PointLine, Points
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, not_negative
 from photocore.camera.similarity import Similarity, fit_similarity
@@ -42,7 +42,7 @@ UNCERTAIN_FLAGS = frozenset({"UNCERTAIN", "NADIR", "OFF-RADIAL", "CHECK"})
 
 def export_points(
     path: Path | str,
-    points: SurveyPoints,
+    points: Points,
     *,
     world: bool = False,
     order: str = "PNEZD",
@@ -57,7 +57,7 @@ def export_points(
     ----------
     path : path
         ``.dxf .ply .las .laz .csv .geojson .xlsx``
-    points : SurveyPoints
+    points : Points
         Points without coordinates are left out, and said so.
     world : bool
         E, N, H instead of X, Y, r.
@@ -85,7 +85,7 @@ def export_points(
     path = Path(path)
     ending = path.suffix.lower()
     drawn = (not_negative(ellipses, "ellipses"), world)
-    writers: dict[str, Callable[[Path, SurveyPoints, FloatArray], None]] = {
+    writers: dict[str, Callable[[Path, Points, FloatArray], None]] = {
         ".dxf": partial(_write_dxf, drawn=drawn, lines=lines),
         ".geojson": partial(_write_geojson, world=world),
         ".xlsx": _write_xlsx,
@@ -114,7 +114,7 @@ def export_points(
         uncertain = np.array([flag in UNCERTAIN_FLAGS for flag in points.flags], dtype=np.uint8)
         attributes = {
             key: values.astype(np.float32)
-            for key, values in _sigmas(points).items()
+            for key, values in points.sigmas.items()
             if np.isfinite(values).any() or key == "sigma_r"
         }
         write_cloud(
@@ -155,19 +155,9 @@ def write_shifts(
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-def _sigmas(points: SurveyPoints) -> dict[str, FloatArray]:
-    """Return the standard deviations as columns; NaN where unknown. [m]"""
-    blank = np.full((len(points), 3), np.nan)
-    xy = blank if points.sigma_xy is None else points.sigma_xy
-    world = blank if points.sigma_world is None else points.sigma_world
-    columns = {f"sigma_{axis}": xy[:, i] for i, axis in enumerate("XY")}
-    columns["sigma_r"] = points.sigma_r
-    return columns | {f"sigma_{axis}": world[:, i] for i, axis in enumerate("ENH")}
-
-
 def _write_dxf(
     path: Path,
-    points: SurveyPoints,
+    points: Points,
     coordinates: FloatArray,
     *,
     drawn: tuple[float, bool],
@@ -205,7 +195,7 @@ def _write_dxf(
 
 
 def _write_csv(
-    path: Path, points: SurveyPoints, coordinates: FloatArray, *, order: str, flavour: str,
+    path: Path, points: Points, coordinates: FloatArray, *, order: str, flavour: str,
     overwrite: bool,
 ) -> None:  # fmt: skip
     """Write a surveyor's point list without a heading line, comma-named order."""
@@ -224,41 +214,9 @@ def _write_csv(
     )  # fmt: skip
 
 
-def _write_geojson(
-    path: Path, points: SurveyPoints, coordinates: FloatArray, *, world: bool
-) -> None:
+def _write_geojson(path: Path, points: Points, coordinates: FloatArray, *, world: bool) -> None:  # noqa: ARG001
     """Write a FeatureCollection in the survey's own metres (a local frame, not longitudes)."""
-    ellipses = points.ellipses(world=world)
-    numbers = {
-        "relief": points.xyz[:, 2],
-        **_sigmas(points),
-        **{key: ellipses[:, i] for i, key in enumerate(_ELLIPSE)},
-    }
-    features = [
-        {
-            "type": "Feature",
-            "id": points.ids[i],
-            "geometry": {"type": "Point", "coordinates": place},
-            "properties": {
-                "id": points.ids[i],
-                **{
-                    key: float(values[i]) if np.isfinite(values[i]) else None
-                    for key, values in numbers.items()
-                },
-                "flag": points.flags[i],
-                "note": points.notes[i],
-            },
-        }
-        for i, place in enumerate(np.round(coordinates, 6).tolist())
-    ]
-    # GeoJSON knows only longitude and latitude; the older "crs" member says that these are not.
-    crs = {"type": "name", "properties": {"name": "local engineering frame, metres"}}
-    text = json.dumps({"type": "FeatureCollection", "crs": crs, "features": features}, indent=1)
-    path.write_text(text, encoding="utf-8")
-
-
-#: The error ellipse of one sigma: half axes [m], direction of the longer, clockwise from +Y [deg].
-_ELLIPSE = ("ellipse_a", "ellipse_b", "ellipse_azimuth")
+    path.write_text(json.dumps(points.to_geojson(world=world), indent=1), encoding="utf-8")
 
 
 #: World coordinates follow from those of the wall where they do to this. [m]
@@ -267,13 +225,13 @@ _EXACT = 1e-6
 _PLACED = "=w_{axis}+w_k*(w_{i}1*(B{row}-w_X)+w_{i}2*(C{row}-w_Y)+w_{i}3*(D{row}-w_Z))"
 
 
-def _write_xlsx(path: Path, points: SurveyPoints, coordinates: FloatArray) -> None:  # noqa: ARG001
+def _write_xlsx(path: Path, points: Points, coordinates: FloatArray) -> None:  # noqa: ARG001
     """Write all coordinates as a plain table, world coordinates as formulas where they can be."""
     from openpyxl import Workbook
 
     book = Workbook(write_only=True)
     sheet, results = book.create_sheet("Results"), dict[str, CellValue]()
-    sigmas, fit = _sigmas(points), _to_world(points)
+    sigmas, fit = points.sigmas, _to_world(points)
     sheet.append(["id", "X", "Y", "Z", "E", "N", "H", *sigmas, "flag", "note"])
     world = points.world if points.world is not None else np.full((len(points), 3), np.nan)
     for row, name in enumerate(points.ids, start=2):
@@ -293,7 +251,7 @@ def _write_xlsx(path: Path, points: SurveyPoints, coordinates: FloatArray) -> No
     finish_book(package, path, results={"Results": results})
 
 
-def _to_world(points: SurveyPoints) -> Similarity | None:
+def _to_world(points: Points) -> Similarity | None:
     """Return what all world coordinates follow from; None where no similarity gives them."""
     if points.world is None or not np.isfinite(points.world).all():
         return None

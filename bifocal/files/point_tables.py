@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.model.points import SurveyPoints
+from bifocal.model.points import Points
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
@@ -29,7 +29,7 @@ _COLUMNS = (
 )
 
 
-def read_survey_points(path: Path | str) -> tuple[SurveyPoints, tuple[str, ...]]:
+def read_survey_points(path: Path | str) -> tuple[Points, tuple[str, ...]]:
     """Return the points of a result, and remarks.
 
     Parameters
@@ -58,7 +58,7 @@ def read_survey_points(path: Path | str) -> tuple[SurveyPoints, tuple[str, ...]]
     cov_xy, cov_en = table.numbers("cov_XY"), table.numbers("cov_EN")
     if isinstance(book, SheetFile) and "cov_XY" not in table.present:
         cov_xy, cov_en = _mixed(book, table)
-    points = SurveyPoints(
+    points = Points(
         ids=tuple(table.texts("id")),
         xyz=np.column_stack([table.numbers(key) for key in "XYZ"]),
         world=world if np.isfinite(world).any() else None,

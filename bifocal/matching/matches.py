@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -70,6 +71,13 @@ class Matches:
             ids=tuple(table.texts("id")),
             kinds=tuple(table.texts("code")),
         )
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """Names and raw pixels by the keys that `bifocal.solve` takes. [px]"""
+        keys = (heading.split(" ")[0] for heading in _PIXELS)
+        pixels = dict(zip(keys, np.hstack([self.pixels1, self.pixels2]).T, strict=True))
+        return {"id": list(self.ids), **pixels, "code": list(self.kinds)}
 
     def write(self, path: Path | str, *, overwrite: bool = False) -> None:
         """Write the points as a text table that ``bifocal solve --pair`` takes.

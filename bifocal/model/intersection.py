@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bifocal import rays
 from bifocal.model.flags import FlagLimits, point_flags
+from bifocal.model.points import Points
 from photocore.arrays import FloatArray
 from photocore.camera.distortion import inverse_2x2
 
@@ -78,6 +79,20 @@ class MeasuredPoints:
         """Return the arrays by name."""
         values = {part.name: getattr(self, part.name) for part in fields(self)}
         return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
+
+    def to_points(self, ids: Sequence[str] | None = None) -> Points:
+        """Return them with names, by default P1, P2 ...: for tables, plots and exports."""
+        xyz, covariance = self.xyz.reshape(-1, 3), self.covariance.reshape(-1, 3, 3)
+        sigma = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+        return Points(
+            ids=tuple(ids or (f"P{number}" for number in range(1, len(xyz) + 1))),
+            xyz=xyz,
+            sigma_r=sigma[:, 2],
+            sigma_xy=sigma[:, :2],
+            cov_xy=covariance[:, 0, 1],
+            flags=self.flags,
+            notes=("",) * len(xyz),
+        )
 
     def reshaped(self, shape: tuple[int, ...]) -> Self:
         """Return the same points in arrays that begin with another shape."""

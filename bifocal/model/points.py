@@ -10,11 +10,14 @@ import numpy as np
 
 from photocore.arrays import BoolArray, FloatArray, as_floats
 from photocore.errors import InputError
+from photocore.plots import new_axes
 
 #: Columns of each array of a set of points; 0 for one number per point.
 _WIDTHS = {
     "xyz": 3, "world": 3, "sigma_r": 0, "sigma_xy": 2, "sigma_world": 3, "cov_xy": 0, "cov_en": 0
 }  # fmt: skip
+#: The error ellipse of one sigma: half axes [m], direction of the longer, clockwise from +Y [deg].
+_ELLIPSE = ("ellipse_a", "ellipse_b", "ellipse_azimuth")
 
 
 class PointLine(NamedTuple):
@@ -28,8 +31,8 @@ class PointLine(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SurveyPoints:
-    """Points of one survey.
+class Points:
+    """Points of a wall with their precision: what `solve`, `intersect` and tables give.
 
     Attributes
     ----------
@@ -101,11 +104,107 @@ class SurveyPoints:
         short = np.sqrt(np.maximum(middle - spread, (1e-5 * long) ** 2))
         return np.stack([long, short, direction], axis=-1)
 
-    def take(self, keep: BoolArray) -> SurveyPoints:
+    @property
+    def sigmas(self) -> dict[str, FloatArray]:
+        """The standard deviations by name, ``sigma_X`` to ``sigma_H``; NaN where unknown. [m]"""
+        blank = np.full((len(self), 3), np.nan)
+        xy = blank if self.sigma_xy is None else self.sigma_xy
+        world = blank if self.sigma_world is None else self.sigma_world
+        columns = {f"sigma_{axis}": xy[:, i] for i, axis in enumerate("XY")}
+        columns["sigma_r"] = self.sigma_r
+        return columns | {f"sigma_{axis}": world[:, i] for i, axis in enumerate("ENH")}
+
+    def to_dataframe(self) -> Any:
+        """Return a table with a row for each point, as pandas knows it. [m]
+
+        Columns ``X Y r``, of a georeferenced survey ``E N H``, the standard deviations that are
+        known, ``flag`` and ``note``; the index are the names.
+
+        Raises
+        ------
+        InputError
+            If pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise InputError("pandas is not installed: pip install pandas") from None
+        columns: dict[str, Any] = dict(zip(("X", "Y", "r"), self.xyz.T, strict=True))
+        if self.world is not None:
+            columns |= dict(zip("ENH", self.world.T, strict=True))
+        columns |= {key: values for key, values in self.sigmas.items() if np.isfinite(values).any()}
+        columns |= {"flag": self.flags, "note": self.notes}
+        return pandas.DataFrame(columns, index=pandas.Index(self.ids, name="id"))
+
+    def to_geojson(self, *, world: bool = False) -> dict[str, Any]:
+        """Return a GeoJSON FeatureCollection in metres (a local frame, not longitudes).
+
+        Parameters
+        ----------
+        world : bool
+            E, N, H in place of X, Y, r.
+
+        Raises
+        ------
+        InputError
+            If the points have no world coordinates, or one lacks its place.
+        """
+        coordinates = self.world if world else self.xyz
+        if coordinates is None:
+            raise InputError(f"{self.name}: has no world coordinates; leave out world=True.")
+        placed: BoolArray = np.asarray(np.isfinite(coordinates).all(axis=1))
+        ellipses = self.ellipses(world=world)
+        numbers = {
+            "relief": self.xyz[:, 2],
+            **self.sigmas,
+            **{key: ellipses[:, i] for i, key in enumerate(_ELLIPSE)},
+        }
+        features = [
+            {
+                "type": "Feature",
+                "id": self.ids[i],
+                "geometry": {"type": "Point", "coordinates": place} if placed[i] else None,
+                "properties": {
+                    "id": self.ids[i],
+                    **{
+                        key: float(values[i]) if np.isfinite(values[i]) else None
+                        for key, values in numbers.items()
+                    },
+                    "flag": self.flags[i],
+                    "note": self.notes[i],
+                },
+            }
+            for i, place in enumerate(np.round(coordinates, 6).tolist())
+        ]
+        # GeoJSON knows only longitude and latitude; the older "crs" member says these are not.
+        crs = {"type": "name", "properties": {"name": "local engineering frame, metres"}}
+        return {"type": "FeatureCollection", "crs": crs, "features": features}
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw the points on the wall, coloured by their relief, and return the axes.
+
+        Parameters
+        ----------
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; by default a new figure.
+
+        Raises
+        ------
+        InputError
+            If matplotlib is not installed.
+        """
+        if axes is None:
+            axes = new_axes()
+        drawn = axes.scatter(*self.xyz[:, :2].T, c=self.xyz[:, 2], s=12)
+        axes.set(xlabel="X [m]", ylabel="Y [m]", aspect="equal")
+        axes.figure.colorbar(drawn, ax=axes, label="r [m]")
+        return axes
+
+    def take(self, keep: BoolArray) -> Points:
         """Return the points where ``keep`` is true."""
         kept: dict[str, Any] = {name: getattr(self, name) for name in _WIDTHS}
         kept = {name: None if v is None else v[keep] for name, v in kept.items()}
-        return SurveyPoints(
+        return Points(
             ids=tuple(compress(self.ids, keep)),
             **kept,
             flags=tuple(compress(self.flags, keep)),

@@ -17,6 +17,7 @@ from bifocal.model.grid import Grid, Gridded
 from bifocal.model.surface import Fetch, MapSurface
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray, as_points, read_only
 from photocore.errors import InputError
+from photocore.plots import new_axes
 from photocore.raster import BLOCK
 
 
@@ -127,6 +128,27 @@ class ReliefMap(Gridded):
                     band = np.asarray(reader.read(*size, bands=[3])[:, :, 0], np.float64)
                     quality = np.clip(np.nan_to_num(band), 0, 255).astype(np.uint8)
             return replace(exact, sigma=sigma, quality=quality)
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw the relief over the wall, and return the axes.
+
+        Parameters
+        ----------
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; by default a new figure.
+
+        Raises
+        ------
+        InputError
+            If matplotlib is not installed.
+        """
+        if axes is None:
+            axes = new_axes()
+        xmin, ymin, xmax, ymax = self.grid.bounds
+        drawn = axes.imshow(self.r, extent=(xmin, xmax, ymin, ymax))
+        axes.set(xlabel="X [m]", ylabel="Y [m]")
+        axes.figure.colorbar(drawn, ax=axes, label="r [m]")
+        return axes
 
     def write(
         self, path: Path | str, *, overwrite: bool = False, tags: Mapping[str, str] | None = None

@@ -269,7 +269,7 @@ class PictureOptions:
     mask: bool = True
     """Leave empty what relief hides from the camera, or show what hides it."""
     fill: bool = False
-    """With --measured-only: close holes with the colours around them."""
+    """With --measured-only: close holes with texture from beside them."""
     complete: Annotated[bool, Typed(hidden=True)] = False
     """Whole pictures are the default."""
     match: bool = True

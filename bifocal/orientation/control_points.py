@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.model.points import SurveyPoints
+from bifocal.model.points import Points
+from bifocal.orientation.tuning import CONTROL
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
@@ -153,8 +154,8 @@ class SiteMeasures:
 def read_control(
     path: Path | str,
     *,
-    sigma: float,
-    sigma_plane: float | None,
+    sigma: float = 0.003,
+    sigma_plane: float | None = CONTROL.sigma_on_wall,
     unit: str = "",
     columns: str | None = None,
     unnamed: str = "",
@@ -252,13 +253,13 @@ def _names(texts: Sequence[str], before: str) -> list[str]:
 
 def known_points(
     path: Path, *, unit: str = "", columns: str | None = None, photos: int = 2
-) -> SurveyPoints:
+) -> Points:
     """Return the coordinates of a table of control or check points, NaN where it has none."""
     control = read_control(
         path, sigma=0.003, sigma_plane=None, unit=unit, columns=columns, photos=photos
     )
     blank = ("",) * len(control.ids)
-    return SurveyPoints(
+    return Points(
         ids=control.ids, xyz=control.xyz, sigma_r=control.sigma[:, 2], flags=blank, notes=blank,
         name=path.name,
     )  # fmt: skip

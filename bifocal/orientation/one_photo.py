@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -153,16 +154,20 @@ def by_rectangle(
         raise GeometryError(remark("rectify.sides", width=width, height=height))
 
     def proportions() -> str:
-        near, left = np.exp(np.linspace(-0.5, 0.5, 41)), []
-        for times in near:
-            control = replace(cornered(width * times, height), pixels1=interior.ideal(corners))
-            try:
-                left.append(_by_points(control, interior, sigma_pick).sigma0)
-            except (GeometryError, ConvergenceError):
-                left.append(SLIPS.most)
-        if min(left) > SLIPS.doubted:
+        def misfits(factors: FloatArray) -> FloatArray:
+            out = np.full(len(factors), SLIPS.most)
+            for k, times in enumerate(factors):
+                control = replace(cornered(width * times, height), pixels1=interior.ideal(corners))
+                with suppress(GeometryError, ConvergenceError):
+                    out[k] = _by_points(control, interior, sigma_pick).sigma0
+            return out
+
+        near = np.exp(np.linspace(-0.5, 0.5, 41))
+        close = near[misfits(near).argmin()] * np.exp(np.linspace(-0.025, 0.025, 21))
+        rest = misfits(close)
+        if rest.min() > SLIPS.doubted:
             return ""
-        best = float(near[int(np.argmin(left))])
+        best = float(close[rest == rest.min()].mean())
         about = {"width": width * best, "height": height / best, "at": height, "by": width}
         return remark("rectify.proportions", **about)
 

@@ -336,9 +336,11 @@ def _closing_gaps(
     gaps, free = ~first.inside | first.hidden, ~first.inside
     if (covered := place.covered(views[0], views[0])) is not None:
         free |= covered
+    things = empty.copy()
     for thing in moved:
         if thing.drawn_from_second and (mask := thing.on(grid)) is not None:
-            gaps, free = gaps | mask, free | mask
+            things |= mask
+    gaps, free = gaps | things, free | things
     if not gaps.any():
         return second
     measured = measured_on(surface, grid)
@@ -368,7 +370,8 @@ def _closing_gaps(
             wanted = gap
         second.image[box], second.inside[box] = seen.image, second.inside[box] | seen.inside
         second.hidden[box] |= seen.hidden
-        second.taken[box] |= wanted & sees
+        # Of a thing that moved the relief is no wall's, nor is what it would hide.
+        second.taken[box] |= wanted & (sees | (things[box] & seen.inside))
     return second
 
 

@@ -26,7 +26,7 @@ from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet, pair_or_set
 from bifocal.model.photos_of_set import PhotosOfSet
-from bifocal.model.points import SurveyPoints
+from bifocal.model.points import Points
 from bifocal.model.relief_map import Quality, measured_part
 from bifocal.model.surface import FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.contour_lines import contour_grid, contours
@@ -89,9 +89,9 @@ class DeliverTask:
         Empty: `default_title`.
     paper : str, optional
         ``A4`` to ``A0``; None: the smallest that holds the picture.
-    mark, control : Path or SurveyPoints, optional
+    mark, control : Path or Points, optional
         Points to draw, or their tables.
-    cad : mapping of str to SurveyPoints
+    cad : mapping of str to Points
         Of ``points``, ``control`` and ``check``: what the drawing for CAD holds though the sheet
         does not show it.
     layers : str
@@ -116,8 +116,8 @@ class DeliverTask:
     title: str = ""
     paper: str | None = None
     mark: Path | None = None
-    control: Path | SurveyPoints | None = None
-    cad: Mapping[str, SurveyPoints] = field(default_factory=dict)
+    control: Path | Points | None = None
+    cad: Mapping[str, Points] = field(default_factory=dict)
     layers: str = "language"
     sections: Sequence[str] = ()
     contours: float | None = None
@@ -431,7 +431,7 @@ def _measured(reader: RasterReader | None, surface: Surface) -> Surface:
     return FacedSurface(told, surface.faces) if isinstance(surface, FacedSurface) else told
 
 
-def _points(source: Path | SurveyPoints | None) -> tuple[SurveyPoints | None, tuple[str, ...]]:
+def _points(source: Path | Points | None) -> tuple[Points | None, tuple[str, ...]]:
     """Return the points of a table, and remarks."""
     if source is None:
         return None, ()

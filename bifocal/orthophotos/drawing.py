@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.model.grid import Grid
-from bifocal.model.points import SurveyPoints
+from bifocal.model.points import Points
 from bifocal.orthophotos.ortho_image import Source
 from bifocal.orthophotos.tuning import SHEET
 from photocore.arrays import BoolArray, FloatArray
@@ -166,8 +166,8 @@ class Drawing:
         Of the picture.
     scale : float
         1:scale.
-    points, control : SurveyPoints, optional
-    cad : mapping of str to SurveyPoints
+    points, control : Points, optional
+    cad : mapping of str to Points
         Of ``points``, ``control`` and ``check``: what only the drawing for CAD holds.
     contours : tuple of Contour
     sections : tuple of Section
@@ -188,9 +188,9 @@ class Drawing:
     kind: str = "ortho"
     grid: Grid
     scale: float
-    points: SurveyPoints | None = None
-    control: SurveyPoints | None = None
-    cad: Mapping[str, SurveyPoints] = field(default_factory=dict)
+    points: Points | None = None
+    control: Points | None = None
+    cad: Mapping[str, Points] = field(default_factory=dict)
     contours: tuple[Contour, ...] = ()
     sections: tuple[Section, ...] = ()
     notes: tuple[str, ...] = field(default=())

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.files.dxf import add_text, dashed, new_drawing, save_drawing, turned
-from bifocal.model.points import SurveyPoints
+from bifocal.model.points import Points
 from bifocal.orthophotos.contour_lines import contour_labels
 from bifocal.orthophotos.drawing import TABLES, Drawing, PrintSheet, Section
 from bifocal.orthophotos.dxf_canvas import DxfCanvas
@@ -144,7 +144,7 @@ def _lay_out(document: Any, drawing: Drawing, sheet: PrintSheet) -> None:
     SheetMargins(DxfCanvas(layout), drawing, sheet, within=False).draw()
 
 
-def _points(model: Any, points: SurveyPoints | None, layer: str, height: float) -> None:
+def _points(model: Any, points: Points | None, layer: str, height: float) -> None:
     if points is None:
         return
     for name, place in zip(points.ids, points.xyz.tolist(), strict=True):

@@ -6,9 +6,10 @@ import cv2
 import numpy as np
 
 from bifocal.model.image import ImageArray
-from bifocal.orthophotos.ortho_image import Source
+from bifocal.orthophotos.ortho_image import Source, shows
 from bifocal.orthophotos.pull_push import fill_holes
 from bifocal.orthophotos.tuning import HOLES
+from bifocal.orthophotos.visibility import parts_of
 from photocore.arrays import BoolArray, ByteArray, Float32Array, IntArray
 
 
@@ -18,18 +19,21 @@ def close_holes(
 ) -> None:  # fmt: skip
     """Fill holes of a window with texture, in place; those of more than ``largest`` [m2] white.
 
-    Texture is a copy of what lies beside, shifted to where the rim fits best, and levelled along
-    the rim. It comes from what lies no farther out than the hole: that is what goes on behind.
+    The fringe of a large one, narrower than `HOLES.narrow`, takes texture, too: a ragged outline
+    would tell of the mask, not of the wall. Texture is a copy of what lies beside, shifted to where
+    the rim fits best, and levelled along the rim. It comes from what lies no farther out than the
+    hole: that is what goes on behind.
     """
-    _, label, stats, _ = cv2.connectedComponentsWithStats(holes.astype(np.uint8), connectivity=8)
-    for number in range(1, len(stats)):
-        left, top, width, height, area = stats[number]
-        if area * gsd**2 > largest:
-            part = np.s_[top : top + height, left : left + width]
-            inside = label[part] == number
-            image[part][inside] = np.iinfo(image.dtype).max
-            source[part][inside] = Source.NEITHER
-            continue
+    side = int(HOLES.narrow / gsd) | 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    large = parts_of(holes, largest / gsd**2).astype(np.uint8)
+    # What the fringe leaves of one may be a crumb.
+    white = parts_of(cv2.morphologyEx(large, cv2.MORPH_OPEN, disc) > 0, largest / 2 / gsd**2)
+    image[white] = np.iinfo(image.dtype).max
+    source[white] = Source.NEITHER
+    rest = (holes & ~white).astype(np.uint8)
+    _, label, stats, _ = cv2.connectedComponentsWithStats(rest, connectivity=8)
+    for number, (left, top, width, height, _) in enumerate(stats[1:].tolist(), start=1):
         _copy_texture(image, source, label, number, (left, top, width, height), relief, gsd)
 
 
@@ -40,7 +44,7 @@ def _copy_texture(
     """Fill one hole, in place; where nothing around fits in, with the colours at its rim."""
     part = grown(box, HOLES.rim, label.shape)
     hole = label[part] == number
-    known = (source[part] > Source.NONE) & (source[part] != Source.NEITHER)
+    known = shows(source[part])
     # A hole that goes on as another part is no rim.
     rim = known & (relief[part] < np.median(relief[part][hole]) + np.float32(HOLES.before))
     if np.count_nonzero(rim) < HOLES.fewest:
@@ -52,7 +56,7 @@ def _copy_texture(
     around = grown(box, HOLES.rim + reach, label.shape)
     copied = None
     if hole.size < HOLES.most:
-        copied = _best_copy(image[around], source[around] > Source.NONE, colours, hole, rim)
+        copied = _best_copy(image[around], shows(source[around]), colours, hole, rim)
     level = colours.astype(np.float32) - (0 if copied is None else copied)
     filled = fill_holes(level, rim, hole)[0] + (0 if copied is None else copied)
     limit = np.iinfo(image.dtype).max

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -15,7 +16,7 @@ from bifocal.model.surface import Surface, measured_on
 from bifocal.orthophotos.rectify import SourcePhoto
 from bifocal.orthophotos.tuning import MOVED
 from bifocal.orthophotos.visibility import hidden_from, tidied
-from photocore.arrays import BoolArray, ByteArray, Float32Array
+from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -78,6 +79,7 @@ def moved_things(
     second = _in_tones_of(first, second, both)
     off = np.where(both, np.abs(first - second).mean(axis=-1), np.float32(0))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
+    strangeness = _Strangeness.to(first[both & (off < MOVED.rim)])
     core = _opened(off > MOVED.core, disc)
     near = _opened((off > MOVED.rim) & ~(measured & (off < MOVED.core)), disc)
     near = cv2.morphologyEx(near.astype(np.uint8), cv2.MORPH_CLOSE, disc)
@@ -98,6 +100,9 @@ def moved_things(
         if known[full > 0].mean() > MOVED.measured or _likeness(one, other, full) > MOVED.likeness:
             continue
         share = _share_of_edges(one, other, full, common > 0)
+        # Of the wall are the colours of the wall: what is stranger to it is the thing.
+        stranger = strangeness(one, full) - strangeness(other, full)
+        share += MOVED.strange * stranger
         if share < 1 - MOVED.sure:
             continue
         mask = cv2.dilate(full, disc) > 0
@@ -130,6 +135,23 @@ def _in_tones_of(first: Float32Array, second: Float32Array, both: BoolArray) -> 
     return out
 
 
+class _Strangeness(NamedTuple):
+    """How rare colours are on a wall."""
+
+    rarity: FloatArray
+
+    @classmethod
+    def to(cls, colours: Float32Array) -> _Strangeness:
+        """Return it for colours of the wall, shape (n, bands)."""
+        count = np.histogramdd(colours, bins=8, range=[(0, 256)] * colours.shape[1])[0] + 1.0
+        return cls(-np.log(count / count.sum()))
+
+    def __call__(self, image: Float32Array, where: ByteArray) -> float:
+        """Return the mean rarity of an image's colours at some pixels. [nats]"""
+        cells = np.clip(image[where > 0] / 32, 0, 7).astype(int)
+        return float(self.rarity[tuple(cells.T)].mean())
+
+
 def _opened(mask: BoolArray, disc: ByteArray) -> BoolArray:
     return cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, disc) > 0
 
@@ -153,7 +175,8 @@ def _likeness(one: Float32Array, other: Float32Array, full: ByteArray) -> float:
     sides = (edge,) * 4
     wide, whole = (cv2.copyMakeBorder(i, *sides, cv2.BORDER_REPLICATE) for i in (one, other))
     best = []
-    for row, column in np.argwhere(full[:: half + 1, :: half + 1]) * (half + 1):
+    step = max(half + 1, math.isqrt(int(full.sum()) // MOVED.blocks))
+    for row, column in np.argwhere(full[::step, ::step]) * step:
         below, right = row + reach, column + reach
         block = whole[below : below + MOVED.block, right : right + MOVED.block]
         around = wide[row : row + 2 * edge + 1, column : column + 2 * edge + 1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, fields
@@ -27,7 +28,7 @@ from bifocal.model.pair import Pair
 from bifocal.model.photo_alone import PhotoAlone
 from bifocal.model.photo_set import PhotoSet
 from bifocal.model.photos_of_set import PhotosOfSet
-from bifocal.model.points import SurveyPoints
+from bifocal.model.points import Points
 from bifocal.model.relief_map import measured_part, told_pixels
 from bifocal.model.surface import EVERYWHERE, FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.compose import choose_grid, render
@@ -60,7 +61,7 @@ class OrthoTask:
     ----------
     relief : Path, optional
         Relief map; else ``points``, else the plane ``r = plane``.
-    points : Path or SurveyPoints, optional
+    points : Path or Points, optional
         Points, or the workbook or table that holds them.
     breaklines : sequence of sequences of str
         Ids of points along edges.
@@ -87,7 +88,7 @@ class OrthoTask:
     """
 
     relief: Path | None = None
-    points: Path | SurveyPoints | None = None
+    points: Path | Points | None = None
     breaklines: Sequence[Sequence[str]] = ()
     plane: float = 0.0
     faces: Faces | Path | None = None
@@ -175,6 +176,8 @@ def make_ortho(
             )  # fmt: skip
             if counts[0] == total and not hidden:
                 raise InputError(remark("ortho.nothing_in_common"))
+            basis = _basis(counts, flat=isinstance(beneath(surface), FlatSurface))
+            writer.tag(BIFOCAL_BASIS=json.dumps({key: round(v, 4) for key, v in basis.items()}))
     shares = {source.name.lower(): float(counts[source]) / total for source in Source}
     if isinstance(pair, PhotosOfSet):
         for number, photo in enumerate(pair.photos, start=OF_SET + 1):
@@ -183,7 +186,6 @@ def make_ortho(
     for thing in moved:
         words = "ortho.moved" if thing.drawn_from_second else "ortho.occluder"
         notes.append(remark(words, x=thing.place[0], y=thing.place[1], area=thing.area))
-    basis = _basis(counts, flat=isinstance(beneath(surface), FlatSurface))
     if task.relief and basis["plane"] > PIXELS.rectified:
         notes.append(remark("ortho.rectified", share=basis["plane"]))
     notes += [] if isinstance(pair, PhotoAlone | PhotosOfSet) else _advice(shares, task)
@@ -289,7 +291,7 @@ def open_surface(
 
 
 def _triangles(
-    source: Path | SurveyPoints, breaklines: Sequence[Sequence[str]]
+    source: Path | Points, breaklines: Sequence[Sequence[str]]
 ) -> tuple[TriangleSurface, tuple[str, ...]]:
     """Return the surface through the useful points of a table, and remarks."""
     points, notes = survey_points_of(source)
@@ -317,9 +319,9 @@ def _triangles(
         return TriangleSurface(used.xyz, lines), tuple(remarks)
 
 
-def survey_points_of(source: Path | SurveyPoints) -> tuple[SurveyPoints, tuple[str, ...]]:
+def survey_points_of(source: Path | Points) -> tuple[Points, tuple[str, ...]]:
     """Return points as they are, or those of a table, and remarks."""
-    return (source, ()) if isinstance(source, SurveyPoints) else read_survey_points(source)
+    return (source, ()) if isinstance(source, Points) else read_survey_points(source)
 
 
 def planned_grid(pair: Pair, surface: Surface, task: OrthoTask) -> Grid:

@@ -55,13 +55,19 @@ class MovedTuning:
     #: Where more of it was measured both photos show one thing.
     measured: float = 0.6
     #: Where half of the blocks correlate by more, too: it is mirrored, or misplaced.
-    likeness: float = 0.5
+    #: Evidence: castle_B: panes and displaced ornaments 0.77 and more, a parked machine 0.55.
+    likeness: float = 0.65
     #: Side of the blocks. [px]
     block: int = 15
+    #: So many of them are enough, about.
+    blocks: int = 100
     #: How far they are sought. [px]
     reach: int = 5
     #: Blocks of less spread show nothing. [of 255]
     contrast: float = 6.0
+    #: What a nat of rarity of its colours on the wall counts beside that share.
+    #: Evidence: castle_B's machine, whose edges alone do not decide (0.44).
+    strange: float = 0.25
     #: Share of the edges that says in which photo the thing is.
     #: Evidence: castle_A's machine on good relief 0.7 and more, on bad 0.35 to 0.59.
     sure: float = 0.65
@@ -73,6 +79,8 @@ class HolesTuning:
 
     #: Larger holes stay paper white. [m2]
     largest: float = 0.05
+    #: But for their fringe, parts of them narrower than this. [m]
+    narrow: float = 0.06
     #: Breadth of the rim at which a copy must fit. [px]
     rim: int = 6
     #: What stands this much before the hole is no part of its rim. [m]
@@ -82,7 +90,7 @@ class HolesTuning:
     #: How far around a hole texture is sought, at least. [m]
     reach: float = 0.25
     #: Holes in larger windows take the colours at their rim. [px]
-    most: int = 40_000
+    most: int = 6_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -490,3 +490,11 @@ def tidied(hidden: BoolArray, side: int = 3) -> BoolArray:
     pinhole = stats[:, cv2.CC_STAT_AREA] < TIDYING.least_area
     pinhole[0] = False
     return solid | np.asarray(pinhole[label])
+
+
+def parts_of(mask: BoolArray, least: float) -> BoolArray:
+    """Return the parts of a mask that have so many pixels."""
+    _, label, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    keep = stats[:, cv2.CC_STAT_AREA] >= least
+    keep[0] = False
+    return np.asarray(keep[label])

@@ -14,6 +14,7 @@ from bifocal.model.surface import FlatSurface, MapSurface, Surface, measured_on
 from bifocal.orthophotos.ortho_image import Source
 from bifocal.orthophotos.pull_push import membrane
 from bifocal.orthophotos.tuning import WHOLE
+from bifocal.orthophotos.visibility import parts_of
 from photocore.arrays import BoolArray, ByteArray, Float32Array
 
 
@@ -156,13 +157,13 @@ def _kept(
     least = WHOLE.broad / gsd**2
     side = int(WHOLE.around / gsd) | 1
     dense = cv2.blur(told.astype(np.float32), (side, side)) >= WHOLE.dense
-    sure = told & (dense | _in_parts(told & even, least))
+    sure = told & (dense | parts_of(told & even, least))
     if not sure.any():
         return known
     away = np.where(known, np.abs(relief - membrane(relief, sure)) * slope, np.float32(0))
     rest = known & ~sure
     far = rest & (cv2.medianBlur(away.astype(np.float32), 5) > bound)
-    return sure | _in_parts(rest & even, least) | _in_parts(far, WHOLE.piece / gsd**2)
+    return sure | parts_of(rest & even, least) | parts_of(far, WHOLE.piece / gsd**2)
 
 
 def _even(relief: Float32Array, slope: Float32Array) -> BoolArray:
@@ -171,11 +172,3 @@ def _even(relief: Float32Array, slope: Float32Array) -> BoolArray:
     known, far = np.isfinite(relief), np.float32(9e9)
     high = cv2.dilate(np.where(known, relief, -far), square)
     return (high - cv2.erode(np.where(known, relief, far), square)) * slope < WHOLE.even
-
-
-def _in_parts(mask: BoolArray, least: float) -> BoolArray:
-    """Return the parts of a mask that have so many pixels."""
-    _, label, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
-    keep = stats[:, cv2.CC_STAT_AREA] >= least
-    keep[0] = False
-    return np.asarray(keep[label])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import compress
@@ -162,6 +163,9 @@ class PairContent:
     ortho : (picture, bounds) or None
     ortho_gsd : float
         Pixel of the orthophoto. [m]
+    ortho_basis : mapping of str to float
+        Parts of it on measured and interpolated relief, on the plane, and seen by neither photo;
+        empty where the file does not say.
     """
 
     task: ReportTask
@@ -173,6 +177,7 @@ class PairContent:
     relief: ReliefMap | None
     ortho: tuple[ByteArray, Bounds] | None
     ortho_gsd: float
+    ortho_basis: Mapping[str, float] = field(default_factory=dict)
     of_set: PhotoSet | None = None
 
     @property
@@ -297,6 +302,7 @@ def read_content(source: Path, task: ReportTask, *, pictures: bool = True) -> Pa
         relief=None if task.relief is None else _relief(task.relief),
         ortho=ortho,
         ortho_gsd=gsd,
+        ortho_basis={} if task.ortho is None else _basis(task.ortho),
     )
 
 
@@ -334,6 +340,13 @@ def _photos(source: Pair | PhotoSet) -> tuple[ReportedPhoto, ...]:
             ReportedPhoto(photo=photo, picture=picture, size=(width, height), reduction=reduction)
         )
     return tuple(photos)
+
+
+def _basis(path: Path) -> dict[str, float]:
+    """Return what parts of an orthophoto rest on; empty where the file does not say."""
+    with RasterReader(path) as reader:
+        basis: dict[str, float] = json.loads(reader.tags.get("BIFOCAL_BASIS", "{}"))
+        return basis
 
 
 def ortho_thumbnail(path: Path, *, side: int = SIDE) -> tuple[tuple[ByteArray, Bounds], float]:

@@ -17,7 +17,7 @@ import numpy as np
 from bifocal.files.point_tables import read_survey_points
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.pair import Pair
-from bifocal.model.points import SurveyPoints
+from bifocal.model.points import Points
 from bifocal.model.relief_map import ReliefMap
 from bifocal.model.surface import MapSurface
 from bifocal.orthophotos.shading import colour_limits, shaded
@@ -109,7 +109,7 @@ class _Shown:
     photos: list[tuple[str, ByteArray, float]]
     ortho: tuple[ByteArray, Bounds] | None
     relief: ReliefMap | None
-    points: SurveyPoints | None
+    points: Points | None
     pair: Pair
 
     @classmethod

@@ -58,6 +58,8 @@ def pair_blocks(content: PairContent, say: Words) -> Iterator[Block]:
         draw = partial(figures.draw_ortho, content=content)
         ratio = figures.ratio_of(content.ortho[1])
         caption = say("overview_caption", gsd=millimetres(content.ortho_gsd))
+        if content.ortho_basis:
+            caption += " " + say("overview_basis", **content.ortho_basis)
         yield Picture(draw=draw, ratio=ratio, caption=caption)
     yield from _geometry(content, say)
     yield from lens_blocks(content, say)

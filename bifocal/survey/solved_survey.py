@@ -11,6 +11,7 @@ import numpy as np
 
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
+from bifocal.model.points import Points
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.orientation_check import OrientationCheck
 from bifocal.survey.reference import CheckResult, Georeference
@@ -163,3 +164,28 @@ class SolvedSurvey:
     def world_sigma(self) -> FloatArray:
         """Standard deviations of E, N, H, shape (n, 3); NaN without control points. [m]"""
         return self.placed.sigma
+
+    def to_points(self) -> Points:
+        """Return what was solved as points for tables, plots, relief, exports and drawings."""
+        table, used = self.table, self.points.use
+        covariance, world = table.covariance, self.georeference
+        mixed, mixed_world = None, None
+        if covariance is not None:
+            mixed = covariance[:, 0, 1]
+            if world is not None:
+                placed = self.placed.covariance
+                mixed_world = None if placed is None else placed[:, 0, 1]
+        points = Points(
+            ids=table.ids,
+            xyz=table.xyz,
+            world=None if world is None else self.world,
+            sigma_r=table["sigma_r"],
+            flags=table.flags,
+            notes=self.points.note,
+            sigma_xy=np.stack([table["sigma_X"], table["sigma_Y"]], axis=-1),
+            sigma_world=None if world is None else self.world_sigma,
+            cov_xy=mixed,
+            cov_en=mixed_world,
+            name=self.source.name,
+        )
+        return points.take(used)

@@ -84,9 +84,7 @@ def write_result(
     if ending not in (".xlsx", ".xlsm"):
         raise InputError(f"{path}: results are written as .xlsx, .xlsm or .csv.")
     if solution.photos is not None:
-        from bifocal.workbook.pair_workflow import survey_points  # late: it reads photos
-
-        said = export_points(path, survey_points(solution), overwrite=overwrite)
+        said = export_points(path, solution.to_points(), overwrite=overwrite)
         return " ".join([remark("survey.set_as_values", count=len(solution.photos)), *said])
     if len(solution.table) > MOST_ROWS:
         about = {"count": len(solution.table), "name": path.with_suffix(".csv").name}

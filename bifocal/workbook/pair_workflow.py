@@ -12,10 +12,9 @@ from bifocal.model.orientation_precision import of_distances
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.model.photo_set import PhotoSet, pair_or_set
-from bifocal.model.points import SurveyPoints
+from bifocal.model.points import Points
 from bifocal.remarks import remark
 from bifocal.survey.setup import SurveySetup
-from bifocal.survey.solved_survey import SolvedSurvey
 from bifocal.workbook.reading.reader import read_survey
 from bifocal.workbook.sources import BOOKS, described_pair
 from bifocal.workbook.workflow import solve
@@ -227,39 +226,13 @@ def _corrected(photo: Photo, matrix: FloatArray | None) -> FloatArray:
     return np.asarray(scale @ matrix @ np.linalg.inv(scale) @ photo.plane_from_pixel)
 
 
-def survey_points(solution: SolvedSurvey) -> SurveyPoints:
-    """Return what was solved as points for relief, exports and drawings."""
-    table, used = solution.table, solution.points.use
-    covariance, world = table.covariance, solution.georeference
-    mixed, mixed_world = None, None
-    if covariance is not None:
-        mixed = covariance[:, 0, 1]
-        if world is not None:
-            placed = solution.placed.covariance
-            mixed_world = None if placed is None else placed[:, 0, 1]
-    points = SurveyPoints(
-        ids=table.ids,
-        xyz=table.xyz,
-        world=None if world is None else solution.world,
-        sigma_r=table["sigma_r"],
-        flags=table.flags,
-        notes=solution.points.note,
-        sigma_xy=np.stack([table["sigma_X"], table["sigma_Y"]], axis=-1),
-        sigma_world=None if world is None else solution.world_sigma,
-        cov_xy=mixed,
-        cov_en=mixed_world,
-        name=solution.source.name,
-    )
-    return points.take(used)
-
-
 def is_survey(path: Path | str) -> bool:
     """Tell whether a workbook is taken as a pair: it states distances and names its photos."""
     setup = read_survey(path).setup
     return None not in (setup.taking.d1, setup.taking.d2) and bool(setup.photo1 and setup.photo2)
 
 
-def points_of(path: Path | str) -> SurveyPoints | None:
+def points_of(path: Path | str) -> Points | None:
     """Return the points of a survey workbook, solved as its set-up says; None where it has none.
 
     Raises
@@ -269,4 +242,4 @@ def points_of(path: Path | str) -> SurveyPoints | None:
     """
     if not len(read_survey(path).points):
         return None
-    return survey_points(solve(path))
+    return solve(path).to_points()

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from bifocal.matching.matches import Matches
 from bifocal.model.lens import Lens
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
@@ -23,7 +24,7 @@ from photocore.errors import GeometryError, InputError
 from photocore.jsonfile import read_object
 
 Lists = tuple[Path | str, Path | str]
-Source = Path | str | PointObservations | SurveyInput | Mapping[str, Any] | Lists
+Source = Path | str | PointObservations | SurveyInput | Matches | Mapping[str, Any] | Lists
 #: Files that are workbooks, and so no pair files.
 BOOKS = (".xlsx", ".xlsm", ".ods")
 
@@ -40,6 +41,8 @@ def measured(source: Source, options: ReadOptions, unit: str | None) -> tuple[Su
             remarks=tuple(left_over(first, second)),
         )
         return survey, first.file
+    if isinstance(source, Matches):
+        source = source.columns
     if isinstance(source, Mapping):
         source = PointObservations.from_columns(source)
     if isinstance(source, PointObservations):

@@ -40,12 +40,12 @@ def solve(
 
     Parameters
     ----------
-    source : path, mapping, PointObservations, SurveyInput or tuple of two paths
+    source : path, mapping, Matches, PointObservations, SurveyInput or tuple of two paths
         A survey workbook or table (``.xlsx .xlsm .ods .csv``), or columns by key: ``id`` and
         ``x1 y1 x2 y2`` [mm or px], or ``s1 s2`` [mm] and ``theta`` [deg], or ``col1 row1 col2
         row2`` [px], of a set of photos more; each of shape (n,), NaN where blank. Two paths: the
         picks of photo 1 and of photo 2 (`bifocal.workbook.reading.pick_lists.read_picks`), joined
-        by name.
+        by name. What `bifocal.match` gives goes with its ``pair``.
     pair : Pair, PhotoSet or path, optional
         Pair, set of photos or the file of either, for raw pixels, or a survey workbook whose
         set-up, check and control points are taken; default the workbook's own set-up.

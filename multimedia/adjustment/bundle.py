@@ -148,9 +148,11 @@ def prepare(project: Project, unknowns: Unknowns) -> tuple[Bundle, tuple[str, ..
     given = [place[control.ids[k]] for k in keep]
     points[given], sigma[given] = control.xyz[keep], control.sigma[keep]
     for plate, name in enumerate(unknowns.plates):
-        on = [place[i] for i, g in zip(control.ids, control.groups, strict=True) if g == name]
+        on = [place[control.ids[k]] for k in keep if control.groups[k] == name]
         if len(on) < 3:
-            raise InputError(f"plates: {name!r} has {len(on)} object points, at least 3 needed.")
+            raise InputError(
+                f"plates: {name!r} has {len(on)} object points in the images, at least 3 needed."
+            )
         plate_of[on] = plate
     local = np.where(plate_of[:, None] >= 0, points, 0.0)
     movable = _movable(unknowns, points, sigma, plate_of)

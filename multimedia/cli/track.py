@@ -44,7 +44,8 @@ class TrackCommand:
     """Cameras that must have seen a particle; with 2, many are by chance."""
     step: Annotated[float | None, Typed(POSITIVE)] = None
     """Largest displacement between frames where nothing is known of a velocity [unit of the
-    project]. [default: half the mean distance between particles]"""
+    project].  [default: half the mean distance between particles, more where that links by chance
+    only]"""
     change: Annotated[float | None, Typed(POSITIVE)] = None
     """Largest distance from where its velocity predicts a particle [unit of the
     project].  [default: 3.5 times the median of those found]"""
@@ -67,7 +68,8 @@ def command(options: TrackCommand) -> None:
     In every frame targets belong together where their rays through glass and water meet, as for
     `multimedia particles`; how many come by chance is counted. A particle is then sought where its
     velocity predicts it, by what fits best in four frames; one that is new, within half the mean
-    distance of the particles. It may be missing in some frames.
+    distance of the particles, and farther where that links by chance only. It may be missing in
+    some frames. How many points would be in tracks by chance is counted, too.
 
     Velocities are slopes of parabolas through five points of a track, with their standard
     deviations; vectors that differ from those around (normalised median test) are marked, not
@@ -95,6 +97,7 @@ def command(options: TrackCommand) -> None:
     speed = np.linalg.norm(tracks.velocity, axis=1)
     sizes = np.bincount(tracks.track)
     sigma, own = np.median(tracks.sigma, axis=0), np.nanmedian(tracks.velocity_sigma, axis=0)
+    lost = tracks.particles - len(tracks.track)
     data = {
         "frames": [found.frames[0], found.frames[-1]], "particles": tracks.particles,
         "tracks": tracks.count, "points": len(tracks.track),
@@ -103,7 +106,8 @@ def command(options: TrackCommand) -> None:
         "median_speed": float(np.nanmedian(speed)), "speed_unit": speed_unit,
         "median_sigma": sigma.tolist(), "median_velocity_sigma": own.tolist(),
         "differ": int(tracks.outlier.sum()), "particles_tested": found.found,
-        "by_chance_at_most": found.chance, "out": options.out, "folder": options.folder,
+        "by_chance_at_most": found.chance, "in_no_track": lost,
+        "in_tracks_by_chance": tracks.by_chance, "out": options.out, "folder": options.folder,
     }  # fmt: skip
     rows = [
         ("frames", f"{found.frames[0]} to {found.frames[-1]}"),
@@ -111,6 +115,8 @@ def command(options: TrackCommand) -> None:
                       f"{found.chance:.0f}"),
         ("tracks", f"{tracks.count} of {len(tracks.track)} points, {np.median(sizes):.0f} the "
                    f"median, {sizes.max()} the longest"),
+        ("in no track", f"{lost} particles, {lost / tracks.particles:.0%}; by chance in tracks "
+                        f"{tracks.by_chance}"),
         (f"sought within [{length}]", f"{tracks.change:.3g} of the prediction, {tracks.step:.3g} "
                                       "where there is none"),
         ("image coordinates [px]", f"sigma {found.sigma_px:.2g}"),
@@ -119,4 +125,6 @@ def command(options: TrackCommand) -> None:
                                   + ", ".join(f"{v:.2g}" for v in own)),
         ("differ from those around", f"{int(tracks.outlier.sum())} vectors"),
     ]  # fmt: skip
-    print_result(data, [text_table(("", ""), rows)], as_json=options.as_json, remarks=())
+    print_result(
+        data, [text_table(("", ""), rows)], as_json=options.as_json, remarks=tracks.remarks
+    )

@@ -50,8 +50,13 @@ class Projection:
 
 
 def as_media(given: Media) -> OpticalMedia:
-    """Return bare layers as an interface whose last face is the plane Z = 0, None as nothing."""
+    """Return bare layers as an interface whose last face is the plane Z = 0, None as nothing.
+
+    Layers of one index are one medium: their faces bend no ray and bound nothing.
+    """
     if given is None:
+        return StraightRays()
+    if isinstance(given, Layers | FlatInterface) and len(set(given.indices)) == 1:
         return StraightRays()
     return FlatInterface(layers=given) if isinstance(given, Layers) else given
 
@@ -179,7 +184,9 @@ def project_with_jacobian(
     Projection
     """
     exterior = any(name in EXTERIOR for name in camera_names)
-    sight = as_media(media).sight(camera, points, exterior=exterior, names=interface_names)
+    # Faces of layers that an adjustment may change are there, whatever their indices are now.
+    between = media if interface_names and isinstance(media, FlatInterface) else as_media(media)
+    sight = between.sight(camera, points, exterior=exterior, names=interface_names)
     image, by_seen, by_interior = _through_lens(camera, sight.vectors, camera_names)
     by_point, by_exterior, by_interface = sight.derivatives(by_seen)
     by_camera = np.empty((len(points), 2, len(camera_names)))

@@ -345,7 +345,7 @@ def _cameras(
         camera, glass, said = read_camera(path, sensor=control.sensor, name=name)
         remarks += said
         cameras.append(camera)
-        if not np.any(glass):
+        if not np.any(glass) or len(set(indices)) == 1:  # of one index all is one medium
             media_of.append("")
             continue
         wall = glass_interface(glass, indices, control.thickness)

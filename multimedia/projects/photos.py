@@ -11,6 +11,7 @@ import numpy as np
 from photocore.arrays import ByteArray
 from photocore.decoding import refuse_damaged_jpeg
 from photocore.errors import InputError
+from photocore.images import FORMATS
 from photocore.textfile import readable
 
 
@@ -28,7 +29,7 @@ def read_photo(path: Path) -> ByteArray:
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)
         refuse_damaged_jpeg(path)
         try:
-            with Image.open(path) as image:
+            with Image.open(path, formats=(*FORMATS, "PPM", "GIF")) as image:
                 return _grey(image)
         except Image.DecompressionBombError:
             raise InputError(

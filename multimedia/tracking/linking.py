@@ -121,6 +121,19 @@ def adapted(places: Sequence[FloatArray], rules: LinkRules) -> LinkRules:
     return rules
 
 
+def in_tracks(previous: IntArray, shortest: int) -> tuple[IntArray, IntArray]:
+    """Return the points that are in tracks, track by track in time, and the number of the track."""
+    track = np.full(len(previous), -1, dtype=np.int64)
+    starts = np.flatnonzero(previous < 0)
+    track[starts] = np.arange(len(starts))
+    for point in np.flatnonzero(previous >= 0).tolist():  # points follow earlier ones
+        track[point] = track[previous[point]]
+    order = np.argsort(track, kind="stable")
+    long = np.bincount(track, minlength=1)[track[order]] >= shortest
+    order = order[long]
+    return order, np.unique(track[order], return_inverse=True)[1].astype(np.int64)
+
+
 def _fresh(xyz: FloatArray, first: int) -> _Heads:
     """Return the particles of a frame as ends of which nothing is known."""
     count = len(xyz)

@@ -9,13 +9,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.remarks import remark
-from multimedia.tracking.linking import LinkRules, adapted, linked, usual_step
+from multimedia.tracking.chance import points_by_chance, widened
+from multimedia.tracking.linking import LinkRules, adapted, in_tracks, linked, usual_step
 from multimedia.tracking.velocities import differs_from_neighbours, track_velocities
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points, positive
 from photocore.errors import InputError
 
 #: Frames for which a particle may be missing, and points of the shortest track.
 GAP, SHORTEST = 2, 4
+#: Points of chance for each in a track from which on the tracks are chance: .84 and more where two
+#: links of three were wrong. Tracks of chance that are too few to tell.
+CHANCE, FEW = 0.8, 10
+#: Points of chance for each in a track from which on they are told of.
+DOUBTFUL = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -42,6 +48,9 @@ class Tracks:
         its velocity predicts one of known. [object unit]
     particles : int
         Of all frames, in tracks or not.
+    by_chance : int
+        Points that are in tracks by the same rules where each frame is displaced by steps of its
+        own: as many of these may be chance.
     """
 
     track: IntArray
@@ -55,11 +64,20 @@ class Tracks:
     step: float
     change: float
     particles: int
+    by_chance: int
 
     @property
     def count(self) -> int:
         """Number of tracks."""
         return int(self.track.max(initial=-1)) + 1
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What is doubtful about the tracks as a whole."""
+        points = len(self.track)
+        if self.by_chance <= DOUBTFUL * points:
+            return ()
+        return (remark("tracks.partly_chance", chance=self.by_chance, points=points),)
 
     @property
     def sigma(self) -> FloatArray:
@@ -97,7 +115,8 @@ def track_particles(
         Of the positions.
     step : float, optional
         Largest displacement from frame to frame of a particle of which nothing is known; by
-        default half the mean distance between particles. [object unit]
+        default half the mean distance between particles, and more where that shows nothing but
+        chance. [object unit]
     change : float, optional
         Largest distance from where its velocity predicts a particle; by default 3.5 times the
         median of those in the data. [object unit]
@@ -113,7 +132,8 @@ def track_particles(
     Raises
     ------
     InputError
-        If there are fewer than three frames, or the options are impossible.
+        If there are fewer than three frames, the options are impossible, or the tracks are
+        those of chance.
 
     Examples
     --------
@@ -135,13 +155,16 @@ def track_particles(
     positive(rate, "rate", unit="frames per second")
     widest = usual_step(clouds) if step is None else positive(step, "step")
     rules = LinkRules(step=widest, change=widest, gap=gap)
-    if change is None:
-        rules = adapted(clouds, rules)
-    else:
+    if change is not None:
         rules = LinkRules(step=widest, change=positive(change, "change"), gap=gap)
+    else:
+        rules = widened(clouds, rules, shortest) if step is None else adapted(clouds, rules)
     previous = linked(clouds, rules)
     sizes = [len(xyz) for xyz in clouds]
-    order, track = _in_tracks(previous, shortest)
+    order, track = in_tracks(previous, shortest)
+    chance = points_by_chance(clouds, rules, shortest)
+    if chance > max(CHANCE * len(order), FEW * shortest):
+        raise InputError(remark("tracks.chance", points=len(order), chance=chance, step=rules.step))
     frame = np.repeat(names, sizes)[order]
     number = np.concatenate([np.arange(size) for size in sizes])[order]
     xyz = np.concatenate(clouds)[order]
@@ -155,18 +178,5 @@ def track_particles(
     return Tracks(
         track=track, frame=frame, number=number, xyz=xyz, covariance=covariance,
         velocity=velocity, velocity_covariance=own, outlier=outlier, step=rules.step,
-        change=rules.change, particles=len(previous),
+        change=rules.change, particles=len(previous), by_chance=chance,
     )  # fmt: skip
-
-
-def _in_tracks(previous: IntArray, shortest: int) -> tuple[IntArray, IntArray]:
-    """Return the points that are in tracks, track by track in time, and the number of the track."""
-    track = np.full(len(previous), -1, dtype=np.int64)
-    starts = np.flatnonzero(previous < 0)
-    track[starts] = np.arange(len(starts))
-    for point in np.flatnonzero(previous >= 0).tolist():  # points follow earlier ones
-        track[point] = track[previous[point]]
-    order = np.argsort(track, kind="stable")
-    long = np.bincount(track, minlength=1)[track[order]] >= shortest
-    order = order[long]
-    return order, np.unique(track[order], return_inverse=True)[1].astype(np.int64)

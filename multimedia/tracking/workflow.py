@@ -177,9 +177,11 @@ def _frames(targets: Sequence[Path], first: int | None, last: int | None) -> ran
     chosen = [n for n in common if (first is None or n >= first) and (last is None or n <= last)]
     begin = first if first is not None else (chosen or [0])[0]
     end = last if last is not None else (chosen or [0])[-1]
-    missing = sorted(set(range(begin, end + 1)) - set(chosen))
-    if missing or len(chosen) < 3:
-        lack = f"frame {missing[0]} is not there of every camera" if missing else "too few"
+    # The first that is missing, without a list of all numbers up to --last.
+    here = set(chosen)
+    missing = next((n for n in range(begin, end + 1) if n not in here), None)
+    if missing is not None or len(chosen) < 3:
+        lack = "too few" if missing is None else f"frame {missing} is not there of every camera"
         raise InputError(
             f"{targets[0]}: {len(chosen)} frames from {begin} to {end}, {lack}. Three or more in a "
             "row are needed, of every camera; choose them by --first and --last."

@@ -125,7 +125,7 @@ def _smaller(found: re.Match[str]) -> str:
     from PIL import Image
 
     data = base64.b64decode(found[1])
-    with Image.open(io.BytesIO(data)) as image:
+    with Image.open(io.BytesIO(data), formats=("PNG",)) as image:
         picture: Any = image.convert("RGBA")
     if picture.getextrema()[3][0] < 255 or len(data) < 50_000:
         return found[0]

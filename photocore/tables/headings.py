@@ -187,11 +187,15 @@ def _assumed_order(grid: CellGrid, match: Match, span: tuple[int, int] | None) -
     texts = next((texts for texts, header in doubles if header > row), {})
     for key in ("x", "col", "s"):
         places = [match.columns.get(f"{key}{k}", 0) for k in "12"]
-        above = []
-        for place in places:
-            lower = str(grid.rows[match.header].get(place, "")).strip()
-            text = texts.get(place, [""])[0]
-            above += [f'"{text.removesuffix(lower).strip()}"'] if text.endswith(f" {lower}") else []
+        lower = [str(grid.rows[match.header].get(place, "")).strip() for place in places if texts]
+        if len({bare(own) for own in lower}) != 1:
+            continue  # these tell the photos apart themselves
+        whole = [texts.get(place, [""])[0] for place in places]
+        above = [
+            f'"{text.removesuffix(own).strip()}"'
+            for text, own in zip(whole, lower, strict=True)
+            if text.endswith(f" {own}")
+        ]
         if len(set(above)) == 2:
             return [remark("table.first_is_far", first=above[0], second=above[1])]
     return []

@@ -10,6 +10,7 @@ from bifocal import InputError
 from photocore.output import check_writable
 from tests.attack.site import make_site
 from tests.fuzz_readers import READERS, attack
+from tests.tables import each
 
 #: Seeds that ended in a traceback, or ended Python, once.
 FOUND = {
@@ -31,7 +32,7 @@ def test_a_damaged_file_ends_in_an_error_of_the_family(site: Path, reader: str) 
         assert attack(reader, site, seed) is None
 
 
-@pytest.mark.parametrize("name", ["n" * 300, "a\0b"], ids=["long", "NUL"])
+@each("name", ["n" * 300, "a\0b"], ids=["long", "NUL"])
 @pytest.mark.parametrize("reader", READERS)
 def test_a_name_no_file_can_have_is_refused_in_the_library_too(
     tmp_path: Path, reader: str, name: str

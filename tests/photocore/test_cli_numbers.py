@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 from photocore.option_types import Length, Number, Numbers, Size
 from tests.builders.commands import bifocal_command, multimedia_command
+from tests.tables import each
 
 PROGRAMS = {"bifocal": bifocal_command, "multimedia": multimedia_command}
 CANON = "--focal 35 --focal 19 --sensor 22.7x15.1"
@@ -76,7 +77,7 @@ IMPOSSIBLE = [
 ]
 
 
-@pytest.mark.parametrize(("line", "option", "reason"), IMPOSSIBLE, ids=[c[0] for c in IMPOSSIBLE])
+@each(("line", "option", "reason"), IMPOSSIBLE, ids=[c[0] for c in IMPOSSIBLE])
 def test_a_number_that_cannot_be_meant_is_wrong_usage(
     line: str, option: str, reason: str, tmp_path, monkeypatch
 ) -> None:
@@ -100,7 +101,7 @@ NUMERIC = [
 ]
 
 
-@pytest.mark.parametrize("parameter", NUMERIC)
+@each("parameter", NUMERIC)
 @pytest.mark.parametrize("text", ["nan", "inf", "-inf", "1e300", "much"])
 def test_no_numeric_option_takes_what_is_no_finite_number(
     parameter: click.Parameter, text: str

@@ -15,7 +15,7 @@ from PIL import Image
 from bifocal.collimation.project import PHOTOS
 from bifocal.remarks import remark
 from photocore.errors import InputError
-from photocore.images import ImageInfo, image_info, read_image
+from photocore.images import FORMATS, ImageInfo, image_info, read_image
 from photocore.output import atomic_path, free_path
 
 #: A survey of more photos is one of pairs.
@@ -113,7 +113,7 @@ def _refuse_bomb(path: Path) -> None:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            with Image.open(path) as image:
+            with Image.open(path, formats=FORMATS) as image:
                 width, height = image.size
     except Image.DecompressionBombError:
         raise InputError(remark("page.too_large", name=path.name)) from None

@@ -126,14 +126,15 @@ def test_an_unknown_lens_gives_a_range_and_says_so() -> None:
 
 def test_errors_of_points_left_out_are_as_large_as_their_sigmas() -> None:
     rng, tests, ratios = np.random.default_rng(4), [], []
-    for _ in range(25):
+    for _ in range(10):
         noisy = control(
             DOTS[::4], pixels1=seen(DOTS[::4]) + rng.normal(0, 0.5, (len(DOTS[::4]), 2))
         )
         photo = rectify(np.zeros(SIZE[::-1], np.uint8), control=noisy, interior=LENS, gsd=0.1).photo
         tests.append(photo.test)
         ratios.append(photo.left_out / photo.sigma_left_out)
-    assert np.sqrt(np.mean(np.square(ratios))) == pytest.approx(1.0, abs=0.1)
+    # 0.1 with 25 draws, and sqrt(2.5) times that with 10.
+    assert np.sqrt(np.mean(np.square(ratios))) == pytest.approx(1.0, abs=0.16)
     assert np.mean(np.array(tests) > 3.0) < 0.02
 
 

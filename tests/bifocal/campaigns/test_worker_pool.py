@@ -30,7 +30,7 @@ def jobs(tmp_path: Path, *needs: int) -> list[SizedJob]:
 
 
 def test_pairs_wait_for_memory_and_a_large_one_runs_alone(tmp_path):
-    waiting = [(job, job.memory(), 1) for job in jobs(tmp_path, 6, 3, 6, 20)]
+    waiting = [(job, job.memory(), 1) for job in jobs(tmp_path, 6, 4, 6, 20)]
     running, workers = {}, []
 
     def start() -> worker_pool._Worker:
@@ -42,7 +42,7 @@ def test_pairs_wait_for_memory_and_a_large_one_runs_alone(tmp_path):
     original, worker_pool._started = worker_pool._started, start
     try:
         worker_pool._share_out(waiting, running, workers, 10, 4)
-        assert set(running) == {"p0", "p1"}  # 6 + 3; 6 more would be too much
+        assert set(running) == {"p0", "p1"}  # 6 + 4 fill the 10; 6 more would be too much
         running.clear()
         for worker in workers:
             worker.job = None

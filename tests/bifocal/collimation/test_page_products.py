@@ -457,3 +457,18 @@ def test_the_precision_of_a_place_is_that_of_its_pixel_up_to_the_rim(tmp_path) -
                 found = told.value(column + 0.3, 2 - row - 0.2)["sigma"]
                 there = 0 <= row < 3 and 0 <= column < 4
                 assert found == (pytest.approx(sigma[row, column]) if there else None)
+
+
+def test_sheets_are_delivered_with_a_drawing_of_the_points_that_are_picked(tmp_path) -> None:
+    folder, picks = sample_folder(tmp_path), sample_picks()
+    task = {"kind": "deliver", "out": str(folder / "sheets")}
+    (folder / "sheets").mkdir()
+    with opened(folder) as session:
+        job_tasks.finish(session, task, {"made": {}, "files": []})
+        assert not list((folder / "sheets").iterdir())
+        pick_both(session, "T01", picks["T01"])
+        job_tasks.finish(session, task, {"made": {}, "files": []})
+        (drawing,) = (folder / "sheets").iterdir()
+        row = session.results.row(session.state.points["T01"])
+    (point,) = ezdxf.readfile(drawing).modelspace().query("POINT")
+    np.testing.assert_allclose(tuple(point.dxf.location), [row["X"], row["Y"], row["r"]], atol=1e-9)

@@ -15,6 +15,7 @@ from starlette.testclient import TestClient
 from bifocal.collimation.server.application import application
 from bifocal.collimation.server.assets import WEB
 from tests.page_session import BASE, TOKEN, client_of, entries, opened, sample_folder
+from tests.tables import each
 
 PATHS = ["/", "/api/state", "/api/events", "/tiles/photo/1/info", "/tiles/photo/1/0/0_0.jpg",
          "/download/facade.xlsx", "/download/all.zip", "/relief/overlay.png", "/uncertainty.png",
@@ -40,7 +41,7 @@ def test_without_the_token_nothing_is_shown(session, path: str) -> None:
     assert stranger(session).get(path, params={"token": "x"}).status_code == 403
 
 
-@pytest.mark.parametrize("path", POSTS)
+@each("path", POSTS)
 @pytest.mark.parametrize(
     "headers",
     [
@@ -139,7 +140,7 @@ def test_every_answer_carries_the_rules_and_none_invites_others(session) -> None
     assert client.get("/api/state").headers["cache-control"] == "no-store"
 
 
-@pytest.mark.parametrize("dots", ["../", "..%2f", "%2e%2e/", "..\\", "....//", "%252e%252e%252f"])
+@each("dots", ["../", "..%2f", "%2e%2e/", "..\\", "....//", "%252e%252e%252f"])
 @pytest.mark.parametrize(
     "path",
     ["/{}far.jpg", "/web/{}server.py", "/download/{}far.jpg", "/download/x/{}{}far.jpg",

@@ -43,7 +43,7 @@ def measured(rng: np.random.Generator, *, moved: float = 0.0, offset: float = 0.
 
 def test_nothing_is_told_where_nothing_changed_and_a_bulge_of_three_sigma_is_found():
     moved, ratios = 3 * SIGMA * np.sqrt(2), []
-    for seed in range(10):
+    for seed in range(4):
         rng = np.random.default_rng(seed)
         before = measured(rng)
         still = compare(before, measured(rng))
@@ -56,9 +56,10 @@ def test_nothing_is_told_where_nothing_changed_and_a_bulge_of_three_sigma_is_fou
         assert pytest.approx((1.4, 1.8), abs=0.15) == (bulge.X, bulge.Y)
         assert bulge.area == pytest.approx(0.1936, abs=3.5 * bulge.sigma_area)
         ratios.append((bulge.volume - 0.1936 * moved) / bulge.sigma_volume)
-    assert len(ratios) >= 9
-    assert np.abs(np.mean(ratios)) < 1.2
-    assert 0.4 < np.sqrt(np.mean(np.square(ratios))) < 2
+    # The mean of four errors in sigmas is good to 0.5, their root mean square to 0.35.
+    assert len(ratios) >= 3
+    assert np.abs(np.mean(ratios)) < 1.9
+    assert 0.2 < np.sqrt(np.mean(np.square(ratios))) < 2.6
 
 
 def test_offset_and_tilt_come_off_by_stable_parts_and_are_told_without_them():

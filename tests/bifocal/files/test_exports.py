@@ -16,10 +16,10 @@ from click.testing import CliRunner
 from bifocal import InputError
 from bifocal.files.exports import export_points
 from bifocal.files.point_tables import read_survey_points
-from bifocal.model.points import SurveyPoints
+from bifocal.model.points import Points
 from tests.builders.commands import bifocal_command as main
 
-POINTS = SurveyPoints(
+POINTS = Points(
     ids=("001", "=HYPERLINK(1)", "C", "lost"),
     xyz=np.array([[1.0, 2.0, 0.5], [-3.25, 0.0, -0.1], [0.0, 0.0, 0.0], [np.nan] * 3]),
     world=np.array(
@@ -125,7 +125,7 @@ def test_refusals_name_the_mend(tmp_path):
     with pytest.raises(InputError, match="overwrite"):
         export_points(tmp_path / "q.csv", POINTS)
     assert (tmp_path / "q.csv").read_text() == "mine"
-    bare = SurveyPoints(ids=("a",), xyz=[[1, 2, 3]], sigma_r=[0.1], flags=("OK",), notes=("",))
+    bare = Points(ids=("a",), xyz=[[1, 2, 3]], sigma_r=[0.1], flags=("OK",), notes=("",))
     with pytest.raises(InputError, match="Georeference"):
         export_points(tmp_path / "w.csv", bare, world=True)
     assert {p.name for p in tmp_path.iterdir()} == {"q.csv"}
@@ -165,7 +165,7 @@ def test_a_survey_is_never_exported_onto_itself(tmp_path):
 
 def test_names_with_control_characters_fit_into_a_workbook(tmp_path):
     nan = np.full(1, np.nan)
-    points = SurveyPoints(
+    points = Points(
         ids=("A\x01b",), xyz=np.ones((1, 3)), world=None, sigma_r=nan, flags=("OK",), notes=("",)
     )
     export_points(tmp_path / "o.xlsx", points)
@@ -177,7 +177,7 @@ def test_error_ellipses_have_the_axes_of_the_covariance(tmp_path):
     turn = np.radians(30.0)
     u, v = np.array([np.sin(turn), np.cos(turn)]), np.array([np.cos(turn), -np.sin(turn)])
     matrix = 25e-6 * np.outer(u, u) + 4e-6 * np.outer(v, v)
-    points = SurveyPoints(
+    points = Points(
         ids=("A",), xyz=np.array([[1.0, 2.0, 0.1]]), sigma_r=np.array([0.02]), flags=("OK",),
         notes=("",), sigma_xy=np.sqrt(np.diagonal(matrix))[None], cov_xy=matrix[:1, 1],
     )  # fmt: skip
@@ -211,7 +211,7 @@ def test_world_coordinates_of_a_workbook_follow_those_of_the_wall(tmp_path):
     xyz = np.random.default_rng(3).uniform(-5, 5, (6, 3))
     turn = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
     world = 1.0002 * xyz @ turn.T + [351234.0, 4123456.0, 33.0]
-    points = SurveyPoints(
+    points = Points(
         ids=tuple("abcdef"), xyz=xyz, world=world, sigma_r=np.full(6, 0.01), flags=("OK",) * 6,
         notes=("",) * 6,
     )  # fmt: skip

@@ -122,6 +122,7 @@ def test_two_shots_from_one_place_are_refused(views) -> None:
         orient_pair((first, twin), control=Control(), site=SiteMeasures(distance1=16.0))
 
 
+@pytest.mark.acceptance
 def test_zoom_without_walking_is_called_the_classic_mistake(views) -> None:
     zoomed = camera(16.0, focal=FAR.matrix[0, 0] * 0.6, turn_deg=(0.5, 0.3, 0.0))
     first, second = inputs(views)
@@ -219,6 +220,6 @@ def test_photos_of_different_walls_are_refused_where_control_contradicts_itself(
         pixels1=pixels[0], pixels2=pixels[1],
     )  # fmt: skip
     first, second = inputs(views)
-    other = replace(second, grey=take(FAR, NEAR, seed=11).near, name="other.jpg")
+    other = replace(second, grey=photograph(NEAR, seed=11), name="other.jpg")
     with pytest.raises(GeometryError, match=r"other\.jpg show different walls.*3 of these"):
         orient_pair((first, other), control=control, site=SiteMeasures())

@@ -50,3 +50,9 @@ def test_relief_scale_is_the_spread_of_relief_under_the_distances_own() -> None:
     drawn = rng.multivariate_normal([16, 8], covariance[np.ix_(rows, rows)], 200_000)
     spread = np.std(1 / (1 / drawn[:, 1] - 1 / drawn[:, 0])) / 16.0
     assert found == pytest.approx(spread, rel=0.02)
+
+
+def test_small_turns_have_the_digits_that_show_their_greater_part() -> None:
+    assert "0.3" in words(near=camera(8.0, turn_deg=(0.0, -0.3, 0.0)))
+    assert "0.30" not in words(near=camera(8.0, turn_deg=(0.0, -0.3, 0.0)))
+    assert "0.15" in words(near=camera(8.0, turn_deg=(0.0, -0.15, 0.0)))

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from bifocal import Grid
-from bifocal.model.points import SurveyPoints
+from bifocal.model.points import Points
 from bifocal.orthophotos.drawing import TABLES, Drawing, PrintSheet, Section
 from bifocal.orthophotos.drawing_files import write_drawing
 
 
-def points(*ids: str) -> SurveyPoints:
+def points(*ids: str) -> Points:
     blank = ("",) * len(ids)
     xyz = np.array([[0.5 * k, 0.25, 0.1] for k in range(len(ids))])
-    return SurveyPoints(ids=ids, xyz=xyz, sigma_r=xyz[:, 2], flags=blank, notes=blank)
+    return Points(ids=ids, xyz=xyz, sigma_r=xyz[:, 2], flags=blank, notes=blank)
 
 
 #: A cut along a line that turns, and an upright one from high to low.

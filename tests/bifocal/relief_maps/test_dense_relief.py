@@ -157,8 +157,11 @@ def test_pairs_of_little_difference_in_distance_work_too():
 
 def test_sixteen_bit_photos_give_the_same_relief():
     wide = [image.astype(np.uint16) * 256 for image in (shot().image1, shot().image2)]
-    again = dense_relief(shot().pair, *wide)
-    np.testing.assert_array_equal(again.r, result().r)
+    part = {"gsd": 0.03, "bounds": (3.5, -2.5, 5.5, 0.5)}
+    again = dense_relief(shot().pair, *wide, **part)
+    np.testing.assert_array_equal(
+        again.r, dense_relief(shot().pair, shot().image1, shot().image2, **part).r
+    )
 
 
 def shifted_pair(metres: float, angle_deg: float = 0.0) -> Pair:

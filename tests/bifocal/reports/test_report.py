@@ -19,7 +19,7 @@ from bifocal.model.geotiff import create_raster
 from bifocal.orientation.walls.wall_shape import WallShape, shape_in_words
 from bifocal.remarks import in_language, remark
 from bifocal.reports.accuracy import accuracy_blocks, verdict_in_words
-from bifocal.reports.content import read_content
+from bifocal.reports.content import _basis, read_content
 from bifocal.reports.pair_report import _provenance, pair_blocks, report_document
 from bifocal.reports.workflow import ReportTask, find_pairs
 from bifocal.survey.results import summary
@@ -245,6 +245,17 @@ def test_photos_of_one_name_in_two_folders_have_a_hash_each(tmp_path):
     *_, table = _provenance(content, words_of("bifocal.reports", "en"))
     named = [[path.name, sha256(path.read_bytes()).hexdigest()] for path in files]
     assert table.rows[1:] == named
+
+
+def test_the_report_says_what_an_orthophoto_rests_on_as_its_file_does(tmp_path):
+    parts = {"measured": 0.5, "interpolated": 0.25, "plane": 0.2, "neither": 0.05}
+    grid = Grid.from_bounds((0, 0, 2, 2), gsd=1.0)
+    with create_raster(tmp_path / "o.tif", grid, bands=1, dtype=np.uint8) as writer:
+        writer.write(np.zeros((2, 2), np.uint8))
+        writer.tag(BIFOCAL_BASIS=json.dumps(parts))
+    assert _basis(tmp_path / "o.tif") == parts
+    words = words_of("bifocal.reports", "de")("overview_basis", **parts)
+    assert "50.0% auf gemessenem Relief" in words.replace("\xa0", "")
 
 
 def test_a_pair_in_the_frame_of_all_pairs_is_told_by_that_pair_file(tmp_path):

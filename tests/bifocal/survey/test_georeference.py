@@ -133,7 +133,7 @@ def test_sigmas_of_placed_points_count_the_picks_and_the_transformation(model):
     world = UTM * [1, 1, model != "2D"] + 1.3 * XYZ @ rotation_of(model).T
     known = control(world if model != "2D" else world * [1, 1, np.nan], range(5))
     standard = []
-    for _ in range(300):
+    for _ in range(100):
         seen = XYZ + np.einsum("nij,nj->ni", draw, rng.normal(0, 1, (12, 3)))
         columns = {"id": IDS, **dict(zip("XYZ", seen.T, strict=True))}
         found = georeference(columns, known, model=model, covariance=own)
@@ -142,9 +142,9 @@ def test_sigmas_of_placed_points_count_the_picks_and_the_transformation(model):
             sigma = np.sqrt(np.diagonal(stated, axis1=1, axis2=2))
             standard.append((found.world_from_wall(seen) - world) / sigma)
     ratio = np.sqrt((np.array(standard) ** 2).mean(axis=(0, 2)))
-    # 300 draws give one ratio to 2 %; the five control points share their error with the fit.
-    assert np.sqrt((ratio[:5] ** 2).mean()) == pytest.approx(1.0, abs=0.05)
-    assert np.sqrt((ratio[5:] ** 2).mean()) == pytest.approx(1.0, abs=0.05)
+    # 100 draws give one ratio to 4 %; the five control points share their error with the fit.
+    assert np.sqrt((ratio[:5] ** 2).mean()) == pytest.approx(1.0, abs=0.09)
+    assert np.sqrt((ratio[5:] ** 2).mean()) == pytest.approx(1.0, abs=0.09)
 
 
 def test_points_weighing_alike_are_as_good_as_the_residuals_say():

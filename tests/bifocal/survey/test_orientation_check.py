@@ -148,5 +148,6 @@ def test_an_ideal_survey_in_millimetres_finds_the_same_centre():
     data |= {"id": [str(i) for i in range(60)], "code": ["PLANE"] * 14 + [""] * 46}
     taking, measuring = Taking(d1=17.5, d2=9.5, c1=35, c2=19), Measuring(sigma_s=0.002)
     survey = solve(data, taking=taking, measuring=measuring, adjust_setup=True)
+    assert any("in mm at the scale of image 1." in remark for remark in map(str, survey.remarks))
     away = np.hypot(xyz[:, 0], xyz[:, 1]) > 1.5
     np.testing.assert_allclose(survey.table["r"][away], xyz[away, 2], atol=2e-4)

@@ -14,7 +14,7 @@ from tests.bifocal.workbook.test_cli_solve import SETUP, rows, run
 from tests.bifocal.workbook.test_survey_workbook import named
 from tests.recalculate import recalculated, rows_of
 
-pytestmark = pytest.mark.office
+pytestmark = [pytest.mark.office, pytest.mark.acceptance]
 #: Prepared rows: few, since LibreOffice recalculates them all.
 ROWS = 15
 #: Name, X, Y, r of a wall; the last stands behind it.
@@ -75,8 +75,8 @@ def test_from_the_template_to_coordinates_and_their_errors(tmp_path):
     ("language", "said"),
     [
         ("en", "Control point F contradicts the others"),
-        pytest.param("it", "Il punto d'appoggio F contraddice", marks=pytest.mark.acceptance),
-        pytest.param("de", "Passpunkt F widerspricht", marks=pytest.mark.acceptance),
+        ("it", "Il punto d'appoggio F contraddice"),
+        ("de", "Passpunkt F widerspricht"),
     ],
 )
 def test_one_of_eight_control_points_a_metre_off_turns_red_and_is_named(language, said, tmp_path):
@@ -98,7 +98,6 @@ def test_one_of_eight_control_points_a_metre_off_turns_red_and_is_named(language
     assert named(recalculated(path, tmp_path), "g_alarm").value == 0
 
 
-@pytest.mark.acceptance
 def test_a_wrong_distance_shows_in_the_scale(tmp_path):
     path = typed(tmp_path / "s.xlsx", points=rows(WALL), control=world(WALL[:8]))
     book = openpyxl.load_workbook(path)
@@ -110,7 +109,6 @@ def test_a_wrong_distance_shows_in_the_scale(tmp_path):
     assert named(book, "g_alarm").value == 1
 
 
-@pytest.mark.acceptance
 def test_flagged_check_points_are_left_out_and_large_errors_are_told_in_sigmas(tmp_path):
     picks = rows(WALL)
     picks[8] = (*picks[8][:2], picks[8][2] + 3, *picks[8][3:])
@@ -130,7 +128,6 @@ def test_flagged_check_points_are_left_out_and_large_errors_are_told_in_sigmas(t
     assert ends[0]["X_from"] == "#N/A"
 
 
-@pytest.mark.acceptance
 def test_forty_check_points_have_an_arrow_each(tmp_path, monkeypatch):
     monkeypatch.setattr(sys.modules[__name__], "ROWS", 45)
     places = np.random.default_rng(4).uniform((-5, -3, -0.3), (5, 3, 0.6), (40, 3)).round(3)
@@ -152,7 +149,6 @@ def test_forty_check_points_have_an_arrow_each(tmp_path, monkeypatch):
     assert named(shown, "vector_scale").value > 10
 
 
-@pytest.mark.acceptance
 def test_one_book_worked_row_rows_below_the_table_and_a_point_at_the_nadir(tmp_path):
     """Three things of the sheets that touch each other nowhere, in one recalculation."""
     worked, nadir = ("TEST", 4.2424, 0, 4.4706, 0), ("N", 0, 0, 0, 0)

@@ -182,3 +182,18 @@ def test_the_empty_template_of_three_photos_says_what_to_fill_in(
     result = run(command, path, *(("--out", tmp_path / "m.xlsx") if command == "match" else ()))
     assert result.exit_code == 1
     assert "ill in the" in result.stderr
+
+
+def test_our_own_workbooks_and_keys_below_labels_are_not_asked_for_the_far_photo(
+    tmp_path: Path,
+) -> None:
+    book = openpyxl.Workbook()
+    book.active.append(("Name", "first photo", "", "second photo", ""))
+    book.active.append(("id", "x1", "y1", "x2", "y2"))
+    book.active.append(("P0", *FAR, *NEAR))
+    path = tmp_path / "own.xlsx"
+    book.save(path)
+    assert "is taken for" not in solved(path, *GIVEN)
+    new = tmp_path / "new.xlsx"
+    assert run("solve", path, "--out", new).exit_code == 0
+    assert "is taken for" not in solved(new)

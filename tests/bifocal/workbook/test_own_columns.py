@@ -79,6 +79,7 @@ def test_widths_that_the_user_chose_later_stay(solved):
     assert not known[11][1]
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_formulas_of_reordered_columns_recalculate_to_the_same(solved, tmp_path):
     stored = openpyxl.load_workbook(solved, data_only=True)["Sheet"]

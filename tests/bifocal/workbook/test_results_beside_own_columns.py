@@ -64,7 +64,6 @@ FOREIGN = {
 }
 
 
-@pytest.mark.office
 @pytest.mark.parametrize("name", [slow("plain"), "italian", slow("german"), slow("text")])
 def test_results_are_new_live_columns_of_the_users_own_table(tmp_path, name):
     heads, table, head = FOREIGN[name]
@@ -94,6 +93,15 @@ def test_results_are_new_live_columns_of_the_users_own_table(tmp_path, name):
     assert {cell.value: cell.column for cell in again["Facciata"][head]} == found
     values = [again["Facciata"].cell(i, found["r [m]"]).value for i in (head + 1, row)]
     assert values[0] == pytest.approx(values[1], rel=1e-12)
+
+
+@pytest.mark.acceptance
+@pytest.mark.office
+@pytest.mark.parametrize("name", FOREIGN)
+def test_columns_in_the_users_own_table_recalculate_to_the_same(tmp_path, name):
+    heads, table, head = FOREIGN[name]
+    path = foreign(tmp_path / "own.xlsx", heads=heads, table=table, head=head)
+    solved_in_place(path, *DISTANCES)
     assert_recalculated_equals_cached(path, tmp_path)
 
 

@@ -97,6 +97,7 @@ def tank(form, tmp_path):
     return shutil.copyfile(form, tmp_path / "filled.xlsx")
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_a_form_filled_in_by_hand_shows_where_shot_rays_meet(tank, tmp_path):
     book = recalculated(tank, tmp_path)
@@ -341,19 +342,12 @@ def leaning_book(name, path, language="en"):
     return pair, pixels
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 @pytest.mark.parametrize(
     ("name", "language"),
-    [
-        ("port", "en"),
-        *(
-            pytest.param(name, language, marks=pytest.mark.acceptance)
-            for name, language in (
-                ("one", "it"), ("surface", "de"), ("gap", "en"),
-            )
-        ),
-    ],
-)  # fmt: skip
+    [("port", "en"), ("one", "it"), ("surface", "de"), ("gap", "en")],
+)
 def test_the_formulas_of_ports_that_lean_equal_the_library(name, language, tmp_path):
     path = tmp_path / "p.xlsx"
     pair, pixels = leaning_book(name, path, language)
@@ -492,3 +486,11 @@ def test_the_heading_of_the_slopes_says_what_they_are(tmp_path):
     labels = {cell.value: sheet.cell(3, cell.column).value for cell in sheet[4]}
     assert labels["den"] == "T2 - T1 of the rays [mm/m]"
     assert "image 2" in labels["tan2"]
+
+
+def test_coordinates_corrected_by_the_plane_stay_at_the_scale_of_image_2(form, tmp_path):
+    """What the wall seems through media is not c / d: in air they take the scale of image 1."""
+    plane = np.column_stack([POINTS[:, :2] * [1, 1.3], np.zeros(5)])
+    fill(form, tmp_path / "s.xlsx", {}, tank_points(plane), ["PLANE"] * 5)
+    remarks = solve(tmp_path / "s.xlsx", adjust_setup=True).remarks
+    assert any("now in mm at the scale of image 2." in remark for remark in map(str, remarks))

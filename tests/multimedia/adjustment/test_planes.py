@@ -85,6 +85,25 @@ def test_plates_that_change_places_in_one_image_are_named_after_few_steps(interi
     assert told.value.iterations <= 30
 
 
+def test_corners_of_a_plate_that_no_camera_sees_are_left_out_by_name():
+    whole = planes()
+    seen = whole.image_points
+    keep = [k for k, name in enumerate(seen.ids) if name not in ("1-0", "1-7")]
+    fewer = ImagePoints(
+        cameras=tuple(seen.cameras[k] for k in keep),
+        ids=tuple(seen.ids[k] for k in keep),
+        image=seen.image[keep],
+    )
+    unknowns = Unknowns(plates=("plate1", "plate2", "plate3"))
+    result = bundle_adjust(replace(whole, image_points=fewer), unknowns)
+    assert result.sigma0 < 0.0015
+    assert any("1-0, 1-7" in text for text in result.remarks)
+    # The plates lie where they were rendered.
+    points, truth = result.project.object_points, whole.object_points
+    at = [truth.ids.index(name) for name in points.ids]
+    assert np.abs(points.xyz - truth.xyz[at]).max() < 0.1
+
+
 @pytest.mark.parametrize(
     ("wrong", "wider"), [("plate2", {"plates": ("plate2",)}), ("k1", {"interior": ("k1",)})]
 )

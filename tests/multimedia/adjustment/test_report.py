@@ -11,7 +11,12 @@ from matplotlib.figure import Figure
 
 import multimedia
 from multimedia.adjustment.report import adjustment_document
-from multimedia.adjustment.report_figures import depth_and_radial, draw_vectors
+from multimedia.adjustment.report_figures import (
+    MOST_ARROWS,
+    _thinned,
+    depth_and_radial,
+    draw_vectors,
+)
 from photocore.reports.document import Paragraph, Picture, TextTable
 from photocore.reports.words import words_of
 
@@ -131,3 +136,16 @@ def test_remarks_are_in_the_language_of_the_report(remarked, language):
     texts = [block.text for block in blocks if isinstance(block, Paragraph)]
     assert any(text.startswith("media.tank: ") for text in texts)
     assert not [text for text in texts if ENGLISH.search(text)]
+
+
+def test_of_many_vectors_each_part_of_the_image_keeps_one_of_each_plate():
+    side = np.linspace(-0.99, 0.99, 60)
+    place = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2) * 7.0
+    one = _thinned(place, np.zeros(len(place), int), 7.0)
+    assert one.sum() == MOST_ARROWS == 20**2
+    assert [one[(place @ sides > 0).all(axis=1)].sum() for sides in
+            (np.diag([1, 1]), np.diag([1, -1]), np.diag([-1, 1]))] == [100] * 3  # fmt: skip
+    two = _thinned(place, np.arange(len(place)) % 2, 7.0)
+    assert two.sum() == pytest.approx(MOST_ARROWS, rel=0.15)  # cells end within the square
+    few = place[:MOST_ARROWS]
+    assert _thinned(few, np.zeros(len(few), int), 7.0).all()

@@ -285,3 +285,14 @@ def test_a_point_seen_from_afar_is_where_a_far_camera_sees_it():
     far = Camera.looking_at(away, (0, 0, 0), principal_distance=25.0)
     apparent = far.centre + wall.apparent_vectors(far, points) @ far.rotation.T
     np.testing.assert_allclose(wall.seen_from_afar(points), apparent, atol=1e-8)
+
+
+def test_equal_indices_are_one_medium_on_either_side_of_the_wall():
+    camera = camera_of(PLAIN)
+    air = Layers(indices=(1.0, 1.0, 1.0), thicknesses=(0.01,))
+    points = np.array([POINTS[0], (0.02, 0.01, 0.5 * camera.centre[2])])
+    for media in (air, FlatInterface(layers=air, point=(0, 0, 1e-4))):
+        np.testing.assert_array_equal(project(camera, points, media), project(camera, points))
+        assert projection_status(camera, points, media) == ["ok", "ok"]
+    water = Layers(indices=(1.0, 1.0, 1.337), thicknesses=(0.01,))
+    assert projection_status(camera, points, water)[1] == "before the interface"

@@ -233,6 +233,21 @@ def test_angles_in_degrees_are_found_by_the_matrix(tank_project, tmp_path):
     assert np.abs(found.cameras[1].rotation - camera.rotation).max() < 1e-9
 
 
+def test_a_folder_of_an_experiment_in_air_has_no_wall(tank_project, tmp_path):
+    """ptv.par of three indices 1 and a placeholder for the glass, as synthetic flows have them."""
+    write_experiment(tmp_path / "e", tank_project)
+    path = tmp_path / "e" / "parameters" / "ptv.par"
+    lines = path.read_text().split()
+    path.write_text("\n".join([*lines[:-4], "1", "1", "1", lines[-1]]) + "\n")
+    inside = read_experiment(tmp_path / "e").project
+    assert inside.media == {}
+    # A particle on the cameras' side of where the glass would be meets.
+    place = np.array([[5.0, -8.0, 40.0]])
+    image = np.stack([project(camera, place) for camera in inside.cameras])
+    met = intersect(inside.cameras, image, inside.interfaces)
+    np.testing.assert_allclose(met.xyz, place, atol=1e-8)
+
+
 def test_damaged_files_are_named(tank_project, tmp_path):
     folder = tmp_path / "exp"
     write_experiment(folder, tank_project)

@@ -22,6 +22,7 @@ from multimedia import (
 )
 from multimedia.refraction.shift import shift_derivatives, shift_ratio, shifted_radius
 from tests.rounding import EPS
+from tests.tables import each
 
 GOLDEN = json.loads(
     (Path(__file__).parents[2] / "golden" / "radial_shift.json").read_text(encoding="utf-8")
@@ -41,7 +42,7 @@ def relative_error(value: float, digits: str) -> float:
         return float(abs(mp.mpf(float(value)) - truth) / abs(truth)) if truth else abs(value)
 
 
-@pytest.mark.parametrize("case", GOLDEN, ids=lambda case: f"{case['name']}, R={case['radius']:g}")
+@each("case", GOLDEN, ids=lambda case: f"{case['name']}, R={case['radius']:g}")
 def test_shift_equals_fifty_digits(case: dict[str, Any]) -> None:
     value = shifted_radius(case["radius"], case["heights"], case["indices"])
     if case["radius_bar"] is None:
@@ -68,7 +69,7 @@ def test_a_gap_beyond_the_critical_angle_keeps_all_digits(
     assert relative_error(float(shifted_radius(radius, heights, indices)), digits) <= 8 * EPS
 
 
-@pytest.mark.parametrize(
+@each(
     "case",
     [case for case in GOLDEN if "d_radius" in case],
     ids=lambda case: f"{case['name']}, R={case['radius']:g}",

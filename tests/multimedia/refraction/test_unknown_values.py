@@ -12,6 +12,7 @@ import multimedia as mm
 from multimedia import GeometryError, InputError, best_over_compensation, iterated_radius
 from multimedia.refraction.shift import axis_ratio, shift_derivatives, shift_ratio, shifted_radius
 from multimedia.refraction.unrolled import unrolled_shift
+from tests.tables import each
 
 NAN = np.nan
 TANK = mm.Layers(indices=(1.0, 1.5, 1.34), thicknesses=(0.01,))
@@ -99,7 +100,7 @@ def test_only_a_set_up_without_height_has_the_ratio_one() -> None:
     assert np.isnan(axis_ratio([0.0, NAN], (1.0, 1.34)))
 
 
-@pytest.mark.parametrize("layers", [TANK, DIVER])
+@each("layers", [TANK, DIVER])
 @pytest.mark.parametrize("as_argument", [float, np.array, lambda v: np.array([v])])
 @pytest.mark.parametrize("unknown", list(product((False, True), repeat=3)))
 def test_every_public_shift_says_unknown(

@@ -64,6 +64,8 @@ def test_tracks_are_those_of_the_particles_in_every_format(sequence, tmp_path):
     assert said["frames"] == [FIRST, FIRST + FRAMES - 1]
     assert said["sigma_px"] == pytest.approx(0.1, rel=0.1)
     assert said["by_chance_at_most"] < 0.1 * said["particles_tested"]
+    assert said["in_no_track"] == 0
+    assert said["in_tracks_by_chance"] < 0.1 * COUNT * FRAMES
     with out.open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == COUNT * FRAMES
@@ -122,6 +124,7 @@ def test_bad_input_is_one_message(sequence, tmp_path, monkeypatch):
     folder, _ = sequence
     for words, text in (
         (["--first", "9999"], "frame 9999 is not there of every camera"),
+        (["--last", "999999999999"], f"frame {FIRST + FRAMES} is not there of every camera"),
         (["--last", "10002"], "Three or more in a row are needed"),
         (["--out", str(tmp_path / "t.txt")], ".csv, .xlsx or .h5"),
         (["--change", "1e-9"], "no track of 4 points"),

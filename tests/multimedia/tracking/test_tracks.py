@@ -34,6 +34,40 @@ def test_a_thousand_particles_with_steps_to_half_their_distance_are_followed(kin
     assert wrong < 0.001
 
 
+@pytest.mark.parametrize("speed", [1.0, 1.6])
+def test_a_flow_faster_than_half_the_distance_widens_the_step_until_links_are_true(speed):
+    """Of 216 particles, 1.67 apart on the average."""
+    places, whose = simulated(
+        lambda xyz: np.tile([speed, 0.0, 0.0], (len(xyz), 1)), speed=speed, count=216, frames=7
+    )
+    tracks = track_particles(places)
+    same = np.diff(tracks.track) == 0
+    names = np.array([whose[f][n] for f, n in zip(tracks.frame, tracks.number, strict=True)])
+    assert (np.diff(names)[same] != 0).mean() < 0.002
+    assert tracks.step > speed
+    assert tracks.change < 0.2 * tracks.step
+    assert np.abs(tracks.velocity.mean(axis=0) - [speed, 0, 0]).max() < 0.01
+    assert tracks.by_chance < 0.01 * len(tracks.track)
+    assert not tracks.remarks
+
+
+def test_particles_that_go_nowhere_are_chance_and_refused_with_the_way_out():
+    rng = np.random.default_rng(3)
+    with pytest.raises(InputError, match=r"these are chance.*--step"):
+        track_particles([rng.uniform(0, 10, (100, 3)) for _ in range(7)])
+
+
+def test_tracks_that_may_be_chance_in_part_say_how_many():
+    # Each goes its own way anew in every frame, a tenth of their distance.
+    rng = np.random.default_rng(4)
+    places = [rng.uniform(0, 7, (300, 3))]
+    for _ in range(7):
+        places.append(places[-1] + 0.1 * rng.standard_normal((300, 3)))
+    tracks = track_particles(places)
+    assert 0.1 < tracks.by_chance / len(tracks.track) < 0.5
+    assert f"{tracks.by_chance} of {len(tracks.track)} points" in tracks.remarks[0]
+
+
 @pytest.mark.acceptance
 def test_particles_that_are_missing_in_some_frames_are_found_again():
     places, whose = simulated(vortices(0.3), speed=0.3, missing=0.03, frames=20, seed=13)

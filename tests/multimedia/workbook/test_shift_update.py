@@ -72,16 +72,9 @@ def test_live_columns_are_added_and_everything_else_stays(own: Path, tmp_path: P
     assert len(new) == 1, new
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
-@pytest.mark.parametrize(
-    "kind",
-    [
-        pytest.param("labels", marks=pytest.mark.acceptance),
-        "texts",
-        pytest.param("names", marks=pytest.mark.acceptance),
-        pytest.param("radius", marks=pytest.mark.acceptance),
-    ],
-)
+@pytest.mark.parametrize("kind", ["labels", "texts", "names", "radius"])
 def test_the_formulas_beside_an_own_table_calculate_the_same(
     own: Path, tmp_path: Path, kind: str
 ) -> None:
@@ -224,6 +217,7 @@ def test_a_template_for_other_media_is_refused(tmp_path: Path) -> None:
     assert "formulas are for 3 media, the options give 2" in result.stderr
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_an_option_takes_the_place_of_a_formula_that_was_never_calculated(tmp_path: Path) -> None:
     path, out = tmp_path / "tank.xlsx", tmp_path / "out.xlsx"

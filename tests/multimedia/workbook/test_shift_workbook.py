@@ -74,16 +74,9 @@ def head_row(path: Path) -> int:
     return int(re.match(r"A(\d+)", area)[1])  # type: ignore[index]
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
-@pytest.mark.parametrize(
-    "name",
-    [
-        name
-        if name in ("air glass water", "five media")
-        else pytest.param(name, marks=pytest.mark.acceptance)
-        for name in ORDERS
-    ],
-)
+@pytest.mark.parametrize("name", ORDERS)
 def test_recalculated_formulas_equal_the_library(name: str, tmp_path: Path) -> None:
     setup = ORDERS[name]
     points = points_for(setup)
@@ -135,6 +128,7 @@ def test_template_calculates_what_is_typed_into_it(tmp_path: Path) -> None:
     assert not any(isinstance(v, str) and v.startswith("#") for v in live["Rbar"])
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_no_formula_is_unknown_to_libreoffice_and_stored_values_are_its_own(
     tmp_path: Path,
