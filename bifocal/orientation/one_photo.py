@@ -258,9 +258,13 @@ def _of_points(control: Control, which: BoolArray) -> Control:
 def _without_gross(
     control: Control, interior: Interior, sigma_pick: float, photo: OrientedPhoto
 ) -> tuple[OrientedPhoto, list[str]]:
-    """Return the photo without gross points, the worst first, and remarks that name them."""
+    """Return the photo without gross points, the worst first, and remarks that name them.
+
+    Where the others fit no better, the points are not to blame (a lens that bends, relief): all
+    stay.
+    """
     named: list[str] = []
-    most = max(len(control.ids) // 3, 1)
+    whole, most = photo, max(len(control.ids) // 4, 1)
     while len(photo.ids) > 5 and len(named) < most:
         test = np.nan_to_num(photo.test)
         worst = int(test.argmax())
@@ -272,7 +276,10 @@ def _without_gross(
         about = {"name": photo.ids[worst], "error": error, "times": float(test[worst])}
         photo = _by_points(control, interior, sigma_pick)
         named.append(remark("rectify.gross", **about))
-    return photo, named
+    fits = np.nan_to_num(photo.test).max() < OUTLIER_LIMIT
+    if fits or photo.sigma0 < whole.sigma0 / SLIPS.better:
+        return photo, named
+    return whole, []
 
 
 def _by_points(control: Control, interior: Interior, sigma_pick: float) -> OrientedPhoto:
