@@ -88,18 +88,16 @@ def check_units(cameras: Cameras, site: SiteMeasures, *, lenses_known: bool = Fa
         if measured is None:
             continue
         agree |= 0.8 < distance / measured < 1.25
-        if unit := unit_of(measured / distance, within=0.1) if lenses_known else "":
-            named = {"unit": unit, "number": name, "found": distance, "given": measured}
-            raise InputError(remark("refused.tape_unit", **named))
+        about = {"number": name, "given": measured, "found": distance}
         if measured > FARTHEST_WALL and not agree:
-            about = {"number": name, "given": measured, "found": distance}
             nearest = min(_UNITS, key=lambda one: abs(np.log(measured / one[0] / distance)))
             meant = {"unit": nearest[1], "meant": measured / nearest[0]}
             raise InputError(remark("refused.too_far", **meant, **about))
+        if unit := unit_of(measured / distance, within=0.1) if lenses_known else "":
+            raise InputError(remark("refused.tape_unit", unit=unit, **about))
         for factor, unit in _UNITS:
             if 0.8 < distance / measured / factor < 1.25:
-                about = {"unit": unit, "number": name, "found": distance, "given": measured}
-                raise InputError(remark("refused.control_unit", **about))
+                raise InputError(remark("refused.control_unit", unit=unit, **about))
     if max(d1, d2) > FARTHEST_WALL and not agree:
         raise InputError(remark("refused.control_far", d1=d1, d2=d2))
 
