@@ -8,14 +8,18 @@ each: half an hour for all numbers on one core. A dot is no change, neither is a
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 import sys
+from contextlib import ExitStack
+from dataclasses import fields, replace
 from unittest.mock import patch
 
 import cv2
 
 from benchmarks.relief_ablation import FIGURES, figures, shots
-from bifocal.relief_maps import flow
-from bifocal.relief_maps.tuning import TUNING
+from bifocal import relief_maps
+from bifocal.relief_maps import flow, tuning
 
 #: Size of the photos, and how much coarser their pixels are than those of the ablation.
 SCENES = {
@@ -24,8 +28,21 @@ SCENES = {
     "church": ((768, 512), 2),
     "plaster balcony": ((900, 600), 1),
 }
-#: Stages whose numbers change the flow, or the frame it is found in.
-UPSTREAM = {"coarse", "exposure", "flow", "frame", "limits", "refinement", "seed"}
+#: Stages whose numbers change what is matched, or the frame it is matched in.
+UPSTREAM = {"COARSE", "EXPOSURE", "FLOW", "FRAME", "LIMITS", "REFINEMENT", "SEED"}
+MODULES = [
+    importlib.import_module(f"bifocal.relief_maps.{module.name}")
+    for module in pkgutil.iter_modules(relief_maps.__path__)
+]
+
+
+def put(stage: str, numbers: object) -> ExitStack:
+    """Give a stage other numbers in all modules, for a while."""
+    stack = ExitStack()
+    for module in MODULES:
+        if hasattr(module, stage):
+            stack.enter_context(patch.object(module, stage, numbers))
+    return stack
 
 
 def scaled(value, factor):
@@ -51,16 +68,14 @@ def sweep(name: str, stages: list[str]) -> None:
         base = figures(shot)
     print(f"\n{name:34s}" + " ".join(f"{heading:>11s}" for heading in FIGURES))
     print(" " * 34 + " ".join(f"{value:11.3f}" for value in base.values()))
-    for stage in stages or vars(TUNING):
-        numbers = getattr(TUNING, stage)
-        for number, value in vars(numbers).copy().items():
+    for stage in stages or [word for word in vars(tuning) if word.isupper()]:
+        numbers = getattr(tuning, stage)
+        for number in (field.name for field in fields(numbers)):
             for factor in (0.5, 2.0):
                 measured = measure if stage in UPSTREAM else once
                 label = f"  {stage}.{number} x {factor:g}"
-                with (
-                    patch.object(numbers, number, scaled(value, factor)),
-                    patch.object(flow, "measure", measured),
-                ):
+                changed = replace(numbers, **{number: scaled(getattr(numbers, number), factor)})
+                with put(stage, changed), patch.object(flow, "measure", measured):
                     try:
                         found = figures(shot)
                     except (ValueError, cv2.error) as error:

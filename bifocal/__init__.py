@@ -32,7 +32,7 @@ The whole wall
 The page
     pick                      orient, pick and draw in the browser, as the command `bifocal pick`
     page_server, PageServer, Session   the same without a browser, for programs that drive it
-    recording                 what the outputs written within it say made them
+    recording, changed_photos   what outputs say made them; changed photos taken, within it
 Sample pairs                  SAMPLE, WATER_SAMPLE: folders of photos with exact truth
 
 What they take and give: Alignment, Bounds, BreakLine, ChangedRegion, CheckResult, Comparison, Face,

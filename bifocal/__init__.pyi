@@ -30,7 +30,7 @@ from .equations import (
 )
 from .faces.faces import BreakLine, Face, Faces, Occluder
 from .faces.suggestions import suggest_faces
-from .files.provenance import recording
+from .files.provenance import changed_photos, recording
 from .matching.homologous_points import match
 from .matching.matches import Matches
 from .matching.matching import MatchSettings
@@ -166,6 +166,7 @@ __all__ = [
     "align",
     "align_set",
     "calibrate",
+    "changed_photos",
     "compare",
     "dense_relief",
     "georeference",

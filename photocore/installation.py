@@ -13,6 +13,7 @@ from pathlib import Path
 #: Our name on the package indexes, where ``bifocal`` and ``multimedia`` are other people's.
 DISTRIBUTION = "bifocal-relief"
 _STRANGERS = ("bifocal", "multimedia")
+_OURS = (*_STRANGERS, "photocore")
 _BOUND = re.compile(r"([\w.-]+)(?:\[.*\])?>=([\d.]+)$")
 
 
@@ -31,9 +32,14 @@ _LATE = {
 def left_out(error: Exception) -> str:
     """Return which library is not installed and what brings it; empty where that is no matter."""
     name = (getattr(error, "name", None) or "").partition(".")[0]
-    if not isinstance(error, ModuleNotFoundError) or name not in _LATE:
+    if not isinstance(error, ModuleNotFoundError) or name in ("", *_OURS):
         return ""
-    return f"{name} was left out: {how_to_install(_LATE[name])}"
+    if name in _LATE:
+        return f"{name} was left out: {how_to_install(_LATE[name])}"
+    return (
+        f"{name} is not installed, or damaged. Mend it: "
+        f'"{sys.executable}" -m pip install --force-reinstall {DISTRIBUTION}, or its wheel'
+    )
 
 
 def installed() -> dict[str, str]:

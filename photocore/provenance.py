@@ -29,6 +29,7 @@ _CHUNK = 1 << 20
 RACY_SECONDS = 2.0
 #: List of the hashes of files beside it, as ``sha256sum`` writes and checks it.
 SUMS = "SHA256SUMS"
+_CHANGED = "BIFOCAL_CHANGED_PHOTOS"
 
 
 @dataclass(slots=True)
@@ -152,7 +153,7 @@ def provenance() -> Provenance:
         if not digest:
             # Hashed once: a file that the command itself replaces counts as it was read.
             try:
-                running.files[path] = file_hash(path)
+                running.files[path] = known_hash(path)
             except InputError:
                 del running.files[path]
     inputs = sorted({(path.name, digest) for path, digest in running.files.items()})
@@ -230,16 +231,18 @@ class FileHashes:
 
     Parameters
     ----------
-    memory : Path
-        JSON file that keeps them between runs; a damaged or missing one is no harm.
+    memory : Path, optional
+        JSON file that keeps them between runs; a damaged or missing one is no harm. Without one
+        they are remembered as long as the object.
     """
 
-    def __init__(self, memory: Path) -> None:
+    def __init__(self, memory: Path | None = None) -> None:
         self.memory = memory
         self._known: dict[str, list[object]] = {}
-        with suppress(OSError, ValueError):
-            known = json.loads(memory.read_text(encoding="utf-8"))
-            self._known = known if isinstance(known, dict) else {}
+        if memory is not None:
+            with suppress(OSError, ValueError):
+                known = json.loads(memory.read_text(encoding="utf-8"))
+                self._known = known if isinstance(known, dict) else {}
         self._changed = False
 
     def __call__(self, path: Path) -> str:
@@ -261,7 +264,7 @@ class FileHashes:
 
     def save(self) -> None:
         """Write the memory, if it is new and has a folder; not being able to costs time only."""
-        if not (self._changed and self.memory.parent.is_dir()):
+        if self.memory is None or not (self._changed and self.memory.parent.is_dir()):
             return
         with suppress(OSError):
             temporary = self.memory.with_name(f"{self.memory.name}.{os.getpid()}")
@@ -271,3 +274,49 @@ class FileHashes:
             finally:
                 temporary.unlink(missing_ok=True)
         self._changed = False
+
+
+#: Return the SHA-256 of a file; of one whose size and time are the same as before without reading.
+known_hash = FileHashes()
+
+
+def digest_of(value: Any) -> str:
+    """Return the SHA-256 of plain data, whatever the order of its keys."""
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
+
+
+@contextmanager
+def changed_photos(*, taken: bool = True) -> Iterator[None]:
+    """Take, within, photos and maps of another state than what was made from them.
+
+    Threads and processes that begin within do so too.
+
+    Parameters
+    ----------
+    taken : bool
+        False: nothing changes.
+
+    Yields
+    ------
+    None
+        Photos, relief maps and orthophotos are read within.
+
+    Examples
+    --------
+    >>> with changed_photos():
+    ...     print("whatever lies beside the pair file is taken")
+    whatever lies beside the pair file is taken
+    """
+    before = os.environ.get(_CHANGED)
+    if taken:
+        os.environ[_CHANGED] = "1"
+    try:
+        yield
+    finally:
+        if taken and before is None:
+            os.environ.pop(_CHANGED, None)
+
+
+def changes_are_taken() -> bool:
+    """Tell whether `changed_photos` holds."""
+    return _CHANGED in os.environ

@@ -42,3 +42,11 @@ def test_hooks_fetch_nothing() -> None:
     hooks = (ROOT / ".pre-commit-config.yaml").read_text("utf-8")
     assert "http" not in hooks
     assert re.findall(r"- repo: (\S+)", hooks) == ["local"]
+
+
+def test_the_plan_of_a_room_names_all_of_its_modules() -> None:
+    rooms = "bifocal/campaigns bifocal/faces bifocal/matching bifocal/survey"
+    for room in (*rooms.split(), "multimedia/refraction", "multimedia/tracking"):
+        plan = (ROOT / room / "__init__.py").read_text("utf-8")
+        modules = {path.stem for path in (ROOT / room).glob("*.py")} - {"__init__"}
+        assert modules == set(re.findall(r"`(\w+)`", plan)), room

@@ -9,12 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-#: Rooms whose numbers are fields; the others have a table still, read by `photocore.tuning`.
-ROOMS = sorted(
-    path.parent
-    for path in ROOT.glob("bifocal/**/tuning.py")
-    if not path.with_suffix(".toml").exists()
-)
+ROOMS = sorted(path.parent for path in ROOT.glob("bifocal/**/tuning.py"))
 
 
 def module_of(room: Path) -> str:

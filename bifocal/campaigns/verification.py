@@ -140,7 +140,7 @@ def verify(
         if not listed:
             raise InputError(remark("campaign.no_record", of=path, record=RECORD, sums=SUMS))
         sums = "".join(f"{digest}  {name}\n" for name, digest in hashes.items())
-        files = [*_judged(hashes, listed), *_broken(records)]
+        files = [*_judged(hashes, listed), *_broken(records), *_no_files(folder, hashes)]
         return Verification(
             files=tuple(sorted(files, key=lambda one: one.file)),
             worked=tuple(_worked(folder, hashes, listed, path)),
@@ -199,6 +199,16 @@ def _visible(folder: Path) -> set[str]:
         if not hidden and path.is_file() and path.resolve().is_relative_to(root):
             names.add(name.as_posix())
     return names
+
+
+def _no_files(folder: Path, hashes: Mapping[str, str]) -> Iterator[FileState]:
+    """Yield links that lead out of the delivery, to folders or nowhere, and what is no file."""
+    for path in sorted(folder.rglob("*")):
+        name = path.relative_to(folder).as_posix()
+        hidden = any(part[0] == "." for part in path.relative_to(folder).parts)
+        plain = path.is_file() or path.is_dir()
+        if name not in hashes and not hidden and (path.is_symlink() or not plain):
+            yield FileState(file=name, state="not listed", why="a link or pipe, not a file")
 
 
 def _records(folder: Path) -> dict[str, dict[str, Any]]:

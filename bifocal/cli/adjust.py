@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from bifocal.options import JointOptions
 from photocore.cli import print_result, progress_bar, tell_written
 from photocore.options import Argument, Typed, declared
-from photocore.shared_options import JsonOption, OverwriteOption
+from photocore.shared_options import ChangedPhotosOption, JsonOption, OverwriteOption
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,6 +30,7 @@ class AdjustCommand:
     check: tuple[Path, ...] = ()
     """The same for independent check points: they are compared, and hold nothing."""
     joint: JointOptions = field(default_factory=JointOptions)
+    changed_photos: ChangedPhotosOption = False
     overwrite: OverwriteOption = False
     as_json: JsonOption = False
 

@@ -9,7 +9,7 @@ from typing import Annotated
 from bifocal.options import LanguageOption
 from photocore.cli import print_result
 from photocore.options import Argument, declared
-from photocore.shared_options import JsonOption, OverwriteOption
+from photocore.shared_options import ChangedPhotosOption, JsonOption, OverwriteOption
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,6 +34,7 @@ class HandoverCommand:
     """Of the page."""
     out: Path
     """Page to write (.html), 24 MB at most."""
+    changed_photos: ChangedPhotosOption = False
     overwrite: OverwriteOption = False
     as_json: JsonOption = False
 
@@ -60,4 +61,4 @@ def command(options: HandoverCommand) -> None:
         overwrite=options.overwrite,
     )
     line = f"{options.out} written, {told['bytes'] / 1e6:.1f} MB."
-    print_result(told, (line,), as_json=options.as_json)
+    print_result(told, (line,), as_json=options.as_json, remarks=told["remarks"])

@@ -12,7 +12,7 @@ import click
 from photocore.cli import print_result, remark
 from photocore.option_types import NEW_TABLE
 from photocore.options import Argument, Typed, declared
-from photocore.shared_options import JsonOption, OverwriteOption
+from photocore.shared_options import ChangedPhotosOption, JsonOption, OverwriteOption
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +43,7 @@ class MatchCommand:
     """Highest relief looked for [m].  [default: 0.4 x near distance]"""
     language: Annotated[Literal["en", "it", "de"], Typed(flag="--lang --language")] = "en"
     """Language of the workbook."""
+    changed_photos: ChangedPhotosOption = False
     overwrite: OverwriteOption = False
     as_json: JsonOption = False
 

@@ -20,7 +20,12 @@ from bifocal.options import (
 from photocore.cli import print_result, progress_bar, remark
 from photocore.option_types import Length
 from photocore.options import Argument, Typed, declared
-from photocore.shared_options import JsonOption, OverwriteOption, RasterCogOption
+from photocore.shared_options import (
+    ChangedPhotosOption,
+    JsonOption,
+    OverwriteOption,
+    RasterCogOption,
+)
 
 if TYPE_CHECKING:
     from bifocal.model.points import Points
@@ -68,6 +73,7 @@ class OrthoCommand:
     tfw: bool = False
     """Also write the world file beside it."""
     cog: RasterCogOption = False
+    changed_photos: ChangedPhotosOption = False
     overwrite: OverwriteOption = False
     as_json: JsonOption = False
 

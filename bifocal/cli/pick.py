@@ -10,7 +10,7 @@ import click
 
 from photocore.cli import print_json, remark
 from photocore.options import Argument, Typed, declared
-from photocore.shared_options import JsonOption
+from photocore.shared_options import ChangedPhotosOption, JsonOption
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +31,7 @@ class PickCommand:
     """Survey workbook the points go into.  [default: named after the pair]"""
     port: Annotated[int, Typed(click.IntRange(min=0, max=65535))] = 0
     """Port; 0: one that is free."""
+    changed_photos: ChangedPhotosOption = False
     no_browser: bool = False
     """Print the address only."""
     language: Annotated[Literal["en", "it", "de"], Typed(flag="--lang --language")] = "en"

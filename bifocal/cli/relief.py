@@ -16,7 +16,12 @@ from bifocal.options import (
 )
 from photocore.cli import print_result, progress_bar
 from photocore.options import Argument, Typed, declared
-from photocore.shared_options import JsonOption, OverwriteOption, RasterCogOption
+from photocore.shared_options import (
+    ChangedPhotosOption,
+    JsonOption,
+    OverwriteOption,
+    RasterCogOption,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +55,7 @@ class ReliefCommand:
     cloud: Path | None = None
     """Also a coloured point cloud (.ply, .las, .laz)."""
     cog: RasterCogOption = False
+    changed_photos: ChangedPhotosOption = False
     overwrite: OverwriteOption = False
     as_json: JsonOption = False
 

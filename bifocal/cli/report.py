@@ -10,7 +10,7 @@ from bifocal.options import SurveyOptions, UnitOption
 from photocore.cli import progress_bar, remark, tell_written
 from photocore.option_types import Scale
 from photocore.options import Argument, Typed, declared
-from photocore.shared_options import OverwriteOption
+from photocore.shared_options import ChangedPhotosOption, OverwriteOption
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +42,7 @@ class ReportCommand:
     """Of the report.  [default: the folder's, else en]"""
     unit: UnitOption = None
     project: SurveyOptions = field(default_factory=SurveyOptions)
+    changed_photos: ChangedPhotosOption = False
     overwrite: OverwriteOption = False
 
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from bifocal.collimation.exchange import exchange_step, turned_picks
 from bifocal.collimation.fields import (
     LONGEST_NAME,
     SETUP,
@@ -35,7 +36,6 @@ from bifocal.collimation.records import (
     WallSpot,
 )
 from bifocal.remarks import remark
-from bifocal.survey.observations import DOUBT_CODES
 from photocore.errors import InputError
 
 #: A larger survey is another one.
@@ -59,6 +59,8 @@ def changes_of(state: SurveyState, command: Fields) -> list[Change]:
         If it is impossible; nothing is changed then.
     """
     op = command["op"]
+    if op == "photos.exchange" and command.get("step"):
+        return exchange_step(state, command, _exchanged_lenses(state))
     if op in _SETTINGS:
         _SETTINGS[op](state, command)
         return []
@@ -321,24 +323,31 @@ def _setup_set(state: SurveyState, command: Fields) -> None:
 
 
 def _exchange(state: SurveyState, command: Fields) -> None:
-    """Exchange far and near photo; what was picked goes with them, and no orientation stays.
+    """Exchange far and near photo as a job found them; no orientation stays.
 
-    A lens goes with its photo too, unless the longer one was typed for the far photo.
+    Older journals know it as the user's own, too.
     """
     state.points = {n: _turned(p) for n, p in state.points.items()}
     state.control = {n: _turned(p) for n, p in state.control.items()}
-    if not (lens_ratio(state.lenses.get(1, {}), state.lenses.get(2, {})) or 0.0) > 1.0:
-        state.lenses = {3 - image: lens for image, lens in state.lenses.items()}
+    state.lenses = _exchanged_lenses(state)
     state.scale = {k: replace(one, image=3 - one.image) for k, one in state.scale.items()}
     state.wall, state.shapes = {}, {}
     state.ordered = command.get("found") is not True
     state.forget_orientation()
+    state.orientation = {}
     state.done, state.undone = (
         [[Change(c.kind, c.key, _turned(c.before), _turned(c.after)) for c in x] for x in history]
         for history in (state.done, state.undone)
     )
     if state.stage in ("points", "products"):
         state.stage = "orientation"
+
+
+def _exchanged_lenses(state: SurveyState) -> dict[int, dict[str, float | None]]:
+    """Return the lenses with their photos, unless the longer one was typed for the far photo."""
+    if (lens_ratio(state.lenses.get(1, {}), state.lenses.get(2, {})) or 0.0) > 1.0:
+        return state.lenses
+    return {3 - image: lens for image, lens in state.lenses.items()}
 
 
 def _turned(record: Any) -> Any:
@@ -349,10 +358,7 @@ def _turned(record: Any) -> Any:
         return None
     if not hasattr(record, "picks"):
         return record
-    turned = replace(record, picks=record.picks[::-1])
-    if getattr(record, "code", "").upper().startswith(DOUBT_CODES):  # it names the photo in doubt
-        turned = replace(turned, code=record.code.translate({49: "2", 50: "1"}))
-    return turned
+    return turned_picks(record)
 
 
 def lens_ratio(*photos: Fields) -> float | None:

@@ -186,7 +186,7 @@ NOTES: Mapping[str, Mapping[str, Reader]] = {
     "files": {"stem": _TEXT, "pair?": _if_any(_TEXT), "photos": _TEXTS},
     "workbook.saved": {"sha256": _TEXT, "at?": number_of},
     "workbook.read": {"rows": _rows, "gone": _TEXTS},
-    "made": {"kind": _TEXT, "names": _TEXTS},
+    "made": {"kind": _TEXT, "names": _TEXTS, "causes?": _of(dict, "digests by cause")},
     "proposed": {"pair": _TEXT, "report": _of(dict, "a report")},
     "accepted": {"pair?": _TEXT},
     "unaligned": {},
@@ -195,7 +195,10 @@ NOTES: Mapping[str, Mapping[str, Reader]] = {
 RECORDS = {
     **COMMANDS, **NOTES, "control.add": {"control": _of([_FOUND], "a list of targets")},
     "points.add": {"points": _of([_FOUND], "a list of points")},
-    "photos.exchange": {"found?": _FLAG},
+    "photos.exchange": {
+        "found?": _FLAG, "step?": _FLAG, "corners?": _of(dict, "corners by shape"),
+        **{f"{key}?": _of(dict, "files") for key in ("made", "causes", "proposal")},
+    },
 }  # fmt: skip
 
 

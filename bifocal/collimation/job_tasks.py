@@ -14,6 +14,7 @@ from bifocal.collimation.drawing import write_points_drawing
 from bifocal.collimation.fields import FieldError, positive_of, tupled
 from bifocal.collimation.jobs import PageJob
 from bifocal.collimation.live_orientation import control_of, lenses_of, site_of
+from bifocal.collimation.product_graph import causes_of, out_of_date
 from bifocal.collimation.proposals import NOMINAL
 from bifocal.collimation.session import Session
 from bifocal.collimation.shapes import outlines_of
@@ -43,6 +44,7 @@ def start_job(session: Session, kind: str, options: Options, *, quiet: bool = Fa
 
     def task() -> dict[str, Any]:
         told = task_of(session, kind, options) | {"quiet": quiet}
+        told["causes"] = causes_of(session, kind)
         if quiet:  # what makes way may still be writing its own
             told["out"] = told["out"].replace(".proposed.", ".found.")
         return told
@@ -145,9 +147,10 @@ def _deliver_options(session: Session, options: Options, pair: Options) -> dict[
     if not isinstance(title, str) or len(title) > 120:
         raise FieldError(remark("page.title_line"))
     before: dict[str, Any] = {}
+    stale = out_of_date(session)
     surface = _ortho_options(session, options)
     for kind, task in (("relief", _relief_task(session, options)), ("ortho", _ortho_task(session))):
-        if products.current(kind) is None:
+        if products.current(kind) is None or kind in stale or before:
             before[kind] = {**pair, **task}
             if kind == "relief":
                 surface["relief"] = str(Path(task["out"]).resolve())
@@ -321,6 +324,11 @@ def _write_outlines(session: Session, folder: Path) -> list[str]:
     return [path.name]
 
 
+def _same(task: Options, *causes: str) -> dict[str, str]:
+    """Return the digests of causes as they were when the job began."""
+    return {key: value for key, value in (task.get("causes") or {}).items() if key in causes}
+
+
 def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any]) -> str:
     """Take over what a job made; return what the user should know."""
     kind = task["kind"]
@@ -328,7 +336,8 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
     if kind == "align":
         if task.get("quiet") and len(control_of(session.state).ids):
             return ""  # the user took it in hand meanwhile
-        session.propose(Path(task["out"]), result)
+        causes = _same(task, "control", *(() if task["free_scale"] else ("site",)))
+        session.propose(Path(task["out"]), {**result, "causes": causes})
         return told
     if kind == "join":
         path = Path(task["out"])
@@ -355,7 +364,8 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
     if kind == "deliver":
         folder = Path(task["out"])
         for first, paths in result["made"].items():
-            session.note_made(first, paths)
+            causes = {**causes_of(session, first), **_same(task, "pair", "faces")}
+            session.note_made(first, paths, causes)
         names = [f"{folder.name}/{name}" for name in result["files"]]
         if any(point.is_complete for point in session.state.points.values()):
             drawing = folder / f"{session.products.stem}_points.dxf"
@@ -363,6 +373,10 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
                 write_points_drawing(session.state, session.results, drawing)
             names.append(f"{folder.name}/{drawing.name}")
         names += [f"{folder.name}/{name}" for name in _write_outlines(session, folder)]
-    session.note_made(kind, names)
+    causes = dict(task.get("causes") or causes_of(session, kind))
+    if kind == "deliver":  # relief and orthophoto may have been made before it
+        now = causes_of(session, kind)
+        causes |= {cause: now[cause] for cause in ("relief", "ortho")}
+    session.note_made(kind, names, causes)
     session.show_products()
     return told

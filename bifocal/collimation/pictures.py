@@ -82,6 +82,7 @@ class Pictures:
             raise InputError("a pair needs two photos.")
         for number, info in enumerate(self.infos, start=1):
             pair.photo(number).check_size(info.size, info.path)
+            pair.photo(number).check_file(info.path, (pair.image1, pair.image2))
         grid = wall_grid(pair, (self.infos[0].size, self.infos[1].size))
         for number, pyramid in enumerate(self.pyramids, start=1):
             photo = pair.photo(number)

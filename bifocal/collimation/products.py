@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -45,13 +45,18 @@ class Products:
     def __init__(self, files: SurveyFiles) -> None:
         self.folder, self.stem = files.folder, files.stem
         self.made: dict[str, str] = {}
+        #: Digests of what each kind was last made from.
+        self.causes: dict[str, Mapping[str, str]] = {}
         self._relief: tuple[tuple[str, int], ReliefMap] | None = None
         self._overlay: tuple[object, bytes] | None = None
         self._reading, self._shading = threading.Lock(), threading.Lock()
         self._facts: dict[str, tuple[tuple[str, int], dict[str, Any]]] = {}
 
-    def note(self, kind: str, names: Sequence[str]) -> None:
-        """Remember that files were made."""
+    def note(
+        self, kind: str, names: Sequence[str], causes: Mapping[str, str] | None = None
+    ) -> None:
+        """Remember that files were made, and from what."""
+        self.causes[kind] = causes or {}
         for name in names:
             self.made.pop(name, None)
             self.made[name] = kind
@@ -75,7 +80,10 @@ class Products:
 
     def downloads(self, workbook: Path) -> dict[str, Path]:
         """Return the files offered for download by name."""
-        names = [name for name in self.made if (self.folder / name).is_file()]
+        names = [
+            name for name, kind in self.made.items()
+            if kind != "aside" and (self.folder / name).is_file()
+        ]  # fmt: skip
         offered = {Path(name).name: self.folder / name for name in names}
         if workbook.is_file():
             offered[workbook.name] = workbook
@@ -86,7 +94,9 @@ class Products:
         offered = self.downloads(workbook)
         return [{"name": n, "bytes": p.stat().st_size} for n, p in sorted(offered.items())]
 
-    def bundle(self, workbook: Path, more: Mapping[str, Path]) -> dict[str, Path]:
+    def bundle(
+        self, workbook: Path, more: Mapping[str, Path], stale: Collection[str] = ()
+    ) -> dict[str, Path]:
         """Return all that *Download all* holds by its name there: products, workbook, photos.
 
         Parameters
@@ -94,8 +104,12 @@ class Products:
         workbook : Path
         more : mapping of str to Path
             Further files: photos and what the pair file names.
+        stale : collection of str
+            Kinds that are out of date and stay out, so that old is never packed with new.
         """
-        return {**more, **self.downloads(workbook)}
+        old = {Path(name).name for name, kind in self.made.items() if kind in stale}
+        current = self.downloads(workbook).items()
+        return {**more, **{name: path for name, path in current if name not in old}}
 
     def preview(self, kind: str) -> bytes:
         """Return a small picture of the relief, the orthophoto or the drawing, PNG.

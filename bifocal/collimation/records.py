@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, cast
 
 from bifocal.survey.observations import DOUBT_CODES, PLANE_CODES
 
@@ -217,6 +217,10 @@ class SurveyState:
     def apply(self, changes: Iterable[Change]) -> None:
         """Put changes into effect."""
         for change in changes:
+            if change.kind == "settings":
+                for name, value in cast("dict[str, Any]", change.after).items():
+                    setattr(self, name, value)
+                continue
             records: dict[str, Any] = getattr(self, change.kind)
             if change.after is None:
                 records.pop(change.key, None)
@@ -225,7 +229,7 @@ class SurveyState:
 
     def forget_orientation(self) -> None:
         """Let go of an orientation that was accepted; nothing can be taken back to it."""
-        self.orientation = {}
+        self.orientation.pop("pair", None)
         self.done, self.undone = (
             [changes for changes in history if changes[0].kind != "orientation"]
             for history in (self.done, self.undone)

@@ -13,6 +13,7 @@ from typing import Any, cast
 
 from bifocal.collimation.commands import changes_of
 from bifocal.collimation.drawn_faces import DrawnFaces
+from bifocal.collimation.exchange import fields_of_exchange, follow_exchange, put_aside
 from bifocal.collimation.fields import NOTES, fields_of
 from bifocal.collimation.jobs import JobRunner
 from bifocal.collimation.journal import Journal
@@ -20,12 +21,13 @@ from bifocal.collimation.listeners import Listeners
 from bifocal.collimation.live_orientation import LiveOrientation
 from bifocal.collimation.live_results import LiveResults
 from bifocal.collimation.pictures import Pictures
+from bifocal.collimation.product_graph import causes_again, causes_hold
 from bifocal.collimation.products import Products, accept_pair, discard_pair
 from bifocal.collimation.project import JoinedSet, SurveyFiles
 from bifocal.collimation.proposals import measure_of, rescale
-from bifocal.collimation.records import Change, PickedPoint, SurveyState
+from bifocal.collimation.records import Change, SurveyState
 from bifocal.collimation.shapes import outlines_of
-from bifocal.collimation.workbook.rows import PointRow, row_of
+from bifocal.collimation.workbook.rows import PointRow, put_rows, row_of
 from bifocal.collimation.workbook.setup import ideal_setup, pair_of, typed_of
 from bifocal.collimation.workbook.sync import WorkbookSync
 from bifocal.model.flags import FlagLimits
@@ -34,7 +36,7 @@ from bifocal.model.photo_set import PhotoSet
 from bifocal.remarks import remark
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.jsonfile import plain
-from photocore.output import free_path, relative_name
+from photocore.output import relative_name
 
 #: Commands that were answered already, by their ids.
 MOST_ANSWERS = 10_000
@@ -164,7 +166,10 @@ class Session:
         with self.lock:
             first = Pair.read(path).photo_file(1)
             if not first.samefile(self.pictures.infos[0].path):
+                current = causes_hold(self, report)
                 self.command({"op": "photos.exchange", "found": True})
+                if current:  # the same, the other way round
+                    report = {**report, "causes": causes_again(self, report)}
             self._note_proposed(path, report)
             self.follow_scale()
             self.changed()
@@ -276,26 +281,25 @@ class Session:
             self._remember_files()
             self._show_pair(Pair.read(path))
 
-    def _exchange_photos(self) -> None:
-        """Exchange far and near; what was made with them the other way round is put aside."""
-        photos = [info.path for info in self.pictures.infos][::-1]
-        if self.pictures.pair is not None:
-            self._write({"op": "unaligned"})
-            made = [self.products.current(kind) for kind in ("relief", "ortho", "pair")]
-            self.note_made("exchanged", [path.name for path in made if path is not None])
-        if self.files.pair is not None:
-            aside = free_path(self.files.folder, f"{self.files.stem}-exchanged", ".pair.json")
-            self.files.pair.replace(aside)
-        self.pictures.show_photos(photos)
-        self.results, self.proposal = None, None
-        self.files = replace(self.files, photos=self.all_photos, pair=None)
+    def take_files(self, pair: Path | None, proposal: dict[str, Any] | None) -> None:
+        """Let this be the pair file of the photos shown, or what is proposed instead."""
+        if proposal is not None or self.proposal is not None:
+            self._write({"op": "unaligned"} if proposal is None else proposal)
+        self.results, self.proposal = None, proposal
+        self.files = replace(self.files, photos=self.all_photos, pair=pair)
         self._remember_files()
+        if pair is not None:
+            self._show_pair(Pair.read(pair))
+        self._show_proposal()
 
-    def note_made(self, kind: str, names: Sequence[str]) -> None:
-        """Say in the journal which files the page made: these it may replace."""
+    def note_made(
+        self, kind: str, names: Sequence[str], causes: Mapping[str, str] | None = None
+    ) -> None:
+        """Say in the journal which files the page made, and from what: these it may replace."""
         with self.lock:
-            self._write({"op": "made", "kind": kind, "names": list(names)})
-            self.products.note(kind, names)
+            record = {"op": "made", "kind": kind, "names": list(names)}
+            self._write({**record, "causes": dict(causes)} if causes else record)
+            self.products.note(kind, names, causes)
 
     def show_products(self) -> None:
         """Show the orthophoto, where there is one."""
@@ -352,8 +356,12 @@ class Session:
                 raise InputError(remark("page.give_photos"))
             if pair is not None and not self.products.is_own(pair):
                 raise InputError(remark("page.begun_with_pair", name=pair.name))
+            if not command.get("found"):
+                command |= fields_of_exchange(self)
             result = self._carry_out(command, write=True)
-            self._exchange_photos()
+            if command.get("found"):
+                put_aside(self)
+                self.take_files(None, None)
             return result
         return self._carry_out(command, write=True)
 
@@ -379,6 +387,8 @@ class Session:
             self._write(command)
         self.state = trial
         self._apply(changes)
+        if write and any(one.kind == "settings" for one in changes):
+            follow_exchange(self, changes)
         return {"name": changes[-1].key} if changes else None
 
     def _apply(self, changes: list[Change]) -> None:
@@ -400,7 +410,10 @@ class Session:
         changes = [change.reversed for change in reversed(source.pop())]
         self.state.apply(changes)
         self.state.revision += 1
-        if changes[0].kind == "orientation":
+        if any(one.kind == "settings" for one in changes):
+            if write:
+                follow_exchange(self, changes)
+        elif changes[0].kind == "orientation":
             self._follow_orientation(changes[0], live=write)
         target.append(changes)
         return {"name": changes[-1].key}
@@ -432,7 +445,7 @@ class Session:
         elif op == "workbook.saved":
             self.sync.digest = fields["sha256"]
         elif op == "made":
-            self.products.note(fields["kind"], fields["names"])
+            self.products.note(fields["kind"], fields["names"], fields.get("causes"))
         elif op == "accepted" and "pair" in fields:
             self._note_accepted(fields["pair"])
         elif op in ("proposed", "accepted", "unaligned"):
@@ -455,17 +468,7 @@ class Session:
         self._apply_rows(rows, gone)
 
     def _apply_rows(self, rows: Mapping[str, PointRow], gone: Sequence[str]) -> None:
-        points = self.state.points
-        for name, row in rows.items():
-            before = points.get(name)
-            order = before.order if before is not None else self.state.next_order()
-            points[name] = PickedPoint(
-                name=name, order=order, picks=row.picks, code=row.code, note=row.note,
-                # What is picked in one photo only was left out for that alone.
-                use=row.use or None in row.picks, reference=row.reference,
-            )  # fmt: skip
-        for name in gone:
-            points.pop(name, None)
+        put_rows(self.state, rows, gone)
         self.state.revision += 1
 
     def note_saved(self, digest: str, revision: int) -> None:

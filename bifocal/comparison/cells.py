@@ -18,11 +18,13 @@ from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import InputError
 
 
-def difference_of(before: ReliefMap, after: ReliefMap) -> tuple[ReliefMap, list[str]]:
-    """Return after minus before on the coarser of both grids, and remarks.
+def difference_of(before: ReliefMap, after: ReliefMap) -> tuple[ReliefMap, BoolArray, list[str]]:
+    """Return after minus before on the coarser of both grids, where it is of two surfaces; remarks.
 
-    Only what both have measured is known. Beside steps and on slopes half the relief's range among
-    the neighbours joins the standard deviation: a pixel may belong to either side.
+    Only what both have measured is known, and what is of one surface: where a column stands before
+    a wall one date may have seen the column and the other, past it, the wall. Beside steps and on
+    slopes half the relief's range among the neighbours joins the standard deviation: a pixel may
+    belong to either side.
 
     Raises
     ------
@@ -45,13 +47,46 @@ def difference_of(before: ReliefMap, after: ReliefMap) -> tuple[ReliefMap, list[
         spread = max(1.4826 * float(np.median(np.abs(r[known]))), 1e-6)
         variance += spread**2
         remarks.append(remark("compare.no_sigma", sigma=1000 * spread))
+    two = _two_surfaces(base, other, np.sqrt(variance), known)
+    known &= ~two
+    if two.any():
+        remarks.append(remark("compare.two_surfaces", area=float(two.sum()) * base.gsd**2))
     unknown = np.where(known, 0.0, np.nan)
     difference = ReliefMap(
         r=np.asarray(r + unknown, np.float32),
         sigma=np.asarray(np.sqrt(variance) + unknown, np.float32),
         quality=known * np.uint8(Quality.MEASURED), plane_from_pixel=base.plane_from_pixel,
     )  # fmt: skip
-    return difference, remarks
+    return difference, two, remarks
+
+
+def _two_surfaces(
+    base: ReliefMap, other: ReliefMap, sigma: FloatArray, known: BoolArray
+) -> BoolArray:
+    """Return where each map shows, nearby, the surface that the other one shows here.
+
+    What really moved leaves its old surface in one map only.
+    """
+    gsd = base.gsd
+    reach = round(CHANGE.beside / gsd)
+    far = known & (np.abs(other.r - base.r) > CHANGE.apart * sigma)
+    rows, columns = np.nonzero(far)
+    if not reach or not len(rows):
+        return np.zeros_like(known)
+    step = max(1, reach // 8)
+    offsets = np.arange(-reach, reach + 1, step)
+    met = np.zeros((2, len(rows)), np.int64)
+    tolerance = 3 * sigma[rows, columns]
+    padded = [np.pad(np.where(known, one.r, np.nan), reach, constant_values=np.nan)
+              for one in (base, other)]  # fmt: skip
+    for dy in offsets:
+        for dx in offsets[np.hypot(offsets, dy) <= reach]:
+            for k, here in enumerate((other, base)):
+                there = padded[k][rows + reach + dy, columns + reach + dx]
+                met[k] += np.abs(there - here.r[rows, columns]) <= tolerance
+    two = np.zeros_like(known)
+    two[rows, columns] = (met >= CHANGE.met * len(offsets) ** 2).all(axis=0)
+    return two
 
 
 def _on_grid(relief: ReliefMap, grid: Grid) -> ReliefMap:

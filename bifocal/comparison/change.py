@@ -34,12 +34,15 @@ class ChangedRegion:
     number : int
         The largest volume is 1.
     X, Y : float
-        Its middle. [m]
+        Its middle, weighted by the change. [m]
     area, volume, mean, largest : float
-        Positive where the wall came forward; the mean over the outline, the largest as an average
-        over the smallest patch. [m², m³, m, m]
+        Positive where the wall came forward; the volume with its rim and its unmeasured holes, the
+        mean over the outline, the largest as an average over the smallest patch that proves it.
+        [m², m³, m, m]
     sigma_area, sigma_volume, sigma_mean, sigma_largest : float
         Their standard deviations.
+    measured : float
+        Share of the area that both maps have measured.
     probability : float
         That chance alone makes so large an average anywhere on the wall; never below 0.0001.
     """
@@ -55,6 +58,7 @@ class ChangedRegion:
     sigma_mean: float
     largest: float
     sigma_largest: float
+    measured: float
     probability: float
 
 
@@ -67,7 +71,8 @@ class Comparison:
     difference : ReliefMap
         After minus before: positive where the wall came forward. [m]
     region : ndarray of int64, shape as the difference's
-        Number of the changed region of each pixel; 0 where no change is proven.
+        Number of the changed region of each pixel; 0 where no change is proven, -1 where each
+        date shows another surface of those that are there.
     smooth : ndarray, shape as the difference's
         Difference averaged over the smallest patches, bilinear between cells; 0 where unknown. [m]
     regions : tuple of ChangedRegion
@@ -166,7 +171,7 @@ def compare(
         positive(value, name)
     if level >= 1:
         raise InputError(f"level: {level:g} is no probability; give for example 0.01.")
-    difference, remarks = difference_of(before, after)
+    difference, two_surfaces, remarks = difference_of(before, after)
     radius = np.sqrt(smallest / (4 * np.pi))
     side = max(difference.gsd, radius / 2, max(difference.shape) * difference.gsd / CHANGE.side)
     pixels = max(1, round(side / difference.gsd))
@@ -190,13 +195,14 @@ def compare(
     unchanged = cells.known & ~_wider(np.abs(_tested(cells.z, cells.known, patches)[0]) > 3)
     for _ in range(CHANGE.rounds):
         by_chance = chance(cells.z, unchanged, patches, cells.least, rng)
-        test, sigmas = _tested(cells.z, unchanged, patches, by_chance)
+        test, sigmas, sizes = _tested(cells.z, unchanged, patches, by_chance)
         limit = by_chance.limit(level)
         labels = _labelled(test, limit)
         proven, unchanged = unchanged, cells.known & ~_wider(labels > 0)
         if (proven == unchanged).all() or not unchanged.any():
             break
-    regions, labels = _regions(cells, labels, test, by_chance, patches, sigmas[0], covariance)
+    outlined = _Outlined(cells, test, sizes, by_chance, patches, sigmas, covariance)
+    regions, labels = outlined.regions(labels)
     usual = float(np.median(cells.sigma[unchanged]))
     if not (stable or fit):
         common, variance = trend_of(cells, unchanged, by_chance.cells)
@@ -204,9 +210,10 @@ def compare(
             remarks.append(remark("compare.offset", offset=1000 * float(common[0])))
     smooth = np.nan_to_num(patches.averages(cells.difference)[0])
     whole = labels.repeat(pixels, axis=0).repeat(pixels, axis=1)
+    whole = whole[: difference.shape[0], : difference.shape[1]]
     return Comparison(
         difference=difference,
-        region=whole[: difference.shape[0], : difference.shape[1]],
+        region=np.where(two_surfaces & (whole == 0), -1, whole),
         smooth=cv2.resize(smooth, None, fx=pixels, fy=pixels, interpolation=cv2.INTER_LINEAR)[
             : difference.shape[0], : difference.shape[1]
         ],
@@ -236,8 +243,8 @@ def _wider(cells: BoolArray) -> BoolArray:
 
 def _tested(
     z: FloatArray, unchanged: BoolArray, patches: Patches, by_chance: Chance | None = None
-) -> tuple[FloatArray, FloatArray]:
-    """Return the average over the size of patch that tells most, over its sigma; and the sigmas.
+) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Return the average over the size of patch that tells most, over its sigma; sigmas; that size.
 
     The sigma of each size is what the wall itself shows, or what chance makes of the covariance,
     whichever is more. The test is 0 where nothing is known.
@@ -249,9 +256,9 @@ def _tested(
     least = 1e-9 if by_chance is None else 1.0
     factors = np.fmax(usual, least)
     tests = np.nan_to_num(tests / factors[:, None, None])
-    best = np.abs(tests).argmax(axis=0)[None]
+    best = np.abs(tests).argmax(axis=0)
     medians = [np.nanmedian(part) for part in sigmas] * factors
-    return np.take_along_axis(tests, best, axis=0)[0], medians
+    return np.take_along_axis(tests, best[None], axis=0)[0], medians, best
 
 
 def _labelled(test: FloatArray, limit: float) -> IntArray:
@@ -265,50 +272,106 @@ def _labelled(test: FloatArray, limit: float) -> IntArray:
     return labels
 
 
-def _regions(
-    cells: Cells, labels: IntArray, test: FloatArray, by_chance: Chance, patches: Patches,
-    sigma: float, covariance: FloatArray,
-) -> tuple[tuple[ChangedRegion, ...], IntArray]:  # fmt: skip
-    """Return the regions and their cells, outlined by the change over the smallest patches.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Outlined:
+    """What is known of the cells when the proven parts of the wall are outlined."""
 
-    A region is what hangs together with a significant part and has changed by a quarter of its
-    largest change at least, and by two standard deviations.
-    """
-    from scipy.ndimage import binary_fill_holes, label
+    cells: Cells
+    test: FloatArray
+    sizes: IntArray
+    by_chance: Chance
+    patches: Patches
+    sigmas: FloatArray
+    covariance: FloatArray
 
-    smooth = np.nan_to_num(patches.averages(cells.difference)[0])
-    terms, cell = trend_terms(cells.grid, cells.grid.bounds), cells.grid.gsd**2
-    numbered, made = np.zeros_like(labels), list[ChangedRegion]()
-    parts = [labels == number for number in range(1, int(labels.max()) + 1)]
-    for part in sorted(parts, key=lambda one: -np.abs(smooth[one]).max()):
-        change = smooth * np.sign(test[part][0])
-        peak, own = float(change[part].max()), sigma * float(np.median(cells.sigma[part]))
-        edge = max(CHANGE.outline * peak, 2 * own)
-        spread_out, _ = label((change >= edge) & cells.known & (numbered == 0))
-        inner = np.isin(spread_out, np.setdiff1d(spread_out[part], [0]))
-        inner = binary_fill_holes(inner) & cells.known & (numbered == 0)
-        if not inner.any():
-            continue
-        common, weights = terms[inner].sum(axis=0), np.where(inner, cells.sigma, 0.0)
-        variance = by_chance.variance_of_sum(weights) + common @ covariance @ common
-        volume, spread = cell * float(cells.difference[inner].sum()), cell * float(variance**0.5)
-        if abs(volume) < 3 * spread:
-            continue
+    def regions(self, labels: IntArray) -> tuple[tuple[ChangedRegion, ...], IntArray]:
+        """Return the regions about parts with these numbers, and the cells of each.
+
+        A region is what hangs together with a proven part and has changed, over the smallest
+        patches that show most of it, by a quarter of its largest change and by two standard
+        deviations; what no outline shows is the proven part itself.
+        """
+        averages = [np.nan_to_num(part) for part in self.patches.averages(self.cells.difference)]
+        numbered, made = np.zeros_like(labels), list[ChangedRegion]()
+        parts = [labels == number for number in range(1, int(labels.max()) + 1)]
+        for part in sorted(parts, key=lambda one: -np.abs(averages[0][one]).max()):
+            inner, level = self._outline(part & (numbered == 0), averages, numbered == 0)
+            if inner is None or (one := self._region(part, inner, averages, level)) is None:
+                continue
+            numbered[inner & self.cells.known] = len(made) + 1
+            made.append(replace(one, number=len(made) + 1))
+        order = sorted(made, key=lambda one: -abs(one.volume))
+        ranks = np.zeros(len(made) + 1, np.int64)
+        for rank, one in enumerate(order, start=1):
+            ranks[one.number] = rank
+        ordered = tuple(replace(one, number=int(ranks[one.number])) for one in order)
+        return ordered, ranks[numbered]
+
+    def _outline(
+        self, part: BoolArray, averages: Sequence[FloatArray], free: BoolArray
+    ) -> tuple[BoolArray | None, int]:
+        """Return the cells of the region about a part, holes too, and the size of its patches."""
+        from scipy.ndimage import binary_fill_holes, label
+
+        if not part.any():
+            return None, 0
+        known, last = self.cells.known, int(self.sizes[part][np.abs(self.test[part]).argmax()])
+        outlines = []
+        for level in range(last + 1):
+            change = averages[level] * np.sign(self.test[part][0])
+            edge = max(CHANGE.outline * float(change[part].max()), 2 * self._own(part, level))
+            spread_out, _ = label((change >= edge) & known & free)
+            outlines.append(np.isin(spread_out, np.setdiff1d(spread_out[part], [0])))
+        changed = np.where(known, self.cells.difference, 0.0)
+        whole = outlines[last] | part
+        for level, inner in enumerate(outlines):
+            rest = whole & ~inner & known
+            spread = self.by_chance.variance_of_sum(np.where(rest, self.cells.sigma, 0.0)) ** 0.5
+            if inner.any() and abs(float(changed[rest].sum())) <= CHANGE.held * float(spread):
+                return binary_fill_holes(inner) & free, level
+        return binary_fill_holes(outlines[last] | part) & free, last
+
+    def _own(self, part: BoolArray, level: int) -> float:
+        """Return the standard deviation of an average over patches of a size. [m]"""
+        return float(self.sigmas[level]) * float(np.median(self.cells.sigma[part]))
+
+    def _region(
+        self, part: BoolArray, inner: BoolArray, averages: Sequence[FloatArray], level: int
+    ) -> ChangedRegion | None:
+        """Return a region, its number not yet given; None if its volume is within its sigma."""
+        cells, own, cell = self.cells, self._own(part, level), self.cells.grid.gsd**2
+        way = float(np.sign(self.test[part][0]))
+        change = averages[level] * way
+        # What the outline cuts off lies within a patch of it, and chance adds nothing there.
+        radius = max(1, round(2 * self.patches.radii[level]))
+        disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1,) * 2)
+        about = cv2.dilate(inner.astype(np.uint8), disc) > 0
+        about &= cells.known
+        terms = trend_terms(cells.grid, cells.grid.bounds)
+        common, weights = terms[about].sum(axis=0), np.where(about, cells.sigma, 0.0)
+        variance = self.by_chance.variance_of_sum(weights) + common @ self.covariance @ common
+        values, holes = cells.difference[inner & cells.known], int((inner & ~cells.known).sum())
+        total = float(cells.difference[about].sum()) + holes * float(values.mean())
+        variance += (holes * float(values.std())) ** 2
+        volume, spread = cell * total, cell * float(variance**0.5)
+        if way * volume < 2 * spread:
+            return None
+        peak = float(change[part].max())
         near = _wider(inner) & cells.known
-        wide, narrow = (int((near & (change >= edge + way * own)).sum()) for way in (-1, 1))
-        y, x = (float(index.mean()) for index in np.nonzero(inner))
+        edge = max(CHANGE.outline * peak, 2 * own)
+        wide, narrow = (int((near & (change >= edge + sign * own)).sum()) for sign in (-1, 1))
+        # How far a change reaches that fades out, no outline knows better than this.
+        fading = int((inner & cells.known & (change < 2 * edge)).sum())
+        moved = np.maximum(averages[0] * way, 0)[inner]
+        y, x = (float(np.average(index, weights=moved)) for index in np.nonzero(inner))
         area = int(inner.sum()) * cell
-        numbered[inner] = len(made) + 1
-        made.append(ChangedRegion(
-            number=len(made) + 1,
+        return ChangedRegion(
+            number=0,
             X=cells.grid.x0 + x * cells.grid.gsd, Y=cells.grid.y0 - y * cells.grid.gsd,
-            area=area, sigma_area=max(cell, (wide - narrow) / 2 * cell),
+            area=area,
+            sigma_area=max(cell, float(np.hypot((wide - narrow) / 2, fading / 2)) * cell),
             volume=volume, sigma_volume=spread, mean=volume / area, sigma_mean=spread / area,
-            largest=peak * float(np.sign(volume)), sigma_largest=own,
-            probability=by_chance.probability(float(np.abs(test[part]).max())),
-        ))  # fmt: skip
-    order = sorted(made, key=lambda one: -abs(one.volume))
-    ranks = np.zeros(len(made) + 1, np.int64)
-    for rank, one in enumerate(order, start=1):
-        ranks[one.number] = rank
-    return tuple(replace(one, number=int(ranks[one.number])) for one in order), ranks[numbered]
+            largest=peak * way, sigma_largest=own,
+            measured=float(cells.known[inner].mean()),
+            probability=self.by_chance.probability(float(np.abs(self.test[part]).max())),
+        )  # fmt: skip

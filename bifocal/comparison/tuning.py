@@ -29,6 +29,16 @@ class ChangeTuning:
     #: How often chance is learned anew without the regions that were found.
     #: Evidence: the second already stands still where one region is found.
     rounds: int = 3
+    #: Within this distance a surface that the other date shows here is looked for. [m]
+    #: Evidence: half of a balcony's column, castle entry seen by two pairs of one day.
+    beside: float = 0.15
+    #: Two surfaces lie this far apart at least. [standard deviations]
+    apart: float = 10.0
+    #: Share of the places about that must show the other date's surface.
+    met: float = 0.03
+    #: What an outline leaves out of the change that larger patches show is not proven: up to here.
+    #: [standard deviations]
+    held: float = 3.0
     #: Share of a region's largest change at which it is outlined.
     #: Evidence: a paraboloid keeps 94 % of its volume.
     outline: float = 0.25

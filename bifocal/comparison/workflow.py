@@ -25,7 +25,7 @@ from photocore.tables import write_csv
 from photocore.workbook.making.newbook import plain_cell, save_book
 
 #: Bands of the difference.
-BANDS = ("difference [m]", "sigma [m]", "region (0 no change proven)")
+BANDS = ("difference [m]", "sigma [m]", "region (0 no change proven, -1 another surface seen)")
 #: Layers of the drawing: what came forward, what went back, numbers; contours by their interval.
 LAYERS = {"BIFOCAL_FORWARD": 1, "BIFOCAL_BACK": 5, "BIFOCAL_NAMES": 7}
 
@@ -171,7 +171,7 @@ def _write_tables(folder: Path, done: Comparison) -> None:
     """Write the regions as CSV and as a plain table of values in a workbook."""
     from openpyxl import Workbook
 
-    units = {"area": "m2", "volume": "m3", "number": "", "probability": ""}
+    units = {"area": "m2", "volume": "m3", "number": "", "probability": "", "measured": ""}
     keys = [field.name for field in fields(ChangedRegion)]
     headings = [
         f"{key} [{unit}]" if (unit := units.get(key.removeprefix("sigma_"), "m")) else key

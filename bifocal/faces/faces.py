@@ -13,7 +13,8 @@ from bifocal.model.grid import Grid
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, as_floats
 from photocore.errors import InputError, located
-from photocore.jsonfile import read_object, write_object
+from photocore.jsonfile import plain, read_object, write_object
+from photocore.provenance import digest_of
 
 Ring = FloatArray
 Kind = Literal["face", "break", "occluder"]
@@ -147,6 +148,11 @@ class Faces:
             more = {} if one.relief is None else {"relief": one.relief}
             features.append(_feature("occluder", one.name, "Polygon", _closed(one.rings), **more))
         return {"type": "FeatureCollection", "features": features}
+
+    @property
+    def digest(self) -> str:
+        """What tells them from others: 16 letters; empty where there are none."""
+        return digest_of(plain(self.to_dict()))[:16] if self else ""
 
     def write(self, path: Path | str, *, overwrite: bool = False) -> None:
         """Write a GeoJSON file; `read` reads it back."""

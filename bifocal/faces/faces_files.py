@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.faces.faces import BreakLine, Face, Faces, Occluder
+from bifocal.model.photo import Photo
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
@@ -20,6 +22,8 @@ LAYERS = ("FACE", "BREAK", "OCCLUDER")
 ENDING = ".faces.geojson"
 #: Given instead of a file: those beside the pair are left alone.
 NONE = "none"
+#: No façade goes deeper behind its wall, in distances of the near camera.
+DEEPEST = 10.0
 _PAIR_ENDINGS = (".pair.json", ".photos.json", ".json", ".xlsx", ".xlsm")
 
 
@@ -66,6 +70,44 @@ def given_faces(given: Faces | Path | None) -> tuple[Faces | None, tuple[str, ..
     faces = read_faces(given)
     about = {"name": given.name, "faces": len(faces.faces), "breaks": len(faces.breaks)}
     return faces, (remark("faces.used", occluders=len(faces.occluders), **about),)
+
+
+def check_faces(faces: Faces | None, photos: Sequence[Photo]) -> tuple[str, ...]:
+    """Refuse faces at a relief where no wall can be; return which of them no photo shows.
+
+    Raises
+    ------
+    InputError
+        If one lies beyond a camera, or farther behind the wall than any façade is deep.
+    """
+    near = min(photo.distance for photo in photos)
+    shown = [box for photo in photos if (box := _shown(photo)) is not None]
+    remarks = []
+    for face in faces.faces if faces else ():
+        corners = face.rings[0]
+        r = face.points[:, 2]
+        if face.plane is not None:
+            r = face.plane[0] + corners @ face.plane[1:]
+        known = r[np.isfinite(r)]
+        if len(known) and not (-DEEPEST * near < known.min() and known.max() < near):
+            about = {"name": face.name, "low": known.min(), "high": known.max(), "near": near}
+            raise InputError(remark("faces.beyond", **about))
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        if len(shown) == len(photos) and not any(
+            (low <= box[1]).all() and (high >= box[0]).all() for box in shown
+        ):
+            remarks.append(remark("faces.outside", name=face.name))
+    return tuple(remarks)
+
+
+def _shown(photo: Photo) -> tuple[FloatArray, FloatArray] | None:
+    """Return the least and greatest X, Y that a photo shows of the wall; None: not known."""
+    if photo.image_size is None:
+        return None
+    width, height = photo.image_size
+    edge = np.array([[0, 0], [width, 0], [0, height], [width, height]], np.float64) - 0.5
+    places = photo.plane_from_pixels(edge)
+    return (places.min(axis=0), places.max(axis=0)) if np.isfinite(places).all() else None
 
 
 def keep_faces(given: Path | None, source: Path) -> tuple[str, ...]:

@@ -1,8 +1,12 @@
-"""What the photos of a pair or set say of themselves."""
+"""What the photos of a pair or set say of themselves, held against what it was made from."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+
 from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
 from bifocal.model.photo_set import PhotoSet
 from photocore.images import ImageInfo, image_info
 
@@ -10,9 +14,7 @@ from photocore.images import ImageInfo, image_info
 def set_photo_info(photos: PhotoSet, number: int) -> ImageInfo:
     """Return what a photo of a set, counted from 0, says of itself; see `photo_info`."""
     photo = photos.photos[number]
-    info = image_info(photo.path)
-    photo.check_size(info.size, info.path)
-    return info
+    return _checked(photo, photo.path, photos.photos)
 
 
 def photo_info(pair: Pair, number: int) -> ImageInfo:
@@ -21,18 +23,21 @@ def photo_info(pair: Pair, number: int) -> ImageInfo:
     Raises
     ------
     InputError
-        Also if it is of another size than the pair was made from.
+        Also if it is of another size than the pair was made from, or another file.
     """
-    info = image_info(pair.photo_file(number))
-    pair.photo(number).check_size(info.size, info.path)
-    return info
+    return _checked(pair.photo(number), pair.photo_file(number), (pair.image1, pair.image2))
 
 
 def photo_infos(source: Pair | PhotoSet) -> tuple[ImageInfo, ...]:
     """Return what the photos of a pair or a set say of themselves, in order; as `photo_info`."""
     if isinstance(source, Pair):
         return photo_info(source, 1), photo_info(source, 2)
-    infos = tuple(image_info(photo.path) for photo in source.photos)
-    for photo, info in zip(source.photos, infos, strict=True):
-        photo.check_size(info.size, info.path)
-    return infos
+    return tuple(_checked(photo, photo.path, source.photos) for photo in source.photos)
+
+
+def _checked(photo: Photo, path: Path, photos: Sequence[Photo]) -> ImageInfo:
+    """Return what a photo says of itself; refuse one that is not what its pair was made from."""
+    info = image_info(path)
+    photo.check_size(info.size, info.path)
+    photo.check_file(info.path, photos)
+    return info

@@ -1,5 +1,5 @@
-"""The public name by which programs tell what makes the outputs they write."""
+"""The public names by which programs tell what makes their outputs, and what they take."""
 
-from photocore.provenance import recording
+from photocore.provenance import changed_photos, recording
 
-__all__ = ["recording"]
+__all__ = ["changed_photos", "recording"]

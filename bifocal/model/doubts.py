@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from bifocal.model.orientation_precision import NAMES
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
+from photocore.errors import InputError
 
 #: A wall bent by certainly more than this, at 3000 px of width, is not that of an honest pair; by
 #: how many standard deviations it is certain. [px]
@@ -19,6 +20,8 @@ MOST_BENT, CERTAIN = 0.2, 2.0
 #: what of k the scale takes up, certainly and by chance: errors of r over sigma_r are 0.8 to
 #: 1.4 on simulated pairs of nearly one axis whose lens bends the wall by 1 to 7 px. [px, -]
 BEND_BY_K, TAKEN_UP, OR_MORE = 144.0, 0.2, 0.1
+#: Unit of lengths to which nothing gives a scale.
+NO_UNIT = "none"
 #: How a doubt begins that leaves no word of how good relief is.
 MISFIT = "THE MODEL DOES NOT FIT"
 #: What free diagnostics may lack or hold instead of numbers.
@@ -36,6 +39,42 @@ def doubts_in_words(setup: Any) -> tuple[str, ...]:
     if told is None and (bend := _bend(setup)):
         told = [remark("pair.bent", bend=bend, most=MOST_BENT)]
     return tuple(map(str, told)) if isinstance(told, list | tuple) else ()
+
+
+def check_scale(extra: Mapping[str, Any], name: object) -> None:
+    """Refuse a drawing scale of a pair or set whose lengths are no metres.
+
+    Parameters
+    ----------
+    extra : mapping
+        Further keys of its file; ``"unit": "none"`` there, or a doubt in those of older versions.
+    name : object
+        What to call it.
+
+    Raises
+    ------
+    InputError
+        If it has no scale.
+    """
+    if unit_of(extra) == NO_UNIT:
+        raise InputError(remark("projects.no_drawing_scale", of=name))
+
+
+def unit_of(extra: Mapping[str, Any]) -> str:
+    """Return the unit of a pair's or set's lengths: ``m``, or ``none`` where nothing gave a scale.
+
+    Examples
+    --------
+    >>> unit_of({}), unit_of({"unit": "none"})
+    ('m', 'none')
+    """
+    untold = str(remark("projects.no_scale"))[:9]
+    doubts = doubts_in_words(extra.get("setup"))
+    return (
+        NO_UNIT
+        if extra.get("unit") == NO_UNIT or any(doubt.startswith(untold) for doubt in doubts)
+        else "m"
+    )
 
 
 def untold(told: Iterable[str], remarks: Iterable[str]) -> list[str]:

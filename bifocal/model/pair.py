@@ -16,13 +16,19 @@ from bifocal.model.doubts import covariance_of_doubts, doubts_in_words
 from bifocal.model.flags import FlagLimits
 from bifocal.model.intersection import Intersection, intersect
 from bifocal.model.photo import Photo
-from bifocal.model.photo_entries import PAIR_FORMAT, SET_FORMAT, file_content, photo_entries
+from bifocal.model.photo_entries import (
+    PAIR_FORMAT,
+    SET_FORMAT,
+    file_content,
+    photo_entries,
+    write_content,
+)
 from bifocal.precision import base_factor
 from bifocal.remarks import remark
 from multimedia import Layers
 from photocore.arrays import FloatArray, as_points, not_negative, positive
 from photocore.errors import GeometryError, InputError, located
-from photocore.jsonfile import read_object, write_object
+from photocore.jsonfile import read_object
 from photocore.series import check_index
 
 #: Parameters of two cameras in air.
@@ -216,7 +222,7 @@ class Pair:
 
     def write(self, path: Path | str, *, overwrite: bool = False) -> None:
         """Write a pair file, whole or not at all."""
-        write_object(path, self.to_dict(), overwrite=overwrite)
+        write_content(path, self.to_dict(), overwrite=overwrite)
 
     @property
     def _knows_its_precision(self) -> bool:

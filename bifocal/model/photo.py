@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,8 @@ from multimedia import Layers
 from photocore.arrays import BoolArray, FloatArray, as_points, not_negative, positive, read_only
 from photocore.camera.distortion import inverse_2x2
 from photocore.errors import GeometryError, InputError, located
+from photocore.jsonfile import plain
+from photocore.provenance import changes_are_taken, digest_of, known_hash
 
 #: No wall is photographed from further away, nor has coordinates beyond. [m]
 FARTHEST, OUTERMOST = 1e5, 1e8
@@ -61,6 +63,8 @@ class Photo:
         Width and height of the photo that the homography belongs to; None where not known. [px]
     principal_distance, pixel_size : float or None
         Of the camera, for lengths in millimetres of the image. [mm]
+    sha256 : str
+        Of the image file that the photo was oriented with; empty where that is not known.
     layers : Layers or None
         Media between camera and object, the same for both photos of a pair; None in air.
     z0 : float or None
@@ -85,6 +89,7 @@ class Photo:
     image_size: tuple[int, int] | None = None
     principal_distance: float | None = None
     pixel_size: float | None = None
+    sha256: str = ""
     layers: Layers | None = None
     z0: float | None = None
     interface_normal: FloatArray | None = None
@@ -165,6 +170,7 @@ class Photo:
 
         image = read_image(self.path)
         self.check_size((image.shape[1], image.shape[0]), self.path)
+        self.check_file(self.path)
         return image
 
     @property
@@ -321,6 +327,41 @@ class Photo:
             f"this is {what}. Use the photo as it was, or align this one anew."
         )
 
+    def check_file(self, path: Path, others: Iterable[Photo] = ()) -> None:
+        """Refuse a file that is not the one the photo was oriented with, where that is known.
+
+        Parameters
+        ----------
+        path : Path
+            The image file.
+        others : iterable of Photo
+            Of which it may be one.
+
+        Raises
+        ------
+        InputError
+            Naming the photo that it is, if it is another of these.
+        """
+        if not self.sha256 or changes_are_taken() or (digest := known_hash(path)) == self.sha256:
+            return
+        match = next((one for one in others if one.sha256 == digest), None)
+        if match is not None:
+            raise InputError(remark("photo.exchanged", of=path, name=Path(match.file).name))
+        raise InputError(remark("photo.changed", of=path))
+
+    @property
+    def digest(self) -> str:
+        """What tells this orientation from another one: 16 letters, whatever file holds it."""
+        lens, matrix = self.lens, self.plane_from_pixel
+        values = {
+            "plane_from_pixel": matrix / matrix.flat[np.abs(matrix).argmax()],
+            "station": [*self.nadir, self.distance],
+            "lens": lens and [lens.model, *lens.camera_matrix.ravel(), *lens.coefficients],
+            "media": self.layers and self.layers.as_dict(),
+            "port": [self.z0, self.interface_normal],
+        }
+        return digest_of(_rounded(plain(values)))[:16]
+
     def gsd(self, size: tuple[int, int]) -> float:
         """Return the side of a pixel in the middle of a photo of (width, height) px. [m]
 
@@ -371,8 +412,8 @@ class Photo:
         missing = [name for name in ("plane_from_pixel", "nadir", "distance") if name not in data]
         if missing:
             raise InputError(f'"{key}" lacks {", ".join(missing)}.')
-        file, called = (data.pop(part, "") for part in ("file", "name"))
-        for part, text in (("file", file), ("name", called)):
+        file, called, sha256 = (data.pop(part, "") for part in ("file", "name", "sha256"))
+        for part, text in (("file", file), ("name", called), ("sha256", sha256)):
             if not isinstance(text, str):
                 raise InputError(f'"{key}.{part}" must be text, found {text!r}.')
         lens = data.get("lens")
@@ -387,6 +428,7 @@ class Photo:
             return cls(
                 file=file,
                 name=called,
+                sha256=sha256,
                 lens=lens_of(folder / lens) if lens else None,
                 plane_from_pixel=data.pop("plane_from_pixel"),
                 nadir=data.pop("nadir"),
@@ -399,7 +441,7 @@ class Photo:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the photo's part of the pair file."""
-        stated = {"name": self.name, "file": self.file}
+        stated = {"name": self.name, "file": self.file, "sha256": self.sha256}
         data: dict[str, Any] = {key: text for key, text in stated.items() if text}
         data |= {
             "plane_from_pixel": self.plane_from_pixel,
@@ -410,6 +452,15 @@ class Photo:
             if (value := getattr(self, name)) is not None:
                 data[name] = value
         return data | dict(self.extra)
+
+
+def _rounded(value: Any) -> Any:
+    """Return plain data with its numbers as text of ten digits."""
+    if isinstance(value, dict):
+        return {key: _rounded(part) for key, part in value.items()}
+    if isinstance(value, list):
+        return [_rounded(part) for part in value]
+    return f"{value:.9e}" if isinstance(value, float | int) else value
 
 
 def _whole_size(size: Any) -> tuple[int, int]:

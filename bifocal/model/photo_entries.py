@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import cache
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
 from bifocal.model import orientation_precision
@@ -13,6 +14,8 @@ from bifocal.model.photo import Photo
 from multimedia import Layers
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
+from photocore.jsonfile import write_object
+from photocore.provenance import known_hash
 
 #: Format of a pair file and of a file of two photos or more.
 PAIR_FORMAT, SET_FORMAT = "bifocal-pair/1", "bifocal-photos/1"
@@ -60,8 +63,9 @@ def photo_entries(data: Mapping[str, Any], folder: Path, *formats: str) -> Photo
             raise InputError('"photos" must list two photos or more.')
         entries = {f"photos[{number}]": entry for number, entry in enumerate(listed)}
     lens_of = cache(Lens.read)
+    digests = _recorded_digests(data.get("provenance"))
     photos = [
-        Photo.from_dict(entry, key, folder, layers, lens_of=lens_of)
+        Photo.from_dict(_with_digest(entry, digests), key, folder, layers, lens_of=lens_of)
         for key, entry in entries.items()
     ]
     stated = data.pop("orientation", None)
@@ -82,3 +86,31 @@ def file_content(
     if orientation is not None:
         data["orientation"] = orientation_precision.as_dict(orientation, layers, len(photos))
     return data
+
+
+def write_content(path: Path | str, content: dict[str, Any], *, overwrite: bool) -> None:
+    """Write the file of a pair or set, each photo that is there with the SHA-256 of its file."""
+    entries = content.get("photos") or [content["image1"], content["image2"]]
+    for entry in entries:
+        photo = Path(path).parent / entry.get("file", "")
+        if not entry.get("sha256") and photo.is_file():
+            entry["sha256"] = known_hash(photo)
+    write_object(path, content, overwrite=overwrite)
+
+
+def _recorded_digests(provenance: Any) -> dict[str, str]:
+    """Return SHA-256 by file name as a file says where it comes from; of names of one file."""
+    inputs = provenance.get("inputs") if isinstance(provenance, dict) else None
+    digests: dict[str, set[str]] = {}
+    for item in inputs if isinstance(inputs, list) else ():
+        with suppress(LookupError, TypeError):
+            digests.setdefault(str(item["file"]), set()).add(str(item["sha256"]))
+    return {name: one.pop() for name, one in digests.items() if len(one) == 1}
+
+
+def _with_digest(entry: Any, digests: Mapping[str, str]) -> Any:
+    """Return the entry of a photo with the SHA-256 of its file, where it was recorded elsewhere."""
+    if not isinstance(entry, dict) or "sha256" in entry or not isinstance(entry.get("file"), str):
+        return entry
+    digest = digests.get(PurePath(entry["file"]).name)
+    return entry if digest is None else {**entry, "sha256": digest}

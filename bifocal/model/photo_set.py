@@ -17,14 +17,20 @@ from bifocal.model.flags import UNCERTAIN_SHARE, FlagLimits
 from bifocal.model.intersection import intersect
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
-from bifocal.model.photo_entries import PAIR_FORMAT, SET_FORMAT, file_content, photo_entries
+from bifocal.model.photo_entries import (
+    PAIR_FORMAT,
+    SET_FORMAT,
+    file_content,
+    photo_entries,
+    write_content,
+)
 from bifocal.model.set_intersection import SetIntersection, intersect_rays
 from bifocal.rays import plane_position
 from bifocal.remarks import remark
 from multimedia import Layers
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points, positive
 from photocore.errors import InputError, located
-from photocore.jsonfile import read_object, write_object
+from photocore.jsonfile import read_object
 from photocore.series import check_index
 
 #: Places a side at which pairs of a set are judged, over each photo.
@@ -143,7 +149,7 @@ class PhotoSet:
 
     def write(self, path: Path | str, *, overwrite: bool = False) -> None:
         """Write the set's file, whole or not at all."""
-        write_object(path, self.to_dict(), overwrite=overwrite)
+        write_content(path, self.to_dict(), overwrite=overwrite)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ import numpy as np
 from bifocal.faces.faced_surface import FacedSurface
 from bifocal.files.strips import write_png
 from bifocal.media import media_words
-from bifocal.model.doubts import MISFIT
+from bifocal.model.doubts import MISFIT, check_scale
 from bifocal.model.geotiff import (
     RELIEF_BANDS,
     RasterReader,
@@ -176,6 +176,7 @@ def deliver(
     gsd = task.gsd or gsd_at_scale(positive(wish.dpi, "dpi"), scale)
     task = replace(task, gsd=gsd, scale=scale, overviews=True)
     pair = PhotosOfSet.of(pair_path)
+    check_scale(pair.extra, pair_path if isinstance(pair_path, Path) else "")
     title = wish.title or default_title(pair_path)
     name = file_name(title)
     _check_outputs(out, folder, name, (task.relief, *pair.photo_files))

@@ -13,9 +13,11 @@ import numpy as np
 
 from bifocal.faces.faced_surface import FacedSurface, beneath
 from bifocal.faces.faces import Faces
-from bifocal.faces.faces_files import given_faces
+from bifocal.faces.faces_files import check_faces, given_faces
+from bifocal.files.made_from import MadeFrom, check_maps, photos_of
 from bifocal.files.photos import photo_info
 from bifocal.files.point_tables import read_survey_points
+from bifocal.model.doubts import check_scale, unit_of
 from bifocal.model.geotiff import (
     RasterReader,
     bytes_in_words,
@@ -137,9 +139,14 @@ def make_ortho(
     """
     check_ending(out, ORTHO_ENDING, ".tif", ".tiff")
     pair = PhotosOfSet.of(pair_path)
+    if task.scale:
+        check_scale(pair.extra, pair_path if isinstance(pair_path, Path) else "")
     check_not_input(out, task.relief, *pair.photo_files)
     check_writable(out, overwrite=overwrite)
     with open_surface(task, pair) as (surface, _, remarks):
+        faces, _ = given_faces(task.faces)
+        drawn = (faces or Faces()).digest
+        made_from = MadeFrom.of(photos_of(pair), faces=drawn, relief=task.relief)
         images, said = _images(pair, task)
         remarks += said
         numbers = tuple(images)
@@ -166,7 +173,7 @@ def make_ortho(
             colour=len(bands) == 3,
             dpi=dpi_at_scale(grid.gsd, task.scale) if task.scale else None,
             crs_name=str(pair.extra.get("name") or "Facade plane"),
-            tags=_tags(pair, task),
+            tags=_tags(pair, task) | made_from.tags(),
             overviews=total > PIXELS.overviews_from if task.overviews is None else task.overviews,
             world_file=world_file,
         ) as writer:
@@ -265,6 +272,10 @@ def open_surface(
 ) -> Iterator[tuple[Surface, RasterReader | None, tuple[str, ...]]]:
     """Yield the relief asked for, checked against the cameras' distances, its map, and remarks."""
     faces, told = given_faces(task.faces)
+    told += check_faces(faces, photos_of(pair))
+    if task.relief is not None:
+        now = MadeFrom.of(photos_of(pair), faces=(faces or Faces()).digest)
+        told += check_maps(now, relief=task.relief)
     with ExitStack() as stack:
         surface: Surface = FlatSurface(task.plane)
         reader: RasterReader | None = None
@@ -394,6 +405,7 @@ def _tags(pair: Pair, task: OrthoTask) -> dict[str, str]:
     return {
         "BIFOCAL_IMAGE": "all" if isinstance(pair, PhotosOfSet) else task.photo_words,
         "BIFOCAL_RELIEF": relief.name if relief else f"plane r = {task.plane:g} m",
+        "BIFOCAL_UNIT": unit_of(pair.extra),
         "BIFOCAL_D1": f"{pair.image1.distance:.6g}",
         **({} if isinstance(pair, PhotoAlone) else {"BIFOCAL_D2": f"{pair.image2.distance:.6g}"}),
         **({} if task.options.measured_only else {"BIFOCAL_BOUND": bound}),

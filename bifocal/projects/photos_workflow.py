@@ -9,6 +9,7 @@ from pathlib import Path, PurePath
 
 import numpy as np
 
+from bifocal.model.doubts import NO_UNIT
 from bifocal.model.interior_orientation import TURNS, lens_of_photo
 from bifocal.model.lens import Lens
 from bifocal.model.pair import Pair
@@ -167,6 +168,7 @@ def photos_from_project(
         frame, turned = turned_by_lines(frame, seen)
         said += turned
     doubts = [remark("projects.no_precision")]
+    unit = {} if scale else {"unit": NO_UNIT}
     if not scale:
         scale = remark("projects.no_scale")
         doubts.insert(0, scale)
@@ -179,7 +181,7 @@ def photos_from_project(
         setup = {"way": f"project of {read.program}", "scale": scale, "doubts": doubts}
         centres = [np.array([*photo.nadir, photo.distance]) for photo in photos]
         made = PhotoSet(
-            photos=tuple(photos), folder=out.parent, extra={"setup": setup},
+            photos=tuple(photos), folder=out.parent, extra={"setup": setup, **unit},
             orientation=of_cameras(centres, covariance) if covariance.any() else None,
         )  # fmt: skip
         written: PhotoSet | Pair = made

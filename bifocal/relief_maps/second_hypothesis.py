@@ -68,7 +68,12 @@ def with_swept(frame: Frame, matched: Measurement) -> tuple[Measurement, BoolArr
     guess = _guessed(coarse)
     found = _refined(fine, guess, _taken(coarse, guess))
     taken = _large(_taken(fine, found))
-    swept = {"r": found.relief, "loop": 0, "across": 0, "sigma_px": HYPOTHESIS.sigma}
+    swept: dict[str, Any] = {
+        "r": found.relief,
+        "loop": 0,
+        "across": 0,
+        "sigma_px": HYPOTHESIS.sigma,
+    }
     bands: dict[str, Any] = {
         name: np.where(taken, np.float32(new), getattr(matched, name))
         for name, new in swept.items()

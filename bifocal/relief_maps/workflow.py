@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.faces.faces import Faces
-from bifocal.faces.faces_files import given_faces
+from bifocal.faces.faces_files import check_faces, given_faces
 from bifocal.faces.suggestions import suggest_faces
+from bifocal.files.made_from import MadeFrom, photos_of
 from bifocal.files.photos import photo_infos
 from bifocal.model.basis import rests_on
+from bifocal.model.doubts import unit_of
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.model.photo_set import PhotoSet, pair_or_set
@@ -93,6 +95,7 @@ def relief_of_pair(
     infos = photo_infos(photos)
     _check_outputs(job, *(info.path for info in infos))
     faces, told = given_faces(job.faces)
+    told += check_faces(faces, photos_of(photos))
     images = tuple(read_image(info.path) for info in infos)
     result = dense_relief(
         photos, *images, gsd=job.gsd, bounds=job.bounds, quality=job.quality,
@@ -107,6 +110,8 @@ def relief_of_pair(
         "BIFOCAL_D1": f"{pair.image1.distance:.6g}",
         "BIFOCAL_D2": f"{pair.image2.distance:.6g}",
         "BIFOCAL_PAIR": named or str(pair.extra.get("name", "")),
+        "BIFOCAL_UNIT": unit_of(pair.extra),
+        **MadeFrom.of(of_set, faces=(faces or Faces()).digest).tags(),
     }
     result.write(job.out, overwrite=job.overwrite, tags=tags)
     written = [job.out]

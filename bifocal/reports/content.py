@@ -12,8 +12,10 @@ from typing import Any, ClassVar, Protocol
 import cv2
 import numpy as np
 
+from bifocal.files.made_from import MadeFrom, check_maps, photos_of
 from bifocal.files.photos import photo_infos
 from bifocal.files.strips import ROWS, colour_strips
+from bifocal.model.doubts import check_scale
 from bifocal.model.geotiff import RasterReader
 from bifocal.model.grid import Bounds
 from bifocal.model.pair import Pair
@@ -265,6 +267,7 @@ def read_content(source: Path, task: ReportTask, *, pictures: bool = True) -> Pa
     """
     solution: SolvedSurvey | None = None
     of_set: PhotoSet | None = None
+    named: Pair | PhotoSet | None = None
     if source.suffix.lower() in _WORKBOOKS:
         if task.control or task.check:
             raise InputError(remark("report.own_check", of=source))
@@ -272,7 +275,8 @@ def read_content(source: Path, task: ReportTask, *, pictures: bool = True) -> Pa
         pair = solution.pair
         setup: Any = pair.extra.get("setup")
         if solution.pair_path is not None:
-            setup = Pair.read(solution.pair_path).extra.get("setup")
+            named = Pair.read(solution.pair_path)
+            setup = named.extra.get("setup")
             pair = _with_photos(pair, solution.pair_path)
     else:
         named = pair_or_set(source)
@@ -290,6 +294,11 @@ def read_content(source: Path, task: ReportTask, *, pictures: bool = True) -> Pa
                 photos=2 if of_set is None else len(of_set), language=task.language, unit=task.unit,
                 columns=task.columns,
             )  # fmt: skip
+    if named is not None:
+        if task.scale:
+            check_scale(named.extra, source)
+        remarks = check_maps(MadeFrom.of(photos_of(named)), relief=task.relief, ortho=task.ortho)
+        pair = replace(pair, remarks=(*pair.remarks, *remarks)) if remarks else pair
     ortho, gsd = (None, 0.0) if task.ortho is None else ortho_thumbnail(task.ortho)
     return PairContent(
         task=task,

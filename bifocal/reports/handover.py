@@ -14,6 +14,8 @@ from typing import Any
 import cv2
 import numpy as np
 
+from bifocal.files.made_from import MadeFrom, check_maps, photos_of
+from bifocal.files.photos import photo_info
 from bifocal.files.point_tables import read_survey_points
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.pair import Pair
@@ -79,7 +81,7 @@ def write_handover(
     Returns
     -------
     dict
-        ``bytes``, and ``pixels`` of the orthophoto in the file.
+        ``bytes``, ``pixels`` of the orthophoto in the file, and ``remarks``.
 
     Raises
     ------
@@ -92,6 +94,7 @@ def write_handover(
     if task.relief is None and task.ortho is None:
         raise InputError(remark("reports.nothing_to_hand_over"))
     pair = Pair.read(source)
+    remarks = check_maps(MadeFrom.of(photos_of(pair)), relief=task.relief, ortho=task.ortho)
     shown = _Shown.read(pair, task)
     factor = 1.0
     while len(page := _page(shown, task, source, factor).encode()) > MOST:
@@ -99,7 +102,7 @@ def write_handover(
     with atomic_path(out, overwrite=overwrite) as temporary:
         temporary.write_bytes(page)
     side = None if shown.ortho is None else _side(shown.ortho[0], factor * ORTHO)
-    return {"bytes": len(page), "pixels": side}
+    return {"bytes": len(page), "pixels": side, "remarks": remarks}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -114,9 +117,8 @@ class _Shown:
 
     @classmethod
     def read(cls, pair: Pair, task: HandoverTask) -> _Shown:
-        paths = pair.photo_files
         photos = []
-        for path in paths:
+        for path in (photo_info(pair, k).path for k in (1, 2) if pair.photo(k).file):
             image = to_eight_bit(read_image(path))
             photos.append((path.name, _reduced(image, PHOTO), float(image.shape[1])))
         return cls(

@@ -127,7 +127,7 @@ def _update(path: Path, solution: SolvedSurvey, content: SurveyContent, *, overw
     if done.added:
         titles = ", ".join(done.added)
         kept = f"missing sheets were added again, behind all others: {titles}; {kept}".rstrip("; ")
-    return kept
+    return " ".join([kept, *done.remarks]).strip()
 
 
 def _options(solution: SolvedSurvey) -> dict[str, Any]:
@@ -147,11 +147,12 @@ def _add_columns(
     if solution.source.suffix.lower() not in (".xlsx", ".xlsm"):
         raise InputError(remark("survey.no_macros", of=path))
     own = as_typed(solution, content)
-    kept = add_results(
+    done = add_results(
         solution.source, path, solution.survey, own, given=_options(solution), overwrite=overwrite
     )
     said = "the results are new columns of your table"
-    return f"{said}; {_kept_as(kept)}" if kept else f"{said}."
+    said = f"{said}; {_kept_as(done.kept)}" if done.kept else f"{said}."
+    return " ".join([said, *done.remarks])
 
 
 def _left_behind(solution: SolvedSurvey) -> str:

@@ -18,6 +18,7 @@ from bifocal.collimation.fields import FieldError, number_of
 from bifocal.collimation.job_tasks import start_job
 from bifocal.collimation.live_results import LiveResults
 from bifocal.collimation.pictures import Pictures
+from bifocal.collimation.product_graph import out_of_date
 from bifocal.collimation.server.requests import answer, in_thread, json_body, session_of
 from bifocal.collimation.server.state_view import state_of
 from bifocal.collimation.server.streamed_zip import streamed_zip
@@ -149,7 +150,7 @@ def bundle_of(session: Session) -> dict[str, Path]:
             faces = beside(session.files.pair)
             if faces.is_file():
                 more[faces.name] = faces
-        return session.products.bundle(session.files.workbook, more)
+        return session.products.bundle(session.files.workbook, more, out_of_date(session))
 
 
 async def _overlay(request: Request) -> Response:

@@ -12,6 +12,7 @@ from bifocal.collimation.asked import goodness, oriented_live
 from bifocal.collimation.commands import lens_ratio
 from bifocal.collimation.fields import SETUP
 from bifocal.collimation.live_orientation import LiveOrientation, lenses_of
+from bifocal.collimation.product_graph import out_of_date, proposal_is_current
 from bifocal.collimation.session import Session
 from bifocal.collimation.shapes import measures_of
 from bifocal.collimation.wording import say, without_options
@@ -69,6 +70,7 @@ def state_of(session: Session) -> dict[str, Any]:
                 "ortho": session.products.facts("ortho"),
                 "rectified": session.products.facts("rectified"),
                 "files": session.products.listed(session.files.workbook),
+                "stale": _stale(session),
             },
             "jobs": [
                 {**job.as_dict(), "cured": job.state == "failed" and job.ended_at < state.revision}
@@ -77,6 +79,20 @@ def state_of(session: Session) -> dict[str, Any]:
             "undo": bool(state.done),
             "redo": bool(state.undone),
         }
+
+
+def _stale(session: Session) -> dict[str, str]:
+    """Return in words why products are out of date, by kind."""
+    language = session.spoken
+    return {
+        kind: say(
+            "stale",
+            "since",
+            language,
+            causes=", ".join(say("stale", cause, language) for cause in causes),
+        )
+        for kind, causes in out_of_date(session).items()
+    }
 
 
 def _stage(session: Session) -> str:
@@ -246,6 +262,7 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
             },
             "images": images,
             "accepted": session.proposed_path is None,
+            "current": proposal_is_current(session),
             "scaled": not _unscaled(session),
             "report": session.proposal and session.proposal["report"],
             "remarks": [without_options(said, session.spoken) for said in remarks],
@@ -270,7 +287,7 @@ def _control(session: Session, live: LiveOrientation | None) -> list[dict[str, A
 def _residuals(session: Session, live: LiveOrientation | None) -> dict[str, Any]:
     """Return the residuals of the proposed orientation, else those of control points alone."""
     found: dict[str, Any] = {} if live is None else dict(live.residuals)
-    if session.proposal is not None:
+    if session.proposal is not None and proposal_is_current(session):
         report = session.proposal["report"].get("control", [])
         found |= {entry["id"]: entry["residual_px"] for entry in report}
     return {
@@ -306,6 +323,8 @@ def _advice(session: Session, live: LiveOrientation | None) -> list[str]:
     hints = live.advice if live and session.state.control else ()
     if session.proposal is not None:
         next_step = "length" if _unscaled(session) else "accept"
+        if not proposal_is_current(session):
+            return [say("advice", "changed", language), *([first] if first else []), *hints]
         hints = (say("advice", next_step, language), *hints)
     return [*([first] if first else []), *hints]
 

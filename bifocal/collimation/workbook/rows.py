@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.collimation.live_results import observations
-from bifocal.collimation.records import Known, PickedPoint, Picks, Pixel
+from bifocal.collimation.records import Known, PickedPoint, Picks, Pixel, SurveyState
 from bifocal.collimation.workbook.outlines import KEYS, TABLE, Outlines, add_outlines, outline_cells
 from bifocal.collimation.workbook.setup import typed_setup
 from bifocal.model.flags import FlagLimits
@@ -86,6 +86,20 @@ def row_of(point: PickedPoint) -> PointRow:
     return PointRow(
         point.picks, point.code, point.note, point.use and point.is_complete, point.reference
     )
+
+
+def put_rows(state: SurveyState, rows: Mapping[str, PointRow], gone: Sequence[str]) -> None:
+    """Let the points of a survey be what the workbook's rows say; those that are gone go."""
+    for name, row in rows.items():
+        before = state.points.get(name)
+        state.points[name] = PickedPoint(
+            name=name, order=state.next_order() if before is None else before.order,
+            picks=row.picks, code=row.code, note=row.note,
+            # What is picked in one photo only was left out for that alone.
+            use=row.use or None in row.picks, reference=row.reference,
+        )  # fmt: skip
+    for name in gone:
+        state.points.pop(name, None)
 
 
 def digest_of(path: Path) -> str:

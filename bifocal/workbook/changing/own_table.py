@@ -15,7 +15,12 @@ from bifocal.survey.reference import Georeference
 from bifocal.survey.relief_table import ENTRIES
 from bifocal.survey.survey_input import SurveyInput
 from bifocal.workbook.changing.setup_update import add_sheets, write_corrections, write_options
-from bifocal.workbook.changing.update import refuse_earlier, store_named_cells
+from bifocal.workbook.changing.update import (
+    BookUpdate,
+    refuse_earlier,
+    saved,
+    store_named_cells,
+)
 from bifocal.workbook.content import SurveyContent, point_cells, result_cells
 from bifocal.workbook.formulas.columns import FORMULAS, NEAR
 from bifocal.workbook.formulas.georeference_values import precision_values
@@ -60,7 +65,7 @@ def add_results(
     *,
     given: Mapping[str, Any],
     overwrite: bool,
-) -> Path | None:
+) -> BookUpdate:
     """Copy a workbook with the results in new columns of its own table; all else as it was.
 
     Parameters
@@ -78,8 +83,8 @@ def add_results(
 
     Returns
     -------
-    Path or None
-        The backup of a workbook changed in place.
+    BookUpdate
+        What the user should be told.
 
     Raises
     ------
@@ -128,7 +133,7 @@ def add_results(
     plain = PlainFormulas((), named)
     columns = [replace(column, formula=plain.plain(column.formula, "")) for column in columns]
     put_result_columns(editor, own, columns, mark=MARK)
-    return editor.save(target, overwrite=overwrite)
+    return saved(editor, built, target, overwrite=overwrite)
 
 
 def _links(editor: WorkbookEditor, survey: SurveyInput, given: Mapping[str, Any]) -> dict[str, str]:

@@ -33,6 +33,7 @@ from photocore.workbook.changing.cells import CellValue, NewColumn, escape
 from photocore.workbook.changing.editor import WorkbookEditor
 from photocore.workbook.changing.named_cells import place_of, type_column, type_value
 from photocore.workbook.changing.plain import MARK, PlainEditor
+from photocore.workbook.changing.settling import Settling, changed_formulas, normal
 from photocore.workbook.making.live_book import BookBuilder, short_formula
 from photocore.workbook.making.live_columns import TEXT_KEYS, row_formula
 from photocore.workbook.making.newbook import RowBlock
@@ -63,10 +64,13 @@ class BookUpdate:
         The backup of a workbook changed in place.
     added : tuple of str
         Sheets that were missing and are there again, behind all others.
+    remarks : tuple of str
+        Formulas of ours that the user changed, and what became of their results.
     """
 
     kept: Path | None
     added: tuple[str, ...]
+    remarks: tuple[str, ...] = ()
 
 
 #: Columns whose formulas differ where the set-up was corrected.
@@ -206,7 +210,58 @@ def update_book(
     _verdict(editor, built, content, rules="rules" in given, words=other_words)
     _charts(editor, built, rows)
     _log(editor, content)
-    return BookUpdate(kept=editor.save(target, overwrite=overwrite), added=tuple(added))
+    return replace(saved(editor, built, target, overwrite=overwrite), added=tuple(added))
+
+
+def saved(
+    editor: WorkbookEditor, built: BookBuilder, target: Path, *, overwrite: bool
+) -> BookUpdate:
+    """Write a changed workbook; where formulas of ours were changed too, with what they give."""
+    changed = changed_formulas(editor, *_results_of(editor, built))
+    settling, remarks = Settling(), list[str]()
+    kept = editor.save(target, overwrite=overwrite, settle=settling if changed else None)
+    if changed:
+        cells = ", ".join(changed[:5]) + (", ..." if len(changed) > 5 else "")
+        count = len(settling.cells)
+        remarks.append(remark("survey.own_formulas", cells=cells, results=count))
+    if settling.unknown:
+        words = ", ".join(f"{word} ({cell})" for word, cell in settling.unknown.items())
+        remarks.append(remark("survey.unknown_functions", names=words))
+    return BookUpdate(kept=kept, added=(), remarks=tuple(remarks))
+
+
+def _results_of(
+    editor: WorkbookEditor, built: BookBuilder
+) -> tuple[set[str], dict[str, list[tuple[int, int, int]]]]:
+    """Return our formulas in their normal form, and the columns and cells where results stand."""
+    ours, places = set[str](), dict[str, list[tuple[int, int, int]]]()
+    for sheet in built.book.worksheets:
+        cells = (cell for row in sheet.iter_rows() for cell in row if cell.data_type == "f")
+        ours |= {normal(str(cell.value)[1:]) for cell in cells}
+    for name, content in built.tables.items():
+        area = editor.table(name)
+        if area is None:
+            continue
+        headings = area.headings()
+        letters = {key: column_letters(number) for key, number in headings.items()}
+        for column in content.columns:
+            if column.kind == "formula" and column.key in headings:
+                ours.add(normal(row_formula(name, column.formula)[1:]))
+                if not _lacks(editor, row_formula(name, column.formula)):
+                    short = short_formula(name, column.formula, letters, area.area[0])
+                    ours.add(normal(short(area.first)))
+                own = (headings[column.key], area.first, area.area[2])
+                places.setdefault(area.sheet, []).append(own)
+    if isinstance(editor, PlainEditor):
+        return ours, {}  # its formulas are the cells' own, none like another
+    for name, defined in built.book.defined_names.items():
+        if name.startswith("unprinted_"):
+            continue  # follows how many points there were
+        sheet, _, cell = defined.attr_text.replace("$", "").partition("!")
+        place = place_of(editor, name)
+        if place and ":" not in cell and built.book[plain_title(sheet)][cell].data_type == "f":
+            places.setdefault(place[0], []).append((place[2], place[1], place[1]))
+    return ours, places
 
 
 def _changes(editor: WorkbookEditor) -> dict[str, float] | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import zipfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
 from itertools import count as counted
@@ -303,7 +303,13 @@ class WorkbookEditor:
             )
         return self.grown.get(area.name, (area, area.area[2]))
 
-    def save(self, target: Path | str | None = None, *, overwrite: bool = False) -> Path | None:
+    def save(
+        self,
+        target: Path | str | None = None,
+        *,
+        overwrite: bool = False,
+        settle: Callable[[Path, dict[str, bytes | None]], dict[str, bytes | None]] | None = None,
+    ) -> Path | None:
         """Write the changed workbook.
 
         Parameters
@@ -314,6 +320,8 @@ class WorkbookEditor:
             backup is ever replaced, and none is made of a state that one holds already.
         overwrite : bool
             Whether to replace another existing file.
+        settle : callable, optional
+            Takes the workbook and its changed parts, and returns these with other results.
 
         Returns
         -------
@@ -337,6 +345,7 @@ class WorkbookEditor:
         else:
             check_new_workbook(target, overwrite=overwrite)
         parts, place = self.changed_parts(), atomic_path if in_place else new_workbook
+        parts = settle(self.path, parts) if settle else parts
         with place(target, overwrite=in_place or overwrite) as temporary:
             rewrite_package(self.path, temporary, parts)
             refuse_lost(temporary, self.path)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import os
 import re
 import shutil
 import zipfile
@@ -245,3 +246,10 @@ def test_a_report_without_its_pair_is_not_called_wrong(wall):
     _, said = verify(wall / "report", status=1)
     assert "Name the folder of the whole delivery" in said
     assert "nan" not in said
+
+
+def test_links_and_pipes_in_a_delivery_are_named(wall):
+    (wall / "secret").symlink_to("/etc")
+    os.mkfifo(wall / "align" / "pipe")
+    found, _ = verify(wall)
+    assert states(found) == {"secret": "not listed", "align/pipe": "not listed"}

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from PIL import Image
+
 from bifocal.campaigns import worker_pool
-from bifocal.campaigns.pair_steps import PairJob
+from bifocal.campaigns.pair_steps import BASE_MEMORY, MEMORY_PER_PIXEL, PairJob
 from bifocal.campaigns.shipping import found_anywhere
 from bifocal.campaigns.worker_pool import Listener, run_here
 
@@ -54,6 +56,16 @@ def test_pairs_wait_for_memory_and_a_large_one_runs_alone(tmp_path):
         assert set(running) == {"p3"}
     finally:
         worker_pool._started = original
+
+
+def test_a_pair_needs_memory_for_the_larger_of_its_photos(tmp_path):
+    far, near = tmp_path / "far.png", tmp_path / "near.png"
+    for path, size in ((far, (20, 10)), (near, (40, 30))):
+        Image.new("L", size).save(path)
+    job = PairJob(name="p", folder=tmp_path, far=far, near=near)
+    assert job.memory() == BASE_MEMORY + MEMORY_PER_PIXEL * 40 * 30
+    near.unlink()
+    assert job.memory() == BASE_MEMORY + MEMORY_PER_PIXEL * 20 * 10
 
 
 def test_a_cluster_is_sent_paths_that_hold_in_any_folder(tmp_path, monkeypatch):

@@ -8,6 +8,8 @@ from contextlib import contextmanager
 import pytest
 
 from bifocal import SAMPLE, Pair
+from bifocal.collimation.product_graph import causes_of
+from bifocal.collimation.shapes import places_of
 from tests.page_session import client_of, opened, pick, pick_both, sample_folder, sample_picks
 
 REPORT = {"remarks": ["found"], "control": []}
@@ -86,15 +88,92 @@ def test_photos_are_exchanged_after_they_are_oriented_and_the_picks_go_along(fol
         assert after["stage"] == "orientation"
         assert session.state.points["T01"].picks == (first, second)
         assert session.state.control["K"].picks == ((5.0, 6.0), None)
-        assert not (folder / "survey.pair.json").exists()
-        session.command({"op": "undo"})
-        assert session.state.points["T01"].picks == (None, second)
+        pick(session, "T02", 1, first)
     with begun(folder) as again:
         assert again.pictures.infos[0].path.name == "far.jpg"
         assert (again.pictures.pair, again.proposal) == (None, None)
-        assert again.state.points["T01"].picks == (None, second)
+        assert again.state.points["T01"].picks == (first, second)
         oriented(again)
         assert state_of(again)["pair"]["accepted"]
+
+
+def everything(session) -> dict:
+    """Return what the page shows of a survey, but for the counters of its changes."""
+    state = state_of(session)
+    for key in ("revision", "serving", "redo", "undo", "stage", "workbook_waiting"):
+        state.pop(key)
+    files = state["products"]["files"]  # the workbook is written when it suits
+    state["products"]["files"] = [one for one in files if not one["name"].endswith(".xlsx")]
+    return state
+
+
+def drawn(session) -> None:
+    """Orient, and let a survey have something of each kind."""
+    session.command({"op": "wall.set", "column": 700.0, "row": 500.0})
+    oriented(session)
+    pick_both(session, "T01", sample_picks()["T01"])
+    corners = [[600.0, 400.0, -0.5], [800.0, 400.0, -0.5], [800.0, 700.0, -0.5]]
+    for kind in ("face", "outline"):
+        session.command({"op": "shape.set", "kind": kind, "corners": corners})
+    shutil.copyfile(SAMPLE / "truth.tif", session.files.folder / "survey.relief.tif")
+    session.note_made("relief", ["survey.relief.tif"], causes_of(session, "relief"))
+
+
+@pytest.mark.parametrize("way", ["undo", "exchange"])
+def test_an_exchange_is_taken_back_exactly_by_undo_and_by_itself(folder, way) -> None:
+    back = {"op": "undo"} if way == "undo" else {"op": "photos.exchange"}
+    with begun(folder) as session:
+        drawn(session)
+        before, files = everything(session), sorted(path.name for path in folder.iterdir())
+        pair = session.files.pair.read_bytes()
+        session.command({"op": "photos.exchange"})
+        between = state_of(session)
+        assert (between["pair"], between["products"]["relief"]) == (None, None)
+        assert [photo["name"] for photo in between["photos"]] == ["near.jpg", "far.jpg"]
+        session.command(back)
+        assert everything(session) == before
+        assert session.files.pair.read_bytes() == pair
+        assert sorted(path.name for path in folder.iterdir()) == files
+    with begun(folder) as again:
+        assert everything(again) == before
+        if way == "undo":
+            again.command({"op": "redo"})
+            assert state_of(again)["pair"] is None
+            again.command({"op": "undo"})
+            for _ in range(4):
+                again.command({"op": "undo"})
+            for _ in range(4):
+                again.command({"op": "redo"})
+        assert everything(again) == before
+
+
+def test_shapes_go_with_an_exchange_to_the_same_place_of_the_wall(folder) -> None:
+    with begun(folder) as session:
+        drawn(session)
+        pair = session.pictures.pair
+        places = places_of(pair, session.state.shapes["F1"].corners)
+        session.command({"op": "photos.exchange"})
+        corners = [corner[:2] for corner in session.state.shapes["F1"].corners]
+        assert corners == pytest.approx(pair.project(places)[1])
+
+
+def test_a_new_orientation_after_an_exchange_leaves_the_first_one_as_it_was(folder) -> None:
+    with begun(folder) as session:
+        drawn(session)
+        before, pair = everything(session), session.files.pair
+        content = pair.read_bytes()
+        session.command({"op": "photos.exchange"})
+        proposed = folder / "survey.proposed.pair.json"
+        data = Pair.read(SAMPLE / "facade.pair.json").to_dict()
+        data["image1"]["file"], data["image2"]["file"] = "near.jpg", "far.jpg"
+        Pair.from_dict(data).write(proposed)
+        session.propose(proposed, REPORT)
+        session.command({"op": "align.accept"})
+        assert session.files.pair != pair
+        session.command({"op": "undo"})
+        session.command({"op": "undo"})
+        assert everything(session) == before
+        assert pair.read_bytes() == content
 
 
 def test_a_survey_begun_with_a_pair_file_keeps_its_order(tmp_path) -> None:

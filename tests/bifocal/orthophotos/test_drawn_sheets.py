@@ -19,6 +19,7 @@ from bifocal import Grid, Pair, ReliefMap
 from bifocal.model.geotiff import RasterReader
 from bifocal.orthophotos.canvas import Pen, text_width
 from bifocal.orthophotos.deliver_workflow import DeliverTask, _notes
+from bifocal.orthophotos.dxf_canvas import DxfCanvas
 from bifocal.orthophotos.ortho_workflow import OrthoTask
 from bifocal.orthophotos.pdf_sheet import _PdfCanvas
 from bifocal.remarks import remark
@@ -410,3 +411,12 @@ def test_words_in_the_middle_of_a_place_stay_there_when_they_are_turned() -> Non
         half = text_width("ABC", 2.0) / 2
         (place,) = re.findall(r"(\S+) (\S+) Tm", canvas.parts[-1])
         assert [float(v) for v in place] == pytest.approx([30 + x * half, 20 + y * half], abs=1e-4)
+
+
+def test_letters_of_a_drawing_are_as_high_as_those_of_the_sheet_in_print() -> None:
+    space = ezdxf.new().modelspace()
+    DxfCanvas(space, unit=0.05).text((30.0, 20.0), "ABC", Pen(layer="X"), size=2.0)
+    (text,) = space.query("TEXT")
+    # A capital letter of Helvetica is 0.72 of its size high; 1 mm is 0.05 of the drawing's unit.
+    assert text.dxf.height == pytest.approx(0.72 * 2.0 * 0.05)
+    assert tuple(text.dxf.insert)[:2] == pytest.approx((1.5, 1.0))

@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from PIL import Image
 
 from bifocal import (
@@ -24,10 +25,13 @@ from bifocal import (
     write_colmap,
 )
 from bifocal.model.basis import rests_on
+from bifocal.model.doubts import unit_of
+from bifocal.model.geotiff import RasterReader
 from photocore.programs.model import ForeignProject
 from photocore.programs.photos import PhotoFinder
 from photocore.programs.projects import read_foreign_project
 from tests.builders import foreign_projects as made
+from tests.builders.commands import bifocal_command as main
 
 BROWN = {"terms": (-0.06, 0.02, 0.0015, -0.002, 0.004), "offset": (6.5, -4.25)}
 RADIAL = {"terms": (-0.06, 0.02, 0, 0, 0)}
@@ -156,6 +160,23 @@ def test_what_gives_the_scale_is_said_and_none_is_invented(tmp_path: Path) -> No
     # The set itself says so, and whatever is made of it.
     assert any("no scale" in text for text in PhotoSet.read(out).pair(0, 1).remarks)
     assert result.photos.photos[0].distance == pytest.approx(12 * made.UNIT, rel=1e-3)
+    data = json.loads(out.read_text())
+    assert data["unit"] == "none"
+    pair = out.with_name("w.pair.json")
+    PhotoSet.read(out).pair(0, 1).write(pair)
+    plain = ["ortho", pair, "--plane", "0", "--any-size", "--gsd", "0.05"]
+    for words in ([*plain, "--scale", "1:50", "--out", tmp_path / "o.tif"],
+                  [*plain, "--scale", "1:50", "--deliver", tmp_path / "sheet"],
+                  ["report", pair, "--scale", "1:50", "--out", tmp_path / "r.html"]):  # fmt: skip
+        done = CliRunner().invoke(main, [*map(str, words)])
+        assert (done.exit_code, "no drawing is to scale" in done.stderr) == (1, True), done.output
+        assert not words[-1].exists()
+    del data["unit"]  # as older versions wrote it
+    assert unit_of(data) == "none"
+    done = CliRunner().invoke(main, [*map(str, plain), "--out", str(tmp_path / "o.tif")])
+    assert done.exit_code == 0, done.output
+    with RasterReader(tmp_path / "o.tif") as reader:
+        assert reader.tags["BIFOCAL_UNIT"] == "none"
     options = ProjectOptions(unit="cm")
     result = photos_from_project(path, out, options, overwrite=True)
     assert result.photos.photos[0].distance == pytest.approx(0.12 * made.UNIT, rel=1e-3)

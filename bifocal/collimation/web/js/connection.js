@@ -197,6 +197,7 @@ export class Connection extends EventTarget {
   #keep() {
     const plain = this.unsent.map(({ id, op, args }) => ({ id, op, args }));
     sessionStorage.setItem(SHELF, JSON.stringify(plain));
+    if (this.state) this.dispatchEvent(new Event("reach"));
   }
 
   #tell(type, detail) {

@@ -122,11 +122,12 @@ class App {
     if (this.current === "photos") return { ready: photos.length === 2, go: () => this.open("orientation") };
     if (this.current === "orientation") {
       const accept = pair?.accepted === false;
+      if (accept && !pair.current) return { key: "align", ready: !this.running("align"), go: () => this.stage.align.click() };
       return { key: accept ? "accept" : "orientation", ready: Boolean(pair?.scaled),
         go: () => (accept ? this.stage.accept() : this.open("points")) };
     }
     if (this.current === "points") return { ready: Boolean(pair), go: () => this.open("products") };
-    return products.files.some(({ name }) => name.endsWith(".pdf"))
+    return products.files.some(({ name }) => name.endsWith(".pdf")) && !Object.keys(products.stale).length
       ? { key: "download", ready: true, go: () => this.stage.download.click() }
       : { ready: Boolean(pair) && !this.running("deliver"), go: () => this.stage.deliver.click() };
   }
@@ -164,11 +165,11 @@ class App {
   reach() {
     const { online, locked, unsent } = this.connection;
     const { workbook_waiting: waiting } = this.state;
-    const key = locked ? "link.locked" : !online ? "link.away" : waiting ? "link.waiting" : unsent.length ? "link.sending" : "link.saved";
+    const key = locked ? "link.locked" : !online ? "link.away" : unsent.length ? "link.sending" : waiting ? "link.waiting" : "link.saved";
     const words = t(key, { count: unsent.length });
     setText(this.link, words);
     this.link.title = waiting ?? words;
-    this.link.dataset.level = locked || !online ? "warn" : waiting ? "fair" : "good";
+    this.link.dataset.level = locked || !online ? "warn" : waiting || unsent.length ? "fair" : "good";
   }
 
   /** Far and near the other way round: what is picked goes along, an orientation has to be made anew. */

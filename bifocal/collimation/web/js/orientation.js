@@ -219,12 +219,13 @@ export class OrientationStage {
     this.acceptAlign.hidden = !state.pair || state.pair.accepted !== false;
     this.acceptAlign.disabled = !state.pair || state.pair.accepted !== false || !state.pair.scaled;
     setText(this.align, t(state.pair?.report?.free_scale ? "align.refine" : "align.run"));
-    this.align.classList.toggle("primary", !state.pair);
+    this.align.classList.toggle("primary", !state.pair?.current);
     // What the program is about asks for no click.
     const busy = Boolean(state.looking) && !state.pair && !state.control.length;
     this.align.hidden = this.target.hidden = busy;
     // The next step stands out.
-    this.acceptAlign.classList.toggle("primary", !this.acceptAlign.disabled);
+    const current = !this.acceptAlign.disabled && state.pair.current;
+    this.acceptAlign.classList.toggle("primary", current);
     this.refresh();
   }
 

@@ -104,6 +104,7 @@ export class ProductsStage {
       save: () => {}, testid: "deliver-sheet" });
     this.deliver = button(t("deliver.run"), () => this.app.job("deliver", { scale: this.scale.value, quality: this.grade.value,
       image: this.source.value, sheet: this.sheet.value === "auto" ? null : this.sheet.value }), { testid: "deliver" });
+    this.deliverState = h("p", { class: "hint", testid: "deliver-state" });
     this.files = h("ul", { class: "files" });
     this.count = h("summary", {});
     this.download = h("a", { class: "button", href: "/download/all.zip", download: "", testid: "download" },
@@ -111,7 +112,7 @@ export class ProductsStage {
     return h("section", { class: "card" }, h("h2", {}, t("deliver.title")),
       h("p", { class: "hint" }, t("deliver.hint")), h("div", { class: "fields" },
         labelled(t("deliver.scale"), this.scale), labelled(t("deliver.sheet"), this.sheet)),
-      h("div", { class: "row" }, this.deliver, this.download), this.app.jobBox("deliver"),
+      h("div", { class: "row" }, this.deliver, this.download), this.deliverState, this.app.jobBox("deliver"),
       h("details", { testid: "files" }, this.count, this.files));
   }
 
@@ -119,7 +120,7 @@ export class ProductsStage {
     if (!state.pair?.accepted) return { text: t("status.points.pair") };
     if (!state.products.relief) return { text: t("status.products.relief") };
     if (!state.products.ortho) return { text: t("status.products.ortho") };
-    if (!state.products.files.some(({ name }) => name.endsWith(".pdf"))) {
+    if (!state.products.files.some(({ name }) => name.endsWith(".pdf")) || Object.keys(state.products.stale).length) {
       return { text: t("status.products.deliver") };
     }
     return { done: true, text: t("status.done") };
@@ -260,14 +261,15 @@ export class ProductsStage {
 
   update(state) {
     this.prepare(state).catch((error) => this.app.refuse(error));
-    const { relief, ortho, files } = state.products;
+    const { relief, ortho, files, stale } = state.products;
+    setText(this.deliverState, stale.deliver ?? "");
     this.picks &&= Boolean(relief);
     const pixels = (product) => (product.cols ? `${product.cols} × ${product.rows} px` : "");
     this.range.show(relief);
     this.loupe.element.hidden = !relief;
     for (const [kind, product] of [["relief", relief], ["ortho", ortho]]) {
       const size = product && t(`${kind}.ready`, { size: `${pixels(product)}, ${number(1000 * product.gsd, 1)} mm` });
-      setText(this[`${kind}State`], size ?? "");
+      setText(this[`${kind}State`], stale[kind] ?? size ?? "");
       const picture = this[`${kind}Picture`];
       const mark = product && JSON.stringify(product).length + state.jobs.filter((job) => job.state === "done").length;
       picture.hidden = !product;

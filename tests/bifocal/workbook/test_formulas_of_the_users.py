@@ -1,0 +1,105 @@
+"""A survey workbook whose formulas the user changed: they count, and what is stored follows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import openpyxl
+import pytest
+
+from photocore.workbook.calculation import Calculation
+from tests import office
+from tests.bifocal.workbook.kept_workbook import DISTANCES, TABLE
+from tests.bifocal.workbook.test_cli_solve import POINTS, run, write_csv
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    folder = tmp_path_factory.mktemp("book")
+    path, table = folder / "survey.xlsx", write_csv(folder / "points.csv", TABLE)
+    assert run("solve", table, *DISTANCES, "--out", path).exit_code == 0
+    book = openpyxl.load_workbook(path)
+    head = int(book["Check"].tables["tblCheck"].ref.partition(":")[0].strip("ABC"))
+    keys = {cell.value: cell.column for cell in book["Check"][head]}
+    for row, (name, x, y, r) in enumerate(POINTS, start=head + 1):
+        known = {"id": name, "X_ref": x + 0.001, "Y_ref": y - 0.002, "Z_ref": r}
+        for key, value in known.items():
+            book["Check"].cell(row, keys[key]).value = value
+    book.save(path)
+    return path.read_bytes()
+
+
+@pytest.fixture
+def survey(written: bytes, tmp_path: Path) -> Path:
+    (tmp_path / "survey.xlsx").write_bytes(written)
+    return tmp_path / "survey.xlsx"
+
+
+def change(path: Path, **formulas: str) -> None:
+    """Put formulas into cells of `Points` by key, each in the first row."""
+    book = openpyxl.load_workbook(path)
+    sheet = book["Points"]
+    heads = {cell.value: cell.column for cell in sheet[4]}
+    for key, text in formulas.items():
+        cell = sheet.cell(5, heads[key])
+        cell.value = text.format(own=str(cell.value).removeprefix("="))
+    book.save(path)
+
+
+def solved(path: Path) -> str:
+    result = run("solve", path, "--out", path, "--overwrite")
+    assert result.exit_code == 0, result.stderr
+    return result.stderr + result.stdout
+
+
+def assert_stored_is_calculated(path: Path) -> int:
+    stored = openpyxl.load_workbook(path, data_only=True)
+    book, count = Calculation(openpyxl.load_workbook(path)), 0
+    for sheet, row, column in book.formulas():
+        shown, value = stored[sheet].cell(row, column), book.value(sheet, row, column)
+        if isinstance(value, float) and value != value:
+            assert shown.value == "#N/A", (sheet, shown.coordinate)
+        elif isinstance(value, float):
+            assert shown.value == pytest.approx(value, rel=1e-9, abs=1e-9), (sheet, shown)
+        else:
+            assert (shown.value or "") == value, (sheet, shown.coordinate)
+        count += 1
+    return count
+
+
+def test_a_formula_that_was_changed_counts_and_all_that_follows_from_it(survey: Path) -> None:
+    change(survey, Z="={own}+1")
+    told = solved(survey)
+    after = openpyxl.load_workbook(survey, data_only=True)
+    heads = {cell.value: cell.column for cell in after["Points"][4]}
+    relief = POINTS[0][3]
+    assert after["Points"].cell(5, heads["r"]).value == pytest.approx(relief, abs=1e-9)
+    assert after["Points"].cell(5, heads["Z"]).value == pytest.approx(relief + 1, abs=1e-9)
+    assert f"stay and count: Points!{after['Points'].cell(5, heads['Z']).coordinate}." in told
+    assert_stored_is_calculated(survey)
+
+
+@pytest.mark.office
+def test_what_follows_from_a_changed_formula_is_what_libreoffice_calculates(
+    survey: Path, tmp_path: Path
+) -> None:
+    change(survey, Z="={own}+1", sigma_r="=2*({own})")
+    solved(survey)
+    stored, anew = office.stored(survey), office.recalculated(survey, tmp_path / "lo")
+    for title, cells in stored.items():
+        for cell, value in cells.items():
+            if isinstance(value, float):
+                assert anew[title][cell] == pytest.approx(value, rel=1e-9, abs=1e-9), cell
+
+
+def test_a_function_that_is_not_known_is_kept_and_named(survey: Path) -> None:
+    change(survey, Z="=BESSELJ({own},1)")
+    told = solved(survey)
+    assert "Not known here: BESSELJ (Points!" in told
+    sheet = openpyxl.load_workbook(survey)["Points"]
+    assert "BESSELJ" in str([cell.value for cell in sheet[5]])
+
+
+def test_a_workbook_as_it_was_made_is_not_calculated(survey: Path) -> None:
+    assert "stay and count" not in solved(survey)
+    assert "stay and count" not in solved(survey)
