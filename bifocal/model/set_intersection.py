@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -75,7 +76,7 @@ class SetIntersection(MeasuredPoints):
 
     def among(self, numbers: Sequence[int], count: int) -> SetIntersection:
         """Return the same of a set of ``count`` photos, those of these numbers among them."""
-        whole = {}
+        whole: dict[str, Any] = {}
         for name, blank in (("residuals", np.nan), ("slips", np.nan), ("suspects", False)):
             part, axis = getattr(self, name), -2 if name == "residuals" else -1
             shape = list(part.shape)
