@@ -81,6 +81,8 @@ class HolesTuning:
     largest: float = 0.05
     #: But for their fringe, parts of them narrower than this. [m]
     narrow: float = 0.06
+    #: Holes of no more take the mean colour of their rim, unseen on paper. [px]
+    speck: int = 25
     #: Breadth of the rim at which a copy must fit. [px]
     rim: int = 6
     #: What stands this much before the hole is no part of its rim. [m]
