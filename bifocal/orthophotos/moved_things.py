@@ -121,12 +121,8 @@ def _smooth(
     image = view.sample(column, row, "linear").astype(np.float32)
     image *= np.float32(255 / np.iinfo(view.image.dtype).max)
     image = cv2.GaussianBlur(image, (0, 0), MOVED.blur).reshape(*grid.shape, -1)
-    # Shadows are sought on a grid half as fine: they cost most, and their rims say little.
-    rough = Grid.from_bounds(grid.bounds, gsd=2 * grid.gsd)
-    hidden = tidied(hidden_from(surface, rough, view.photo.foot, surface.window(rough)))
-    shape = grid.shape[::-1]
-    shadow = cv2.resize(hidden.astype(np.uint8), shape, interpolation=cv2.INTER_NEAREST)
-    return image, view.inside(column, row) & (shadow == 0)
+    hidden = tidied(hidden_from(surface, grid, view.photo.foot, relief))
+    return image, view.inside(column, row) & ~hidden
 
 
 def _in_tones_of(first: Float32Array, second: Float32Array, both: BoolArray) -> Float32Array:
