@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.files.exif_judge import NOMINAL, judged_focal
 from bifocal.files.haze import read_greys
 from bifocal.model.basis import rests_on
 from bifocal.model.interior_orientation import Interior, lens_of_photo
@@ -20,7 +21,6 @@ from bifocal.orientation.alignment import Alignment, make_alignment, with_files
 from bifocal.orientation.alignment_picture import write_alignment_picture
 from bifocal.orientation.as_set_up import pair_as_set_up
 from bifocal.orientation.control_points import Control, SiteMeasures, read_control, read_lengths
-from bifocal.orientation.exif_judge import judged_focal
 from bifocal.orientation.media_options import media_of
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.tuning import CONTROL
@@ -314,10 +314,10 @@ def interior_of_photo(info: ImageInfo, data: KnownLens, number: int | str = "") 
         if pitch is None:
             about = {"number": number, "focal": data.focal, "name": info.path.name}
             raise InputError(remark("refused.no_sensor", **about))
-        focal, sigma = data.focal / pitch, CONTROL.sigma_nominal
+        focal, sigma = data.focal / pitch, NOMINAL
         source = f"--focal{number} {data.focal:g} mm"
     elif info.focal_length and pitch:
-        sigma, source = CONTROL.sigma_nominal, f"EXIF, {info.focal_length:g} mm"
+        sigma, source = NOMINAL, f"EXIF, {info.focal_length:g} mm"
         focal = info.focal_length / pitch * (info.digital_zoom or 1.0)
     elif judged.focal:
         focal, sigma, pitch, source = judged.focal, judged.sigma, judged.pitch, judged.source

@@ -8,6 +8,7 @@ import numpy as np
 
 from bifocal.model.flags import FlagLimits
 from bifocal.model.homography import apply_homography
+from bifocal.model.hypotheses import SCALE_TOLERANCE
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
 from bifocal.remarks import remark
@@ -25,6 +26,7 @@ from bifocal.survey.point_survey import solve_points
 from bifocal.survey.reference import Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.remarks import (
+    angle_remarks,
     exchanged_remark,
     georeference_remarks,
     opposite_signs_remark,
@@ -34,7 +36,7 @@ from bifocal.survey.remarks import (
     wide_remarks,
 )
 from bifocal.survey.set_survey import best_pair, solve_set
-from bifocal.survey.setup import SCALE_TOLERANCE, SurveySetup
+from bifocal.survey.setup import SurveySetup
 from bifocal.survey.solved_survey import Corrections, SolvedSurvey
 from bifocal.survey.survey_input import SurveyInput
 from bifocal.survey.survey_media import AIR
@@ -308,6 +310,7 @@ def _ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -> _Arr
     remarks = [*setup.remarks, setup.check_scales(scale_tolerance)]
     refuse_wrong_unit(setup, points, survey.where, said=survey.unit)
     remarks += wide_remarks(setup, points)
+    remarks += angle_remarks(points)
     if pair.exchanged:
         remarks.append(exchanged_remark(setup))
         setup, points = setup.exchanged(), points.exchanged()
