@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
@@ -188,12 +189,17 @@ def test_an_exchange_that_a_job_found_is_undone_and_redone_exactly(
         assert everything(again) == after
 
 
-def test_a_job_writes_over_no_orientation_that_was_proposed_before(folder) -> None:
+@pytest.mark.parametrize("quiet", [False, True])
+def test_a_job_writes_over_no_orientation_that_was_proposed_before(
+    folder, monkeypatch, quiet: bool
+) -> None:
+    tasks: list[dict] = []
     with begun(folder) as session:
-        (folder / "survey.proposed.pair.json").write_text("{}")
-        job = start_job(session, "align", {"way": "auto"})
-        session.jobs.cancel(job.number)
-    assert (folder / "survey.proposed.pair.json").read_text() == "{}"
+        monkeypatch.setattr(session.jobs, "start", lambda _, task, *__, **___: tasks.append(task()))
+        start_job(session, "align", {"way": "auto"}, quiet=quiet)
+        Path(tasks[0]["out"]).write_text("{}")
+        start_job(session, "align", {"way": "auto"}, quiet=quiet)
+    assert tasks[0]["out"] != tasks[1]["out"]
 
 
 def test_shapes_go_with_an_exchange_to_the_same_place_of_the_wall(folder) -> None:
