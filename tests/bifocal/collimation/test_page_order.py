@@ -178,13 +178,13 @@ def test_an_exchange_that_a_job_found_is_undone_and_redone_exactly(
         assert not session.state.ordered
         session.command({"op": "undo"})
         assert everything(session) == before
-    with begun(folder) as again:
+    with begun(folder, "near.jpg", "far.jpg") as again:
         assert everything(again) == before
         again.command({"op": "redo"})
         assert everything(again) == after
         again.command({"op": "undo"})
         assert everything(again) == before
-    with begun(folder) as again:
+    with begun(folder, "near.jpg", "far.jpg") as again:
         again.command({"op": "photos.exchange"})
         assert everything(again) == after
 
