@@ -84,6 +84,18 @@ def _within(text: str) -> Iterator[tuple[int, Remark]]:
         end, held = place - length, [found[2] for found in places]
 
 
+def keys_in(text: str) -> set[str]:
+    """Return the keys of the remarks that a text holds.
+
+    Examples
+    --------
+    >>> text = Remarks("bifocal")("survey.off_radial_more", count=3)
+    >>> keys_in(f"survey.xlsx: {text}")
+    {'survey.off_radial_more'}
+    """
+    return {told.key for _, told in _within(text)}
+
+
 def with_keys(value: dict[str, Any]) -> dict[str, Any]:
     """Return an object for JSON with keys, values and levels of all remarks that its texts hold."""
     held: dict[str, Any] = {}

@@ -20,6 +20,7 @@ from bifocal.calibration.plumb_line import (
     calibrate_from_lines,
     find_straight_edges,
 )
+from bifocal.files.exif_judge import judged_focal
 from bifocal.model.lens import SIGMA_FOCAL, Lens
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
@@ -80,9 +81,13 @@ def calibrate_from_edges(
     check_writable(out, overwrite=overwrite)
     size = _common_size(images)
     remarks: list[str] = []
-    focal_px = focal_px or image_info(images[0]).focal_pixels
-    sigma_focal = GIVEN_FOCAL if focal_px else GUESSED_FOCAL
+    sigma_focal = GIVEN_FOCAL
     if focal_px is None:
+        judged = judged_focal(image_info(images[0]))
+        focal_px, sigma_focal = judged.focal, judged.sigma
+        remarks.extend(filter(None, [judged.doubt]))
+    if focal_px is None:
+        sigma_focal = GUESSED_FOCAL
         focal_px = float(np.hypot(*size))
         remarks.append(remark("calibration.assumed_focal", focal_px=focal_px))
     if lines is not None:

@@ -186,6 +186,7 @@ def rectify_photo(
             unit=given["unit"] or "", columns=given["columns"], photos=1,
         )  # fmt: skip
         check_inside(control, control.pixels1, info.size, path.name)
+    reading = () if control is None else control.remarks
     rectangle = given["rectangle"]
     if rectangle is not None:
         picks = np.reshape(corners, (-1, 2)) if control is None else control.pixels1
@@ -215,7 +216,8 @@ def rectify_photo(
         )  # fmt: skip
         done = deliver(pair, folder, task, wish, out=out, overwrite=overwrite, progress=progress)
         ortho = done.ortho
-    return replace(_told(photo, ortho, relief, scale), delivery=done)
+    told = _told(photo, ortho, relief, scale)
+    return replace(told, delivery=done, remarks=(*reading, *told.remarks))
 
 
 def _drawn(control: Control | None) -> Points | None:

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from bifocal.collimation.records import SurveyState
+from bifocal.model.doubts import RIVALS, doubts_of
 from bifocal.model.pair import Pair
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.rescaling import scaled_by_distance, scaled_by_length
@@ -50,7 +51,8 @@ def rescale(path: Path, report: Mapping[str, Any], measure: list[Any] | None) ->
     else:
         scaled = scaled_by_distance(pair, number, rest[0], sigma=rest[1])
     scaled.write(path, overwrite=True)
-    setup = scaled.extra["setup"]
+    setup, remarks = scaled.extra["setup"], report.get("remarks", ())
+    stale, rivals = (doubts_of(RIVALS, texts) for texts in (remarks, setup["doubts"]))
     return {
         **report,
         "scale": measure,
@@ -59,10 +61,7 @@ def rescale(path: Path, report: Mapping[str, Any], measure: list[Any] | None) ->
         "standard_deviations": setup["standard_deviations"],
         "words": setup["words"],
         "planes": setup["planes"],
-        "remarks": [
-            next((new for new in setup["doubts"] if new[:14] == old[:14]), old)
-            for old in report.get("remarks", ())
-        ],
+        "remarks": [next(iter(rivals), text) if text in stale else text for text in remarks],
     }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Set
 from contextlib import suppress
 from typing import Any
 
@@ -12,6 +12,7 @@ from bifocal.model.orientation_precision import NAMES
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
+from photocore.remarks import keys_in
 
 #: A wall bent by certainly more than this, at 3000 px of width, is not that of an honest pair; by
 #: how many standard deviations it is certain. [px]
@@ -22,8 +23,11 @@ MOST_BENT, CERTAIN = 0.2, 2.0
 BEND_BY_K, TAKEN_UP, OR_MORE = 144.0, 0.2, 0.1
 #: Unit of lengths to which nothing gives a scale.
 NO_UNIT = "none"
-#: How a doubt begins that leaves no word of how good relief is.
-MISFIT = "THE MODEL DOES NOT FIT"
+#: Keys of doubts that leave no word of how good relief is, and of those about which plane is the
+#: wall; how these began in files of versions that kept no keys.
+MISFITS = frozenset({"orientation.misses_lines", "orientation.bent", "pair.bent"})
+RIVALS = frozenset({"orientation.rivals"})
+_WITHOUT_KEYS = {"THE MODEL DOES NOT FIT": "pair.bent", "CHECK THE WALL": "orientation.rivals"}
 #: What free diagnostics may lack or hold instead of numbers.
 NO_NUMBER = (LookupError, TypeError, ValueError, ZeroDivisionError)
 
@@ -39,6 +43,22 @@ def doubts_in_words(setup: Any) -> tuple[str, ...]:
     if told is None and (bend := _bend(setup)):
         told = [remark("pair.bent", bend=bend, most=MOST_BENT)]
     return tuple(map(str, told)) if isinstance(told, list | tuple) else ()
+
+
+def doubts_of(keys: Set[str], texts: Iterable[str]) -> list[str]:
+    """Return the remarks that have one of some keys.
+
+    Examples
+    --------
+    >>> bent = remark("pair.bent", bend=0.7, most=0.2)
+    >>> doubts_of(MISFITS, ["It leans.", bent]) == [bent]
+    True
+    """
+    return [text for text in texts if keys & _keys(text)]
+
+
+def _keys(text: str) -> set[str]:
+    return keys_in(text) | {key for words, key in _WITHOUT_KEYS.items() if text.startswith(words)}
 
 
 def check_scale(extra: Mapping[str, Any], name: object) -> None:

@@ -51,6 +51,9 @@ def _enlarged(times: float) -> Callable[[Picks, Sizes], Picks]:
     )
 
 
+#: The scales of a bifocal pair, c / d, may differ by this much, relative.
+SCALE_TOLERANCE = 0.02
+
 #: Of the pixels of both photos.
 PICKS = (
     PickSlip("picks", lambda picks, _: picks[::-1]),

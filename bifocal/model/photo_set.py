@@ -180,6 +180,19 @@ class PhotoSet:
             raise InputError(remark("photo_set.no_photo", name=photo, names=", ".join(self.names)))
         return int(photo)
 
+    def only(self, numbers: Sequence[int]) -> PhotoSet:
+        """Return some of the photos, two or more, with their part of the covariance."""
+        part = self.orientation
+        if part is not None:
+            part = orientation_precision.of_photos(part, numbers, len(self))
+        photos = tuple(self.photos[number] for number in numbers)
+        return replace(self, photos=photos, orientation=part)
+
+    def picked_in(self, pixels: Sequence[FloatArray]) -> list[int]:
+        """Return the numbers of the photos with a pick, the first two where fewer have any."""
+        numbers = [k for k, own in enumerate(pixels) if not np.isnan(own).all()]
+        return numbers if len(numbers) > 1 else [0, 1]
+
     def pair(self, first: int | str = 0, second: int | str = 1) -> Pair:
         """Return two of the photos as a pair, the far one first, with their part of the covariance.
 
@@ -324,6 +337,11 @@ class PhotoSet:
         if sigma_r_max is not None:
             positive(sigma_r_max, "sigma_r_max", unit="m")
         rows = [own.reshape(-1, 2) for own in given]
+        if len(numbers := self.picked_in(rows)) < len(self):  # the others tell nothing
+            part = self.only(numbers).intersect(
+                [given[number] for number in numbers], sigma_px=sigma_px, sigma_r_max=sigma_r_max
+            )
+            return part.among(numbers, len(self))
         whole = intersect_rays(
             self.photos, rows, sigma_px=sigma_px, limits=FlagLimits(sigma_r_max=sigma_r_max),
             orientation=self._whole_orientation,

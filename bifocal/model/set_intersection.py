@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -72,6 +73,17 @@ class SetIntersection(MeasuredPoints):
         flags = np.array(self.flags, dtype=object)
         flags[places] = points.flags
         return replace(self, **parts, flags=tuple(flags.tolist()))
+
+    def among(self, numbers: Sequence[int], count: int) -> SetIntersection:
+        """Return the same of a set of ``count`` photos, those of these numbers among them."""
+        whole: dict[str, Any] = {}
+        for name, blank in (("residuals", np.nan), ("slips", np.nan), ("suspects", False)):
+            part, axis = getattr(self, name), -2 if name == "residuals" else -1
+            shape = list(part.shape)
+            shape[axis] = count
+            whole[name] = np.full(shape, blank)
+            np.moveaxis(whole[name], axis, 0)[list(numbers)] = np.moveaxis(part, axis, 0)
+        return replace(self, **whole)
 
 
 def intersect_rays(

@@ -31,6 +31,7 @@ class NamedPositions:
     sigma: FloatArray
     is_check: BoolArray
     shared: SharedPoints
+    remarks: tuple[str, ...] = ()
 
 
 def named_positions(
@@ -53,6 +54,7 @@ def named_positions(
     xyz: dict[str, tuple[FloatArray, FloatArray]] = {}
     checks: set[str] = set()
     rays: list[tuple[int, str, FloatArray]] = []
+    remarks: list[str] = []
     for role, tables in (("control", control), ("check", check)):
         if tables and len(tables) != len(paths):
             raise InputError(
@@ -71,6 +73,7 @@ def named_positions(
             if pairs[index].exchanged:
                 part = part.exchanged()
             _add(part, path, index, xyz, rays)
+            remarks += part.remarks
             checks |= set(part.ids) if role == "check" else set()
     ids = tuple(dict.fromkeys(name for _, name, _ in rays))
     number = {name: k for k, name in enumerate(ids)}
@@ -86,6 +89,7 @@ def named_positions(
             pixels=np.array([pixel for _, _, pixel in rays], dtype=float).reshape(-1, 2),
             count=len(ids),
         ),
+        remarks=tuple(dict.fromkeys(remarks)),
     )
 
 

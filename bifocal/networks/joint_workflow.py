@@ -89,12 +89,15 @@ class JointResult:
     points : tuple of dict
         Named points: id, kind (control, check, tie), X, Y, r, their sigmas, rays, and how far they
         lie from what was known. [m]
+    remarks : tuple of str
+        What the reader of the tables left out or used with doubt.
     """
 
     pairs: tuple[Pair, ...]
     names: tuple[str, ...]
     adjustment: JointAdjustment
     points: tuple[dict[str, Any], ...]
+    remarks: tuple[str, ...] = ()
 
     def check_rms(self, kind: str) -> tuple[int, FloatArray]:
         """Return how many points of a kind were compared, and their RMS in X, Y, r. [m]
@@ -128,7 +131,7 @@ class JointResult:
         if photos:
             lines.append("rays taken out: " + ", ".join(f"{n} in {k}" for k, n in photos))
         lines += [f"gross error LEFT IN: {_told(b)}" for b in a.left_in[:NAMED]]
-        return lines
+        return [*lines, *self.remarks]
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -142,6 +145,7 @@ class JointResult:
             "points": list(self.points),
             "blunders": [asdict(b) for b in a.blunders],
             "left_in": [asdict(b) for b in a.left_in],
+            "remarks": list(self.remarks),
         }
 
 
@@ -256,6 +260,7 @@ def joint_adjustment(
             for k, pair in enumerate(pairs)
         ),
         names=tuple(names), adjustment=adjusted, points=_points(named, adjusted),
+        remarks=named.remarks,
     )  # fmt: skip
 
 

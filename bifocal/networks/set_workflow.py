@@ -81,6 +81,7 @@ def align_photo_set(
     control = control_of(options, [photo.interior.image_size for photo in photos])
     oriented = orient_set(photos, control=control, site=options.site, progress=progress)
     made = set_alignment(replace(oriented, way=way), photos, options.direction)
+    made = replace(made, remarks=(*control.remarks, *made.remarks))
     stem = out.name[: -len(ENDING)]
     entries = []
     for k, (path, name, photo) in enumerate(zip(paths, names, made.photos.photos, strict=True)):

@@ -26,6 +26,7 @@ from bifocal.orientation.approximate_orientation import (
     ties_of,
 )
 from bifocal.orientation.as_set_up import check_room
+from bifocal.orientation.control_groups import weighed_by_control
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.media_report import media_remarks, refuse_impossible_media
 from bifocal.orientation.orientation_remarks import (
@@ -117,7 +118,7 @@ def _oriented(given: Given) -> OrientedPair:
         note = remark("orientation.distances_exchanged", d1=d1, d2=d2, name=given.names[0])
         return _told(replace(given, site=site.far_first), note)
     if enough:
-        validation.check_units(cameras, site)
+        validation.check_units(cameras, site, lenses_known=not lacking)
     elif ties is not None:
         flat = validation.is_flat(ties, interiors, given.names, flat_is_fine=site.parallel)
         # What stands out shows how the cameras stood; a flat wall does not.
@@ -137,6 +138,7 @@ def _oriented(given: Given) -> OrientedPair:
         # Photos through glass or water may fit no cameras at all: then that is the reason.
         raise _reason(error, observations, start, lacking) from error
     pair = _without_gross(replace(pair, shape=_bend(pair.observations, pair.adjusted)))
+    pair = weighed_by_control(pair) if enough else pair
     wrong = int((~pair.observations.pick_used).sum())
     if ties is None and remarks and wrong > CONTROL.of_another_wall * len(given.control.ids):
         first, second = given.names

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.files.exif_judge import NOMINAL, judged_focal
 from bifocal.files.haze import read_greys
 from bifocal.model.basis import rests_on
 from bifocal.model.interior_orientation import Interior, lens_of_photo
@@ -20,7 +21,6 @@ from bifocal.orientation.alignment import Alignment, make_alignment, with_files
 from bifocal.orientation.alignment_picture import write_alignment_picture
 from bifocal.orientation.as_set_up import pair_as_set_up
 from bifocal.orientation.control_points import Control, SiteMeasures, read_control, read_lengths
-from bifocal.orientation.exif_judge import judged_focal
 from bifocal.orientation.media_options import media_of
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.tuning import CONTROL
@@ -177,12 +177,14 @@ def align_photos(
         PhotoInput(grey=grey, interior=interior, name=info.path.name)
         for info, interior, grey in zip(infos, interiors, greys, strict=True)
     )
+    reading: tuple[str, ...] = ()
     if way == "as set up":
         oriented = pair_as_set_up((first, second), options.site, options.media)
     else:
         if way == "site" and not options.auto and options.length is None:
             _check_focal((first, second))
         control = control_of(options, (first.interior.image_size, second.interior.image_size))
+        reading = control.remarks
         oriented = orient_pair(
             (first, second), control=control, site=options.site, media=options.media
         )
@@ -190,6 +192,7 @@ def align_photos(
     if oriented.exchanged:
         paths, ordered = (near, far), (second, first)
     alignment = make_alignment(oriented, ordered, way=way, direction=options.direction)
+    alignment = replace(alignment, remarks=(*reading, *alignment.remarks))
     if picture is not None:
         images = [photo.grey for photo in ordered if photo.grey is not None]
         write_alignment_picture(picture, alignment, (images[0], images[1]), overwrite=overwrite)
@@ -314,10 +317,10 @@ def interior_of_photo(info: ImageInfo, data: KnownLens, number: int | str = "") 
         if pitch is None:
             about = {"number": number, "focal": data.focal, "name": info.path.name}
             raise InputError(remark("refused.no_sensor", **about))
-        focal, sigma = data.focal / pitch, CONTROL.sigma_nominal
+        focal, sigma = data.focal / pitch, NOMINAL
         source = f"--focal{number} {data.focal:g} mm"
     elif info.focal_length and pitch:
-        sigma, source = CONTROL.sigma_nominal, f"EXIF, {info.focal_length:g} mm"
+        sigma, source = NOMINAL, f"EXIF, {info.focal_length:g} mm"
         focal = info.focal_length / pitch * (info.digital_zoom or 1.0)
     elif judged.focal:
         focal, sigma, pitch, source = judged.focal, judged.sigma, judged.pitch, judged.source

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from bifocal import rays
-from bifocal.model.doubts import MISFIT
+from bifocal.model.doubts import MISFITS, doubts_of
 from bifocal.model.homography import apply_homography
 from bifocal.model.interior_orientation import Cameras, Interior
 from bifocal.model.lens import Lens
@@ -122,7 +122,7 @@ def make_alignment(
     sigma_tie = robust_sigma(adjusted.tie_misfit[used]) if used.any() else observations.sigma_pick
     words: tuple[str, ...] = orientation_in_words(
         cameras, deviations, sigma_px=max(sigma_tie, 0.05), media=adjusted.media,
-        fits=not any(text.startswith(MISFIT) for text in oriented.remarks),
+        fits=not doubts_of(MISFITS, oriented.remarks),
     )  # fmt: skip
     words += media_in_words(adjusted, observations.media)
     first, second = observations.interiors

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.model.hypotheses import SCALE_TOLERANCE
 from bifocal.model.interior_orientation import Cameras
 from bifocal.model.orientation_precision import NAMES
 from bifocal.model.pair_media import PairMedia
@@ -46,6 +47,14 @@ def pair_as_set_up(photos: Photos, site: SiteMeasures, media: PairMedia) -> Orie
     for number, photo in enumerate(photos, start=1):
         if photo.interior.is_assumed:
             raise InputError(remark("refused.typed_focal", name=photo.name, number=number))
+    scales = [p.interior.focal / d for p, d in zip(photos, (d1, d2), strict=True)]
+    pitches = [p.interior.pixel_size for p in photos if p.interior.pixel_size is not None]
+    if len(pitches) == 2:  # as sensors show it, of whatever size the photos were saved
+        scales = [s * pitch for s, pitch in zip(scales, pitches, strict=True)]
+    apart = scales[0] / scales[1] - 1.0
+    if abs(apart) > SCALE_TOLERANCE and not media:
+        unit = {"apart": 100 * abs(apart), "most": 100 * SCALE_TOLERANCE}
+        raise InputError(remark("refused.scales", d1=d1, d2=d2, meant=d1 * (1 + apart), **unit))
     square_on = np.diag([1.0, -1.0, -1.0])
     first, second = (
         Pinhole(photo.interior.matrix, square_on, np.array([0.0, 0.0, distance]))

@@ -30,6 +30,7 @@ COLUMNS = (
     Column("col2", ("column2", "col near", "x near", "colonna2", "spalte2"), unit="px"),
     Column("row2", ("row near", "y near", "riga2", "zeile2"), unit="px"),
     Column("sigma", ("sigma control", "std"), unit="m"),
+    Column("use", ("usa", "usare", "verwenden", "benutzen", "active", "enabled"), kind="flag"),
 )  # fmt: skip
 #: The same of one photo alone.
 ALONE = tuple(
@@ -64,6 +65,8 @@ class Control:
         3 mm at most. [m]
     more : tuple of ndarray, each of shape (n, 2)
         Picks in the third photo of a set and those that follow. [px]
+    remarks : tuple of str
+        What the reader of the table left out or used with doubt.
     """
 
     ids: tuple[str, ...] = ()
@@ -74,6 +77,7 @@ class Control:
     lengths: tuple[tuple[int, int, float], ...] = ()
     sigma_lengths: tuple[float, ...] = ()
     more: tuple[FloatArray, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.ids)
@@ -97,6 +101,14 @@ class Control:
         blank = np.full((len(self.ids), 2), np.nan)  # a length is picked in the first photo alone
         picks = [self.picks[k] if k < len(self.picks) else blank for k in (far, near)]
         return replace(self, pixels1=picks[0], pixels2=picks[1], more=())
+
+    def only(self, rows: BoolArray) -> Control:
+        """Return the points of some rows; taped lengths are added later."""
+        return replace(
+            self, ids=tuple(name for name, is_in in zip(self.ids, rows, strict=True) if is_in),
+            xyz=self.xyz[rows], sigma=self.sigma[rows], pixels1=self.pixels1[rows],
+            pixels2=self.pixels2[rows], more=tuple(picks[rows] for picks in self.more),
+        )  # fmt: skip
 
     @property
     def positioned(self) -> BoolArray:
@@ -231,10 +243,17 @@ def read_control(
         for column, row in zip(keys[::2], keys[1::2], strict=True)
     ]
     picks += [np.full((len(table), 2), np.nan)] * alone
-    return Control(
+    control = Control(
         ids=tuple(names), xyz=xyz, sigma=spread,
         pixels1=picks[0], pixels2=picks[1], more=tuple(picks[2:]),
     )  # fmt: skip
+    remarks = [f"{Path(path).name}: {text}" for text in table.remarks]
+    off = table.numbers("use") == 0
+    if off.any():
+        control = control.only(~off)
+        listed = ", ".join(name for name, out in zip(names, off, strict=True) if out)
+        remarks.append(remark("control.switched_off", of=Path(path).name, names=listed))
+    return replace(control, remarks=tuple(remarks))
 
 
 def _names(texts: Sequence[str], before: str) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,7 +20,7 @@ from bifocal.orientation.tuning import SLIPS
 from bifocal.remarks import remark
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.adjustment.network import Network, NetworkState, Rows
-from photocore.arrays import ByteArray, FloatArray, positive
+from photocore.arrays import BoolArray, ByteArray, FloatArray, positive
 from photocore.camera import pinhole
 from photocore.camera.pinhole import PARAMETERS, Pinhole, ray_on_plane
 from photocore.errors import ConvergenceError, GeometryError, InputError
@@ -53,6 +54,7 @@ class OrientedPhoto:
     test : ndarray, shape (n,)
         The one over the other, as one value.
     remarks : tuple of str
+        With the points left out as gross.
     """
 
     interior: Interior
@@ -131,13 +133,15 @@ def by_rectangle(
     if len(corners) != 4:
         raise InputError(f"--rectangle: {len(corners)} corners; a rectangle has four.")
 
-    def fitted(width: float, height: float) -> OrientedPhoto:
+    def cornered(width: float, height: float) -> Control:
         xyz = np.array([[0, height, 0], [width, height, 0], [width, 0, 0], [0.0, 0, 0]])
-        control = Control(
+        return Control(
             ids=("upper left", "upper right", "lower right", "lower left"), xyz=xyz,
             sigma=np.full((4, 3), sigma), pixels1=corners, pixels2=np.full((4, 2), np.nan),
         )  # fmt: skip
-        return by_control(control, interior, sigma_pick=sigma_pick)
+
+    def fitted(width: float, height: float) -> OrientedPhoto:
+        return by_control(cornered(width, height), interior, sigma_pick=sigma_pick)
 
     def misfit(width: float, height: float) -> float:
         try:
@@ -148,7 +152,33 @@ def by_rectangle(
     width, height = (positive(side, "--rectangle", unit="m") for side in sides)
     if misfit(height, width) < min(SLIPS.fits, misfit(width, height) / SLIPS.better):
         raise GeometryError(remark("rectify.sides", width=width, height=height))
-    return fitted(width, height)
+
+    def proportions() -> str:
+        def misfits(factors: FloatArray) -> FloatArray:
+            out = np.full(len(factors), SLIPS.most)
+            for k, times in enumerate(factors):
+                control = replace(cornered(width * times, height), pixels1=interior.ideal(corners))
+                with suppress(GeometryError, ConvergenceError):
+                    out[k] = _by_points(control, interior, sigma_pick).sigma0
+            return out
+
+        near = np.exp(np.linspace(-0.5, 0.5, 41))
+        close = near[misfits(near).argmin()] * np.exp(np.linspace(-0.025, 0.025, 21))
+        rest = misfits(close)
+        if rest.min() > SLIPS.doubted:
+            return ""
+        best = float(close[rest == rest.min()].mean())
+        about = {"width": width * best, "height": height / best, "at": height, "by": width}
+        return remark("rectify.proportions", **about)
+
+    try:
+        photo = fitted(width, height)
+    except GeometryError:
+        if words := proportions():
+            raise GeometryError(words) from None
+        raise
+    words = proportions() if photo.sigma0 > SLIPS.doubted else ""
+    return replace(photo, remarks=(words, *photo.remarks)) if words else photo
 
 
 def by_control(control: Control, interior: Interior, *, sigma_pick: float) -> OrientedPhoto:
@@ -160,11 +190,13 @@ def by_control(control: Control, interior: Interior, *, sigma_pick: float) -> Or
         If there are fewer than four, they lie on one line, or do not fit; a slip is named.
     """
     whole = np.isfinite(np.column_stack([control.xyz, control.pixels1])).all(axis=1)
-    control = Control(
-        ids=tuple(np.array(control.ids)[whole].tolist()), xyz=control.xyz[whole],
-        sigma=control.sigma[whole], pixels1=interior.ideal(control.pixels1[whole]),
-        pixels2=control.pixels2[whole],
-    )  # fmt: skip
+    # Several points at one pixel, often 0, 0 or -1, -1, are what programs write for "not seen".
+    places, count = np.unique(control.pixels1[whole], axis=0, return_counts=True)
+    unseen = (control.pixels1[:, None] == places[count > 1]).all(axis=2).any(axis=1)
+    names = ", ".join(np.array(control.ids)[unseen][:10])
+    before = (remark("rectify.one_pixel", names=names),) if names else ()
+    control = _of_points(control, whole & ~unseen)
+    control = replace(control, pixels1=interior.ideal(control.pixels1))
 
     def fitted(typed: Typed) -> TrialOrientation | None:
         if not np.isfinite(typed.control.pixels1).all():
@@ -181,17 +213,73 @@ def by_control(control: Control, interior: Interior, *, sigma_pick: float) -> Or
     slip = slip_of(typed, fitted, by_control=True)
     if slip is not None and not slip.mended:
         raise GeometryError(slip.words)
-    notes = () if slip is None else (slip.words,)
+    notes = before if slip is None else (*before, slip.words)
     control = control if slip is None else slip.meant.control
-    photo = _by_points(control, interior, sigma_pick)
-    if photo.sigma0 > SLIPS.doubted and not interior.is_calibrated:
+    first = _by_points(control, interior, sigma_pick)
+    photo, gross = _without_gross(control, interior, sigma_pick, first)
+    if first.sigma0 > SLIPS.doubted and not interior.is_calibrated:
         wide = _CUT_OUT * float(np.hypot(*interior.image_size))
-        loose = _by_points(control, replace(interior, sigma_centre=wide), sigma_pick)
-        if loose.sigma0 < photo.sigma0 / SLIPS.better:
-            photo, notes = loose, (*notes, remark("rectify.cut_out"))
+        loose = replace(interior, sigma_centre=wide)
+        cut = _by_points(control, loose, sigma_pick)
+        # The fewest slips: a crop beside one wrong point, whichever leaves less. Four points fit
+        # any crop.
+        fewer = len(gross) != 1 or cut.sigma0 < photo.sigma0
+        if cut.sigma0 < first.sigma0 / SLIPS.better and fewer:
+            if len(control.ids) > 4 and _is_odd(interior.image_size):
+                photo, gross = _without_gross(control, loose, sigma_pick, cut)
+                gross = [remark("rectify.cut_out"), *gross]
+            else:
+                gross = [remark("rectify.cut_out_perhaps"), *gross]
     if photo.sigma0 > SLIPS.doubted:
-        notes = (*notes, remark("rectify.misfit", times=photo.sigma0))
-    return replace(photo, remarks=notes)
+        gross = [remark("rectify.misfit", times=photo.sigma0), *gross]
+    return replace(photo, remarks=(*notes, *gross))
+
+
+def _is_odd(size: tuple[int, int]) -> bool:
+    """Return whether no camera gives photos of these proportions: they were cut out of one.
+
+    Examples
+    --------
+    >>> _is_odd((3072, 2048)), _is_odd((2448, 3264)), _is_odd((700, 800))
+    (False, False, True)
+    """
+    ratio = max(size) / min(size)
+    return all(abs(ratio / usual - 1) > 0.005 for usual in (3 / 2, 4 / 3, 16 / 9, 1.0, 5 / 4))
+
+
+def _of_points(control: Control, which: BoolArray) -> Control:
+    """Return some of the points alone."""
+    return Control(
+        ids=tuple(np.array(control.ids)[which].tolist()), xyz=control.xyz[which],
+        sigma=control.sigma[which], pixels1=control.pixels1[which], pixels2=control.pixels2[which],
+    )  # fmt: skip
+
+
+def _without_gross(
+    control: Control, interior: Interior, sigma_pick: float, photo: OrientedPhoto
+) -> tuple[OrientedPhoto, list[str]]:
+    """Return the photo without gross points, the worst first, and remarks that name them.
+
+    Where the others fit no better, the points are not to blame (a lens that bends, relief): all
+    stay.
+    """
+    named: list[str] = []
+    whole, most = photo, max(len(control.ids) // 4, 1)
+    while len(photo.ids) > 5 and len(named) < most:
+        test = np.nan_to_num(photo.test)
+        worst = int(test.argmax())
+        if test[worst] < OUTLIER_LIMIT:
+            break
+        keep = np.arange(len(control.ids)) != worst
+        control = _of_points(control, keep)
+        error = 1000 * float(np.hypot(*photo.left_out[worst]))
+        about = {"name": photo.ids[worst], "error": error, "times": float(test[worst])}
+        photo = _by_points(control, interior, sigma_pick)
+        named.append(remark("rectify.gross", **about))
+    fits = np.nan_to_num(photo.test).max() < OUTLIER_LIMIT
+    if fits or photo.sigma0 < whole.sigma0 / SLIPS.better:
+        return photo, named
+    return whole, []
 
 
 def _by_points(control: Control, interior: Interior, sigma_pick: float) -> OrientedPhoto:

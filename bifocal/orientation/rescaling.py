@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from bifocal import rays
-from bifocal.model.doubts import MISFIT
+from bifocal.model.doubts import MISFITS, RIVALS, doubts_of
 from bifocal.model.orientation_precision import CAMERA, NAMES, pinhole, pixel_rates
 from bifocal.model.pair import Pair
 from bifocal.model.pair_media import PairMedia
@@ -150,14 +150,14 @@ def _setup(pair: Pair, factor: float) -> dict[str, Any]:
     if "relief_offset" in setup.get("standard_deviations", {}) and faces:
         deviations["relief_offset"] = zero_sigma(faces)
     known = rivals_in_words(faces, SiteMeasures()) if faces else ""
-    doubts = [
-        known if known and text.startswith("CHECK THE WALL") else text
-        for text in setup.get("doubts", [])
-    ]
+    doubts = [*map(str, setup.get("doubts", ()))]
+    if known:
+        stale = doubts_of(RIVALS, doubts)
+        doubts = [known if text in stale else text for text in doubts]
     sigma = max(setup.get("common_points", {}).get("sigma_px", 0.0), 0.05)
     words = orientation_in_words(
         cameras, deviations, sigma_px=sigma,
-        fits=not any(text.startswith(MISFIT) for text in doubts),
+        fits=not doubts_of(MISFITS, doubts),
     )  # fmt: skip
     return setup | {
         "standard_deviations": deviations, "planes": planes, "wall_relief_mm": zones,

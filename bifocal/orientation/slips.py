@@ -82,6 +82,8 @@ def slip_of(
     if not fits:
         tables += _of_control(typed, now) if by_control else _of_site(typed)
     found = _explaining([*lenses, *tables], fitted, now)
+    if not found and tables and by_control:
+        found = _explaining(_of_crops(typed), fitted, now)
     if not found and tables and by_control and len(typed.control.ids) > 5:
         # Two at once, of a lens and of the table.
         both = (
@@ -159,6 +161,19 @@ def _of_lenses(typed: Typed, *, free: bool) -> Iterator[Slip]:
         loose = replace(first, sigma_focal=0.5), replace(second, sigma_focal=0.5)
         words = remark("slips.focals_contradict", first=first.source, second=second.source)
         yield Slip(meant=replace(typed, interiors=loose), words=words, handicap=SLIPS.clearly)
+
+
+def _of_crops(typed: Typed) -> Iterator[Slip]:
+    """Yield that photos are parts of larger ones, where there are points enough to tell."""
+    if any(i.is_calibrated for i in typed.interiors) or typed.control.positioned.sum() < 8:
+        return
+    for which, key in (((0, 1), "both"), ((0,), "first"), ((1,), "second")):
+        loose = [
+            replace(i, sigma_centre=0.15 * float(np.hypot(*i.image_size))) if k in which else i
+            for k, i in enumerate(typed.interiors)
+        ]
+        meant = replace(typed, interiors=(loose[0], loose[1]))
+        yield Slip(meant=meant, words=remark(f"slips.cropped_{key}"), handicap=SLIPS.clearly)
 
 
 def _of_site(typed: Typed) -> Iterator[Slip]:

@@ -139,10 +139,6 @@ class ControlTuning:
     of_another_wall: float = 0.25
     #: A wall point given without r lies on the plane to this. [m]
     sigma_on_wall: float = 0.005
-    #: Nominal focal lengths are rounded and change with focus.
-    sigma_nominal: float = 0.02
-    #: 35 mm equivalents are rounder still.
-    sigma_equivalent: float = 0.04
     #: Logarithms of a ratio of distances so far apart contradict each other; tilted cameras change
     #: the scale over the wall.
     unlike: float = 0.15

@@ -7,6 +7,7 @@ import numpy as np
 
 from bifocal.matching.features import sharpness
 from bifocal.model.homography import apply_homography
+from bifocal.model.hypotheses import FACTORS, unit_of
 from bifocal.model.interior_orientation import Cameras, Images, Interior, Interiors
 from bifocal.model.photo import FARTHEST_WALL
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
@@ -76,10 +77,10 @@ def is_flat(
 
 
 #: Units in which lengths are typed by mistake, parts of a metre.
-_UNITS = ((1000.0, "mm"), (100.0, "cm"))
+_UNITS = tuple((FACTORS[unit], unit) for unit in ("mm", "cm"))
 
 
-def check_units(cameras: Cameras, site: SiteMeasures) -> None:
+def check_units(cameras: Cameras, site: SiteMeasures, *, lenses_known: bool = False) -> None:
     """Refuse control points and distances that are not in metres, one beside the other."""
     d1, d2 = (float(camera.centre[2]) for camera in cameras)
     agree = False
@@ -87,15 +88,16 @@ def check_units(cameras: Cameras, site: SiteMeasures) -> None:
         if measured is None:
             continue
         agree |= 0.8 < distance / measured < 1.25
+        about = {"number": name, "given": measured, "found": distance}
         if measured > FARTHEST_WALL and not agree:
-            about = {"number": name, "given": measured, "found": distance}
             nearest = min(_UNITS, key=lambda one: abs(np.log(measured / one[0] / distance)))
             meant = {"unit": nearest[1], "meant": measured / nearest[0]}
             raise InputError(remark("refused.too_far", **meant, **about))
+        if unit := unit_of(measured / distance, within=0.1) if lenses_known else "":
+            raise InputError(remark("refused.tape_unit", unit=unit, **about))
         for factor, unit in _UNITS:
             if 0.8 < distance / measured / factor < 1.25:
-                about = {"unit": unit, "number": name, "found": distance, "given": measured}
-                raise InputError(remark("refused.control_unit", **about))
+                raise InputError(remark("refused.control_unit", unit=unit, **about))
     if max(d1, d2) > FARTHEST_WALL and not agree:
         raise InputError(remark("refused.control_far", d1=d1, d2=d2))
 

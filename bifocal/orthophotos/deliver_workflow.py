@@ -14,7 +14,7 @@ import numpy as np
 from bifocal.faces.faced_surface import FacedSurface
 from bifocal.files.strips import write_png
 from bifocal.media import media_words
-from bifocal.model.doubts import MISFIT, check_scale
+from bifocal.model.doubts import MISFITS, check_scale, doubts_of
 from bifocal.model.geotiff import (
     RELIEF_BANDS,
     RasterReader,
@@ -470,7 +470,7 @@ def _notes(
     precise = _accuracy(pair, grid, task, reader)
     known = dict(zip(("own", "place", "relief"), precise, strict=False))
     words = "accuracy" if len(known) > 1 else "photo_pixel"
-    misfit = any(text.startswith(MISFIT) for text in pair.remarks)
+    misfit = bool(doubts_of(MISFITS, pair.remarks))
     if wish.checked is not None:
         count, place, deep = wish.checked
         words, known = "accuracy_checked", known | {

@@ -46,8 +46,10 @@ def hatched_strips(
         source = reader.read(*size, bands=[reader.bands])[:, :, 0]
         lines = _lines(source, least, pixel, top - least)[least:-least]
         picture, valid = np.array(colours), np.array(valid)
-        # Light lines on what is dark, dark ones on what is light.
-        light = picture[lines].mean(axis=1, keepdims=True) < HATCH.dark
+        # Light lines on what is dark, dark ones on what is light, whole ones over fine detail.
+        side = max(3, round(HATCH.period / pixel) | 1)
+        around = cv2.blur(picture, (side, side))
+        light = around[lines].mean(axis=1, keepdims=True) < HATCH.dark
         tone = np.where(light, 255, 0)
         picture[lines] = np.rint(picture[lines] * (1 - HATCH.share) + tone * HATCH.share)
         rim = _rim(source == Source.NEITHER, pixel)[least:-least]

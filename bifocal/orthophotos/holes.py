@@ -22,7 +22,7 @@ def close_holes(
     The fringe of a large one, narrower than `HOLES.narrow`, takes texture, too: a ragged outline
     would tell of the mask, not of the wall. Texture is a copy of what lies beside, shifted to where
     the rim fits best, and levelled along the rim. It comes from what lies no farther out than the
-    hole: that is what goes on behind.
+    hole: that is what goes on behind. Specks take the mean colour of their rim.
     """
     side = int(HOLES.narrow / gsd) | 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
@@ -33,8 +33,40 @@ def close_holes(
     source[white] = Source.NEITHER
     rest = (holes & ~white).astype(np.uint8)
     _, label, stats, _ = cv2.connectedComponentsWithStats(rest, connectivity=8)
-    for number, (left, top, width, height, _) in enumerate(stats[1:].tolist(), start=1):
+    closed = _close_specks(image, source, label, stats[:, cv2.CC_STAT_AREA], relief)
+    for number in (np.flatnonzero(~closed[1:]) + 1).tolist():
+        left, top, width, height, _ = stats[number].tolist()
         _copy_texture(image, source, label, number, (left, top, width, height), relief, gsd)
+
+
+def _close_specks(
+    image: ImageArray, source: ByteArray, label: IntArray, areas: IntArray, relief: Float32Array
+) -> BoolArray:
+    """Give small holes the mean colour of their rim, in place; return which were closed."""
+    small = areas <= HOLES.speck
+    small[0] = False
+    numbers = np.where(small[label], label, 0).astype(np.float32)
+    row, column = np.nonzero(numbers)
+    if not len(row):
+        return small
+    inside = label[row, column]
+    with np.errstate(invalid="ignore"):
+        level = np.bincount(inside, relief[row, column], len(areas)) / areas + HOLES.before
+    around = cv2.dilate(numbers, np.ones((3, 3), np.uint8)).astype(np.int32)
+    rim_row, rim_column = np.nonzero((around > 0) & shows(source))
+    beside = around[rim_row, rim_column]
+    behind = relief[rim_row, rim_column] < level[beside]
+    rim_row, rim_column, beside = rim_row[behind], rim_column[behind], beside[behind]
+    count = np.bincount(beside, minlength=len(areas))
+    closed: BoolArray = small & (count > 0)
+    taken = closed[inside]
+    row, column, inside = row[taken], column[taken], inside[taken]
+    colours = image[rim_row, rim_column].reshape(len(beside), -1)
+    total = np.stack([np.bincount(beside, band, len(areas)) for band in colours.T], axis=-1)
+    mean = np.rint(total[inside] / count[inside, None]).astype(image.dtype)
+    image[row, column] = mean.reshape(len(row), *image.shape[2:])
+    source[row, column] = Source.FILLED
+    return closed
 
 
 def _copy_texture(

@@ -81,6 +81,8 @@ class HolesTuning:
     largest: float = 0.05
     #: But for their fringe, parts of them narrower than this. [m]
     narrow: float = 0.06
+    #: Holes of no more take the mean colour of their rim, unseen on paper. [px]
+    speck: int = 25
     #: Breadth of the rim at which a copy must fit. [px]
     rim: int = 6
     #: What stands this much before the hole is no part of its rim. [m]
@@ -396,9 +398,11 @@ class HatchTuning:
     """Lines over what is not measured."""
 
     #: Distance of the lines over what is not measured, on paper. [mm]
-    period: float = 2.2
+    period: float = 3.0
     #: How opaque they are.
-    share: float = 0.5
+    #: Evidence: castle_B, of which half is hatched: at 0.5 and 2.2 mm the lines are seen before the
+    #: wall is.
+    share: float = 0.3
     #: Below this lines are white, else black. [grey levels]
     dark: int = 100
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bifocal.model.doubts import MISFIT
+from bifocal.model.doubts import MISFITS, doubts_of
 from bifocal.remarks import in_language
 from bifocal.reports.content import PairContent
 from bifocal.survey.reference import CheckResult
@@ -29,7 +29,7 @@ FAR_OFF = 3.0
 
 def accuracy_blocks(content: PairContent, say: Words) -> Iterator[Block]:
     """Yield doubts in the model, the verdict, its table per drawing scale, and compared points."""
-    doubts = [text for text in content.pair.remarks if text.startswith(MISFIT)]
+    doubts = doubts_of(MISFITS, content.pair.remarks)
     if doubts:
         told = tuple(in_language(text, content.task.language) for text in doubts)
         yield Banner(text=say("misfit"), details=told, good=False)
@@ -54,7 +54,7 @@ def verdict_in_words(content: PairContent) -> list[str]:
     if solution is None or not np.isfinite(solution.check.accuracy):
         return [say("verdict_none")]
     banner = _banner(content, solution.check, say)
-    misfit = any(text.startswith(MISFIT) for text in content.pair.remarks)
+    misfit = bool(doubts_of(MISFITS, content.pair.remarks))
     parts, (_, *expected) = banner.details[: len(_PARTS)], banner.details[len(_PARTS) :]
     return [f"{banner.text}.", *parts, *expected[:1], *[say("misfit")] * misfit]
 

@@ -104,7 +104,9 @@ def solve_control(
     if not compared.any():
         compared[:] = True
     known = KnownPoints(ids=points.ids, xyz=xyz[seen], use=compared)
-    survey = replace(SurveyInput.of_points(points), known=known, language=language)
+    remarks = tuple(text for part in parts for text in part.remarks)
+    survey = SurveyInput.of_points(points)
+    survey = replace(survey, known=known, language=language, remarks=(*survey.remarks, *remarks))
     return solve(survey, pair=pair_path)
 
 

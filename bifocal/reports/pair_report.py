@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.media import media_words
-from bifocal.model.doubts import MISFIT, untold
+from bifocal.model.doubts import MISFITS, doubts_of, untold
 from bifocal.model.orientation_precision import pinhole
 from bifocal.model.photo import Photo
 from bifocal.model.relief_map import TOLD, Quality, ReliefMap
@@ -287,7 +287,7 @@ def _foundations(content: PairContent, say: Words) -> Iterator[Block]:
         told = refraction_remarks(content.solution.pair, content.solution.points)
         remarks = [remark for remark in remarks if remark not in told]
     # What does not fit heads the report; a solution tells the doubts of its pair with their file.
-    head = tuple(text for text in content.pair.remarks if text.startswith(MISFIT))
+    head = tuple(doubts_of(MISFITS, content.pair.remarks))
     remarks = [remark for remark in untold((), remarks) if not remark.endswith(head)]
     if remarks:
         yield Heading(text=say("remarks"), level=3)

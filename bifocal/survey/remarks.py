@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
+from dataclasses import replace
 
 import numpy as np
 
+from bifocal.model.hypotheses import unit_of
 from bifocal.model.pair import Pair
 from bifocal.remarks import remark
+from bifocal.survey.georeferencing import georeference
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.setup import SurveySetup
 from photocore.arrays import FloatArray
+from photocore.errors import GeometryError
 
 #: A scale further from 1 than this is no matter of taping distances.
 SCALE_SHARE = 0.01
@@ -51,11 +55,31 @@ def georeference_remarks(
     scale = world.world_from_wall.scale
     if abs(scale - 1.0) > SCALE_SHARE:
         said.append(remark("survey.wrong_scale", scale=scale))
+        if unit := unit_of(max(scale, 1 / scale)):
+            said.append(remark("survey.scale_of_unit", unit=unit))
     sizes = np.where(world.used, np.sqrt(np.nansum(world.residuals**2, axis=1)), 0.0)
     if sizes.size and sizes.max() > LARGEST_RESIDUAL:
         name = world.ids[int(sizes.argmax())]
         said.append(remark("survey.large_residuals", size=sizes.max(), name=name))
+        turned = replace(control, xyz=control.xyz[:, [1, 0, 2]])
+        try:
+            fitted = georeference(table, turned, model=world.model).residuals
+        except GeometryError:
+            return said
+        if np.sqrt(np.nansum(fitted**2, axis=1)).max() < 0.1 * sizes.max():
+            said.insert(0, remark("survey.east_north_exchanged"))
     return said
+
+
+def angle_remarks(points: PointObservations) -> list[str]:
+    """Return that angles typed as degrees look like radians or gon."""
+    theta = points.polar[points.use & ~points.is_cartesian, 2]
+    theta = theta[np.isfinite(theta)]
+    if len(theta) >= 6 and np.abs(theta).max() < 6.3 and np.ptp(theta) > 3.0:
+        return [remark("survey.angles_in_radians", most=theta.max())]
+    if len(theta) and 360.0 < theta.max() <= 400.0:
+        return [remark("survey.angles_in_gon", most=theta.max())]
+    return []
 
 
 def exchanged_remark(setup: SurveySetup) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from bifocal.model.flags import SIGMA_PIXEL, FlagLimits
 from bifocal.model.homography import apply_homography
+from bifocal.model.hypotheses import SCALE_TOLERANCE
 from bifocal.model.lens import Lens
 from bifocal.model.pair import Pair
 from bifocal.precision import false_relief_of_scale
@@ -22,8 +23,6 @@ from bifocal.survey.survey_media import SurveyMedia
 from photocore.arrays import FloatArray, positive
 from photocore.errors import GeometryError, InputError, located
 
-#: Scales of the two photos may differ by this share; what remains is taken out by `k_12`.
-SCALE_TOLERANCE = 0.02
 #: Precision of an image coordinate where the pixel size is unknown. [mm]
 SIGMA_RADIAL = 0.004
 #: The same on a print, read by a ruler: what a line on a drawing is good to. [mm]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bifocal.model.flags import FlagLimits
 from bifocal.model.homography import apply_homography
+from bifocal.model.hypotheses import SCALE_TOLERANCE
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
 from bifocal.remarks import remark
@@ -25,6 +27,7 @@ from bifocal.survey.point_survey import solve_points
 from bifocal.survey.reference import Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.remarks import (
+    angle_remarks,
     exchanged_remark,
     georeference_remarks,
     opposite_signs_remark,
@@ -34,7 +37,7 @@ from bifocal.survey.remarks import (
     wide_remarks,
 )
 from bifocal.survey.set_survey import best_pair, solve_set
-from bifocal.survey.setup import SCALE_TOLERANCE, SurveySetup
+from bifocal.survey.setup import SurveySetup
 from bifocal.survey.solved_survey import Corrections, SolvedSurvey
 from bifocal.survey.survey_input import SurveyInput
 from bifocal.survey.survey_media import AIR
@@ -140,13 +143,17 @@ def solve_survey_of_set(
     InputError
         If there are no raw pixels.
     """
-    points, measuring, pair = survey.points, survey.setup.measuring, best_pair(photos)
+    points, measuring = survey.points, survey.setup.measuring
+    numbers = photos.picked_in(points.pixels)
+    picked = photos.only(numbers) if len(numbers) < len(photos) else photos
+    pair = best_pair(picked)
     if not points.has_pixels.any():
         needed = remark("survey.set_pixels", count=len(photos))
         raise InputError(f"{survey.where}: {needed}")
     sigma, said = measuring.sigma_px, tuple[str, ...]()
     if sigma is None and not any(photo.sigma_pixel for photo in photos.photos):
-        sigma, said = _sigma_of_set(photos, points)
+        pixels = [points.pixels[k] for k in numbers if k < len(points.pixels)]
+        sigma, said = _sigma_of_set(picked, points, pixels)
     table, notes, off = solve_set(photos, points, sigma_px=sigma, limits=measuring.limits)
     noted = ("; ".join(filter(None, both)) for both in zip(points.note, notes, strict=True))
     unused = points.unused
@@ -280,13 +287,13 @@ def _sigma_from_misfits(
 
 
 def _sigma_of_set(
-    photos: PhotoSet, points: PointObservations
+    photos: PhotoSet, points: PointObservations, pixels: Sequence[FloatArray]
 ) -> tuple[float | None, tuple[str, ...]]:
     """Return the picks' precision from the misfits of the pair whose are largest; None if few."""
-    found, count = [], len(points.pixels)
+    found, count = [], len(pixels)
     for far, near, *_ in photos.pairs():
         if max(far, near) < count:
-            both = replace(points, pixels1=points.pixels[far], pixels2=points.pixels[near])
+            both = replace(points, pixels1=pixels[far], pixels2=pixels[near])
             found.append(_sigma_from_misfits(photos.pair(far, near), both))
     return max(found, key=lambda each: each[0] or 0.0, default=(None, ()))
 
@@ -308,6 +315,7 @@ def _ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -> _Arr
     remarks = [*setup.remarks, setup.check_scales(scale_tolerance)]
     refuse_wrong_unit(setup, points, survey.where, said=survey.unit)
     remarks += wide_remarks(setup, points)
+    remarks += angle_remarks(points)
     if pair.exchanged:
         remarks.append(exchanged_remark(setup))
         setup, points = setup.exchanged(), points.exchanged()

@@ -7,10 +7,11 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
+from bifocal.model.hypotheses import SCALE_TOLERANCE
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
 from bifocal.remarks import remark
-from bifocal.survey.setup import SCALE_TOLERANCE, Measuring, Taking, given_of
+from bifocal.survey.setup import Measuring, Taking, given_of
 from bifocal.survey.solved_survey import SolvedSurvey
 from bifocal.survey.solver import solve_survey, solve_survey_of_set
 from bifocal.survey.survey_input import SurveyInput

@@ -24,6 +24,7 @@ from photocore.textfile import readable
 from photocore.workbook.reading.grid import CellGrid, SheetFile, Value, cell_name
 
 _DELIMITERS = (";", "\t", ",", "|", " ")
+_COMMENTED = re.compile(r"^[ \t]*(?:#|//)", re.M)
 #: The apostrophes of `photocore.tables.csvwrite.guarded`.
 _GUARDED = re.compile(r"(?:^|(?<=[;\r\n]))'(?='*[=+\-@\t\r])")
 _SAMPLE = 200
@@ -215,6 +216,8 @@ def plain_rows(
     numeric = {key for key in match.columns if kinds[key] in ("number", "integer")}
     quick = sorted(numeric - careful)
     if all(plain_numbers([match.headings.get(key) or "x"]) for key in quick):
+        return None
+    if _COMMENTED.search(file.text):
         return None
     others = sorted(match.columns.keys() - quick)
     chunks: dict[str, list[FloatArray]] = {key: [] for key in quick}

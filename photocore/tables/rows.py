@@ -10,6 +10,9 @@ from photocore.tables.headings import Match, bare, is_summary
 from photocore.tables.model import Column
 from photocore.workbook.reading.grid import CellGrid, Value
 
+#: What a row begins with that is switched off.
+COMMENTS = ("#", "//")
+
 
 @dataclass(slots=True)
 class DataRows:
@@ -134,10 +137,24 @@ def data_rows(
             continue
         del data.rows[index], data.blocks[index]
         data.remarks.append(remark("table.summary_left_out", row=row))
+    _drop_commented(grid, data)
     if hidden:
         key = f"table.hidden_{'left_out' if visible_only else 'used'}"
         data.remarks.append(remark(key, count=hidden))
     return data
+
+
+def _drop_commented(grid: CellGrid, data: DataRows) -> None:
+    """Leave out rows that begin with # or //, unless all do: then it is part of the names."""
+    first = [str(grid.rows[row][min(grid.rows[row])]) for row in data.rows]
+    off = [text.lstrip().startswith(COMMENTS) for text in first]
+    if not any(off) or all(off):
+        return
+    rows = [str(row) for row, out in zip(data.rows, off, strict=True) if out]
+    listed = ", ".join(rows[:5]) + (", ..." if len(rows) > 5 else "")
+    data.remarks.append(remark("table.commented", rows=listed))
+    for index in reversed([k for k, out in enumerate(off) if out]):
+        del data.rows[index], data.blocks[index]
 
 
 def block_above(grid: CellGrid, match: Match) -> str:

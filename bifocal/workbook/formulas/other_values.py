@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from bifocal.survey.setup import SCALE_TOLERANCE, OtherPhoto, SurveySetup
+from bifocal.model.hypotheses import SCALE_TOLERANCE
+from bifocal.survey.setup import OtherPhoto, SurveySetup
 from bifocal.workbook.formulas.setup_cells import other_cells
 from photocore.workbook.changing.cells import CellValue
 

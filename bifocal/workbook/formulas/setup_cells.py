@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from bifocal.model.flags import SIGMA_PIXEL, UNCERTAIN_SHARE
+from bifocal.model.hypotheses import SCALE_TOLERANCE
 from bifocal.model.photo import LEAST_COSINE
 from bifocal.options.commands import SolveCommand
-from bifocal.survey.setup import SCALE_TOLERANCE, SIGMA_PRINT, SIGMA_RADIAL
+from bifocal.survey.setup import SIGMA_PRINT, SIGMA_RADIAL
 from bifocal.survey.survey_media import HEIGHTS, index_names, media_names, thickness_names
 from bifocal.workbook.formulas.columns import FORMULAS, other_numbers
 from bifocal.workbook.formulas.media_formulas import calculated_names

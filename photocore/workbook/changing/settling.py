@@ -13,7 +13,8 @@ from zipfile import BadZipFile
 
 from openpyxl import load_workbook
 
-from photocore.workbook.calculation import Calculation, Unknown
+from photocore.workbook.calculating.calculation import Calculation
+from photocore.workbook.calculating.values import Unknown
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.changing.editor import WorkbookEditor
 from photocore.workbook.making.newbook import is_untouched

@@ -8,8 +8,10 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 from bifocal import InputError, Interior, Lens
+from bifocal.calibration.workflow import calibrate_from_edges
 from tests.bifocal.calibration.known_lens import BROWN, GRID, MATRIX, brown_by_hand
 
 
@@ -146,3 +148,19 @@ def test_a_lens_file_whose_precision_is_no_number_is_named():
         lens = replace(BROWN, extra={"sigma_focal": wrong})
         with pytest.raises(InputError, match=rf"lens\.json: sigma_focal: {said}"):
             Interior.from_lens(lens, source="lens.json")
+
+
+def test_straight_lines_of_a_resized_photo_have_the_lens_of_its_size(tmp_path):
+    """A 35 mm lens on a sensor 22.7 mm wide, 3072 px; the photo was saved at a third of it."""
+    exif = Image.Exif()
+    exif.get_ifd(34665).update(
+        {37386: 35.0, 41486: 3072 / 22.7, 41488: 4, 40962: 3072, 40963: 2304}
+    )
+    Image.new("RGB", (1024, 768), (120, 110, 100)).save(tmp_path / "wall.jpg", exif=exif)
+    along = np.linspace(20, 1000, 30)
+    rows = [f"L{k},{x:.3f},{at:.3f}" for k, at in enumerate((60, 300, 500, 700)) for x in along]
+    (tmp_path / "lines.csv").write_text("\n".join(["line,col [px],row [px]", *rows]))
+    out = tmp_path / "lens.json"
+    calibrate_from_edges([tmp_path / "wall.jpg"], out, lines=tmp_path / "lines.csv")
+    assert Lens.read(out).camera_matrix[0, 0] == pytest.approx(35 / 22.7 * 1024, rel=1e-3)
+    assert Lens.read(out).extra["sigma_focal"] == 0.02

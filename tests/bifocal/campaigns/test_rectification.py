@@ -280,3 +280,42 @@ def test_a_known_lens_straightens_the_photo() -> None:
     points = control(DOTS[::2], pixels1=picks)
     bent = rectify(image, control=points, interior=LENS, sigma_pick=0.1, gsd=0.1)
     assert any("a lens that bends (--lens)" in note for note in bent.remarks)
+
+
+def test_a_gross_point_is_left_out_and_moves_nothing() -> None:
+    picks, image = seen(DOTS[::3]), np.zeros(SIZE[::-1], np.uint8)
+    clean = rectify(image, control=control(DOTS[::3]), interior=LENS, gsd=0.1).photo
+    picks[4] += [40, -25]
+    done = rectify(image, control=control(DOTS[::3], pixels1=picks), interior=LENS, gsd=0.1)
+    assert "E" not in done.photo.ids
+    assert any(n.startswith("Point E lies ") and "was left out" in n for n in done.remarks)
+    assert done.photo.camera.centre == pytest.approx(clean.camera.centre, abs=0.02)
+
+
+def test_a_side_that_was_measured_wrongly_is_no_crop() -> None:
+    """A rectangle 5 m wide taken for 5.5 m; the photo has the proportions of a camera."""
+    image = np.zeros(SIZE[::-1], np.uint8)
+    with pytest.raises(
+        GeometryError, match=r"5.5 m wide and 4 m high; they fit one [45]\.\d* m wide"
+    ):
+        rectify(image, rectangle=((5.5, 4.0), seen(CORNERS)), interior=LENS)
+    done = rectify(image, rectangle=((5.2, 4.0), seen(CORNERS)), interior=LENS)
+    (words,) = [note for note in done.remarks if note.startswith("The corners do not fit")]
+    width = float(words.partition("fit one ")[2].partition(" m")[0])
+    assert width == pytest.approx(5.0, rel=0.02)
+    assert not any("was taken so" in note for note in done.remarks)
+    assert done.photo.sigma_at(CORNERS).max() > 0.03  # 0.2 m off in the width
+
+
+def test_points_at_one_pixel_were_not_seen() -> None:
+    points = np.vstack([DOTS[::4], [[1.0, 1.0], [2.0, -1.0]]])
+    picks = seen(points)
+    picks[-2:] = 0.0
+    done = rectify(
+        np.zeros(SIZE[::-1], np.uint8),
+        control=control(points, pixels1=picks),
+        gsd=0.1,
+        interior=LENS,
+    )
+    assert any("one and the same pixel" in note for note in done.remarks)
+    assert done.photo.camera.centre == pytest.approx(CAMERA.centre, abs=0.05)

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from bifocal import Grid, Pair
+from bifocal.model.doubts import MISFITS, RIVALS, doubts_of
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
+from photocore.remarks import KEYS, learn
 
 PAIR = Pair.ideal(
     d1=17.5,
@@ -50,6 +52,14 @@ def test_the_words_of_the_set_up_are_repeated_once() -> None:
     pair = with_setup(**BENT, doubts=["THE MODEL DOES NOT FIT: as it was said."])
     assert pair.remarks == ("THE MODEL DOES NOT FIT: as it was said.",)
     assert replace(pair, folder=pair.folder).remarks == pair.remarks
+
+
+def test_a_doubt_is_recognised_by_its_key_however_it_reads() -> None:
+    changed, old = "Il muro risulta curvato.", "THE MODEL DOES NOT FIT: of a file without keys."
+    learn({KEYS: {changed: {"key": "pair.bent", "values": {}, "level": "doubt"}}})
+    pair = with_setup(doubts=["It leans.", changed, old])
+    assert doubts_of(MISFITS, pair.remarks) == [changed, old]
+    assert doubts_of(RIVALS, pair.remarks) == []
 
 
 def test_another_face_that_may_be_the_wall_is_in_every_sigma() -> None:

@@ -406,10 +406,9 @@ def test_unknown_lenses_are_named_where_control_does_not_make_up_for_them(
     monkeypatch, kind, seed, count, relief, said
 ):
     """Before photos are matched: control off the wall by 2 to 5 cm, picked to 0.3 px."""
-    monkeypatch.setattr(CONTROL, "hopeless", 0.3)
-    monkeypatch.setattr(
-        "bifocal.orientation.absolute_orientation.ties_of", lambda *_, **__: pytest.fail("matched")
-    )
+    room = "bifocal.orientation.absolute_orientation"
+    monkeypatch.setattr(f"{room}.CONTROL", replace(CONTROL, hopeless=0.3))
+    monkeypatch.setattr(f"{room}.ties_of", lambda *_, **__: pytest.fail("matched"))
     rng = np.random.default_rng(seed)
     taken, media, placed = cameras(kind)
     xyz = points(rng, count, relief)

@@ -1,11 +1,13 @@
 """A pair that the photos alone gave gets its scale from one measure; one lens nobody measured."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bifocal import SAMPLE, Interior, Pair
+from bifocal.collimation.proposals import rescale
 from bifocal.model.homography import apply_homography
 from bifocal.model.orientation_precision import NAMES
 from bifocal.orientation.rescaling import scaled_by_distance, scaled_by_length
@@ -13,6 +15,7 @@ from bifocal.orientation.starts.relative_orientation import Ties, sought_focal
 from multimedia import GeometryError, InputError
 from photocore.camera.pinhole import Pinhole, camera_matrix, plane_transfer, project
 from photocore.camera.rotation import rotation_from_vector
+from photocore.remarks import KEYS, learn
 
 ENDS = np.array([[300.0, 250.0], [1200.0, 700.0]])
 
@@ -51,6 +54,17 @@ def test_a_length_multiplies_all_lengths_and_nothing_else(pair: Pair) -> None:
     assert setup["wall_relief_mm"][0]["spread"] == pytest.approx(2 * factor)
     assert f"{80 * factor:+.0f} mm" in setup["doubts"][0]
     assert f"Far camera {scaled.d1:.3f} m" in setup["words"][0]
+
+
+def test_the_page_renews_what_it_told_about_the_wall(pair: Pair, tmp_path: Path) -> None:
+    told = "Prüfen: 80 mm."
+    learn({KEYS: {told: {"key": "orientation.rivals", "values": {}, "level": "doubt"}}})
+    setup = {**pair.extra["setup"], "doubts": [told]}
+    path = tmp_path / "w.pair.json"
+    replace(pair, extra={**pair.extra, "setup": setup}).write(path)
+    report = rescale(path, {"remarks": ["It leans.", told]}, ["distance", 1, 35.0, 0.01])
+    assert report["remarks"] == ["It leans.", *Pair.read(path).extra["setup"]["doubts"]]
+    assert f"{80 * 35.0 / pair.d1:+.0f} mm" in report["remarks"][1]
 
 
 def test_the_scale_a_pair_had_leaves_nothing_in_its_covariance(pair: Pair) -> None:

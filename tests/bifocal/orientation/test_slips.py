@@ -311,3 +311,51 @@ def test_what_the_photos_show_decides_between_slips_that_fit_alike(
     assert off(made, SQUARE) < 0.03
     near_first = named == -1
     assert made.exchanged == near_first
+
+
+def test_photos_cropped_alike_are_taken_as_parts_of_larger_ones() -> None:
+    cut, size = np.array([220.0, 150.0]), (SIZE[0] - 220, SIZE[1] - 150)
+    points = control(xyz=np.concatenate([POINTS, POINTS * [0.7, 0.8, 1.0] + [0.2, 0.1, 0.12]]))
+    points = replace(points, pixels1=points.pixels1 - cut, pixels2=points.pixels2 - cut)
+    typed = [
+        replace(
+            p, interior=Interior.from_focal(
+                cam.matrix[0, 0], image_size=size, sigma=0.02, source="EXIF",
+                pixel_size=SENSOR / SIZE[0],
+            ),
+        )
+        for p, cam in zip(photos(), OBLIQUE, strict=True)
+    ]  # fmt: skip
+    made = orient_pair((typed[0], typed[1]), control=points, site=SiteMeasures())
+    assert "Both photos fit as parts cut out of larger ones" in made.remarks[0]
+    assert made.observations.pick_used.all()
+    assert off(made) < 0.02
+
+
+def test_a_tape_in_feet_is_named_where_lens_and_control_agree() -> None:
+    with pytest.raises(InputError, match=r"--distance1 52.4934 m .* by the factor of ft"):
+        orient_pair(
+            photos(), control=control(), site=SiteMeasures(distance1=16 / 0.3048, distance2=9.0)
+        )
+
+
+def many(seed: int) -> Control:
+    """Return sixteen points, half of them off the wall, as many on either side of the middle."""
+    rng = np.random.default_rng(seed)
+    xyz = np.column_stack([rng.uniform(0.8, 4.5, 16), rng.uniform(-2.5, 2.5, 16), np.zeros(16)])
+    xyz[::2, 0] *= -1
+    xyz[::4, 2], xyz[1::4, 2] = 0.35, -0.3
+    return control(xyz=xyz, seed=seed, noise=0.2)
+
+
+def test_two_groups_of_control_are_named_and_widen_what_is_stated() -> None:
+    fine, points = many(4), many(4)
+    points = replace(points, xyz=points.xyz + np.where(points.xyz[:, :1] > 0, [0.05, 0, 0], 0.0))
+    clean = orient_pair(photos(), control=fine, site=SiteMeasures())
+    made = orient_pair(photos(), control=points, site=SiteMeasures())
+    assert not any("GROUPS" in text or "miss by" in text for text in clean.remarks)
+    (words,) = [text for text in made.remarks if "TWO GROUPS" in text]
+    assert "below X = " in words
+    apart = float(words.partition("groups lie ")[2].partition(" mm")[0])
+    assert abs(abs(apart) - 50) < 12
+    assert made.adjusted.sigma("X", 1) > 1.5 * clean.adjusted.sigma("X", 1)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from bifocal import Grid, OrthoOptions, Pair, Photo, ReliefMap, Source, orthophoto
+from bifocal.orthophotos.holes import close_holes
 
 GSD = 0.01
 GRID = Grid.from_bounds((-2.0, -2.0, 2.0, 2.0), gsd=GSD)
@@ -136,3 +137,20 @@ def test_a_small_hole_takes_texture_from_beside_it_not_fog():
     filled = picture.source == Source.FILLED
     assert 100 < filled.sum() < 0.05 / GSD**2
     assert picture.image[filled].std() > 0.7 * photo.std()
+
+
+@pytest.mark.parametrize("bands", [1, 3])
+def test_specks_take_the_mean_colour_of_the_wall_beside_them(bands):
+    shape = (60, 60, 3) if bands == 3 else (60, 60)
+    image = np.full(shape, 1000, np.uint16)
+    image[:, 32:] = 3000  # a pilaster, which stands before the wall
+    relief = np.where(np.arange(60) >= 32, 0.3, 0.0) * np.ones((60, 1))
+    holes = np.zeros((60, 60), bool)
+    holes[20:25, 27:32] = True
+    holes[40:42, 10:14] = True
+    image[holes] = 0
+    source = np.where(holes, Source.NONE, Source.IMAGE_1).astype(np.uint8)
+    close_holes(image, source, holes, relief.astype(np.float32), GSD, largest=0.05)
+    assert (source[holes] == Source.FILLED).all()
+    assert (image[holes] == 1000).all()
+    assert (source[~holes] == Source.IMAGE_1).all()

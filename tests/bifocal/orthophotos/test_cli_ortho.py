@@ -233,7 +233,7 @@ def test_any_file_of_an_earlier_delivery_is_refused_before_the_work(
 
 def test_a_one_pixel_photo_is_refused(wall: Path) -> None:
     write_image(wall / "far.png", np.zeros((1, 1, 3), np.uint8), overwrite=True)
-    done = run(wall, "--plane", "--out", "o.tif")
+    done = run(wall, "--plane", "--out", "o.tif", "--changed-photos")
     assert done.exit_code == 1
     assert "1 x 1 px is not a photo" in done.stderr
 

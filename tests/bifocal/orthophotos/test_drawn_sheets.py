@@ -268,6 +268,22 @@ def test_the_sheet_of_a_whole_picture_says_what_was_not_measured(wall: Path) -> 
     assert "(sections A-A  y=-1.2)" in page_of(wall / "d" / "Torre_est_relief.pdf")
 
 
+def test_a_picture_mostly_on_the_plane_says_that_it_is_a_rectified_photo(wall: Path) -> None:
+    relief = ReliefMap.read(wall / "relief.tif")
+    wide = relief.r.shape[1]
+    titles = []
+    for known in (wide // 8, wide - 5):
+        r = relief.r.copy()
+        r[:, known:] = np.nan
+        replace(relief, r=r).write(wall / "part.tif", overwrite=True)
+        done = run(wall, "--relief", "part.tif", "--deliver", f"d{known}", "--scale", "1:50")
+        assert done.exit_code == 0, done.output
+        assert ("this is a rectified photo, no orthophoto" in done.stderr) == (known < wide // 2)
+        titles.append(page_of(wall / f"d{known}" / "Torre_est.pdf"))
+    assert "Rectified photo" in titles[0]
+    assert "Rectified photo" not in titles[1]
+
+
 def test_the_sheet_is_true_to_scale(wall: Path) -> None:
     done = run(wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:20", "--dpi", "51")
     assert done.exit_code == 0, done.output

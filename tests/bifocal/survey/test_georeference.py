@@ -7,6 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from bifocal import GeometryError, InputError, KnownPoints, ReliefTable, georeference
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.remarks import angle_remarks, georeference_remarks
 
 RNG = np.random.default_rng(8)
 XYZ = np.column_stack([RNG.uniform(-5, 5, 12), RNG.uniform(-3, 3, 12), RNG.uniform(-1, 1, 12)])
@@ -152,3 +154,21 @@ def test_points_weighing_alike_are_as_good_as_the_residuals_say():
     centre = found.precision.of_points(found.near.mean(axis=0)[None])[0]
     expected = found.sigma0 / np.sqrt(12)
     assert np.sqrt(np.diagonal(centre)) == pytest.approx([expected] * 3, rel=0.01)
+
+
+def test_east_and_north_exchanged_are_named():
+    right = levelled(0.001)
+    for world, expected in ((right[:, [1, 0, 2]], True), (right, False)):
+        typed = control(world, range(8))
+        placed = georeference(table(), typed)
+        said = georeference_remarks(placed, typed, table(), is_auto=True)
+        assert any("fit with E and N exchanged" in words for words in said) == expected
+
+
+@pytest.mark.parametrize(("factor", "word"), [(np.pi / 180, "radians"), (1 / 0.9, "gon"), (1, "")])
+def test_angles_in_another_unit_are_said(factor, word):
+    theta = np.array([12.0, 71.0, 140.0, 188.0, 240.0, 301.0, 355.0])
+    points = {"id": list("ABCDEFG"), "s1": [5.0] * 7, "s2": [5.2] * 7, "theta": theta * factor}
+    said = angle_remarks(PointObservations.from_columns(points))
+    assert bool(said) == bool(word)
+    assert word in "".join(said)

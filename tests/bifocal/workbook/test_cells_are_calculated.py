@@ -10,7 +10,8 @@ import pytest
 
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.making.book import write_book
-from photocore.workbook.calculation import Calculation, Unknown
+from photocore.workbook.calculating.calculation import Calculation
+from photocore.workbook.calculating.values import Unknown
 from tests.bifocal.workbook.test_survey_workbook import ideal_content, of_turns, pair_content
 
 CHANGES = {"d_1": 0.0, "d_2": 0.1, "c_1": 0.0, "c_2": 0.0, "pitch": 0.0}

@@ -7,7 +7,7 @@ from pathlib import Path
 import openpyxl
 import pytest
 
-from photocore.workbook.calculation import Calculation
+from photocore.workbook.calculating.calculation import Calculation
 from tests import office
 from tests.bifocal.workbook.kept_workbook import DISTANCES, TABLE
 from tests.bifocal.workbook.test_cli_solve import POINTS, run, write_csv

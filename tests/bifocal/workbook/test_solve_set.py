@@ -199,3 +199,41 @@ def test_without_a_stated_precision_it_is_taken_from_the_misfits_of_the_best_pai
     assert found == pytest.approx(0.3, abs=0.08)
     stated = replace(photos, photos=tuple(replace(p, sigma_pixel=0.4) for p in photos.photos))
     assert solve(columns, pair=stated).sigma_px is None
+
+
+def test_photos_without_a_pick_change_nothing_and_cost_nothing(monkeypatch):
+    """Three of 60 photos have picks: all pairs of the set were judged, of 300 for minutes."""
+    three = wall(orientation=np.diag(np.full(48, 1e-8))).only([0, 1, 2])
+    more = [replace(three.photos[k % 3], name=f"more {k}") for k in range(57)]
+    many = PhotoSet(
+        photos=(more[0], *three.photos, *more[1:]), orientation=np.diag(np.full(720, 1e-8))
+    )
+    _, picks = measured(three)
+    picks[2, 1] += [5, -6]
+    pixels = np.full((len(picks), 60, 2), np.nan)
+    pixels[:, 1:4] = picks
+    judged = []
+    pairs_of = PhotoSet.pairs
+    monkeypatch.setattr(PhotoSet, "pairs", lambda own: judged.append(len(own)) or pairs_of(own))
+
+    def columns(values):
+        named = {
+            f"{axis}{k}": values[:, k - 1, i]
+            for k in range(1, values.shape[1] + 1)
+            for i, axis in enumerate(("col", "row"))
+        }
+        return {"id": [f"P{k}" for k in range(1, len(values) + 1)], **named}
+
+    few, solved = (
+        solve(columns(values), pair=photos) for values, photos in ((picks, three), (pixels, many))
+    )
+    assert max(judged) == 3
+    np.testing.assert_allclose(solved.table.xyz, few.table.xyz, atol=1e-12)
+    np.testing.assert_allclose(solved.table["sigma_r"], few.table["sigma_r"], rtol=1e-9)
+    assert solved.table.flags == few.table.flags
+    assert solved.points.note == few.points.note
+    np.testing.assert_allclose(solved.table["e2"], few.table["e1"], atol=1e-9)
+    apart = many.intersect(list(pixels.transpose(1, 0, 2)))
+    assert apart.suspects.shape == (len(picks), 60)
+    assert np.flatnonzero(apart.suspects[2]).tolist() == [2]
+    assert np.isnan(apart.residuals[:, 4:]).all()

@@ -158,7 +158,8 @@ def test_hidden_rows_are_used_with_a_remark_unless_only_visible_ones_are_wanted(
     table = read_table(path, POLAR)
     check_samples(table)
     assert table.remarks == [
-        "1 hidden or filtered rows are used too; --visible-only leaves them out."
+        "1 hidden or filtered rows are used too; `no` in a column `use` leaves a row out, and "
+        "--visible-only of `solve` all of them."
     ]
     assert read_table(path, POLAR, visible_only=True).texts("id") == ["P2"]
 

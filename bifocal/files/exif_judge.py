@@ -10,10 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bifocal.orientation.tuning import CONTROL
 from bifocal.remarks import remark
 from photocore.images import ImageInfo
 
+#: Nominal focal lengths are rounded and change with focus: relative standard deviation.
+NOMINAL = 0.02
+#: 35 mm equivalents are rounder still.
+EQUIVALENT = 0.04
 #: Two tags that differ by less agree: equivalents are rounded, and by diagonal or longer side.
 AGREE = 0.12
 #: A principal distance between tags that contradict each other is never given worse than this.
@@ -39,7 +42,7 @@ class JudgedFocal:
     """
 
     focal: float | None = None
-    sigma: float = CONTROL.sigma_equivalent
+    sigma: float = EQUIVALENT
     pitch: float | None = None
     source: str = ""
     doubt: str = ""
@@ -73,18 +76,14 @@ def judged_focal(info: ImageInfo) -> JudgedFocal:
     if not equivalent:
         if plane is None:
             return JudgedFocal(pitch=pitch)
-        return JudgedFocal(
-            focal=plane, sigma=CONTROL.sigma_nominal, pitch=pitch and pitch / zoom, source=source
-        )
+        return JudgedFocal(focal=plane, sigma=NOMINAL, pitch=pitch and pitch / zoom, source=source)
     # The equivalent refers to the diagonal of 36 x 24 mm, of some makers to the longer side.
     by_size = [np.hypot(*info.size) / np.hypot(36, 24), wide / 36]
     stated = float(equivalent * by_size[0])
     if plane is not None and pitch:
         other = [equivalent * by * z for by in by_size for z in (1.0, zoom)]
         if min(abs(np.log(plane / one)) for one in other) < AGREE:
-            return JudgedFocal(
-                focal=plane, sigma=CONTROL.sigma_nominal, pitch=pitch / zoom, source=source
-            )
+            return JudgedFocal(focal=plane, sigma=NOMINAL, pitch=pitch / zoom, source=source)
     source = remark("orientation.exif_equivalent", focal=equivalent)
     if plane is not None:
         sigma = min(WORST, abs(float(np.log(plane / stated))) / 2)

@@ -1,0 +1,264 @@
+"""What signs and functions of formulas do, by the rules of spreadsheets.
+
+A blank counts as 0 or as an empty text, aggregates pass over what is no number, an error spreads.
+Arguments lie as rows of a table down, ranges across.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from functools import reduce
+from typing import Any
+
+import numpy as np
+
+from photocore.arrays import FloatArray
+from photocore.workbook.calculating.values import (
+    BLANK,
+    ERROR,
+    NUMBER,
+    TEXT,
+    TRUTH,
+    Cells,
+    Unknown,
+    as_numbers,
+    number_cells,
+    spread,
+    text_cells,
+)
+
+
+def _compare(sign: str, one: Cells, other: Cells) -> Cells:
+    one, other = spread(one, other)
+    bad = one.is_error | other.is_error
+    a, b = one.numbers.copy(), other.numbers.copy()
+    words = [(c.kinds == TEXT) | (c.kinds == BLANK) for c in (one, other)]
+    textual = words[0] & words[1] & ((one.kinds == TEXT) | (other.kinds == TEXT))
+    # A text is above every number.
+    a[(one.kinds == TEXT) & ~textual], b[(other.kinds == TEXT) & ~textual] = np.inf, np.inf
+    if textual.any():
+        left, right = ([str(t).casefold() for t in c.texts[textual]] for c in (one, other))
+        a[textual] = [(x > y) - (x < y) for x, y in zip(left, right, strict=True)]
+        b[textual] = 0.0
+    return number_cells(_COMPARISONS[sign](a, b), bad, kind=TRUTH)
+
+
+_COMPARISONS: Mapping[str, Callable[..., Any]] = {
+    "=": np.equal, "<>": np.not_equal, "<": np.less, ">": np.greater, "<=": np.less_equal,
+    ">=": np.greater_equal,
+}  # fmt: skip
+_ARITHMETIC: Mapping[str, Callable[..., Any]] = {
+    "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "^": np.power,
+}  # fmt: skip
+
+
+def signed(sign: str, one: Cells, other: Cells) -> Cells:
+    """Return what a sign makes of the cells before and behind it."""
+    if sign == "&":
+        one, other = spread(one, other)
+        return text_cells(one.shown() + other.shown(), one.is_error | other.is_error)
+    if sign in _COMPARISONS:
+        return _compare(sign, one, other)
+    (a, bad), (b, worse) = as_numbers(one), as_numbers(other)
+    with np.errstate(all="ignore"):
+        return number_cells(_ARITHMETIC[sign](a, b), bad | worse)
+
+
+def _choice(test: Cells, yes: Cells, no: Cells | None = None) -> Cells:
+    test, yes, no = spread(test, yes, no or number_cells([[0.0]], kind=TRUTH))
+    bad, holds = test.is_error | (test.kinds == TEXT), test.numbers != 0
+    parts = ((yes.numbers, no.numbers), (yes.kinds, no.kinds), (yes.texts, no.texts))
+    numbers, kinds, texts = (np.where(holds, a, b) for a, b in parts)
+    return Cells(numbers, np.where(bad, ERROR, kinds).astype(np.uint8), texts)
+
+
+def _or_else(value: Cells, other: Cells) -> Cells:
+    return _choice(number_cells(value.is_error, kind=TRUTH), other, value)
+
+
+def _each(function: Callable[..., Any]) -> Callable[..., Cells]:
+    def apply(*given: Cells) -> Cells:
+        numbers, bad = zip(*map(as_numbers, given), strict=True)
+        with np.errstate(all="ignore"):
+            return number_cells(function(*numbers), reduce(np.logical_or, bad))
+
+    return apply
+
+
+def _whole(function: Callable[..., Any], *, none: float = 0.0) -> Callable[..., Cells]:
+    """Return an aggregate of what are numbers, for each row; ``none`` where there is not one."""
+
+    def apply(*given: Cells) -> Cells:
+        rows = max(len(one.numbers) for one in given)
+        values = [np.broadcast_to(np.where(one.kinds == NUMBER, one.numbers, np.nan),
+                                  (rows, one.numbers.shape[1])) for one in given]  # fmt: skip
+        bad = reduce(np.logical_or, (one.is_error.any(axis=1, keepdims=True) for one in given))
+        table = np.concatenate(values, axis=1)
+        has = np.isfinite(table).any(axis=1, keepdims=True)
+        table = np.where(has, table, none)
+        return number_cells(function(table, axis=1, keepdims=True), bad)
+
+    return apply
+
+
+def _count(*kinds: int) -> Callable[..., Cells]:
+    def apply(*given: Cells) -> Cells:
+        counts = [np.isin(c.kinds, kinds).sum(axis=1, keepdims=True) for c in given]
+        return number_cells(reduce(np.add, counts))
+
+    return apply
+
+
+def _logical(all_of: bool) -> Callable[..., Cells]:
+    def apply(*given: Cells) -> Cells:
+        parts, bad = [], []
+        for one in given:
+            counts = np.isin(one.kinds, (NUMBER, TRUTH))
+            holds = np.where(counts, one.numbers != 0, all_of)
+            parts.append(holds.all(1, keepdims=True) if all_of else holds.any(1, keepdims=True))
+            bad.append(one.is_error.any(axis=1, keepdims=True))
+        join = np.logical_and if all_of else np.logical_or
+        return number_cells(reduce(join, parts), reduce(np.logical_or, bad), kind=TRUTH)
+
+    return apply
+
+
+def _sum_of_products(*given: Cells) -> Cells:
+    bad = reduce(np.logical_or, (one.is_error for one in given))
+    product = reduce(np.multiply, (np.where(c.kinds == NUMBER, c.numbers, 0.0) for c in given))
+    return number_cells(product.sum(axis=1, keepdims=True), bad.any(axis=1, keepdims=True))
+
+
+def _position(value: Cells, among: Cells, _: Cells | None = None) -> Cells:
+    if len(among.numbers) > 1:
+        raise Unknown("MATCH in rows")
+    keys: dict[Any, int] = {}
+    parts = (among.kinds[0].tolist(), among.numbers[0].tolist(), among.texts[0].tolist())
+    for i, (kind, number, text) in enumerate(zip(*parts, strict=True), start=1):
+        if kind in (NUMBER, TEXT):
+            keys.setdefault(text.casefold() if kind == TEXT else number, i)
+    parts = (value.kinds.ravel().tolist(), value.numbers.ravel().tolist(), value.texts.ravel())
+    found = [keys.get(t.casefold() if k == TEXT else n if k != ERROR else None, np.nan)
+             for k, n, t in zip(*parts, strict=True)]  # fmt: skip
+    return number_cells(np.reshape(found, value.numbers.shape))
+
+
+def _entry(area: Cells, row: Cells, column: Cells | None = None) -> Cells:
+    down, wide = area.size
+    (i, bad) = as_numbers(row)
+    j = np.ones_like(i) if column is None else as_numbers(column)[0]
+    if down == 1 and column is None:
+        i, j = np.ones_like(i), i
+    bad = bad | (i < 1) | (i > down) | (j < 1) | (j > wide)
+    flat = np.where(bad, 0, (i - 1) * wide + j - 1).astype(int)
+    shape = flat.shape
+    if len(area.numbers) > 1:  # a range of its own in each row
+        place: Any = (np.arange(len(area.numbers))[:, None], flat)
+        numbers, kinds, texts = area.numbers[place], area.kinds[place], area.texts[place]
+    else:
+        numbers, kinds, texts = area.numbers[0][flat], area.kinds[0][flat], area.texts[0][flat]
+    kinds = np.where(bad, ERROR, kinds).astype(np.uint8)
+    return Cells(numbers.reshape(shape), kinds.reshape(shape), texts.reshape(shape))
+
+
+def _inverse(area: Cells) -> Cells:
+    down, wide = area.size
+    matrix = np.where(area.kinds == NUMBER, area.numbers, np.nan).reshape(down, wide)
+    inverse = np.full((down, wide), np.nan)
+    if down == wide and np.isfinite(matrix).all() and np.linalg.det(matrix) != 0:
+        inverse = np.linalg.inv(matrix)
+    cells = number_cells(inverse.reshape(1, -1))
+    return Cells(cells.numbers, cells.kinds, cells.texts, area.size)
+
+
+def _counted_if(area: Cells, wanted: Cells) -> Cells:
+    counts = np.zeros(wanted.numbers.shape)
+    texts, kinds = wanted.shown(), wanted.kinds
+    for at in np.ndindex(counts.shape):
+        sign, word = _CRITERION.fullmatch(str(texts[at])).groups()  # type: ignore[union-attr]
+        try:
+            value, of_kind = number_cells([[float(word)]]), NUMBER
+        except ValueError:
+            value, of_kind = text_cells([[word]]), TEXT
+        holds = _compare(sign or "=", area, value).numbers != 0
+        counts[at] = (holds & (area.kinds == of_kind)).sum() if kinds[at] != BLANK else 0
+    return number_cells(counts)
+
+
+_CRITERION = re.compile(r"(>=|<=|<>|>|<|=)?(.*)", re.DOTALL)
+
+
+def _sum_if(area: Cells, wanted: Cells, summed: Cells) -> Cells:
+    holds = _compare("=", area, wanted).numbers != 0
+    terms = np.where(holds & (summed.kinds == NUMBER), summed.numbers, 0.0)
+    return number_cells(terms.sum(axis=1, keepdims=True))
+
+
+def _worded(function: Callable[..., str]) -> Callable[..., Cells]:
+    def apply(text: Cells, *given: Cells) -> Cells:
+        text, *more = spread(text, *given)
+        words, bad = text.shown(), reduce(np.logical_or, (c.is_error for c in (text, *more)))
+        out = np.full(words.shape, "", dtype=object)
+        for at in np.ndindex(words.shape):
+            out[at] = function(words[at], *(int(c.numbers[at]) for c in more))
+        return text_cells(out, bad)
+
+    return apply
+
+
+def _is(*kinds: int) -> Callable[[Cells], Cells]:
+    return lambda value: number_cells(np.isin(value.kinds, kinds), kind=TRUTH)
+
+
+def _half_up(values: FloatArray, places: FloatArray) -> FloatArray:
+    factor = 10.0**places
+    # As spreadsheets do: what 15 digits show counts, not the last bit.
+    scaled = np.abs(values) * factor
+    return np.asarray(np.sign(values) * np.floor(scaled * (1 + 4e-16) + 0.5) / factor)
+
+
+def _angle(x: FloatArray, y: FloatArray) -> FloatArray:
+    return np.asarray(np.where((x == 0) & (y == 0), np.nan, np.arctan2(y, x)))
+
+
+def _special(name: str) -> Callable[..., FloatArray]:
+    def apply(*given: FloatArray) -> FloatArray:
+        from scipy import special  # late: seldom needed
+
+        return np.asarray(getattr(special, name)(*given))
+
+    return apply
+
+
+def _as_number(value: Cells) -> Cells:
+    is_number = np.isin(value.kinds, (NUMBER, TRUTH))
+    return number_cells(np.where(is_number, value.numbers, 0), value.is_error)
+
+
+def _average(*given: Cells) -> Cells:
+    return signed("/", FUNCTIONS["SUM"](*given), FUNCTIONS["COUNT"](*given))
+
+
+FUNCTIONS: dict[str, Callable[..., Cells]] = {
+    "IF": _choice, "IFERROR": _or_else, "AND": _logical(True), "OR": _logical(False),
+    "NOT": lambda v: number_cells(v.numbers == 0, v.is_error, kind=TRUTH),
+    "ISNUMBER": _is(NUMBER), "ISERROR": _is(ERROR), "ISTEXT": _is(TEXT), "ISBLANK": _is(BLANK),
+    "NA": lambda: number_cells([[np.nan]]), "PI": lambda: number_cells([[np.pi]]),
+    "COUNT": _count(NUMBER), "COUNTA": _count(NUMBER, TEXT, TRUTH, ERROR), "COUNTIF": _counted_if,
+    "SUM": _whole(np.nansum), "SUMSQ": _whole(lambda v, **k: np.nansum(v * v, **k)),
+    "MAX": _whole(np.nanmax), "MIN": _whole(np.nanmin), "AVERAGE": _average,
+    "SUMPRODUCT": _sum_of_products, "SUMIF": _sum_if, "INDEX": _entry, "MATCH": _position,
+    "MINVERSE": _inverse, "ROWS": lambda v: number_cells([[v.size[0]]]),
+    "N": _as_number,
+    "SQRT": _each(np.sqrt), "ABS": _each(np.abs), "EXP": _each(np.exp), "LOG10": _each(np.log10),
+    "LN": _each(np.log), "INT": _each(np.floor), "SIN": _each(np.sin), "COS": _each(np.cos),
+    "TAN": _each(np.tan), "ASIN": _each(np.arcsin), "ACOS": _each(np.arccos),
+    "ATAN": _each(np.arctan), "ATAN2": _each(_angle), "DEGREES": _each(np.degrees),
+    "RADIANS": _each(np.radians), "ROUND": _each(_half_up), "NORMSDIST": _each(_special("ndtr")),
+    "MOD": _each(np.mod), "FDIST": _each(lambda x, m, n: _special("fdtrc")(m, n, x)),
+    "CHIDIST": _each(lambda x, n: _special("chdtrc")(n, x)),
+    "TRIM": _worded(lambda t: " ".join(t.split())), "UPPER": _worded(str.upper),
+    "LEFT": _worded(lambda t, n: t[:n]), "MID": _worded(lambda t, i, n: t[i - 1 : i - 1 + n]),
+    "CHAR": lambda v: text_cells([[chr(int(n)) for n in row] for row in v.numbers]),
+}  # fmt: skip
