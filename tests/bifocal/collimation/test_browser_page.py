@@ -404,7 +404,7 @@ def test_a_late_answer_does_not_bring_back_an_older_state(page: Driver) -> None:
         const { Connection } = await import(new URL("js/connection.js", document.baseURI));
         const kept = [window.fetch, window.EventSource];
         let stream, answer;
-        window.EventSource = class { constructor() { stream = this; } };
+        window.EventSource = class { constructor() { stream = this; } close() {} };
         const connection = new Connection();
         await connection.start();
         const first = connection.state;
