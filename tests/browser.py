@@ -207,7 +207,8 @@ class Driver:
     def settled(self, condition: str, argument: Any = None) -> dict[str, Any]:
         """Wait until nothing is unsent and the state satisfies a condition; return the state."""
         self.wait(
-            f"(argument) => JSON.parse(sessionStorage['bifocal-unsent'] ?? '[]').length === 0"
+            "(argument) =>"
+            " !Object.keys(localStorage).some((key) => key.startsWith('bifocal-unsent'))"
             f" && ((state) => {condition})(bifocal.state())",
             argument,
         )

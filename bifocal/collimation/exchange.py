@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any
 from bifocal.collimation.records import Change, PickedControl, PickedPoint, SurveyState
 from bifocal.collimation.shapes import places_of
 from bifocal.model.pair import Pair
+from bifocal.remarks import remark
 from bifocal.survey.observations import DOUBT_CODES
+from photocore.errors import InputError
 from photocore.provenance import known_hash
 
 if TYPE_CHECKING:
@@ -26,15 +28,24 @@ _ORIENTED = ("relief", "ortho", "deliver", "set", "pair")
 
 
 def fields_of_exchange(session: Session) -> dict[str, Any]:
-    """Return what the command is told besides: the orientation's files, shapes re-projected."""
-    products, proposal = session.products, session.proposed_path
+    """Return what the command is told besides: the orientation's files, shapes re-projected.
+
+    Raises
+    ------
+    InputError
+        If there are no two photos, or the survey was begun with a pair file, whose order stays.
+    """
+    products, file = session.products, session.files.pair
+    if len(session.pictures.infos) != 2:
+        raise InputError(remark("page.give_photos"))
+    if file is not None and not products.is_own(file):
+        raise InputError(remark("page.begun_with_pair", name=file.name))
     made = {name: kind for name, kind in products.made.items() if kind in _ORIENTED}
     told: dict[str, Any] = {
         "step": True, "made": made,
         "causes": {kind: dict(products.causes.get(kind, {})) for kind in {*made.values()}},
     }  # fmt: skip
-    if proposal is not None:
-        told["proposal"] = {**(session.proposal or {}), "sha256": known_hash(proposal)}
+    told |= _proposal_now(session)
     if (pair := session.pictures.pair) is not None:
         told["corners"] = {
             shape.name: [
@@ -68,7 +79,8 @@ def exchange_step(
     stage = back.get("stage", state.stage)
     if not back.get("accepted") and stage in ("points", "products"):
         stage = "orientation"
-    after = {"lenses": dict(lenses), "ordered": True, "stage": stage}
+    by_user = command.get("found") is not True  # a job leaves the order open
+    after = {"lenses": dict(lenses), "ordered": by_user, "stage": stage}
     before = {key: getattr(state, key) for key in after}
     turned: dict[str, dict[str, Any]] = {
         "points": {name: turned_picks(one) for name, one in state.points.items()},
@@ -97,9 +109,38 @@ def turned_picks(record: Any) -> Any:
     return turned
 
 
+def proposal_noted(
+    session: Session, command: Mapping[str, Any], changes: list[Change]
+) -> dict[str, Any]:
+    """Return the undo of an exchange with what is proposed after it; other commands as they are."""
+    undone = command["op"] == "undo" and any(map(_is_swap, changes))
+    return {**command, **(_proposal_now(session) if undone else {})}
+
+
+def proposal_kept(command: Mapping[str, Any], changes: list[Change]) -> list[Change]:
+    """Return the changes of an undo, after which redo brings back what was proposed before it."""
+    if "proposal" not in command:
+        return changes
+    kept: Any = {"made": {}, "causes": {}, "proposal": command["proposal"]}
+    return [replace(one, after=kept) if _is_swap(one) else one for one in changes]
+
+
+def _is_swap(change: Change) -> bool:
+    """Whether a change says what an exchange put aside."""
+    return (change.kind, change.key) == ("orientation", ASIDE)
+
+
+def _proposal_now(session: Session) -> dict[str, Any]:
+    """Return the orientation that waits to be accepted, with the digest of its file."""
+    path = session.proposed_path
+    if path is None:
+        return {}
+    return {"proposal": {**(session.proposal or {}), "sha256": known_hash(path)}}
+
+
 def follow_exchange(session: Session, changes: list[Change]) -> None:
     """Let photos, pair and products be those of the survey after an exchange, its undo or redo."""
-    (swap,) = (one for one in changes if (one.kind, one.key) == ("orientation", ASIDE))
+    (swap,) = filter(_is_swap, changes)
     back: Any = swap.before or {}
     folder = session.files.folder
     put_aside(session)

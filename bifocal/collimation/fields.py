@@ -195,6 +195,7 @@ NOTES: Mapping[str, Mapping[str, Reader]] = {
 RECORDS = {
     **COMMANDS, **NOTES, "control.add": {"control": _of([_FOUND], "a list of targets")},
     "points.add": {"points": _of([_FOUND], "a list of points")},
+    "undo": {"proposal?": _of(dict, "what was proposed")},
     "photos.exchange": {
         "found?": _FLAG, "step?": _FLAG, "corners?": _of(dict, "corners by shape"),
         **{f"{key}?": _of(dict, "files") for key in ("made", "causes", "proposal")},

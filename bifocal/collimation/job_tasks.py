@@ -15,6 +15,7 @@ from bifocal.collimation.fields import FieldError, positive_of, tupled
 from bifocal.collimation.jobs import PageJob
 from bifocal.collimation.live_orientation import control_of, lenses_of, site_of
 from bifocal.collimation.product_graph import causes_of, out_of_date
+from bifocal.collimation.products import discard_pair
 from bifocal.collimation.proposals import NOMINAL
 from bifocal.collimation.session import Session
 from bifocal.collimation.shapes import outlines_of
@@ -45,8 +46,10 @@ def start_job(session: Session, kind: str, options: Options, *, quiet: bool = Fa
     def task() -> dict[str, Any]:
         told = task_of(session, kind, options) | {"quiet": quiet}
         told["causes"] = causes_of(session, kind)
-        if quiet:  # what makes way may still be writing its own
-            told["out"] = told["out"].replace(".proposed.", ".found.")
+        if kind == "align":  # what was proposed before stays: an exchange may bring it back
+            # What makes way for this may still be writing its own.
+            stem = f"{session.products.stem}.{'found' if quiet else 'proposed'}"
+            told["out"] = str(free_path(session.files.folder.resolve(), stem, ".pair.json"))
         return told
 
     # The drawing shows the points as the workbook has them; its writer needs the survey's lock.
@@ -176,7 +179,7 @@ def _deliver_options(session: Session, options: Options, pair: Options) -> dict[
 
 
 def _align_task(session: Session, options: Options) -> dict[str, Any]:
-    infos, state, products = session.pictures.infos, session.state, session.products
+    infos, state = session.pictures.infos, session.state
     if len(infos) != 2:
         raise InputError(remark("page.give_photos"))
     control, site = control_of(state), site_of(state)
@@ -190,11 +193,9 @@ def _align_task(session: Session, options: Options) -> dict[str, Any]:
     tables: dict[str, Path | None] = {"control": None, "lengths": None}
     if way == "control":
         tables = _write_control(session, control)
-    out = products.folder / f"{products.stem}.proposed.pair.json"
     return {
         "far": str(infos[0].path.resolve()),
         "near": str(infos[1].path.resolve()),
-        "out": str(out.resolve()),
         "site": plain(asdict(site)),
         "lenses": [plain(asdict(lens)) for lens in lenses_of(state)],
         "auto": way not in ("control", "as set up"),
@@ -335,6 +336,7 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
     told = " ".join(without_options(said, session.spoken) for said in result.get("remarks", ()))
     if kind == "align":
         if task.get("quiet") and len(control_of(session.state).ids):
+            discard_pair(Path(task["out"]))
             return ""  # the user took it in hand meanwhile
         causes = _same(task, "control", *(() if task["free_scale"] else ("site",)))
         session.propose(Path(task["out"]), {**result, "causes": causes})

@@ -13,7 +13,12 @@ from typing import Any, cast
 
 from bifocal.collimation.commands import changes_of
 from bifocal.collimation.drawn_faces import DrawnFaces
-from bifocal.collimation.exchange import fields_of_exchange, follow_exchange, put_aside
+from bifocal.collimation.exchange import (
+    fields_of_exchange,
+    follow_exchange,
+    proposal_kept,
+    proposal_noted,
+)
 from bifocal.collimation.fields import NOTES, fields_of
 from bifocal.collimation.jobs import JobRunner
 from bifocal.collimation.journal import Journal
@@ -351,18 +356,7 @@ class Session:
         if op == "align.accept":
             return self._accept()
         if op == "photos.exchange":
-            pair = self.files.pair
-            if len(self.pictures.infos) != 2:
-                raise InputError(remark("page.give_photos"))
-            if pair is not None and not self.products.is_own(pair):
-                raise InputError(remark("page.begun_with_pair", name=pair.name))
-            if not command.get("found"):
-                command |= fields_of_exchange(self)
-            result = self._carry_out(command, write=True)
-            if command.get("found"):
-                put_aside(self)
-                self.take_files(None, None)
-            return result
+            command |= fields_of_exchange(self)
         return self._carry_out(command, write=True)
 
     def _remember_answer(self, known: str, result: Any) -> None:
@@ -405,9 +399,11 @@ class Session:
             source, target = target, source
         if not source:
             raise InputError(remark(f"page.nothing_to_{'undo' if back else 'redo'}"))
+        changes = [change.reversed for change in reversed(source[-1])]
         if write:
-            self._write(command)
-        changes = [change.reversed for change in reversed(source.pop())]
+            self._write(command := proposal_noted(self, command, changes))
+        changes = proposal_kept(command, changes)
+        source.pop()
         self.state.apply(changes)
         self.state.revision += 1
         if any(one.kind == "settings" for one in changes):

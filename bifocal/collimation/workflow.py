@@ -18,6 +18,7 @@ from bifocal.collimation.first_orientation import FirstOrientation
 from bifocal.collimation.project import find_files
 from bifocal.collimation.server.access import Access
 from bifocal.collimation.server.application import application
+from bifocal.collimation.server.security import place_of
 from bifocal.collimation.session import Session
 from bifocal.collimation.starting import remember
 from photocore.errors import InputError, PhotogrammetryError
@@ -94,7 +95,7 @@ def page_server(
     access = Access.of(files.folder / f".{files.stem}.page.json")
     with raising(), _listening(port, access.port) as listening:
         number = listening.getsockname()[1]
-        url = f"http://{HOST}:{number}/?token={access.token}"
+        url = f"http://{HOST}:{number}{place_of(access.token)}/?token={access.token}"
         session = Session(files, language=language)
         warm = threading.Timer(WARM_UP, _warm_up, [session])
         warm.daemon = True

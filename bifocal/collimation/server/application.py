@@ -18,7 +18,7 @@ from bifocal.collimation.server.assets import KEEP, Assets
 from bifocal.collimation.server.measuring_routes import ROUTES as MEASURING
 from bifocal.collimation.server.product_routes import ROUTES as PRODUCTS
 from bifocal.collimation.server.requests import answer, in_thread, json_body, session_of
-from bifocal.collimation.server.security import Guard, TooLarge, cookie_of
+from bifocal.collimation.server.security import COOKIE, Guard, TooLarge, place_of
 from bifocal.collimation.server.state_view import state_of
 from bifocal.collimation.session import Session
 from bifocal.remarks import in_language
@@ -84,12 +84,9 @@ async def _page(request: Request) -> Response:
     text = request.app.state.assets.page(session.spoken)
     response = Response(text, media_type="text/html", headers={"cache-control": "no-store"})
     if "token" in request.query_params:
+        token = request.app.state.token
         response.set_cookie(
-            cookie_of(request.scope),
-            request.app.state.token,
-            httponly=True,
-            samesite="strict",
-            path="/",
+            COOKIE, token, httponly=True, samesite="strict", path=f"{place_of(token)}/"
         )
     return response
 

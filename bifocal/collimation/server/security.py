@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
+import hashlib
 import hmac
 import secrets
 from collections.abc import Mapping
-from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.responses import HTMLResponse, JSONResponse, Response
+from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from bifocal.collimation.wording import say
@@ -32,9 +31,16 @@ _HEADERS: Mapping[str, str] = {
 }
 
 
-def cookie_of(scope: Scope) -> str:
-    """Return the name of a server's cookie; a browser sends those of all ports to each."""
-    return f"bifocal_token_{(scope.get('server') or ('', 0))[1]}"
+#: Name of the cookie that holds the token.
+COOKIE = "bifocal_token"
+
+
+def place_of(token: str) -> str:
+    """Return the path under which a server's page lies, which nobody can guess.
+
+    A browser sends the cookies of one port to the servers of all others, but never to another path.
+    """
+    return f"/{hashlib.sha256(f'page of {token}'.encode()).hexdigest()[:32]}"
 
 
 def new_token() -> str:
@@ -54,11 +60,12 @@ class Guard:
     Notes
     -----
     A foreign page in the same browser is stopped by its Origin, a name that was bent to 127.0.0.1
-    by its Host, another user of the computer by the token. Answers carry no CORS header.
+    by its Host, another user of the computer by the token. Answers carry no CORS header. The page
+    lies under a path of its own, where its cookie is taken; elsewhere only a token that is named.
     """
 
     def __init__(self, app: ASGIApp, token: str) -> None:
-        self.app, self.token = app, token
+        self.app, self.token, self.place = app, token, place_of(token)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer, or refuse."""
@@ -66,14 +73,21 @@ class Guard:
             if scope["type"] == "lifespan":
                 await self.app(scope, receive, send)
             return
-        refusal = self._refusal(scope)
+        at_page = scope["path"].startswith(f"{self.place}/")
+        if at_page:
+            scope = {**scope, "path": scope["path"].removeprefix(self.place)}
+        refusal = self._refusal(scope, at_page=at_page)
         if refusal is not None:
             await _answer(scope, *refusal)(scope, receive, _with_headers(send))
+            return
+        if scope["path"] == "/" and not at_page:
+            moved = RedirectResponse(f"{self.place}/?token={self.token}", 303)
+            await moved(scope, receive, _with_headers(send))
             return
         limit = LARGEST_PHOTOS if scope["path"] == UPLOAD else LARGEST_COMMAND
         await self.app(scope, _limited(receive, limit), _with_headers(send))
 
-    def _refusal(self, scope: Scope) -> tuple[int, str] | None:
+    def _refusal(self, scope: Scope, *, at_page: bool) -> tuple[int, str] | None:
         """Return status and reason where a request is refused."""
         headers = Headers(scope=scope)
         server = scope.get("server") or ("127.0.0.1", 0)
@@ -89,7 +103,8 @@ class Guard:
         foreign = headers.get("sec-fetch-site", "none") not in ("same-origin", "none")
         if foreign and not (opens and headers.get("sec-fetch-mode") == "navigate"):
             return 403, "another page may not use this server."
-        if not self._is_token(*query, *_tokens_in(scope, headers)):
+        cookies = _cookies_in(headers) if at_page else []
+        if not self._is_token(*query, headers.get("x-bifocal-token", ""), *cookies):
             return 403, "open the page with the address that `bifocal pick` printed."
         if len(scope["path"]) > LONGEST_PATH:
             return 414, "the address is too long."
@@ -107,13 +122,10 @@ class Guard:
         return any(hmac.compare_digest(word.encode("utf-8", "replace"), known) for word in given)
 
 
-def _tokens_in(scope: Scope, headers: Headers) -> list[str]:
-    """Return the tokens that a request's headers name."""
-    cookies = SimpleCookie()
-    with contextlib.suppress(CookieError):
-        cookies.load(headers.get("cookie", ""))
-    own = cookies.get(cookie_of(scope))
-    return [headers.get("x-bifocal-token", ""), *([] if own is None else [own.value])]
+def _cookies_in(headers: Headers) -> list[str]:
+    """Return the tokens that cookies name: another server may have set one of the same name."""
+    pairs = (pair.strip().partition("=") for pair in headers.get("cookie", "").split(";"))
+    return [value for name, _, value in pairs if name == COOKIE]
 
 
 def _answer(scope: Scope, status: int, text: str) -> Response:

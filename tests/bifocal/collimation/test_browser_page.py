@@ -89,7 +89,7 @@ def test_the_page_bends_pixels_as_the_library_does(page: Driver, name: str) -> N
     )
     pixels = [[2990.0, 2010.0], [10.0, 20.0], [5900.0, 3900.0], [3000.5, 100.25], [700.0, 2600.0]]
     script = """async ([description, pixels]) => {
-        const { Lens } = await import("/js/lens.js");
+        const { Lens } = await import(new URL("js/lens.js", document.baseURI));
         const lens = new Lens(description);
         return [pixels.map((one) => lens.distort(one)), pixels.map((one) => lens.undistort(one))];
     }"""
@@ -109,7 +109,7 @@ def test_the_page_bends_rays_into_water_and_out_of_it(page: Driver, indices: Any
     bent = np.arcsin(np.sin(angles)[:, None] * indices[0] / np.array(indices))
     radius = np.tan(bent) @ heights
     script = """async ([media, places]) => {
-        const { Media } = await import("/js/media.js");
+        const { Media } = await import(new URL("js/media.js", document.baseURI));
         const through = new Media(media);
         const apparent = places.map((one) => through.apparent(one));
         return [apparent, apparent.map((one) => through.onPlane(one))];
@@ -294,7 +294,7 @@ SLOW_COMMAND = """() => {
   window.held = {};
   const gate = new Promise((done) => { held.release = done; });
   window.fetch = async (path, ...rest) => {
-    if (path === "/api/command") {
+    if (path === "api/command") {
       await gate;
       window.fetch = real;
     }
@@ -401,16 +401,16 @@ def test_the_page_ships_with_the_package() -> None:
 def test_a_late_answer_does_not_bring_back_an_older_state(page: Driver) -> None:
     """Asked for when the stream of news opened, answered after a command had changed the state."""
     seen = page.tab.evaluate("""async () => {
-        const { Connection } = await import("/js/connection.js");
+        const { Connection } = await import(new URL("js/connection.js", document.baseURI));
         const kept = [window.fetch, window.EventSource];
         let stream, answer;
-        window.EventSource = class { constructor() { stream = this; } };
+        window.EventSource = class { constructor() { stream = this; } close() {} };
         const connection = new Connection();
         await connection.start();
         const first = connection.state;
         const later = (n, serving = first.serving) =>
             new Response(JSON.stringify({ ...first, serving, revision: first.revision + n }));
-        window.fetch = async (path) => path === "/api/state"
+        window.fetch = async (path) => path === "api/state"
             ? new Promise((resolve) => { answer = resolve; })
             : Response.json({ result: null, state: await later(2).json() });
         const shown = [];

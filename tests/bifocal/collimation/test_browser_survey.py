@@ -44,7 +44,7 @@ def relief_of(book: Path) -> dict[str, float]:
 SLOW_STATE = """() => {
   const real = window.fetch;
   window.fetch = async (path, ...rest) => {
-    if (path === "/api/state") await new Promise((done) => setTimeout(done, 700));
+    if (path === "api/state") await new Promise((done) => setTimeout(done, 700));
     return real(path, ...rest);
   };
 }"""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import shutil
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
 from bifocal import SAMPLE, Pair
+from bifocal.collimation.job_tasks import start_job
 from bifocal.collimation.product_graph import causes_of
 from bifocal.collimation.shapes import places_of
 from tests.page_session import client_of, opened, pick, pick_both, sample_folder, sample_picks
@@ -145,6 +147,59 @@ def test_an_exchange_is_taken_back_exactly_by_undo_and_by_itself(folder, way) ->
             for _ in range(4):
                 again.command({"op": "redo"})
         assert everything(again) == before
+
+
+def found_turned(session, name: str) -> None:
+    """Let a job propose the sample's orientation with far and near exchanged."""
+    proposed = session.files.folder / name
+    data = Pair.read(SAMPLE / "facade.pair.json").to_dict()
+    Pair.from_dict(data).write(proposed)
+    session.propose(proposed, REPORT | {"remarks": [name]})
+
+
+@pytest.mark.parametrize("proposed_before", [False, True])
+def test_an_exchange_that_a_job_found_is_undone_and_redone_exactly(
+    folder, proposed_before: bool
+) -> None:
+    with begun(folder, "near.jpg", "far.jpg") as session:
+        pick_both(session, "T01", sample_picks()["T01"][::-1])
+        session.command({"op": "wall.set", "column": 700.0, "row": 500.0})
+        if proposed_before:
+            first = folder / "survey.proposed.pair.json"
+            data = Pair.read(SAMPLE / "facade.pair.json").to_dict()
+            data["image1"]["file"], data["image2"]["file"] = "near.jpg", "far.jpg"
+            Pair.from_dict(data).write(first)
+            session.propose(first, REPORT)
+        before = everything(session)
+        found_turned(session, "survey.found.pair.json")
+        after = everything(session)
+        assert [photo["name"] for photo in after["photos"]] == ["far.jpg", "near.jpg"]
+        assert after["pair"]["report"]["remarks"] == ["survey.found.pair.json"]
+        assert not session.state.ordered
+        session.command({"op": "undo"})
+        assert everything(session) == before
+    with begun(folder, "near.jpg", "far.jpg") as again:
+        assert everything(again) == before
+        again.command({"op": "redo"})
+        assert everything(again) == after
+        again.command({"op": "undo"})
+        assert everything(again) == before
+    with begun(folder, "near.jpg", "far.jpg") as again:
+        again.command({"op": "photos.exchange"})
+        assert everything(again) == after
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_a_job_writes_over_no_orientation_that_was_proposed_before(
+    folder, monkeypatch, quiet: bool
+) -> None:
+    tasks: list[dict] = []
+    with begun(folder) as session:
+        monkeypatch.setattr(session.jobs, "start", lambda _, task, *__, **___: tasks.append(task()))
+        start_job(session, "align", {"way": "auto"}, quiet=quiet)
+        Path(tasks[0]["out"]).write_text("{}")
+        start_job(session, "align", {"way": "auto"}, quiet=quiet)
+    assert tasks[0]["out"] != tasks[1]["out"]
 
 
 def test_shapes_go_with_an_exchange_to_the_same_place_of_the_wall(folder) -> None:

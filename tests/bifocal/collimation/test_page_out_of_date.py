@@ -116,6 +116,7 @@ def test_control_changed_after_align_is_said_and_counts_again_when_taken_back(tm
     with opened(folder / "far.jpg", folder / "near.jpg") as session:
         control(session, "K1", 1.0, (300.0, 300.0))
         task = task_of(session, "align", {}) | {"causes": causes_of(session, "align")}
+        task["out"] = str(folder / "facade.proposed.pair.json")
         shutil.copyfile(SAMPLE / "facade.pair.json", task["out"])
         report = {"id": "K1", "residual_px": [0.1, 0.1, 0.1, 0.1]}
         finish(session, task, {"remarks": [], "control": [report]})

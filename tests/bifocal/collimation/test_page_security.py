@@ -14,13 +14,14 @@ from starlette.testclient import TestClient
 
 from bifocal.collimation.server.application import application
 from bifocal.collimation.server.assets import WEB
+from bifocal.collimation.server.security import place_of
 from tests.page_session import BASE, TOKEN, client_of, entries, opened, sample_folder
 from tests.tables import each
 
 PATHS = ["/", "/api/state", "/api/events", "/tiles/photo/1/info", "/tiles/photo/1/0/0_0.jpg",
          "/download/facade.xlsx", "/download/all.zip", "/relief/overlay.png", "/uncertainty.png",
          "/web/index.html", "/nowhere"]  # fmt: skip
-NAME = "bifocal_token_8765"
+NAME, PLACE = "bifocal_token", place_of(TOKEN)
 POSTS = ["/api/command", "/api/suggest", "/api/photos", "/api/jobs", "/api/measure"]
 
 
@@ -79,19 +80,28 @@ def test_the_first_visit_sets_a_cookie_that_scripts_cannot_read(session) -> None
     cookie = answer.headers["set-cookie"].lower()
     assert "httponly" in cookie
     assert "samesite=strict" in cookie
-    assert client.get("/api/state").status_code == 200
-    assert stranger(session, cookie=f"{NAME}=wrong").get("/api/state").status_code == 403
+    assert client.get(f"{PLACE}/api/state").status_code == 200
+    assert stranger(session, cookie=f"{NAME}=wrong").get(f"{PLACE}/api/state").status_code == 403
 
 
-def test_servers_side_by_side_keep_their_cookies_apart(session) -> None:
-    """A browser keeps cookies by name, not by port, and sends those of all ports to each."""
+def test_the_cookie_goes_to_the_page_alone(session) -> None:
+    """A browser sends the cookies of all ports to each, but only under the path they name."""
     client = stranger(session)
     answer = client.get("/", params={"token": TOKEN})
-    assert answer.headers["set-cookie"].startswith(f"{NAME}={TOKEN}")
-    both = {"cookie": f"bifocal_token_9999=another; {NAME}={TOKEN}"}
-    assert stranger(session, **both).get("/api/state").status_code == 200
-    other = {"cookie": f"bifocal_token_9999={TOKEN}"}
-    assert stranger(session, **other).get("/api/state").status_code == 403
+    assert answer.headers["set-cookie"].startswith(f"{NAME}={TOKEN};")
+    assert f"Path={PLACE}/;" in answer.headers["set-cookie"]
+    assert len(PLACE) > 32
+    assert TOKEN not in PLACE
+    request = client.build_request("GET", "http://127.0.0.1:9999/")
+    assert "cookie" not in request.headers
+    assert client.get("/api/state").status_code == 403
+    assert stranger(session, cookie=f"{NAME}={TOKEN}").get("/api/state").status_code == 403
+
+
+def test_a_cookie_that_another_server_set_does_not_lock_the_page(session) -> None:
+    both = {"cookie": f"theme=; {NAME}={TOKEN}; {NAME}=planted"}
+    assert stranger(session, **both).get(f"{PLACE}/api/state").status_code == 200
+    assert stranger(session, cookie=f"{NAME}=planted").get(f"{PLACE}/").status_code == 403
 
 
 def test_a_person_without_the_token_gets_a_page_in_his_language(session) -> None:
@@ -110,7 +120,8 @@ def test_a_file_that_knows_the_token_opens_the_page_and_nothing_else(session) ->
     client = stranger(session, **foreign)
     assert client.get("/", params={"token": TOKEN}).status_code == 200
     assert client.get("/", params={"token": TOKEN[:-1]}).status_code == 403
-    assert client.get("/").status_code == 403  # the cookie alone is what a foreign page would use
+    # The cookie alone is what a foreign page would use.
+    assert client.get(f"{PLACE}/").status_code == 403
     assert client.get("/api/state", params={"token": TOKEN}).status_code == 403
     assert stranger(session, **{"sec-fetch-site": "cross-site"}).get(
         "/", params={"token": TOKEN}

@@ -24,7 +24,7 @@ export class Alone {
     this.again = button(t("alone.again"), () => { this.corners = []; this.#tell(); }, { class: "quiet" });
     this.picture = h("img", { class: "preview large", alt: t("alone.alt"), hidden: true });
     this.told = h("p", { testid: "alone-told" });
-    this.download = h("a", { class: "button", href: "/download/all.zip", download: "", testid: "alone-download" }, t("deliver.download"));
+    this.download = h("a", { class: "button", href: "download/all.zip", download: "", testid: "alone-download" }, t("deliver.download"));
     this.element = h("section", { class: "card alone", testid: "alone" }, h("h2", {}, t("alone.title")),
       h("p", { class: "hint" }, t("alone.hint")),
       h("div", { class: "alone-body" }, this.viewer, h("div", { class: "card-body" }, this.asks,
@@ -48,7 +48,7 @@ export class Alone {
     const done = state.jobs.findLast(({ kind, state: how }) => kind === "rectify" && how === "done");
     setText(this.told, done?.message ?? "");
     const mark = rectified && `${done?.id}-${state.revision}`;
-    if (rectified && this.seen !== mark) this.picture.src = `/preview/rectified?v=${mark}`;
+    if (rectified && this.seen !== mark) this.picture.src = `preview/rectified?v=${mark}`;
     this.seen = mark;
     this.#tell();
   }
@@ -67,7 +67,7 @@ export class Alone {
     this.viewer.replaceChildren(this.pane.element);
     this.pane.mounted();
     const info = await this.app.pyramids.info("photo", 1, mark);
-    if (this.mark === mark) this.pane.setLayers([tileLayer(view, "layer-1", "/tiles/photo/1", info)]);
+    if (this.mark === mark) this.pane.setLayers([tileLayer(view, "layer-1", "tiles/photo/1", info)]);
   }
 
   /** Arrows move a cross over the photo, Enter sets a corner there. */
@@ -90,7 +90,7 @@ export class Alone {
     const corner = [column, row];
     this.corners = [...this.corners, corner];
     this.#tell();
-    const found = await this.app.connection.ask("/api/snap", { image: 1, column, row, radius: REACH }).catch(() => null);
+    const found = await this.app.connection.ask("api/snap", { image: 1, column, row, radius: REACH }).catch(() => null);
     if (found && found.kind !== "none") [corner[0], corner[1]] = [found.column, found.row];
     if (this.corners.length === CORNERS) this.width.focus();
     this.#tell();

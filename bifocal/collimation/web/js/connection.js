@@ -4,9 +4,9 @@
  * the server was away is sent, in order, when it is back, and its id keeps it from counting twice.
  */
 import { ahead } from "./ahead.js";
+import { Shelf } from "./shelf.js";
 
 const WAITS = [200, 400, 800, 1500];
-const SHELF = "bifocal-unsent";
 
 /** The server understood and declined; the message is for the user. */
 export class Refusal extends Error {}
@@ -41,6 +41,7 @@ export class Connection extends EventTarget {
     this.online = true;
     this.locked = false;
     this.unsent = [];
+    this.shelf = new Shelf();
     this.running = false;
     this.heard = 0;
     this.moved = new Map();
@@ -51,14 +52,20 @@ export class Connection extends EventTarget {
     const first = await ahead;
     if (first) this.#adopt(first);
     else await this.#retry(() => this.refresh());
-    for (const { id, op, args } of JSON.parse(sessionStorage.getItem(SHELF) ?? "[]")) {
-      this.#enqueue({ id, op, args, key: null }).catch((error) => this.#tell("refused", error));
-    }
+    this.shelf.inherit((commands) => {
+      for (const { id, op, args } of commands) {
+        this.#enqueue({ id, op, args, key: null }).catch((error) => this.#tell("refused", error));
+      }
+    });
+    window.addEventListener("beforeunload", (event) => {
+      if (this.unsent.length) event.preventDefault();
+    });
+    document.addEventListener("visibilitychange", () => this.#listen());
     this.#listen();
   }
 
   async refresh() {
-    const answer = await call("/api/state", { cache: "no-store" });
+    const answer = await call("api/state", { cache: "no-store" });
     this.#adopt(await answer.json());
   }
 
@@ -113,7 +120,7 @@ export class Connection extends EventTarget {
   async upload(files) {
     const form = new FormData();
     files.forEach((file, index) => form.append(`photo${index + 1}`, file, file.name));
-    const answer = await call("/api/photos", { method: "POST", body: form });
+    const answer = await call("api/photos", { method: "POST", body: form });
     const body = await answer.json();
     this.#adopt(body.state ?? body);
   }
@@ -147,7 +154,7 @@ export class Connection extends EventTarget {
     try {
       const answer = await this.#retry(() => {
         command.sent = true;
-        return call("/api/command", {
+        return call("api/command", {
           method: "POST",
           headers: { "Content-Type": "application/json" },
           body: JSON.stringify({ id: command.id, op: command.op, ...command.args }),
@@ -195,8 +202,7 @@ export class Connection extends EventTarget {
   }
 
   #keep() {
-    const plain = this.unsent.map(({ id, op, args }) => ({ id, op, args }));
-    sessionStorage.setItem(SHELF, JSON.stringify(plain));
+    this.shelf.put(this.unsent.map(({ id, op, args }) => ({ id, op, args })));
     if (this.state) this.dispatchEvent(new Event("reach"));
   }
 
@@ -204,8 +210,12 @@ export class Connection extends EventTarget {
     this.dispatchEvent(new CustomEvent(type, { detail }));
   }
 
+  /** Only the tab that is looked at: a browser allows six connections to a server in all. */
   #listen() {
-    const source = new EventSource("/api/events");
+    this.source?.close();
+    if (document.hidden) return;
+    const source = new EventSource("api/events");
+    this.source = source;
     source.onopen = () => this.#retry(() => this.refresh());
     source.onmessage = ({ data }) => {
       const news = JSON.parse(data);
@@ -217,7 +227,7 @@ export class Connection extends EventTarget {
     };
     source.onerror = () => {
       if (source.readyState !== EventSource.CLOSED) return;
-      setTimeout(() => this.#listen(), WAITS.at(-1));
+      setTimeout(() => this.source === source && this.#listen(), WAITS.at(-1));
     };
   }
 

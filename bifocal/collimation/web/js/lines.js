@@ -126,7 +126,7 @@ export class Measure {
     this.question = question;
     if (names.length < 2) return this.show(null);
     try {
-      const found = await this.app.connection.ask("/api/measure", { points: names });
+      const found = await this.app.connection.ask("api/measure", { points: names });
       if (this.question === question) this.show(found);
     } catch (error) {
       this.app.refuse(error);

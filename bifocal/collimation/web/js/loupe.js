@@ -22,7 +22,7 @@ class Tiles {
     else {
       tile = new Image();
       tile.onload = this.changed;
-      tile.src = `/tiles/photo/${this.image}/${this.info.max_level}/${name}.jpg?v=${this.info.version}`;
+      tile.src = `tiles/photo/${this.image}/${this.info.max_level}/${name}.jpg?v=${this.info.version}`;
     }
     this.kept.set(name, tile);
     if (this.kept.size > KEEP) this.kept.delete(this.kept.keys().next().value);

@@ -40,7 +40,7 @@ class App {
     this.title = h("h1", {}, "bifocal");
     this.undoButton = button("↶", () => this.undo(), { class: "icon", testid: "undo", "aria-label": t("top.undo"), title: `${t("top.undo")} (Ctrl+Z)` });
     this.redoButton = button("↷", () => this.redo(), { class: "icon", testid: "redo", "aria-label": t("top.redo"), title: `${t("top.redo")} (Ctrl+Y)` });
-    this.exchangeButton = button("⇄", () => this.exchange(), { class: "icon", testid: "exchange", "aria-label": t("photos.exchange"), title: t("photos.exchange") });
+    this.exchangeButton = button(`⇄ ${t("photos.exchange")}`, () => this.exchange(), { class: "quiet", testid: "exchange" });
     this.nextButton = button("", () => this.next(), { class: "primary next-step", testid: "next" });
     this.themeButton = button("◐", () => { useTheme(theme() === "light" ? "dark" : "light"); this.#tellTheme(); },
       { class: "icon", testid: "theme" });
@@ -53,14 +53,14 @@ class App {
       h("a", { class: "skip", href: "#stage" }, t("top.skip")),
       h("header", { class: "top" }, this.title,
         h("nav", { role: "tablist", "aria-label": t("top.stages") }, Object.values(this.tabs)),
-        h("div", { class: "tools" }, this.link, this.nextButton, this.exchangeButton, this.undoButton, this.redoButton,
+        h("div", { class: "tools" }, this.link, this.nextButton, this.undoButton, this.redoButton,
           this.themeButton, language,
           button("?", () => this.help(), { class: "icon", "aria-label": t("top.help"), testid: "help" }))),
       h("main", { id: "stage", tabindex: "-1" }, Object.values(this.stages).map(({ element }) => element)),
       this.toast);
     const wanted = location.hash.slice(1);
     this.open(wanted in STAGES ? wanted : this.state.stage, false);
-    history.replaceState({ stage: this.current }, "", `/#${this.current}`);
+    history.replaceState({ stage: this.current }, "", `#${this.current}`);
     window.addEventListener("popstate", ({ state }) => state?.stage && this.open(state.stage, true, false));
     listen(this);
   }
@@ -93,10 +93,11 @@ class App {
    * browser's Back leads here.
    */
   open(key, tell = true, remember = tell) {
-    if (remember && this.current !== key) history.pushState({ stage: key }, "", `/#${key}`);
+    if (remember && this.current !== key) history.pushState({ stage: key }, "", `#${key}`);
     this.current = key;
     for (const [name, stage] of Object.entries(this.stages)) {
       stage.element.hidden = name !== key;
+      if (name === key) stage.exchangePlace?.append(this.exchangeButton);
       this.tabs[name].setAttribute("aria-selected", String(name === key));
       this.tabs[name].tabIndex = name === key ? 0 : -1;
       stage.element.setAttribute("role", "tabpanel");
@@ -173,12 +174,16 @@ class App {
   }
 
   /** Far and near the other way round: what is picked goes along, an orientation has to be made anew. */
-  async exchange() {
-    const oriented = Boolean(this.state.pair);
-    if (await this.send("photos.exchange") && oriented) {
+  exchange() {
+    const { pair } = this.state;
+    const go = async () => {
+      await this.connection.send("photos.exchange");
+      if (!pair) return;
       this.open("orientation");
       this.say(t("photos.exchanged"));
-    }
+    };
+    if (!pair?.accepted) return go().catch((error) => this.refuse(error));
+    return this.dialog(t("photos.exchange"), h("p", {}, t("photos.exchangeAsks")), t("dialog.exchange"), go);
   }
 
   undo() {
@@ -228,7 +233,7 @@ class App {
     // The server may have the workbook to write first: what was asked for is answered at once.
     this.say(t("job.started", { kind: t(`job.${kind}`) }));
     try {
-      await this.connection.ask("/api/jobs", { kind, options });
+      await this.connection.ask("api/jobs", { kind, options });
     } catch (error) {
       this.refuse(error);
     }
@@ -241,7 +246,7 @@ class App {
     const told = h("p", { class: "hint" });
     const fold = h("details", { hidden: true }, h("summary", {}, t("job.remarks")), told);
     const cancel = button(t("job.cancel"), () => {
-      this.connection.remove(`/api/jobs/${cancel.dataset.job}`).catch((error) => this.refuse(error));
+      this.connection.remove(`api/jobs/${cancel.dataset.job}`).catch((error) => this.refuse(error));
     }, { class: "quiet", testid: `cancel-${kind}` });
     const box = h("div", { class: "job", hidden: true, testid: `job-${kind}` }, h("div", { class: "row" }, bar, cancel), words, fold);
     this.boxes.push((state) => {
@@ -340,7 +345,7 @@ async function start() {
   await connection.start();
   const { language } = connection.state;
   await load(language);
-  if (location.search) history.replaceState(null, "", `/${location.hash}`);
+  if (location.search) history.replaceState(null, "", `${location.pathname}${location.hash}`);
   const app = new App(connection);
   app.build();
   let waiting = 0;
@@ -349,7 +354,7 @@ async function start() {
     waiting ||= requestAnimationFrame(() => {
       waiting = 0;
       if (connection.state.language === language) app.update();
-      else location.reload();
+      else if (!connection.unsent.length) location.reload();
     });
   });
   connection.addEventListener("reach", () => app.reach());

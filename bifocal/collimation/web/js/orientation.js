@@ -39,9 +39,10 @@ export class OrientationStage {
     this.acceptAlign = button(t("align.accept"), () => this.accept(), { testid: "align-accept" });
     this.good = h("p", { class: "good", role: "status", testid: "how-good" });
     this.target = h("p", { class: "target", role: "status" });
+    this.exchangePlace = h("div", { class: "row" });
     this.element = h("div", { class: "stage work", id: "stage-orientation" }, this.photos,
       h("aside", { class: "side" }, h("div", { class: "panel" }, this.target, this.wallCard.element, this.loupe.element,
-        this.#controlTable(), this.#tapeTable(), this.#tellResult()), this.#result()));
+        this.#controlTable(), this.#tapeTable(), this.#tellResult(), this.exchangePlace), this.#result()));
   }
 
   #controlButtons() {
@@ -149,7 +150,7 @@ export class OrientationStage {
     if (this.mark !== mark) return;
     infos.forEach((info, index) => {
       const { view, image } = this.panes[index];
-      this.panes[index].setLayers([tileLayer(view, `layer-${image}`, `/tiles/photo/${image}`, info)]);
+      this.panes[index].setLayers([tileLayer(view, `layer-${image}`, `tiles/photo/${image}`, info)]);
       this.loupe.source(image, info);
     });
   }

@@ -44,9 +44,10 @@ export class PhotosStage {
         h("div", { class: "row" }, button(t("start.print"), () => window.print(), { class: "quiet", testid: "print" }))),
       h("div", { class: "card" }, h("h2", {}, t("start.recent")), this.recent));
     this.alone = new Alone(app);
+    this.exchangePlace = h("div", { class: "row" });
     this.others = h("div", { class: "cards", testid: "other-photos" });
     this.element = h("div", { class: "stage photos", id: "stage-photos" }, this.zone, this.beginning,
-      h("div", { class: "cards" }, this.cards.map(({ element }) => element)), this.others, app.jobBox("join"),
+      h("div", { class: "cards" }, this.cards.map(({ element }) => element)), this.exchangePlace, this.others, app.jobBox("join"),
       this.alone.element, this.form, this.media);
     this.#listen();
   }
@@ -84,7 +85,7 @@ export class PhotosStage {
 
   async #sample() {
     try {
-      await this.app.connection.ask("/api/sample", {});
+      await this.app.connection.ask("api/sample", {});
       await this.app.connection.refresh();
       this.app.open("points");
     } catch (error) {
@@ -94,10 +95,10 @@ export class PhotosStage {
 
   /** Surveys that were open before; another page opens beside this one. */
   async #tellRecent() {
-    const { surveys } = await this.app.connection.get("/api/recent").catch(() => ({ surveys: [] }));
+    const { surveys } = await this.app.connection.get("api/recent").catch(() => ({ surveys: [] }));
     const open = async (number) => {
       try {
-        const { url } = await this.app.connection.ask("/api/recent", { number });
+        const { url } = await this.app.connection.ask("api/recent", { number });
         window.location.assign(url);
       } catch (error) {
         this.app.refuse(error);
@@ -153,7 +154,7 @@ export class PhotosStage {
     const away = button(t("photo.takeAway"), () => this.#takeAway(image), { class: "quiet", "aria-label": `${t("photo.takeAway")}: ${name}` });
     const thumb = h("img", { alt: t("photo.alt", { role: name }) });
     this.app.pyramids.info("photo", image, name).then(({ version, max_level: most }) => {
-      thumb.src = `/tiles/photo/${image}/${Math.min(THUMB_LEVEL, most)}/0_0.jpg?v=${version}`;
+      thumb.src = `tiles/photo/${image}/${Math.min(THUMB_LEVEL, most)}/0_0.jpg?v=${version}`;
     }).catch((error) => this.app.refuse(error));
     return h("section", { class: "card photo" }, h("h2", {}, `${image} · ${t("photo.further")}`), thumb,
       h("div", { class: "card-body" }, h("p", { class: "file" }, name), h("p", { class: "hint" }, `${width} × ${height} px`),
@@ -163,7 +164,7 @@ export class PhotosStage {
 
   async #takeAway(image) {
     try {
-      await this.app.connection.remove(`/api/photos/${image}`);
+      await this.app.connection.remove(`api/photos/${image}`);
       await this.app.connection.refresh();
     } catch (error) {
       this.app.refuse(error);
@@ -207,6 +208,6 @@ export class PhotosStage {
     const info = await this.app.pyramids.info("photo", card.image, mark);
     if (card.mark !== mark) return;
     const level = Math.min(THUMB_LEVEL, info.max_level);
-    card.thumb.src = `/tiles/photo/${card.image}/${level}/0_0.jpg?v=${info.version}`;
+    card.thumb.src = `tiles/photo/${card.image}/${level}/0_0.jpg?v=${info.version}`;
   }
 }

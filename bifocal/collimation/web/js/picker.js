@@ -184,7 +184,7 @@ export class Picker extends EventTarget {
     if (!from) return;
     const [column, row] = from;
     const answer = await this.connection
-      .ask("/api/line", { image: other(image), column, row })
+      .ask("api/line", { image: other(image), column, row })
       .catch(() => null);
     if (!answer || this.selected !== item.name) return;
     this.guide = { image, line: answer.line };
@@ -215,7 +215,7 @@ export class Picker extends EventTarget {
     const from = this.pick(item, other(image));
     if (!from) return this.say("say.nothing");
     const [column, row] = from;
-    const found = await this.connection.ask("/api/suggest", { image: other(image), column, row });
+    const found = await this.connection.ask("api/suggest", { image: other(image), column, row });
     if (this.selected !== item.name) return undefined;
     this.guide = { image, line: found.line };
     this.proposal = Number.isFinite(found.column) ? { image, name: item.name, from, ...found } : null;
@@ -277,7 +277,7 @@ export class Picker extends EventTarget {
       const from = item && this.pick(item, image);
       if (!from) return this.say("say.nothing");
       const [column, row] = from;
-      const found = await this.connection.ask("/api/snap", { image, column, row, radius });
+      const found = await this.connection.ask("api/snap", { image, column, row, radius });
       if (found.kind === "none") return this.say("say.unsnapped");
       this.#shift(item, image, found.column, found.row);
       return this.say(`say.${found.kind}`, { sigma: found.sigma_px?.toFixed(2) ?? "?" });

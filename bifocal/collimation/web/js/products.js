@@ -107,7 +107,7 @@ export class ProductsStage {
     this.deliverState = h("p", { class: "hint", testid: "deliver-state" });
     this.files = h("ul", { class: "files" });
     this.count = h("summary", {});
-    this.download = h("a", { class: "button", href: "/download/all.zip", download: "", testid: "download" },
+    this.download = h("a", { class: "button", href: "download/all.zip", download: "", testid: "download" },
       t("deliver.download"));
     return h("section", { class: "card" }, h("h2", {}, t("deliver.title")),
       h("p", { class: "hint" }, t("deliver.hint")), h("div", { class: "fields" },
@@ -147,7 +147,7 @@ export class ProductsStage {
       this.loupe.source(index + 1, info);
       if (!this.loupe.places[index + 1]) this.loupe.look(index + 1, this.pane.middle(index + 1));
     });
-    this.wallLayer = tileLayer(this.view, "layer-1", "/tiles/wall/1", walls, null, this.wall.frameOf(1, state.photos[0]));
+    this.wallLayer = tileLayer(this.view, "layer-1", "tiles/wall/1", walls, null, this.wall.frameOf(1, state.photos[0]));
     this.ortho = image && this.#orthoLayer(ortho, image, state.photos);
     this.reliefMark = `${done.length}-${state.revision}`;
     this.#showRelief();
@@ -159,7 +159,7 @@ export class ProductsStage {
     if (!this.wallLayer) return;
     const wanted = [`v=${this.reliefMark}`, ...(this.limits ? [`low=${this.limits[0]}`, `high=${this.limits[1]}`] : []),
       ...(this.hatched ? ["hatched"] : [])].join("&");
-    this.relief = relief && pictureLayer(this.view, "layer-relief", `/relief/overlay.png?${wanted}`, this.#edges(relief.bounds));
+    this.relief = relief && pictureLayer(this.view, "layer-relief", `relief/overlay.png?${wanted}`, this.#edges(relief.bounds));
     this.pane.setLayers([this.wallLayer, this.ortho, this.relief].filter(Boolean));
     this.#apply();
   }
@@ -194,7 +194,7 @@ export class ProductsStage {
   async #point(X, Y) {
     const { connection } = this.app;
     try {
-      const { picks, r } = await connection.get(`/relief/value?X=${X}&Y=${Y}`);
+      const { picks, r } = await connection.get(`relief/value?X=${X}&Y=${Y}`);
       if (!picks) return this.app.say(t("relief.unknown"), "warning");
       const pick = (image, name) => connection.send("point.pick", { name, image, column: picks[image - 1][0], row: picks[image - 1][1] });
       const { name } = await pick(1, null);
@@ -219,7 +219,7 @@ export class ProductsStage {
   #orthoLayer(ortho, info, photos) {
     const [left, top, right] = this.#edges(ortho.bounds);
     const scale = (right - left) / info.width;
-    return tileLayer(this.view, "layer-ortho", "/tiles/ortho/0", info, [left + 0.5, -top - 0.5, scale],
+    return tileLayer(this.view, "layer-ortho", "tiles/ortho/0", info, [left + 0.5, -top - 0.5, scale],
       ...[1, 2].map((one) => this.wall.frameOf(one, photos[one - 1])));
   }
 
@@ -241,7 +241,7 @@ export class ProductsStage {
   async #tell(wanted) {
     const spot = this.pane.unplace(wanted);
     const [X, Y] = this.wall.toPlane(spot);
-    const { r, sigma, picks } = await this.app.connection.get(`/relief/value?X=${X}&Y=${Y}`).catch(() => ({}));
+    const { r, sigma, picks } = await this.app.connection.get(`relief/value?X=${X}&Y=${Y}`).catch(() => ({}));
     const relief = Number.isFinite(r) ? `r ${number(r, 3)} ± ${number(sigma, 3)} m` : t("relief.unknown");
     for (const image of [1, 2]) this.loupe.look(image, picks?.[image - 1] ?? (image === 1 ? this.wall.toPhoto(1, spot) : null));
     setText(this.value, `X ${number(X, 3)} · Y ${number(Y, 3)} · ${relief}`);
@@ -275,7 +275,7 @@ export class ProductsStage {
       picture.hidden = !product;
       if (product && picture.dataset.mark !== String(mark)) {
         picture.dataset.mark = String(mark);
-        picture.src = `/preview/${kind}?v=${mark}-${state.revision}`;
+        picture.src = `preview/${kind}?v=${mark}-${state.revision}`;
       }
     }
     this.shapes.update(state);
@@ -286,7 +286,7 @@ export class ProductsStage {
     const bytes = files.reduce((sum, file) => sum + file.bytes, 0);
     setText(this.count, t("deliver.files", { count: files.length, size: size(bytes) }));
     keyedRows(this.files, files, { key: ({ name }) => name, signature: JSON.stringify,
-      build: ({ name, bytes: own }) => h("li", {}, h("a", { href: `/download/${encodeURIComponent(name)}`, download: "" }, name),
+      build: ({ name, bytes: own }) => h("li", {}, h("a", { href: `download/${encodeURIComponent(name)}`, download: "" }, name),
         h("span", { class: "hint" }, ` ${size(own)}`)) });
   }
 

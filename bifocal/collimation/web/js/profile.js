@@ -63,7 +63,7 @@ export class Profile {
     this.drawing = false;
     try {
       const [from, to] = this.ends;
-      const data = await this.app.connection.ask("/relief/profile", { from, to });
+      const data = await this.app.connection.ask("relief/profile", { from, to });
       if (this.ends[1] !== to) return undefined; // closed or drawn anew meanwhile
       this.data = data;
       this.#show();

@@ -60,14 +60,14 @@ export class Shapes {
     let pixel = this.stage.wall.toPhoto(1, spot);
     if (this.stage.onOrtho) {
       const [X, Y] = this.stage.wall.toPlane(spot);
-      const { picks } = await connection.get(`/relief/value?X=${X}&Y=${Y}`).catch(() => ({}));
+      const { picks } = await connection.get(`relief/value?X=${X}&Y=${Y}`).catch(() => ({}));
       if (picks) [pixel] = picks;
     }
     const [column, row] = pixel;
     const radius = Math.min(Math.max(4 / this.stage.pane.zoom, 4), 14);
-    const found = await connection.ask("/api/snap", { image: 1, column, row, radius }).catch(() => null);
+    const found = await connection.ask("api/snap", { image: 1, column, row, radius }).catch(() => null);
     if (found && found.kind !== "none") pixel = [found.column, found.row];
-    const { places } = await connection.ask("/relief/met", { pixels: [pixel] });
+    const { places } = await connection.ask("relief/met", { pixels: [pixel] });
     return [...pixel, places[0][2] ?? 0];
   }
 
@@ -79,7 +79,7 @@ export class Shapes {
     this.corners = null;
     let shape = corners;
     if (kind === "face" || kind === "occluder") {
-      const { within } = await this.app.connection.ask("/relief/met", { pixels: corners.map(([c, r]) => [c, r]) }).catch(() => ({}));
+      const { within } = await this.app.connection.ask("relief/met", { pixels: corners.map(([c, r]) => [c, r]) }).catch(() => ({}));
       shape = corners.map(([column, row]) => [column, row, kind === "face" ? within ?? 0 : 0]);
     }
     if (await this.app.send("shape.set", { kind, corners: shape })) this.app.say(t(`shape.made.${kind}`));

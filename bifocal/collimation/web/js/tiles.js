@@ -11,7 +11,7 @@ export class Pyramids {
     const key = `${space}/${image}`;
     const known = this.known.get(key);
     if (known?.mark === mark) return known.promise;
-    const promise = this.connection.get(`/tiles/${space}/${image}/info`);
+    const promise = this.connection.get(`tiles/${space}/${image}/info`);
     promise.catch(() => this.known.delete(key));
     this.known.set(key, { mark, promise });
     return promise;

@@ -77,7 +77,7 @@ export class WallCard {
     }
     this.stage.refresh();
     const radius = this.stage.picker.reach;
-    const found = await this.app.connection.ask("/api/snap", { image, column, row, radius }).catch(() => null);
+    const found = await this.app.connection.ask("api/snap", { image, column, row, radius }).catch(() => null);
     if (this.ends === ends && found && found.kind !== "none") {
       this.ends = [...ends.slice(0, -1), [found.column, found.row]];
     }
