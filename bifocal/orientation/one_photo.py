@@ -193,6 +193,7 @@ def by_control(control: Control, interior: Interior, *, sigma_pick: float) -> Or
     # Several points at one pixel, often 0, 0 or -1, -1, are what programs write for "not seen".
     places, count = np.unique(control.pixels1[whole], axis=0, return_counts=True)
     unseen = (control.pixels1[:, None] == places[count > 1]).all(axis=2).any(axis=1)
+    unseen &= (whole & ~unseen).sum() > 2  # points all of one pixel lie on a line, which is refused
     names = ", ".join(np.array(control.ids)[unseen][:10])
     before = (remark("rectify.one_pixel", names=names),) if names else ()
     control = _of_points(control, whole & ~unseen)
