@@ -47,7 +47,7 @@ def test_nobody_is_told_to_install_what_is_not_ours():
 @pytest.mark.parametrize(
     ("name", "version", "said"),
     [
-        ("opencv-python-headless", "4.9.0.80", "opencv-python-headless 4.9.0.80 is too old, 4.10"),
+        ("opencv-python-headless", "4.9.0.80", "opencv-python-headless 4.9.0.80 is too old, 4.12"),
         ("opencv-python", "4.9.0", "pip uninstall -y opencv-python; "),
         ("numpy", "1.25.2", '-m pip install --force-reinstall "numpy>=2.0"'),
     ],

@@ -43,8 +43,9 @@ def without_options(text: str, language: str = "en") -> str:
     'Distortion (calibrate), or refraction. Check it.'
     >>> without_options("+12 mm, 30 % (--wall 120,130): name a spot with --wall COL,ROW.")
     '+12 mm, 30 %: name a spot.'
+    >>> from bifocal.remarks import remark
     >>> ways = "--fill closes holes with the colours around them"
-    >>> without_options(f"35% of the picture is empty: {ways}.", "de")
+    >>> without_options(remark("ortho.empty", share=0.35, ways=ways), "de")
     '35% des Bildes sind leer.'
     >>> without_options("wall--b.jpg: is blurred.")
     'wall--b.jpg: is blurred.'
