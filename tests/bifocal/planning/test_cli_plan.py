@@ -52,6 +52,7 @@ def test_the_workbook_holds_the_stations_and_two_charts_of_precision(tmp_path):
 
 @pytest.mark.acceptance
 @pytest.mark.parametrize("language", ["en", "it", "de"])
+@pytest.mark.office
 def test_the_workbook_follows_what_is_changed_on_site(tmp_path, language):
     """Equal to the plan as written, and to the library after d1, c2, pixels and wall change."""
     out = tmp_path / "plan.xlsx"
