@@ -138,6 +138,10 @@ def image_info(path: Path | str) -> ImageInfo:
             return _info_from_exif(path, image.size, bits, image.getexif())
     except UnidentifiedImageError:
         raise InputError(f"{path}: is not an image (JPEG, PNG or TIFF).") from None
+    except KeyError as error:  # a reader of Pillow's own that could not be loaded
+        raise InputError(
+            f"{path}: Pillow cannot read {error.args[0]} here; install it anew."
+        ) from None
     except (OSError, SyntaxError, ValueError) as error:
         if isinstance(error, InputError):
             raise

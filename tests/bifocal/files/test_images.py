@@ -181,3 +181,15 @@ def test_large_photos_are_read_by_strips_to_the_same_pixels(
     images.write_image(tmp_path / f"p{ending}", photo)
     monkeypatch.setattr(images, "_BY_STRIPS", 1000)
     np.testing.assert_array_equal(images.read_image(tmp_path / f"p{ending}"), photo)
+
+
+def test_a_reader_that_pillow_lacks_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "wall.png"
+    Image.new("RGB", (40, 30)).save(path)
+    Image.init()
+    monkeypatch.delitem(Image.OPEN, "PNG")
+    monkeypatch.setattr(Image, "init", lambda: 0)
+    with pytest.raises(InputError, match="Pillow cannot read PNG here"):
+        image_info(path)
