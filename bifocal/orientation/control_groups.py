@@ -27,6 +27,7 @@ class GroupTest:
     searched: float = 3.0  #: Groups are looked for where a point misses by so many times its sigma.
     apart: float = 5.0  #: Groups are apart by so many times the sigma of the offset.
     explains: float = 2.0  #: And leave a misfit so many times smaller.
+    carried: float = 0.05  #: Where distances are known no better, control carries the lenses too.
 
 
 GROUPS = GroupTest()
@@ -40,7 +41,12 @@ def weighed_by_control(pair: OrientedPair) -> OrientedPair:
     """
     observations, used = pair.observations, pair.observations.pick_used
     tests = pair.adjusted.control_test[used & observations.control.positioned]
-    if len(tests) < GROUPS.fewest:
+    cameras = enumerate(pair.adjusted.cameras, start=1)
+    known = all(
+        pair.adjusted.sigma("Z", number) < GROUPS.carried * float(camera.centre[2])
+        for number, camera in cameras
+    )
+    if len(tests) < GROUPS.fewest or not known:
         return pair
     times = float(np.sqrt(np.mean(tests**2)))
     many = int((~used).sum()) > max(2, len(used) // 4)
