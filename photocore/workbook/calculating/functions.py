@@ -6,8 +6,10 @@ Arguments lie as rows of a table down, ranges across.
 
 from __future__ import annotations
 
+import math
+import operator
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import reduce
 from typing import Any
 
@@ -22,8 +24,10 @@ from photocore.workbook.calculating.values import (
     TRUTH,
     Cells,
     Unknown,
+    among,
     as_numbers,
     number_cells,
+    single,
     spread,
     text_cells,
 )
@@ -55,6 +59,8 @@ _ARITHMETIC: Mapping[str, Callable[..., Any]] = {
 
 def signed(sign: str, one: Cells, other: Cells) -> Cells:
     """Return what a sign makes of the cells before and behind it."""
+    if one.is_number and other.is_number and sign != "&":
+        return _of_numbers(sign, one.numbers.item(), other.numbers.item())
     if sign == "&":
         one, other = spread(one, other)
         return text_cells(one.shown() + other.shown(), one.is_error | other.is_error)
@@ -65,20 +71,54 @@ def signed(sign: str, one: Cells, other: Cells) -> Cells:
         return number_cells(_ARITHMETIC[sign](a, b), bad | worse)
 
 
-def _choice(test: Cells, yes: Cells, no: Cells | None = None) -> Cells:
-    test, yes, no = spread(test, yes, no or number_cells([[0.0]], kind=TRUTH))
+def _of_numbers(sign: str, a: float, b: float) -> Cells:
+    """Return what a sign makes of two numbers: single cells are many, and arrays slow for them."""
+    if sign in _COMPARISONS:
+        return single(float(_PLAIN[sign](a, b)), TRUTH)
+    try:
+        value = _PLAIN[sign](a, b)
+    except (ZeroDivisionError, OverflowError):
+        value = math.nan
+    return single(value if isinstance(value, float) else math.nan)  # roots of less than 0
+
+
+_PLAIN: Mapping[str, Callable[..., Any]] = {
+    "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv,
+    "^": operator.pow, "=": operator.eq, "<>": operator.ne, "<": operator.lt, ">": operator.gt,
+    "<=": operator.le, ">=": operator.ge,
+}  # fmt: skip
+
+
+def chosen(name: str, parts: Sequence[Callable[[], Cells]]) -> Cells:
+    """Return what IF or IFERROR chooses; what is chosen nowhere is not calculated."""
+    if name == "IFERROR":
+        value = parts[0]()
+        if not value.is_error.any():
+            return value
+        test, yes, no = number_cells(value.is_error, kind=TRUTH), parts[1], lambda: value
+    else:
+        test, yes = parts[0](), parts[1]
+        no = parts[2] if len(parts) > 2 else lambda: number_cells([[0.0]], kind=TRUTH)
+    bad = test.is_error | (test.kinds == TEXT)
+    holds = test.numbers != 0
+    if not bad.any() and holds.all():
+        return yes()
+    if not bad.any() and not holds.any():
+        return no()
+    test, first, second = spread(test, yes(), no())
     bad, holds = test.is_error | (test.kinds == TEXT), test.numbers != 0
-    parts = ((yes.numbers, no.numbers), (yes.kinds, no.kinds), (yes.texts, no.texts))
-    numbers, kinds, texts = (np.where(holds, a, b) for a, b in parts)
+    pairs = (
+        (first.numbers, second.numbers), (first.kinds, second.kinds), (first.texts, second.texts)
+    )  # fmt: skip
+    numbers, kinds, texts = (np.where(holds, a, b) for a, b in pairs)
     return Cells(numbers, np.where(bad, ERROR, kinds).astype(np.uint8), texts)
-
-
-def _or_else(value: Cells, other: Cells) -> Cells:
-    return _choice(number_cells(value.is_error, kind=TRUTH), other, value)
 
 
 def _each(function: Callable[..., Any]) -> Callable[..., Cells]:
     def apply(*given: Cells) -> Cells:
+        if len(given) == 1 and given[0].is_number:
+            with np.errstate(all="ignore"):
+                return single(float(function(given[0].numbers.item())))
         numbers, bad = zip(*map(as_numbers, given), strict=True)
         with np.errstate(all="ignore"):
             return number_cells(function(*numbers), reduce(np.logical_or, bad))
@@ -104,7 +144,7 @@ def _whole(function: Callable[..., Any], *, none: float = 0.0) -> Callable[..., 
 
 def _count(*kinds: int) -> Callable[..., Cells]:
     def apply(*given: Cells) -> Cells:
-        counts = [np.isin(c.kinds, kinds).sum(axis=1, keepdims=True) for c in given]
+        counts = [among(c.kinds, kinds).sum(axis=1, keepdims=True) for c in given]
         return number_cells(reduce(np.add, counts))
 
     return apply
@@ -114,7 +154,7 @@ def _logical(all_of: bool) -> Callable[..., Cells]:
     def apply(*given: Cells) -> Cells:
         parts, bad = [], []
         for one in given:
-            counts = np.isin(one.kinds, (NUMBER, TRUTH))
+            counts = among(one.kinds, (NUMBER, TRUTH))
             holds = np.where(counts, one.numbers != 0, all_of)
             parts.append(holds.all(1, keepdims=True) if all_of else holds.any(1, keepdims=True))
             bad.append(one.is_error.any(axis=1, keepdims=True))
@@ -208,7 +248,7 @@ def _worded(function: Callable[..., str]) -> Callable[..., Cells]:
 
 
 def _is(*kinds: int) -> Callable[[Cells], Cells]:
-    return lambda value: number_cells(np.isin(value.kinds, kinds), kind=TRUTH)
+    return lambda value: number_cells(among(value.kinds, kinds), kind=TRUTH)
 
 
 def _half_up(values: FloatArray, places: FloatArray) -> FloatArray:
@@ -232,7 +272,7 @@ def _special(name: str) -> Callable[..., FloatArray]:
 
 
 def _as_number(value: Cells) -> Cells:
-    is_number = np.isin(value.kinds, (NUMBER, TRUTH))
+    is_number = among(value.kinds, (NUMBER, TRUTH))
     return number_cells(np.where(is_number, value.numbers, 0), value.is_error)
 
 
@@ -241,7 +281,9 @@ def _average(*given: Cells) -> Cells:
 
 
 FUNCTIONS: dict[str, Callable[..., Cells]] = {
-    "IF": _choice, "IFERROR": _or_else, "AND": _logical(True), "OR": _logical(False),
+    "IF": lambda *values: chosen("IF", [lambda v=v: v for v in values]),
+    "IFERROR": lambda *values: chosen("IFERROR", [lambda v=v: v for v in values]),
+    "AND": _logical(True), "OR": _logical(False),
     "NOT": lambda v: number_cells(v.numbers == 0, v.is_error, kind=TRUTH),
     "ISNUMBER": _is(NUMBER), "ISERROR": _is(ERROR), "ISTEXT": _is(TEXT), "ISBLANK": _is(BLANK),
     "NA": lambda: number_cells([[np.nan]]), "PI": lambda: number_cells([[np.pi]]),

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -41,6 +44,8 @@ class Cells:
     def of(cls, items: list[CellValue], *, size: tuple[int, int] | None = None) -> Cells:
         """Return what stands in cells: across in a range of a size, down without one."""
         shape = (len(items), 1) if size is None else (1, len(items))
+        if len(items) == 1 and type(items[0]) in (float, int):
+            return single(float(items[0]))  # type: ignore[arg-type]
         kinds = [_kind(item) for item in items]
         pairs = list(zip(items, kinds, strict=True))
         numbers = [float(v) if k in (NUMBER, TRUTH) and v is not None else 0.0 for v, k in pairs]
@@ -49,6 +54,11 @@ class Cells:
             np.array(numbers).reshape(shape), np.array(kinds, dtype=np.uint8).reshape(shape),
             texts.reshape(shape), size or (1, 1),
         )  # fmt: skip
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it is a single number."""
+        return self.numbers.size == 1 and self.kinds.item() == NUMBER
 
     @property
     def is_error(self) -> BoolArray:
@@ -97,10 +107,39 @@ _ERRORS = {"#N/A", "#DIV/0!", "#NUM!", "#VALUE!", "#REF!", "#NAME?", "#NULL!"}
 def number_cells(numbers: ArrayLike, bad: ArrayLike = False, *, kind: int = NUMBER) -> Cells:
     """Return numbers as cells: an error where they are bad or not finite."""
     values = np.asarray(numbers, dtype=np.float64)
-    values, wrong = np.broadcast_arrays(values, np.asarray(bad))
-    wrong = wrong | ~np.isfinite(values)
-    kinds = np.where(wrong, ERROR, kind).astype(np.uint8)
-    return Cells(np.where(wrong, 0.0, values), kinds, np.full(values.shape, "", dtype=object))
+    wrong = ~np.isfinite(values) | bad
+    if wrong.shape != values.shape:
+        values = np.broadcast_to(values, wrong.shape)
+    if wrong.any():
+        kinds = np.where(wrong, ERROR, kind).astype(np.uint8)
+        values = np.where(wrong, 0.0, values)
+    else:
+        kinds = np.full(values.shape, kind, dtype=np.uint8)
+    return Cells(values, kinds, _no_texts(values.shape))
+
+
+@lru_cache(maxsize=256)
+def _no_texts(shape: tuple[int, ...]) -> np.ndarray[Any, np.dtype[np.object_]]:
+    """Return empty texts, shared by all cells of a shape: nothing writes to the parts of `Cells`."""
+    texts = np.full(shape, "", dtype=object)
+    texts.flags.writeable = False
+    return texts
+
+
+def single(value: float, kind: int = NUMBER) -> Cells:
+    """Return one number or truth as a cell: an error where it is not finite."""
+    if not math.isfinite(value):
+        value, kind = 0.0, ERROR
+    return Cells(np.array([[value]]), _KINDS[kind], _no_texts((1, 1)))
+
+
+#: Kinds of single cells, shared by all.
+_KINDS = [np.array([[kind]], dtype=np.uint8) for kind in range(5)]
+
+
+def among(kinds: np.ndarray[Any, np.dtype[np.uint8]], wanted: Sequence[int]) -> BoolArray:
+    """Return where a kind is one of those wanted."""
+    return np.array([kind in wanted for kind in range(5)])[kinds]
 
 
 def text_cells(texts: ArrayLike, bad: ArrayLike = False) -> Cells:
