@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,7 +11,6 @@ from typing import Any
 from bifocal.remarks import remark
 from bifocal.survey.survey_input import SurveyInput
 from bifocal.survey.survey_media import NORMALS
-from bifocal.survey.what_if import CHANGED
 from bifocal.workbook.changing.setup_update import (
     add_missing_sheets,
     chart_sheet,
@@ -21,6 +19,7 @@ from bifocal.workbook.changing.setup_update import (
 )
 from bifocal.workbook.changing.translate import translate
 from bifocal.workbook.content import CHART_ROWS, STRUCTURED_ROWS, SurveyContent
+from bifocal.workbook.formulas.columns import CHANGED
 from bifocal.workbook.formulas.setup_cells import TYPED_FORMULAS
 from bifocal.workbook.formulas.space_block import BLOCK
 from bifocal.workbook.making.book import build, unprinted_formula
@@ -438,7 +437,7 @@ def _verdict(
     if area is None or not {"tolerance", "verdict"} <= area.headings().keys():
         return
     headings, first, grid = area.headings(), area.first, editor.grid(area.sheet).rows
-    accuracy = content.check.accuracy if content.check is not None else math.nan
+    accuracy = built.value_of("check_worst")
     holds, fails = word("holds", content.language), word("fails", content.language)
     formula = row_formula(area.name, wanted.columns[-1].formula)[1:]
     count = len(wanted.cells["rule"]) if rules else 0
@@ -453,7 +452,7 @@ def _verdict(
             for key in asked.keys() - {"verdict"}:
                 type_value(editor, (area.sheet, row, headings[key]), asked[key])
         result = ""
-        if isinstance(tolerance, int | float) and not math.isnan(accuracy):
+        if isinstance(tolerance, int | float) and isinstance(accuracy, int | float):
             result = holds if accuracy <= tolerance / 1000 else fails
         place = (area.sheet, row, headings["verdict"])
         if rules or words:

@@ -106,8 +106,7 @@ class Calculation:
         for sheet in self.book.worksheets:
             cells = {
                 (int(cell.row), int(cell.column)): _content(cell)
-                for row in sheet.iter_rows()
-                for cell in row
+                for cell in sheet._cells.values()  # iter_rows makes all that are not there
                 if cell.value is not None
             }
             end = max(row for row, _ in cells or [(1, 1)]), max(c for _, c in cells or [(1, 1)])
@@ -145,17 +144,38 @@ class Calculation:
         with _deep():
             return self._cell(title, row, column).items()[0]
 
-    def column(self, title: str, first: int, column: int) -> list[CellValue]:
-        """Return what the cells of a table's column show, from its first row on.
+    def values(self) -> dict[tuple[str, int, int], CellValue]:
+        """Return what single cells with formulas show, by sheet, row and column.
 
         Raises
         ------
         Unknown
             As `value`.
         """
-        rows = next(rows for rows in self._sheets[title].long[column] if rows[0] == first)
         with _deep():
-            return self._column(title, rows, column).items()
+            return {
+                (title, *at): self._cell(title, *at).items()[0]
+                for title, sheet in self._sheets.items()
+                for at, content in sheet.cells.items()
+                if isinstance(content, _Formula) and sheet.typed.get(at[1], (0, ()))[0] != at[0]
+            }
+
+    def columns(self, title: str, first: int) -> dict[int, list[CellValue]]:
+        """Return what the columns of formulas show that begin in a row of a sheet, by number.
+
+        Raises
+        ------
+        Unknown
+            As `value`.
+        """
+        sheet = self._sheets[title]
+        with _deep():
+            return {
+                number: self._column(title, rows, number).items()
+                for number, long in sheet.long.items()
+                for rows in long
+                if rows[0] == first and isinstance(sheet.cells.get((first, number)), _Formula)
+            }
 
     def formulas(self) -> list[tuple[str, int, int]]:
         """Return sheet, row and column of all cells that hold a formula."""
@@ -300,7 +320,8 @@ class Calculation:
             return self._single(table.sheet, table.head, column)
         cells = self._column(table.sheet, (table.head + 1, table.last), column)
         if part != "This Row":
-            return cells.across()
+            key = (table.sheet, f":{table.head}:", column)
+            return self._once(key, cells.across)
         if not table.head < rows[0] <= rows[-1] <= table.last:
             raise Unknown(f"{name}[{heading}] of another row")
         if len(rows) == table.last - table.head:
@@ -316,7 +337,9 @@ class Calculation:
             letters, number = first.rstrip("0123456789"), first.lstrip("ABCDEFGHIJKLMNOPQRSTUVWXYZ")
             column = column_number(letters)
             if number == "0":  # the row where the formula stands
-                return _stacked([self._cell(title, row, column) for row in rows], across=False)
+                cells = self._down(title, rows[0], rows[-1], column)
+                is_whole = len(rows) == rows[-1] - rows[0] + 1
+                return cells if is_whole else cells.at([row - rows[0] for row in rows])
             return self._cell(title, int(number), column)
         return self._once((title, area, 1), lambda: self._range(title, area))
 
@@ -328,12 +351,35 @@ class Calculation:
         top, left, bottom, right = split_area(area)
         end = self._sheets[title].end
         bottom, right = min(bottom, max(end[0], top)), min(right, max(end[1], left))
-        cells = [
-            self._cell(title, row, column)
-            for row in range(top, bottom + 1)
-            for column in range(left, right + 1)
-        ]
-        return _stacked(cells, across=True, size=(bottom - top + 1, right - left + 1))
+        columns = [self._down(title, top, bottom, column) for column in range(left, right + 1)]
+        numbers, kinds, texts = (
+            np.hstack([getattr(one, part) for one in columns]).reshape(1, -1)
+            for part in ("numbers", "kinds", "texts")
+        )
+        return Cells(numbers, kinds, texts, (bottom - top + 1, right - left + 1))
+
+    def _down(self, title: str, top: int, bottom: int, column: int) -> Cells:
+        """Return the cells of a column from one row to another, long columns at once."""
+        parts, row = [], top
+        long = self._sheets[title].long.get(column, ())
+        while row <= bottom:
+            for first, last in long:
+                if first <= row <= last:
+                    end = min(last, bottom)
+                    cells = self._column(title, (first, last), column)
+                    parts.append(cells.at(slice(row - first, end - first + 1)))
+                    row = end + 1
+                    break
+            else:
+                parts.append(self._cell(title, row, column))
+                row += 1
+        if len(parts) == 1:
+            return parts[0]
+        return Cells(
+            np.concatenate([one.numbers for one in parts]),
+            np.concatenate([one.kinds for one in parts]),
+            np.concatenate([one.texts for one in parts]),
+        )
 
 
 @contextmanager
@@ -369,16 +415,6 @@ def _of_row(text: str, row: int) -> str:
 
 #: A cell of any row, not part of a range nor on another sheet.
 _ROW_CELL = re.compile(r"(?<![\w$!'.:\"])([A-Z]{1,3})(\d+)(?![\w(:.!\"])")
-
-
-def _stacked(cells: Sequence[Cells], *, across: bool, size: tuple[int, int] = (1, 1)) -> Cells:
-    """Return single cells as the rows of a column, or as a range."""
-    shape = (1, -1) if across else (-1, 1)
-    numbers, kinds, texts = (
-        np.concatenate([getattr(cell, part).ravel() for cell in cells]).reshape(shape)
-        for part in ("numbers", "kinds", "texts")
-    )
-    return Cells(numbers, kinds, texts, size)
 
 
 def _no_blank(cells: Cells, rows: int) -> Cells:

@@ -10,7 +10,7 @@ import math
 import operator
 import re
 from collections.abc import Callable, Mapping, Sequence
-from functools import reduce
+from functools import lru_cache, reduce
 from typing import Any
 
 import numpy as np
@@ -170,14 +170,21 @@ def _sum_of_products(*given: Cells) -> Cells:
     return number_cells(product.sum(axis=1, keepdims=True), bad.any(axis=1, keepdims=True))
 
 
-def _position(value: Cells, among: Cells, _: Cells | None = None) -> Cells:
-    if len(among.numbers) > 1:
-        raise Unknown("MATCH in rows")
+@lru_cache(maxsize=8)
+def _places(area: Cells) -> dict[Any, int]:
+    """Return where each number and text of a range stands first."""
     keys: dict[Any, int] = {}
-    parts = (among.kinds[0].tolist(), among.numbers[0].tolist(), among.texts[0].tolist())
+    parts = (area.kinds[0].tolist(), area.numbers[0].tolist(), area.texts[0].tolist())
     for i, (kind, number, text) in enumerate(zip(*parts, strict=True), start=1):
         if kind in (NUMBER, TEXT):
             keys.setdefault(text.casefold() if kind == TEXT else number, i)
+    return keys
+
+
+def _position(value: Cells, area: Cells, _: Cells | None = None) -> Cells:
+    if len(area.numbers) > 1:
+        raise Unknown("MATCH in rows")
+    keys = _places(area)
     parts = (value.kinds.ravel().tolist(), value.numbers.ravel().tolist(), value.texts.ravel())
     found = [keys.get(t.casefold() if k == TEXT else n if k != ERROR else None, np.nan)
              for k, n, t in zip(*parts, strict=True)]  # fmt: skip

@@ -120,7 +120,7 @@ def number_cells(numbers: ArrayLike, bad: ArrayLike = False, *, kind: int = NUMB
 
 @lru_cache(maxsize=256)
 def _no_texts(shape: tuple[int, ...]) -> np.ndarray[Any, np.dtype[np.object_]]:
-    """Return empty texts, shared by all cells of a shape: nothing writes to the parts of `Cells`."""
+    """Return empty texts, shared by all cells of a shape: nothing writes to them."""
     texts = np.full(shape, "", dtype=object)
     texts.flags.writeable = False
     return texts

@@ -169,7 +169,7 @@ def ideal_content(rows=40, model="levelled", **more):
         points=points,
         table=table,
         known=known,
-        check=check_points(table, known),
+
         control=control,
         georeference=georeference(table, control),
         sensor=(22.7, 15.1),
