@@ -289,8 +289,8 @@ def setup_cells(content: SurveyContent) -> dict[str, CellValue]:
     cells["sigma_r_max"] = limits.relief_limit(content.pair.d2)
     if setup is None:
         return cells | _pair_cells(content, first, second)
-    for k, photo in enumerate(setup.others, start=3):
-        typed = (photo.c, photo.d, photo.enlargement or 1, *(photo.nadir or (None, None)))
+    for k, third in enumerate(setup.others, start=3):
+        typed = (third.c, third.d, third.enlargement or 1, *(third.nadir or (None, None)))
         cells |= dict(zip(other_cells(k), typed, strict=True))
     cells |= {"photo_1": setup.photo1 or None, "photo_2": setup.photo2 or None}
     enlargement1, enlargement2 = setup.taking.enlargements

@@ -168,7 +168,7 @@ def _inputs(columns: Mapping[str, int], content: SurveyContent) -> dict[str, int
 
 def _columns(table: OwnTable, content: SurveyContent, built: BookBuilder) -> list[ResultColumn]:
     """Return the results: what the formulas need and the table lacks, then the formulas."""
-    cells = built.tables["tblPoints"].cells
+    cells = _of_rows(built, "tblPoints", table)
     described = content.point_columns(
         xy="x1" in table.columns or bool(content.corrected),
         polar="s1" in table.columns,
@@ -183,7 +183,7 @@ def _columns(table: OwnTable, content: SurveyContent, built: BookBuilder) -> lis
             continue
         results.append(_column(column, cells[column.key]))
     if content.georeference is not None:
-        results += _world(content, built)
+        results += _world(content, built, {**cells, **_of_rows(built, "tblResults", table)})
     return results
 
 
@@ -200,7 +200,14 @@ def _column(column: LiveColumn, values: Sequence[CellValue]) -> ResultColumn:
     )
 
 
-def _world(content: SurveyContent, built: BookBuilder) -> list[ResultColumn]:
+def _of_rows(built: BookBuilder, name: str, table: OwnTable) -> dict[str, Sequence[CellValue]]:
+    """Return the columns of a table of ours without its spare rows."""
+    return {key: cells[: len(table.rows)] for key, cells in built.tables[name].cells.items()}
+
+
+def _world(
+    content: SurveyContent, built: BookBuilder, values: Mapping[str, Sequence[CellValue]]
+) -> list[ResultColumn]:
     """Return E, N, H, their sigmas and what these need; the transformation stands as numbers."""
     geo, table = content.georeference, content.table
     assert geo is not None
@@ -212,9 +219,7 @@ def _world(content: SurveyContent, built: BookBuilder) -> list[ResultColumn]:
     lists = ["columns"]
     if geo.precision is not None and table.covariance is not None:
         lists.append("sigmas")
-    parts = _numbers(geo, built)
-    values = {**built.tables["tblPoints"].cells, **built.tables["tblResults"].cells}
-    values |= {"shared": shared}
+    parts, values = _numbers(geo, built), {**values, "shared": shared}
     columns = (c for rows in lists for c in FORMULAS.columns("own_world", facts, parts, rows=rows))
     return [_column(column, values[column.key]) for column in columns]
 

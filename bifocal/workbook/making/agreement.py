@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from bifocal.remarks import remark
+from bifocal.survey.remarks import LARGEST_RESIDUAL
 from bifocal.workbook.content import SurveyContent
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
@@ -15,6 +16,9 @@ from photocore.workbook.making.live_book import BookBuilder
 
 #: Numbers that differ by less are alike: of what is above 1, and of what is uncertain in a number.
 ALIKE = 1e-9
+#: The sheet's turns are a fixed number. Where control contradicts itself so much that the sheet says
+#: so, they end short of the solution by up to 1e-5 of sigma0 (one of 8 points wrong by a metre).
+_TURNS_LEFT = 1e-4
 
 #: A column's key, its cells, what was solved, and what of it is uncertain.
 _Column = tuple[str, Sequence[CellValue], FloatArray, FloatArray]
@@ -28,18 +32,22 @@ def refuse_contradictions(builder: BookBuilder, content: SurveyContent) -> None:
     InputError
         Naming the first such cell.
     """
-    if content.table is None:
+    table = content.table
+    if table is None:
         return
     for key, cells, solved, uncertain in _columns(builder, content):
         numbers = np.array([v if isinstance(v, float) else np.nan for v in cells[: len(solved)]])
         allowed = ALIKE * np.fmax(np.fmax(1.0, np.abs(solved)), uncertain)
+        if content.georeference is not None and key not in table.columns:
+            sigma0 = content.georeference.sigma0
+            allowed += _TURNS_LEFT * sigma0 if sigma0 > LARGEST_RESIDUAL else 0.0
         differs = np.abs(numbers - solved) > allowed
         if key.startswith("sigma_"):  # in squares: rounding is left of points placed exactly
             differs &= np.abs(numbers**2 - solved**2) > ALIKE * (solved**2 + uncertain**2)
         differs |= np.isnan(numbers) != np.isnan(solved)
         if differs.any():
             row = int(np.flatnonzero(differs)[0])
-            about = {"key": key, "name": content.table.ids[row], "cell": cells[row] or "-"}
+            about = {"key": key, "name": table.ids[row], "cell": cells[row] or "-"}
             raise InputError(remark("survey.sheet_contradicts", solved=solved[row], **about))
 
 
@@ -54,8 +62,8 @@ def _columns(builder: BookBuilder, content: SurveyContent) -> Iterator[_Column]:
         yield key, cells[key], table[key], table["sigma_r"]
     if content.georeference is None or content.as_given:
         return
-    placed, cells = content.placed, builder.tables["tblResults"].cells
-    world, sigma = placed.xyz, placed.sigma
+    placed, results = content.placed, builder.tables["tblResults"].cells
+    near, sigma = placed.near, placed.sigma
     for i, axis in enumerate("ENH"):
-        yield axis, cells[axis], world[:, i], sigma[:, i]
-        yield f"sigma_{axis}", cells[f"sigma_{axis}"], sigma[:, i], table["sigma_r"]
+        yield f"n_{axis}", cells[f"n_{axis}"], near[:, i], sigma[:, i]
+        yield f"sigma_{axis}", results[f"sigma_{axis}"], sigma[:, i], table["sigma_r"]

@@ -125,11 +125,11 @@ def planning(builder: BookBuilder, content: SurveyContent) -> None:
     sheet.word("A7", "gsd")
     sheet.formula("B7", lines["gsd_mm"], form="0.00", name="gsd_mm")
     sheet.word("A9", "uncertainty", HEAD_FONT)
-    columns, cells = FORMULAS.columns("planning", facts, PLANNING), {"relief_cm": PLANNED_RELIEF}
-    sheet.table("tblPlan", columns, at=(11, 1), rows=len(PLANNED_RELIEF), cells=cells)
+    columns, rows = FORMULAS.columns("planning", facts, PLANNING), len(PLANNED_RELIEF)
+    sheet.table("tblPlan", columns, at=(11, 1), rows=rows, cells={"relief_cm": PLANNED_RELIEF})
     head = 11 + len(PLANNED_RELIEF) + 4
     sheet.word(f"A{head - 2}", "over_frame", HEAD_FONT)
-    columns, cells = FORMULAS.columns("over_frame", facts), {"share": FRAME_SHARES}
-    sheet.table("tblFrame", columns, at=(head, 1), rows=len(FRAME_SHARES), cells=cells)
+    columns, rows = FORMULAS.columns("over_frame", facts), len(FRAME_SHARES)
+    sheet.table("tblFrame", columns, at=(head, 1), rows=rows, cells={"share": FRAME_SHARES})
     sheet.worksheet.column_dimensions["A"].width = 36
     sheet.finish()

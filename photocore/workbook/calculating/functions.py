@@ -10,7 +10,7 @@ import math
 import operator
 import re
 from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache, reduce
+from functools import lru_cache, partial, reduce
 from typing import Any
 
 import numpy as np
@@ -95,10 +95,10 @@ def chosen(name: str, parts: Sequence[Callable[[], Cells]]) -> Cells:
         value = parts[0]()
         if not value.is_error.any():
             return value
-        test, yes, no = number_cells(value.is_error, kind=TRUTH), parts[1], lambda: value
+        test, yes, no = number_cells(value.is_error, kind=TRUTH), parts[1], partial(_itself, value)
     else:
         test, yes = parts[0](), parts[1]
-        no = parts[2] if len(parts) > 2 else lambda: number_cells([[0.0]], kind=TRUTH)
+        no = parts[2] if len(parts) > 2 else partial(single, 0.0, TRUTH)
     bad = test.is_error | (test.kinds == TEXT)
     holds = test.numbers != 0
     if not bad.any() and holds.all():
@@ -287,9 +287,16 @@ def _average(*given: Cells) -> Cells:
     return signed("/", FUNCTIONS["SUM"](*given), FUNCTIONS["COUNT"](*given))
 
 
+def _chosen_of(name: str, *values: Cells) -> Cells:
+    return chosen(name, [partial(_itself, value) for value in values])
+
+
+def _itself(value: Cells) -> Cells:
+    return value
+
+
 FUNCTIONS: dict[str, Callable[..., Cells]] = {
-    "IF": lambda *values: chosen("IF", [lambda v=v: v for v in values]),
-    "IFERROR": lambda *values: chosen("IFERROR", [lambda v=v: v for v in values]),
+    "IF": partial(_chosen_of, "IF"), "IFERROR": partial(_chosen_of, "IFERROR"),
     "AND": _logical(True), "OR": _logical(False),
     "NOT": lambda v: number_cells(v.numbers == 0, v.is_error, kind=TRUTH),
     "ISNUMBER": _is(NUMBER), "ISERROR": _is(ERROR), "ISTEXT": _is(TEXT), "ISBLANK": _is(BLANK),
