@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from bifocal.remarks import remark
-from bifocal.survey.remarks import LARGEST_RESIDUAL
 from bifocal.workbook.content import SurveyContent
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
@@ -16,9 +15,9 @@ from photocore.workbook.making.live_book import BookBuilder
 
 #: Numbers that differ by less are alike: of what is above 1, and of what is uncertain in a number.
 ALIKE = 1e-9
-#: The sheet's turns are a fixed number. Where control contradicts itself so much that the sheet says
-#: so, they end short of the solution by up to 1e-5 of sigma0 (one of 8 points wrong by a metre).
-_TURNS_LEFT = 1e-4
+#: The sheet's turns are a fixed number: they reach rounding where control agrees to a decimetre,
+#: and end short by up to 6e-4 of sigma0 where one of 8 points is wrong by a metre.
+_TURNS_LEFT = 1e-3
 
 #: A column's key, its cells, what was solved, and what of it is uncertain.
 _Column = tuple[str, Sequence[CellValue], FloatArray, FloatArray]
@@ -39,8 +38,7 @@ def refuse_contradictions(builder: BookBuilder, content: SurveyContent) -> None:
         numbers = np.array([v if isinstance(v, float) else np.nan for v in cells[: len(solved)]])
         allowed = ALIKE * np.fmax(np.fmax(1.0, np.abs(solved)), uncertain)
         if content.georeference is not None and key not in table.columns:
-            sigma0 = content.georeference.sigma0
-            allowed += _TURNS_LEFT * sigma0 if sigma0 > LARGEST_RESIDUAL else 0.0
+            allowed = np.fmax(allowed, _TURNS_LEFT * content.georeference.sigma0)
         differs = np.abs(numbers - solved) > allowed
         if key.startswith("sigma_"):  # in squares: rounding is left of points placed exactly
             differs &= np.abs(numbers**2 - solved**2) > ALIKE * (solved**2 + uncertain**2)
