@@ -16,8 +16,9 @@ from bifocal.survey.results import csv_columns
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.solved_survey import SolvedSurvey
 from bifocal.survey.tolerances import RULES
+from bifocal.workbook.changing.kinds import check_kind, is_same_kind
 from bifocal.workbook.changing.own_table import add_results
-from bifocal.workbook.changing.update import check_kind, is_same_kind, update_book
+from bifocal.workbook.changing.update import update_book
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.making.book import write_book
 from bifocal.workbook.template_workflow import MOST_ROWS, log_row

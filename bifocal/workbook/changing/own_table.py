@@ -14,10 +14,10 @@ from bifocal.remarks import remark
 from bifocal.survey.reference import Georeference
 from bifocal.survey.relief_table import ENTRIES
 from bifocal.survey.survey_input import SurveyInput
+from bifocal.workbook.changing.kinds import refuse_earlier
 from bifocal.workbook.changing.setup_update import add_sheets, write_corrections, write_options
 from bifocal.workbook.changing.update import (
     BookUpdate,
-    refuse_earlier,
     saved,
     store_named_cells,
 )

@@ -21,7 +21,7 @@ from photocore.workbook.calculating.syntax import Node, parts_of
 from photocore.workbook.calculating.values import (
     BLANK,
     NUMBER,
-    Cells,
+    CellArray,
     Unknown,
     number_cells,
 )
@@ -48,7 +48,7 @@ class _Formula(str):
 
 
 @dataclass(frozen=True, slots=True)
-class _Table:
+class _CalculatedTable:
     """A table: its sheet, the row of its headings, its last row, its columns by heading."""
 
     sheet: str
@@ -98,8 +98,8 @@ class Calculation:
     unknown: dict[str, str] = field(default_factory=dict)
     _sheets: dict[str, _Sheet] = field(default_factory=dict)
     _names: dict[str, str] = field(default_factory=dict)
-    _tables: dict[str, _Table] = field(default_factory=dict)
-    _values: dict[tuple[Any, ...], Cells | str | None] = field(default_factory=dict)
+    _tables: dict[str, _CalculatedTable] = field(default_factory=dict)
+    _values: dict[tuple[Any, ...], CellArray | str | None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._names = _texts_of(self.book.defined_names)
@@ -115,7 +115,9 @@ class Calculation:
                 top, left, bottom, _ = split_area(table.ref)
                 headings = [column.name.casefold() for column in table.tableColumns]
                 columns = {heading: left + i for i, heading in enumerate(headings)}
-                self._tables[table.name.casefold()] = _Table(sheet.title, top, bottom, columns)
+                self._tables[table.name.casefold()] = _CalculatedTable(
+                    sheet.title, top, bottom, columns
+                )
                 for number in columns.values():
                     long = self._sheets[sheet.title].long
                     long.setdefault(number, []).append((top + 1, bottom))
@@ -186,26 +188,26 @@ class Calculation:
             if isinstance(content, _Formula)
         ]
 
-    def _cell(self, title: str, row: int, column: int) -> Cells:
+    def _cell(self, title: str, row: int, column: int) -> CellArray:
         for first, last in self._sheets[title].long.get(column, ()):
             if first <= row <= last:
                 return self._column(title, (first, last), column).at([row - first])
         key = (title, row, column)
         value = self._values.get(key)
-        if isinstance(value, Cells):
+        if isinstance(value, CellArray):
             return value
         return self._once(key, lambda: self._single(title, row, column))
 
-    def _single(self, title: str, row: int, column: int) -> Cells:
+    def _single(self, title: str, row: int, column: int) -> CellArray:
         content = self._sheets[title].cells.get((row, column))
         if isinstance(content, _Formula):
             shown = self.results.get(title, {}).get(f"{column_letters(column)}{row}")
             if shown is not None:
-                return Cells.of([shown])
+                return CellArray.of([shown])
             return _no_blank(self._evaluated(content, (title, [row], column)), 1)
-        return Cells.of([content])
+        return CellArray.of([content])
 
-    def _once(self, at: tuple[Any, ...], make: Callable[[], Cells]) -> Cells:
+    def _once(self, at: tuple[Any, ...], make: Callable[[], CellArray]) -> CellArray:
         """Return what was calculated already, or calculate it."""
         if at not in self._values:
             self._values[at] = None  # meanwhile: met again, it follows from itself
@@ -217,16 +219,16 @@ class Calculation:
             except RecursionError:
                 self._values[at] = "a chain of formulas that is too long"
         value = self._values[at]
-        if not isinstance(value, Cells):
+        if not isinstance(value, CellArray):
             raise Unknown(value or "a formula that follows from itself")
         return value
 
-    def _column(self, title: str, rows: tuple[int, int], column: int) -> Cells:
+    def _column(self, title: str, rows: tuple[int, int], column: int) -> CellArray:
         """Return a long column: formulas that are alike are calculated together."""
         key = (title, f":{rows[0] - 1}", column)
         return self._once(key, lambda: self._calculated(title, rows, column))
 
-    def _calculated(self, title: str, rows: tuple[int, int], column: int) -> Cells:
+    def _calculated(self, title: str, rows: tuple[int, int], column: int) -> CellArray:
         sheet, (first, last) = self._sheets[title], rows
         contents = [sheet.cells.get((row, column)) for row in range(first, last + 1)]
         alike: dict[str, list[int]] = {}
@@ -240,7 +242,7 @@ class Calculation:
             for i, content in enumerate(contents):
                 if isinstance(content, _Formula):
                     alike.setdefault(_of_row(content, first + i), []).append(i)
-        cells = Cells.of([None if isinstance(c, _Formula) else c for c in contents])
+        cells = CellArray.of([None if isinstance(c, _Formula) else c for c in contents])
         for text, places in alike.items():
             numbers = [first + i for i in places]
             result = _no_blank(self._evaluated(text, (title, numbers, column)), len(places))
@@ -250,14 +252,14 @@ class Calculation:
             cells.texts[places] = result.texts
         return cells
 
-    def _evaluated(self, text: str, where: tuple[str, list[int], int]) -> Cells:
+    def _evaluated(self, text: str, where: tuple[str, list[int], int]) -> CellArray:
         return self._value(parts_of(text), where)
 
-    def _value(self, node: Node, where: tuple[str, list[int], int]) -> Cells:
+    def _value(self, node: Node, where: tuple[str, list[int], int]) -> CellArray:
         """Return the value of a part of a formula that stands in rows of a column of a sheet."""
         match node[0]:
             case "value":
-                value: Cells = node[1]
+                value: CellArray = node[1]
                 return value
             case "sign":
                 return signed(node[1], self._value(node[2], where), self._value(node[3], where))
@@ -270,7 +272,9 @@ class Calculation:
             case _:
                 return self._call(node[1], node[2:], where)
 
-    def _call(self, name: str, nodes: Sequence[Node], where: tuple[str, list[int], int]) -> Cells:
+    def _call(
+        self, name: str, nodes: Sequence[Node], where: tuple[str, list[int], int]
+    ) -> CellArray:
         if name == "ROW":
             return self._row(nodes, where)
         if name not in FUNCTIONS:
@@ -284,7 +288,7 @@ class Calculation:
         except TypeError:
             raise Unknown(f"{name} with {len(nodes)} arguments") from None
 
-    def _row(self, nodes: Sequence[Node], where: tuple[str, list[int], int]) -> Cells:
+    def _row(self, nodes: Sequence[Node], where: tuple[str, list[int], int]) -> CellArray:
         if not nodes:
             return number_cells(np.array(where[1], dtype=float)[:, None])
         kind, *parts = nodes[0]
@@ -294,7 +298,7 @@ class Calculation:
             return number_cells([[split_cell(parts[1])[0]]])
         raise Unknown("ROW")
 
-    def _named(self, name: str, where: tuple[str, list[int], int]) -> Cells:
+    def _named(self, name: str, where: tuple[str, list[int], int]) -> CellArray:
         key = name.casefold()
         text = self._sheets[where[0]].names.get(key) or self._names.get(key)
         if not text:
@@ -304,13 +308,13 @@ class Calculation:
             raise Unknown(name)
         return self._value(node, where)
 
-    def _table(self, name: str) -> _Table:
+    def _table(self, name: str) -> _CalculatedTable:
         table = self._tables.get(name.casefold())
         if table is None:
             raise Unknown(f"{name}[]")
         return table
 
-    def _of_table(self, parts: Sequence[Any], rows: list[int]) -> Cells:
+    def _of_table(self, parts: Sequence[Any], rows: list[int]) -> CellArray:
         name, part, heading = parts
         table = self._table(name)
         column = table.columns.get(heading.casefold())
@@ -328,7 +332,7 @@ class Calculation:
             return cells
         return cells.at([row - table.head - 1 for row in rows])
 
-    def _area(self, title: str, area: str, rows: list[int]) -> Cells:
+    def _area(self, title: str, area: str, rows: list[int]) -> CellArray:
         title = plain_title(title)
         if title not in self._sheets:
             raise Unknown(f"{title}!")
@@ -343,7 +347,7 @@ class Calculation:
             return self._cell(title, int(number), column)
         return self._once((title, area, 1), lambda: self._range(title, area))
 
-    def _range(self, title: str, area: str) -> Cells:
+    def _range(self, title: str, area: str) -> CellArray:
         """Return the cells of a range."""
         first, _, last = area.partition(":")
         if first.isalpha():
@@ -356,9 +360,9 @@ class Calculation:
             np.hstack([getattr(one, part) for one in columns]).reshape(1, -1)
             for part in ("numbers", "kinds", "texts")
         )
-        return Cells(numbers, kinds, texts, (bottom - top + 1, right - left + 1))
+        return CellArray(numbers, kinds, texts, (bottom - top + 1, right - left + 1))
 
-    def _down(self, title: str, top: int, bottom: int, column: int) -> Cells:
+    def _down(self, title: str, top: int, bottom: int, column: int) -> CellArray:
         """Return the cells of a column from one row to another, long columns at once."""
         parts, row = [], top
         long = self._sheets[title].long.get(column, ())
@@ -375,7 +379,7 @@ class Calculation:
                 row += 1
         if len(parts) == 1:
             return parts[0]
-        return Cells(
+        return CellArray(
             np.concatenate([one.numbers for one in parts]),
             np.concatenate([one.kinds for one in parts]),
             np.concatenate([one.texts for one in parts]),
@@ -417,14 +421,14 @@ def _of_row(text: str, row: int) -> str:
 _ROW_CELL = re.compile(r"(?<![\w$!'.:\"])([A-Z]{1,3})(\d+)(?![\w(:.!\"])")
 
 
-def _no_blank(cells: Cells, rows: int) -> Cells:
+def _no_blank(cells: CellArray, rows: int) -> CellArray:
     """Return what formulas show, one a row: 0 for a cell that is blank."""
     shape = (rows, 1)
     kinds = cells.kinds[:, :1]
     if cells.kinds.shape == shape and not (kinds == BLANK).any():
         return cells
     kinds = np.broadcast_to(kinds, shape)
-    return Cells(
+    return CellArray(
         np.broadcast_to(cells.numbers[:, :1], shape).copy(),
         np.where(kinds == BLANK, NUMBER, kinds).astype(np.uint8),
         np.broadcast_to(cells.texts[:, :1], shape).copy(),

@@ -8,7 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from photocore.workbook.calculating.values import TRUTH, Cells, Unknown, number_cells, text_cells
+from photocore.workbook.calculating.values import (
+    TRUTH,
+    CellArray,
+    Unknown,
+    number_cells,
+    text_cells,
+)
 
 Node = tuple[Any, ...]
 
@@ -117,7 +123,7 @@ class _Reader:
         nodes: list[Node] = []
         while self.sign() != ")":
             is_blank = self.sign() == ","
-            nodes.append(("value", Cells.of([None])) if is_blank else self.expression(0))
+            nodes.append(("value", CellArray.of([None])) if is_blank else self.expression(0))
             if self.sign() == ",":
                 self.next += 1
             elif self.sign() != ")":

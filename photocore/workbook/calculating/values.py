@@ -23,7 +23,7 @@ class Unknown(Exception):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Cells:
+class CellArray:
     """Values of cells: numbers, what each is, texts; rows of a table go down, ranges across.
 
     Attributes
@@ -41,7 +41,7 @@ class Cells:
     size: tuple[int, int] = (1, 1)
 
     @classmethod
-    def of(cls, items: list[CellValue], *, size: tuple[int, int] | None = None) -> Cells:
+    def of(cls, items: list[CellValue], *, size: tuple[int, int] | None = None) -> CellArray:
         """Return what stands in cells: across in a range of a size, down without one."""
         shape = (len(items), 1) if size is None else (1, len(items))
         if len(items) == 1 and type(items[0]) in (float, int):
@@ -73,13 +73,13 @@ class Cells:
         texts[self.kinds == TRUTH] = np.where(self.numbers, "TRUE", "FALSE")[self.kinds == TRUTH]
         return texts
 
-    def at(self, rows: Any) -> Cells:
+    def at(self, rows: Any) -> CellArray:
         """Return some of the rows."""
-        return Cells(self.numbers[rows], self.kinds[rows], self.texts[rows])
+        return CellArray(self.numbers[rows], self.kinds[rows], self.texts[rows])
 
-    def across(self) -> Cells:
+    def across(self) -> CellArray:
         """Return a column of a table as a range."""
-        return Cells(self.numbers.T, self.kinds.T, self.texts.T, (len(self.numbers), 1))
+        return CellArray(self.numbers.T, self.kinds.T, self.texts.T, (len(self.numbers), 1))
 
     def items(self) -> list[CellValue]:
         """Return what cells show: an empty text for a blank text, NaN for an error."""
@@ -104,7 +104,7 @@ def _kind(item: CellValue) -> int:
 _ERRORS = {"#N/A", "#DIV/0!", "#NUM!", "#VALUE!", "#REF!", "#NAME?", "#NULL!"}
 
 
-def number_cells(numbers: ArrayLike, bad: ArrayLike = False, *, kind: int = NUMBER) -> Cells:
+def number_cells(numbers: ArrayLike, bad: ArrayLike = False, *, kind: int = NUMBER) -> CellArray:
     """Return numbers as cells: an error where they are bad or not finite."""
     values = np.asarray(numbers, dtype=np.float64)
     wrong = ~np.isfinite(values) | bad
@@ -115,7 +115,7 @@ def number_cells(numbers: ArrayLike, bad: ArrayLike = False, *, kind: int = NUMB
         values = np.where(wrong, 0.0, values)
     else:
         kinds = np.full(values.shape, kind, dtype=np.uint8)
-    return Cells(values, kinds, _no_texts(values.shape))
+    return CellArray(values, kinds, _no_texts(values.shape))
 
 
 @lru_cache(maxsize=256)
@@ -126,11 +126,11 @@ def _no_texts(shape: tuple[int, ...]) -> np.ndarray[Any, np.dtype[np.object_]]:
     return texts
 
 
-def single(value: float, kind: int = NUMBER) -> Cells:
+def single(value: float, kind: int = NUMBER) -> CellArray:
     """Return one number or truth as a cell: an error where it is not finite."""
     if not math.isfinite(value):
         value, kind = 0.0, ERROR
-    return Cells(np.array([[value]]), _KINDS[kind], _no_texts((1, 1)))
+    return CellArray(np.array([[value]]), _KINDS[kind], _no_texts((1, 1)))
 
 
 #: Kinds of single cells, shared by all.
@@ -142,18 +142,18 @@ def among(kinds: np.ndarray[Any, np.dtype[np.uint8]], wanted: Sequence[int]) -> 
     return np.array([kind in wanted for kind in range(5)])[kinds]
 
 
-def text_cells(texts: ArrayLike, bad: ArrayLike = False) -> Cells:
+def text_cells(texts: ArrayLike, bad: ArrayLike = False) -> CellArray:
     """Return texts as cells."""
     words = np.asarray(texts, dtype=object)
     kinds = np.where(np.broadcast_to(bad, words.shape), ERROR, TEXT).astype(np.uint8)
-    return Cells(np.zeros(words.shape), kinds, words)
+    return CellArray(np.zeros(words.shape), kinds, words)
 
 
-def spread(*cells: Cells) -> list[Cells]:
+def spread(*cells: CellArray) -> list[CellArray]:
     """Return cells in one shape, single ones and rows repeated."""
     shape = np.broadcast_shapes(*(one.numbers.shape for one in cells))
     return [
-        Cells(
+        CellArray(
             np.broadcast_to(one.numbers, shape), np.broadcast_to(one.kinds, shape),
             np.broadcast_to(one.texts, shape), one.size,
         )
@@ -161,7 +161,7 @@ def spread(*cells: Cells) -> list[Cells]:
     ]  # fmt: skip
 
 
-def as_numbers(cells: Cells) -> tuple[FloatArray, BoolArray]:
+def as_numbers(cells: CellArray) -> tuple[FloatArray, BoolArray]:
     """Return numbers for arithmetic, and where there are none; a text that is a number is one."""
     numbers, bad = cells.numbers, np.asarray(cells.is_error | (cells.kinds == TEXT))
     if (cells.kinds == TEXT).any():

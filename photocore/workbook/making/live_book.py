@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import re
 from collections.abc import Hashable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -43,6 +42,7 @@ from photocore.workbook.making.look import (
     prepare_page,
 )
 from photocore.workbook.making.newbook import RowBlock, finish_book, finished_parts, new_workbook
+from photocore.workbook.making.repeated_rows import repeated_rows
 from photocore.workbook.making.sketch import Sketch
 from photocore.workbook.making.words import WordBook
 from photocore.workbook.reading.grid import TableArea, cell_name, plain_title, split_area
@@ -346,7 +346,7 @@ class SheetBuilder:
         sheet.row_dimensions[head - 1].height = 38
         self._add_table(name, columns, at, rows)
         if repeat:
-            block = _block(name, columns, head + 1, rows, cells, letters, short)
+            block = repeated_rows(name, columns, head + 1, rows, cells, letters, short)
             self.book.blocks[sheet.title] = block
             for i, formula in block.formulas.items():
                 sheet.cell(head + 1, left + i).value = f"={formula(head + 1)}"
@@ -479,47 +479,3 @@ _LABEL_PLACE = Alignment(wrap_text=True, vertical="bottom", horizontal="center")
 def _at(cells: Cells, column: LiveColumn, row: int) -> CellValue:
     values = cells.get(column.key, ())
     return values[row - 1] if row <= len(values) else column.spare
-
-
-def _block(
-    table: str,
-    columns: Sequence[LiveColumn],
-    first: int,
-    rows: int,
-    cells: Cells,
-    letters: Mapping[str, str],
-    short: bool,
-) -> RowBlock:
-    """Return the rows that `finish_book` makes of the prototype."""
-    listed = [list(cells.get(column.key, ())) for column in columns]
-    listed = [
-        values + [column.spare] * (rows - len(values))
-        for column, values in zip(columns, listed, strict=True)
-    ]
-    formulas = {}
-    if short:
-        for i, column in enumerate(columns):
-            if column.kind == "formula":
-                formulas[i] = short_formula(table, column.formula, letters, first - 1)
-    return RowBlock(row=first, columns=listed, formulas=formulas)
-
-
-def short_formula(table: str, text: str, letters: Mapping[str, str], head: int) -> RowText:
-    """Return a formula with A1 references.
-
-    Parameters
-    ----------
-    table : str
-        Name of the table.
-    text : str
-        The formula, with ``[@key]`` for the cell of the same row.
-    letters : mapping
-        Key to the letters of its column.
-    head : int
-        Row of the keys.
-    """
-    # The same in all rows, it takes no space in the file.
-    heads = rf"{table}\[\[#Headers\],\[(\w+)\]\]"
-    text = re.sub(heads, lambda key: f"${letters[key[1]]}${head}", text)
-    text = re.sub(r"\[@(\w+)\]", lambda key: letters[key[1]] + ROW_MARK, text)
-    return RowText(text)
