@@ -97,6 +97,7 @@ class Calculation:
     results: Mapping[str, Mapping[str, CellValue]] = field(default_factory=dict)
     unknown: dict[str, str] = field(default_factory=dict)
     _sheets: dict[str, _Sheet] = field(default_factory=dict)
+    _shown: dict[tuple[str, int, int], CellValue] = field(default_factory=dict)
     _names: dict[str, str] = field(default_factory=dict)
     _tables: dict[str, _CalculatedTable] = field(default_factory=dict)
     _values: dict[tuple[Any, ...], CellArray | str | None] = field(default_factory=dict)
@@ -121,6 +122,12 @@ class Calculation:
                 for number in columns.values():
                     long = self._sheets[sheet.title].long
                     long.setdefault(number, []).append((top + 1, bottom))
+        self._shown = {
+            (title, *split_cell(cell)): value
+            for title, cells_of in self.results.items()
+            for cell, value in cells_of.items()
+            if value is not None
+        }
         for title, (first, columns_of) in self.repeated.items():
             self._repeat(self._sheets[title], first, columns_of)
 
@@ -147,7 +154,7 @@ class Calculation:
             return self._cell(title, row, column).items()[0]
 
     def values(self) -> dict[tuple[str, int, int], CellValue]:
-        """Return what single cells with formulas show, by sheet, row and column.
+        """Return what single cells with formulas show, but those of ``results``, by their place.
 
         Raises
         ------
@@ -159,7 +166,9 @@ class Calculation:
                 (title, *at): self._cell(title, *at).items()[0]
                 for title, sheet in self._sheets.items()
                 for at, content in sheet.cells.items()
-                if isinstance(content, _Formula) and sheet.typed.get(at[1], (0, ()))[0] != at[0]
+                if isinstance(content, _Formula)
+                and (title, *at) not in self._shown
+                and sheet.typed.get(at[1], (0, ()))[0] != at[0]
             }
 
     def columns(self, title: str, first: int) -> dict[int, list[CellValue]]:
@@ -201,9 +210,8 @@ class Calculation:
     def _single(self, title: str, row: int, column: int) -> CellArray:
         content = self._sheets[title].cells.get((row, column))
         if isinstance(content, _Formula):
-            shown = self.results.get(title, {}).get(f"{column_letters(column)}{row}")
-            if shown is not None:
-                return CellArray.of([shown])
+            if (title, row, column) in self._shown:
+                return CellArray.of([self._shown[title, row, column]])
             return _no_blank(self._evaluated(content, (title, [row], column)), 1)
         return CellArray.of([content])
 

@@ -116,8 +116,7 @@ class BookBuilder:
         repeated = {title: (block.row, block.columns) for title, block in self.blocks.items()}
         calculation = Calculation(self.book, repeated, self.results)
         for (title, row, column), value in calculation.values().items():
-            if self.results[title].get(cell := cell_name(row, column)) is None:
-                self.results[title][cell] = value
+            self.results[title][cell_name(row, column)] = value
         for title, cell, shown in self._titles:
             shown.v = str(self.results[title][cell])
         for title, block in self.blocks.items():
