@@ -254,9 +254,11 @@ def _corners(rows: Any, least: int) -> FloatArray:
     """Return positions as X, Y, relief, NaN where the last is not given."""
     corners = as_floats([[*row, np.nan][:3] for row in rows], "coordinates")
     # NaN of the relief that is not given is not above anything.
-    if len(corners) < least or not (np.abs(corners[:, :2]) <= LARGEST).all() or (
-        np.abs(corners[:, 2]) > LARGEST
-    ).any():
+    if (
+        len(corners) < least
+        or not (np.abs(corners[:, :2]) <= LARGEST).all()
+        or (np.abs(corners[:, 2]) > LARGEST).any()
+    ):
         raise ValueError("coordinates")
     return corners
 

@@ -276,5 +276,5 @@ def test_a_survey_file_with_an_impossible_value_is_refused_when_it_is_read(tmp_p
     photos = "" if line.startswith("photos") else 'far = "a.jpg"\nnear = "b.jpg"\n'
     path = tmp_path / "survey.toml"
     path.write_text(f'[[pair]]\nname = "w"\n{photos}{line}\n')
-    with pytest.raises(InputError, match="one photo is named twice|expected"):
+    with pytest.raises(InputError, match=r"one photo is named twice|expected"):
         read_survey_file(path)
