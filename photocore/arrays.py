@@ -20,6 +20,10 @@ BoolArray = NDArray[np.bool_]
 ByteArray = NDArray[np.uint8]
 
 
+#: Longer lists are not searched for true and false, which takes longer than all the rest.
+_LOOKED_AT = 10_000
+
+
 def as_floats(value: ArrayLike, name: str) -> FloatArray:
     """Return value as a float64 array; what is masked becomes NaN.
 
@@ -32,7 +36,7 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
         array = np.asarray(value)
         # numpy would take the text "17.5", true for 1, a date for its days, and drop what is
         # imaginary; no file of ours means it.
-        if array.dtype.kind in "USbcmM" or _holds_truth(value):
+        if array.dtype.kind in "USbcmM" or (array.size < _LOOKED_AT and _holds_truth(value)):
             raise TypeError
         if isinstance(value, np.ma.MaskedArray):
             plain = np.asarray(value.data, dtype=np.float64)

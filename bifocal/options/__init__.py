@@ -334,7 +334,7 @@ class DrawingOptions:
         tuple[str, ...], Typed(SECTION, "x=M|y=M|'X,Y X,Y ...'", flag="--section")
     ] = ()
     """Section of the relief as DXF and SVG [m], beside a drawing; repeat it."""
-    contours: Annotated[float | None, Typed(Length(least=1e-6), "M")] = None
+    contours: Annotated[float | None, Typed(Length(least=1e-4), "M")] = None
     """Between contour lines [m].  [default: by relief]"""
     layers: Literal["language", "bifocal", "ncs"] = "language"
     """Names of the layers of DXF drawings: in the language (English BIFOCAL_POINTS, Italian
