@@ -21,8 +21,8 @@ MOST_BENT, CERTAIN = 0.2, 2.0
 #: what of k the scale takes up, certainly and by chance: errors of r over sigma_r are 0.8 to
 #: 1.4 on simulated pairs of nearly one axis whose lens bends the wall by 1 to 7 px. [px, -]
 BEND_BY_K, TAKEN_UP, OR_MORE = 144.0, 0.2, 0.1
-#: Unit of lengths to which nothing gives a scale.
-NO_UNIT = "none"
+#: Unit of lengths to which nothing gives a scale, and of all others.
+NO_UNIT, METRES = "none", "m"
 #: Keys of doubts that leave no word of how good relief is, and of those about which plane is the
 #: wall; how these began in files of versions that kept no keys.
 MISFITS = frozenset(
@@ -95,7 +95,7 @@ def unit_of(extra: Mapping[str, Any]) -> str:
     return (
         NO_UNIT
         if extra.get("unit") == NO_UNIT or any(doubt.startswith(untold) for doubt in doubts)
-        else "m"
+        else METRES
     )
 
 
