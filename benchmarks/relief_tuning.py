@@ -12,14 +12,14 @@ import importlib
 import pkgutil
 import sys
 from contextlib import ExitStack
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
 from unittest.mock import patch
 
 import cv2
 
 from benchmarks.relief_ablation import FIGURES, figures, shots
 from bifocal import relief_maps
-from bifocal.relief_maps import flow, tuning
+from bifocal.relief_maps import flow
 
 #: Size of the photos, and how much coarser their pixels are than those of the ablation.
 SCENES = {
@@ -34,6 +34,13 @@ MODULES = [
     importlib.import_module(f"bifocal.relief_maps.{module.name}")
     for module in pkgutil.iter_modules(relief_maps.__path__)
 ]
+#: All tuned numbers, a stage each.
+STAGES = {
+    stage: numbers
+    for module in MODULES
+    for stage, numbers in vars(module).items()
+    if stage.isupper() and is_dataclass(numbers) and type(numbers).__name__.endswith("Tuning")
+}
 
 
 def put(stage: str, numbers: object) -> ExitStack:
@@ -68,8 +75,8 @@ def sweep(name: str, stages: list[str]) -> None:
         base = figures(shot)
     print(f"\n{name:34s}" + " ".join(f"{heading:>11s}" for heading in FIGURES))
     print(" " * 34 + " ".join(f"{value:11.3f}" for value in base.values()))
-    for stage in stages or [word for word in vars(tuning) if word.isupper()]:
-        numbers = getattr(tuning, stage)
+    for stage in stages or STAGES:
+        numbers = STAGES[stage]
         for number in (field.name for field in fields(numbers)):
             for factor in (0.5, 2.0):
                 measured = measure if stage in UPSTREAM else once

@@ -9,41 +9,48 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-ROOMS = sorted(path.parent for path in ROOT.glob("bifocal/**/tuning.py"))
+TEXTS = {path: path.read_text("utf-8") for path in sorted(ROOT.glob("bifocal/**/*.py"))}
+#: Modules with classes of tuned numbers.
+MODULES = [path for path, text in TEXTS.items() if re.search(r"^class \w+Tuning:", text, re.M)]
 
 
-def module_of(room: Path) -> str:
-    return ".".join((room / "tuning").relative_to(ROOT).parts)
+def name_of(path: Path) -> str:
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts)
 
 
-def numbers(room: Path) -> set[str]:
-    """Return the numbers of a room, as `STAGE.name`."""
+def numbers(path: Path) -> set[str]:
+    """Return the numbers of a module, as `STAGE.name`."""
+    stages = re.findall(r"^([A-Z]\w*) = \w+Tuning\(\)$", TEXTS[path], re.M)
+    module = importlib.import_module(name_of(path))
+    fields = {stage: dataclasses.fields(getattr(module, stage)) for stage in stages}
+    assert len(fields) == len(re.findall(r"^class \w+Tuning:", TEXTS[path], re.M)), path
+    return {f"{stage}.{field.name}" for stage in stages for field in fields[stage]}
+
+
+def uses(path: Path) -> set[str]:
+    """Return all that the package takes of a module's tuned numbers, as `STAGE.name`."""
+    stages = {number.partition(".")[0] for number in numbers(path)}
+    listed = {path: stages}
+    for importing, text in TEXTS.items():
+        for names in re.findall(rf"from {name_of(path)} import (\([^)]*\)|.*)", text):
+            imported = stages & set(re.findall(r"[A-Z]\w+", names))
+            for stage in imported:
+                assert re.search(rf"\b{stage}\.\w", text), f"{importing} has no use for {stage}"
+            listed.setdefault(importing, set()).update(imported)
     return {
-        f"{stage}.{field.name}"
-        for stage, value in vars(importlib.import_module(module_of(room))).items()
-        if stage.isupper()
-        for field in dataclasses.fields(value)
+        f"{stage}.{name}"
+        for importing, taken in listed.items()
+        for stage in taken
+        for name in re.findall(rf"(?<![\w.]){stage}\.(\w+)", TEXTS[importing])
     }
 
 
-def uses(room: Path) -> set[str]:
-    """Return all that the package asks of a room's tuning, as `STAGE.name`."""
-    asked = set()
-    for path in ROOT.glob("bifocal/**/*.py"):
-        text = path.read_text("utf-8")
-        for names in re.findall(rf"from {module_of(room)} import (\([^)]*\)|.*)", text):
-            for stage in re.findall(r"[A-Z]\w+", names):
-                found = re.findall(rf"\b{stage}\.(\w+)", text)
-                assert found, f"{path} imports {stage} and asks nothing of it"
-                asked |= {f"{stage}.{name}" for name in found}
-    return asked
-
-
-@pytest.mark.parametrize("room", ROOMS, ids=lambda room: room.name)
-def test_every_tuned_number_is_a_typed_field_that_says_what_it_is(room):
-    text = (room / "tuning.py").read_text("utf-8")
-    lines = text.splitlines()
-    for stage in (node for node in ast.parse(text).body if isinstance(node, ast.ClassDef)):
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_every_tuned_number_is_a_typed_field_that_says_what_it_is(path):
+    lines = TEXTS[path].splitlines()
+    for stage in (node for node in ast.parse(TEXTS[path]).body if isinstance(node, ast.ClassDef)):
+        if not stage.name.endswith("Tuning"):
+            continue
         assert ast.get_docstring(stage), stage.name
         for field in (node for node in stage.body if isinstance(node, ast.AnnAssign)):
             above = lines[field.lineno - 2].strip()
@@ -53,14 +60,14 @@ def test_every_tuned_number_is_a_typed_field_that_says_what_it_is(room):
             assert field.value is not None
 
 
-@pytest.mark.parametrize("room", ROOMS, ids=lambda room: room.name)
-def test_no_tuned_number_can_be_changed_on_the_way(room):
-    for name in sorted(numbers(room)):
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_no_tuned_number_can_be_changed_on_the_way(path):
+    for name in sorted(numbers(path)):
         stage, _, number = name.partition(".")
         with pytest.raises(dataclasses.FrozenInstanceError):
-            setattr(getattr(importlib.import_module(module_of(room)), stage), number, 0)
+            setattr(getattr(importlib.import_module(name_of(path)), stage), number, 0)
 
 
-@pytest.mark.parametrize("room", ROOMS, ids=lambda room: room.name)
-def test_every_tuned_number_is_used(room):
-    assert uses(room) == numbers(room)
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_every_tuned_number_is_used(path):
+    assert uses(path) == numbers(path)

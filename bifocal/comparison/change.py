@@ -172,6 +172,9 @@ def compare(
     if level >= 1:
         raise InputError(f"level: {level:g} is no probability; give for example 0.01.")
     difference, two_surfaces, remarks = difference_of(before, after)
+    wall = difference.r.size * difference.gsd**2
+    if smallest > wall:
+        raise InputError(remark("compare.patch_too_large", smallest=smallest, area=wall))
     radius = np.sqrt(smallest / (4 * np.pi))
     side = max(difference.gsd, radius / 2, max(difference.shape) * difference.gsd / CHANGE.side)
     pixels = max(1, round(side / difference.gsd))

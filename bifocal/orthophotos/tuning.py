@@ -267,8 +267,6 @@ class ColoursTuning:
 
     #: Halvings of the picture; holes up to 2^8 px wide are closed.
     halvings: int = 8
-    #: Largest coefficient of vignetting; lenses have some tenths.
-    steepest: float = 100.0
     #: Side of the grid on which two photos are compared. [px]
     compare: int = 400
     #: Fewer common pixels than this say nothing about colours. [px]

@@ -15,6 +15,7 @@ from bifocal.model.relief_map import Quality, ReliefMap
 from bifocal.rays import object_rays, plane_position
 from bifocal.relief_maps import coarse_level, flow, seed, smoothing
 from bifocal.relief_maps.exposure import match_exposure
+from bifocal.relief_maps.flow import FLOW
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import (
     LONGEST_SIDE,
@@ -25,13 +26,31 @@ from bifocal.relief_maps.frame import (
 )
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
 from bifocal.relief_maps.registration import Registration, check_registration
+from bifocal.relief_maps.seed import SEED
 from bifocal.relief_maps.stages import relief_map
-from bifocal.relief_maps.tuning import FLOW, LIMITS, SEED
 from bifocal.remarks import remark
 from photocore.arrays import ByteArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LimitsTuning:
+    """What is refused, and what small frames can afford."""
+
+    #: Working frames of fewer pixels can afford the finer search. [px]
+    small: float = 3e6
+    #: Relief maps of more pixels are refused: a unit has been mistaken. [px]
+    largest_map: float = 400e6
+    #: A GSD coarser than this, and coarser than twice the far photo's pixel, is a slip, too. [m]
+    coarsest_gsd: float = 0.2
+    #: So is a GSD coarser than the photo's that leaves fewer pixels a side. [px]
+    fewest_pixels: int = 64
+    #: Matching needs this many working pixels a side. [px]
+    smallest_work: int = 24
+
+
+LIMITS = LimitsTuning()
 #: Coarsening of the working frame, and the most pixels it may have. Every second pixel of a frame
 #: is matched in `fast`, but all of them refine it.
 QUALITIES = {"fast": (2.0, 3.2e6), "standard": (1.0, 9e6), "best": (1.0, 30e6)}

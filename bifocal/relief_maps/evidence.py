@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import cv2
@@ -11,8 +12,71 @@ from bifocal.model.image import local_contrast
 from bifocal.relief_maps import edges
 from bifocal.relief_maps.flow import Measurement
 from bifocal.relief_maps.frame import Frame, offsets
-from bifocal.relief_maps.tuning import EVIDENCE
 from photocore.arrays import BoolArray, Float32Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EvidenceTuning:
+    """What is believed of a measurement."""
+
+    #: Limit of a validated pixel across the radius. [px]
+    #: Evidence: half / twice, beyond 3 cm [%]: facade +0.08 / +0.01, plaster facade +0.72 / +0.13,
+    #: church +0.29 / -0.08.
+    across_limit: float = 0.5
+    #: Limit of a validated pixel there and back. [px]
+    #: Evidence: half / twice, beyond 3 cm [%]: facade +0.89 / -0.17, plaster facade +1.19 / -0.80,
+    #: church +3.07 / -0.57.
+    loop_limit: float = 0.8
+    #: A measured relief is known better than this share of d2.
+    #: Evidence: half / twice, beyond 3 cm [%]: facade +0.68 / +0.00, plaster facade +1.52 / -0.32,
+    #: church +0.31 / -0.03.
+    sigma_share: float = 0.01
+    #: Sides of the blocks, fine and coarse, that a pixel's validated surroundings consist of. [px]
+    #: Evidence: plaster, façade 12: blocks of 4 px clip relief that is right, 10.5 instead of 9.6 %
+    #: beyond 3 cm.
+    blocks: tuple[int, int] = (16, 64)
+    #: A block with fewer supported pixels says nothing. [px]
+    #: Evidence: half / twice, beyond 3 cm [%]: facade +0.00 / -0.00, plaster facade +0.02 / +0.02,
+    #: church +0.00 / -0.00.
+    fewest: int = 6
+    #: Share of d2 by which a pixel may leave the range of its surroundings.
+    #: Evidence: half / twice, beyond 3 cm [%]: facade +0.05 / +0.00, plaster facade +0.00 / +0.08,
+    #: church +0.11 / -0.14.
+    slack: float = 0.002
+    #: Slope outwards, as a share of that of camera 2's rays, times the square of the misfit of the
+    #: photos from which a pixel counts as not measured; such pixels are placed all the same. To be
+    #: multiplied by a power of 1 - d2 / d1, the parallax of a step whose strip is one pixel wide:
+    #: the less of it, the less misfit tells the strip. [grey levels²]
+    #: Evidence: of 14 features of façade 61 and loggia 301 these two tell best; façade 81, left out
+    #: 1.57 instead of 1.33 % of the orthophoto beyond 1 px.
+    falls_away: float = 20.0
+    #: That power.
+    #: Evidence: at 95 % measured 35/19 bears 6.3 and 4.2 % false (façade 81), 35/28 2.0 and 4.8 %
+    #: (façade 83).
+    falls_power: float = 1.4
+    #: The same where matching is imprecise, without the power. [grey levels²]
+    #: Evidence: church_2 and church_1: measured 72 and 65 % of the points, as good as the 69 and 62
+    #: % that `falls_away` leaves.
+    falls_away_imprecise: float = 25.0
+    #: Farther away is lost, not imprecise. A pixel that does not come back to itself is measured
+    #: all the same if it lands no farther away: flow back runs as a ramp over every step, on its
+    #: seen side, too. [px]
+    #: Evidence: façade 81: 3.3 % failed by it alone, nine in ten of them right to a centimetre.
+    lost_loop: float = 5.0
+    #: Such a pixel is measured if the photos fit at it better than this. [grey levels]
+    #: Evidence: half / twice, beyond 3 cm [%]: facade +0.12 / -0.05, church +0.15 / -0.14.
+    pardon_misfit: float = 6.0
+    #: Such a pixel is measured if they have this contrast at it: in weaker texture anything fits.
+    #: [grey levels]
+    #: Evidence: half / twice, beyond 3 cm [%]: facade -0.00 / +0.01, church +0.00 / +0.01.
+    pardon_contrast: float = 3.0
+    #: A pixel of a plain wall whose own relief is so far off its plane patch is not measured: one
+    #: of the two is wrong. [sigma]
+    #: Evidence: façade 62: wrongly measured 8.7 to 7.6 %, measured beyond 3 cm 4.8 to 3.8 %.
+    off_patch: float = 3.0
+
+
+EVIDENCE = EvidenceTuning()
 
 
 def validated(

@@ -11,8 +11,60 @@ from bifocal import rays
 from bifocal.model.image import QUIET_BLUR, local_contrast, noise
 from bifocal.relief_maps.flow_refinement import refined
 from bifocal.relief_maps.frame import Frame, offsets, radial_stretch, zoom_map
-from bifocal.relief_maps.tuning import FLOW
 from photocore.arrays import BoolArray, ByteArray, Float32Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlowTuning:
+    """Flow between the photos."""
+
+    #: Weight of smoothness.
+    #: Evidence: 30 is as good before noise is taken out, 20 keeps more detail for it.
+    alpha: float = 20.0
+    #: The same on plain walls, between blurred photos: the texture lies in the noise.
+    #: Evidence: plaster, façade 62: 6.4 to 6.1 mm of median error, measured RMSE 14 to 11.6 mm;
+    #: textured façades get worse by it.
+    plain_alpha: float = 60.0
+    #: A photo is plain if this share of it has less contrast within 15 px, blurred, than its noise
+    #: is. [per cent]
+    #: Evidence: 0.4 to 0.7 times on plaster (façades 12 and 62, loggia 302), whose median edges and
+    #: bars can lift to 4; at half the resolution, where a smoother flow does harm, 1.2 and more;
+    #: 2.9 to 10 on textured façades and churches.
+    plain_share: int = 30
+    #: Weight of constant grey value, against 10 for constant gradient.
+    #: Evidence: half / twice, beyond 3 cm [%]: facade +0.99 / -0.84, plaster facade +0.32 / -1.14,
+    #: church +0.76 / -0.44.
+    delta: float = 10.0
+    #: Stride of the inverse search's patches. [px]
+    stride: int = 3
+    #: The same in small frames: a little better and half as slow again. [px]
+    #: Evidence: half / twice, beyond 3 cm [%]: facade +0.03 / +0.43, plaster facade +1.01 / -0.42,
+    #: church -0.24 / -0.16.
+    fine_stride: int = 2
+    #: The pyramid starts this many halvings down: the seed replaces what lies above.
+    #: Evidence: half / twice, beyond 3 cm [%]: facade +0.00 / +0.00, plaster facade +0.00 / -0.13,
+    #: church +0.00 / +0.10.
+    coarsest: int = 3
+    #: Photos that miss the radius by more, in the median, are not refined: they fit no better than
+    #: that. [px]
+    #: Evidence: fast, church_2: 0.45 px, refined 2.5 instead of 2.0 % beyond 10 cm; semireal
+    #: church: 0.04 px.
+    fit: float = 0.3
+    #: Window of the local error across the radius. [px]
+    #: Evidence: half / twice, beyond 3 cm [%]: facade -0.30 / +0.38, plaster facade -1.48 / +1.94,
+    #: church -0.50 / +0.44.
+    window: int = 31
+    #: Errors across the radius count no more than this. [px]
+    #: Evidence: half / twice, beyond 3 cm [%]: facade +0.02 / +0.24, plaster facade -0.76 / +0.59,
+    #: church -0.04 / +0.08.
+    clip: float = 2.0
+    #: The local error across the radius is no less than this. [px]
+    #: Evidence: half / twice, beyond 3 cm [%]: facade -0.09 / +0.39, plaster facade -0.03 / +0.09,
+    #: church -0.03 / +0.09.
+    floor: float = 0.02
+
+
+FLOW = FlowTuning()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import cv2
@@ -13,8 +14,59 @@ from bifocal.model.relief_map import Quality
 from bifocal.rays import Foot, magnification, reduction
 from bifocal.relief_maps.flow import Measurement
 from bifocal.relief_maps.frame import Frame, offsets, values_at, zoom_map
-from bifocal.relief_maps.tuning import PROJECTION
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray, IntArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProjectionTuning:
+    """Pixels of photo 1 put on the map."""
+
+    #: A relief agrees with the pixel it came from to this share of d1.
+    #: Evidence: half / twice, beyond 3 cm [%]: facade -0.01 / +0.08, plaster facade -0.05 / +0.04,
+    #: church +0.01 / +0.02.
+    agreement: float = 0.0004
+    #: A ramp that stretches the wall by more than this is flow running over a hidden strip.
+    #: Evidence: half / twice, beyond 3 cm [%]: facade +1.22 / -0.04, plaster facade +3.92 / +0.06,
+    #: church +2.75 / -0.17.
+    stretch: float = 1.3
+    #: A pixel that covers less of the wall than this sees the side face of a step.
+    #: Evidence: half / twice, beyond 3 cm [%]: facade +0.05 / +24.04, plaster facade -0.04 / +8.66,
+    #: church +0.07 / +19.74.
+    side_face: float = 0.5
+    #: Steps outwards when a hidden strip is filled. [px]
+    #: Evidence: half / twice, beyond 3 cm [%]: facade +0.00 / +0.09, plaster facade +0.00 / -0.10,
+    #: church +0.00 / +0.08.
+    leap: int = 3
+    #: The most steps are 2 to the power of this.
+    #: Evidence: half / twice, beyond 3 cm [%]: plaster facade +0.00 / +0.00, church -0.00 / +0.00.
+    leaps: int = 7
+    #: How much higher relief to be believed must be than what it covers in photo 2: parallax and
+    #: share of d2. [px, -]
+    #: Evidence: half / twice, beyond 3 cm [%]: facade +0.05 / +0.04, plaster facade -0.01 / +0.04,
+    #: church +0.02 / +0.01.
+    covers: tuple[float, float] = (0.7, 0.0005)
+    #: The same for any relief, which covers only what is not valid. [px, -]
+    #: Evidence: church_1, without it: 14.3 instead of 14.2 % beyond 3 cm, 178 instead of 126 scraps
+    #: of picture.
+    covers_invalid: tuple[float, float] = (1.5, 0.002)
+    #: Hidden relief farther than this from measured one must be surrounded by it. [px]
+    #: Evidence: half / twice, beyond 3 cm [%]: facade +0.00 / +0.00, plaster facade +0.01 / -0.00,
+    #: church +0.00 / +0.00.
+    fringe_hidden: float = 24.0
+    #: The same for interpolated relief. [px]
+    #: Evidence: benchmarks/relief_tuning.py: half of it and twice it change nothing there.
+    fringe_interpolated: float = 100.0
+    #: Relief leans on squares of this side. [px]
+    #: Evidence: half / twice, beyond 3 cm [%]: facade +0.00 / +0.00, plaster facade +0.00 / +0.01.
+    grain: int = 3
+    #: The same on plain walls, where specks of interpolated pixels lie in strips that a cornice
+    #: hides. [px]
+    #: Evidence: plaster, façade 511, 6 MP; 7, 11, 15 px: 73, 26, 23 scraps of picture, RMSE off
+    #: edges 37.4, 39.7, 49.9 mm.
+    grain_plain: int = 11
+
+
+PROJECTION = ProjectionTuning()
 
 
 class MapBands(NamedTuple):

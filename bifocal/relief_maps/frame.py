@@ -16,11 +16,24 @@ from bifocal.model.grid import Bounds, Grid, bounds_of, cut
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.model.ray_field import RayField
-from bifocal.relief_maps.tuning import FRAME
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
 from photocore.errors import GeometryError, InputError
 
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrameTuning:
+    """Both photos on one grid."""
+
+    #: A plane grid that fits the pixels of a photo this well is not resampled. [px]
+    same_lattice: float = 0.002
+    #: Parts of an oblique photo this much coarser than its middle are left out.
+    coarsest_share: float = 3.0
+    #: Side of the raster on which the pixels' shapes are taken. [px]
+    stretch_side: int = 64
+
+
+FRAME = FrameTuning()
 #: cv2.remap counts pixels in 16 bits. [px]
 LONGEST_SIDE = 32_000
 

@@ -6,6 +6,7 @@ chance. A few lost pixels lie on ramps that the photos tell apart (`edges`); wid
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -13,12 +14,27 @@ import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.relief_maps import forward_projection
+from bifocal.relief_maps.edges import EDGES
+from bifocal.relief_maps.evidence import EVIDENCE
 from bifocal.relief_maps.flow import Measurement
-from bifocal.relief_maps.forward_projection import MapBands
+from bifocal.relief_maps.forward_projection import PROJECTION, MapBands
 from bifocal.relief_maps.frame import Frame
-from bifocal.relief_maps.tuning import EDGES, EVIDENCE, PROJECTION, REGIONS
 from photocore.arrays import BoolArray, Float32Array
 
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegionBlockTuning:
+    """Regions that camera 2 cannot see."""
+
+    #: Side of the blocks that regions consist of, half of whose pixels are lost. [px]
+    #: Evidence: half / twice, beyond 3 cm [%]: church +0.00 / +0.00.
+    block: int = 8
+    #: A part that camera 2 cannot see counts from so many blocks a side on.
+    #: Evidence: benchmarks/relief_tuning.py: half of it and twice it change nothing there.
+    fewest_blocks: int = 3
+
+
+REGIONS = RegionBlockTuning()
 #: Regions of fewer blocks a side are two ramps, one from either rim, that meet.
 NARROWEST = 2 * (2 * EDGES.reach) // REGIONS.block + 1
 

@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
-from bifocal.relief_maps.tuning import SIGMA
 from photocore.arrays import Float32Array, FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SigmaTuning:
+    """Sigma of orientation."""
+
+    #: Cells of the map in either direction between which the covariance is interpolated: it is a
+    #: polynomial of low degree.
+    #: Evidence: a pair tilted by 20 degrees: exact to 0.1 %.
+    nodes: int = 24
+
+
+SIGMA = SigmaTuning()
 
 
 def orientation_sigma(pair: Pair, relief: Float32Array, grid: Grid) -> Float32Array:

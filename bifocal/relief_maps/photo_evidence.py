@@ -15,8 +15,35 @@ from bifocal.rays import straight
 from bifocal.relief_maps.forward_projection import hidden_on_map
 from bifocal.relief_maps.frame import values_at
 from bifocal.relief_maps.registration import least_absolute
-from bifocal.relief_maps.tuning import FUSION
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WitnessTuning:
+    """Photos of a set compared with each other."""
+
+    #: Side of the windows over which photos are compared. [px]
+    #: Evidence: balcony 1203 and façade 311, quarter frames, beyond 3 cm [%]: 3 px 7.72 and 1.57, 5
+    #: px 7.80 and 1.53, 7 px 8.00 and 1.54.
+    window: int = 5
+    #: Photos differ by so many times the usual at most, and where fewer than two see a place.
+    #: Evidence: balcony 1203 and façade 311, quarter frames, beyond 3 cm [%]: 2 8.05 and 1.59, 3
+    #: 7.80 and 1.53, 5 7.78 and 1.53; 30 grey levels, 30 times the usual, 9.18 and 1.91.
+    worst: float = 3.0
+    #: Photos are taken to differ by so much at least. [grey levels]
+    #: Evidence: chosen: rounding.
+    quiet: float = 0.5
+    #: A photo so many times finer than the map is reduced first.
+    #: Evidence: as the working frame.
+    coarser: float = 1.5
+    #: Places a side at which exposures are compared.
+    exposure_samples: int = 160
+    #: With fewer places in common a photo keeps its exposure.
+    #: Evidence: as for a pair.
+    exposure_least: int = 200
+
+
+WITNESSES = WitnessTuning()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,7 +68,7 @@ class Witness:
         """Return a photo prepared for a map's pixels."""
         size = (grey.shape[1], grey.shape[0])
         scale = min(1.0, photo.gsd(size) / gsd)
-        if scale < 1 / FUSION.coarser:
+        if scale < 1 / WITNESSES.coarser:
             small = (max(16, round(size[0] * scale)), max(16, round(size[1] * scale)))
             grey = np.asarray(cv2.resize(grey, small, interpolation=cv2.INTER_AREA), np.uint8)
         return cls(photo, grey, size)
@@ -98,7 +125,7 @@ def misfit(
     -------
     ndarray of float32
         Mean of what all that see a place and of what the two most alike say of it, averaged over
-        the best of the windows that contain it; ``FUSION.worst`` where fewer than two photos see
+        the best of the windows that contain it; ``WITNESSES.worst`` where fewer than two photos see
         it, and elsewhere.
 
     Notes
@@ -107,7 +134,7 @@ def misfit(
     at 30 grey levels one strong edge decided for its whole window. A window about the pixel mixes
     both sides of a step; of those that contain it one lies on its own side.
     """
-    worst, side = float(FUSION.worst), int(FUSION.window)
+    worst, side = float(WITNESSES.worst), int(WITNESSES.window)
     square, reach = (np.ones((n, n), np.uint8) for n in (side, 2 * side - 1))
     around = cv2.dilate(where.astype(np.uint8), reach) > 0
     around &= np.isfinite(relief)
@@ -139,7 +166,7 @@ def exposed_alike(
     ``I1 = a + b I2 + c x + d y``, robustly, over a few thousand places of the map; and by how many
     grey levels they then differ in the median.
     """
-    step = max(1, max(grid.shape) // FUSION.exposure_samples)
+    step = max(1, max(grid.shape) // WITNESSES.exposure_samples)
     part = np.zeros(grid.shape, bool)
     part[step // 2 :: step, step // 2 :: step] = True
     part &= np.isfinite(relief)
@@ -150,7 +177,7 @@ def exposed_alike(
     for number, witness in enumerate(witnesses):
         for other in shown[:number]:
             use = np.isfinite(shown[number]) & np.isfinite(other)
-            if use.sum() < FUSION.exposure_least:
+            if use.sum() < WITNESSES.exposure_least:
                 continue
             place = witness.photo.project(xyz) / witness.size * 2 - 1
             terms = np.column_stack([np.ones(len(xyz)), shown[number], place])
@@ -164,4 +191,4 @@ def exposed_alike(
             break
     shown = shown[:, np.isfinite(shown).sum(axis=0) >= 2]
     typical = float(np.median(_differing(shown, np.inf))) if shown.size else 0.0
-    return done, max(typical, FUSION.quiet)
+    return done, max(typical, WITNESSES.quiet)

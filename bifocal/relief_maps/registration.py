@@ -9,10 +9,28 @@ import numpy as np
 from bifocal.precision import false_relief_of_scale
 from bifocal.relief_maps.flow import Measurement
 from bifocal.relief_maps.frame import Frame
-from bifocal.relief_maps.tuning import REGISTRATION
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegistrationTuning:
+    """Whether the photos fit."""
+
+    #: Pixels that come back to themselves within this are taken for matched. [px]
+    matched: float = 1.0
+    #: With a smaller share of matched pixels the photos do not show the same thing.
+    least_matched: float = 0.12
+    #: Systematic misfit that is worth a remark. [px]
+    remark_px: float = 0.35
+    #: Misfit beyond which no relief is made. [px]
+    refuse_px: float = 3.0
+    #: The nadir zone has no direction across the radius: share of the frame's half diagonal.
+    nadir_zone: float = 0.15
+
+
+REGISTRATION = RegistrationTuning()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

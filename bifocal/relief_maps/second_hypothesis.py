@@ -7,7 +7,7 @@ what is behind them. Where the sweep fits better, and fits nothing else in photo
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import cv2
@@ -18,8 +18,81 @@ from bifocal.relief_maps import coarse_level, evidence, forward_projection, plan
 from bifocal.relief_maps.flow import Measurement, sigma_of_relief
 from bifocal.relief_maps.frame import Frame
 from bifocal.relief_maps.plane_sweep import Box, Hypotheses
-from bifocal.relief_maps.tuning import HYPOTHESIS
 from photocore.arrays import BoolArray, Float32Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HypothesisTuning:
+    """Thin things, found by a sweep."""
+
+    #: Side of the tiles that are swept, or not. [px]
+    #: Evidence: balcony of façade 1011 (balconies), rail within 5 cm and all beyond 3 cm [%]: 64 px
+    #: 63.0 and 6.05, 96 px 63.9 and 5.74, 128 px 65.7 and 5.66; façade 1021, hypotheses times
+    #: pixels: 1, 1.5 and 1.7.
+    tile: int = 96
+    #: A tile is swept with so much around it. [px]
+    #: Evidence: chosen: bars need what is around them; never varied by itself.
+    margin: int = 16
+    #: Tiles are swept of which flow leaves more than this share unvalidated.
+    #: Evidence: balcony of façade 1011 (balconies), rail within 5 cm and all beyond 3 cm [%]: 0.03
+    #: 62.8 and 6.01, 0.1 62.8 and 6.05, for half of the pixels of façade 1021.
+    unsure: float = 0.1
+    #: Tiles a side around a tile whose relief says what may be in it.
+    #: Evidence: balcony of façade 1011 (balconies), rail within 5 cm and all beyond 3 cm [%]: 3
+    #: 42.2 and 7.76, 5 61.0 and 6.37, 7 61.5 and 6.38.
+    around: int = 5
+    #: Tiles with fewer believed pixels say nothing. [px]
+    fewest: int = 100
+    #: Percentiles of a tile's relief that count as its least and greatest. [%]
+    outliers: tuple[int, int] = (1, 99)
+    #: How far beyond what is known around it a tile is searched. [m]
+    #: Evidence: balcony of façade 1011 (balconies), rail within 5 cm and all beyond 3 cm [%]: 0.1 m
+    #: 61.0 and 6.37, 0.3 m 61.8 and 6.34, for more to compare.
+    beyond: float = 0.1
+    #: Parallax from which on the sweep says another thing than flow. [px]
+    #: Evidence: balcony of façade 1011 (balconies), rail within 5 cm and all beyond 3 cm [%]: 1 px
+    #: 61.3 and 6.10, 1.5 px 61.0 and 6.37.
+    differs: float = 1.0
+    #: Two pixels at one place of photo 2 within this parallax are one surface. [px]
+    #: Evidence: balcony of façade 1011 (balconies), rail within 5 cm and all beyond 3 cm [%]: 1 px
+    #: 60.9 and 6.41, 1.5 px 61.0 and 6.37.
+    alone: float = 1.5
+    #: What is validated gives way to a sweep that fits better by this cost.
+    #: Evidence: balcony of façade 1011 (balconies), rail within 5 cm and all beyond 3 cm [%]: 12
+    #: 61.2 and 6.37, 24 61.0 and 6.37, 48 59.8 and 6.51.
+    better: int = 24
+    #: What is not validated gives way to one that fits better by this cost.
+    #: Evidence: balcony of façade 1011 (balconies), rail within 5 cm and all beyond 3 cm [%]: 12
+    #: 61.0 and 6.37, 24 60.0 and 6.45.
+    better_invalid: int = 12
+    #: Parts with fewer pixels are chance. [px]
+    #: Evidence: balcony of façade 1011 (balconies), rail within 5 cm and all beyond 3 cm [%]: 30 px
+    #: 61.5 and 6.29, 60 px 61.0 and 6.37; plaster balcony 1005, all beyond 3 cm, 60 px 17.5 and 200
+    #: px 18.1. Hidden from photo 2 and called measured on loggia 201 [%]: 60 px 3.45, 120 px 3.34,
+    #: 200 px 3.26; a quarter of 1011, rails and beyond 3 cm: 60 px 74.6 and 3.48, 120 px 74.4 and
+    #: 3.53, 200 px 74.2 and 3.58.
+    least_area: int = 200
+    #: Precision of a sweep along the radius. [px]
+    sigma: float = 0.3
+    #: With fewer hypotheses there is nothing to choose from.
+    fewest_tried: int = 5
+    #: Pixels at half the resolution where the sweep knows better that a tile is swept in full for.
+    #: [px]
+    #: Evidence: balcony of façade 1011 (balconies), rail within 5 cm and all beyond 3 cm [%]: 8 px
+    #: 62.8 and 6.01, 24 px 63.1 and 6.01, for three quarters of the tiles of façade 1021.
+    wanted: int = 24
+    #: Walls that are not plain are left alone of which flow validates a smaller share.
+    #: Evidence: church_2 and church_1 in `fast` have 0.45 and 0.33, and the sweep made 4.5 and 13.6
+    #: % of 2.0 and 10.3 % beyond 10 cm; façades and balconies have 0.8 and more.
+    least_valid: float = 0.6
+    #: The same of a pair of a set, whose other photos tell what is right.
+    #: Evidence: a crop of balcony 1203 has 0.505 in the far photo and one aside, and there the
+    #: sweep finds 42.7 % of the rails instead of 2.7; with 0.4 four photos of the church had 12.3 %
+    #: of the points beyond 3 cm, with 0.6 11.8.
+    least_valid_of_set: float = 0.5
+
+
+HYPOTHESIS = HypothesisTuning()
 
 
 class _Level(NamedTuple):

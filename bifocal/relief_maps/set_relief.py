@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import NamedTuple
 
@@ -25,12 +25,39 @@ from bifocal.relief_maps.fusion import PairRelief, fused
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
 from bifocal.relief_maps.photo_evidence import Witness
 from bifocal.relief_maps.seed import usual_range
-from bifocal.relief_maps.tuning import FUSION
 from bifocal.relief_maps.turned_plane import TurnedPlane, steepness
 from bifocal.remarks import remark
 from photocore.arrays import ByteArray, Float32Array, FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import GeometryError, InputError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairingTuning:
+    """Which pairs of a set measure a part of the wall."""
+
+    #: Side of the windows in which a set's map is made: memory goes by it, not by the wall. [px]
+    tile: int = 4096
+    #: Pairs that measure a place: the best by geometry.
+    #: Evidence: chosen: three photos make three.
+    pairs: int = 3
+    #: Places a side of a window at which pairs are judged.
+    places: int = 24
+    #: A pair is measured if it is among the best at more than this share of the places.
+    least_share: float = 0.03
+    #: Rays that part by more per relief show too different sides of things to be matched.
+    widest: float = 0.8
+    #: Of two photos equally far from the wall one counts as farther by this share.
+    #: Evidence: 0.01 mm at 10 m.
+    farther: float = 1e-06
+    #: Relief over a turned plane is so much less precise than its geometry promises.
+    #: Evidence: façade 41 near the nadir: median 0.75 mm against 0.46 of a pair of the same
+    #: geometry.
+    turned: float = 1.6
+
+
+PAIRING = PairingTuning()
+
 
 Image = NDArray[np.generic]
 #: Cameras whose base rises less from the plane, per length along it, stand beside each other.
@@ -178,7 +205,7 @@ def _of_set(
         Witness.of(photo, grey, grid.gsd) for photo, grey in zip(photos.photos, greys, strict=True)
     ]
     parts = [
-        _Part(part, _best_pairs(photos, greys, part)) for _, _, part in grid.tiles(FUSION.tile)
+        _Part(part, _best_pairs(photos, greys, part)) for _, _, part in grid.tiles(PAIRING.tile)
     ]
     jobs = sum(len(part.pairs) for part in parts)
     bands = MapBands(
@@ -237,7 +264,7 @@ def _pair(photos: PhotoSet, far: int, near: int) -> Pair:
     """Return two photos as a pair, also if both stand equally far from the wall."""
     one, other = photos.photos[far], photos.photos[near]
     if one.distance == other.distance:
-        farther = replace(one, distance=one.distance * (1 + FUSION.farther))
+        farther = replace(one, distance=one.distance * (1 + PAIRING.farther))
         changed = (farther if number == far else p for number, p in enumerate(photos.photos))
         photos = replace(photos, photos=tuple(changed))
     return photos.pair(far, near)
@@ -269,7 +296,7 @@ def _best_pairs(
 ) -> tuple[tuple[int, int], ...]:
     """Return the pairs that promise the best relief at places of a window, far photo first."""
     places = np.stack(
-        np.meshgrid(*(np.linspace(0.5, side - 0.5, FUSION.places) for side in part.shape[::-1])),
+        np.meshgrid(*(np.linspace(0.5, side - 0.5, PAIRING.places) for side in part.shape[::-1])),
         axis=-1,
     ).reshape(-1, 2)
     xy = places * [part.gsd, -part.gsd] + [part.x0, part.y0]
@@ -279,13 +306,13 @@ def _best_pairs(
         away = np.linalg.norm(_parallax(photos, one, other, xy), axis=-1)
         with np.errstate(divide="ignore", invalid="ignore"):
             sigma = np.hypot(pixel[one], pixel[other]) / away
-        sigma[~(away < FUSION.widest)] = np.inf
+        sigma[~(away < PAIRING.widest)] = np.inf
         sigma[~np.isfinite(sigma)] = np.inf
         pairs.append((one, other))
         sigmas.append(sigma)
     rank = np.argsort(np.argsort(sigmas, axis=0), axis=0)
-    chosen = (rank < FUSION.pairs) & np.isfinite(sigmas)
-    useful = chosen.mean(axis=1) > FUSION.least_share
+    chosen = (rank < PAIRING.pairs) & np.isfinite(sigmas)
+    useful = chosen.mean(axis=1) > PAIRING.least_share
     distance = [photo.distance for photo in photos.photos]
     return tuple(
         pair if distance[pair[0]] >= distance[pair[1]] else pair[::-1]
@@ -340,7 +367,7 @@ def _measured(
 
 def _weight(photos: PhotoSet, numbers: tuple[int, int], part: Grid, turned: bool) -> Float32Array:
     """Return one over the square of the relief that a pixel of parallax is worth. [1/m²]"""
-    x, y = (np.linspace(0, side - 1, FUSION.places) for side in part.shape[::-1])
+    x, y = (np.linspace(0, side - 1, PAIRING.places) for side in part.shape[::-1])
     coarse = np.stack(np.meshgrid(part.x0 + x * part.gsd, part.y0 - y * part.gsd), axis=-1)
     square = np.zeros(coarse.shape[:2])
     for number in numbers:
@@ -353,4 +380,4 @@ def _weight(photos: PhotoSet, numbers: tuple[int, int], part: Grid, turned: bool
     pixel = cv2.resize(square.astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
     xy = np.stack(np.meshgrid(part.columns_x, part.rows_y), axis=-1)
     away = (_parallax(photos, *numbers, xy) ** 2).sum(axis=-1)
-    return np.asarray(away / pixel / (FUSION.turned if turned else 1.0) ** 2, np.float32)
+    return np.asarray(away / pixel / (PAIRING.turned if turned else 1.0) ** 2, np.float32)

@@ -52,9 +52,8 @@ from bifocal.relief_maps import (
     smoothing,
     snapping,
 )
-from bifocal.relief_maps.forward_projection import MapBands
+from bifocal.relief_maps.forward_projection import PROJECTION, MapBands
 from bifocal.relief_maps.frame import Frame
-from bifocal.relief_maps.tuning import PROJECTION
 from photocore.arrays import BoolArray, Float32Array
 
 

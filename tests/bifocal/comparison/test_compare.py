@@ -16,6 +16,7 @@ from click.testing import CliRunner
 from openpyxl import load_workbook
 
 from bifocal import Grid, InputError, Quality, ReliefMap, compare
+from bifocal.comparison.workflow import compare_files
 from tests.builders.commands import bifocal_command as bifocal
 
 GRID = Grid.from_bounds((0.0, 0.0, 4.0, 3.0), gsd=0.04)
@@ -157,6 +158,26 @@ def test_maps_without_sigma_take_it_from_their_differences():
     done = compare(before, after)
     assert [round(one.mean, 2) for one in done.regions] == [0.02]
     assert "without standard deviations" in done.remarks[0]
+
+
+@pytest.mark.parametrize(("values", "where"), [(-0.003, "sigma"), (3e38, "r"), (np.inf, "r")])
+def test_a_map_that_cannot_be_a_relief_is_refused_without_a_warning(values: float, where: str):
+    whole = measured(np.random.default_rng(1))
+    spoilt = getattr(whole, where).copy()
+    spoilt[3, 3] = values
+    with pytest.raises(InputError, match="make it anew"):
+        compare(replace(whole, **{where: spoilt}), whole)
+
+
+def test_a_patch_larger_than_the_wall_is_refused():
+    whole = measured(np.random.default_rng(1))
+    with pytest.raises(InputError, match="whole wall of 12 m2"):
+        compare(whole, whole, smallest=1e9)
+
+
+def test_stable_parts_and_a_fit_of_the_whole_are_not_both_taken(tmp_path: Path):
+    with pytest.raises(InputError, match="give one of them"):
+        compare_files(tmp_path / "a.tif", tmp_path / "b.tif", tmp_path, stable=tmp_path, fit=True)
 
 
 @pytest.mark.acceptance

@@ -13,11 +13,10 @@ from bifocal.model.image import as_grey
 from bifocal.orientation.adjustment.pair_observations import at
 from bifocal.relief_maps import edges, flow, forward_projection, seed
 from bifocal.relief_maps.dense_matching import _resampled
-from bifocal.relief_maps.forward_projection import MapBands
+from bifocal.relief_maps.forward_projection import PROJECTION, MapBands
 from bifocal.relief_maps.frame import common_bounds, make_frame, working_grid
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
 from bifocal.relief_maps.relief_files import hatched, shaded
-from bifocal.relief_maps.tuning import PROJECTION
 from multimedia import GeometryError, InputError
 from photocore.shrinkage import shrink_noise
 from tests.scenes import RICH, Rendering, Scene, SetupErrors, bifocal_cameras, facade, render

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.relief_maps.flow_refinement import STRIP, refined
-from bifocal.relief_maps.tuning import REFINEMENT
+from bifocal.relief_maps.flow_refinement import REFINEMENT, STRIP, refined
 
 #: Displacement of the pixels of the first photo in the second. [px of the photo]
 SHIFT = (3.3, -1.6)

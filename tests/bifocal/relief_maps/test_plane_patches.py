@@ -10,8 +10,7 @@ import numpy as np
 from bifocal import Grid, Pair, Photo
 from bifocal.relief_maps import coarse_level, plane_patches
 from bifocal.relief_maps.frame import Frame
-from bifocal.relief_maps.segments import Segments
-from bifocal.relief_maps.tuning import SEGMENTS
+from bifocal.relief_maps.segments import SEGMENTS, Segments
 
 SIDE, PANEL = 320, 0.3
 #: Rows and columns of a panel before the wall, in photo 1.

@@ -15,8 +15,8 @@ from bifocal.orthophotos.visibility import hidden_from
 from bifocal.relief_maps import plane_sweep, second_hypothesis
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import make_frame
+from bifocal.relief_maps.second_hypothesis import HYPOTHESIS
 from bifocal.relief_maps.smoothing import straightened
-from bifocal.relief_maps.tuning import HYPOTHESIS
 from tests.scenes import RICH, CameraPair, Rendering, Scene, bifocal_cameras, render
 from tests.scenes.balconies import balconies
 

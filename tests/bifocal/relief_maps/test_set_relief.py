@@ -11,9 +11,8 @@ import pytest
 from bifocal import Grid, InputError, Pair, PhotoSet, Quality, ReliefMap, dense_relief
 from bifocal.relief_maps import fusion
 from bifocal.relief_maps.forward_projection import MapBands
-from bifocal.relief_maps.fusion import PairRelief, fused
+from bifocal.relief_maps.fusion import FUSION, PairRelief, fused
 from bifocal.relief_maps.photo_evidence import Witness
-from bifocal.relief_maps.tuning import FUSION
 from bifocal.relief_maps.turned_plane import TurnedPlane
 from tests.scenes import Exposure, bifocal_cameras, facade
 from tests.scenes.sets import SetRendering, aside, render_set

@@ -21,10 +21,13 @@ from bifocal.relief_maps import (
     snapping,
     stages,
 )
-from bifocal.relief_maps.forward_projection import MapBands
+from bifocal.relief_maps.coarse_level import COARSE
+from bifocal.relief_maps.edges import EDGES
+from bifocal.relief_maps.evidence import EVIDENCE
+from bifocal.relief_maps.forward_projection import PROJECTION, MapBands
 from bifocal.relief_maps.frame import Frame, radial_stretch
-from bifocal.relief_maps.map_completion import _spread_inwards, tidied
-from bifocal.relief_maps.tuning import COARSE, EDGES, EVIDENCE, LEVELS, MAP, PROJECTION
+from bifocal.relief_maps.levels import LEVELS
+from bifocal.relief_maps.map_completion import MAP, _spread_inwards, tidied
 from photocore.shrinkage import shrink_noise
 
 METRES = [[0.01, 0, -0.995], [0, -0.01, 0.995], [0, 0, 1]]
