@@ -256,10 +256,8 @@ def assert_recalculated_equals_cached(path, folder):
 
 
 @pytest.mark.office
-@pytest.mark.parametrize(
-    "model",
-    ["levelled", *(pytest.param(m, marks=pytest.mark.acceptance) for m in ("3D", "2D"))],
-)
+@pytest.mark.acceptance
+@pytest.mark.parametrize("model", ["levelled", "3D", "2D"])
 def test_every_formula_recalculated_by_libreoffice_equals_the_library(model, tmp_path):
     write_book(tmp_path / "ideal.xlsx", ideal_content(model=model))
     assert assert_recalculated_equals_cached(tmp_path / "ideal.xlsx", tmp_path) > 1500
@@ -331,6 +329,7 @@ def test_an_empty_template_shows_no_error_anywhere(tmp_path):
                 assert not str(cell.value).startswith(("#", "Err:")), f"{sheet.title} {cell}"
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_changing_an_input_changes_relief_in_libreoffice(tmp_path):
     write_template(tmp_path / "form.xlsx", rows=15)
