@@ -408,7 +408,7 @@ def test_rays_through_parallel_planes_equal_the_50_digit_shifts(step: int) -> No
         assert angle == pytest.approx(np.arctan(expected), rel=1e-12, abs=1e-300), case
         if expected < 1e3:  # beyond, R_bar magnifies the rounding of a unit vector
             assert heading[0] / -heading[2] == pytest.approx(expected, rel=1e-12), case
-    assert limits < 0.03 * len(cases)
+    assert limits <= max(2, 0.03 * len(cases))
 
 
 def test_least_time_finds_the_ray_that_shooting_loses() -> None:
