@@ -313,8 +313,9 @@ class RepetitionTuning:
     reach: float = 1.2
     #: Least share of the smaller picture that is common to both.
     overlap: float = 0.25
-    #: Radii of what is shading, not pattern, and of what is no grain any more, of the side.
+    #: Radius from which on grey values are shading, not pattern, of the picture's side.
     ground: float = 0.03
+    #: Radius from which on they are no grain of the plaster, of the same.
     grain: float = 0.015
     #: Rows of windows are askew by no more than this. [m/m]
     cone: float = 0.06
@@ -326,9 +327,9 @@ class RepetitionTuning:
     repeats: float = 0.5
     #: Share of the picture, of the gentlest slopes, that is plaster.
     calm: float = 0.5
-    #: The place of the photos is certain if its peak is so many sigma high, and so many times as
-    #: high as any other.
+    #: The place of the photos is certain if its peak is so many sigma high.
     sure: float = 6.0
+    #: And so many times as high as any other.
     clearly: float = 1.4
 
 
