@@ -21,7 +21,7 @@ from photocore.installation import left_out, too_old
 from photocore.interrupts import STOPPED
 from photocore.log import COMMAND_LINE, DATE, is_quiet, log_options
 from photocore.option_types import STREAMS
-from photocore.provenance import recording
+from photocore.provenance import noted_remarks, recording
 from photocore.textfile import odd_name
 
 #: Exit status of a fault of the program: EX_SOFTWARE of sysexits.h, which Windows' os lacks.
@@ -141,7 +141,11 @@ class LazyGroup(click.Group):
             click.echo(f"{line}.", err=True)
         try:
             with recording(ctx.meta[COMMAND_LINE], day=ctx.meta.get(DATE)):
-                return super().invoke(ctx)
+                try:
+                    return super().invoke(ctx)
+                finally:
+                    for text in noted_remarks():
+                        remark(text)
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise
         except PhotogrammetryError as error:
