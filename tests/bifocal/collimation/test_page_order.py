@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from bifocal import SAMPLE, Pair
+from bifocal.collimation.first_orientation import FirstOrientation
 from bifocal.collimation.job_tasks import start_job
 from bifocal.collimation.product_graph import causes_of
 from bifocal.collimation.server.uploads import far_first
@@ -42,6 +43,20 @@ def test_a_resized_photo_of_the_long_lens_is_still_the_far_one() -> None:
     assert far_first([near, far]) == [far, near]
     without = replace(near, focal_plane_pitch=None)
     assert far_first([without, far]) == [far, without]
+
+
+def test_picks_that_came_at_once_are_held_against_the_photos(folder) -> None:
+    (folder / "kept.json").rename(folder / "facade.pair.json")
+    with begun(folder, "facade.pair.json") as session:
+        watch, picks = FirstOrientation(session), list(sample_picks().items())
+        for name, (first, second) in picks:
+            pick_both(session, name, (second, first))
+        watch.hold_picks()
+        assert any("picks" in text for text in state_of(session)["advice"])
+        for name, both in picks:
+            pick_both(session, name, both)
+        watch.hold_picks()
+        assert state_of(session)["advice"] == []
 
 
 def oriented(session) -> None:
