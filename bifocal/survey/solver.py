@@ -323,7 +323,8 @@ def _ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -> _Arr
     measured = setup.in_millimetres(points)
     if not adjust:  # which finds by itself what is counted from
         typed = points.use & points.is_cartesian
-        refuse_corner(*(xy[typed] for xy in measured.all_xy()), survey.where)
+        first, second = measured.all_xy()
+        refuse_corner(first[typed], second[typed], survey.where)
     check = _check_plane(pair, points, measured.all_xy(), None, survey, adjust)
     arranged = _Arranged(
         points=points, measured=measured, pair=pair, setup=setup, check=check,
