@@ -363,6 +363,26 @@ class EvidenceTuning:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class InformationTuning:
+    """What both photos tell of relief."""
+
+    #: Blur of the photos before their gradients. [px]
+    blur: float = 0.8
+    #: Side of the window in which information is summed. [px]
+    window: int = 15
+    #: Side of the tiles in which the noise of the pair is estimated. [px]
+    tile: int = 64
+    #: A tile with fewer matched pixels takes the usual noise. [px]
+    fewest: int = 60
+    #: Least noise: that of whole grey levels. [grey levels]
+    least_noise: float = 0.35
+    #: Relief counts as measured if noise leaves matching more precise than this. [px]
+    precise: float = 0.3
+    #: And if both photos' gradients correlate by more than this.
+    agreement: float = 0.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RegionBlockTuning:
     """Regions that camera 2 cannot see."""
 
@@ -849,6 +869,7 @@ COARSE = CoarseTuning()
 HYPOTHESIS = HypothesisTuning()
 SWEEP = SweepTuning()
 EVIDENCE = EvidenceTuning()
+INFORMATION = InformationTuning()
 REGIONS = RegionBlockTuning()
 EDGES = EdgeTuning()
 SMOOTHING = SmoothingTuning()
