@@ -16,7 +16,7 @@ from bifocal.model.relief_map import Quality
 from bifocal.relief_maps import flow, forward_projection
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame, radial_stretch, values_at, zoom_map
-from bifocal.relief_maps.tuning import INFORMATION
+from bifocal.relief_maps.tuning import EVIDENCE, INFORMATION
 from photocore.arrays import BoolArray, Float32Array
 
 
@@ -27,12 +27,12 @@ class Information(NamedTuple):
     ----------
     sigma_px : ndarray of float32
         Of matching along the radius, by noise and the texture that both photos share. [px]
-    agreement : ndarray of float32
-        Correlation of both photos' radial gradients.
+    distinct : ndarray of bool
+        Whether the photos fit better there than a pixel of parallax farther in or out.
     """
 
     sigma_px: Float32Array
-    agreement: Float32Array
+    distinct: BoolArray
 
 
 def information(frame: Frame, relief: Float32Array, matched: BoolArray) -> Information:
@@ -41,50 +41,60 @@ def information(frame: Frame, relief: Float32Array, matched: BoolArray) -> Infor
     With radial gradients g1, g2 the normal equation of a shift along the radius has the weight
     S12 = sum g1 g2 over a window, so that sigma = s_e / sqrt(S12).
     """
-    places = zoom_map(frame, relief)
-    laid = cv2.remap(
-        frame.image2, *places, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-    ).astype(np.float32)
-    first = frame.image1.astype(np.float32)
+    columns, rows = zoom_map(frame, relief)
     x, y = frame.from_centre()
     radius = np.maximum(np.hypot(x, y), np.float32(1))
-    slopes = []
-    for image in (first, laid):
-        quiet = cv2.GaussianBlur(image, (0, 0), INFORMATION.blur)
-        across, down = (
-            cv2.Sobel(quiet, cv2.CV_32F, *order, ksize=3, scale=0.125) for order in ((1, 0), (0, 1))
-        )
-        slopes.append((across * x + down * y) / radius)
-    n = INFORMATION.window
-    one, two, both = (cv2.blur(slopes[i] * slopes[j], (n, n)) for i, j in ((0, 0), (1, 1), (0, 1)))
-    least = np.float32(1e-4)
-    return Information(
-        _noise(first - laid, matched) / np.sqrt(np.maximum(both, least)) / n,
-        both / np.sqrt(np.maximum(one * two, least * least)),
+    out_x, out_y = x / radius, y / radius
+    first, second = (
+        cv2.GaussianBlur(image.astype(np.float32), (0, 0), INFORMATION.blur)
+        for image in (frame.image1, frame.image2)
     )
+
+    def laid(image: Float32Array, outwards: int = 0) -> Float32Array:
+        places = (columns + outwards * out_x, rows + outwards * out_y)
+        border = cv2.BORDER_REPLICATE
+        return np.asarray(cv2.remap(image, *places, cv2.INTER_LINEAR, borderMode=border))
+
+    raw = frame.image1.astype(np.float32) - laid(frame.image2.astype(np.float32))
+    noise = _noise(raw, matched)
+    here = laid(second)
+    slopes = []
+    for image in (first, here):
+        across, down = (
+            cv2.Sobel(image, cv2.CV_32F, *order, ksize=3, scale=0.125) for order in ((1, 0), (0, 1))
+        )
+        slopes.append(across * out_x + down * out_y)
+    n = INFORMATION.window
+    shared = np.maximum(cv2.blur(slopes[0] * slopes[1], (n, n)), np.float32(1e-4))
+
+    def misfit(image: Float32Array) -> Float32Array:
+        apart = first - image
+        apart -= cv2.blur(apart, INFORMATION.exposure)  # what exposure leaves
+        square = np.minimum(apart * apart, (INFORMATION.outlier * noise) ** 2)
+        return np.asarray(cv2.blur(square, INFORMATION.fit))
+
+    rival = np.minimum(misfit(laid(second, 1)), misfit(laid(second, -1)))
+    return Information(noise / np.sqrt(shared) / n, rival > misfit(here))
 
 
 def measured_by_texture(
     frame: Frame, source: MapBands, valid: BoolArray, bands: MapBands, grid: Grid
 ) -> MapBands:
-    """Return the map whose measured pixels are those that both photos tell precisely.
+    """Return the map whose measured pixels are those that both photos tell.
 
     Stages build on more: what is smooth between edges is believed, but not measured. Sigma of what
-    is measured has its share of the noise.
+    they called measured has its share of the noise.
     """
-    told = information(frame, source.r, valid)
+    found = information(frame, source.r, valid)
     places = forward_projection.seen_by_first(frame, grid, np.nan_to_num(bands.r))
-    sigma_px = np.minimum(told.sigma_px, np.float32(INFORMATION.precise)) * radial_stretch(frame)
-    noise = values_at(
-        flow.sigma_of_relief(frame, source.r, sigma_px), places, cv2.INTER_NEAREST
-    )
-    enough = (told.sigma_px < INFORMATION.precise) & (told.agreement > INFORMATION.agreement)
-    told_here = values_at(enough.view(np.uint8), places, cv2.INTER_NEAREST) > 0
+    sigma_px = np.minimum(found.sigma_px, np.float32(INFORMATION.most)) * radial_stretch(frame)
+    noise = values_at(flow.sigma_of_relief(frame, source.r, sigma_px), places, cv2.INTER_NEAREST)
     measured = bands.quality == Quality.MEASURED
-    return bands._replace(
-        sigma=np.where(measured & told_here, np.hypot(bands.sigma, noise), bands.sigma),
-        quality=np.where(measured & ~told_here, np.uint8(Quality.INTERPOLATED), bands.quality),
-    )
+    sigma = np.where(measured, np.hypot(bands.sigma, noise), bands.sigma)
+    enough = values_at(found.distinct.view(np.uint8), places, cv2.INTER_NEAREST) > 0
+    enough &= sigma < EVIDENCE.sigma_share * frame.distances[1]
+    quality = np.where(measured & ~enough, np.uint8(Quality.INTERPOLATED), bands.quality)
+    return bands._replace(sigma=sigma, quality=quality)
 
 
 def _noise(apart: Float32Array, matched: BoolArray) -> Float32Array:
