@@ -34,7 +34,7 @@ def delivered(image: np.ndarray, rng: np.random.Generator, jpeg: int) -> np.ndar
 
 
 def frame_of(first: np.ndarray, second: np.ndarray, jpeg: int = 85) -> Frame:
-    """Return the photos of a flat wall at `RELIEF`: photo 2 is enlarged about the nadir, Eq. (6)."""
+    """Return photos of a flat wall at `RELIEF`: photo 2 is enlarged about the nadir, Eq. (6)."""
     rng = np.random.default_rng(13)
     k = (9.5 / (9.5 - RELIEF)) / (17.5 / (17.5 - RELIEF))
     matrix = np.array([[k, 0, 59.5 * (1 - k)], [0, k, 159.5 * (1 - k)]])
