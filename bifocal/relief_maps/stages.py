@@ -209,7 +209,7 @@ STAGES = (
           "bands matched", "bands"),
     Stage("outline tidied", map_completion.tidied,
           "bands", "bands"),
-    Stage("measured by texture", information.measured_by_texture,
+    Stage("sigma of noise", information.with_sigma_of_noise,
           "frame source valid bands grid", "bands"),
 )
 # fmt: on

@@ -10,7 +10,7 @@ from bifocal import Grid, Pair, Photo, Quality
 from bifocal.relief_maps import flow
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame, parallax_per_metre
-from bifocal.relief_maps.information import information, measured_by_texture
+from bifocal.relief_maps.information import sigma_of_noise, with_sigma_of_noise
 
 SIDE, RELIEF = 320, 0.3
 METRES = [[0.01, 0, -1.595], [0, -0.01, 1.595], [0, 0, 1]]
@@ -47,41 +47,39 @@ def frame_of(first: np.ndarray, second: np.ndarray, jpeg: int = 85) -> Frame:
     )  # fmt: skip
 
 
-def called_measured(frame: Frame) -> tuple[MapBands, np.ndarray]:
-    """Return a map whose relief flow found and called measured, and its error in parallax. [px]"""
-    found = flow.measure(frame, np.full((20, 20), 0.28, np.float32))
-    sigma = flow.sigma_of_relief(frame, found.r, found.sigma_px)
-    every = np.ones(found.r.shape, bool)
-    all_measured = np.full(found.r.shape, Quality.MEASURED, np.uint8)
-    source = MapBands(found.r, sigma, all_measured)
-    flat = np.full(found.r.shape, RELIEF, np.float32)
-    bands = MapBands(flat, sigma, all_measured)
-    return measured_by_texture(frame, source, every, bands, frame.grid), found.r - RELIEF
+def map_of(frame: Frame, relief: np.ndarray, sigma: np.ndarray) -> MapBands:
+    """Return the map of a relief of photo 1 of which every pixel was measured."""
+    every = np.ones(relief.shape, bool)
+    measured = np.full(relief.shape, Quality.MEASURED, np.uint8)
+    bands = MapBands(np.full(relief.shape, RELIEF, np.float32), sigma, measured)
+    return with_sigma_of_noise(frame, MapBands(relief, sigma, measured), every, bands, frame.grid)
 
 
 @pytest.mark.parametrize("jpeg", [75, 85, 95])
-def test_a_plain_wall_is_not_measured_however_strongly_it_is_compressed(jpeg):
+def test_nothing_is_known_of_a_plain_wall_however_strongly_it_is_compressed(jpeg):
     plain = np.full((SIDE, SIDE), 120.0)
-    bands, _ = called_measured(frame_of(plain, plain, jpeg))
-    assert (bands.quality[INNER] == Quality.MEASURED).mean() < 0.02
+    frame = frame_of(plain, plain, jpeg)
+    relief = np.full((SIDE, SIDE), RELIEF, np.float32)
+    sigma = map_of(frame, relief, np.zeros_like(relief)).sigma[INNER]
+    assert np.median(sigma * parallax_per_metre(frame)[INNER]) > 1
+    assert (sigma > 0.01 * PAIR.image2.distance).mean() > 0.75
 
 
-def test_a_textured_wall_is_measured_and_its_sigma_holds_its_errors():
-    wall = texture(8, 25.0)
+@pytest.mark.parametrize("contrast", [4.0, 25.0])
+def test_sigma_holds_the_errors_of_a_textured_wall_and_is_not_far_above_them(contrast):
+    wall = texture(8, contrast)
     frame = frame_of(wall, wall)
-    bands, error = called_measured(frame)
-    good = bands.quality[INNER] == Quality.MEASURED
-    assert good.mean() > 0.95
-    ratio = np.abs(error / bands.sigma)[INNER][good]
+    found = flow.measure(frame, np.full((20, 20), 0.28, np.float32))
+    sigma = map_of(frame, found.r, flow.sigma_of_relief(frame, found.r, found.sigma_px)).sigma
+    ratio = (np.abs(found.r - RELIEF) / sigma)[INNER]
     assert np.percentile(ratio, 99) < 4
-    assert np.median(np.abs(error * parallax_per_metre(frame))[INNER]) < 0.1
+    assert np.median(ratio) > 0.1
 
 
-def test_relief_that_fits_better_a_pixel_farther_on_is_not_measured():
-    wall = texture(3, 12.0)
-    frame = frame_of(wall, wall)
-    every = np.ones((SIDE, SIDE), bool)
-    beside = (RELIEF + 0.8 / parallax_per_metre(frame)).astype(np.float32)
-    right = np.full((SIDE, SIDE), RELIEF, np.float32)
-    assert information(frame, right, every).distinct[INNER].mean() > 0.95
-    assert information(frame, beside, every).distinct[INNER].mean() < 0.1
+def test_texture_of_one_photo_alone_is_no_information():
+    wall, other = texture(8, 25.0), texture(9, 25.0)
+    relief, every = np.full((SIDE, SIDE), RELIEF, np.float32), np.ones((SIDE, SIDE), bool)
+    both = sigma_of_noise(frame_of(wall, wall), relief, every)[INNER]
+    one = sigma_of_noise(frame_of(wall, other), relief, every)[INNER]
+    assert np.median(both) < 0.1
+    assert np.median(one) > 10 * np.median(both)
