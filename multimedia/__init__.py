@@ -30,6 +30,7 @@ Cameras
     intersect, IntersectedPoints   points from image points, least squares
     intersect_rays, intersect_pairs, PointStatus   fast ways; why a point is missing, doubtful
     epipolar_curve, EpipolarCurves, epipolar_candidates, Candidates   a ray in another image
+    find_targets, TargetImages   images of particles in a photo
     correspondences, track_particles, Tracks   targets of one particle; particles over time
     bundle_adjust, Adjustment, Unknowns, ScaleBar, diagnose, Extension    all of these together
 Bathymetry
