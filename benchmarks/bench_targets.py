@@ -4,7 +4,7 @@ Run: python benchmarks/bench_targets.py
 
 Rendered images with known places (tests/multimedia/targets): alone, at random, crowded, small,
 large, faint. Centroids are those of scikit-image's regions above 5 standard deviations of the
-noise; where trackpy is installed, it is asked too. CPU time of one image beside that of the centroids.
+noise; where trackpy is installed, it is asked too. CPU time of an image beside that of centroids.
 """
 
 from __future__ import annotations
