@@ -101,6 +101,10 @@ def find_targets(
     dark : bool
         Whether particles are darker than the light, as in front of a lamp.
 
+    Returns
+    -------
+    targets : TargetImages
+
     Raises
     ------
     InputError
