@@ -24,13 +24,12 @@ Surfaces and rays
 Cameras
     Camera, Sensor            exterior and interior orientation
     Brown, Fisheye            distortion of a lens, or the law of a fisheye
-    project, projection_status   image coordinates through the media, and why there are none
-    image_rays                the ray of an image point in the object's medium
+    project, projection_status, image_rays   image coordinates, why there are none; rays in water
     resect, Resection, resect_many, CameraPoses   a camera from control points; many of them
     intersect, IntersectedPoints   points from image points, least squares
     intersect_rays, intersect_pairs, PointStatus   fast ways; why a point is missing, doubtful
     epipolar_curve, EpipolarCurves, epipolar_candidates, Candidates   a ray in another image
-    correspondences, track_particles, Tracks   targets of one particle; particles over time
+    find_targets, TargetImages, correspondences, track_particles, Tracks   particles, over time
     bundle_adjust, Adjustment, Unknowns, ScaleBar, diagnose, Extension    all of these together
 Bathymetry
     correct_bathymetry, CorrectedPoints   points from above the water

@@ -99,6 +99,7 @@ from .refraction.water import (
     water_index_sigma,
     water_refractive_index,
 )
+from .targets.target_images import TargetImages, find_targets
 from .tracking.tracks import Tracks, track_particles
 
 __version__: str
@@ -173,6 +174,7 @@ __all__ = [
     "Sphere",
     "Study",
     "SurfaceSequence",
+    "TargetImages",
     "Term",
     "Tracks",
     "Unknowns",
@@ -202,6 +204,7 @@ __all__ = [
     "diagnose",
     "epipolar_candidates",
     "epipolar_curve",
+    "find_targets",
     "image_rays",
     "intersect",
     "intersect_pairs",

@@ -20,6 +20,10 @@ BoolArray = NDArray[np.bool_]
 ByteArray = NDArray[np.uint8]
 
 
+#: Longer lists are not searched for true and false, which takes longer than all the rest.
+_LOOKED_AT = 10_000
+
+
 def as_floats(value: ArrayLike, name: str) -> FloatArray:
     """Return value as a float64 array; what is masked becomes NaN.
 
@@ -32,7 +36,7 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
         array = np.asarray(value)
         # numpy would take the text "17.5", true for 1, a date for its days, and drop what is
         # imaginary; no file of ours means it.
-        if array.dtype.kind in "USbcmM":
+        if array.dtype.kind in "USbcmM" or (array.size < _LOOKED_AT and _holds_truth(value)):
             raise TypeError
         if isinstance(value, np.ma.MaskedArray):
             plain = np.asarray(value.data, dtype=np.float64)
@@ -43,6 +47,13 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
         raise InputError(f"{name}: holds a whole number above {largest:.2g}.") from error
     except (TypeError, ValueError) as error:
         raise InputError(f"{name}: expected numbers, found {value!r:.60}.") from error
+
+
+def _holds_truth(value: Any) -> bool:
+    """Tell whether true or false stands among the numbers of a list."""
+    return isinstance(value, bool) or (
+        isinstance(value, list | tuple) and any(map(_holds_truth, value))
+    )
 
 
 def floats_of_words(words: Sequence[str], path: Path, where: str) -> FloatArray:

@@ -17,17 +17,25 @@ from typing import Any, Protocol
 import click
 
 from photocore.errors import PhotogrammetryError
-from photocore.installation import left_out, too_old
+from photocore.installation import (
+    LEAST_MEMORY,
+    allowed_memory,
+    is_of_memory,
+    left_out,
+    too_old,
+)
 from photocore.interrupts import STOPPED
 from photocore.log import COMMAND_LINE, DATE, is_quiet, log_options
 from photocore.option_types import STREAMS
-from photocore.provenance import recording
+from photocore.provenance import noted_remarks, recording
 from photocore.textfile import odd_name
 
 #: Exit status of a fault of the program: EX_SOFTWARE of sysexits.h, which Windows' os lacks.
 UNFORESEEN = 70
 
 _DEBUG = "photocore.debug"
+_HELP = {"-h", "--help"}
+_NO_MEMORY = "not enough memory. Use smaller images, a coarser --gsd or --bounds."
 _LOG = logging.getLogger(__name__)
 _LOG.addHandler(logging.NullHandler())  # errors are printed here, not by logging as well
 
@@ -139,9 +147,19 @@ class LazyGroup(click.Group):
             sys.stdout.reconfigure(errors="backslashreplace")
         for line in too_old():
             click.echo(f"{line}.", err=True)
+        if (allowed := allowed_memory()) < LEAST_MEMORY and not _HELP & set(ctx.args):
+            _tell_error(
+                f"Error: only {allowed:.0f} MB of memory are allowed here (ulimit -v), and "
+                f"{LEAST_MEMORY} MB are needed at least."
+            )
+            return ctx.exit(1)
         try:
             with recording(ctx.meta[COMMAND_LINE], day=ctx.meta.get(DATE)):
-                return super().invoke(ctx)
+                try:
+                    return super().invoke(ctx)
+                finally:
+                    for text in noted_remarks():
+                        remark(text)
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise
         except PhotogrammetryError as error:
@@ -150,9 +168,7 @@ class LazyGroup(click.Group):
         except KeyboardInterrupt:
             _tell_error(STOPPED)
         except MemoryError:
-            _tell_error(
-                "Error: not enough memory. Use smaller images, a coarser --gsd or --bounds."
-            )
+            _tell_error(f"Error: {_NO_MEMORY}")
         except BrokenPipeError:
             # The reader of our output went away (``| head``): not our failure, nothing to say.
             sys.stderr.close()
@@ -167,6 +183,9 @@ class LazyGroup(click.Group):
             _show_details(ctx)
             program = self.commands_package.partition(".")[0]
             task = f"{program} {ctx.invoked_subcommand or ''}".rstrip()
+            if is_of_memory(error):
+                _tell_error(f"Error: {_NO_MEMORY}")
+                ctx.exit(1)
             if lacks := left_out(error) or next(iter(too_old()), ""):
                 _tell_error(f"Error: {task} cannot be done with what is installed: {lacks}.")
                 ctx.exit(1)

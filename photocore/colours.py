@@ -8,6 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from photocore.decoding import decoders_words
+from photocore.provenance import note_remark
+from photocore.remarks import remark
+
 #: Farthest that a primary of a profile may lie from that of sRGB, as CIE XYZ of the profile's
 #: white, and be the same: profiles called sRGB differ by 0.002; Display P3 by 0.08, Adobe RGB 0.17.
 _SAME = 0.01
@@ -18,17 +22,25 @@ _ROWS = 512
 
 
 def in_srgb(path: Path, image: Any) -> Any:
-    """Return RGB pixels of a photo in sRGB; unchanged without a profile, in grey, or in 16 bit."""
+    """Return RGB pixels of a photo in sRGB; unchanged without a profile, in grey, or in 16 bit.
+
+    What 16 bits leave in another space is noted.
+    """
     from PIL import Image, ImageCms
 
-    if image.dtype != np.uint8 or image.ndim != 3:
+    if image.ndim != 3:
         return image
     try:
-        with Image.open(path) as file:
-            data = file.info.get("icc_profile")
-        if not data or (profile := ImageCms.ImageCmsProfile(io.BytesIO(data))) is None:
+        if (
+            not (data := _profile_of(path))
+            or (profile := ImageCms.ImageCmsProfile(io.BytesIO(data))) is None
+        ):
             return image
         if not _is_other(profile):
+            return image
+        if image.dtype != np.uint8:
+            name = ImageCms.getProfileDescription(profile).strip()
+            note_remark(remark("photo.other_colours", of=path.name, name=name))
             return image
         change = ImageCms.buildTransform(profile, ImageCms.createProfile("sRGB"), "RGB", "RGB")
     except (OSError, SyntaxError, ValueError, ImageCms.PyCMSError):
@@ -37,6 +49,20 @@ def in_srgb(path: Path, image: Any) -> Any:
         part = Image.fromarray(np.ascontiguousarray(image[top : top + _ROWS]))
         image[top : top + _ROWS] = np.asarray(ImageCms.applyTransform(part, change))
     return image
+
+
+def _profile_of(path: Path) -> bytes | None:
+    """Return the colour profile of a photo; of a TIFF by tifffile: Pillow knows no deep colours."""
+    if path.suffix.lower() in {".tif", ".tiff"}:
+        import tifffile
+
+        with decoders_words(), tifffile.TiffFile(path) as tiff:
+            page: Any = tiff.pages[0]
+            return bytes(page.tags[34675].value) if 34675 in page.tags else None
+    from PIL import Image
+
+    with Image.open(path) as file:
+        return file.info.get("icc_profile")
 
 
 def _is_other(profile: Any) -> bool:

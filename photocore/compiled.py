@@ -157,8 +157,8 @@ def compiled(function: Callable[P, T]) -> Kernel[P, T]:
 
 @cache
 def _numba() -> Any:
-    """Return numba; None where it is absent or refuses the numpy that is installed."""
-    if find_spec("numba") is None:
+    """Return numba; None where it is absent, switched off or refuses the numpy installed."""
+    if find_spec("numba") is None or os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
         return None
     try:
         import numba

@@ -32,7 +32,7 @@ from photocore.optional_photos import (
 )
 from photocore.output import atomic_path, check_ending
 from photocore.png_text import with_provenance
-from photocore.provenance import note
+from photocore.provenance import note, note_remark
 from photocore.raster import RasterFile
 from photocore.remarks import remark
 from photocore.textfile import check_file
@@ -185,7 +185,7 @@ def read_image(path: Path | str, *, grey: bool = False) -> ImageArray:
         if of_bands and whole is None:
             raise InputError(remark("photo.planar", of=path))
         if whole is not None:
-            whole = _full_range(in_srgb(info.path, whole))
+            whole = _full_range(info.path, in_srgb(info.path, whole))
             whole = cv2.cvtColor(whole, cv2.COLOR_RGB2GRAY) if grey else whole
             return turn_upright(whole, info.orientation)
     flags = cv2.IMREAD_IGNORE_ORIENTATION | cv2.IMREAD_ANYDEPTH
@@ -202,13 +202,15 @@ def read_image(path: Path | str, *, grey: bool = False) -> ImageArray:
         for top in range(0, len(image), 512):
             part = image[top : top + 512]
             part[:] = cv2.cvtColor(part, cv2.COLOR_BGR2RGB)
-    return turn_upright(_full_range(in_srgb(info.path, image)), info.orientation)
+    return turn_upright(_full_range(info.path, in_srgb(info.path, image)), info.orientation)
 
 
-def _full_range(image: ImageArray) -> ImageArray:
+def _full_range(path: Path, image: ImageArray) -> ImageArray:
     """Multiply 10, 12 or 14 bits in 16 by a power of two: eight bits of them would be few greys."""
     if image.dtype == np.uint16 and 0 < (top := int(image.max(initial=0))) < _SHALLOW:
-        image <<= np.uint16(16 - max(top.bit_length() + top.bit_length() % 2, 10))
+        bits = max(top.bit_length() + top.bit_length() % 2, 10)
+        image <<= np.uint16(16 - bits)
+        note_remark(remark("photo.stretched", of=path.name, bits=bits, times=1 << (16 - bits)))
     return image
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import sys
@@ -14,6 +15,8 @@ from pathlib import Path
 DISTRIBUTION = "bifocal-relief"
 _STRANGERS = ("bifocal", "multimedia")
 _OURS = (*_STRANGERS, "photocore")
+#: Numbers cannot be calculated in less: numpy's own library ends in a fault then. [MB]
+LEAST_MEMORY = 480
 _BOUND = re.compile(r"([\w.-]+)(?:\[.*\])?>=([\d.]+)$")
 
 
@@ -39,6 +42,23 @@ def left_out(error: Exception) -> str:
     return (
         f"{name} is not installed, or damaged. Mend it: "
         f'"{sys.executable}" -m pip install --force-reinstall {DISTRIBUTION}, or its wheel'
+    )
+
+
+def allowed_memory() -> float:
+    """Return what memory this process may take, in MB; infinite where nothing limits it."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return math.inf
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    return math.inf if limit == resource.RLIM_INFINITY else limit / 2**20
+
+
+def is_of_memory(error: BaseException) -> bool:
+    """Whether a library could not be loaded because no memory was left for it."""
+    return isinstance(error, ImportError) and (
+        "failed to map" in str(error) or "allocate memory" in str(error)
     )
 
 

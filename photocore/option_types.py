@@ -216,6 +216,8 @@ class Numbers(Number):
         How many; any number of them when None.
     word : str
         That may stand in their place.
+    rising : bool
+        The second half of them, each above its fellow of the first: low and high, or a box.
     limits
         As for `Number`; they hold for each.
     """
@@ -223,9 +225,11 @@ class Numbers(Number):
     name = "numbers"
     is_single = False
 
-    def __init__(self, count: int | None = None, *, word: str = "", **limits: Any) -> None:
+    def __init__(
+        self, count: int | None = None, *, word: str = "", rising: bool = False, **limits: Any
+    ) -> None:
         super().__init__(**limits)
-        self.count, self.word = count, word
+        self.count, self.word, self.rising = count, word, rising
         many = "a list of" if count is None else count
         self.described = f"{word and word + ' or '}{many} numbers with commas between them"
         quoted = f'"{word}", or ' if word else ""
@@ -233,7 +237,12 @@ class Numbers(Number):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return a tuple of numbers, or the word."""
-        return value if self.word and value == self.word else super().convert(value, param, ctx)
+        if self.word and value == self.word:
+            return value
+        numbers = super().convert(value, param, ctx)
+        if self.rising and not _rises(numbers):
+            self.fail(f"must be {RISING[len(numbers)]}, got {value}.", param, ctx)
+        return numbers
 
     def read(self, value: object) -> Any:
         """Return what a file holds: a list, or the word."""
@@ -241,7 +250,10 @@ class Numbers(Number):
             return value
         if not isinstance(value, list) or self.count not in (None, len(value)):
             raise ValueError(self.wanted)
-        return self._checked(value)
+        numbers = self._checked(value)
+        if self.rising and not _rises(numbers):
+            raise ValueError(f"{self.wanted}, {RISING[len(numbers)]}")
+        return numbers
 
     def parse(self, text: str) -> list[float]:
         """Split at the separators; a list may end in one."""
@@ -250,6 +262,41 @@ class Numbers(Number):
         if self.count not in (None, len(numbers)):
             raise ValueError(text)
         return numbers
+
+
+#: What rising numbers are, by their count.
+RISING = {2: "low, high with low < high", 4: "xmin,ymin,xmax,ymax with xmin < xmax, ymin < ymax"}
+
+
+def _rises(numbers: Sequence[float]) -> bool:
+    """Whether each number of the second half is above its fellow of the first."""
+    half = len(numbers) // 2
+    return all(low < high for low, high in zip(numbers[:half], numbers[half:], strict=True))
+
+
+class Checked(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+    """A text kept as it is typed, which a reader must understand.
+
+    Parameters
+    ----------
+    reader : callable
+        Raises ValueError, or `click.BadParameter`, where it does not.
+    wanted : str
+        What it understands.
+    """
+
+    name = "text"
+
+    def __init__(self, reader: Callable[[str], Any], wanted: str) -> None:
+        self.reader, self.wanted = reader, wanted
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the text; an empty one says nothing."""
+        try:
+            _ = value and self.reader(value)
+        except (ValueError, click.BadParameter):
+            self.fail(f"{value!r} is not {self.wanted}.", param, ctx)
+        return value
 
 
 class Size(Number):

@@ -24,7 +24,7 @@ from typing import Annotated, Any
 
 import click
 
-from photocore.option_types import Names, Number, Scale
+from photocore.option_types import Checked, Names, Number, Scale
 
 
 class Typed:
@@ -186,7 +186,7 @@ class Option:
         if self.attributes.get("multiple") or isinstance(kind, Names):
             if not isinstance(value, list) or not all(isinstance(word, str) for word in value):
                 raise ValueError("a list of texts")
-            return tuple(value)
+            return tuple(map(self._understood, value))
         if isinstance(kind, Number):
             return kind.read(value)
         if isinstance(kind, click.Choice):
@@ -196,7 +196,17 @@ class Option:
                 raise ValueError(f"one of {', '.join(kind.choices)}") from None
         if not isinstance(value, str):
             raise ValueError("a text")
-        return value
+        return self._understood(value)
+
+    def _understood(self, text: str) -> str:
+        """Return a text that is understood where it is used."""
+        kind = self.attributes.get("type")
+        if isinstance(kind, Checked):
+            try:
+                kind.convert(text, None, None)
+            except click.BadParameter:
+                raise ValueError(kind.wanted) from None
+        return text
 
 
 def _shown(value: Any) -> str:

@@ -39,6 +39,7 @@ class _Recording:
     command: str
     day: str
     files: dict[Path, str] = field(default_factory=dict)
+    remarks: dict[str, None] = field(default_factory=dict)
     outputs: set[Path] = field(default_factory=set)
 
 
@@ -135,6 +136,19 @@ def note(path: Path | str) -> None:
     running, place = _recording.get(), Path(path).absolute()
     if running is not None and place not in running.outputs and place.name[:1] != ".":
         running.files.setdefault(place, "")
+
+
+def note_remark(text: str) -> None:
+    """Remember, while something is recorded, what a reader did to a file, each once."""
+    running = _recording.get()
+    if running is not None:
+        running.remarks[text] = None
+
+
+def noted_remarks() -> tuple[str, ...]:
+    """Return what readers did to files, as long as this is recorded."""
+    running = _recording.get()
+    return () if running is None else tuple(running.remarks)
 
 
 def note_output(path: Path | str) -> None:

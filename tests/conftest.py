@@ -35,8 +35,13 @@ settings.load_profile("same")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Choose which third of the slow tests is run."""
+    """Choose which third of the slow tests is run; only with slow ones kernels are compiled.
+
+    On a fresh machine numba takes a minute for them: the other tests run them as they are written.
+    """
     turns.choose(config)
+    if "not acceptance" in config.getoption("markexpr"):
+        os.environ["NUMBA_DISABLE_JIT"] = "1"
 
 
 @pytest.hookimpl(tryfirst=True)  # before -m chooses

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -217,6 +218,9 @@ def _job(
     if not isinstance(photos, list) or len(photos) < 2 or not all(map(_is_name, photos)):
         faults.append(f"{where}: far and near, or a list photos, must name its photos.")
         return None
+    places = [os.path.realpath(base / photo) for photo in photos]
+    if len(set(places)) < len(places):
+        faults.append(f"{where}: one photo is named twice; name another.")
     if "photos" in entry and {"far", "near"} & entry.keys():
         faults.append(f"{where}: name its photos by far and near or by a list photos, not both.")
     name = str(entry.get("name") or f"pair {number}")

@@ -15,10 +15,15 @@ from typing import Any
 from bifocal.collimation.background import in_background
 from bifocal.collimation.job_tasks import start_job
 from bifocal.collimation.live_orientation import control_of, lenses_of
+from bifocal.collimation.live_results import observations
 from bifocal.collimation.session import Session
 from bifocal.collimation.stated_media import lacking, media_of
+from bifocal.model.pair import Pair
+from bifocal.workbook.held_picks import verdict_of_picks
 from photocore.errors import PhotogrammetryError
 
+#: Fewer new points than this come from clicks on the photos themselves, which cannot be others.
+FEWEST_AT_ONCE = 3
 #: What is typed in one go is waited for. [s]
 PAUSE = 0.6
 
@@ -34,6 +39,7 @@ class FirstOrientation:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._tried: Any = None
+        self._held: tuple[Pair | None, frozenset[Any]] = None, frozenset()
         self._leave: Callable[[], None] | None = None
 
     def start(self) -> None:
@@ -45,6 +51,7 @@ class FirstOrientation:
     def _watch(self, events: queue.SimpleQueue[dict[str, Any] | None]) -> None:
         while True:
             self.look()
+            self.hold_picks()
             event: dict[str, Any] | None = events.get()
             while event is not None:
                 try:
@@ -72,6 +79,25 @@ class FirstOrientation:
                     start_job(session, "join", {})
                 else:
                     start_job(session, "align", {"way": "auto"}, quiet=True)
+
+    def hold_picks(self) -> None:
+        """Hold picks against the photos that did not come one by one: typed, pasted, read."""
+        session = self._session
+        with session.lock:
+            pair, points = session.accepted_pair, session.state.sorted_points()
+        held = frozenset((p.name, p.picks) for p in points if p.use and p.is_complete)
+        before = self._held[1] if self._held[0] is pair else frozenset()
+        if pair is None or pair.layers or session.files.pair_is_workbook or held == before:
+            return
+        self._held = pair, held
+        if len(held - before) < FEWEST_AT_ONCE and not session.pick_doubt:
+            return
+        seen = observations(point for point in points if point.use)
+        words = verdict_of_picks(pair, seen.pixels1, seen.pixels2).words
+        with session.lock:
+            if words != session.pick_doubt:
+                session.pick_doubt = words
+                session.changed()
 
     def _to_join(self) -> Any:
         """Return what further photos would join; None where there are none, or they did."""

@@ -80,6 +80,7 @@ class Session:
         self.results: LiveResults | None = None
         self.orientation: tuple[object, LiveOrientation] | None = None
         self.proposal: dict[str, Any] | None = None
+        self.pick_doubt = ""
         self.good: tuple[LiveResults, dict[str, Any] | None] | None = None
         self._joined = JoinedSet()
         self._faces = DrawnFaces(lambda: self.state, lambda one: self._carry_out(one, write=True))

@@ -15,7 +15,7 @@ from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality, ReliefMap
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, as_points
-from photocore.errors import InputError
+from photocore.errors import LARGEST, InputError
 
 
 def difference_of(before: ReliefMap, after: ReliefMap) -> tuple[ReliefMap, BoolArray, list[str]]:
@@ -31,6 +31,10 @@ def difference_of(before: ReliefMap, after: ReliefMap) -> tuple[ReliefMap, BoolA
     InputError
         If nothing is known in both.
     """
+    for relief in (before, after):
+        measured = relief.quality == Quality.MEASURED
+        if (relief.sigma[measured] < 0).any() or (np.abs(relief.r[measured]) > LARGEST).any():
+            raise InputError(remark("compare.no_relief"))
     base, other = (before, after) if before.gsd >= after.gsd else (after, before)
     other = _on_grid(other, base.grid)
     sign = 1 if base is before else -1

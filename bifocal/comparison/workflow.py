@@ -102,6 +102,8 @@ def compare_files(
     InputError
         If a file is unusable, the maps have nothing in common, or the folder cannot be written.
     """
+    if stable is not None and fit:
+        raise InputError(remark("compare.stable_and_fit"))
     paths = [_relief_of(path) for path in (before, after)]
     if os.path.realpath(paths[0]) == os.path.realpath(paths[1]):
         raise InputError(f"{before}: is compared with itself; name two dates.")

@@ -11,8 +11,8 @@ import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.remarks import remark
-from photocore.arrays import BoolArray, FloatArray, as_floats
-from photocore.errors import InputError, located
+from photocore.arrays import BoolArray, FloatArray, as_floats, positive
+from photocore.errors import LARGEST, InputError, located
 from photocore.jsonfile import plain, read_object, write_object
 from photocore.provenance import digest_of
 
@@ -202,7 +202,7 @@ def _shape_of(item: Mapping[str, Any]) -> tuple[Kind, Face | BreakLine | Occlude
     plane: FloatArray | None = None
     if (given := said.get("plane", None if relief is None else [relief, 0.0, 0.0])) is not None:
         plane = as_floats(given, "plane")
-        if plane.shape != (3,) or not np.isfinite(plane).all():
+        if plane.shape != (3,) or not (np.abs(plane) <= LARGEST).all():
             raise ValueError("plane")
     if said.get("points"):
         rows = [[*row, np.nan][:4] for row in said["points"]]
@@ -212,6 +212,8 @@ def _shape_of(item: Mapping[str, Any]) -> tuple[Kind, Face | BreakLine | Occlude
     if plane is None and len(points) and (len(points) < 3 or not np.isfinite(points[:, :3]).all()):
         raise ValueError("points")
     sigma, mends = _number(said, "sigma"), _number(said, "mends")
+    if sigma is not None:
+        positive(sigma, "sigma", unit="m")
     return "face", Face(
         name=name, rings=rings, plane=plane, points=points, sigma=sigma, mends=mends
     )
@@ -251,7 +253,12 @@ def _opened(ring: FloatArray) -> FloatArray:
 def _corners(rows: Any, least: int) -> FloatArray:
     """Return positions as X, Y, relief, NaN where the last is not given."""
     corners = as_floats([[*row, np.nan][:3] for row in rows], "coordinates")
-    if len(corners) < least or not np.isfinite(corners[:, :2]).all():
+    # NaN of the relief that is not given is not above anything.
+    if (
+        len(corners) < least
+        or not (np.abs(corners[:, :2]) <= LARGEST).all()
+        or (np.abs(corners[:, 2]) > LARGEST).any()
+    ):
         raise ValueError("coordinates")
     return corners
 
@@ -260,7 +267,7 @@ def _number(said: Mapping[str, Any], key: str) -> float | None:
     value = said.get(key)
     if value is None:
         return None
-    if isinstance(value, bool) or not np.isfinite(float(value)):
+    if isinstance(value, bool) or not abs(float(value)) <= LARGEST:
         raise ValueError(key)
     return float(value)
 

@@ -60,7 +60,7 @@ def faces_path(given: Path | None, *sources: object) -> Path | None:
     if given is not None:
         return None if given.name == NONE else given
     places = [beside(source) for source in sources if isinstance(source, Path | str)]
-    return next((place for place in places if place.is_file()), None)
+    return next((place for place in places if place.exists()), None)
 
 
 def given_faces(given: Faces | Path | None) -> tuple[Faces | None, tuple[str, ...]]:

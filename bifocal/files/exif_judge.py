@@ -48,6 +48,31 @@ class JudgedFocal:
     doubt: str = ""
 
 
+def sensors_apart(first: ImageInfo, second: ImageInfo) -> float:
+    """Return by how much (logarithm) two photos of one camera tell of sensors of different size.
+
+    0 where they agree, or do not say.
+
+    Examples
+    --------
+    One of them was halved since, and nothing else tells so:
+
+    >>> from dataclasses import replace
+    >>> from pathlib import Path
+    >>> whole = ImageInfo(path=Path("a.jpg"), size=(3072, 2048), model="X", focal_length=35,
+    ...                   focal_plane_pitch=22.7 / 3072)
+    >>> half = replace(whole, size=(1536, 1024), focal_length=19)
+    >>> round(sensors_apart(whole, half), 2), sensors_apart(whole, whole)
+    (0.69, 0.0)
+    """
+    pitches = [judged_focal(info).pitch for info in (first, second)]
+    if not first.model or first.model != second.model or None in pitches:
+        return 0.0
+    sizes = [max(i.size) * (p or 1.0) for i, p in zip((first, second), pitches, strict=True)]
+    apart = abs(float(np.log(sizes[0] / sizes[1])))
+    return apart if apart > AGREE else 0.0
+
+
 def judged_focal(info: ImageInfo) -> JudgedFocal:
     """Return the principal distance on which a photo's EXIF data agree, or what covers them.
 

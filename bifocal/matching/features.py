@@ -38,12 +38,16 @@ class Features:
 
     def strongest(self, count: int) -> Features:
         """Return the first so many features."""
+        return self.of(slice(count))
+
+    def of(self, rows: slice | NDArray[np.intp]) -> Features:
+        """Return the features of some rows."""
         return replace(
             self,
-            pixels=self.pixels[:count],
-            size=self.size[:count],
-            direction=self.direction[:count],
-            descriptors=self.descriptors[:count],
+            pixels=self.pixels[rows],
+            size=self.size[rows],
+            direction=self.direction[rows],
+            descriptors=self.descriptors[rows],
         )
 
 

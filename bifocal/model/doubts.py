@@ -21,11 +21,13 @@ MOST_BENT, CERTAIN = 0.2, 2.0
 #: what of k the scale takes up, certainly and by chance: errors of r over sigma_r are 0.8 to
 #: 1.4 on simulated pairs of nearly one axis whose lens bends the wall by 1 to 7 px. [px, -]
 BEND_BY_K, TAKEN_UP, OR_MORE = 144.0, 0.2, 0.1
-#: Unit of lengths to which nothing gives a scale.
-NO_UNIT = "none"
+#: Unit of lengths to which nothing gives a scale, and of all others.
+NO_UNIT, METRES = "none", "m"
 #: Keys of doubts that leave no word of how good relief is, and of those about which plane is the
 #: wall; how these began in files of versions that kept no keys.
-MISFITS = frozenset({"orientation.misses_lines", "orientation.bent", "pair.bent"})
+MISFITS = frozenset(
+    {"orientation.misses_lines", "orientation.bent", "pair.bent", "orientation.aside"}
+)
 RIVALS = frozenset({"orientation.rivals"})
 _WITHOUT_KEYS = {"THE MODEL DOES NOT FIT": "pair.bent", "CHECK THE WALL": "orientation.rivals"}
 #: What free diagnostics may lack or hold instead of numbers.
@@ -93,7 +95,7 @@ def unit_of(extra: Mapping[str, Any]) -> str:
     return (
         NO_UNIT
         if extra.get("unit") == NO_UNIT or any(doubt.startswith(untold) for doubt in doubts)
-        else "m"
+        else METRES
     )
 
 
@@ -129,7 +131,8 @@ def covariance_of_doubts(setup: Any) -> FloatArray | None:
     Notes
     -----
     A bend counts as radial distortion k of one photo against the other, with what a scale takes up
-    of it; another face that may be the wall moves both cameras alike.
+    of it; another face that may be the wall moves both cameras alike; a wall that repeats itself
+    leaves the near camera some periods aside.
     """
     variance = np.zeros((len(NAMES), len(NAMES)))
     k1, scale, *both = (NAMES.index(name) for name in ("k1 1", "focal length 1", "Z 1", "Z 2"))
@@ -140,6 +143,10 @@ def covariance_of_doubts(setup: Any) -> FloatArray | None:
         bent[[k1, scale]] = k * (float(setup["focal_px"][0]) / half) ** 2, -TAKEN_UP * k
         variance = np.outer(bent, bent)
         variance[scale, scale] += (OR_MORE * k) ** 2
+    for place in ("X 2", "Y 2"):
+        with suppress(*NO_NUMBER):
+            aside = float(setup["standard_deviations"][f"aside_{place[0].lower()}"])
+            variance[NAMES.index(place), NAMES.index(place)] += aside**2
     with suppress(*NO_NUMBER):
         offset = float(setup["standard_deviations"]["relief_offset"])
         variance[np.ix_(both, both)] += offset**2

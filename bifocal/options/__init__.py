@@ -6,14 +6,51 @@ the step behind is given by its name.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import click
 
-from photocore.option_types import FOCAL, NOT_NEGATIVE, POSITIVE, Length, Names, Numbers, Scale
+from photocore.option_types import (
+    FOCAL,
+    NOT_NEGATIVE,
+    POSITIVE,
+    Checked,
+    Length,
+    Names,
+    Numbers,
+    Scale,
+)
 from photocore.options import Typed, options_of
 from photocore.shared_options import CogOption
+
+#: How vignetting is described; lenses have coefficients of some tenths.
+VIGNETTING = Checked(
+    Numbers(3, word="cos4", least=-100, most=100).typed,
+    "cos4 or three numbers k1,k2,k3 from -100 to 100",
+)
+
+
+def section_corners(text: str) -> tuple[str, tuple[float, ...]]:
+    """Return x, y or line, and where that section lies: one number, or X, Y of its corners. [m]
+
+    Raises
+    ------
+    ValueError
+        If it is none of these.
+    """
+    packed = text.replace(" ", "").lower()
+    kind = packed[0] if packed.startswith(("x=", "y=")) else "line"
+    words = [packed[2:]] if kind != "line" else text.replace(",", " ").replace(";", " ").split()
+    numbers = tuple(map(float, words))
+    corners = kind != "line" or (len(numbers) >= 4 and len(numbers) % 2 == 0)
+    if not (corners and all(map(isfinite, numbers))):
+        raise ValueError(text)
+    return kind, numbers
+
+
+SECTION = Checked(section_corners, 'x=1.5, y=2 or the corners of a line, "0,1 4,1"')
 
 ControlOption = Annotated[
     Path | None, Typed(text="Table of control points: id, X, Y, r [m] and pixels.")
@@ -42,7 +79,7 @@ LanguageOption = Annotated[
 BoundsOption = Annotated[
     tuple[float, float, float, float] | None,
     Typed(
-        Numbers(4),
+        Numbers(4, rising=True),
         "XMIN,YMIN,XMAX,YMAX",
         text="Part of the wall [m].  [default: all that is known]",
     ),
@@ -89,7 +126,7 @@ QualityOption = Annotated[
 ReliefRangeOption = Annotated[
     tuple[float, float] | None,
     Typed(
-        Numbers(2),
+        Numbers(2, rising=True),
         "LOW,HIGH",
         text="Least and greatest relief to expect [m].  [default: -36 % and +22 % of d2]",
     ),
@@ -274,7 +311,7 @@ class PictureOptions:
     """Whole pictures are the default."""
     match: bool = True
     """With --image both: bring photo 2 to the colours of photo 1."""
-    vignetting: Annotated[str, Typed(unit="cos4|K1,K2,K3")] = ""
+    vignetting: Annotated[str, Typed(VIGNETTING, "cos4|K1,K2,K3")] = ""
     """Undo the fall-off of light to the corners.  [default: off]"""
     chromatic: bool = False
     """Measure and undo red and blue fringes."""
@@ -293,9 +330,11 @@ class DrawingOptions:
     paper: PaperOption = None
     hatch: bool = True
     """Lines over what is not measured; which ones mean what stands in the legend."""
-    sections: Annotated[tuple[str, ...], Typed(unit="x=M|y=M|'X,Y X,Y ...'", flag="--section")] = ()
+    sections: Annotated[
+        tuple[str, ...], Typed(SECTION, "x=M|y=M|'X,Y X,Y ...'", flag="--section")
+    ] = ()
     """Section of the relief as DXF and SVG [m], beside a drawing; repeat it."""
-    contours: Annotated[float | None, Typed(Length(above=0), "M")] = None
+    contours: Annotated[float | None, Typed(Length(least=1e-4), "M")] = None
     """Between contour lines [m].  [default: by relief]"""
     layers: Literal["language", "bifocal", "ncs"] = "language"
     """Names of the layers of DXF drawings: in the language (English BIFOCAL_POINTS, Italian

@@ -21,6 +21,7 @@ from bifocal.orientation.approximate_orientation import (
     check_picks,
     contradiction,
     features_of,
+    laid_together,
     observations_of,
     order_of,
     ties_of,
@@ -36,6 +37,7 @@ from bifocal.orientation.orientation_remarks import (
     hopeless_shape,
     model_remarks,
     order_remarks,
+    repeated_in_words,
     wall_remarks,
 )
 from bifocal.orientation.orientation_stages import (
@@ -46,6 +48,7 @@ from bifocal.orientation.orientation_stages import (
     oriented_in_stages,
     with_refracted_ties,
 )
+from bifocal.orientation.repetition import Repetition
 from bifocal.orientation.slips import TrialOrientation, TypedOrientation, slip_of
 from bifocal.orientation.starts.refracted_start import refracted_start
 from bifocal.orientation.starts.relative_orientation import Ties
@@ -103,7 +106,9 @@ def _oriented(given: Given) -> OrientedPair:
         if right is not None:
             return right
         given = replace(given, settled=True)
+    repeated: Repetition | None = None
     if ties is not None and not enough:
+        ties, repeated = laid_together(given, ties)
         order = order_of(given, ties)
         if order < -ORDER.sure:
             return _with_photos_exchanged(given, typed_stay=True)
@@ -152,6 +157,8 @@ def _oriented(given: Given) -> OrientedPair:
     bent = hopeless_shape(pair.observations, pair.shape) if certain and not enough else ""
     if bent and likely_on_wall(pair.observations, pair.adjusted) < TIES.fewest_on_wall:
         raise GeometryError(bent)  # what holds a bent wall by small chances only is none
+    if repeated is not None:
+        pair = repeated_in_words(pair, repeated)
     return _with_words(pair, given, remarks)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.files.exif_judge import NOMINAL, judged_focal
+from bifocal.files.exif_judge import NOMINAL, judged_focal, sensors_apart
 from bifocal.files.haze import read_greys
 from bifocal.model.basis import rests_on
 from bifocal.model.interior_orientation import Interior, lens_of_photo
@@ -171,6 +171,7 @@ def align_photos(
         interior_of_photo(info, known, number)
         for number, (info, known) in enumerate(zip(infos, options.lenses, strict=True), start=1)
     ]
+    interiors = judged_together(infos, interiors)
     if options.one_lens and all(interior.is_assumed for interior in interiors):
         interiors = [Interior.sought(info.size) for info in infos]
     first, second = (
@@ -331,6 +332,22 @@ def interior_of_photo(info: ImageInfo, data: KnownLens, number: int | str = "") 
     )
     typed = data.focal is not None
     return replace(found, is_typed=typed, doubt="" if typed else judged.doubt)
+
+
+def judged_together(
+    infos: tuple[ImageInfo, ImageInfo], interiors: Sequence[Interior]
+) -> list[Interior]:
+    """Return interiors out of EXIF data, doubted where the photos contradict each other."""
+    apart = sensors_apart(*infos)
+    believed = [i.is_typed or i.is_calibrated or i.is_assumed for i in interiors]
+    if not apart or all(believed):
+        return list(interiors)
+    sigma = min(apart, 0.5)  # as of a lens of which nothing is known
+    doubt = remark("orientation.exif_sensors", model=infos[0].model, share=100 * sigma)
+    return [
+        i if sure else replace(i, sigma_focal=max(i.sigma_focal, sigma), doubt=i.doubt or doubt)
+        for i, sure in zip(interiors, believed, strict=True)
+    ]
 
 
 def control_of(options: AlignOptions, sizes: Sequence[tuple[int, int]]) -> Control:

@@ -118,6 +118,9 @@ def make_alignment(
     deviations = standard_deviations(adjusted)
     if (offset := zero_sigma(oriented.faces)) and not oriented.wall_named:
         deviations["relief_offset"] = offset
+    if oriented.aside is not None:
+        ends = apply_homography(plane_from_pixel(cameras[0]), oriented.aside)
+        deviations = aside(deviations, *np.abs(ends[1:] - ends[0]).max(axis=0).tolist())
     used = observations.tie_used
     sigma_tie = robust_sigma(adjusted.tie_misfit[used]) if used.any() else observations.sigma_pick
     words: tuple[str, ...] = orientation_in_words(
@@ -262,6 +265,12 @@ def deviations_of(cameras: Cameras, covariance: FloatArray, media: PairMedia) ->
     variances = (abs(float(row @ covariance @ row)) for row in (by_scale, by_relief))
     scale, relief = map(np.sqrt, variances)
     return out | {"scale": float(scale), "relief_scale": float(relief / abs(1 / d2 - 1 / d1))}
+
+
+def aside(deviations: Mapping[str, float], x: float, y: float) -> dict[str, float]:
+    """Return deviations of a pair whose near camera may stand a period of the wall aside. [m]"""
+    nadir = float(np.hypot(deviations["nadir2"], np.hypot(x, y)))
+    return {**deviations, "aside_x": x, "aside_y": y, "nadir2": nadir}
 
 
 def _diagnostics(

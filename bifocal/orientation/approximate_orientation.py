@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from bifocal.orientation import validation
 from bifocal.orientation.adjustment.pair_observations import PairObservations
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import SIGMA_PARALLEL, Photos
+from bifocal.orientation.repetition import Repetition, repetition
 from bifocal.orientation.starts.photo_order import first_is_far
 from bifocal.orientation.starts.relative_orientation import (
     Ties,
@@ -157,6 +159,21 @@ def ties_of(given: Given, *, needed: bool) -> tuple[Ties | None, tuple[str, ...]
         if needed or isinstance(error, validation.SamePhotoError):
             raise
         return None, (remark("orientation.control_alone", why=error),)
+
+
+def laid_together(given: Given, ties: Ties) -> tuple[Ties, Repetition | None]:
+    """Return common points where the photos belong together, if the wall repeats itself."""
+    far, near = (photo.grey for photo in given.photos)
+    if far is None or near is None:
+        return ties, None
+    with suppress(GeometryError):
+        cameras, _, interiors = approximate_cameras(given, ties, False)
+        repeated = repetition((far, near), interiors, cameras[0], ties)
+        if repeated is not None:
+            around = repeated.surrounding
+            ties = find_ties(*features_of(given), given.interiors, given.names, around)
+        return ties, repeated
+    return ties, None
 
 
 def approximate_cameras(

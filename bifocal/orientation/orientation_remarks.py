@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from bifocal.orientation.adjustment.pair_observations import PairObservations
 from bifocal.orientation.alignment import standard_deviations, wall_relief
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair
+from bifocal.orientation.repetition import Repetition
 from bifocal.orientation.tuning import BEND, ORDER, REMARKS
 from bifocal.orientation.walls.wall_shape import WallShape, shape_in_words
 from bifocal.remarks import remark
@@ -84,6 +87,15 @@ def order_remarks(order: float, names: tuple[str, str]) -> list[str]:
     if order > ORDER.sure:
         return []
     return [remark("orientation.near_unsure", name=names[1])]
+
+
+def repeated_in_words(pair: OrientedPair, repeated: Repetition) -> OrientedPair:
+    """Return the pair of a wall that repeats itself, with how far its photos may lie aside."""
+    period = float(np.linalg.norm(repeated.ends[1] - repeated.ends[0]))
+    note = remark(f"orientation.{'repeats' if repeated.is_certain else 'aside'}", period=period)
+    if repeated.is_certain:
+        return pair.told(note)
+    return replace(pair, remarks=(note, *pair.remarks), aside=repeated.ends)
 
 
 def wall_remarks(pair: OrientedPair) -> list[str]:

@@ -48,7 +48,7 @@ from bifocal.orientation.walls.wall_planes import (
 from bifocal.orientation.walls.wall_shape import WallShape
 from bifocal.remarks import remark
 from photocore.adjustment.outliers import robust_sigma
-from photocore.arrays import ByteArray
+from photocore.arrays import ByteArray, FloatArray
 from photocore.camera.pinhole import plane_transfer
 from photocore.errors import GeometryError
 
@@ -99,6 +99,9 @@ class OrientedPair:
         How far the wall is from a plane between the photos.
     lines_off : bool
         Whether lines of the façade come out of the wall by more than they may.
+    aside : ndarray, shape (n, 2), or None
+        A place of the far photo, and those as far away as the photos may lie aside of each other,
+        on a wall that repeats itself. [ideal px]
     """
 
     observations: PairObservations
@@ -111,6 +114,7 @@ class OrientedPair:
     tolerance: tuple[float, float] = STAGES.free
     shape: WallShape = field(default_factory=WallShape)
     lines_off: bool = False
+    aside: FloatArray | None = None
 
     def readjusted(self, start: PairUnknowns | None = None, **changes: Any) -> OrientedPair:
         """Return the pair adjusted with changed observations, from here or another start."""

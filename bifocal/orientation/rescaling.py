@@ -17,7 +17,7 @@ from bifocal.model.doubts import MISFITS, RIVALS, doubts_of
 from bifocal.model.orientation_precision import CAMERA, NAMES, pinhole, pixel_rates
 from bifocal.model.pair import Pair
 from bifocal.model.pair_media import PairMedia
-from bifocal.orientation.alignment import deviations_of
+from bifocal.orientation.alignment import aside, deviations_of
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.walls.reference_plane import WallFace, rivals_in_words, zero_sigma
@@ -147,6 +147,9 @@ def _setup(pair: Pair, factor: float) -> dict[str, Any]:
     cameras = pinhole(pair.image1), pinhole(pair.image2)
     covariance = np.zeros((len(NAMES),) * 2) if pair.orientation is None else pair.orientation
     deviations = deviations_of(cameras, covariance, PairMedia.none())
+    before = setup.get("standard_deviations", {})
+    if {"aside_x", "aside_y"} <= before.keys():
+        deviations = aside(deviations, factor * before["aside_x"], factor * before["aside_y"])
     if "relief_offset" in setup.get("standard_deviations", {}) and faces:
         deviations["relief_offset"] = zero_sigma(faces)
     known = rivals_in_words(faces, SiteMeasures()) if faces else ""

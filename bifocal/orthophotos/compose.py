@@ -358,7 +358,8 @@ def _closing_gaps(
         box = grown(bounds, TIDYING.margin, grid.shape)
         gap = label[box] == number
         wanted = gap & free[box]
-        level = np.nanmedian(relief[box][gap]) + np.float32(GAPS.before)
+        heights = relief[box][gap & np.isfinite(relief[box])]
+        level = np.median(heights) + np.float32(GAPS.before) if heights.size else -np.inf
         rim = (cv2.dilate(gap.astype(np.uint8), ring) > 0) & usable[box] & (relief[box] < level)
         backed = rim if measured is None else rim & measured[box]
         anchored = backed.any() and backed.sum() >= GAPS.measured * rim.sum()

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bifocal.model.doubts import METRES
 from bifocal.model.geotiff import RasterReader, check_relief, create_raster
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.surface import MapSurface
@@ -128,7 +129,10 @@ def make_mosaic(
             names=[*names, "source"],
             colour=not values and len(names) == 3,
             nodata=float("nan") if values else None,
-            tags={f"BIFOCAL_INPUT_{i}": path.name for i, path in enumerate(inputs, start=1)},
+            tags={
+                "BIFOCAL_UNIT": _unit_of(layers[0]),
+                **{f"BIFOCAL_INPUT_{i}": path.name for i, path in enumerate(inputs, start=1)},
+            },
             overviews=overviews,
         ) as writer:
             counts = write_tiles(
@@ -152,8 +156,16 @@ def _check_alike(layers: Sequence[_FileLayer]) -> None:
                 f"{first.path} ({count} of {first.dtype}) cannot be joined: give only orthophotos "
                 "of the same kind, or only relief maps."
             )
+        if _unit_of(layer) != _unit_of(layers[0]):
+            names = {"path": layer.reader.path, "first": first.path}
+            raise InputError(remark("mosaic.two_units", **names))
         if layer.reader.crs != first.crs:
             raise InputError(remark("mosaic.two_systems", path=layer.reader.path, first=first.path))
+
+
+def _unit_of(layer: _FileLayer) -> str:
+    """Return the unit of a raster's lengths: ``m``, or ``none`` where nothing gave a scale."""
+    return layer.reader.tags.get("BIFOCAL_UNIT", METRES)
 
 
 def _relief_of(paths: Sequence[Path], stack: ExitStack, coarse: Grid) -> Float32Array:
@@ -174,6 +186,8 @@ def _remarks(
 ) -> list[str]:
     """Return what the user should know of how the inputs fit."""
     remarks: list[str] = []
+    if _unit_of(layers[0]) != METRES:
+        remarks.append(remark("projects.no_scale"))
     paths = [layer.reader.path for layer in layers]
     alone = len({path.name for path in paths}) == len(paths)
     names = [path.name if alone else str(path) for path in paths]

@@ -18,6 +18,7 @@ from bifocal.model.grid import Grid
 from bifocal.model.image import ImageArray, as_photo
 from bifocal.model.photo import Photo
 from bifocal.model.surface import Surface
+from bifocal.options import VIGNETTING
 from bifocal.orthophotos.rectify import ChromaticShift, SourcePhoto
 from bifocal.orthophotos.tuning import COLOURS
 from bifocal.orthophotos.visibility import hidden_from
@@ -76,14 +77,9 @@ def devignetted(image: ImageArray, photo: Photo, model: str) -> ImageArray:
         share = (radius / focal) ** 2
         return _scaled(image, lambda square: (1 + np.float32(share) * square) ** 2)
     try:
-        k1, k2, k3 = (float(value) for value in model.split(","))
-        if not max(abs(k1), abs(k2), abs(k3)) <= COLOURS.steepest:
-            raise ValueError(model)
+        k1, k2, k3 = VIGNETTING.reader(model)
     except ValueError:
-        raise InputError(
-            f"vignetting: {model!r} is neither cos4 nor three numbers k1,k2,k3 up to "
-            f"{COLOURS.steepest:g}."
-        ) from None
+        raise InputError(f"vignetting: {model!r} is not {VIGNETTING.wanted}.") from None
 
     def gain(square: Float32Array) -> Float32Array:
         falloff = 1 + square * (k1 + square * (k2 + square * k3))

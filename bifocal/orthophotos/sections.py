@@ -9,6 +9,7 @@ import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.model.surface import Surface
+from bifocal.options import section_corners
 from bifocal.orthophotos.drawing import Section
 from bifocal.orthophotos.tuning import PROFILE
 from bifocal.remarks import remark
@@ -79,18 +80,13 @@ def sample(surface: Surface, points: FloatArray, *, gsd: float) -> FloatArray:
 
 def _path(name: str, grid: Grid) -> tuple[str, FloatArray]:
     xmin, ymin, xmax, ymax = grid.bounds
-    text = name.replace(" ", "").lower()
-    kind = text[0] if text.startswith(("x=", "y=")) else "line"
     try:
-        if kind == "line":
-            numbers = [float(value) for value in name.replace(",", " ").replace(";", " ").split()]
-        else:
-            at = float(text[2:])
-            numbers = [at, ymin, at, ymax] if kind == "x" else [xmin, at, xmax, at]
+        kind, numbers = section_corners(name)
     except ValueError:
-        numbers = []
-    if len(numbers) < 4 or len(numbers) % 2 or not np.isfinite(numbers).all():
-        raise InputError(remark("ortho.section_place", name=name))
+        raise InputError(remark("ortho.section_place", name=name)) from None
+    if kind != "line":
+        at = numbers[0]
+        numbers = (at, ymin, at, ymax) if kind == "x" else (xmin, at, xmax, at)
     corners = np.array(numbers).reshape(-1, 2)
     if not np.ptp(corners, axis=0).any():
         raise InputError(f"section {name!r}: its corners are one point; write two or more.")

@@ -93,10 +93,9 @@ class CompletedSurface:
 
     def source(self, grid: Grid) -> ByteArray:
         """Return what relief stands on: `Source` INTERPOLATED, PLANE, or NONE where measured."""
-        known = np.isfinite(self.surface.window(grid))
-        told = self.measured(grid)
-        if told is not None:
-            known &= told & self._flags(self._kept, grid)
+        known = self.measured(grid)
+        known = np.isfinite(self.surface.window(grid)) if known is None else known
+        known = known & self._flags(self._kept, grid)
         near = self._at(self._share, grid) >= 0.5
         mark = np.where(near, np.uint8(Source.INTERPOLATED), np.uint8(Source.PLANE))
         return np.where(known, np.uint8(Source.NONE), mark)
@@ -163,7 +162,22 @@ def _kept(
     away = np.where(known, np.abs(relief - membrane(relief, sure)) * slope, np.float32(0))
     rest = known & ~sure
     far = rest & (cv2.medianBlur(away.astype(np.float32), 5) > bound)
-    return sure | parts_of(rest & even, least) | parts_of(far, WHOLE.piece / gsd**2)
+    kept = sure | parts_of(rest & even, least) | parts_of(far, WHOLE.piece / gsd**2)
+    return _with_rims(kept, relief)
+
+
+def _with_rims(kept: BoolArray, relief: Float32Array) -> BoolArray:
+    """Return what is kept with what goes on beside it without a step, as far as `WHOLE.rim`.
+
+    The rim of a raised part is interpolated, a few pixels broad, and stands where it stands: left
+    out, the sheet would fall from it to the wall, and what it hides with it.
+    """
+    square, limit, far = np.ones((3, 3), np.uint8), np.float32(WHOLE.even), np.float32(9e9)
+    for _ in range(WHOLE.rim):
+        low = relief - cv2.erode(np.where(kept, relief, far), square)
+        high = cv2.dilate(np.where(kept, relief, -far), square) - relief
+        kept = kept | (np.minimum(np.abs(low), np.abs(high)) < limit)
+    return kept
 
 
 def _even(relief: Float32Array, slope: Float32Array) -> BoolArray:

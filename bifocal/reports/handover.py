@@ -96,6 +96,8 @@ def write_handover(
     pair = Pair.read(source)
     remarks = check_maps(MadeFrom.of(photos_of(pair)), relief=task.relief, ortho=task.ortho)
     shown = _Shown.read(pair, task)
+    if shown.points is not None and not np.isfinite(shown.points.xyz).all(axis=1).any():
+        remarks = (*remarks, remark("reports.no_points_to_show", path=task.points))
     factor = 1.0
     while len(page := _page(shown, task, source, factor).encode()) > MOST:
         factor *= SHRINK

@@ -45,6 +45,7 @@ from bifocal.survey.tolerances import RULES, ToleranceRule
 from bifocal.survey.units import (
     as_pixels,
     refuse_contradiction,
+    refuse_corner,
     refuse_millimetres,
     refuse_wrong_unit,
 )
@@ -317,6 +318,10 @@ def _ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -> _Arr
         remarks.append(exchanged_remark(setup))
         setup, points = setup.exchanged(), points.exchanged()
     measured = setup.in_millimetres(points)
+    if not adjust:  # which finds by itself what is counted from
+        typed = points.use & points.is_cartesian
+        first, second = measured.all_xy()
+        refuse_corner(first[typed], second[typed], survey.where)
     check = _check_plane(pair, points, measured.all_xy(), None, survey, adjust)
     arranged = _Arranged(
         points=points, measured=measured, pair=pair, setup=setup, check=check,

@@ -24,6 +24,8 @@ CONTRADICTION = 100.0
 WIDEST = 3.0
 #: Without a principal distance: no sensor or film of a hand camera is this large. [mm]
 LARGEST_MM = 150.0
+#: So few points tell nothing of where their coordinates count from.
+FEWEST_FOR_ORIGIN = 6
 #: Pixels that all lie within this of the top-left corner are millimetres. [px]
 CORNER_PX = 60.0
 
@@ -147,6 +149,42 @@ def refuse_millimetres(pair: Pair, points: PointObservations, where: str) -> Non
     if np.nanmax(np.abs(nadirs)) > 2 * CORNER_PX:
         seems = remark("units.millimetres", largest=np.nanmax(np.abs(pixels)))
         raise InputError(f"{where}: {seems}")
+
+
+def refuse_corner(xy1: FloatArray, xy2: FloatArray, where: str) -> None:
+    """Refuse coordinates in mm that count from a corner of the pictures, not from the nadir.
+
+    Parameters
+    ----------
+    xy1, xy2 : ndarray, shape (n, 2)
+        Of the points in use. [mm]
+    where : str
+        File and sheet, for the message.
+
+    Raises
+    ------
+    InputError
+        With what is to be subtracted.
+
+    Notes
+    -----
+    Both photos show a point in one direction from the nadir, x1 y2 = x2 y1. Of coordinates that
+    count from (a, b) the difference is a (y2 - y1) - b (x2 - x1).
+    """
+    whole = np.isfinite(np.hstack([xy1, xy2])).all(axis=1)
+    first, second = xy1[whole], xy2[whole]
+    one_sided = all((v >= 0).all() or (v <= 0).all() for v in np.hstack([first, second]).T)
+    if whole.sum() < FEWEST_FOR_ORIGIN or not one_sided:
+        return
+    off = first[:, 0] * second[:, 1] - second[:, 0] * first[:, 1]
+    apart = second - first
+    design = np.column_stack([apart[:, 1], -apart[:, 0]])
+    origin, *_ = np.linalg.lstsq(design, off)
+    rest = np.sqrt(np.mean((off - design @ origin) ** 2))
+    middle = origin / np.where(np.median(first, axis=0), np.median(first, axis=0), np.inf)
+    if rest < 0.1 * np.sqrt(np.mean(off**2)) and (middle > 1 / 3).all() and (middle < 3).all():
+        about = {"x": float(origin[0]), "y": float(origin[1])}
+        raise InputError(f"{where}: {remark('units.from_corner', **about)}")
 
 
 def refuse_contradiction(points: PointObservations, table: ReliefTable, where: str) -> None:

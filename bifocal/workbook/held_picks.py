@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from bifocal.files.photos import photo_info
-from bifocal.matching.pick_evidence import held_against_photos
+from bifocal.matching.pick_evidence import PickVerdict, held_against_photos
 from bifocal.model.pair import Pair
 from bifocal.survey.solved_survey import SolvedSurvey
+from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.images import read_grey
 
@@ -23,15 +24,21 @@ def photos_against_picks(solved: SolvedSurvey, pair: Pair) -> tuple[str, ...]:
     InputError
         If they agree with the picks read in another way: exchanged, from the bottom, of copies.
     """
-    picks = solved.points.pixels1, solved.points.pixels2
-    rows = np.flatnonzero(np.isfinite(np.hstack(picks)).all(axis=1) & solved.points.use)
+    used, nowhere = solved.points.use[:, None], np.nan
+    picks = (solved.points.pixels1, solved.points.pixels2)
+    verdict = verdict_of_picks(pair, *(np.where(used, pixels, nowhere) for pixels in picks))
+    if verdict.slip is not None:
+        raise InputError(f"{solved.survey.where}: {verdict.words}")
+    return (verdict.words,) if verdict.words else ()
+
+
+def verdict_of_picks(pair: Pair, pixels1: FloatArray, pixels2: FloatArray) -> PickVerdict:
+    """Return what a pair's photos say of picks of the same points, NaN where not picked. [px]"""
+    rows = np.flatnonzero(np.isfinite(np.hstack([pixels1, pixels2])).all(axis=1))
     rows = rows[:: max(1, len(rows) // MOST_HELD)]
     try:
         first, second = (read_grey(photo_info(pair, number).path) for number in (1, 2))
     except InputError:  # what is wrong with a photo says who needs it
-        return ()
+        return PickVerdict(likeness=np.zeros(0))
     transfer = np.linalg.solve(pair.image2.plane_from_pixel, pair.image1.plane_from_pixel)
-    verdict = held_against_photos((first, second), picks[0][rows], picks[1][rows], transfer)
-    if verdict.slip is not None:
-        raise InputError(f"{solved.survey.where}: {verdict.words}")
-    return (verdict.words,) if verdict.words else ()
+    return held_against_photos((first, second), pixels1[rows], pixels2[rows], transfer)

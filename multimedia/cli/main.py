@@ -21,6 +21,7 @@ SUMMARIES = {
     "bathymetry": "Refraction correction of a DEM or point cloud.",
     "waterlevel": "Mean water height from tie points on the surface.",
     "soundings": "A corrected bottom held against soundings, by depth.",
+    "targets": "Images of particles in photos: where, how precisely, how large.",
     "openptv": "Project file from an OpenPTV experiment folder.",
     "particles": "Particles of a frame from the targets of all cameras.",
     "track": "Tracks and velocities of particles through many frames.",

@@ -125,6 +125,4 @@ def command(options: TrackCommand) -> None:
                                   + ", ".join(f"{v:.2g}" for v in own)),
         ("differ from those around", f"{int(tracks.outlier.sum())} vectors"),
     ]  # fmt: skip
-    print_result(
-        data, [text_table(("", ""), rows)], as_json=options.as_json, remarks=tracks.remarks
-    )
+    print_result(data, [text_table(("", ""), rows)], as_json=options.as_json, remarks=found.remarks)

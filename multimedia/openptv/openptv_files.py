@@ -185,6 +185,29 @@ def read_targets(path: Path, *, field: int = 0) -> DetectedTargets:
     )
 
 
+def targets_text(pixels: FloatArray, counts: IntArray, extents: IntArray, sums: FloatArray) -> str:
+    """Return the content of a _targets file.
+
+    Parameters
+    ----------
+    pixels : ndarray, shape (n, 2)
+        Column and row, counted as those will who read it: OpenPTV counts from the corner of the
+        image, half a pixel more than from pixel centres.
+    counts : ndarray of int, shape (n,)
+        Pixels of each.
+    extents : ndarray of int, shape (n, 2)
+        Columns and rows that it takes.
+    sums : ndarray, shape (n,)
+        Of its grey values.
+    """
+    lines = [f"{len(pixels)}"]
+    for k, (column, row) in enumerate(pixels):
+        numbers = (counts[k], *extents[k], round(float(sums[k])))
+        words = " ".join(f"{number:5d}" for number in numbers)
+        lines.append(f"{k:4d} {column:9.4f} {row:9.4f} {words} {-1:5d}")
+    return "\n".join(lines) + "\n"
+
+
 def read_body(path: Path) -> tuple[list[str], FloatArray]:
     """Read a calibration body: lines of number X Y Z.
 

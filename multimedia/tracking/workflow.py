@@ -52,6 +52,8 @@ class TrackedParticles:
         A-posteriori standard deviation of an image coordinate. [px]
     found, chance : float
         Particles of the frames that were held against chance, and how many come by it at most.
+    remarks : tuple of str
+        What to look at: those of the tracks, and files that are lost.
     """
 
     project: Project
@@ -62,6 +64,7 @@ class TrackedParticles:
     sigma_px: float
     found: float
     chance: float
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,11 +135,21 @@ def find_tracks(
         )
     frames = _frames(targets, first, last)
     files = {frame: [_file(base, frame) for base in targets] for frame in frames}
-    check_not_input(out, project, *(path for paths in files.values() for path in paths))
+    lost = [
+        f"{base.name}{frame}{ENDING}"
+        for frame, paths in files.items()
+        for base, path in zip(targets, paths, strict=True)
+        if path is None
+    ]
+    check_not_input(out, project, *(path for paths in files.values() for path in paths if path))
     if folder is not None and folder.is_dir():
         written = [folder / f"{kind}.{frame}" for frame in frames for kind in ("rt_is", "ptv_is")]
         check_all_writable(*written, overwrite=overwrite)
-    places = {frame: [read_targets(path).pixels for path in files[frame]] for frame in frames}
+    none = np.empty((0, 2))
+    places = {
+        frame: [none if path is None else read_targets(path).pixels for path in files[frame]]
+        for frame in frames
+    }
     found, chance = _beyond_chance(project, content, places, tolerance, fewest)
     with ThreadPoolExecutor(cores()) as pool:
         particles = list(
@@ -159,13 +172,14 @@ def find_tracks(
     result = TrackedParticles(
         content, tracks, rows, (content.unit, f"{content.unit}/{'s' if rate else 'frame'}"),
         tuple(frames), SIGMA_PIXEL * float(np.sqrt(factor)), found, chance,
+        (*_lost_files(lost), *tracks.remarks),
     )  # fmt: skip
     _write(result, particles, out, folder, overwrite=overwrite)
     return result
 
 
 def _frames(targets: Sequence[Path], first: int | None, last: int | None) -> range:
-    """Return the frames that all cameras have, in a row."""
+    """Return the frames in a row that all cameras have, or all but a few of them."""
     seen: list[set[int]] = []
     for base in targets:
         names = [path.name for path in base.parent.glob(f"{base.name}*{ENDING}")]
@@ -178,7 +192,7 @@ def _frames(targets: Sequence[Path], first: int | None, last: int | None) -> ran
     begin = first if first is not None else (chosen or [0])[0]
     end = last if last is not None else (chosen or [0])[-1]
     # The first that is missing, without a list of all numbers up to --last.
-    here = set(chosen)
+    here = {n for n in set.union(*seen) if sum(n in numbers for numbers in seen) >= 2}
     missing = next((n for n in range(begin, end + 1) if n not in here), None)
     if missing is not None or len(chosen) < 3:
         lack = "too few" if missing is None else f"frame {missing} is not there of every camera"
@@ -189,13 +203,20 @@ def _frames(targets: Sequence[Path], first: int | None, last: int | None) -> ran
     return range(begin, end + 1)
 
 
-def _file(base: Path, frame: int) -> Path:
-    """Return the target file of a frame; numbers may have zeros before them."""
+def _lost_files(names: Sequence[str]) -> list[str]:
+    """Say which files are taken for frames without targets."""
+    shown = ", ".join(names[:3]) + (" ..." if len(names) > 3 else "")
+    return [remark("tracks.lost", count=len(names), names=shown)] if names else []
+
+
+def _file(base: Path, frame: int) -> Path | None:
+    """Return the target file of a frame, if it is there; numbers may have zeros before them."""
     plain = base.with_name(f"{base.name}{frame}{ENDING}")
     if plain.exists():
         return plain
     found = base.parent.glob(f"{base.name}0*{frame}{ENDING}")
-    return next(p for p in found if int(p.name[len(base.name) : -len(ENDING)]) == frame)
+    numbered = (p for p in found if p.name[len(base.name) : -len(ENDING)].isdecimal())
+    return next((p for p in numbered if int(p.name[len(base.name) : -len(ENDING)]) == frame), None)
 
 
 def _beyond_chance(

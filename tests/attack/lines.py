@@ -67,6 +67,7 @@ INPUTS: list[tuple[str, ...]] = [
     ("bifocal report {} --out o.html", "survey.xlsx"),
     ("bifocal report wall.pair.json --out o.html --relief {}", "relief.tif"),
     ("bifocal pick {}", "wall.pair.json", "folder"),
+    ("multimedia targets {} --out o.csv", "far.jpg", "photo"),
     (
         "multimedia particles {} --targets t --targets t --targets t --targets t --out o.csv",
         "tank.toml",

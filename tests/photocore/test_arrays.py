@@ -17,7 +17,9 @@ def test_a_whole_number_beyond_float64_is_refused(value: object) -> None:
         as_floats(value, "width")
 
 
-@pytest.mark.parametrize("value", ["a", "17.5", ["1", "2"], [1, [2, 3]], {}, [None, "x"]])
+@pytest.mark.parametrize(
+    "value", ["a", "17.5", ["1", "2"], [1, [2, 3]], {}, [None, "x"], [[0, True], [1.5, 2]]]
+)
 def test_what_is_no_number_is_refused(value: object) -> None:
     with pytest.raises(InputError, match=r"^width: expected numbers"):
         as_floats(value, "width")

@@ -87,6 +87,7 @@ def test_a_very_long_error_stays_one_readable_line(run, unforeseen) -> None:
         (FileNotFoundError(2, "No such file", "b.csv"), 1, "Error: b.csv: No such file."),
         (KeyboardInterrupt(), 1, "Stopped by the user"),
         (MemoryError(), 1, "not enough memory"),
+        (ImportError("a.so: failed to map segment from shared object"), 1, "not enough memory"),
         (click.UsageError("no such thing"), 2, "no such thing"),
         (click.Abort(), 1, "Aborted"),
         (click.exceptions.Exit(0), 0, ""),
@@ -99,6 +100,15 @@ def test_what_was_foreseen_keeps_its_message_and_status(run, error, status, mess
     assert message in result.stderr
     assert "nobody foresaw" not in result.stderr
     assert "Traceback" not in result.stderr
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows limits no process so")
+def test_too_little_memory_is_said_before_a_library_dies_of_it() -> None:
+    words = "index --wavelength 520 --temperature 20 --salinity 0 --depth 1"
+    line = f'ulimit -v 350000; exec "{sys.executable}" -m multimedia {words}'
+    done = subprocess.run(["sh", "-c", line], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "Error: only 342 MB of memory are allowed here" in done.stderr
 
 
 def test_debug_shows_where_bad_input_was_met_too(run) -> None:

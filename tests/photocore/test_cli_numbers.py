@@ -20,7 +20,7 @@ DELIVER = "ortho w.pair.json --deliver d"
 
 IMPOSSIBLE = [
     (f"bifocal {DELIVER} --scale 1:50 --contours nan", "--contours", "finite"),
-    (f"bifocal {DELIVER} --scale 1:50 --contours 0", "--contours", "above zero"),
+    (f"bifocal {DELIVER} --scale 1:50 --contours 0", "--contours", "0.0001 or more"),
     (f"bifocal {DELIVER} --scale 1:nan", "--scale", "finite"),
     (f"bifocal {DELIVER} --scale 1:50 --dpi 0", "--dpi", "above zero"),
     ("bifocal ortho w.pair.json --out o.tif --feather -1", "--feather", "zero or more"),

@@ -48,9 +48,7 @@ def _run(folder: Path, code: str, **environment: str) -> str:
     return done.stdout.strip()
 
 
-@pytest.mark.skipif(
-    os.environ.get("NUMBA_DISABLE_JIT", "0") != "0", reason="NUMBA_DISABLE_JIT is set"
-)
+@pytest.mark.acceptance  # compiles
 def test_kernels_call_each_other_and_are_kept_on_the_disk(tmp_path: Path) -> None:
     pytest.importorskip("numba")
     cache = tmp_path / "cache"
@@ -93,6 +91,12 @@ def test_numba_that_refuses_the_installed_numpy_counts_as_absent(
     (tmp_path / "numba.py").write_text("raise ImportError('Numba needs NumPy 2.3 or less')")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "numba", raising=False)
+    monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
+    assert module._numba.__wrapped__() is None
+
+
+def test_numba_that_is_switched_off_counts_as_absent(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")  # its loops would run as Python, slower than numpy
     assert module._numba.__wrapped__() is None
 
 
@@ -105,7 +109,8 @@ def test_a_kernel_pays_once_the_road_of_numpy_has_taken_long(
 
 
 def test_a_full_disk_costs_the_copy_and_not_the_result(monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("numba")
+    numba = pytest.importorskip("numba")
+    monkeypatch.setattr(module, "_numba", lambda: numba)
     kernel = Kernel(lambda number: number + 1)
 
     def full(*_: object) -> int:

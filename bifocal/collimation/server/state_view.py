@@ -313,7 +313,8 @@ def _advice(session: Session, live: LiveOrientation | None) -> list[str]:
     if len(session.pictures.infos) < 2:
         return [say("ask", "photos", language)]
     if session.files.pair is not None:
-        return [] if session.state.points else [say("advice", "points", language)]
+        doubt = [without_options(session.pick_doubt, language)] if session.pick_doubt else []
+        return doubt if session.state.points else [say("advice", "points", language)]
     if session.proposal is None and live is not None and not session.state.control:
         running = any(job.quiet and job.state == "running" for job in session.jobs.jobs.values())
         return [say("advice", "looking", language)] if running else list(live.advice)

@@ -13,6 +13,7 @@ from typing import BinaryIO
 from PIL import Image
 
 from bifocal.collimation.project import PHOTOS
+from bifocal.files.exif_judge import judged_focal
 from bifocal.remarks import remark
 from photocore.errors import InputError
 from photocore.images import FORMATS, ImageInfo, image_info, read_image
@@ -83,9 +84,13 @@ def safe_name(name: str) -> str:
 def far_first(infos: Sequence[ImageInfo]) -> list[ImageInfo]:
     """Return photos with that of the longest lens first, then that of the shortest.
 
-    As they are where one does not tell its lens, or all have the same.
+    Lengths count in widths of the picture, which resizing keeps. As they are where one does not
+    tell its lens, or all have the same.
     """
-    focal = {info.path: info.focal_pixels or info.focal_length or 0.0 for info in infos}
+    judged = [judged_focal(info).focal for info in infos]
+    angles = [f and f / max(info.size) for f, info in zip(judged, infos, strict=True)]
+    lengths = angles if all(angles) else [info.focal_length for info in infos]
+    focal = {info.path: f or 0.0 for info, f in zip(infos, lengths, strict=True)}
     if not all(focal.values()) or len(infos) < 2:
         return list(infos)
     far, *others = sorted(infos, key=lambda info: -focal[info.path])

@@ -72,21 +72,42 @@ class Ties:
         return replace(self, **{name: getattr(self, name)[some] for name in each})
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Surrounding:
+    """Where in photo 2 partners are sought, on a wall that repeats itself.
+
+    Attributes
+    ----------
+    homography : ndarray, shape (3, 3)
+        Photo 2 from photo 1 over the wall.
+    reach : float
+        Farthest from there. [px]
+    """
+
+    homography: FloatArray
+    reach: float
+
+
 def find_ties(
-    first: Features, second: Features, interiors: Interiors, names: tuple[str, str]
+    first: Features,
+    second: Features,
+    interiors: Interiors,
+    names: tuple[str, str],
+    surrounding: Surrounding | None = None,
 ) -> Ties:
     """Match features and keep those that obey one epipolar geometry and have support.
 
     Nearest neighbours give the geometry, a second search along its lines most of the ties; a tie
     stays if its neighbours move like it against the dominant plane (`supported`). Where the lens
-    is unknown, its distortion is scanned first.
+    is unknown, its distortion is scanned first. Partners lie within ``surrounding``, if that is
+    given.
 
     Raises
     ------
     GeometryError
         If the photos have too little in common, or no dominant plane.
     """
-    rows1, rows2, radial = _neighbours(first, second, interiors)
+    rows1, rows2, radial = _neighbours(first, second, interiors, surrounding)
     straight = [
         replace(f, pixels=i.radial(radial).undistort(i.ideal(f.pixels)))
         for f, i in zip((first, second), interiors, strict=True)
@@ -104,7 +125,9 @@ def find_ties(
         )
     homography, _ = _dominant_plane(x1[agree], x2[agree], 1.5 * tolerance, 8000)
     if matrix is not None:
-        rows1, rows2 = _along_lines(straight[0], straight[1], matrix, homography, tolerance)
+        reach = TIES.along * float(np.ptp(straight[1].pixels[:, 0]))
+        reach = reach if surrounding is None else surrounding.reach
+        rows1, rows2 = _along_lines(straight[0], straight[1], matrix, homography, tolerance, reach)
     else:
         rows1, rows2 = rows1[agree], rows2[agree]
     x1, x2 = straight[0].pixels[rows1], straight[1].pixels[rows2]
@@ -142,12 +165,35 @@ def _tolerance(first: Features, second: Features, interiors: Interiors) -> float
     return tolerance
 
 
+def _within(
+    first: Features, second: Features, interiors: Interiors, surrounding: Surrounding
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return nearest neighbours among the features of a surrounding, square by square."""
+    reach = surrounding.reach
+    there = apply_homography(surrounding.homography, interiors[0].ideal(first.pixels))
+    places = interiors[1].ideal(second.pixels)
+    squares, of_square = np.unique(np.floor(there / reach), axis=0, return_inverse=True)
+    found = [np.zeros((2, 0), np.intp)]
+    for number, corner in enumerate(squares * reach):
+        rows1 = np.flatnonzero(of_square.ravel() == number)
+        rows2 = np.flatnonzero(((places > corner - reach) & (places < corner + 2 * reach)).all(1))
+        one, two = match_features(first.of(rows1), second.of(rows2))
+        found.append(np.stack([rows1[one], rows2[two]]))
+    rows1, rows2 = np.concatenate(found, axis=1)
+    near = np.linalg.norm(places[rows2] - there[rows1], axis=1) < reach
+    return rows1[near], rows2[near]
+
+
 def _neighbours(
-    first: Features, second: Features, interiors: Interiors
+    first: Features, second: Features, interiors: Interiors, surrounding: Surrounding | None
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], float]:
     """Return nearest neighbours: of the strongest features, or of all; the distortion scanned."""
     for count in (TIES.first_tried, max(len(first.pixels), len(second.pixels))):
-        rows1, rows2 = match_features(first.strongest(count), second.strongest(count))
+        some = first.strongest(count), second.strongest(count)
+        if surrounding is None:
+            rows1, rows2 = match_features(*some)
+        else:
+            rows1, rows2 = _within(*some, interiors, surrounding)
         ideal = interiors[0].ideal(first.pixels[rows1]), interiors[1].ideal(second.pixels[rows2])
         keep = drop_repeated(*ideal)
         rows1, rows2, ideal = rows1[keep], rows2[keep], (ideal[0][keep], ideal[1][keep])
@@ -201,6 +247,7 @@ def _along_lines(
     matrix: FloatArray,
     homography: FloatArray,
     tolerance: float,
+    reach: float,
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return features matched along the lines of a fundamental matrix, around the plane."""
     line = homogeneous(first.pixels) @ matrix.T
@@ -209,7 +256,6 @@ def _along_lines(
         normal = line[:, :2] / length
         seen = apply_homography(homography, first.pixels)
         foot = seen - normal * ((seen * normal).sum(axis=1) + line[:, 2] / length[:, 0])[:, None]
-    reach = TIES.along * float(np.ptp(second.pixels[:, 0]))
     along = reach * np.column_stack([-normal[:, 1], normal[:, 0]])
     left = np.linalg.svd(matrix)[0][:, 2]
     scale = left[2] if abs(left[2]) > 1e-9 * np.abs(left[:2]).max() else 1e-9

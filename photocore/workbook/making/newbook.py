@@ -55,6 +55,7 @@ _PACKAGE = "http://schemas.openxmlformats.org/package/2006/relationships"
 _DRAWING = "application/vnd.openxmlformats-officedocument.drawing+xml"
 #: The part with the properties of a workbook.
 _CORE = "docProps/core.xml"
+_DUBLIN_CORE = "http://purl.org/dc/elements/1.1/"
 _ILLEGAL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
 
 
@@ -184,15 +185,16 @@ def _stated_properties(core: bytes) -> bytes:
     moment = rb"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ"
     core = re.sub(moment, b"1980-01-01T00:00:00Z", core)
     core = re.sub(
-        rb"<dc:description>.*?</dc:description>|<dc:description\s*/>", b"", core, flags=re.S
+        rb"<dc:description[^>]*/>|<dc:description\b.*?</dc:description>", b"", core, flags=re.S
     )
     made = provenance()
     if not made.command:
         # An empty form written from Python says the same whatever the day.
         return core
     said = escape(without_control("\n".join(made.lines())))
-    told = f"<dc:description>{said}</dc:description>".encode()
-    # The order of the elements is free; the last one closes the part.
+    # Without lxml openpyxl declares the prefix for the whole part, with it in each element. The
+    # order of the elements is free; the last one closes the part.
+    told = f'<dc:description xmlns:dc="{_DUBLIN_CORE}">{said}</dc:description>'.encode()
     return core.replace(b"</cp:coreProperties>", told + b"</cp:coreProperties>")
 
 

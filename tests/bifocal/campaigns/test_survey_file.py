@@ -263,3 +263,18 @@ def test_an_equivalent_and_a_true_focal_length_do_not_tell_which_photo_is_far():
     assert (found.far.name, found.certain) == ("c.jpg", True)
     zoom = replace(camera, path=Path("z.jpg"), focal_length=70.0)
     assert photo_pairing._ordered(camera, zoom, 50).far.name == "z.jpg"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        'vignetting = "cos5"', "contours = 1e-9", "bounds = [0, 0, 0, 0]", "relief_range = [1, -1]",
+        'sections = ["z=1"]', 'photos = ["a.jpg", "a.jpg"]',
+    ],
+)  # fmt: skip
+def test_a_survey_file_with_an_impossible_value_is_refused_when_it_is_read(tmp_path, line):
+    photos = "" if line.startswith("photos") else 'far = "a.jpg"\nnear = "b.jpg"\n'
+    path = tmp_path / "survey.toml"
+    path.write_text(f'[[pair]]\nname = "w"\n{photos}{line}\n')
+    with pytest.raises(InputError, match=r"one photo is named twice|expected"):
+        read_survey_file(path)

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import shutil
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from bifocal import SAMPLE, Pair
+from bifocal.collimation.first_orientation import FirstOrientation
 from bifocal.collimation.job_tasks import start_job
 from bifocal.collimation.product_graph import causes_of
+from bifocal.collimation.server.uploads import far_first
 from bifocal.collimation.shapes import places_of
+from photocore.images import ImageInfo
 from tests.page_session import client_of, opened, pick, pick_both, sample_folder, sample_picks
 
 REPORT = {"remarks": ["found"], "control": []}
@@ -30,6 +34,29 @@ def folder(tmp_path):
     sample_folder(tmp_path)
     (tmp_path / "facade.pair.json").rename(tmp_path / "kept.json")
     return tmp_path
+
+
+def test_a_resized_photo_of_the_long_lens_is_still_the_far_one() -> None:
+    tags = {"focal_plane_pitch": 22.7 / 3072, "recorded_size": (3072, 2048)}
+    far = ImageInfo(path=Path("a.jpg"), size=(1024, 683), focal_length=35, **tags)
+    near = ImageInfo(path=Path("b.jpg"), size=(3072, 2048), focal_length=19, **tags)
+    assert far_first([near, far]) == [far, near]
+    without = replace(near, focal_plane_pitch=None)
+    assert far_first([without, far]) == [far, without]
+
+
+def test_picks_that_came_at_once_are_held_against_the_photos(folder) -> None:
+    (folder / "kept.json").rename(folder / "facade.pair.json")
+    with begun(folder, "facade.pair.json") as session:
+        watch, picks = FirstOrientation(session), list(sample_picks().items())
+        for name, (first, second) in picks:
+            pick_both(session, name, (second, first))
+        watch.hold_picks()
+        assert any("PICKS" in text for text in state_of(session)["advice"])
+        for name, both in picks:
+            pick_both(session, name, both)
+        watch.hold_picks()
+        assert state_of(session)["advice"] == []
 
 
 def oriented(session) -> None:

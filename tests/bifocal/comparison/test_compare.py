@@ -16,6 +16,7 @@ from click.testing import CliRunner
 from openpyxl import load_workbook
 
 from bifocal import Grid, InputError, Quality, ReliefMap, compare
+from bifocal.comparison.workflow import compare_files
 from tests.builders.commands import bifocal_command as bifocal
 
 GRID = Grid.from_bounds((0.0, 0.0, 4.0, 3.0), gsd=0.04)
@@ -157,6 +158,36 @@ def test_maps_without_sigma_take_it_from_their_differences():
     done = compare(before, after)
     assert [round(one.mean, 2) for one in done.regions] == [0.02]
     assert "without standard deviations" in done.remarks[0]
+
+
+@pytest.mark.parametrize(("values", "where"), [(-0.003, "sigma"), (3e38, "r"), (np.inf, "r")])
+def test_a_map_that_cannot_be_a_relief_is_refused_without_a_warning(values: float, where: str):
+    whole = measured(np.random.default_rng(1))
+    spoilt = getattr(whole, where).copy()
+    spoilt[3, 3] = values
+    with pytest.raises(InputError, match="make it anew"):
+        compare(replace(whole, **{where: spoilt}), whole)
+
+
+def test_errors_that_hang_together_over_all_that_is_measured_are_no_reason_to_refuse():
+    wide = np.random.default_rng(1).standard_normal((GRID.height + 200, GRID.width + 200))
+    field = cv2.GaussianBlur(wide, (0, 0), 20)[100:-100, 100:-100]
+    field[:, GRID.width // 4 :] = np.nan  # two such errors are all there is of it
+    flat = ReliefMap.from_relief(0 * field, plane_from_pixel=GRID.plane_from_pixel)
+    before = replace(flat, sigma=np.full(GRID.shape, SIGMA))
+    after = replace(before, r=before.r + SIGMA * field / np.nanstd(field))
+    assert compare(before, after).regions == ()
+
+
+def test_a_patch_larger_than_the_wall_is_refused():
+    whole = measured(np.random.default_rng(1))
+    with pytest.raises(InputError, match="whole wall of 12 m2"):
+        compare(whole, whole, smallest=1e9)
+
+
+def test_stable_parts_and_a_fit_of_the_whole_are_not_both_taken(tmp_path: Path):
+    with pytest.raises(InputError, match="give one of them"):
+        compare_files(tmp_path / "a.tif", tmp_path / "b.tif", tmp_path, stable=tmp_path, fit=True)
 
 
 @pytest.mark.acceptance

@@ -114,6 +114,12 @@ def test_a_drawing_gives_faces_by_layer_in_metres(tmp_path) -> None:
         ({"kind": "face", "plane": [1, 2], "type": "Polygon",
           "coordinates": [[[0, 0], [1, 1], [0, 1]]]}, "plane"),
         ({"kind": "break", "type": "Polygon", "coordinates": [[[0, 0], [1, 1]]]}, "LineString"),
+        ({"kind": "face", "relief": 0, "sigma": -0.01, "type": "Polygon",
+          "coordinates": [[[0, 0], [1, 1], [0, 1]]]}, "sigma"),
+        ({"kind": "face", "plane": [1e308, 0, 0], "type": "Polygon",
+          "coordinates": [[[0, 0], [1, 1], [0, 1]]]}, "plane"),
+        ({"kind": "face", "type": "Polygon",
+          "coordinates": [[[0, 0], [1e308, 1], [0, 1]]]}, "coordinates"),
         (7, "geometry"),
     ],
 )  # fmt: skip
@@ -134,6 +140,9 @@ def test_faces_are_kept_beside_the_pair_and_found_again(tmp_path) -> None:
     assert faces_path(tmp_path / "none", pair) is None
     assert keep_faces(beside(pair), pair) == ()
     assert "stays as it is" in keep_faces(drawn, pair)[0]
+    beside(pair).unlink()
+    beside(pair).mkdir()  # faces that cannot be read are no reason to go on without them
+    assert faces_path(None, pair) == beside(pair)
 
 
 def test_a_pixel_is_within_an_outline_where_its_centre_is() -> None:

@@ -12,6 +12,7 @@ from PIL import Image, ImageCms
 
 from bifocal import InputError, read_image
 from photocore.decoding import decoded
+from photocore.provenance import noted_remarks, recording
 
 RNG = np.random.default_rng(11)
 COLOUR = RNG.integers(0, 256, (20, 31, 4), dtype=np.uint8)
@@ -63,7 +64,11 @@ def test_few_bits_in_sixteen_fill_them(tmp_path, bits, ending):
     path = tmp_path / f"p.{ending}"
     Image.fromarray(pixels).save(path)
     room = {9: 10, 15: 16}.get(bits, bits)
-    np.testing.assert_array_equal(read_image(path), pixels << (16 - room))
+    with recording("a test"):
+        for _ in range(2):
+            np.testing.assert_array_equal(read_image(path), pixels << (16 - room))
+        said = [f"holds {room} of 16 bits; its numbers were multiplied by {1 << (16 - room)}."]
+        assert [text.partition(": ")[2] for text in noted_remarks()] == said * (room < 16)
 
 
 def rgb_profile(red, green, blue) -> bytes:
@@ -126,6 +131,18 @@ def test_colours_of_another_space_become_those_of_srgb(tmp_path, primaries, endi
     else:
         assert np.abs(got - [190, 70, 60]).max() <= 2
         assert np.abs(numbers - np.array([190, 70, 60])).max() > 5
+
+
+@pytest.mark.parametrize(("primaries", "told"), [(P3, 1), (SRGB, 0)], ids=["P3", "sRGB"])
+def test_sixteen_bits_of_another_space_stay_as_they_are_and_that_is_said(tmp_path, primaries, told):
+    path = tmp_path / "deep.tif"
+    deep = np.full((16, 16, 3), [50000, 20000, 15000], np.uint16)
+    profile = rgb_profile(*primaries)
+    tifffile.imwrite(path, deep, photometric="rgb", iccprofile=profile)
+    with recording("a test"):
+        np.testing.assert_array_equal(read_image(path), deep)
+        assert len(noted_remarks()) == told
+        assert all("not brought to sRGB" in text for text in noted_remarks())
 
 
 def test_a_film_or_zeros_behind_a_jpeg_are_no_cut(tmp_path):

@@ -34,6 +34,7 @@ from bifocal.orientation.facade_lines import FacadeDirection
 from tests.bifocal.campaigns.sample_tables import write_tables
 from tests.builders.commands import bifocal_command as main
 from tests.builders.pinholes import camera_matrix, project, rotation_from_vector
+from tests.cases import few_by_default
 from tests.scenes.make_sample import PIXEL
 
 SIZE = (3072, 2048)
@@ -93,7 +94,7 @@ def simulated(rng: np.random.Generator, *, by_wall: bool):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("by_wall", [False, True])
+@pytest.mark.parametrize("by_wall", few_by_default([False, True], True))
 def test_cameras_and_points_of_a_set_are_as_precise_as_their_sigmas_say(by_wall):
     centres, focals, points = [], [], []
     for seed in range(8):

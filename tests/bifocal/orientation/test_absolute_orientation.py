@@ -209,6 +209,7 @@ def test_boards_do_not_overlap() -> None:
     np.testing.assert_array_equal(relief_at(centres), centres[:, 2])
 
 
+@pytest.mark.acceptance
 def test_photos_of_different_walls_are_refused_where_control_contradicts_itself(views) -> None:
     """Of a wall and another one only picks that were guessed agree with nothing."""
     rng = np.random.default_rng(3)

@@ -1,12 +1,13 @@
 """EXIF data of a photo held against each other: what agrees counts, what contradicts is said."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from bifocal.orientation.align_workflow import KnownLens, interior_of_photo
+from bifocal.orientation.align_workflow import KnownLens, interior_of_photo, judged_together
 from photocore.images import ImageInfo, image_info
 
 #: A 35 mm lens on a sensor 22.7 mm wide, 3072 px; and at half the size.
@@ -64,6 +65,24 @@ def test_digital_zoom_lengthens_the_lens() -> None:
     assert "digital zoom 1.3" in alone.doubt
     for true in (WHOLE, 1.3 * WHOLE):
         assert abs(np.log(alone.focal / true)) < 1.2 * alone.sigma_focal
+
+
+def test_two_photos_of_one_camera_with_sensors_of_two_sizes_are_doubted() -> None:
+    whole, near = (
+        ImageInfo(
+            path=Path(name), size=(width, width * 2 // 3), model="X", focal_length=focal,
+            focal_plane_pitch=PITCH,
+        )
+        for name, width, focal in (("far.jpg", 3072, 35.0), ("near.jpg", 1536, 19.0))
+    )  # fmt: skip
+    lenses = [interior_of_photo(info, KnownLens()) for info in (whole, near)]
+    for made in judged_together((whole, near), lenses):
+        assert made.sigma_focal == pytest.approx(np.log(2), abs=0.2)
+        assert "both of X" in made.doubt
+    known = interior_of_photo(near, KnownLens(focal=19, sensor_width=22.7))
+    assert judged_together((whole, near), [lenses[0], known])[1] is known
+    other = replace(near, model="Y")
+    assert judged_together((whole, other), lenses) == lenses
 
 
 def test_what_was_typed_is_not_doubted() -> None:

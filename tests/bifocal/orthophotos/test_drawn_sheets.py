@@ -306,15 +306,6 @@ def test_too_many_contour_lines_are_refused_before_the_work(wall: Path, monkeypa
     assert "choose a larger interval" in done.stderr
 
 
-@pytest.mark.parametrize("place", ["x=nan", "y=", "1,2", "0,0 inf,1"])
-def test_a_section_must_have_a_place(wall: Path, place: str) -> None:
-    words = ("--relief", "relief.tif", "--deliver", "d", "--scale", "1:50", "--section", place)
-    done = run(wall, *words)
-    assert done.exit_code == 1
-    assert "write x=1.5" in done.stderr
-    assert not (wall / "d").exists()
-
-
 def test_a_drawing_that_fits_no_paper_is_refused_before_the_work(wall: Path) -> None:
     done = run(wall, "--plane", "--deliver", "d", "--scale", "1:1", "--any-size")
     assert done.exit_code == 1

@@ -201,6 +201,23 @@ def test_rasters_that_are_little_alike_are_pointed_out_by_their_paths(tmp_path: 
     assert "alike" not in twice.stderr
 
 
+def test_a_mosaic_of_rasters_without_a_scale_has_none_and_is_not_mixed_with_metres(
+    tmp_path: Path,
+) -> None:
+    for name, bounds in (("a.tif", (0, 0, 0.5, 0.5)), ("b.tif", (0.25, 0, 0.75, 0.5))):
+        write(tmp_path / name, bounds)
+    with rasterio.open(tmp_path / "a.tif", "r+") as file:
+        file.update_tags(BIFOCAL_UNIT="none")
+    mixed = run(tmp_path, "a.tif", "b.tif", "--out", "m.tif")
+    assert (mixed.exit_code, "has a scale in metres" in mixed.stderr) == (1, True)
+    with rasterio.open(tmp_path / "b.tif", "r+") as file:
+        file.update_tags(BIFOCAL_UNIT="none")
+    done = run(tmp_path, "a.tif", "b.tif", "--out", "m.tif")
+    assert (done.exit_code, "unit of the model" in done.stderr) == (0, True)
+    with rasterio.open(tmp_path / "m.tif") as file:
+        assert file.tags()["BIFOCAL_UNIT"] == "none"
+
+
 def test_rasters_of_different_coordinate_systems_are_refused(tmp_path: Path) -> None:
     for name in ("a.tif", "b.tif"):
         write(tmp_path / name, (0, 0, 0.5, 0.5))

@@ -96,6 +96,7 @@ def test_unknown_relief_neither_hides_nor_is_hidden() -> None:
     assert not of_tiles(surface, grid, Foot(np.array([0.0, 0.0]), 10.0), 512).any()
 
 
+@pytest.mark.acceptance  # compiles
 def test_numpy_and_machine_code_hide_the_same_pixels(monkeypatch: pytest.MonkeyPatch) -> None:
     grid = Grid.from_bounds((0.2, -0.3, 1.4, 0.5), gsd=0.005)
     x, y = np.meshgrid(grid.columns_x, grid.rows_y)

@@ -77,6 +77,16 @@ def test_interpolated_relief_is_left_out_only_where_that_moves_the_picture_littl
     assert (source[told] == Source.NONE).all()
 
 
+def test_the_interpolated_rim_of_a_raised_part_is_no_crumb():
+    # What a step hides from the near photo is not measured: a fringe on top of the raised part.
+    x, y = np.meshgrid(np.arange(400), np.arange(400))
+    raised, top = ((x > 40 - n) & (x < 90 + n) & (y > 150 - n) & (y < 250 + n) for n in (3, 0))
+    relief = np.where(raised, 0.3, 0.0).astype(np.float32)
+    surface = MapSurface.of_array(relief, GRID, top | ~raised)
+    whole = CompletedSurface(surface, GRID, PAIR.image1, 0.01)
+    np.testing.assert_allclose(whole.window(GRID)[raised], 0.3, atol=1e-6)
+
+
 def test_a_complete_orthophoto_has_no_gap_and_lists_what_is_not_measured():
     rng = np.random.default_rng(3)
     photo = rng.integers(1, 255, (400, 400, 3), dtype=np.uint8)

@@ -57,6 +57,7 @@ def test_a_railing_is_found_that_flow_cannot_find(monkeypatch):
     assert right[(shot.visible1 & shot.visible2 & ~rail)].mean() > 0.9  # flow alone 0.82
 
 
+@pytest.mark.acceptance  # compiles
 def test_numpy_and_machine_code_give_the_same_bits(monkeypatch):
     shot, _ = railing()
     greys = (as_grey(image, "photo") for image in (shot.image1, shot.image2))

@@ -16,6 +16,7 @@ from bifocal.model.image import as_grey
 from bifocal.rays import plane_position, point_on_ray, straight
 from bifocal.relief_maps import evidence
 from bifocal.relief_maps.frame import make_frame, offsets
+from tests.cases import few_by_default
 from tests.scenes import RICH, Rendering, Scene, bifocal_cameras, render
 from tests.scenes.shapes import box
 from tests.scenes.wet import pair_through_media, under_water
@@ -66,7 +67,7 @@ def errors(taken: Rendering, found) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    "name", ["port", "leaning port", pytest.param("surface", marks=pytest.mark.acceptance)]
+    "name", few_by_default(["port", "leaning port", "surface"], "leaning port")
 )
 def test_relief_through_media_is_good_to_hundredths_of_a_pixel(name):
     """2.4 and 3.1 mm of median, 6.1 and 6.4 mm of mean here; 1 px at a metre is 0.3 m of relief.
@@ -128,7 +129,9 @@ def test_the_orthophoto_shows_each_place_its_own_pixel(name):
     assert np.abs(picture - wanted)[shown].mean() < 0.5
 
 
-@pytest.mark.parametrize("name", ["air", "port", "leaning port", "surface"])
+@pytest.mark.parametrize(
+    "name", few_by_default(["air", "port", "leaning port", "surface"], "leaning port")
+)
 def test_hidden_pixels_are_found_as_in_air(name):
     taken, pair, camera = shot(name)
     found = orthophoto(pair, taken.image1, taken.truth).hidden

@@ -69,6 +69,11 @@ def test_it_shrinks_its_pictures_and_refuses_to_show_nothing(tmp_path, relief, m
     assert (tmp_path / "b.html").stat().st_size <= whole // 2
     data, _ = data_of(tmp_path / "b.html")
     assert data["layers"][1]["scale"] == pytest.approx(data["layers"][1]["width"] / 1536)
+    empty = tmp_path / "empty.csv"
+    empty.write_text("id,X,Y,Z,sigma_r\nA,0.5,,0.1,0.01\n", encoding="utf-8")
+    task = HandoverTask(relief=relief[0], points=empty)
+    told = write_handover(PAIR, tmp_path / "b.html", task, overwrite=True)["remarks"]
+    assert any("no point with X, Y and r" in text for text in told)
     with pytest.raises(InputError, match="nothing to hand over"):
         write_handover(PAIR, tmp_path / "c.html", HandoverTask())
     assert not (tmp_path / "c.html").exists()

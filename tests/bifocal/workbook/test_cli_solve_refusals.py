@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zipfile
 
+import numpy as np
 import openpyxl
 import pytest
 
@@ -191,3 +192,31 @@ def test_raw_pixels_without_a_pair(tmp_path):
 def test_too_few_control_points(tmp_path):
     path = fill(tmp_path / "s.xlsx", Georeference=[("P1", 1000, 2000, 50)])
     refused(path, "at least 2")
+
+
+SPREAD = [
+    (f"Q{k}", x, y, r)
+    for k, (x, y, r) in enumerate(
+        [(2, 0.4, 1), (-3, 2, 0.5), (4, -2, -0.4), (-4, -1.5, 0), (1, 2.2, 0.3), (-2, -2.3, 0.8),
+         (3.1, 1.9, 0.0), (-0.7, 1.1, 0.6)]
+    )
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("down", [False, True], ids=["y upwards", "y downwards"])
+def test_millimetres_from_a_corner_of_the_pictures_are_refused_with_what_to_subtract(
+    tmp_path, down
+):
+    rng, sign = np.random.default_rng(4), -1 if down else 1
+    counted = [
+        (name, *(np.array(xy) * [1, sign, 1, sign] + [11.35, 7.6] * 2 + rng.normal(0, 0.004, 4)))
+        for name, *xy in rows(SPREAD)
+    ]
+    refused(fill(tmp_path / "s.xlsx", counted), "corner of the pictures", " 11.")
+    plain = [(name, *(np.array(xy) + rng.normal(0, 0.004, 4))) for name, *xy in rows(SPREAD)]
+    answer, said = solved(fill(tmp_path / "t.xlsx", plain))
+    assert "corner" not in said
+    # All in one quadrant, as when the camera stood at the wall's end.
+    aside = [(name, abs(x) + 0.3, abs(y) + 0.2, r) for name, x, y, r in SPREAD]
+    answer, said = solved(fill(tmp_path / "u.xlsx", rows(aside)))
+    assert by_id(answer)["Q0"]["X"] == pytest.approx(2.3, abs=1e-9)

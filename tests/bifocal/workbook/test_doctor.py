@@ -48,6 +48,7 @@ def test_a_workbook_of_ours_is_sound(book):
     assert "0 cells differ when calculated anew" in sound.stdout
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_a_stale_result_is_named_with_both_numbers_and_all_others_are_sound(book, tmp_path):
     before = book.read_bytes()

@@ -79,6 +79,7 @@ def test_a_formula_that_was_changed_counts_and_all_that_follows_from_it(survey: 
     assert_stored_is_calculated(survey)
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_what_follows_from_a_changed_formula_is_what_libreoffice_calculates(
     survey: Path, tmp_path: Path

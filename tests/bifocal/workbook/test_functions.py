@@ -79,6 +79,7 @@ OTHERS = {
 }
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_cells_equal_the_library_recalculated(book, tmp_path):
     sheet = recalculated(book, tmp_path)["Functions"]

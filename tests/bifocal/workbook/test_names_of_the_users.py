@@ -75,6 +75,7 @@ def test_names_that_mean_something_else_keep_their_cells_and_do_not_enter(plante
     assert openpyxl.load_workbook(planted, data_only=True)["Picks"]["F2"].value == pytest.approx(1)
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_names_that_mean_something_else_recalculate_to_what_is_stored(
     planted: Path, tmp_path: Path

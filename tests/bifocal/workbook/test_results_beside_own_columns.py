@@ -175,6 +175,7 @@ def test_a_macro_workbook_of_the_users_own_keeps_its_macros(tmp_path):
     assert parts(out)["xl/vbaProject.bin"] == b"MACROS"
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_sheets_of_an_ods_are_not_dropped_without_a_word(tmp_path):
     path = foreign(tmp_path / "own.xlsx", heads=FOREIGN["plain"][0], table=rows(POINTS))

@@ -224,7 +224,14 @@ def put_in(path):
     return solution
 
 
-@pytest.mark.parametrize("features", CORPUS, ids=" ".join)
+REST = pytest.mark.acceptance
+#: By default: all at once, forms of the XML, and what stands where the results go.
+ALONE = (CORPUS[-1], *((name,) for name in ("strict", "prefixed", "crlf", "formulas", "layout")))
+
+
+@pytest.mark.parametrize(
+    "features", [pytest.param(f, marks=() if f in ALONE else REST) for f in CORPUS], ids=" ".join
+)
 def test_results_go_in_and_all_else_stays(tmp_path, features):
     path = made(tmp_path / "own.xlsx", features)
     before, rows_before = parts(path), cells_of(path, "Feld")

@@ -29,6 +29,7 @@ from multimedia.orientation.plate_poses import plate_pose
 from multimedia.projects.photos import read_photo
 from photocore.camera.boards import BoardView, detect_board
 from tests.builders.commands import multimedia_command as main
+from tests.cases import few_by_default
 from tests.multimedia.rendered_boards import Housing, chessboard, dots, drawn, photo, poses
 
 EYE = Housing(width=480, height=360, pitch=0.008, c=2.8, k1=-4e-3)
@@ -275,7 +276,7 @@ def test_boards_of_two_cameras_get_one_numbering_and_adjust() -> None:
     assert result.sigma0 < 1e-9
 
 
-@pytest.mark.parametrize("rows", [5, 8])
+@pytest.mark.parametrize("rows", few_by_default([5, 8], 8))
 def test_asymmetric_grids_of_two_cameras_get_one_numbering(rows: int) -> None:
     grid = np.mgrid[0:4, 0:rows].T.reshape(-1, 2)
     board = np.column_stack([2 * grid[:, 0] + grid[:, 1] % 2, grid[:, 1], 0 * grid[:, 0]]) * 1.0

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import multimedia as mm
 from multimedia import GeometryError, InputError
+from tests.cases import few_by_default
 from tests.rounding import EPS
 
 WATER = 1.337
@@ -385,8 +386,9 @@ def golden_shifts() -> list[dict]:
     return json.loads(path.read_text(encoding="utf-8"))
 
 
-def test_rays_through_parallel_planes_equal_the_50_digit_shifts() -> None:
-    cases = golden_shifts()
+@pytest.mark.parametrize("step", few_by_default([1, 7], 7))
+def test_rays_through_parallel_planes_equal_the_50_digit_shifts(step: int) -> None:
+    cases = golden_shifts()[::step]
     limits = 0
     for case in cases:
         layers = mm.Layers(indices=case["indices"], thicknesses=case["heights"][1:-1])
@@ -406,7 +408,7 @@ def test_rays_through_parallel_planes_equal_the_50_digit_shifts() -> None:
         assert angle == pytest.approx(np.arctan(expected), rel=1e-12, abs=1e-300), case
         if expected < 1e3:  # beyond, R_bar magnifies the rounding of a unit vector
             assert heading[0] / -heading[2] == pytest.approx(expected, rel=1e-12), case
-    assert limits < 0.03 * len(cases)
+    assert limits <= max(2, 0.03 * len(cases))
 
 
 def test_least_time_finds_the_ray_that_shooting_loses() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -118,6 +119,21 @@ def test_tracks_of_cameras_in_the_wrong_order_are_chance(sequence, tmp_path):
     assert got.exit_code == 1
     assert "order of the cameras cam1, cam2, cam3, cam4" in got.stderr
     assert not list(tmp_path.iterdir())
+
+
+def test_a_lost_file_is_a_frame_without_targets(sequence, tmp_path):
+    folder = tmp_path / "part"
+    shutil.copytree(sequence[0], folder)
+    (folder / f"cam2.{FIRST + 3}_targets").unlink()
+    got = run(folder, "--json")
+    assert got.exit_code == 0, got.stderr
+    assert f"1 files of targets are not there (cam2.{FIRST + 3}_targets)" in got.stderr
+    assert json.loads(got.stdout)["tracks"] == COUNT
+    for camera in (1, 3, 4):
+        (folder / f"cam{camera}.{FIRST + 3}_targets").unlink()
+    got = run(folder)
+    assert got.exit_code == 1
+    assert f"frame {FIRST + 3} is not there" in got.stderr
 
 
 def test_bad_input_is_one_message(sequence, tmp_path, monkeypatch):

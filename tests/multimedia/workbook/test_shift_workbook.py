@@ -98,6 +98,7 @@ def test_recalculated_formulas_equal_the_library(name: str, tmp_path: Path) -> N
             assert shown == (None if np.isnan(value) else pytest.approx(value, rel=1e-9))
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_template_calculates_what_is_typed_into_it(tmp_path: Path) -> None:
     path = tmp_path / "tank.xlsx"

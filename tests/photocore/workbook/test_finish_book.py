@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import io
 import math
+from xml.etree.ElementTree import fromstring
 
 import numpy as np
 import openpyxl
 import pytest
 
 from bifocal import InputError
+from photocore.provenance import Provenance
 from photocore.workbook.changing.cells import ROW_MARK, NewColumn, NewRows, RowText
+from photocore.workbook.making import newbook
 from photocore.workbook.making.newbook import RowBlock, finish_book
 
 
@@ -98,3 +101,21 @@ def test_texts_that_look_like_formulas_stay_texts(tmp_path):
 def test_a_missing_prototype_row_is_said(tmp_path):
     with pytest.raises(InputError, match="row 7: no prototype"):
         finished(tmp_path, RowBlock(row=7, columns=[[1.0]]))
+
+
+def test_properties_are_xml_however_openpyxl_declares_their_prefixes(monkeypatch):
+    made = Provenance(program="bifocal 1.0", date="2026-01-02", command="bifocal template o.xlsx")
+    monkeypatch.setattr(newbook, "provenance", lambda: made)
+    core = "http://schemas.openxmlformats.org/package/2006/metadata/core-properties"
+    dublin = 'xmlns:dc="http://purl.org/dc/elements/1.1/"'
+    by_lxml = (
+        f'<cp:coreProperties xmlns:cp="{core}"><dc:creator {dublin}>x</dc:creator>'
+        f"<dc:description {dublin}>y</dc:description></cp:coreProperties>"
+    )
+    plain = (
+        f'<cp:coreProperties xmlns:cp="{core}" {dublin}><dc:creator>x</dc:creator>'
+        "<dc:description>y</dc:description></cp:coreProperties>"
+    )
+    for text in (by_lxml, plain):
+        stated = fromstring(newbook._stated_properties(text.encode()))
+        assert [element.text[:5] for element in stated] == ["x", "bifoc"]
