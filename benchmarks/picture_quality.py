@@ -74,12 +74,17 @@ def _areas(mask) -> np.ndarray:
 
 
 def tears(photo, places, measured, gsd: float) -> float:
-    """Return the metres along which neighbours lie 2 px further apart, off measured steps. [m]"""
-    count, first, (column, row, _) = 0, photo == 1, places
-    for a, b in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
-        dc, dr = column[a] - column[b], row[a] - row[b]
-        jump = np.hypot(dc - np.nanmedian(dc), dr - np.nanmedian(dr)) > 2
-        count += int((jump & first[a] & first[b] & ~(measured[a] & measured[b])).sum())
+    """Return the metres along which neighbours lie 2 px further apart, off measured steps. [m]
+
+    Of whichever photo is drawn: a picture mostly of photo 2 has hardly any of photo 1.
+    """
+    count = 0
+    for number, (column, row, _) in enumerate(places, start=1):
+        shown = photo == number
+        for a, b in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
+            dc, dr = column[a] - column[b], row[a] - row[b]
+            jump = np.hypot(dc - np.nanmedian(dc), dr - np.nanmedian(dr)) > 2
+            count += int((jump & shown[a] & shown[b] & ~(measured[a] & measured[b])).sum())
     return count * gsd
 
 
@@ -180,7 +185,7 @@ def rendered(shot, relief: ReliefMap) -> dict[str, float]:
     picture, photo, places, took = drawn(shot.pair, images, relief, shot.truth.grid)
     measured = relief.quality == 1
     figures = wrong(shot, picture, photo, places) | looks(picture, photo)
-    return figures | {"tears m": tears(photo, places[0], measured, picture.gsd), "CPU s": took}
+    return figures | {"tears m": tears(photo, places, measured, picture.gsd), "CPU s": took}
 
 
 def real(pair_file: Path, relief_file: Path, points: Path) -> dict[str, float]:
@@ -192,7 +197,7 @@ def real(pair_file: Path, relief_file: Path, points: Path) -> dict[str, float]:
     far = cv2.cvtColor(images[0], cv2.COLOR_RGB2GRAY)
     measured = as_surface(relief).measured(grid)
     figures = features(pair, far, picture, points) | looks(picture, photo)
-    figures["tears m"] = tears(photo, places[0], measured, picture.gsd)
+    figures["tears m"] = tears(photo, places, measured, picture.gsd)
     figures["bent %"] = bent_lines(pair, far, picture, photo, places[0])
     return figures | {"CPU s": took}
 

@@ -102,10 +102,9 @@ def _best_copy(
     """Return the part of the surroundings whose rim fits best; None if none is whole."""
     if around.shape[0] <= colours.shape[0] or around.shape[1] <= colours.shape[1]:
         return None
-    wide = around.astype(np.float32)
-    mask = np.repeat(rim[..., None], 3, axis=2) if colours.ndim == 3 else rim
-    patch, weight, unknown, wanted = (
-        np.asarray(part, np.float32) for part in (colours, mask, ~known, hole)
+    grey = [part.mean(axis=2) if part.ndim == 3 else part for part in (around, colours)]
+    wide, patch, weight, unknown, wanted = (
+        np.asarray(part, np.float32) for part in (*grey, rim, ~known, hole)
     )
     off = cv2.matchTemplate(wide, patch, cv2.TM_SQDIFF, mask=weight)
     empty = cv2.matchTemplate(unknown, wanted, cv2.TM_CCORR)
@@ -113,7 +112,8 @@ def _best_copy(
     row, column = np.unravel_index(int(np.argmin(off)), off.shape)
     if not np.isfinite(off[row, column]):
         return None
-    return wide[row : row + colours.shape[0], column : column + colours.shape[1]]
+    part = around[row : row + colours.shape[0], column : column + colours.shape[1]]
+    return part.astype(np.float32)
 
 
 def grown(box: tuple[int, int, int, int], by: int, shape: tuple[int, ...]) -> tuple[slice, slice]:

@@ -226,11 +226,14 @@ def _hidden(
     if not thin.any():
         return hidden
     relief = np.where(thin, ground * np.float32(grid.gsd), relief)
-    solid = _behind(_Surroundings.of_window(relief, grid, camera, core), largest) & ~thin[core]
-    faces = _Buffer.of_surroundings(around, largest, thin)
-    if faces is not None:
-        solid |= faces.covers(around)
-    return solid | (hidden & ~_seen_past(hidden & ~solid, measured))
+    body = _Surroundings.of_window(relief, grid, camera, core)
+    solid = np.zeros(hidden.shape, np.uint8)
+    for part, of in ((body, None), (around, thin)):
+        if (buffer := _Buffer.of_surroundings(part, largest, of)) is not None:
+            solid |= buffer.covers(part)
+    # A shadow's rim, a pixel broad, belongs to it.
+    doubtful = hidden & (cv2.dilate(solid, np.ones((3, 3), np.uint8)) == 0)
+    return hidden & ~_seen_past(doubtful, measured)
 
 
 def _seen_past(doubtful: BoolArray, measured: BoolArray) -> BoolArray:
@@ -485,16 +488,13 @@ def tidied(hidden: BoolArray, side: int = 3) -> BoolArray:
     keep[np.unique(label[core & hidden])] = True
     keep &= stats[:, cv2.CC_STAT_AREA] >= TIDYING.least_area
     keep[0] = False
-    solid: BoolArray = keep[label]
-    _, label, stats, _ = cv2.connectedComponentsWithStats((~solid).astype(np.uint8), connectivity=4)
-    pinhole = stats[:, cv2.CC_STAT_AREA] < TIDYING.least_area
-    pinhole[0] = False
-    return solid | np.asarray(pinhole[label])
+    return ~parts_of(~keep[label], TIDYING.least_area, connectivity=4)
 
 
-def parts_of(mask: BoolArray, least: float) -> BoolArray:
+def parts_of(mask: BoolArray, least: float, connectivity: int = 8) -> BoolArray:
     """Return the parts of a mask that have so many pixels."""
-    _, label, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    flags = mask.astype(np.uint8)
+    _, label, stats, _ = cv2.connectedComponentsWithStats(flags, connectivity=connectivity)
     keep = stats[:, cv2.CC_STAT_AREA] >= least
     keep[0] = False
     return np.asarray(keep[label])

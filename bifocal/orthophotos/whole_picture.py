@@ -93,10 +93,9 @@ class CompletedSurface:
 
     def source(self, grid: Grid) -> ByteArray:
         """Return what relief stands on: `Source` INTERPOLATED, PLANE, or NONE where measured."""
-        known = np.isfinite(self.surface.window(grid))
-        told = self.measured(grid)
-        if told is not None:
-            known &= told & self._flags(self._kept, grid)
+        known = self.measured(grid)
+        known = np.isfinite(self.surface.window(grid)) if known is None else known
+        known = known & self._flags(self._kept, grid)
         near = self._at(self._share, grid) >= 0.5
         mark = np.where(near, np.uint8(Source.INTERPOLATED), np.uint8(Source.PLANE))
         return np.where(known, np.uint8(Source.NONE), mark)

@@ -202,6 +202,11 @@ def _away(
     return np.stack(np.broadcast_arrays(x[None, :], y[:, None]), axis=-1)
 
 
+def seen_by_first(frame: Frame, grid: Grid, relief: Float32Array) -> Float32Array:
+    """Return where photo 1 shows the pixels of a map (column, row), shape (h, w, 2). [px]"""
+    return shown_by_first(frame, _away(frame, frame.foot(1), grid), relief)
+
+
 def shown_by_first(frame: Frame, away: Float32Array, relief: Float32Array) -> Float32Array:
     """Return where photo 1 shows points of the wall (column, row), shape (..., 2). [px]
 

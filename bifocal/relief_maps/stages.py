@@ -42,6 +42,7 @@ from bifocal.relief_maps import (
     evidence,
     flow,
     forward_projection,
+    information,
     levels,
     map_completion,
     occluded_regions,
@@ -208,5 +209,7 @@ STAGES = (
           "bands matched", "bands"),
     Stage("outline tidied", map_completion.tidied,
           "bands", "bands"),
+    Stage("sigma of noise", information.with_sigma_of_noise,
+          "frame source valid bands grid", "bands"),
 )
 # fmt: on
