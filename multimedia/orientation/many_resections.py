@@ -260,7 +260,7 @@ class _Fitted:
     def _judge(self, rows: FloatArray) -> None:
         """Find precision and residuals, and who fits so well that no other pose can."""
         table = np.swapaxes(rows, 1, 2).reshape(len(rows), 7, -1)
-        lost = ~np.isfinite(table).all(axis=(1, 2))  # a pose that nothing leads to
+        lost = np.asarray(~np.isfinite(table).all(axis=(1, 2)))  # a pose that nothing leads to
         self.sure &= ~lost
         table = np.where(lost[:, None, None], 0.0, table)
         residuals, jacobian = table[:, 0], table[:, 1:]
