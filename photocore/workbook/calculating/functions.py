@@ -33,17 +33,17 @@ from photocore.workbook.calculating.values import (
 )
 
 
-def _compare(sign: str, one: CellArray, other: CellArray) -> CellArray:
-    one, other = spread(one, other)
-    bad = one.is_error | other.is_error
-    a, b = one.numbers.copy(), other.numbers.copy()
-    words = [(c.kinds == TEXT) | (c.kinds == BLANK) for c in (one, other)]
-    textual = words[0] & words[1] & ((one.kinds == TEXT) | (other.kinds == TEXT))
+def _compare(sign: str, first: CellArray, second: CellArray) -> CellArray:
+    first, second = spread(first, second)
+    bad = first.is_error | second.is_error
+    a, b = first.numbers.copy(), second.numbers.copy()
+    words = [(c.kinds == TEXT) | (c.kinds == BLANK) for c in (first, second)]
+    textual = words[0] & words[1] & ((first.kinds == TEXT) | (second.kinds == TEXT))
     # A text is above every number.
-    a[(one.kinds == TEXT) & ~textual], b[(other.kinds == TEXT) & ~textual] = np.inf, np.inf
+    a[(first.kinds == TEXT) & ~textual], b[(second.kinds == TEXT) & ~textual] = np.inf, np.inf
     if textual.any():
-        left, right = ([str(t).casefold() for t in c.texts[textual]] for c in (one, other))
-        a[textual] = [(x > y) - (x < y) for x, y in zip(left, right, strict=True)]
+        firsts, seconds = ([str(t).casefold() for t in c.texts[textual]] for c in (first, second))
+        a[textual] = [(x > y) - (x < y) for x, y in zip(firsts, seconds, strict=True)]
         b[textual] = 0.0
     return number_cells(_COMPARISONS[sign](a, b), bad, kind=TRUTH)
 
@@ -57,16 +57,16 @@ _ARITHMETIC: Mapping[str, Callable[..., Any]] = {
 }  # fmt: skip
 
 
-def signed(sign: str, one: CellArray, other: CellArray) -> CellArray:
+def signed(sign: str, first: CellArray, second: CellArray) -> CellArray:
     """Return what a sign makes of the cells before and behind it."""
-    if one.is_number and other.is_number and sign != "&":
-        return _of_numbers(sign, one.numbers.item(), other.numbers.item())
+    if first.is_number and second.is_number and sign != "&":
+        return _of_numbers(sign, first.numbers.item(), second.numbers.item())
     if sign == "&":
-        one, other = spread(one, other)
-        return text_cells(one.shown() + other.shown(), one.is_error | other.is_error)
+        first, second = spread(first, second)
+        return text_cells(first.shown() + second.shown(), first.is_error | second.is_error)
     if sign in _COMPARISONS:
-        return _compare(sign, one, other)
-    (a, bad), (b, worse) = as_numbers(one), as_numbers(other)
+        return _compare(sign, first, second)
+    (a, bad), (b, worse) = as_numbers(first), as_numbers(second)
     with np.errstate(all="ignore"):
         return number_cells(_ARITHMETIC[sign](a, b), bad | worse)
 
@@ -116,11 +116,11 @@ def chosen(name: str, parts: Sequence[Callable[[], CellArray]]) -> CellArray:
 
 
 def _each(function: Callable[..., Any]) -> Callable[..., CellArray]:
-    def apply(*given: CellArray) -> CellArray:
-        if len(given) == 1 and given[0].is_number:
+    def apply(*arguments: CellArray) -> CellArray:
+        if len(arguments) == 1 and arguments[0].is_number:
             with np.errstate(all="ignore"):
-                return single(float(function(given[0].numbers.item())))
-        numbers, bad = zip(*map(as_numbers, given), strict=True)
+                return single(float(function(arguments[0].numbers.item())))
+        numbers, bad = zip(*map(as_numbers, arguments), strict=True)
         with np.errstate(all="ignore"):
             return number_cells(function(*numbers), reduce(np.logical_or, bad))
 
@@ -130,11 +130,11 @@ def _each(function: Callable[..., Any]) -> Callable[..., CellArray]:
 def _whole(function: Callable[..., Any], *, none: float = 0.0) -> Callable[..., CellArray]:
     """Return an aggregate of what are numbers, for each row; ``none`` where there is not one."""
 
-    def apply(*given: CellArray) -> CellArray:
-        rows = max(len(one.numbers) for one in given)
+    def apply(*arguments: CellArray) -> CellArray:
+        rows = max(len(one.numbers) for one in arguments)
         values = [np.broadcast_to(np.where(one.kinds == NUMBER, one.numbers, np.nan),
-                                  (rows, one.numbers.shape[1])) for one in given]  # fmt: skip
-        bad = reduce(np.logical_or, (one.is_error.any(axis=1, keepdims=True) for one in given))
+                                  (rows, one.numbers.shape[1])) for one in arguments]  # fmt: skip
+        bad = reduce(np.logical_or, (one.is_error.any(axis=1, keepdims=True) for one in arguments))
         table = np.concatenate(values, axis=1)
         has = np.isfinite(table).any(axis=1, keepdims=True)
         table = np.where(has, table, none)
@@ -144,17 +144,17 @@ def _whole(function: Callable[..., Any], *, none: float = 0.0) -> Callable[..., 
 
 
 def _count(*kinds: int) -> Callable[..., CellArray]:
-    def apply(*given: CellArray) -> CellArray:
-        counts = [among(c.kinds, kinds).sum(axis=1, keepdims=True) for c in given]
+    def apply(*arguments: CellArray) -> CellArray:
+        counts = [among(c.kinds, kinds).sum(axis=1, keepdims=True) for c in arguments]
         return number_cells(reduce(np.add, counts))
 
     return apply
 
 
 def _logical(all_of: bool) -> Callable[..., CellArray]:
-    def apply(*given: CellArray) -> CellArray:
+    def apply(*arguments: CellArray) -> CellArray:
         parts, bad = [], []
-        for one in given:
+        for one in arguments:
             counts = among(one.kinds, (NUMBER, TRUTH))
             holds = np.where(counts, one.numbers != 0, all_of)
             parts.append(holds.all(1, keepdims=True) if all_of else holds.any(1, keepdims=True))
@@ -165,9 +165,9 @@ def _logical(all_of: bool) -> Callable[..., CellArray]:
     return apply
 
 
-def _sum_of_products(*given: CellArray) -> CellArray:
-    bad = reduce(np.logical_or, (one.is_error for one in given))
-    product = reduce(np.multiply, (np.where(c.kinds == NUMBER, c.numbers, 0.0) for c in given))
+def _sum_of_products(*arguments: CellArray) -> CellArray:
+    bad = reduce(np.logical_or, (one.is_error for one in arguments))
+    product = reduce(np.multiply, (np.where(c.kinds == NUMBER, c.numbers, 0.0) for c in arguments))
     return number_cells(product.sum(axis=1, keepdims=True), bad.any(axis=1, keepdims=True))
 
 
@@ -220,9 +220,9 @@ def _inverse(area: CellArray) -> CellArray:
     return CellArray(cells.numbers, cells.kinds, cells.texts, area.size)
 
 
-def _counted_if(area: CellArray, wanted: CellArray) -> CellArray:
-    counts = np.zeros(wanted.numbers.shape)
-    texts, kinds = wanted.shown(), wanted.kinds
+def _counted_if(area: CellArray, criterion: CellArray) -> CellArray:
+    counts = np.zeros(criterion.numbers.shape)
+    texts, kinds = criterion.shown(), criterion.kinds
     for at in np.ndindex(counts.shape):
         sign, word = _CRITERION.fullmatch(str(texts[at])).groups()  # type: ignore[union-attr]
         try:
@@ -237,15 +237,15 @@ def _counted_if(area: CellArray, wanted: CellArray) -> CellArray:
 _CRITERION = re.compile(r"(>=|<=|<>|>|<|=)?(.*)", re.DOTALL)
 
 
-def _sum_if(area: CellArray, wanted: CellArray, summed: CellArray) -> CellArray:
-    holds = _compare("=", area, wanted).numbers != 0
+def _sum_if(area: CellArray, criterion: CellArray, summed: CellArray) -> CellArray:
+    holds = _compare("=", area, criterion).numbers != 0
     terms = np.where(holds & (summed.kinds == NUMBER), summed.numbers, 0.0)
     return number_cells(terms.sum(axis=1, keepdims=True))
 
 
 def _worded(function: Callable[..., str]) -> Callable[..., CellArray]:
-    def apply(text: CellArray, *given: CellArray) -> CellArray:
-        text, *more = spread(text, *given)
+    def apply(text: CellArray, *arguments: CellArray) -> CellArray:
+        text, *more = spread(text, *arguments)
         words, bad = text.shown(), reduce(np.logical_or, (c.is_error for c in (text, *more)))
         out = np.full(words.shape, "", dtype=object)
         for at in np.ndindex(words.shape):
@@ -271,10 +271,10 @@ def _angle(x: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def _special(name: str) -> Callable[..., FloatArray]:
-    def apply(*given: FloatArray) -> FloatArray:
+    def apply(*arguments: FloatArray) -> FloatArray:
         from scipy import special  # late: seldom needed
 
-        return np.asarray(getattr(special, name)(*given))
+        return np.asarray(getattr(special, name)(*arguments))
 
     return apply
 
@@ -284,8 +284,8 @@ def _as_number(value: CellArray) -> CellArray:
     return number_cells(np.where(is_number, value.numbers, 0), value.is_error)
 
 
-def _average(*given: CellArray) -> CellArray:
-    return signed("/", FUNCTIONS["SUM"](*given), FUNCTIONS["COUNT"](*given))
+def _average(*arguments: CellArray) -> CellArray:
+    return signed("/", FUNCTIONS["SUM"](*arguments), FUNCTIONS["COUNT"](*arguments))
 
 
 def _chosen_of(name: str, *values: CellArray) -> CellArray:

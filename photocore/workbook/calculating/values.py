@@ -137,9 +137,9 @@ def single(value: float, kind: int = NUMBER) -> CellArray:
 _KINDS = [np.array([[kind]], dtype=np.uint8) for kind in range(5)]
 
 
-def among(kinds: np.ndarray[Any, np.dtype[np.uint8]], wanted: Sequence[int]) -> BoolArray:
-    """Return where a kind is one of those wanted."""
-    return np.array([kind in wanted for kind in range(5)])[kinds]
+def among(kinds: np.ndarray[Any, np.dtype[np.uint8]], listed: Sequence[int]) -> BoolArray:
+    """Return where a kind is one of those listed."""
+    return np.array([kind in listed for kind in range(5)])[kinds]
 
 
 def text_cells(texts: ArrayLike, bad: ArrayLike = False) -> CellArray:
