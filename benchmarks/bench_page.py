@@ -76,7 +76,7 @@ def first_paint(browser: Any, server: Served) -> float:
 def asked(page: Driver, count: int = 20) -> Any:
     """Return the milliseconds that suggestions take."""
     script = """async ([column, row]) => { const start = performance.now();
-      await (await fetch("/api/suggest", { method: "POST", headers: { "Content-Type":
+      await (await fetch("api/suggest", { method: "POST", headers: { "Content-Type":
         "application/json" }, body: JSON.stringify({ image: 1, column, row }) })).json();
       return performance.now() - start; }"""
     rng = np.random.default_rng(3)

@@ -207,7 +207,8 @@ def compare(
     outlined = _Outlined(cells, test, sizes, by_chance, patches, sigmas, covariance)
     regions, labels = outlined.regions(labels)
     usual = float(np.median(cells.sigma[unchanged]))
-    if not (stable or fit):
+    # What errs as one over most of the wall tells no offset either.
+    if not (stable or fit) and unchanged.sum() >= CHANGE.least * max(by_chance.cells, 1.0):
         common, variance = trend_of(cells, unchanged, by_chance.cells)
         if abs(common[0]) > 3 * np.sqrt(variance[0, 0]):
             remarks.append(remark("compare.offset", offset=1000 * float(common[0])))

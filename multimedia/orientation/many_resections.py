@@ -192,7 +192,8 @@ class _Fitted:
         seen: BoolArray = np.asarray(np.isfinite(image).all(-1) & np.isfinite(control).all(-1))
         self.cameras, self.control, self.seen = cameras, control, seen
         self.image = np.where(seen[..., None], image, np.nan)
-        mean = np.where(seen[..., None], sigmas**2, 0.0).sum((1, 2)) / (2 * seen.sum(1) + 1e-300)
+        total = np.where(seen[..., None], sigmas**2, 0.0).sum((1, 2))
+        mean = np.where(seen.any(1), total, 1.0) / np.maximum(2 * seen.sum(1), 1)
         self.sigmas = sigmas / np.sqrt(mean)[:, None, None]
         self.centre = np.array([camera.centre for camera in cameras])
         self.rotation = np.array([camera.rotation for camera in cameras])
@@ -259,6 +260,9 @@ class _Fitted:
     def _judge(self, rows: FloatArray) -> None:
         """Find precision and residuals, and who fits so well that no other pose can."""
         table = np.swapaxes(rows, 1, 2).reshape(len(rows), 7, -1)
+        lost = np.asarray(~np.isfinite(table).all(axis=(1, 2)))  # a pose that nothing leads to
+        self.sure &= ~lost
+        table = np.where(lost[:, None, None], 0.0, table)
         residuals, jacobian = table[:, 0], table[:, 1:]
         normal = jacobian @ np.swapaxes(jacobian, 1, 2)
         scale = 1.0 / np.sqrt(np.diagonal(normal, axis1=1, axis2=2) + 1e-300)

@@ -52,7 +52,7 @@ def test_picks_that_came_at_once_are_held_against_the_photos(folder) -> None:
         for name, (first, second) in picks:
             pick_both(session, name, (second, first))
         watch.hold_picks()
-        assert any("picks" in text for text in state_of(session)["advice"])
+        assert any("PICKS" in text for text in state_of(session)["advice"])
         for name, both in picks:
             pick_both(session, name, both)
         watch.hold_picks()

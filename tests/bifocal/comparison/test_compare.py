@@ -169,6 +169,16 @@ def test_a_map_that_cannot_be_a_relief_is_refused_without_a_warning(values: floa
         compare(replace(whole, **{where: spoilt}), whole)
 
 
+def test_errors_that_hang_together_over_all_that_is_measured_are_no_reason_to_refuse():
+    wide = np.random.default_rng(1).standard_normal((GRID.height + 200, GRID.width + 200))
+    field = cv2.GaussianBlur(wide, (0, 0), 20)[100:-100, 100:-100]
+    field[:, GRID.width // 4 :] = np.nan  # two such errors are all there is of it
+    flat = ReliefMap.from_relief(0 * field, plane_from_pixel=GRID.plane_from_pixel)
+    before = replace(flat, sigma=np.full(GRID.shape, SIGMA))
+    after = replace(before, r=before.r + SIGMA * field / np.nanstd(field))
+    assert compare(before, after).regions == ()
+
+
 def test_a_patch_larger_than_the_wall_is_refused():
     whole = measured(np.random.default_rng(1))
     with pytest.raises(InputError, match="whole wall of 12 m2"):

@@ -135,6 +135,20 @@ def test_many_cameras_are_each_oriented_as_one_alone(frames, quick, monkeypatch)
         poses.camera(6)
 
 
+@pytest.mark.parametrize("quick", [True, False])
+def test_cameras_that_see_nothing_or_start_anywhere_end_in_their_status(frames, quick, monkeypatch):
+    start, images = frames[0][:4], frames[1][:4].copy()
+    images[1] = np.nan
+    start[0] = replace(start[0], centre=control()[0])
+    start[3] = replace(start[3], centre=np.array([0.0, 0.0, -50.0]))
+    monkeypatch.setattr(fitted_poses, "pays", lambda _: quick)
+    poses = resect_many(start, control(), images, LAYERS)
+    assert "0 control points measured" in poses.status[1]
+    assert np.isfinite(
+        poses.centre[[k for k, said in enumerate(poses.status) if said == "ok"]]
+    ).all()
+
+
 def test_many_cameras_keep_the_ratios_of_standard_deviations(frames, monkeypatch):
     start, images = frames
     sigma = np.where(np.arange(images.shape[1]) % 2, 0.002, 0.004)[None, :, None]
