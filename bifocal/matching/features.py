@@ -42,13 +42,8 @@ class Features:
 
     def of(self, rows: slice | NDArray[np.intp]) -> Features:
         """Return the features of some rows."""
-        return replace(
-            self,
-            pixels=self.pixels[rows],
-            size=self.size[rows],
-            direction=self.direction[rows],
-            descriptors=self.descriptors[rows],
-        )
+        each = ("pixels", "size", "direction", "descriptors")
+        return replace(self, **{name: getattr(self, name)[rows] for name in each})
 
 
 def stretch(image: ByteArray) -> ByteArray:

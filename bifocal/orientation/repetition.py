@@ -32,8 +32,6 @@ class Repetition:
     ----------
     ends : ndarray, shape (2 or 3, 2)
         A place of the far photo, and those one period away, the nearest first. [ideal px]
-    likeness : float
-        Correlation of the wall with itself a period aside.
     surrounding : Surrounding
         Where partners are to be sought: within a third of a period.
     is_certain : bool
@@ -41,7 +39,6 @@ class Repetition:
     """
 
     ends: FloatArray
-    likeness: float
     surrounding: Surrounding
     is_certain: bool
 
@@ -66,33 +63,25 @@ def repetition(images: Images, interiors: Interiors, far: Pinhole, ties: Ties) -
         inside = (raw > 1) & (raw < np.array(interior.image_size) - 2)
         shown = np.asarray(inside.all(axis=-1))
         sheets.append((resampled(image, raw).astype(np.float32), shown))
-    periods = _periods(sheets[0])
-    if not periods:
+    if not len(moves := _periods(sheets[0])):
         return None
-    moves = np.array([move for move, _ in periods])
+    around = int(np.linalg.norm(moves[0]) / 3)
     for witness in (_grain, _outstanding):
         first, second = (witness(sheet, moves[0]) for sheet in sheets)
-        around = int(np.linalg.norm(moves[0]) / 3)
         lag, is_certain = _clear_peak(_correlation(first, second), around)
         if is_certain:
             break
     metres = np.array([1.0, -1.0]) * spacing  # rows run down, Y up
     middle = grid[grid.shape[0] // 2, grid.shape[1] // 2]
-    ends = _seen(far, middle + np.vstack([np.zeros(2), moves * metres]))
+    places = middle + np.vstack([np.zeros(2), moves * metres])
+    ends = project(far, np.column_stack([places, np.zeros(len(places))]))
     carried = np.eye(3)
     carried[:2, 2] = lag * metres if is_certain else 0.0
-    homography = ties.homography @ np.linalg.inv(plane_from_pixel(far)) @ carried
-    homography = homography @ plane_from_pixel(far)
-    there = apply_homography(homography, ends)
-    reach = float(np.linalg.norm(there[1] - there[0])) / 3
-    return Repetition(
-        ends=ends, likeness=periods[0][1], is_certain=is_certain,
-        surrounding=Surrounding(homography=homography, reach=reach),
-    )  # fmt: skip
-
-
-def _seen(far: Pinhole, places: FloatArray) -> FloatArray:
-    return project(far, np.column_stack([places, np.zeros(len(places))]))
+    to_plane = plane_from_pixel(far)
+    homography = ties.homography @ np.linalg.inv(to_plane) @ carried @ to_plane
+    reach = float(np.linalg.norm(np.diff(apply_homography(homography, ends[:2]), axis=0))) / 3
+    surrounding = Surrounding(homography=homography, reach=reach)
+    return Repetition(ends=ends, is_certain=is_certain, surrounding=surrounding)
 
 
 def _grid(far: Pinhole, size: tuple[int, int]) -> tuple[FloatArray, float]:
@@ -108,8 +97,8 @@ def _grid(far: Pinhole, size: tuple[int, int]) -> tuple[FloatArray, float]:
     return np.stack(np.meshgrid(x, y), axis=-1), spacing
 
 
-def _periods(sheet: Sheet) -> list[tuple[FloatArray, float]]:
-    """Return the moves along either axis by which a sheet is like itself, and how much. [px]
+def _periods(sheet: Sheet) -> FloatArray:
+    """Return the moves along either axis by which a sheet is like itself, the nearest first. [px]
 
     Half the pixels a side tell.
     """
@@ -131,15 +120,10 @@ def _periods(sheet: Sheet) -> list[tuple[FloatArray, float]]:
         peak = (top[1:-1] >= top[:-2]) & (top[1:-1] > top[2:])
         peak &= (top - np.minimum.accumulate(top))[1:-1] > REPETITION.stands_out
         peaks = 1 + np.flatnonzero(peak)
-        peaks = (
-            peaks[top[peaks] > max(REPETITION.repeats, REPETITION.as_good * top[peaks].max())]
-            if len(peaks)
-            else peaks
-        )
-        if len(peaks):
-            move = np.array([lags[peaks[0]], across[band[:, peaks[0]].argmax()]], dtype=float)
-            out.append((2 * move[::order], float(top[peaks[0]])))
-    return sorted(out, key=lambda one: float(np.linalg.norm(one[0])))
+        least = max(REPETITION.repeats, REPETITION.as_good * top[peaks].max(initial=0.0))
+        for first in peaks[top[peaks] > least][:1]:
+            out.append([lags[first], across[band[:, first].argmax()]][::order])
+    return 2.0 * np.array(sorted(out, key=np.linalg.norm))
 
 
 def _grain(sheet: Sheet, period: FloatArray) -> Sheet:
@@ -150,7 +134,9 @@ def _grain(sheet: Sheet, period: FloatArray) -> Sheet:
     kernel = np.ones((7, 7), np.uint8)
     slope = np.hypot(cv2.Sobel(fine, cv2.CV_32F, 1, 0), cv2.Sobel(fine, cv2.CV_32F, 0, 1))
     steep, inner = cv2.dilate(slope, kernel), cv2.erode(shown.astype(np.uint8), kernel) > 0
-    calm = inner & (steep < np.quantile(steep[inner], REPETITION.calm))
+    if not inner.any():
+        return np.zeros_like(values), inner
+    calm = inner & (steep <= np.quantile(steep[inner], REPETITION.calm))
     rest = fine - cv2.medianBlur(values.astype(np.uint8), 2 * round(REPETITION.grain * side) + 1)
     spread = 1.4826 * float(np.median(np.abs(rest[calm])))
     calm &= np.abs(rest) < 4 * max(spread, 0.5)

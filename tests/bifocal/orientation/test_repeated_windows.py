@@ -69,6 +69,17 @@ def test_smooth_plaster_tells_nothing_and_is_not_believed_to() -> None:
     assert not found.is_certain
 
 
+@pytest.mark.parametrize("believed", [0.62, 60.0], ids=["seen by both", "seen by one"])
+def test_a_wall_on_which_nothing_is_to_be_seen_tells_nothing(believed: float) -> None:
+    lenses = tuple(Interior.unknown(SIZE) for _ in range(2))
+    empty = np.full(SIZE[::-1], 128, np.uint8)
+    assert repeated((empty, empty), lenses, believed=believed) is None
+    images, lenses = pair_of(plaster=2.0, aside=0.62)
+    found = repeated(images, lenses, believed=believed)
+    assert found is not None
+    assert found.is_certain == (believed == 0.62)
+
+
 def test_a_wall_without_windows_in_rows_does_not_repeat_itself() -> None:
     rng = np.random.default_rng(5)
     wall = cv2.resize(rng.uniform(60, 220, (9, 12)), SIZE, interpolation=cv2.INTER_NEAREST)
