@@ -39,9 +39,8 @@ What they take and give: Alignment, Bounds, BreakLine, ChangedRegion, CheckResul
 Faces, FlagLimits, FlatSurface, Foot, Grid, Intersection, KnownPoints, Layers, MapSurface,
 MediaPath, NamedPoints, Occluder, OrientationCheck, Pinhole, PlanePicks, PointObservations,
 Progress, ProjectedPoints, ProjectOptions, ProjectPhotos, RadialDivision, RankedPair, Rectification,
-Registration, ReliefTable, SetAlignment, SetIntersection, Similarity, SpaceSums, suggest_faces,
-Surface, SurveyInput, SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision,
-WeightedSums, Window, WorldPoints.
+Registration, ReliefTable, SetAlignment, SetIntersection, Similarity, suggest_faces, Surface,
+SurveyInput, SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision, Window, WorldPoints.
 
 Errors are one family with one message each that says what is wrong, where, and how to mend it:
 PhotogrammetryError > InputError (a ValueError) > CellError, WorkbookError, MissingExtraError;

@@ -69,12 +69,10 @@ from .survey.reference import CheckResult, Georeference, KnownPoints, NamedPoint
 from .survey.relief_table import ReliefTable
 from .survey.setup import Measuring, SurveySetup, Taking
 from .survey.solved_survey import SolvedSurvey, WorldPoints
-from .survey.space_similarity import SpaceSums
 from .survey.survey_input import SurveyInput
 from .survey.survey_media import SurveyMedia
 from .survey.tolerances import ToleranceRule
 from .survey.transformation_precision import TransformationPrecision
-from .survey.weighted_similarity import WeightedSums
 from .workbook.reading.reader import ReadOptions
 from .workbook.workflow import solve
 
@@ -150,7 +148,6 @@ __all__ = [
     "SiteMeasures",
     "SolvedSurvey",
     "Source",
-    "SpaceSums",
     "Surface",
     "SurveyInput",
     "SurveyMedia",
@@ -159,7 +156,6 @@ __all__ = [
     "ToleranceRule",
     "TransformationPrecision",
     "WATER_SAMPLE",
-    "WeightedSums",
     "Window",
     "WorkbookError",
     "WorldPoints",

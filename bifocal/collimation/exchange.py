@@ -9,25 +9,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from bifocal.collimation.records import Change, PickedControl, PickedPoint, SurveyState
 from bifocal.collimation.shapes import places_of
+from bifocal.collimation.survey_on_page import SurveyOnPage
 from bifocal.model.pair import Pair
 from bifocal.remarks import remark
 from bifocal.survey.observations import DOUBT_CODES
 from photocore.errors import InputError
 from photocore.provenance import known_hash
 
-if TYPE_CHECKING:
-    from bifocal.collimation.session import Session
-
 #: Kind of files that belong to an orientation that was put aside.
 ASIDE = "aside"
 _ORIENTED = ("relief", "ortho", "deliver", "set", "pair")
 
 
-def fields_of_exchange(session: Session) -> dict[str, Any]:
+def fields_of_exchange(session: SurveyOnPage) -> dict[str, Any]:
     """Return what the command is told besides: the orientation's files, shapes re-projected.
 
     Raises
@@ -110,7 +108,7 @@ def turned_picks(record: Any) -> Any:
 
 
 def proposal_noted(
-    session: Session, command: Mapping[str, Any], changes: list[Change]
+    session: SurveyOnPage, command: Mapping[str, Any], changes: list[Change]
 ) -> dict[str, Any]:
     """Return the undo of an exchange with what is proposed after it; other commands as they are."""
     undone = command["op"] == "undo" and any(map(_is_swap, changes))
@@ -130,7 +128,7 @@ def _is_swap(change: Change) -> bool:
     return (change.kind, change.key) == ("orientation", ASIDE)
 
 
-def _proposal_now(session: Session) -> dict[str, Any]:
+def _proposal_now(session: SurveyOnPage) -> dict[str, Any]:
     """Return the orientation that waits to be accepted, with the digest of its file."""
     path = session.proposed_path
     if path is None:
@@ -138,7 +136,7 @@ def _proposal_now(session: Session) -> dict[str, Any]:
     return {"proposal": {**(session.proposal or {}), "sha256": known_hash(path)}}
 
 
-def follow_exchange(session: Session, changes: list[Change]) -> None:
+def follow_exchange(session: SurveyOnPage, changes: list[Change]) -> None:
     """Let photos, pair and products be those of the survey after an exchange, its undo or redo."""
     (swap,) = filter(_is_swap, changes)
     back: Any = swap.before or {}
@@ -153,7 +151,7 @@ def follow_exchange(session: Session, changes: list[Change]) -> None:
         session.show_products()
 
 
-def put_aside(session: Session) -> None:
+def put_aside(session: SurveyOnPage) -> None:
     """Show the photos the other way round; what was made of their orientation stays on the disk."""
     made = [name for name, kind in session.products.made.items() if kind in _ORIENTED]
     if made:

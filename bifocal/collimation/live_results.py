@@ -77,7 +77,7 @@ class LiveResults:
         table = self._solved(observations(new))
         covariance = table.covariance
         for row, point in enumerate(new):
-            misfit = table.formula_cells.get("misfit_px")
+            misfit = table.of_pixels.get("misfit_px")
             self._rows[_key(point)] = plain(
                 {key: float(table[column][row]) for key, column in _KEYS.items()}
                 | {

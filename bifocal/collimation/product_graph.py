@@ -9,17 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from bifocal.collimation.shapes import outlines_of
+from bifocal.collimation.survey_on_page import SurveyOnPage
 from bifocal.faces.faces_files import beside
 from bifocal.files.made_from import MadeFrom, photos_of
 from photocore.errors import PhotogrammetryError
 from photocore.jsonfile import plain
 from photocore.provenance import digest_of, known_hash
-
-if TYPE_CHECKING:
-    from bifocal.collimation.session import Session
 
 #: Each product and its causes, in the order in which they are made.
 GRAPH: Mapping[str, tuple[str, ...]] = {
@@ -30,12 +28,12 @@ GRAPH: Mapping[str, tuple[str, ...]] = {
 }
 
 
-def causes_of(session: Session, kind: str) -> dict[str, str]:
+def causes_of(session: SurveyOnPage, kind: str) -> dict[str, str]:
     """Return the digests of a product's causes as they are now; empty of what there is not."""
     return {cause: _digest(session, cause) for cause in GRAPH.get(kind, ())}
 
 
-def out_of_date(session: Session) -> dict[str, list[str]]:
+def out_of_date(session: SurveyOnPage) -> dict[str, list[str]]:
     """Return the products that are there and are out of date, and because of what."""
     stale: dict[str, list[str]] = {}
     for kind, causes in GRAPH.items():
@@ -50,7 +48,7 @@ def out_of_date(session: Session) -> dict[str, list[str]]:
     return stale
 
 
-def proposal_is_current(session: Session) -> bool:
+def proposal_is_current(session: SurveyOnPage) -> bool:
     """Whether the proposed orientation was made from what is typed and picked now.
 
     What gives the scale of one that has none is taken up as it is typed.
@@ -58,18 +56,18 @@ def proposal_is_current(session: Session) -> bool:
     return causes_hold(session, (session.proposal or {}).get("report", {}))
 
 
-def causes_hold(session: Session, report: Mapping[str, Any]) -> bool:
+def causes_hold(session: SurveyOnPage, report: Mapping[str, Any]) -> bool:
     """Whether the causes that a report names are as they were."""
     causes = report.get("causes", {})
     return all(_digest(session, cause) == digest for cause, digest in causes.items())
 
 
-def causes_again(session: Session, report: Mapping[str, Any]) -> dict[str, str]:
+def causes_again(session: SurveyOnPage, report: Mapping[str, Any]) -> dict[str, str]:
     """Return the causes that a report names, as they are now."""
     return {cause: _digest(session, cause) for cause in report.get("causes", {})}
 
 
-def _digest(session: Session, cause: str) -> str:
+def _digest(session: SurveyOnPage, cause: str) -> str:
     """Return what tells the state of a cause from another one."""
     pair, products, state = session.accepted_pair, session.products, session.state
     if cause == "control":
@@ -100,7 +98,7 @@ def _digest(session: Session, cause: str) -> str:
     return digest_of(plain(outlines_of(state, pair)))[:16]
 
 
-def _recorded_in(session: Session, kind: str) -> dict[str, str]:
+def _recorded_in(session: SurveyOnPage, kind: str) -> dict[str, str]:
     """Return what a map itself tells of its pair, where the journal of an older version does not.
 
     The digest of the pair as it is now, if the map was made from it; another one, if not.

@@ -49,7 +49,7 @@ from bifocal.orientation.orientation_stages import (
     with_refracted_ties,
 )
 from bifocal.orientation.repetition import Repetition
-from bifocal.orientation.slips import TrialOrientation, Typed, slip_of
+from bifocal.orientation.slips import TrialOrientation, TypedOrientation, slip_of
 from bifocal.orientation.starts.refracted_start import refracted_start
 from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.tie_points import likely_on_wall
@@ -309,12 +309,12 @@ def _typed_right(
         Naming a slip that only the user can mend.
     """
 
-    def meant(typed: Typed) -> Given:
+    def meant(typed: TypedOrientation) -> Given:
         lens = given.with_interiors(typed.interiors)
         lens = lens.turned if typed.exchanged else lens
         return replace(lens, control=typed.control, site=typed.site)
 
-    typed = Typed(interiors=given.interiors, control=given.control, site=given.site)
+    typed = TypedOrientation(interiors=given.interiors, control=given.control, site=given.site)
     slip = slip_of(typed, lambda one: fitted(meant(one)), by_control=by_control)
     if slip is not None and not slip.mended:
         raise GeometryError(slip.words)

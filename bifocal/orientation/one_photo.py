@@ -14,7 +14,7 @@ from bifocal.model.photo_alone import PhotoAlone
 from bifocal.orientation.adjustment.pair_adjustment import ROUNDING, as_one
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.facade_lines import facing_wall
-from bifocal.orientation.slips import TrialOrientation, Typed, slip_of
+from bifocal.orientation.slips import TrialOrientation, TypedOrientation, slip_of
 from bifocal.orientation.starts.space_resection import refuse_line, resect
 from bifocal.orientation.tuning import SLIPS
 from bifocal.remarks import remark
@@ -199,7 +199,7 @@ def by_control(control: Control, interior: Interior, *, sigma_pick: float) -> Or
     control = _of_points(control, whole & ~unseen)
     control = replace(control, pixels1=interior.ideal(control.pixels1))
 
-    def fitted(typed: Typed) -> TrialOrientation | None:
+    def fitted(typed: TypedOrientation) -> TrialOrientation | None:
         if not np.isfinite(typed.control.pixels1).all():
             return None  # the picks of a second photo
         try:
@@ -210,7 +210,7 @@ def by_control(control: Control, interior: Interior, *, sigma_pick: float) -> Or
         return TrialOrientation(misfit=photo.sigma0, cameras=(photo.camera,) * 2, lost=lost)
 
     known = replace(interior, is_calibrated=True)  # the points' own slips alone are looked for
-    typed = Typed(interiors=(known, known), control=control, site=SiteMeasures())
+    typed = TypedOrientation(interiors=(known, known), control=control, site=SiteMeasures())
     slip = slip_of(typed, fitted, by_control=True)
     if slip is not None and not slip.mended:
         raise GeometryError(slip.words)

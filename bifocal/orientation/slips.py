@@ -19,7 +19,7 @@ FILM = 36.0  #: Width of 35-mm film. [mm]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Typed:
+class TypedOrientation:
     """What a pair is set up from; ``exchanged`` where the photos' names are the other way round."""
 
     interiors: Interiors
@@ -55,20 +55,23 @@ class TrialOrientation:
 class Slip:
     """What was meant, and what to say; whether to go on with it, or only a person can mend it."""
 
-    meant: Typed
+    meant: TypedOrientation
     words: str
     mended: bool = True
     handicap: float = 1.0
 
 
 def slip_of(
-    typed: Typed, fitted: Callable[[Typed], TrialOrientation | None], *, by_control: bool
+    typed: TypedOrientation,
+    fitted: Callable[[TypedOrientation], TrialOrientation | None],
+    *,
+    by_control: bool,
 ) -> Slip | None:
     """Return the slip that explains why something typed does not fit; None where nothing does.
 
     Parameters
     ----------
-    typed : Typed
+    typed : TypedOrientation
     fitted : function
         Tells how well something fits; None if not at all.
     by_control : bool
@@ -101,7 +104,7 @@ def slip_of(
 
 def _explaining(
     slips: Iterable[Slip],
-    fitted: Callable[[Typed], TrialOrientation | None],
+    fitted: Callable[[TypedOrientation], TrialOrientation | None],
     now: TrialOrientation | None,
 ) -> list[tuple[float, Slip]]:
     """Return the slips that explain a misfit, each with what is left of it."""
@@ -120,7 +123,7 @@ def _explaining(
     return found
 
 
-def _of_lenses(typed: Typed, *, free: bool) -> Iterator[Slip]:
+def _of_lenses(typed: TypedOrientation, *, free: bool) -> Iterator[Slip]:
     """Yield slips of the focal lengths, of the sensor's size, and of a photo's."""
     first, second = typed.interiors
     if any(i.is_calibrated or i.is_assumed or i.pixel_size is None for i in typed.interiors):
@@ -163,7 +166,7 @@ def _of_lenses(typed: Typed, *, free: bool) -> Iterator[Slip]:
         yield Slip(meant=replace(typed, interiors=loose), words=words, handicap=SLIPS.clearly)
 
 
-def _of_crops(typed: Typed) -> Iterator[Slip]:
+def _of_crops(typed: TypedOrientation) -> Iterator[Slip]:
     """Yield that photos are parts of larger ones, where there are points enough to tell."""
     if any(i.is_calibrated for i in typed.interiors) or typed.control.positioned.sum() < 8:
         return
@@ -176,7 +179,7 @@ def _of_crops(typed: Typed) -> Iterator[Slip]:
         yield Slip(meant=meant, words=remark(f"slips.cropped_{key}"), handicap=SLIPS.clearly)
 
 
-def _of_site(typed: Typed) -> Iterator[Slip]:
+def _of_site(typed: TypedOrientation) -> Iterator[Slip]:
     """Yield that the cameras were not square to the wall, where that was said."""
     if typed.site.parallel:
         words = remark("slips.not_square", tilts="<tilts>")
@@ -184,7 +187,7 @@ def _of_site(typed: Typed) -> Iterator[Slip]:
         yield Slip(meant=meant, words=words, mended=False)
 
 
-def _of_control(typed: Typed, now: TrialOrientation | None) -> Iterator[Slip]:
+def _of_control(typed: TypedOrientation, now: TrialOrientation | None) -> Iterator[Slip]:
     """Yield slips of the control table: how its axes count, which pick and which point is which."""
     control, count = typed.control, len(typed.control.ids)
     xyz, (first, second) = control.xyz, typed.interiors

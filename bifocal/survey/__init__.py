@@ -5,7 +5,7 @@ Read `observations`, `setup`, `survey_lens`, `survey_media` and `survey_input` f
 other. It exchanges or converts what was typed in other units (`units`), corrects the orientation
 by points of the plane (`orientation_check`), and calls `point_survey`, where Eqs. (1) to (7) run;
 its columns are prepared by `radii`, `refracted_radii` and `image_shift`. More than two photos are
-`other_photos` and `set_survey`. Then the world: `georeferencing`, by `weighted_similarity` and
-`space_similarity`, its worth by `transformation_precision` and `leave_one_out`. Last the
-judgement: `check_points`, `tolerances`, `basis`, `remarks`, `what_if`; `results` are its words.
+`other_photos` and `set_survey`. Then the world: `georeferencing`, by `weighted_similarity`, its
+worth by `transformation_precision`. Last the judgement: `check_points`, `tolerances`, `basis`,
+`remarks`; `results` are its words.
 """

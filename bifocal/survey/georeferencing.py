@@ -10,9 +10,8 @@ import numpy as np
 
 from bifocal.survey.reference import Georeference, KnownPoints, NamedPoints
 from bifocal.survey.relief_table import ReliefTable
-from bifocal.survey.space_similarity import SpaceSums, fit_of_space, space_sums
 from bifocal.survey.transformation_precision import TransformationPrecision, precision_of
-from bifocal.survey.weighted_similarity import WeightedSums, fit_of_sums, weighted_sums, weights_of
+from bifocal.survey.weighted_similarity import WeightedFit, weighted_fit, weights_of
 from photocore.arrays import BoolArray, FloatArray, as_floats
 from photocore.camera.similarity import (
     Similarity,
@@ -202,7 +201,7 @@ class _FittedTransformation:
     squares: float
     noise: float
     redundancy: int
-    sums: WeightedSums | SpaceSums | None = None
+    weighted: WeightedFit | None = None
 
 
 def _fit(
@@ -217,7 +216,7 @@ def _fit(
     origin = round_origin(target)
     near = target - origin
     offset = near.mean(axis=0)
-    sums: WeightedSums | SpaceSums | None = None
+    weighted: WeightedFit | None = None
     if model.axes == 2:
         offset[2] = found.target_centre[2]
     # Rounding noise of large coordinates is no contradiction.
@@ -228,32 +227,16 @@ def _fit(
         squares = float((left**2).sum())
     else:
         weights = weights_of(measured.covariance[used], flat=model.axes == 2)
-        sums = _sums(model, wall, weights, near, found)
-        if isinstance(sums, SpaceSums):
-            found, offset = fit_of_space(sums, found.source_centre, origin)
-        else:
-            found, offset = fit_of_sums(sums, found.source_centre, origin, model=model.name)
+        about = wall - found.source_centre
+        weighted = weighted_fit(about, weights, near, found, model=model.name)
+        found, offset = weighted.similarity(found.source_centre, origin), weighted.offset
         left = residuals(found, wall, near, offset) @ found.rotation / found.scale
         squares = float(np.einsum("ni,nij,nj->", left, weights, left))
         noise *= float(np.trace(weights.mean(axis=0))) / model.axes
     return _FittedTransformation(
         model=model, used=used, transformation=found, origin=origin, offset=offset,
-        squares=squares, noise=noise, redundancy=redundancy, sums=sums,
+        squares=squares, noise=noise, redundancy=redundancy, weighted=weighted,
     )  # fmt: skip
-
-
-def _sums(
-    model: TransformationModel,
-    wall: FloatArray,
-    weights: FloatArray,
-    near: FloatArray,
-    start: Similarity,
-) -> WeightedSums | SpaceSums:
-    """Return what a weighted fit is made of."""
-    about = wall - start.source_centre
-    if model.name == "3D":
-        return space_sums(about, weights, near)
-    return weighted_sums(about, weights, near, start, model=model.name)
 
 
 def residuals(
@@ -338,7 +321,6 @@ def _as_georeference(
         redundancy=best.redundancy,
         origin=best.origin,
         offset=best.offset,
-        sums=best.sums,
         covariance=measured.covariance,
         near=flattened,
         precision=precision,
@@ -349,21 +331,22 @@ def _precision(
     measured: _MeasuredControl, best: _FittedTransformation, near: FloatArray, sigma0: float
 ) -> tuple[TransformationPrecision | None, float]:
     """Return what the fit is worth, and the weighted sum of squares to be expected."""
-    used, fit, sums = best.used, best.transformation, best.sums
+    used, fit, weighted = best.used, best.transformation, best.weighted
     effect = None if measured.effect is None else measured.effect[used]
     expected = float(best.redundancy)
-    if sums is None:
+    if weighted is None:
         # All points alike: as good as the residuals say, which say nothing without redundancy.
         if not sigma0 > 0:
             return None, expected
         alike = np.tile(np.eye(3) * (sigma0 / fit.scale) ** 2, (int(used.sum()), 1, 1))
         weights = weights_of(alike, flat=best.model.axes == 2)
-        sums = _sums(best.model, measured.wall[used], weights, near[used], fit)
-    precision = precision_of(best.model.name, fit, sums, near[used], effect)
+        about = measured.wall[used] - fit.source_centre
+        weighted = weighted_fit(about, weights, near[used], fit, model=best.model.name)
+    precision = precision_of(best.model.name, fit, weighted, near[used], effect)
     if effect is not None:
         moved = precision.moved_by_orientation(near[used])
         unexplained = effect - np.einsum("ba,nbk->nak", fit.rotation, moved) / fit.scale
-        expected += float(np.einsum("nak,nab,nbk->", unexplained, sums.weights, unexplained))
+        expected += float(np.einsum("nak,nab,nbk->", unexplained, weighted.weights, unexplained))
     return precision, expected
 
 

@@ -40,9 +40,7 @@ class _PlanePositions(NamedTuple):
     scales: FloatArray
 
 
-def of_all_photos(
-    setup: SurveySetup, points: PointObservations
-) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+def of_all_photos(setup: SurveySetup, points: PointObservations) -> dict[str, FloatArray]:
     """Solve points that were measured in the pair of a set-up and in other photos.
 
     Parameters
@@ -53,11 +51,9 @@ def of_all_photos(
 
     Returns
     -------
-    columns : dict of str to ndarray, shape (n,)
+    dict of str to ndarray, shape (n,)
         ``r_1_3 sigma_1_3`` ... of photo 1 with each other one, ``r_all sigma_all X_all Y_all`` of
         three rays and more [m], and ``chance``: the share of honest points that miss as much.
-    cells : dict of str to ndarray, shape (n,)
-        The steps to these, as the workbook's formulas make them.
 
     Notes
     -----
@@ -67,17 +63,13 @@ def of_all_photos(
     photo counts once, in however many pairs. With X, Y eliminated a turn of Gauss-Newton is a
     quotient of sums over the photos, which a cell can hold.
     """
-    seen = _on_wall(setup, points)
+    positions = _on_wall(setup, points)
     columns: dict[str, FloatArray] = {}
-    cells: dict[str, FloatArray] = {}
-    for k, (x, y, weight) in enumerate(zip(seen.x.T, seen.y.T, seen.weight.T, strict=True), 1):
-        cells |= {f"wall_x{k}": x, f"wall_y{k}": y, f"weight{k}": weight}
-        if k > 2:
-            own, cells[f"den_1_{k}"] = _of_pair(seen, k - 1, setup.precision)
-            columns |= dict(zip((f"r_1_{k}", f"sigma_1_{k}"), own, strict=True))
+    for k in range(3, positions.x.shape[1] + 1):
+        relief_and_sigma = _of_pair(positions, k - 1, setup.precision)
+        columns |= dict(zip((f"r_1_{k}", f"sigma_1_{k}"), relief_and_sigma, strict=True))
     with np.errstate(divide="ignore", invalid="ignore"):
-        together, turns = _together(seen, setup.precision)
-    return columns | together, cells | turns
+        return columns | _together(positions, setup.precision)
 
 
 def _on_wall(setup: SurveySetup, points: PointObservations) -> _PlanePositions:
@@ -103,26 +95,23 @@ def _on_wall(setup: SurveySetup, points: PointObservations) -> _PlanePositions:
 
 
 def _of_pair(
-    seen: _PlanePositions, photo: int, precision: float
-) -> tuple[tuple[FloatArray, FloatArray], FloatArray]:
-    """Return relief by the first photo and another with its sigma, and what is divided by."""
-    d, radii = seen.distances, np.hypot(seen.x, seen.y)
-    rate = radii[:, photo] / d[photo] - radii[:, 0] / d[0]
+    positions: _PlanePositions, photo: int, precision: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return relief by the first photo and another, and its sigma."""
+    d, radii = positions.distances, np.hypot(positions.x, positions.y)
     far, near = (0, photo) if d[0] > d[photo] else (photo, 0)
     if not d[far] > d[near]:
         blank = np.full(len(radii), np.nan)
-        return (blank, blank), rate
+        return blank, blank
     s1, s2, d1, d2 = radii[:, far], radii[:, near], d[far], d[near]
-    sigma_1, sigma_2 = precision * seen.scales[far], precision * seen.scales[near]
+    sigma_1, sigma_2 = precision * positions.scales[far], precision * positions.scales[near]
     sigma = sigma_relief(s1, s2, d1=d1, d2=d2, sigma_1=sigma_1, sigma_2=sigma_2)
-    return (relief(s1, s2, d1=d1, d2=d2), sigma), rate
+    return relief(s1, s2, d1=d1, d2=d2), sigma
 
 
-def _together(
-    seen: _PlanePositions, precision: float
-) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
-    """Return the points by all rays, and the turns that lead there."""
-    x, y, w, d, _ = seen
+def _together(positions: _PlanePositions, precision: float) -> dict[str, FloatArray]:
+    """Return the points by all rays."""
+    x, y, w, d, _ = positions
 
     def total(values: FloatArray) -> FloatArray:
         return np.asarray(np.nansum(w * values, axis=1))
@@ -134,25 +123,21 @@ def _together(
         total(squares / d**2) - (lean_x**2 + lean_y**2) / weight
     )
     r = np.where((count > 2) & np.isfinite(r), r, np.nan)
-    cells = {"turn_0": r}
     for turn in range(TURNS + 1):
         t = d / (d - r[:, None])
-        rate, own = t**2 / d, total(t**2)
-        at_x, at_y = total(t * x) / own, total(t * y) / own
-        lever = (at_x**2 + at_y**2) * (total(rate**2) - total(t * rate) ** 2 / own)
+        rate, across = t**2 / d, total(t**2)
+        at_x, at_y = total(t * x) / across, total(t * y) / across
+        lever = (at_x**2 + at_y**2) * (total(rate**2) - total(t * rate) ** 2 / across)
         miss_x, miss_y = x - at_x[:, None] * t, y - at_y[:, None] * t
-        cells |= {f"at_x{turn}": at_x, f"at_y{turn}": at_y}
         if turn < TURNS:
             r = r + (at_x * total(rate * miss_x) + at_y * total(rate * miss_y)) / lever
-            cells[f"turn_{turn + 1}"] = r
     # NaN of distances, of photos that did not see the point, tells nothing.
     behind = ~np.isnan(w) & ~(r[:, None] < d)
     kept = np.isfinite(r) & ~behind.any(axis=1)
     chance = _chance(total(miss_x**2 + miss_y**2) / precision**2, 2 * count - 3)
-    found = (r, precision / np.sqrt(lever), at_x, at_y, chance)
-    columns = dict(zip(OF_ALL, found, strict=True))
-    return {key: np.where(kept, values, np.nan) for key, values in columns.items()}, {
-        key: np.where(np.isfinite(r), values, np.nan) for key, values in cells.items()
+    columns = (r, precision / np.sqrt(lever), at_x, at_y, chance)
+    return {
+        key: np.where(kept, values, np.nan) for key, values in zip(OF_ALL, columns, strict=True)
     }
 
 

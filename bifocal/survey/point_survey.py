@@ -19,9 +19,9 @@ from bifocal.survey.radii import Radii
 from bifocal.survey.refracted_radii import (
     length,
     met_rays,
-    ray_columns,
     refracted_radii,
     scale_ratio,
+    slope_gains,
 )
 from bifocal.survey.relief_table import ReliefTable, entries
 from photocore.arrays import FloatArray
@@ -92,7 +92,7 @@ def solve_points(
         radii = _doubted(radii, points, first.distance, DOUBTFUL_SHARE * pair.d2)
     s1, s2, d1, d2 = radii.s1, radii.s2, first.distance, second.distance
     if radii.bent is not None:
-        ds, den, r, e1, e2, _ = radii.bent
+        ds, den, r, e1, e2, *_ = radii.bent
     else:
         ds, den = s2 - s1, s2 / d2 - s1 / d1
         (d_far, far), (d_near, near) = _far_first((d1, s1), (d2, s2))
@@ -135,7 +135,7 @@ def solve_points(
             limits=limits,
         ),
         standardised=radii.standardised,
-        formula_cells=radii.formula_cells,
+        of_pixels=radii.of_pixels,
         image_scale=first.scale_number,
         sigma_px=radii.sigma_px,
         pair=None if pair.whole_orientation is None else pair,
@@ -145,21 +145,23 @@ def solve_points(
 def _doubted(radii: Radii, points: PointObservations, d1: float, sigma: float) -> Radii:
     """Return radii whose doubtful points may lie anywhere on the ray of the far photo. [m]"""
     spread = np.where(points.in_doubt, sigma, 0.0)
-    carried, angle = dict(radii.formula_cells), np.radians(radii.own_theta)
-    slope = carried.get("t1", radii.own1 / d1)  # through media, of the bent ray
-    outwards = carried.get("t1x", slope * np.sin(angle)), carried.get("t1y", slope * np.cos(angle))
-    rate = [-part * radii.scale_number / 1000 for part in outwards]
-    along = np.stack([*rate, np.ones(len(angle))], axis=-1) * spread[:, None]
-    own = along[:, :, None] * along[:, None, :]
+    angle = np.radians(radii.own_theta)
+    outwards = (radii.own1 / d1)[:, None] * np.stack([np.sin(angle), np.cos(angle)], axis=-1)
+    if radii.bent is not None:
+        outwards = radii.bent.outwards
+    rate = -outwards * radii.scale_number / 1000
+    along = np.column_stack([rate, np.ones(len(angle))]) * spread[:, None]
+    covariance = along[:, :, None] * along[:, None, :]
+    of_pixels = dict(radii.of_pixels)
     if radii.sigma_px is not None:
-        carried["k_r"] = np.hypot(carried["k_r"], spread / radii.sigma_px)
-        for key, value in entries(own / radii.sigma_px**2, "k_").items():
-            carried[key] = carried[key] + value
+        of_pixels["k_r"] = np.hypot(of_pixels["k_r"], spread / radii.sigma_px)
+        for key, value in entries(covariance / radii.sigma_px**2, "k_").items():
+            of_pixels[key] = of_pixels[key] + value
     return replace(
         radii,
         sigma_r=np.hypot(radii.sigma_r, spread),
-        covariance=radii.covariance + own,
-        formula_cells=carried,
+        covariance=radii.covariance + covariance,
+        of_pixels=of_pixels,
     )
 
 
@@ -252,12 +254,14 @@ def _adjusted_radii(
         moved - (photo.nadir - centre) * to_mm
         for moved, photo in ((moved1, first), (moved2, second))
     )
-    names = ("x1", "y1", "x2", "y2", "g1x", "g1y", "g2x", "g2y")
-    carried = dict(zip(names, np.hstack([x1, x2, gain1, gain2]).T, strict=True))
-    bent = None
+    gains, bent = dict(zip(("g1x", "g1y"), gain1.T, strict=True)), None
+    gains |= dict(zip(("g2x", "g2y"), gain2.T, strict=True))
     if pair.refracted:
-        bent = met_rays(fitted, (moved1, moved2), (own1, own2), to_mm, solved.xyz[:, 2])
-        carried |= ray_columns(picks, places, fitted, q, to_mm)
+        bent = met_rays(
+            fitted, (moved1, moved2), (own1, own2), to_mm, solved.xyz[:, 2],
+            outwards=-places[0].slope * to_mm,
+        )  # fmt: skip
+        gains |= slope_gains(places, fitted, q, to_mm)
     s1 = length(moved1)
     return Radii(
         scale_number=scale_number,
@@ -273,7 +277,7 @@ def _adjusted_radii(
         sigma_r=np.hypot(solved.sigma_px * k_r, o_r),
         covariance=solved.covariance + common,
         sigma_px=float(solved.sigma_px),
-        formula_cells=carried
+        of_pixels=gains
         | {
             "k_q": k_q,
             "k_w": k_q * scale_number / 1000,

@@ -13,7 +13,8 @@ class RefractedRays(NamedTuple):
     """What Eqs. (1) to (7) become through media, shape (n,).
 
     Lengths in mm at the scale of image 1: ``ds``, ``den`` [mm/m], displacements ``e1`` and ``e2``,
-    ``place`` (n, 2) of the points from the nadir of camera 1; ``relief`` in m.
+    ``place`` (n, 2) of the points from the nadir of camera 1; ``outwards`` (n, 2) by how much ray 1
+    leads outwards per metre of relief [mm/m]; ``relief`` in m.
     """
 
     ds: FloatArray
@@ -22,6 +23,7 @@ class RefractedRays(NamedTuple):
     e1: FloatArray
     e2: FloatArray
     place: FloatArray
+    outwards: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -30,7 +32,8 @@ class Radii:
 
     ``s1, s2, theta`` count from the zoom centre, ``own1, own2, own_theta`` from each camera's
     nadir; ``q`` is the misfit across the radius, ``standardised`` in its sigma,
-    ``covariance`` that of X, Y and r from the picks, shape (n, 3, 3) [m²].
+    ``covariance`` that of X, Y and r from the picks, shape (n, 3, 3) [m²]; ``of_pixels`` as in
+    `bifocal.survey.relief_table.ReliefTable`.
     """
 
     scale_number: float
@@ -46,5 +49,5 @@ class Radii:
     sigma_r: FloatArray
     covariance: FloatArray
     sigma_px: float | None = None
-    formula_cells: Mapping[str, FloatArray] = field(default_factory=dict)
+    of_pixels: Mapping[str, FloatArray] = field(default_factory=dict)
     bent: RefractedRays | None = None

@@ -9,10 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from bifocal.remarks import remark
-from bifocal.survey.space_similarity import SpaceSums
 from bifocal.survey.tolerances import Verdict
 from bifocal.survey.transformation_precision import TransformationPrecision
-from bifocal.survey.weighted_similarity import WeightedSums
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_floats
 from photocore.camera.similarity import Similarity
 from photocore.errors import InputError
@@ -198,8 +196,6 @@ class Georeference:
     origin, offset : ndarray, shape (3,)
         Whole-metre origin of the world coordinates and where the centre lies from it: with them
         differences of large coordinates lose no digits. [m]
-    sums : WeightedSums, SpaceSums or None
-        What the weighted fit is made of, for the workbook; None where all weights are equal.
     covariance : ndarray, shape (n, 3, 3), or None
         Of X, Y, Z of the control points, as solved. [m²]
     near : ndarray, shape (n, 3)
@@ -220,7 +216,6 @@ class Georeference:
     origin: FloatArray
     offset: FloatArray
     error_ratio: float = float("nan")
-    sums: WeightedSums | SpaceSums | None = None
     covariance: FloatArray | None = None
     near: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     precision: TransformationPrecision | None = None

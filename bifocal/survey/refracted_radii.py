@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from bifocal.media import MediaPath, ObjectRays
-from bifocal.model.intersection import PlanePicks
 from bifocal.model.photo import Photo
 from bifocal.rays import seen_distance
 from bifocal.survey.radii import Radii, RefractedRays
@@ -52,19 +51,16 @@ def refracted_radii(
     """
     scale = radii.scale_number
     to_mm = 1.0 if np.isnan(scale) else 1000.0 / scale
-    carried: dict[str, FloatArray] = {}
     s, t, ways = [], [], []
-    for image, (photo, own) in enumerate(zip(photos, measured, strict=True), start=1):
+    for photo, radius in zip(photos, measured, strict=True):
         per_mm = float(photo.plane_from_pixel[0, 0]) / photo.distance
-        tangent = own * per_mm
+        tangent = radius * per_mm
         path = photo.media
         assert isinstance(path, MediaPath)
         way = path.radial_rays(tangent)
         s.append(tangent * way.arm * to_mm)
         t.append(tangent * way.bend * to_mm)
         ways.append((way.pace * per_mm * to_mm, way.turn * per_mm * to_mm))
-        carried[f"tan{image}"] = tangent
-        carried |= {f"{name}{image}": value for name, value in way._asdict().items()}
     lost = np.isnan(s[0]) | np.isnan(s[1])
     s1, s2, t1, t2 = (np.where(lost, np.nan, values) for values in (*s, *t))
     ds, den = s2 - s1, t2 - t1
@@ -87,7 +83,7 @@ def refracted_radii(
         [(along - across) * sine * cosine, along * cosine**2 + across * sine**2, with_r * cosine],
         [with_r * sine, with_r * cosine, v1 + v2],
     ]
-    carried |= {"t1": t1, "t2": t2, "g1": g1, "g2": g2}
+    outwards = t1[:, None] * np.stack([sine, cosine], axis=-1)
     return replace(
         radii,
         s1=s1,
@@ -96,8 +92,7 @@ def refracted_radii(
         own2=s2,
         sigma_r=np.sqrt(v1 + v2),
         covariance=np.moveaxis(np.array(rows), 2, 0),
-        formula_cells=carried,
-        bent=RefractedRays(ds, den, r, t1 * r, t2 * r, place),
+        bent=RefractedRays(ds, den, r, t1 * r, t2 * r, place, outwards),
     )
 
 
@@ -112,6 +107,8 @@ def met_rays(
     own: tuple[FloatArray, FloatArray],
     to_mm: float,
     solved: FloatArray,
+    *,
+    outwards: FloatArray,
 ) -> RefractedRays:
     """Return what Eq. (6) becomes for rays through media; NaN where the relief solved is.
 
@@ -127,96 +124,26 @@ def met_rays(
         foot + ray.slope * (to_mm * relief)[:, None] for foot, ray in zip(own, rays, strict=True)
     ]
     e1, e2 = (length(foot) - length(place) for foot, place in zip(own, places, strict=True))
-    return RefractedRays(ds, den, relief, np.asarray(e1), np.asarray(e2), places[0])
+    return RefractedRays(ds, den, relief, np.asarray(e1), np.asarray(e2), places[0], outwards)
 
 
-def ray_columns(
-    picks: tuple[PlanePicks, PlanePicks],
-    places: list[ObjectRays],
-    fitted: list[ObjectRays],
-    q: FloatArray,
-    to_mm: float,
+def slope_gains(
+    places: list[ObjectRays], fitted: list[ObjectRays], q: FloatArray, to_mm: float
 ) -> dict[str, FloatArray]:
-    """Return the picks' rays and how their slopes move with the misfit, as columns.
+    """Return how the slopes of both rays move with the misfit. [mm/m per mm of q]
 
     Parameters
     ----------
-    picks : tuple of PlanePicks
     places, fitted : list of ObjectRays
-        Their rays in the object's medium, as measured and adjusted.
+        The rays in the object's medium, as measured and adjusted.
     q : ndarray, shape (n,)
         Misfits. [mm]
     to_mm : float
         What brings metres on the plane to the scale of image 1. [mm/m]
-
-    Returns
-    -------
-    dict
-        ``p`` tangents in the first medium, ``t`` slopes outwards [mm/m], ``u`` their gains [mm/m
-        per mm of q]; ``arm`` [m] and ``bend``; where interfaces lean what `_leaning_columns` adds.
     """
     columns: dict[str, FloatArray] = {}
-    both = zip(picks, places, fitted, strict=True)
-    leaning = any(pick.foot.media and pick.foot.media.rotation is not None for pick in picks)
-    for image, (pick, place, moved) in enumerate(both, start=1):
-        tangent = (pick.positions - pick.foot.nadir) / pick.foot.distance
-        media = pick.foot.media
-        if media is not None and leaning:
-            columns |= _leaning_columns(image, level_too(media), tangent, pick.foot.nadir, moved)
-        elif media is not None:
-            way = media.radial_rays(length(tangent))
-            columns |= {f"arm{image}": way.arm, f"bend{image}": way.bend}
+    for image, (place, moved) in enumerate(zip(places, fitted, strict=True), start=1):
         with np.errstate(divide="ignore", invalid="ignore"):
             gain = np.where((q != 0)[:, None], (moved.slope - place.slope) / q[:, None], 0.0)
-        for axis, k in (("x", 0), ("y", 1)):
-            columns[f"p{image}{axis}"] = tangent[:, k]
-            columns[f"t{image}{axis}"] = -place.slope[:, k] * to_mm
-            columns[f"u{image}{axis}"] = gain[:, k] * to_mm
+        columns |= {f"u{image}{axis}": gain[:, k] * to_mm for k, axis in enumerate("xy")}
     return columns
-
-
-def level_too(path: MediaPath) -> MediaPath:
-    """Return a path with axes of its interfaces, those of the plane frame where they are level."""
-    return path if path.rotation is not None else replace(path, rotation=np.eye(3))
-
-
-def _leaning_columns(
-    image: int, path: MediaPath, tangent: FloatArray, nadir: FloatArray, fitted: ObjectRays
-) -> dict[str, FloatArray]:
-    """Return the columns of rays that are bent about a normal a of their own.
-
-    Parameters
-    ----------
-    image : int
-        1 or 2, which the columns' names tell.
-    path : MediaPath
-        With axes.
-    tangent : ndarray, shape (n, 2)
-        Of the rays in the first medium, in the plane frame.
-    nadir : ndarray, shape (2,)
-        [m]
-    fitted : ObjectRays
-        The adjusted rays behind the last interface.
-
-    Returns
-    -------
-    dict
-        ``down1`` makes a ray (p, -1) go down by 1 along a; ``w1x w1y w1z`` is what is left of it
-        along the interfaces, tan in the first medium; ``arm1`` to the last interface [m] and
-        ``bend1``; ``fall1`` how much it then falls in the plane frame; ``top1`` the relief at which
-        the adjusted ray leaves the last interface [m].
-    """
-    assert path.rotation is not None
-    normal = path.rotation[2]
-    against = normal[2] - tangent @ normal[:2]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        down = np.where(against > 0, 1 / against, np.nan)
-        along = np.column_stack([tangent, -np.ones(len(tangent))]) * down[:, None] + normal
-        way = path.radial_rays(length(along))
-        fall = normal[2] - way.bend * along[:, 2]
-        start = path.distance * normal[2] - (fitted.position - nadir) @ normal[:2]
-        top = (start - path.last_interface) / (normal[2] + fitted.slope @ normal[:2])
-    fall = np.where(fall > 0, fall, np.nan)
-    single = {"down": down, "arm": way.arm, "bend": way.bend, "fall": fall, "top": top}
-    columns = {f"{name}{image}": values for name, values in single.items()}
-    return columns | {f"w{image}{axis}": along[:, k] for k, axis in enumerate("xyz")}

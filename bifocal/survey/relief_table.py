@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,12 +31,12 @@ class ReliefTable:
         One of `bifocal.model.flags.FLAGS` per point.
     standardised : ndarray, shape (n,)
         Misfit across the radius over its standard deviation; NaN where it cannot be tested.
-    formula_cells : mapping of str to ndarray, shape (n,)
-        For points measured in raw pixels of a general pair: positions carried to the plane
-        ``x1 y1 x2 y2`` [mm at image scale, from the zoom centre], least-squares gains
-        ``g1x g1y g2x g2y`` [mm per mm of q], ``k_q`` [mm/px], ``k_w`` (the same on the wall) and
-        ``k_r`` [m/px], ``o_r`` [m] (what the orientation adds to sigma_r), and ``misfit_px``, the
-        miss across the radius in pixels of image 2.
+    of_pixels : mapping of str to ndarray, shape (n,)
+        Of points measured in raw pixels of a general pair, what no formula of a spreadsheet gives:
+        least-squares gains ``g1x g1y g2x g2y`` [mm per mm of q], through media those of the rays'
+        slopes ``u1x u1y u2x u2y``; ``k_q`` [mm/px], ``k_w`` (the same on the wall), ``k_r`` and
+        the covariance ``k_XX ...`` of a pick of 1 px, what the orientation adds to them, ``o_r``
+        and ``o_XX ...`` [m]; and ``misfit_px``, the miss across the radius in pixels of image 2.
     image_scale : float or None
         Scale number of image 1; None where no principal distance is known.
     sigma_px : float or None
@@ -51,7 +51,7 @@ class ReliefTable:
     columns: Mapping[str, FloatArray]
     flags: tuple[str, ...]
     standardised: FloatArray
-    formula_cells: Mapping[str, FloatArray]
+    of_pixels: Mapping[str, FloatArray]
     image_scale: float | None
     sigma_px: float | None = None
     pair: Pair | None = None
@@ -62,11 +62,6 @@ class ReliefTable:
 
     def __getitem__(self, key: str) -> FloatArray:
         return self.columns[key]
-
-    def completed_by(self, other: ReliefTable) -> ReliefTable:
-        """Return the table with the columns and cells that only another one of its points has."""
-        cells = {**other.formula_cells, **self.formula_cells}
-        return replace(self, columns={**other.columns, **self.columns}, formula_cells=cells)
 
     @property
     def xyz(self) -> FloatArray:
@@ -83,9 +78,9 @@ class ReliefTable:
     @property
     def own_covariance(self) -> FloatArray | None:
         """Its part that is each point's own, from the picks, shape (n, 3, 3). [m²]"""
-        if self.sigma_px is None or "k_XX" not in self.formula_cells:
+        if self.sigma_px is None or "k_XX" not in self.of_pixels:
             return self.covariance
-        return np.asarray(self.sigma_px**2 * symmetric(self.formula_cells, "k_"))
+        return np.asarray(self.sigma_px**2 * symmetric(self.of_pixels, "k_"))
 
     def effect_of_orientation(self, rows: IntArray | None = None) -> FloatArray | None:
         """Return what errors common to all points move them by, shape (n, 3, k) [m]; None if none.

@@ -134,8 +134,8 @@ def point_remarks(
     off = [int(i) for i in np.flatnonzero(flags == "OFF-RADIAL") if points.use[i]]
     off.sort(key=lambda i: -abs(table.standardised[i]))
     misses, unit = table["q"], "mm"
-    if "misfit_px" in table.formula_cells:
-        misses, unit = table.formula_cells["misfit_px"], "px"
+    if "misfit_px" in table.of_pixels:
+        misses, unit = table.of_pixels["misfit_px"], "px"
     elif setup is not None and setup.taking.pitch is not None:
         misses, unit = table["q"] / setup.taking.pitch, "px"
     remarks: list[str] = [

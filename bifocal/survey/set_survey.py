@@ -71,7 +71,7 @@ def solve_set(
         columns=columns | entries(solved.covariance),
         flags=solved.flags,
         standardised=solved.standardised,
-        formula_cells=entries(solved.own_covariance / solved.sigma_px**2, "k_"),
+        of_pixels=entries(solved.own_covariance / solved.sigma_px**2, "k_"),
         image_scale=scale_number,
         sigma_px=solved.sigma_px,
         effect=solved.effect,

@@ -18,7 +18,7 @@ from bifocal.precision import false_relief_of_scale
 from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.refracted_radii import scale_ratio
-from bifocal.survey.survey_lens import SurveyLens, turns_of
+from bifocal.survey.survey_lens import SurveyLens, freed_scale
 from bifocal.survey.survey_media import SurveyMedia
 from photocore.arrays import FloatArray, positive
 from photocore.errors import GeometryError, InputError, located
@@ -305,7 +305,7 @@ class SurveySetup:
             return seen
         free = lens.undistort(seen)
         # The formulas' turns lead there too, and the way back to the pick.
-        scale = turns_of(lens, seen, image)[f"lens{image}"][:, None]
+        scale = freed_scale(lens, seen)[:, None]
         ways = lens.principal_point + (seen - lens.principal_point) * scale - free
         missed = np.abs(np.hstack([ways, lens.distort(free) - seen])).max(axis=1)
         allowed = 1e-9 * lens.camera_matrix[0, 0]

@@ -123,15 +123,12 @@ def _with_others(
         return table, []
     found = arranged.setup.adjusted
     setup = replace(setup, adjusted=found[::-1] if arranged.pair.exchanged else found)
-    columns, cells = of_all_photos(setup, survey.points)
+    columns = of_all_photos(setup, survey.points)
     doubtful = contradictions(table.ids, np.where(survey.points.use, columns["chance"], np.nan))
     said: list[str] = []
     if doubtful:
         said.append(remark("survey.picks_contradict", names=", ".join(doubtful[:10])))
-    table = replace(
-        table, columns={**table.columns, **columns}, formula_cells={**table.formula_cells, **cells}
-    )
-    return table, said
+    return replace(table, columns={**table.columns, **columns}), said
 
 
 def solve_survey_of_set(

@@ -58,8 +58,8 @@ class SurveyLens:
         return Lens(camera_matrix=matrix, coefficients=terms, image_size=(1, 1))
 
 
-def turns_of(lens: Lens, seen: FloatArray, image: int) -> dict[str, FloatArray]:
-    """Return the columns by which formulas free the picks of an image of distortion.
+def freed_scale(lens: Lens, seen: FloatArray) -> FloatArray:
+    """Return what picks, from the principal point, are multiplied by to be freed of distortion.
 
     Parameters
     ----------
@@ -67,14 +67,15 @@ def turns_of(lens: Lens, seen: FloatArray, image: int) -> dict[str, FloatArray]:
         In millimetres from the nadir.
     seen : ndarray, shape (n, 2)
         Picks as seen. [mm]
-    image : int
-        1 or 2.
+
+    Returns
+    -------
+    ndarray, shape (n,)
     """
     k1, k2 = lens.coefficients[:2]
     seen_radius = np.hypot(*(seen - lens.principal_point).T) / lens.camera_matrix[0, 0]
-    columns, t = {f"seen{image}": seen_radius}, seen_radius
-    for turn in range(1, TURNS + 1):
+    t = seen_radius
+    for _ in range(TURNS):
         gap = t * (1 + k1 * t**2 + k2 * t**4) - seen_radius
         t = t - gap / (1 + 3 * k1 * t**2 + 5 * k2 * t**4)
-        columns[f"free{image}_{turn}"] = t
-    return columns | {f"lens{image}": 1 / (1 + k1 * t**2 + k2 * t**4)}
+    return np.asarray(1 / (1 + k1 * t**2 + k2 * t**4))

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from bifocal.survey.space_similarity import SpaceSums
-from bifocal.survey.weighted_similarity import WeightedSums
+from bifocal.survey.weighted_similarity import UNKNOWNS, WeightedFit
 from photocore.arrays import FloatArray
 from photocore.camera.rotation import skew
 from photocore.camera.similarity import Similarity
-
-#: Which of rotations about the wall's X, Y, Z and logarithm of the scale a model has.
-_UNKNOWNS: Mapping[str, tuple[int, ...]] = {"2D": (2, 3), "levelled": (1, 3), "3D": (0, 1, 2, 3)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -77,7 +72,7 @@ def _design(near: FloatArray) -> FloatArray:
 def precision_of(
     model: str,
     fit: Similarity,
-    sums: WeightedSums | SpaceSums,
+    weighted: WeightedFit,
     near: FloatArray,
     effect: FloatArray | None = None,
 ) -> TransformationPrecision:
@@ -89,8 +84,8 @@ def precision_of(
         ``2D``, ``levelled`` or ``3D``.
     fit : Similarity
         World from wall.
-    sums : WeightedSums or SpaceSums
-        What it was found from.
+    weighted : WeightedFit
+        As found.
     near : ndarray, shape (n, 3)
         E, N, H of the control points about the origin. [m]
     effect : ndarray, shape (n, 3, k), optional
@@ -98,31 +93,22 @@ def precision_of(
 
     Notes
     -----
-    The inverse of the normal equations at the solution, shifts eliminated first, from the same sums
-    as the workbook's formulas: next to the nadir X, Y and relief share nearly all their error, and
-    another order of summation would differ in the ninth digit. The errors of the photos'
-    orientation are common to all points: what they do to the fit is carried separately, because
-    most of it is taken up by the fit itself.
+    The inverse of the normal equations at the solution, shifts eliminated first. The errors of the
+    photos' orientation are common to all points: what they do to the fit is carried separately,
+    because most of it is taken up by the fit itself.
     """
-    spread: FloatArray
-    shift_rates: FloatArray
-    if isinstance(sums, SpaceSums):
-        spread, shift_rates = sums.turns[-1].inverse, sums.shift @ sums.turns[-1].design
-    else:
-        spread, shift_rates = _of_direction(sums)
-    inverse = sums.inverse.copy()
-    if model == "2D":
-        inverse[2, 2] = 0.0
+    spread, shift_rates = weighted.spread, weighted.shift_rates
+    inverse, weights = weighted.inverse, weighted.weights
     axes: FloatArray = np.eye(4)
     axes[:3, :3] = fit.rotation
-    into = axes[:, list(_UNKNOWNS[model])]
+    into = axes[:, list(UNKNOWNS[model])]
     to_world = fit.scale * fit.rotation
     gain = np.zeros((7, 0))
     if effect is not None:
         turned = near @ fit.rotation / fit.scale
-        slopes = _design(turned)[:, :, 3:][:, :, list(_UNKNOWNS[model])]
-        pulled = np.einsum("nab,nbk->ak", sums.weights, effect)
-        moved = np.einsum("nai,nab,nbk->ik", slopes, sums.weights, effect)
+        slopes = _design(turned)[:, :, 3:][:, :, list(UNKNOWNS[model])]
+        pulled = np.einsum("nab,nbk->ak", weights, effect)
+        moved = np.einsum("nai,nab,nbk->ik", slopes, weights, effect)
         unknowns = spread @ (moved - shift_rates.T @ pulled)
         gain = np.vstack([to_world @ (inverse @ pulled - shift_rates @ unknowns), into @ unknowns])
     return TransformationPrecision(
@@ -131,20 +117,3 @@ def precision_of(
         spread=into @ spread @ into.T,
         gain=gain,
     )
-
-
-def _of_direction(sums: WeightedSums) -> tuple[FloatArray, FloatArray]:
-    """Return covariance and shift_rates of the turn in plan and the logarithm of the scale.
-
-    A small turn w and stretch k change ``p = m cos, q = m sin`` by ``w q + k p`` and
-    ``-w p + k q``.
-    """
-    pp, pq, qq, p, q = sums.turns[-1, 2:]
-    below = (pp * qq - pq**2) * (p**2 + q**2) ** 2
-    turn = (q**2 * qq + 2 * p * q * pq + p**2 * pp) / below
-    both = (p * q * qq - (q**2 - p**2) * pq - p * q * pp) / below
-    stretch = (p**2 * qq - 2 * p * q * pq + q**2 * pp) / below
-    shift_rates = np.stack(
-        [sums.shift[:, 0] * q - sums.shift[:, 1] * p, sums.mean - sums.constants], axis=-1
-    )
-    return np.array([[turn, both], [both, stretch]]), shift_rates

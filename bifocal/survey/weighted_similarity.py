@@ -1,79 +1,76 @@
 """Roto-translation with scale from points whose coordinates are not equally good.
 
 Control points are taken as exact, the wall's coordinates as measured with a covariance each:
-``x = c + s R' w`` for a control point w about a whole-metre origin. In the wall's own frame the
-covariance does not turn with the unknowns, and with ``p = s cos``, ``q = s sin`` the equations are
-linear but for the scale m of the heights. The workbook's formulas do the same, cell by cell.
+``x = c + B w`` with ``B = R' / m`` for a control point w about a whole-metre origin. In the wall's
+own frame the covariance does not turn with the unknowns: all that the points say stands in sums of
+the nine entries of B, and a turn of Gauss-Newton only multiplies small matrices.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
+from photocore.camera.rotation import skew
 from photocore.camera.similarity import Similarity
 from photocore.errors import GeometryError
 
-#: Turns of the direction, each some 1e-3 as far as the one before: six reach rounding.
-TURNS = 6
-#: Design of (p, q, m) on X, Y, Z: which of E, N, H, with which sign; 0 where absent.
-_DESIGNS = {
-    "levelled": ((("E", 1), (None, 0), ("N", -1)), (("N", 1), (None, 0), ("E", 1)),
-                 ((None, 0), ("H", 1), (None, 0))),
-    "2D": ((("E", 1), ("N", 1), (None, 0)), (("N", 1), ("E", -1), (None, 0)),
-           ((None, 0), (None, 0), (None, 0))),
-}  # fmt: skip
+#: Turns of Gauss-Newton at most: from the unweighted fit five reach rounding, also on walls that
+#: lean or lie.
+_MOST_TURNS = 20
+#: Which of rotations about the wall's X, Y, Z and logarithm of the scale a model has.
+UNKNOWNS: Mapping[str, tuple[int, ...]] = {"2D": (2, 3), "levelled": (1, 3), "3D": (0, 1, 2, 3)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class WeightedSums:
-    """The normal equations of a weighted fit of the models 2D and levelled.
+class WeightedFit:
+    """A weighted fit of the wall to control points, k of turns and logarithm of the scale unknown.
 
     Attributes
     ----------
     weights : ndarray, shape (n, 3, 3)
         Inverse covariances; without relief for the model 2D. [1/m²]
-    design : ndarray, shape (n, 3, 3)
-        Columns p, q, m of the equations of each point. [m]
-    total, inverse : ndarray, shape (3, 3)
-        Sum of the weights and its inverse; both 1 at Z for the model 2D.
-    mixed, shift : ndarray, shape (3, 3)
-        Sum of weights times design, and ``inverse @ mixed``.
-    right, mean : ndarray, shape (3,)
-        Sum of weights times coordinates, and ``inverse @ right``.
-    reduced : ndarray, shape (3, 3)
-        Normal matrix of p, q, m, freed of the shifts.
-    left : ndarray, shape (3,)
-        Right-hand side of p, q, m, freed of the shifts.
-    turns : ndarray, shape (TURNS, 7)
-        Cosine and sine of the direction, the three entries of the normal matrix, and p, q.
+    inverse : ndarray, shape (3, 3)
+        Covariance of the shift alone; of X and Y in the model 2D. [m²]
+    spread : ndarray, shape (k, k)
+        Covariance of the unknowns, shifts eliminated.
+    shift_rates : ndarray, shape (3, k)
+        What the unknowns shift on the wall. [m]
+    rotation, scale : ndarray of shape (3, 3), float
+        World from wall.
+    offset : ndarray, shape (3,)
+        Where the wall's centre lies from the world's origin. [m]
     """
 
     weights: FloatArray
-    design: FloatArray
-    total: FloatArray
     inverse: FloatArray
-    mixed: FloatArray
-    shift: FloatArray
-    right: FloatArray
-    mean: FloatArray
-    reduced: FloatArray
-    left: FloatArray
-    turns: FloatArray
+    spread: FloatArray
+    shift_rates: FloatArray
+    rotation: FloatArray
+    scale: float
+    offset: FloatArray
 
-    @property
-    def unknowns(self) -> FloatArray:
-        """p, q and the scale m of the last turn, shape (3,)."""
-        p, q = self.turns[-1, 5:]
-        return np.array([p, q, np.sqrt(p**2 + q**2)])
+    def similarity(self, centre: FloatArray, origin: FloatArray) -> Similarity:
+        """Return the transformation about a wall's centre and the world's origin, shape (3,)."""
+        return Similarity(
+            scale=self.scale, rotation=self.rotation, source_centre=centre,
+            target_centre=origin + self.offset,
+        )  # fmt: skip
 
-    @property
-    def constants(self) -> FloatArray:
-        """The wall's coordinates of the world's origin about the wall's centre, shape (3,). [m]"""
-        return np.asarray(self.mean - self.shift @ self.unknowns)
+
+def weights_of(covariance: FloatArray, *, flat: bool) -> FloatArray:
+    """Return the inverse covariances, shape (n, 3, 3); of X and Y alone where ``flat``."""
+    if not flat:
+        return inverse_symmetric(covariance)
+    a, b, d = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
+    weights = np.zeros_like(covariance)
+    weights[:, 0, 0], weights[:, 1, 1] = d, a
+    weights[:, 0, 1] = weights[:, 1, 0] = -b
+    return weights / (a * d - b * b)[:, None, None]
 
 
 def inverse_symmetric(matrices: FloatArray) -> FloatArray:
@@ -86,97 +83,74 @@ def inverse_symmetric(matrices: FloatArray) -> FloatArray:
     return np.moveaxis(rows, (0, 1), (-2, -1))
 
 
-def determinant(matrix: FloatArray) -> float:
-    """Return the determinant of a symmetric 3x3 matrix by cofactors, as `inverse_symmetric`."""
-    (a, b, c), (_, d, e), (_, _, f) = matrix
-    return float(a * (d * f - e * e) + b * (c * e - b * f) + c * (b * e - c * d))
-
-
-def weights_of(covariance: FloatArray, *, flat: bool) -> FloatArray:
-    """Return the inverse covariances, shape (n, 3, 3); of X and Y alone where ``flat``."""
-    if flat:
-        a, b, d = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
-        weights = np.zeros_like(covariance)
-        weights[:, 0, 0], weights[:, 1, 1] = d, a
-        weights[:, 0, 1] = weights[:, 1, 0] = -b
-        return weights / (a * d - b * b)[:, None, None]
-    return inverse_symmetric(covariance)
-
-
-def weighted_sums(
+def weighted_fit(
     wall: FloatArray, weights: FloatArray, near: FloatArray, start: Similarity, *, model: str
-) -> WeightedSums:
-    """Return the solution of the models 2D and levelled.
+) -> WeightedFit:
+    """Return the solution of a model.
 
     Parameters
     ----------
     wall : ndarray, shape (n, 3)
-        X, Y, Z about their mean. [m]
+        X, Y, Z about the centre of ``start``. [m]
     weights : ndarray, shape (n, 3, 3)
         From `weights_of`. [1/m²]
     near : ndarray, shape (n, 3)
-        E, N, H about a whole-metre origin. [m]
+        E, N, H about a whole-metre origin; H is 0 in the model 2D. [m]
     start : Similarity
-        The unweighted fit, whose direction the first turn starts from.
+        The unweighted fit.
     model : str
-        ``2D`` or ``levelled``.
+        ``2D``, ``levelled`` or ``3D``.
+
+    Raises
+    ------
+    GeometryError
+        If the points do not determine it.
     """
-    world = dict(zip("ENH", near.T, strict=True))
-    design = np.zeros((len(wall), 3, 3))
-    for column, parts in enumerate(_DESIGNS[model]):
-        for axis, (name, sign) in enumerate(parts):
-            if name is not None:
-                design[:, axis, column] = sign * world[name]
-    weighted = weights @ design
-    total, right = weights.sum(axis=0), (weights @ wall[:, :, None]).sum(axis=0)[:, 0]
-    if model == "2D":
+    flat, unknowns = model == "2D", list(UNKNOWNS[model])
+    total = weights.sum(axis=0)
+    if flat:
         total[2, 2] = 1.0
     inverse = inverse_symmetric(total[None])[0]
-    mixed = weighted.sum(axis=0)
-    shift, mean = inverse @ mixed, inverse @ right
-    normal = np.einsum("nki,nkj->ij", design, weighted)
-    target = np.einsum("nk,nki->i", wall, weighted)
-    reduced, left = normal - mixed.T @ shift, target - mixed.T @ mean
-    return WeightedSums(
-        weights=weights, design=design, total=total, inverse=inverse, mixed=mixed, shift=shift,
-        right=right, mean=mean, reduced=reduced, left=left,
-        turns=_turns(reduced, left, start.rotation[:2, 0]),
+    mixed = np.einsum("nab,nk->abk", weights, near).reshape(3, 9)
+    shift, mean = inverse @ mixed, inverse @ np.einsum("nab,nb->a", weights, wall)
+    normal = np.einsum("nab,nk,nl->akbl", weights, near, near).reshape(9, 9)
+    target = np.einsum("nab,nb,nk->ak", weights, wall, near).reshape(9)
+    reduced, right = normal - mixed.T @ shift, target - mixed.T @ mean
+    entries = (start.rotation.T / start.scale).reshape(9)
+    size = np.inf
+    for _ in range(_MOST_TURNS):
+        # d(R B) = omega x B, column by column; the scale multiplies all.
+        matrix = entries.reshape(3, 3)
+        turns = [(skew(axis) @ matrix).reshape(9) for axis in np.eye(3)]
+        design = np.stack([*turns, entries], axis=-1)[:, unknowns]
+        spread = _inverse(design.T @ reduced @ design)
+        step = np.zeros(4)
+        step[unknowns] = spread @ (design.T @ (right - reduced @ entries))
+        # At rounding the steps grow no smaller.
+        if np.abs(step).max() < 1e-9 and np.abs(step).max() >= size / 2:
+            break
+        size = np.abs(step).max()
+        # Cayley's rotation: exact, and to second order that of the rotation vector.
+        half = skew(step[:3] / 2)
+        grown = 2 / (1 + (step[:3] ** 2).sum() / 4) * half @ (matrix + half @ matrix)
+        entries = (np.exp(step[3]) * (matrix + grown)).reshape(9)
+    matrix = entries.reshape(3, 3)
+    scale = float(1.0 / np.cbrt(abs(np.linalg.det(matrix))))
+    offset = -(scale**2) * matrix.T @ (mean - shift @ entries)
+    if flat:
+        offset[2] = scale * start.source_centre[2]
+        inverse[2, 2] = 0.0
+    return WeightedFit(
+        weights=weights, inverse=inverse, spread=spread, shift_rates=shift @ design,
+        rotation=scale * matrix.T, scale=scale, offset=np.asarray(offset),
     )  # fmt: skip
 
 
-def _turns(reduced: FloatArray, left: FloatArray, direction: FloatArray) -> FloatArray:
-    """Return every turn: m is p c + q s in the direction of the turn before."""
-    rows = []
-    for _ in range(TURNS):
-        c, s = direction
-        n11 = reduced[0, 0] + 2 * c * reduced[0, 2] + c**2 * reduced[2, 2]
-        n12 = reduced[0, 1] + c * reduced[1, 2] + s * reduced[0, 2] + c * s * reduced[2, 2]
-        n22 = reduced[1, 1] + 2 * s * reduced[1, 2] + s**2 * reduced[2, 2]
-        h1, h2 = left[0] + c * left[2], left[1] + s * left[2]
-        det = n11 * n22 - n12**2
-        p, q = (h1 * n22 - h2 * n12) / det, (h2 * n11 - h1 * n12) / det
-        rows.append((c, s, n11, n12, n22, p, q))
-        length = np.sqrt(p**2 + q**2)
-        if not length > 0:
-            raise GeometryError(remark("survey.no_direction"))
-        direction = np.array([p, q]) / length
-    return np.array(rows)
-
-
-def fit_of_sums(
-    sums: WeightedSums, centre: FloatArray, origin: FloatArray, *, model: str
-) -> tuple[Similarity, FloatArray]:
-    """Return the transformation, and where the wall's centre lies from the origin, shape (3,)."""
-    p, q, inverse_scale = sums.unknowns
-    cos, sin = p / inverse_scale, q / inverse_scale
-    rotation = np.array([[cos, 0.0, sin], [sin, 0.0, -cos], [0.0, 1.0, 0.0]])
-    if model == "2D":
-        rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    scale = 1.0 / inverse_scale
-    offset = -scale * rotation @ sums.constants
-    if model == "2D":
-        offset[2] = scale * centre[2]
-    similarity = Similarity(
-        scale=float(scale), rotation=rotation, source_centre=centre, target_centre=origin + offset
-    )
-    return similarity, offset
+def _inverse(normal: FloatArray) -> FloatArray:
+    try:
+        inverse = np.linalg.inv(normal)
+    except np.linalg.LinAlgError:
+        inverse = np.full_like(normal, np.nan)
+    if not np.isfinite(inverse).all():
+        raise GeometryError(remark("survey.no_rotation"))
+    return inverse

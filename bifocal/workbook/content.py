@@ -1,4 +1,4 @@
-"""What goes into a survey workbook, and the numbers its formula cells show."""
+"""What goes into a survey workbook: all that is no formula."""
 
 from __future__ import annotations
 
@@ -7,29 +7,24 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bifocal.model.flags import DOUBTFUL_SHARE, FlagLimits
+from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
-from bifocal.survey.image_shift import foot_tangents, image_shift, lens_turns
+from bifocal.survey.image_shift import image_shift
 from bifocal.survey.observations import PointObservations
-from bifocal.survey.other_photos import is_of_others
-from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
+from bifocal.survey.reference import Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable
-from bifocal.survey.setup import SIGMA_RADIAL, SurveySetup
+from bifocal.survey.setup import SurveySetup
 from bifocal.survey.solved_survey import SolvedSurvey, WorldPoints
 from bifocal.survey.survey_media import SurveyMedia
 from bifocal.survey.tolerances import RULES, ToleranceRule
 from bifocal.workbook.formulas.columns import (
-    NEAR,
     adjustment_names,
-    compared,
     ideal_points,
     other_numbers,
     pair_points,
 )
-from bifocal.workbook.formulas.media_formulas import setup_values
-from bifocal.workbook.formulas.other_values import other_values
-from bifocal.workbook.formulas.setup_cells import MATRICES, NADIRS, PHOTOS, setup_checks
+from bifocal.workbook.formulas.setup_cells import MATRICES, NADIRS, PHOTOS, other_cells
 from photocore.arrays import BoolArray, FloatArray
 from photocore.workbook.changing.cells import CellValue, name_cell
 from photocore.workbook.making.live_columns import LiveColumn
@@ -42,8 +37,6 @@ STRUCTURED_ROWS = 2000
 CHART_ROWS = 1000
 #: Arrows of errors at check points that are ready to be drawn: a chart gets none by itself.
 ARROWS = 100
-#: Columns that are blank where a point has no place on the wall.
-_PLACES = ("X", "Y", "sigma_X", "sigma_Y")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -68,8 +61,8 @@ class SurveyContent:
         Measuring precision of raw pixels. [px]
     points, table : PointObservations, ReliefTable or None
         What was measured and what came out.
-    known, check : KnownPoints, CheckResult or None
-        Check points and their errors.
+    known : KnownPoints
+        Check points.
     control, georeference : KnownPoints, Georeference or None
         Control points and the transformation.
     model : str
@@ -112,7 +105,6 @@ class SurveyContent:
     points: PointObservations | None = None
     table: ReliefTable | None = None
     known: KnownPoints = field(default_factory=KnownPoints)
-    check: CheckResult | None = None
     control: KnownPoints = field(default_factory=KnownPoints)
     georeference: Georeference | None = None
     model: str = "auto"
@@ -136,7 +128,7 @@ class SurveyContent:
         return cls(
             language=survey.language, setup=solved.setup, pair=solved.pair,
             sigma_px=solved.sigma_px, points=solved.points, table=solved.table,
-            known=survey.known, check=solved.check, control=survey.control,
+            known=survey.known, control=survey.control,
             georeference=solved.georeference, model=survey.model, rules=solved.rules,
             sensor=setup.sensor, limits=setup.measuring.limits, media=solved.media,
         )  # fmt: skip
@@ -242,7 +234,7 @@ def named_rows(names: Sequence[str], used: BoolArray) -> dict[str, list[CellValu
 
 
 def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
-    """Return every column of `Points` by key."""
+    """Return the columns of `Points` that are no formulas, by key."""
     points, table = content.points, content.table
     if points is None:
         return {}
@@ -267,184 +259,65 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
             groups.append(((f"ucol{image}", f"urow{image}"), ideal))
     for keys, array in groups:
         cells |= {key: inputs(array[:, i]) for i, key in enumerate(keys)}
-    if table is None:
+    if table is None or not content.is_pair:
         return cells
-    # A formula shows nothing where a measurement is missing or relief is undefined: an error value
-    # would be that of every sum.
-    incomplete = np.isnan(table["s1_used"])
-    placeless = incomplete | np.isnan(table["theta_used"])
-    if not content.is_pair and table.image_scale is None:
-        placeless[:] = True
-    for key, values in table.columns.items():
-        blank = placeless if key in _PLACES or key.startswith("cov_") else incomplete
-        if is_of_others(key):
-            blank = np.isnan(values)
-        if key in ("q", "theta_used"):
-            blank = np.isnan(values)
-        cells[key] = _unless(blank, values)
-    undirected = incomplete | np.isnan(table["theta_used"])
-    first = content.photos[0]
-    feet = foot_tangents(first, table)
-    found = ~np.isnan(feet.get("foot_a", np.zeros(len(points))))
-    moves = image_shift(first, content.setup, points, table)
-    shifts = {key: np.where(found, values, np.nan) for key, values in moves.items()} | feet
-    if content.setup is not None and content.has_lens:
-        more = lens_turns(content.setup, points, shifts)
-        shifts["grown"] = more.pop("grown", np.full(len(points), np.nan))
-        cells |= {key: inputs(values) for key, values in more.items()}
-    cells |= {key: _unless(undirected, values) for key, values in shifts.items()}
-    cells |= {key: inputs(values) for key, values in table.formula_cells.items()}
-    for key in {"g1", "g2"} & table.formula_cells.keys():
-        cells[key] = _unless(incomplete, table.formula_cells[key])
-    placed = content.placed
-    cells |= {key: inputs(placed.near[:, i]) for i, key in enumerate(NEAR[:3])}
-    mixed = placed.covariance
-    cells[NEAR[3]] = [None] * len(table) if mixed is None else inputs(mixed[:, 0, 1])
-    if content.is_pair:
-        common = placed.common
-        cells |= {f"o_{axis}": inputs(np.sqrt(common[:, i, i])) for i, axis in enumerate("ENH")}
-        cells["o_EN"] = inputs(common[:, 0, 1])
-    else:
-        cells |= _radial_variances(content, placeless)
-    typed = points.has_pixels | points.is_cartesian | points.is_polar
-    if content.others:
-        pairs = [np.isfinite(table.columns[r]) for r, _ in compared(content.others)[:-1]]
-        letters = np.where(pairs, np.array(list("ABCDE")[: len(pairs)])[:, None], "")
-        cells["pair"] = [" ".join(filter(None, own)) or None for own in letters.T]
-    cells["flag"] = [
-        flag if given else None for flag, given in zip(table.flags, typed, strict=True)
-    ]
+    cells |= {key: inputs(values) for key, values in table.of_pixels.items()}
+    common = content.placed.common
+    cells |= {f"o_{axis}": inputs(np.sqrt(common[:, i, i])) for i, axis in enumerate("ENH")}
+    cells["o_EN"] = inputs(common[:, 0, 1])
+    if content.undistorted:  # no formula distorts pixels
+        shift = image_shift(content.photos[0], None, points, table)
+        directed = ~np.isnan(table["s1_used"]) & ~np.isnan(table["theta_used"])
+        cells |= {key: inputs(np.where(directed, v, np.nan)) for key, v in shift.items()}
     return cells
 
 
-def _radial_variances(content: SurveyContent, blank: BoolArray) -> dict[str, list[CellValue]]:
-    """Return the variances that the covariance of a point on an ideal pair is made of."""
-    table, setup = content.table, content.setup
-    assert table is not None
-    assert setup is not None
-    first, second = content.photos
-    m1 = first.scale_number or np.nan
-    k12 = 1.0 if second.scale_number is None else second.scale_number / m1
-    d1, d2, sigma = first.distance, second.distance, setup.precision
-    r, den = table["r"], table["den"]
-    near, far = table["s2_used"] / d2, table["s1_used"] / d1
-    with np.errstate(divide="ignore", invalid="ignore"):
-        g1, g2, aside = 1 - r / d1, (1 - r / d2) * k12, 1 - r / d1
-        if "t1" in table.formula_cells:
-            near, far, g1, g2 = (table.formula_cells[key] for key in ("t2", "t1", "g1", "g2"))
-            aside = table["s_c"] / (table.formula_cells["tan1"] * (first.principal_distance or d1))
-        v1, v2 = (g1 * sigma / den) ** 2, (g2 * sigma / den) ** 2
-    if content.points is not None:
-        v2 += np.where(content.points.in_doubt, DOUBTFUL_SHARE * min(d1, d2), 0.0) ** 2
-    found = {
-        "v_1": v1,
-        "v_2": v2,
-        "v_s": (v1 * near**2 + v2 * far**2) * (m1 / 1000) ** 2,
-        "v_t": (aside * sigma * m1 / 1000) ** 2,
-        "v_sr": -(v1 * near + v2 * far) * m1 / 1000,
-    }
-    return {key: _unless(blank, values) for key, values in found.items()}
-
-
-def _unless(blank: BoolArray, values: FloatArray) -> list[CellValue]:
-    """Return a column of numbers, blank where a condition holds and where they are undefined."""
-    return [
-        None if no or v != v else v for no, v in zip(blank.tolist(), values.tolist(), strict=True)
-    ]
-
-
-def result_cells(
-    content: SurveyContent, cells: Mapping[str, Sequence[CellValue]]
-) -> dict[str, Sequence[CellValue]]:
-    """Return every column of `Results` by key."""
-    if content.table is None:
-        return {}
-    world, sigma = content.placed.xyz, content.placed.sigma
-    return {
-        "id": cells["id"],
-        **{key: inputs(content.table[key]) for key in ("X", "Y", "Z")},
-        **{key: inputs(content.table[key]) for key in ("sigma_X", "sigma_Y", "sigma_r")},
-        **{key: inputs(world[:, i]) for i, key in enumerate("ENH")},
-        **{f"sigma_{key}": inputs(sigma[:, i]) for i, key in enumerate("ENH")},
-        "flag": cells["flag"],
-        "note": cells["note"],
-    }
-
-
 def setup_cells(content: SurveyContent) -> dict[str, CellValue]:
-    """Return the value of every named cell of `Setup`; what is absent is blank."""
-    pair, is_pair, media = content.pair, content.is_pair, content.bent
-    cells = _setup_cells(content)
-    cells |= setup_values(media, pair, as_given=content.as_given, is_pair=is_pair)
-    return cells | setup_checks(cells, is_pair=is_pair, media=content.media_cells)
-
-
-def _setup_cells(content: SurveyContent) -> dict[str, CellValue]:
+    """Return what is typed into named cells of `Setup`; what is absent is blank."""
     limits, setup = content.limits, content.setup
     cells: dict[str, CellValue] = {
         "input_unit": "mm", "k_off": limits.off_radial, "k_plane": limits.on_plane,
-        "unit_x": 1, "unit_y": 1, "k_12": 1.0, "enlargement_1": 1, "enlargement_2": 1,
-        **{f"off_{axis}{image}": 0 for axis in "xy" for image in "12"},
-        **{f"lens_{image}_{axis}": 0 for axis in "uv" for image in "12"},
+        "enlargement_1": 1, "enlargement_2": 1,
+        **{f"enlargement_{k}": 1 for k in other_numbers(content.others)},
+        **({} if content.bent is None else content.bent.cells),
     }  # fmt: skip
-    for k in other_numbers(content.others):
-        cells |= {f"off_x{k}": 0, f"off_y{k}": 0, f"enlargement_{k}": 1}
     if content.pair is None:
-        return cells | {"sigma_s": SIGMA_RADIAL}
+        return cells
     for image, photo in enumerate(content.photos, start=1):
-        cells |= {
-            f"d_{image}": photo.distance,
-            f"c_{image}": photo.principal_distance,
-            f"m_{image}": photo.scale_number,
-        }
+        cells |= {f"d_{image}": photo.distance, f"c_{image}": photo.principal_distance}
     first, second = content.photos
-    d1, d2 = first.distance, second.distance
-    # As its formula has it: of photos typed the other way round it is negative.
-    cells["b_lever"] = d1 * d2 / (d1 - d2)
     cells["sigma_r_max"] = limits.relief_limit(content.pair.d2)
     if setup is None:
         return cells | _pair_cells(content, first, second)
-    cells |= other_values(setup)
-    if first.scale_number is not None and second.scale_number is not None:
-        cells["k_12"] = second.scale_number / first.scale_number
+    for k, third in enumerate(setup.others, start=3):
+        typed = (third.c, third.d, third.enlargement or 1, *(third.nadir or (None, None)))
+        cells |= dict(zip(other_cells(k), typed, strict=True))
     cells |= {"photo_1": setup.photo1 or None, "photo_2": setup.photo2 or None}
     enlargement1, enlargement2 = setup.taking.enlargements
     cells |= {"c_1": setup.taking.c1, "enlargement_1": enlargement1}
     cells |= {"c_2": setup.taking.c2, "enlargement_2": enlargement2}
     cells |= setup.title_block
     cells |= {"pitch": setup.taking.pitch, "input_unit": setup.unit, "sigma_s": setup.precision}
-    if setup.unit == "px" and setup.taking.pitch is not None:
-        cells |= {"unit_x": setup.taking.pitch, "unit_y": -setup.taking.pitch}
     for image, lens in enumerate(setup.lenses or (), start=1):
-        typed = {f"lens_{image}_{name}": getattr(lens, name) for name in ("k1", "k2", "x", "y")}
-        u, v = lens.middle(*setup.typed_frame(image)).tolist()
-        c = setup.taking.c_used[image - 1]
-        cells |= typed | {f"lens_{image}_c": c, f"lens_{image}_u": u, f"lens_{image}_v": v}
+        cells |= {f"lens_{image}_{name}": getattr(lens, name) for name in ("k1", "k2", "x", "y")}
     for image, matrix in enumerate(setup.adjusted, start=1):
         if matrix is not None:
             cells |= dict(zip(adjustment_names(image), matrix.ravel().tolist(), strict=True))
     for image, nadir in ((1, setup.taking.nadir1), (2, setup.taking.nadir2)):
         column, row = nadir or (0.0, 0.0)
         cells |= {f"nadir_{image}_col": column, f"nadir_{image}_row": row}
-        if setup.unit == "px":
-            cells |= {f"off_x{image}": column, f"off_y{image}": row}
     return cells
 
 
 def _pair_cells(content: SurveyContent, first: Photo, second: Photo) -> dict[str, CellValue]:
     """Return the cells of `Setup` that only a general pair has."""
-    assert content.pair is not None
-    scale = first.scale_number or 1000.0
-    sigma = first.precision(content.sigma_px or first.sigma_pixel or second.sigma_pixel)
     cells: dict[str, CellValue] = {
         "pair_file": content.pair_file,
         **{key: name or None for key, name in zip(PHOTOS, content.photo_files, strict=True)},
         "input_unit": "px",
         "pitch": first.pixel_size,
-        "sigma_px": sigma,
-        "m_1": scale,
+        "sigma_px": first.precision(content.sigma_px or first.sigma_pixel or second.sigma_pixel),
     }
-    cells |= dict(zip(("e_x", "e_y"), content.pair.zoom_centre.tolist(), strict=True))
     spacing = []
     for image, photo in enumerate((first, second)):
         cells |= dict(zip(NADIRS[image], photo.nadir.tolist(), strict=True))
@@ -455,5 +328,21 @@ def _pair_cells(content: SurveyContent, first: Photo, second: Photo) -> dict[str
             if len(jacobian):
                 spacing.append(float(np.median(np.sqrt((jacobian**2).sum(axis=(1, 2)) / 2))))
     # What one pixel is on the wall, typically: whatever image scale is typed later.
-    pixel = 1000.0 * sum(spacing) / len(spacing) if spacing else 0.0
-    return cells | {"pixel_wall": pixel, "sigma_s": sigma * pixel / scale}
+    return cells | {"pixel_wall": 1000.0 * sum(spacing) / len(spacing) if spacing else 0.0}
+
+
+def check_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
+    """Return the columns of `Check` that are typed, by key."""
+    known = content.known
+    cells = named_rows(known.ids, known.used)
+    return cells | {f"{axis}_ref": inputs(known.xyz[:, i]) for i, axis in enumerate("XYZ")}
+
+
+def control_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
+    """Return the columns of `Georeference` that are no formulas, by key."""
+    control, geo = content.control, content.georeference
+    cells = named_rows(control.ids, control.used)
+    cells |= {axis: inputs(control.xyz[:, i]) for i, axis in enumerate("ENH")}
+    if geo is not None:
+        cells["found_bad"] = [0 if name in geo.bad else None for name in geo.ids]
+    return cells

@@ -10,17 +10,15 @@ import numpy as np
 
 from bifocal.files.exports import export_points
 from bifocal.remarks import remark
-from bifocal.survey.check_points import check_points
-from bifocal.survey.georeferencing import georeference
 from bifocal.survey.observations import PointObservations
-from bifocal.survey.point_survey import solve_points
 from bifocal.survey.reference import KnownPoints
 from bifocal.survey.results import csv_columns
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.solved_survey import SolvedSurvey
 from bifocal.survey.tolerances import RULES
+from bifocal.workbook.changing.kinds import check_kind, is_same_kind
 from bifocal.workbook.changing.own_table import add_results
-from bifocal.workbook.changing.update import check_kind, is_same_kind, update_book
+from bifocal.workbook.changing.update import update_book
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.making.book import write_book
 from bifocal.workbook.template_workflow import MOST_ROWS, log_row
@@ -119,7 +117,7 @@ def _is_survey_book(solution: SolvedSurvey) -> bool:
 
 def _update(path: Path, solution: SolvedSurvey, content: SurveyContent, *, overwrite: bool) -> str:
     """Put the results into a survey workbook; return where its old state is kept."""
-    own = as_typed(solution, content)
+    own = typed_content(solution, content)
     done = update_book(
         solution.source, path, solution.survey, own, given=_options(solution), overwrite=overwrite
     )
@@ -146,7 +144,7 @@ def _add_columns(
     """Put the results beside the user's own table; return where its old state is kept."""
     if solution.source.suffix.lower() not in (".xlsx", ".xlsm"):
         raise InputError(remark("survey.no_macros", of=path))
-    own = as_typed(solution, content)
+    own = typed_content(solution, content)
     done = add_results(
         solution.source, path, solution.survey, own, given=_options(solution), overwrite=overwrite
     )
@@ -179,38 +177,17 @@ def _is_same_file(path: Path, source: Path) -> bool:
     return path.exists() and source.exists() and path.samefile(source)
 
 
-def as_typed(solution: SolvedSurvey, content: SurveyContent) -> SurveyContent:
-    """Return the content as the workbook's formulas see it: images in the order they were typed."""
-    table, setup, points = solution.table, solution.setup, solution.points
-    world, exchanged = solution.georeference, solution.pair.exchanged
-    control = solution.survey.control.without(points.unused)
+def typed_content(solution: SolvedSurvey, content: SurveyContent) -> SurveyContent:
+    """Return the content as it was typed: images in that order, no relief given beside points."""
+    setup, points = solution.setup, solution.points
     if solution.corrections[1] is not None and setup is not None:
         setup, points = _uncorrected(solution, setup)
-    if exchanged and setup is not None:
+    if solution.pair.exchanged and setup is not None:
         setup, points = setup.exchanged(), points.exchanged()
-        table = solve_points(
-            solution.pair,
-            setup.in_millimetres(points),
-            limits=setup.measuring.limits,
-            as_given=True,
-        )
-        table = table.completed_by(solution.table)
-        if world is not None:
-            world = georeference(table, control, model=world.model)
-    # Relief given beside the points is checked too, but stands not on the sheet Check.
-    listed = len(solution.survey.known_rows)
-    whole = solution.survey.known
-    known = KnownPoints(ids=whole.ids[:listed], xyz=whole.xyz[:listed], use=whole.used[:listed])
-    return replace(
-        content,
-        setup=setup,
-        as_given=exchanged,
-        points=points,
-        table=table,
-        known=known,
-        check=check_points(table, known.without(points.unused)),
-        georeference=world,
-    )
+    listed, known = len(solution.survey.known_rows), solution.survey.known
+    known = KnownPoints(ids=known.ids[:listed], xyz=known.xyz[:listed], use=known.used[:listed])
+    exchanged = solution.pair.exchanged
+    return replace(content, setup=setup, as_given=exchanged, points=points, known=known)
 
 
 def _uncorrected(

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class AdjustCommand:
+class BundleCommand:
     """The options of ``multimedia adjust``, and examples.
 
     multimedia adjust tank.toml --interior c,xh,yh,k1 --media index3 --out tank2.toml
@@ -80,7 +80,7 @@ class AdjustCommand:
     as_json: JsonOption = False
 
 
-@declared(AdjustCommand)
+@declared(BundleCommand)
 def command(
     project: Path, wavelength: float | None, temperature: float | None, depth: float,
     out: Path | None, report: Path | None, diagnose: bool, as_json: bool, **choices: Any,

@@ -12,7 +12,7 @@ from photocore.shared_options import OverwriteOption
 
 
 @dataclass(frozen=True, kw_only=True)
-class TemplateCommand:
+class ShiftTemplateCommand:
     """The options of ``multimedia template``, and examples.
 
     multimedia template tank.xlsx
@@ -30,8 +30,8 @@ class TemplateCommand:
     overwrite: OverwriteOption = False
 
 
-@declared(TemplateCommand)
-def command(options: TemplateCommand) -> None:
+@declared(ShiftTemplateCommand)
+def command(options: ShiftTemplateCommand) -> None:
     """Write a workbook that shifts points and gives the refractive index of water by itself.
 
     No macros, no circular references: Excel, LibreOffice and others calculate it.

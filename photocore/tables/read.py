@@ -120,7 +120,7 @@ def read_table(
         else open_tables(source, max_rows=max_rows)
     )
     if isinstance(book, CsvFile):
-        place = _Place(*find_in_text(book, columns, column_map))
+        place = _CellPlace(*find_in_text(book, columns, column_map))
     else:
         place = _find(book, columns, name=name, sheet=sheet, column_map=column_map)
     asked = column_map or {}
@@ -153,7 +153,7 @@ def read_table(
 
 
 @dataclass(slots=True)
-class _Place:
+class _CellPlace:
     """A table in a file: its sheet, its columns, and what separates the fields of a text."""
 
     grid: CellGrid
@@ -168,7 +168,7 @@ def _find(
     name: str | None,
     sheet: str | None,
     column_map: Mapping[str, str] | None,
-) -> _Place:
+) -> _CellPlace:
     """Return the place of a table: by the table's name, by the sheet's, then by headings alone."""
     titles = book.titles
     if sheet is not None:
@@ -178,7 +178,7 @@ def _find(
                 remark("table.no_sheet", of=book.label, sheet=sheet, titles=_quoted(book.titles))
             )
     wanted = bare(name or "")
-    near: _Place | None = None
+    near: _CellPlace | None = None
     areas = [
         a for a in book.tables if a.sheet in titles and bare(a.name) in (wanted, f"tbl{wanted}")
     ]
@@ -209,7 +209,7 @@ def _in_area(
     area: TableArea,
     columns: Sequence[Column],
     column_map: Mapping[str, str] | None,
-) -> _Place | None:
+) -> _CellPlace | None:
     """Look for the columns in the heading row of a named table."""
     if area.header_rows == 0:
         return None
@@ -224,7 +224,7 @@ def _in_area(
     match = replace(match, header=header, first=header + 1, last=bottom - area.totals_rows)
     if not area.totals_rows:
         _reach_below(grid, match, bottom)
-    return _Place(grid, match)
+    return _CellPlace(grid, match)
 
 
 def _reach_below(grid: CellGrid, match: Match, bottom: int) -> None:
@@ -248,7 +248,7 @@ def _count(cells: Mapping[int, Value], columns: Collection[int]) -> int:
 
 def _in_sheet(
     book: SheetFile, title: str, columns: Sequence[Column], column_map: Mapping[str, str] | None
-) -> _Place | None:
+) -> _CellPlace | None:
     """Look for the columns anywhere in a sheet."""
     grid = book.grid(title)
     match = find_columns(grid, columns, column_map=column_map)
@@ -260,11 +260,11 @@ def _in_sheet(
     )
     if area and area.totals_rows:
         match.last = area.area[2] - area.totals_rows
-    return _Place(grid, match)
+    return _CellPlace(grid, match)
 
 
 def _nothing_found(
-    book: SheetFile, titles: Sequence[str], columns: Sequence[Column], near: _Place | None
+    book: SheetFile, titles: Sequence[str], columns: Sequence[Column], near: _CellPlace | None
 ) -> InputError:
     """Return the complaint that no table fits, naming the nearest one."""
     required = [column.key for column in columns if column.required]
@@ -287,7 +287,7 @@ def _nothing_found(
 
 def _read_text(
     file: CsvFile,
-    place: _Place,
+    place: _CellPlace,
     columns: Sequence[Column],
     decimal: Decimal | None,
     errors: list[CellError],
@@ -317,7 +317,7 @@ def _read_text(
     return table
 
 
-def _new_table(book: SheetFile | CsvFile, place: _Place, rows: DataRows) -> Table:
+def _new_table(book: SheetFile | CsvFile, place: _CellPlace, rows: DataRows) -> Table:
     """Return a table without values."""
     return Table(
         file=book.label,
@@ -333,7 +333,7 @@ def _new_table(book: SheetFile | CsvFile, place: _Place, rows: DataRows) -> Tabl
     )
 
 
-def _cells(place: _Place, rows: DataRows) -> dict[str, Sequence[Value | None]]:
+def _cells(place: _CellPlace, rows: DataRows) -> dict[str, Sequence[Value | None]]:
     """Return the cells of each column."""
     grid = place.grid.rows
     return {

@@ -23,7 +23,7 @@ from bifocal.survey.survey_media import MOST, SurveyMedia, media_names
 from bifocal.workbook.changing.update import update_book
 from bifocal.workbook.content import SurveyContent, setup_cells
 from bifocal.workbook.formulas.setup_cells import MATRICES, NADIRS
-from bifocal.workbook.output import as_typed, result_content
+from bifocal.workbook.output import result_content, typed_content
 from bifocal.workbook.pair_workflow import is_survey
 from bifocal.workbook.reading.reader import read_survey
 from bifocal.workbook.template_workflow import write_survey
@@ -230,7 +230,7 @@ def _solved(typed: Path, target: Path) -> bool:
         solution = solve(typed)
     except PhotogrammetryError:  # nothing to solve yet: the formulas stay live
         return False
-    own = as_typed(solution, replace(result_content(solution, typed, None), log=()))
+    own = typed_content(solution, replace(result_content(solution, typed, None), log=()))
     try:
         update_book(typed, target, solution.survey, own, given={}, overwrite=True)
     except InputError:  # a workbook changed beyond recognition still takes the picks

@@ -14,16 +14,15 @@ from bifocal.remarks import remark
 from bifocal.survey.reference import Georeference
 from bifocal.survey.relief_table import ENTRIES
 from bifocal.survey.survey_input import SurveyInput
+from bifocal.workbook.changing.kinds import refuse_earlier
 from bifocal.workbook.changing.setup_update import add_sheets, write_corrections, write_options
 from bifocal.workbook.changing.update import (
     BookUpdate,
-    refuse_earlier,
     saved,
     store_named_cells,
 )
-from bifocal.workbook.content import SurveyContent, point_cells, result_cells
+from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.formulas.columns import FORMULAS, NEAR
-from bifocal.workbook.formulas.georeference_values import precision_values
 from bifocal.workbook.formulas.placed_formulas import added_covariance
 from bifocal.workbook.formulas.setup_cells import TITLE_BLOCK, cells_of
 from bifocal.workbook.making.book import build
@@ -42,6 +41,7 @@ from photocore.workbook.changing.result_columns import (
     head_row,
     put_result_columns,
 )
+from photocore.workbook.making.live_book import BookBuilder
 from photocore.workbook.making.live_columns import LiveColumn
 from photocore.workbook.reading.grid import column_letters, quoted_title, split_cell
 
@@ -127,7 +127,7 @@ def add_results(
         factors={key: factor for key, factor in factors.items() if key not in typed},
     )
     columns = sorted(
-        _columns(own, content), key=lambda column: (*_RESULTS, column.key).index(column.key)
+        _columns(own, content, built), key=lambda column: (*_RESULTS, column.key).index(column.key)
     )
     # Names may mean something else to the user: formulas on their sheets hold addresses alone.
     plain = PlainFormulas((), named)
@@ -166,9 +166,9 @@ def _inputs(columns: Mapping[str, int], content: SurveyContent) -> dict[str, int
     return inputs
 
 
-def _columns(table: OwnTable, content: SurveyContent) -> list[ResultColumn]:
+def _columns(table: OwnTable, content: SurveyContent, built: BookBuilder) -> list[ResultColumn]:
     """Return the results: what the formulas need and the table lacks, then the formulas."""
-    cells = point_cells(content)
+    cells = _of_rows(built, "tblPoints", table)
     described = content.point_columns(
         xy="x1" in table.columns or bool(content.corrected),
         polar="s1" in table.columns,
@@ -183,7 +183,7 @@ def _columns(table: OwnTable, content: SurveyContent) -> list[ResultColumn]:
             continue
         results.append(_column(column, cells[column.key]))
     if content.georeference is not None:
-        results += _world(content, cells, result_cells(content, cells))
+        results += _world(content, built, {**cells, **_of_rows(built, "tblResults", table)})
     return results
 
 
@@ -200,10 +200,13 @@ def _column(column: LiveColumn, values: Sequence[CellValue]) -> ResultColumn:
     )
 
 
+def _of_rows(built: BookBuilder, name: str, table: OwnTable) -> dict[str, Sequence[CellValue]]:
+    """Return the columns of a table of ours without its spare rows."""
+    return {key: cells[: len(table.rows)] for key, cells in built.tables[name].cells.items()}
+
+
 def _world(
-    content: SurveyContent,
-    cells: Mapping[str, Sequence[CellValue]],
-    world: Mapping[str, Sequence[CellValue]],
+    content: SurveyContent, built: BookBuilder, values: Mapping[str, Sequence[CellValue]]
 ) -> list[ResultColumn]:
     """Return E, N, H, their sigmas and what these need; the transformation stands as numbers."""
     geo, table = content.georeference, content.table
@@ -216,14 +219,14 @@ def _world(
     lists = ["columns"]
     if geo.precision is not None and table.covariance is not None:
         lists.append("sigmas")
-    parts, values = _numbers(geo), {**cells, **world, "shared": shared}
+    parts, values = _numbers(geo, built), {**values, "shared": shared}
     columns = (c for rows in lists for c in FORMULAS.columns("own_world", facts, parts, rows=rows))
     return [_column(column, values[column.key]) for column in columns]
 
 
-def _numbers(geo: Georeference) -> dict[str, str]:
+def _numbers(geo: Georeference, built: BookBuilder) -> dict[str, str]:
     """Return the numbers of the transformation as parts of formulas."""
-    fit, numbers = geo.world_from_wall, precision_values(geo)
+    fit = geo.world_from_wall
     origin, centre = np.asarray(geo.origin) + np.asarray(geo.offset), fit.source_centre.tolist()
     near, parts = {name: f"[@n_{name}]" for name in "ENH"}, {"scale": repr(fit.scale)}
     for i, name in enumerate("ENH"):
@@ -239,7 +242,7 @@ def _numbers(geo: Georeference) -> dict[str, str]:
         )
         parts[f"added_{name}"] = re.sub(
             r"g_[zuw]_[A-Z]+",
-            lambda m: f"({numbers[m[0]]!r})" if numbers else "",
+            lambda name: f"({built.value_of(name[0])!r})",
             added_covariance(name, name, near),
         )
     return parts

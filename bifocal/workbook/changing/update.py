@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -11,8 +10,7 @@ from typing import Any
 
 from bifocal.remarks import remark
 from bifocal.survey.survey_input import SurveyInput
-from bifocal.survey.survey_media import NORMALS
-from bifocal.survey.what_if import CHANGED
+from bifocal.workbook.changing.kinds import check_kind
 from bifocal.workbook.changing.setup_update import (
     add_missing_sheets,
     chart_sheet,
@@ -21,23 +19,23 @@ from bifocal.workbook.changing.setup_update import (
 )
 from bifocal.workbook.changing.translate import translate
 from bifocal.workbook.content import CHART_ROWS, STRUCTURED_ROWS, SurveyContent
+from bifocal.workbook.formulas.columns import CHANGED
 from bifocal.workbook.formulas.setup_cells import TYPED_FORMULAS
 from bifocal.workbook.formulas.space_block import BLOCK
 from bifocal.workbook.making.book import build, unprinted_formula
 from bifocal.workbook.making.charts import HEAD, LEFT
-from bifocal.workbook.reading.setup_reader import media_count
 from bifocal.workbook.words import word
 from photocore.errors import InputError
-from photocore.output import free_path
 from photocore.workbook.changing.cells import CellValue, NewColumn, escape
 from photocore.workbook.changing.editor import WorkbookEditor
 from photocore.workbook.changing.named_cells import place_of, type_column, type_value
 from photocore.workbook.changing.plain import MARK, PlainEditor
 from photocore.workbook.changing.settling import Settling, changed_formulas, normal
-from photocore.workbook.making.live_book import BookBuilder, short_formula
+from photocore.workbook.making.live_book import BookBuilder
 from photocore.workbook.making.live_columns import TEXT_KEYS, row_formula
 from photocore.workbook.making.newbook import RowBlock
 from photocore.workbook.making.print_area import move_print_area
+from photocore.workbook.making.repeated_rows import short_formula
 from photocore.workbook.reading.grid import (
     Value,
     column_letters,
@@ -75,61 +73,6 @@ class BookUpdate:
 
 #: Columns whose formulas differ where the set-up was corrected.
 _CORRECTED = ("s1_used", "s2_used", "theta_used", "q", "grown", "x_c", "y_c", "dx", "dy")
-
-
-def is_earlier(survey: SurveyInput) -> bool:
-    """Tell by its names whether a workbook's sheets were made by an earlier version."""
-    names = () if survey.book is None else survey.book.names
-    newest = "setup_missing" if "sigma_px" in names else "enlargement_1"
-    # What stands beside what from the start.
-    came = {"b_lever": newest, "g_k": "g_space", "g_space": "g_alarm"}
-    return any(old in names and new not in names for old, new in came.items())
-
-
-def refuse_earlier(source: Path, survey: SurveyInput) -> None:
-    """Refuse to change a workbook in place whose formulas an earlier version made.
-
-    Raises
-    ------
-    InputError
-        Naming the way out.
-    """
-    if is_earlier(survey):
-        raise InputError(remark("survey.earlier_version", of=source, other=_other(source)))
-
-
-def is_same_kind(survey: SurveyInput, content: SurveyContent) -> bool:
-    """Tell whether a survey workbook has the formulas that what came out of it needs."""
-    names = () if survey.book is None else survey.book.names
-    measured = content.is_pair == ("col1" in survey.table.present)
-    alike = content.has_lens == ("lens_1_k1" in names)
-    alike &= content.media_cells == media_count(names)
-    alike &= content.leaning == (NORMALS[0][0] in names)
-    return measured and alike and not is_earlier(survey)
-
-
-def check_kind(source: Path, survey: SurveyInput, content: SurveyContent) -> None:
-    """Refuse to change a survey workbook for coordinates into one for raw pixels, or the reverse.
-
-    Nor one for photos in air into one for media, nor one of an earlier version.
-
-    Raises
-    ------
-    InputError
-        Naming the way out.
-    """
-    refuse_earlier(source, survey)
-    if is_same_kind(survey, content):
-        return
-    kind = "coordinates in mm or px" if content.is_pair else "raw pixels of a pair"
-    if content.is_pair == ("col1" in survey.table.present):
-        kind = "ports parallel to the wall" if content.leaning else "photos in air"
-    raise InputError(remark("survey.other_kind", of=source, kind=kind, other=_other(source)))
-
-
-def _other(source: Path) -> str:
-    """Return the name of a new workbook beside one that stays as it is."""
-    return free_path(source.parent, f"{source.stem}-result", source.suffix).name
 
 
 @uncollected()
@@ -438,7 +381,7 @@ def _verdict(
     if area is None or not {"tolerance", "verdict"} <= area.headings().keys():
         return
     headings, first, grid = area.headings(), area.first, editor.grid(area.sheet).rows
-    accuracy = content.check.accuracy if content.check is not None else math.nan
+    accuracy = built.value_of("check_worst")
     holds, fails = word("holds", content.language), word("fails", content.language)
     formula = row_formula(area.name, wanted.columns[-1].formula)[1:]
     count = len(wanted.cells["rule"]) if rules else 0
@@ -453,7 +396,7 @@ def _verdict(
             for key in asked.keys() - {"verdict"}:
                 type_value(editor, (area.sheet, row, headings[key]), asked[key])
         result = ""
-        if isinstance(tolerance, int | float) and not math.isnan(accuracy):
+        if isinstance(tolerance, int | float) and isinstance(accuracy, int | float):
             result = holds if accuracy <= tolerance / 1000 else fails
         place = (area.sheet, row, headings["verdict"])
         if rules or words:

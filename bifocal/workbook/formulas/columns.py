@@ -9,7 +9,6 @@ from collections.abc import Collection
 
 from bifocal.model.flags import DOUBTFUL_SHARE, UNCOUNTED, FlagLimits
 from bifocal.survey.georeferencing import ALPHA_POINT
-from bifocal.survey.leave_one_out import ROUNDING
 from bifocal.survey.observations import DOUBT_CODES
 from bifocal.survey.other_photos import CHANCE, TURNS
 from bifocal.workbook.formulas.placed_formulas import placed_parts
@@ -20,6 +19,10 @@ FORMULAS = FormulaBook(__package__)
 FUNCTIONS = FormulaBook(__package__, "functions")
 #: E, N, H from a whole-metre origin: columns that refer to the sheet `Georeference`.
 NEAR = ("n_E", "n_N", "n_H", "cov_EN")
+#: What the sheet `WhatIf` changes: distances [m], principal distances [mm], size of a pixel [mm].
+CHANGED = ("d_1", "d_2", "c_1", "c_2", "pitch")
+#: World coordinates carry no more than so many digits: what is below is no contradiction.
+ROUNDING = 1e-9
 #: Relief whose area of uncertainty the sheet `Planning` shows. [cm]
 PLANNED_RELIEF = (1, 2, 5, 10, 20, 50, 100)
 FRAME_SHARES = (10, 20, 30, 40, 50, 60, 70, 80, 90, 100)

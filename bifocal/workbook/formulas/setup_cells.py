@@ -14,7 +14,6 @@ from bifocal.workbook.formulas.columns import FORMULAS, other_numbers
 from bifocal.workbook.formulas.media_formulas import calculated_names
 from photocore.option_types import Number
 from photocore.options import options_of
-from photocore.workbook.changing.cells import CellValue
 
 Groups = tuple[tuple[str, ...], ...]
 
@@ -24,9 +23,7 @@ PHOTOS = ("photo_1", "photo_2")
 IDEAL_NADIRS = ("nadir_1_col", "nadir_1_row", "nadir_2_col", "nadir_2_row")
 #: Cells for the head of the printed results.
 TITLE_BLOCK = ("project", "client", "surveyor", "survey_date")
-#: How many times larger than on the sensor the images are that were measured.
-PRINTS = ("enlargement_1", "enlargement_2")
-_CHECKS = ("setup_missing", "check_order", "check_scale")
+_CHECKS = ("check_order", "check_scale")
 MATRICES: Groups = tuple(
     tuple(f"h{image}_{row}{column}" for row in "123" for column in "123") for image in "12"
 )
@@ -76,41 +73,6 @@ def _missing_formula(
     return f"MID({'&'.join(parts)},3,200)"
 
 
-def setup_checks(
-    cells: Mapping[str, CellValue], *, is_pair: bool, media: int = 0
-) -> dict[str, CellValue]:
-    """Return what the checks of the set-up show: what is missing, d_1 > d_2, the scales.
-
-    ``media`` is how many media there are cells for.
-    """
-
-    def known(*names: str) -> bool:
-        return all(isinstance(cells.get(name), int | float) for name in names)
-
-    needed = _PAIR_NEEDED if is_pair else _IDEAL_NEEDED
-    bent = any(known(name) for name in _stated(media))
-    missing = [name for name in HEIGHTS if bent and not known(name)]
-    missing += [
-        name
-        for name, wanted, unit in needed
-        if not known(*wanted) and unit in ("", cells["input_unit"])
-    ]
-    order: CellValue = None
-    if known("d_1", "d_2"):
-        order = _verdict(float(cells["d_1"] or 0) > float(cells["d_2"] or 0))
-    scale: CellValue = None
-    if known("m_1", "m_2"):
-        first, second = (float(cells.get(name) or 1) for name in PRINTS)
-        ratio = float(cells["k_12"] or 0) * second / first
-        scale = _verdict(abs(ratio - 1) <= SCALE_TOLERANCE)
-    checks = (", ".join(missing) or None, order, scale)
-    return dict(zip(_CHECKS, checks, strict=True))
-
-
-def _verdict(good: bool) -> str:
-    return "OK" if good else "CHECK"
-
-
 def state_formula(words: Mapping[str, str], *, is_pair: bool) -> str:
     """Return the formula of the line that says what `Setup` still lacks.
 
@@ -120,18 +82,9 @@ def state_formula(words: Mapping[str, str], *, is_pair: bool) -> str:
         `STATES` to sentences.
     """
     rest = f'"{words["state_ready"]}"'
-    checks = _CHECKS[1:2] if is_pair else _CHECKS[1:]
-    for check in reversed(checks):
+    for check in reversed(_CHECKS[:1] if is_pair else _CHECKS):
         rest = f'IF({check}="CHECK","{words[check.replace("check", "state")]}",{rest})'
     return f'IF(setup_missing<>"","{words["state_missing"]} "&setup_missing,{rest})'
-
-
-def state(cells: Mapping[str, CellValue], words: Mapping[str, str]) -> str:
-    """Return what that line says."""
-    if cells["setup_missing"]:
-        return f"{words['state_missing']} {cells['setup_missing']}"
-    wrong = [check for check in _CHECKS[1:] if cells.get(check) == "CHECK"]
-    return words[wrong[0].replace("check", "state") if wrong else "state_ready"]
 
 
 #: Keys of the sentences about the set-up.

@@ -1,20 +1,18 @@
 """The model 3D as live formulas: Horn's start, then turns of Gauss-Newton, to the right of tblGeo.
 
 Plain functions of one cell each, no array formulas: columns of the nine entries of B = m R' in the
-order XE XN XH YE YN YH ZE ZN ZH are multiplied by SUMPRODUCT. `bifocal.survey.space_similarity`
-does the same and gives the numbers shown.
+order XE XN XH YE YN YH ZE ZN ZH are multiplied by SUMPRODUCT. Horn's start is the first eigenvector
+of a 4 x 4 matrix (B. K. P. Horn, "Closed-form solution of absolute orientation using unit
+quaternions", JOSA A 4(4), 1987), found by squaring it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import repeat
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from bifocal.survey.space_similarity import SPACE_STEPS, SQUARINGS, SpaceSums
 from bifocal.workbook.formulas.placed_formulas import entry
 from photocore.workbook.making.live_book import SheetBuilder
 from photocore.workbook.making.look import LABEL_FONT
@@ -24,6 +22,10 @@ from photocore.workbook.reading.grid import column_letters
 LEFT, TOP = 72, 3
 #: First column right of the table: all that stands there is folded away.
 FOLDED = 55
+#: Turns of Gauss-Newton: from the unweighted fit five reach rounding on walls that lean or lie.
+SPACE_STEPS = 6
+#: Squarings of Horn's matrix: its first eigenvector then counts 1024 times its own share.
+SQUARINGS = 10
 #: Name of the whole block, by which its results are stored in a workbook that exists.
 BLOCK = "g_space_block"
 #: Steps range from 1E-13 to 1E+6; a column of usual width holds them so.
@@ -74,27 +76,27 @@ class CellMatrix:
 
 
 class SpaceBlock:
-    """Places matrices of formulas side by side and remembers where they stand."""
+    """Places matrices of formulas side by side and remembers where they stand.
 
-    def __init__(self, sheet: SheetBuilder, sums: SpaceSums | None) -> None:
+    Of another model than 3D all of them are blank, which needs no calculation.
+    """
+
+    def __init__(self, sheet: SheetBuilder, *, blank: bool) -> None:
         self.sheet = sheet
         self.next = LEFT
-        self.values = _values(sums)
+        self.shown = "" if blank else None
         self._write()
 
     def _put(
         self, label: str, shape: tuple[int, int], body: Callable[[int, int], str]
     ) -> CellMatrix:
-        """Write a matrix of formulas, its values the next ones, and return where it stands."""
+        """Write a matrix of formulas and return where it stands."""
         matrix = CellMatrix(TOP, self.next, *shape)
         self.next += shape[1]
         self.sheet.text(f"{column_letters(matrix.left)}{TOP - 1}", label, LABEL_FONT)
-        shown = next(self.values)
-        values = None if shown is None else np.asarray(shown, dtype=np.float64).reshape(shape)
         for i, j in np.ndindex(shape):
-            value = None if values is None else float(values[i, j])
             text = f'IF(g_space=1,{body(i, j)},"")'
-            self.sheet.formula(matrix.cell(i, j), text, value, form=STEP_FORM)
+            self.sheet.formula(matrix.cell(i, j), text, self.shown, form=STEP_FORM)
         return matrix
 
     def _column(self, label: str, bodies: Sequence[str]) -> CellMatrix:
@@ -214,20 +216,6 @@ class SpaceBlock:
             width.outlineLevel, width.hidden = 1, True
         cells = f"${column_letters(LEFT)}${TOP}:${column_letters(last)}${TOP + 8}"
         self.sheet.book.define(BLOCK, f"'{self.sheet.worksheet.title}'!{cells}")
-
-
-def _values(sums: SpaceSums | None) -> Iterator[ArrayLike | None]:
-    """Yield what the matrices show, in the order in which they are put; None without a fit."""
-    if sums is None:
-        yield from repeat(None)
-        return
-    longest = int(np.argmax(np.diag(sums.powers[-1])))
-    yield from (sums.mixed.T, sums.shift.T, sums.reduced, sums.left, sums.crossed, *sums.powers)
-    yield from (sums.powers[-1][:, longest], sums.start, sums.squares / (sums.start @ sums.crossed))
-    for turn in sums.turns[:SPACE_STEPS]:
-        yield from (turn.entries, turn.design, turn.product, turn.normal, turn.inverse)
-        yield from (turn.right, turn.step, turn.halfway)
-    yield sums.entries
 
 
 def _axis_rows(j: int) -> Iterator[tuple[int, int, int]]:

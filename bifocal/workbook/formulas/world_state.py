@@ -5,11 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-import numpy as np
-
-from bifocal.survey.leave_one_out import leave_one_out
-from bifocal.survey.reference import Georeference
-from bifocal.survey.remarks import LARGEST_RESIDUAL, SCALE_SHARE
+from bifocal.survey.remarks import SCALE_SHARE
 
 #: Name of its cell, and the keys of its sentences.
 STATE = "world_state"
@@ -35,32 +31,6 @@ def world_state_formula(words: Mapping[str, str]) -> str:
     right = f'{good}&IF(N(g_spare)<1," "&{unchecked},"")'
     placed = f"IF(ISNUMBER(g_k),IF(g_alarm=1,{wrong},{right}),{few})"
     return f'IF(COUNT(tblGeo[E])=0,"",{placed})'
-
-
-def world_state(words: Mapping[str, str], geo: Georeference | None) -> tuple[str | None, int]:
-    """Return what it says, None without control points, and 1 where it is an alarm."""
-    if geo is None:
-        return None, 0
-    found = leave_one_out(geo)
-    worst, largest = found.worst, int(np.nanargmax(found.size))
-    scale, size = geo.world_from_wall.scale, found.size[largest]
-    shown = {
-        "n": str(int(geo.used.sum())), "k": _rounded(scale), "s": _rounded(geo.sigma0),
-        "v": _rounded(size), "name": geo.ids[largest],
-        "worst": geo.ids[worst], "off": _rounded(found.size[worst]),
-    }  # fmt: skip
-    keys = ["world_scale"] if abs(scale - 1) > SCALE_SHARE else []
-    keys += ["world_bad"] if worst >= 0 else []
-    if not keys and size > LARGEST_RESIDUAL:
-        keys = ["world_large"]
-    alarm = len(keys) > 0
-    if not alarm:
-        keys = ["world_good", *(["world_unchecked"] if found.spare < 1 else [])]
-    return " ".join(words[key].format(**shown) for key in keys), int(alarm)
-
-
-def _rounded(value: float) -> str:
-    return "?" if value != value else f"{round(float(value), 4):.15g}"
 
 
 def _live(sentence: str) -> str:

@@ -8,15 +8,10 @@ from pathlib import Path
 from openpyxl.styles import Alignment, Protection
 
 from bifocal.survey.other_photos import CHANCE
-from bifocal.workbook.content import (
-    STRUCTURED_ROWS,
-    SurveyContent,
-    point_cells,
-    result_cells,
-    setup_cells,
-)
+from bifocal.workbook.content import STRUCTURED_ROWS, SurveyContent, point_cells
 from bifocal.workbook.formulas.columns import FORMULAS, results_columns
-from bifocal.workbook.formulas.world_state import STATE, STATES, world_state
+from bifocal.workbook.formulas.world_state import STATE
+from bifocal.workbook.making.agreement import refuse_contradictions
 from bifocal.workbook.making.charts import charts
 from bifocal.workbook.making.compare_sheet import compare
 from bifocal.workbook.making.functions_sheet import functions_sheet
@@ -26,7 +21,6 @@ from bifocal.workbook.making.reference_sheets import check, planning
 from bifocal.workbook.making.setup_sheet import setup_sheet
 from bifocal.workbook.making.what_if_sheet import what_if_sheet
 from bifocal.workbook.words import WORDS, word
-from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
 from photocore.workbook.making.live_columns import LiveColumn
 from photocore.workbook.making.look import (
@@ -86,33 +80,35 @@ def build(content: SurveyContent) -> BookBuilder:
     builder = BookBuilder(language=content.language, words=WORDS)
     builder.book.properties.creator = "bifocal"
     builder.book.properties.title = "bifocal survey"
-    cells = point_cells(content)
-    readme_sheet(builder, content, cells)
+    readme_sheet(builder, content)
     setup_sheet(builder, content)
-    _points(builder, content, cells)
-    _results(builder, content, cells)
-    check(builder, content, cells)
+    _points(builder, content)
+    _results(builder, content)
+    check(builder, content)
     if content.others:
-        compare(builder, content, cells)
+        compare(builder, content)
     georeference(builder, content)
     planning(builder, content)
     if content.changes is not None:
         what_if_sheet(builder, content)
-    charts(builder, content, cells)
+    charts(builder, content)
     _log(builder, content)
     if content.functions:
         functions_sheet(builder, named=not content.plain)
+    builder.calculate()
+    if content.table is not None:
+        refuse_contradictions(builder, content)
     if content.plain:
         builder.make_plain("'Setup'!$A$1")
     builder.open_at("Points" if content.points else "Readme")
     return builder
 
 
-def _points(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
+def _points(builder: BookBuilder, content: SurveyContent) -> None:
     """Write what was measured and, beside it, all results as formulas."""
     columns = content.point_columns()
     note = "points_pair" if content.is_pair else "points_lens" if content.has_lens else "points_how"
-    sheet = _long_sheet(builder, "Points", note, columns, content, cells)
+    sheet = _long_sheet(builder, "Points", note, columns, content, point_cells(content))
     keys = [column.key for column in columns]
     breaks = [keys.index("note") + 2, keys.index("x_c") + 1]
     if content.others:
@@ -129,11 +125,11 @@ def _points(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
     )
 
 
-def _results(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
+def _results(builder: BookBuilder, content: SurveyContent) -> None:
     """Write what a client is handed: names, coordinates, precision, below a title block."""
-    results, columns = result_cells(content, cells), results_columns(is_pair=content.is_pair)
-    sheet = _long_sheet(builder, "Results", "", columns, content, results)
-    _title_block(sheet, content, results)
+    columns = results_columns(is_pair=content.is_pair)
+    sheet = _long_sheet(builder, "Results", "", columns, content, {})
+    _title_block(sheet)
     sheet.finish(landscape=True, freeze=f"B{HEAD + 1}", repeat=f"{HEAD - 1}:{HEAD}")
 
 
@@ -214,7 +210,7 @@ def _printed(sheet: SheetBuilder, area: str, content: SurveyContent) -> None:
     name = sheet.worksheet.title
     sheet.worksheet.print_area = area
     formula = unprinted_formula(sheet.book.language, printed_rows(content))
-    sheet.formula("E1", formula, None, name=f"unprinted_{name}", font=WARN_FONT)
+    sheet.formula("E1", formula, name=f"unprinted_{name}", font=WARN_FONT)
 
 
 _BLOCK_PLACE = Alignment(wrap_text=True, vertical="top")
@@ -222,36 +218,24 @@ _BLOCK_PLACE = Alignment(wrap_text=True, vertical="top")
 _BLOCKS = {"A2:D2": "title_project", "E2:I2": "title_survey", "J2:O2": ""}
 
 
-def _title_block(sheet: SheetBuilder, content: SurveyContent, results: Cells) -> None:
+def _title_block(sheet: SheetBuilder) -> None:
     """Write whose survey it is, by whom, when, in which units, and how good."""
-    book, setup = sheet.book, setup_cells(content)
-
-    def line(word: str, name: str) -> tuple[str, str]:
-        return f'"{book.word(word)}: "&{name}', f"{book.word(word)}: {setup.get(name) or ''}"
-
-    people = [line("project", "project"), line("client", "client")]
-    survey = [line("surveyor", "surveyor"), line("survey_date", "survey_date")]
-    solved = sum(isinstance(x, float) and x == x for x in results.get("X", ()))
-    worst = None if content.check is None else content.check.accuracy
-    shown = "" if worst is None or worst != worst else f"{round(worst, 3):g} m"
-    points, rmse = book.word("points_solved"), book.word("worst_of_checks")
-    people.append((f'"{points}: "&COUNT(tblResults[X])', f"{points}: {solved}"))
-    live = f'"{rmse}: "&IF(ISNUMBER(check_worst),ROUND(check_worst,3)&" m","")'
-    survey.append((live, f"{rmse}: {shown}"))
+    book = sheet.book
+    people = [f'"{book.word(name)}: "&{name}' for name in ("project", "client")]
+    survey = [f'"{book.word(name)}: "&{name}' for name in ("surveyor", "survey_date")]
+    people.append(f'"{book.word("points_solved")}: "&COUNT(tblResults[X])')
+    worst = 'IF(ISNUMBER(check_worst),ROUND(check_worst,3)&" m","")'
+    survey.append(f'"{book.word("worst_of_checks")}: "&{worst}')
     for (area, name), lines in zip(_BLOCKS.items(), (people, survey, ()), strict=True):
         left = area.partition(":")[0]
         if lines:
-            text = "&CHAR(10)&".join(formula for formula, _ in lines)
-            value: CellValue = "\n".join(shown for _, shown in lines)
-            sheet.formula(left, text, value, name=name, font=BODY_FONT)
+            sheet.formula(left, "&CHAR(10)&".join(lines), name=name, font=BODY_FONT)
         else:
             sheet.word(left, "result_units")
         sheet.worksheet.merge_cells(area)
         sheet.worksheet[left].alignment = _BLOCK_PLACE
     sheet.worksheet.row_dimensions[2].height = 42
-    words = {key: book.word(key) for key in STATES}
-    said, _ = world_state(words, content.georeference)
-    sheet.formula("H1", STATE, said, name="title_world", font=HEAD_FONT)
+    sheet.formula("H1", STATE, name="title_world", font=HEAD_FONT)
     colour_where(sheet.worksheet, "H1", "g_alarm=1", WRONG)
     for area in ("E1:G1", "H1:O1"):
         sheet.worksheet.merge_cells(area)

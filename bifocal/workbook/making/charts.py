@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from openpyxl.chart import BarChart, LineChart, Reference, ScatterChart, Series
 from openpyxl.chart.layout import Layout, ManualLayout
@@ -18,7 +16,7 @@ from bifocal.workbook.making.reference_sheets import CHECK_HEAD
 from bifocal.workbook.words import word
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
-from photocore.workbook.making.live_charts import COLOURS, linked_title, scatter, titled
+from photocore.workbook.making.live_charts import COLOURS, scatter, titled
 from photocore.workbook.making.look import FACE, LABEL, LABEL_FONT
 from photocore.workbook.making.newbook import RowBlock
 from photocore.workbook.reading.grid import column_letters
@@ -32,7 +30,7 @@ KEYS = ("X", "Y", "s_c", "sigma_r")
 _BINS = (-99, -3, -2, -1, 0, 1, 2, 3, 99)
 
 
-def charts(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
+def charts(builder: BookBuilder, content: SurveyContent) -> None:
     """Write the chart data and three charts."""
     language = builder.language
     rows = min(content.point_rows, CHART_ROWS)
@@ -45,15 +43,9 @@ def charts(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
         sheet.text(f"{letter}{HEAD}", key, LABEL_FONT)
         at = f"ROW()-{HEAD}"
         value = f"INDEX(tblPoints[{key}],{at})"
-        sheet.formula(
-            f"{letter}{HEAD + 1}", f"IF(ISNUMBER({value}),{value},NA())", None, form="0.000"
-        )
+        sheet.formula(f"{letter}{HEAD + 1}", f"IF(ISNUMBER({value}),{value},NA())", form="0.000")
         sheet.worksheet[f"{letter}{HEAD + 1}"].font = Font(name=FACE, color="7F7F7F", size=LABEL)
-        listed: list[CellValue] = [
-            value if isinstance(value, int | float) else float("nan")
-            for value in cells.get(key, [])[:rows]
-        ]
-        columns.append(listed + [float("nan")] * (rows - len(listed)))
+        columns.append([float("nan")] * rows)
     builder.blocks["Charts"] = RowBlock(row=HEAD + 1, columns=columns)
     last = HEAD + rows
     data = [
@@ -61,7 +53,7 @@ def charts(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
         for i in range(len(KEYS))
     ]
     plan = scatter(word("chart_plan", language), "X [m]", "Y [m]", data[0], {"Y": data[1]})
-    _equal_scales(plan, cells)
+    _equal_scales(plan, content)
     sheet.worksheet.add_chart(plan, "A3")
     title, series = word("chart_sigma", language), {"sigma_r": data[3]}
     sigma = scatter(title, "s' [mm]", "sigma_r [m]", data[2], series)
@@ -69,36 +61,37 @@ def charts(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
     sigma.y_axis.number_format = "General"  # 0.00 would say the same of 1 mm and of 4 mm
     sheet.worksheet.add_chart(sigma, "A32")
     _errors(builder, content)
-    _checked(sheet, content, cells, last + 4)
+    _checked(sheet, content, last + 4)
     sheet.finish()
     sheet.worksheet.print_area = "A1:J115"
     sheet.worksheet.row_breaks.append(Break(id=57))
     sheet.worksheet.page_setup.fitToHeight = 2
 
 
-def _checked(sheet: SheetBuilder, content: SurveyContent, cells: Cells, head: int) -> None:
+def _checked(sheet: SheetBuilder, content: SurveyContent, head: int) -> None:
     """Draw how large the errors at check points are, and which way they point.
 
     Parameters
     ----------
-    sheet, content, cells
-        The sheet, what the workbook holds, and the columns of `Points`.
+    sheet, content
+        The sheet, and what the workbook holds.
     head : int
         Row of the keys of their numbers, below those of the other charts.
     """
     told = sheet.book.word("chart_vectors").split("{n}")
     bins, vectors = FORMULAS.columns("bins"), FORMULAS.columns("vectors")
-    counts, arrows, scale = _bin_cells(content), *_vector_cells(content)
+    counts = _bin_cells()
     (line,) = FORMULAS.columns("vectors", rows="lines")
     place = f"{column_letters(LEFT + 6)}{head - 2}"
-    sheet.formula(place, line.formula, scale, form=line.number_format, name=line.key)
+    sheet.formula(place, line.formula, form=line.number_format, name=line.key)
     live = f'"{told[0]}"&{line.key}&"{told[1]}"'
-    said, at = f"{scale:g}".join(told), f"{column_letters(LEFT + 7)}{head - 2}"
-    sheet.formula(at, live, said, name="chart_vectors", font=LABEL_FONT)
+    at = f"{column_letters(LEFT + 7)}{head - 2}"
+    sheet.formula(at, live, name="chart_vectors", font=LABEL_FONT)
     rows = len(counts["sigmas_from"])
     sheet.table("tblBins", bins, at=(head, LEFT + 6), rows=rows, cells=counts)
     left, count = LEFT + 12, content.arrows
-    sheet.table("tblVectors", vectors, at=(head, left), rows=count, cells=arrows)
+    numbered: Cells = {"check_row": list(range(1, count + 1))}
+    sheet.table("tblVectors", vectors, at=(head, left), rows=count, cells=numbered)
     area = {"min_row": head + 1, "max_row": head + rows}
     bars, line_of = BarChart(), LineChart()
     for chart, offset in ((bars, 9), (line_of, 10)):
@@ -127,57 +120,27 @@ def _checked(sheet: SheetBuilder, content: SurveyContent, cells: Cells, head: in
         arrow.graphicalProperties.line.width = 15000
         arrow.graphicalProperties.line.tailEnd = LineEndProperties(type="triangle")
         plan.series.append(arrow)
-    plan.title = linked_title("Charts", at, said)
-    _equal_scales(plan, cells)
+    plan.title = sheet.book.linked_title("Charts", at)
+    _equal_scales(plan, content)
     sheet.worksheet.add_chart(plan, "A87")
 
 
-def _bin_cells(content: SurveyContent) -> Cells:
-    """Return how many errors at check points lie between two numbers of sigmas."""
-    check = content.check
-    errors = np.zeros(0) if check is None else check.standardised[~np.isnan(check.standardised)]
-    shares = [math.erf(edge / math.sqrt(2)) / 2 for edge in _BINS]
-    above = np.array([(errors >= edge).sum() for edge in _BINS])
+def _bin_cells() -> Cells:
+    """Return the edges between which errors are counted."""
     return {
         "bin": [f"< {_BINS[1]}", *(f"{a} … {a + 1}" for a in _BINS[1:-2]), f"> {_BINS[-2]}"],
         "sigmas_from": list(_BINS[:-1]),
         "sigmas_to": list(_BINS[1:]),
-        "counted": (above[:-1] - above[1:]).tolist(),
-        "expected": (len(errors) * np.diff(shares)).tolist(),
     }
 
 
-def _vector_cells(content: SurveyContent) -> tuple[Cells, float]:
-    """Return the ends of the arrows of errors at check points, and how often they are enlarged."""
-    count, check = content.arrows, content.check
-    start, tip, scale = np.full((count, 2), np.nan), np.full((count, 2), np.nan), 1.0
-    if check is not None and len(check.errors):
-        errors, known = check.errors[:, :2], content.known.xyz[:, :2]
-        span = max(
-            (
-                np.nanmax(column, initial=-np.inf) - np.nanmin(column, initial=np.inf)
-                for column in check.solved[:, :2].T
-            ),
-            default=0.0,
-        )
-        largest = np.nanmax(np.abs(errors), initial=0.0)
-        if span > 0 and largest > 1e-9 * span:  # less is rounding
-            raw = float(0.15 * span / largest)
-            scale = round(raw, -math.floor(math.log10(raw)))
-        both = ~np.isnan(errors).any(axis=1, keepdims=True)
-        start[: len(errors)] = np.where(both, known, np.nan)
-        tip[: len(errors)] = start[: len(errors)] + scale * errors
-    ends = {f"{axis}_from": start[:, i].tolist() for i, axis in enumerate("XY")}
-    ends |= {f"{axis}_to": tip[:, i].tolist() for i, axis in enumerate("XY")}
-    return {"check_row": list(range(1, count + 1)), **ends}, scale
-
-
-def _equal_scales(chart: ScatterChart, cells: Cells) -> None:
+def _equal_scales(chart: ScatterChart, content: SurveyContent) -> None:
     """Give X and Y the same scale, so that the wall keeps its shape."""
     extents = []
     for key in ("X", "Y"):
-        listed = [v for v in cells.get(key, []) if isinstance(v, int | float) and v == v]
-        extents.append((min(listed), max(listed)) if listed else (-5.0, 5.0))
+        places = np.zeros(0) if content.table is None else content.table[key]
+        places = places[np.isfinite(places)].tolist()
+        extents.append((min(places), max(places)) if places else (-5.0, 5.0))
     span = max(high - low for low, high in extents) * 1.1 or 1.0
     for axis, (low, high) in zip((chart.x_axis, chart.y_axis), extents, strict=True):
         middle = (low + high) / 2

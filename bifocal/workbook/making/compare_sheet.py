@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
 from openpyxl.styles import Alignment
 
-from bifocal.survey.check_points import statistics
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.formulas.columns import compare_columns, compared
 from bifocal.workbook.making.reference_sheets import statistics_of
 from bifocal.workbook.making.setup_sheet import pair_names
-from bifocal.workbook.reference_cells import compare_cells
-from photocore.arrays import FloatArray
-from photocore.workbook.making.live_book import BookBuilder, Cells
+from photocore.workbook.making.live_book import BookBuilder
 from photocore.workbook.making.look import HEAD_FONT
 from photocore.workbook.reading.grid import column_letters
 
@@ -20,9 +16,9 @@ from photocore.workbook.reading.grid import column_letters
 HEAD = 11
 
 
-def compare(builder: BookBuilder, content: SurveyContent, points: Cells) -> None:
+def compare(builder: BookBuilder, content: SurveyContent) -> None:
     """Write errors of relief of every pair, and of all photos together, with their statistics."""
-    sheet, cells = builder.sheet("Compare", "compare_how"), compare_cells(content, points)
+    sheet = builder.sheet("Compare", "compare_how")
     columns, kinds = compare_columns(content.others), compared(content.others)
     keys = [column.key for column in columns]
     sheet.word("A9", "expected_sigma")
@@ -31,17 +27,9 @@ def compare(builder: BookBuilder, content: SurveyContent, points: Cells) -> None
         letter = column_letters(keys.index(f"e_{r}") + 1)
         sheet.text(f"{letter}4", title, HEAD_FONT)
         sheet.worksheet[f"{letter}4"].alignment = Alignment(horizontal="right")
-        found = statistics(_numbers(cells, f"e_{r}"))
-        statistics_of(sheet, letter, f"tblCompare[e_{r}]", f"compare_{{}}_{r}", found)
-        sigmas = _numbers(cells, sigma)
-        known = sigmas[~np.isnan(sigmas)]
+        statistics_of(sheet, letter, f"tblCompare[e_{r}]", f"compare_{{}}_{r}")
         text = f'IF({letter}5=0,"",SQRT(SUMSQ(tblCompare[{sigma}])/{letter}5))'
-        value = float(np.sqrt(np.mean(known**2))) if len(known) else None
-        sheet.formula(f"{letter}9", text, value, form="0.0000", name=f"compare_sigma_{r}")
-    sheet.table("tblCompare", columns, at=(HEAD, 1), rows=content.check_rows, cells=cells)
+        sheet.formula(f"{letter}9", text, form="0.0000", name=f"compare_sigma_{r}")
+    sheet.table("tblCompare", columns, at=(HEAD, 1), rows=content.check_rows, cells={})
     sheet.worksheet.column_dimensions["A"].width = 26
     sheet.finish(landscape=True, freeze=f"B{HEAD + 1}", repeat=f"{HEAD - 1}:{HEAD}")
-
-
-def _numbers(cells: Cells, key: str) -> FloatArray:
-    return np.array([np.nan if value is None else value for value in cells.get(key, ())], float)

@@ -69,7 +69,7 @@ def _function(sheet: SheetBuilder, row: int, name: str, *, named: bool) -> int:
         sheet.describe(row, (key, text), unit)
         if column.formula:
             formula = _GIVEN.sub(lambda match: places[match[1]], column.formula)
-            sheet.formula(cell, formula, value, form="0.000000")
+            sheet.formula(cell, formula, form="0.000000")
         else:
             sheet.input(cell, value)
             sheet.validate(cell, title=key, prompt=text, limits=(-1e7, 1e7))

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 import numpy as np
 
 from bifocal.survey.remarks import LARGEST_RESIDUAL, SCALE_SHARE
-from bifocal.survey.space_similarity import SpaceSums
-from bifocal.survey.weighted_similarity import TURNS
-from bifocal.workbook.content import SurveyContent
+from bifocal.workbook.content import SurveyContent, control_cells
 from bifocal.workbook.formulas.columns import FORMULAS, georeference_columns
-from bifocal.workbook.formulas.georeference_values import georeference_values
 from bifocal.workbook.formulas.space_block import STEP_FORM, SpaceBlock
-from bifocal.workbook.formulas.world_state import STATE, STATES, world_state, world_state_formula
-from bifocal.workbook.reference_cells import control_cells
-from photocore.workbook.changing.cells import CellValue
+from bifocal.workbook.formulas.world_state import STATE, STATES, world_state_formula
 from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
 from photocore.workbook.making.live_columns import LiveColumn
 from photocore.workbook.making.look import HEAD_FONT, LABEL_FONT, NOTE_FONT, WRONG, colour_where
 from photocore.workbook.reading.grid import column_letters
 
+#: Turns of the direction, each some 1e-3 as far as the one before: six reach rounding.
+TURNS = 6
 #: Row of the keys of the control points; model and parameters stand above.
 CONTROL_HEAD = 12
 #: First column and rows of the steps of the fit: above the folded columns of the table.
@@ -51,18 +48,14 @@ def georeference(builder: BookBuilder, content: SurveyContent) -> None:
     prompt, choices = builder.word("geo_models"), "auto,levelled,3D,2D"
     sheet.validate("B4", title="g_model", prompt=prompt, choices=choices)
     sheet.input("B5", None if geo is None else geo.model, name="g_auto", editable=False)
-    values = georeference_values(geo, content.model)
     head = FORMULAS.columns("georeference", parts={"last": str(TURNS)})
     for cell, line in zip(_HEAD, head, strict=True):
-        value = values.get(line.key)
-        sheet.formula(cell, line.formula, value, form=line.number_format, name=line.key)
-    sums = None if geo is None else geo.sums
+        sheet.formula(cell, line.formula, form=line.number_format, name=line.key)
     words = {key: builder.word(key) for key in STATES}
-    said, values["g_alarm"] = world_state(words, geo)
-    sheet.formula("A2", world_state_formula(words), said, name=STATE, font=HEAD_FONT)
+    sheet.formula("A2", world_state_formula(words), name=STATE, font=HEAD_FONT)
     colour_where(sheet.worksheet, "A2", "g_alarm=1", WRONG)
-    space = SpaceBlock(sheet, sums if isinstance(sums, SpaceSums) else None)
-    _write_steps(sheet, FORMULAS.columns("georeference", rows="steps", parts=_parts(space)), values)
+    space = SpaceBlock(sheet, blank=geo is None or geo.model != "3D")
+    _write_steps(sheet, FORMULAS.columns("georeference", rows="steps", parts=_parts(space)))
     cells = control_cells(content)
     columns = georeference_columns(is_pair=content.is_pair)
     sheet.table("tblGeo", columns, at=(CONTROL_HEAD, 1), rows=rows, cells=cells)
@@ -91,14 +84,12 @@ def _parts(space: SpaceBlock) -> dict[str, str]:
     }
 
 
-def _write_steps(
-    sheet: SheetBuilder, steps: Iterable[LiveColumn], values: Mapping[str, CellValue]
-) -> None:
+def _write_steps(sheet: SheetBuilder, steps: Iterable[LiveColumn]) -> None:
     """Write the steps of the fit, each beside its name, above the folded columns."""
     for i, step in enumerate(steps):
         row, left = _TOP + i % _ROWS, _LEFT + 2 * (i // _ROWS)
         # Not above the residuals, which are not folded away.
         left += _BESIDE if left >= _RESIDUALS else 0
         sheet.text(f"{column_letters(left)}{row}", step.key, LABEL_FONT)
-        place, value = f"{column_letters(left + 1)}{row}", values.get(step.key)
-        sheet.formula(place, step.formula, value, form=STEP_FORM, name=step.key)
+        place = f"{column_letters(left + 1)}{row}"
+        sheet.formula(place, step.formula, form=STEP_FORM, name=step.key)

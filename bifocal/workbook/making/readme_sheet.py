@@ -7,7 +7,7 @@ from openpyxl.worksheet.pagebreak import Break
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.making.cameras_sketch import SIZE, cameras_sketch, hand_sketch
 from bifocal.workbook.words import WORDS, readme
-from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
+from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
 from photocore.workbook.making.look import HEAD_FONT, ROW_HEIGHT
 
 #: Printed rows of the first page, where the second begins, and the height of its drawing. [pt]
@@ -18,7 +18,7 @@ _TOP = 3
 _NAME, _KNOWN, _NEARLY = "TEST", {"r": 1.0, "X": 2.0}, 0.002
 
 
-def readme_sheet(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
+def readme_sheet(builder: BookBuilder, content: SurveyContent) -> None:
     """Write the sheet; where points are measured by hand, what that takes and a worked row.
 
     Parameters
@@ -26,8 +26,6 @@ def readme_sheet(builder: BookBuilder, content: SurveyContent, cells: Cells) -> 
     builder : BookBuilder
     content : SurveyContent
         What the workbook holds.
-    cells : mapping
-        The columns of `Points`.
     """
     media = bool(content.media_cells)
     lines = readme(builder.language, media=media, leaning=content.leaning)
@@ -45,10 +43,10 @@ def readme_sheet(builder: BookBuilder, content: SurveyContent, cells: Cells) -> 
     sheet = SheetBuilder(book=builder, worksheet=builder.book["Readme"])
     sheet.worksheet.row_breaks.append(Break(id=_SECOND - 1))
     sheet.worksheet.page_setup.fitToHeight = 2
-    _worked_row(sheet, _TOP + lines.index("{test}"), cells)
+    _worked_row(sheet, _TOP + lines.index("{test}"))
 
 
-def _worked_row(sheet: SheetBuilder, row: int, cells: Cells) -> None:
+def _worked_row(sheet: SheetBuilder, row: int) -> None:
     """Write the line that says whether the worked row comes out, wherever it stands in `Points`."""
     say = {key: sheet.book.word(f"test_{key}") for key in ("waits", "holds", "fails")}
     off = "+".join(
@@ -56,12 +54,5 @@ def _worked_row(sheet: SheetBuilder, row: int, cells: Cells) -> None:
         for key, value in _KNOWN.items()
     )
     judged = f'IF({off}<{_NEARLY:g},"{say["holds"]}","{say["fails"]}")'
-    said, ids = "waits", list(cells.get("id", ()))
-    if _NAME in ids:
-        found = [cells[key][ids.index(_NAME)] for key in _KNOWN]
-        numbers = [value for value in found if isinstance(value, int | float)]
-        if len(numbers) == len(found):
-            far = sum(abs(a - b) for a, b in zip(numbers, _KNOWN.values(), strict=True))
-            said = "holds" if far < _NEARLY else "fails"
     text = f'IFERROR({judged},"{say["waits"]}")'
-    sheet.formula(f"A{row}", text, say[said], name="worked_row", font=HEAD_FONT)
+    sheet.formula(f"A{row}", text, name="worked_row", font=HEAD_FONT)

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 from openpyxl.styles import Alignment
 
-from bifocal.model.flags import FlagLimits
-from bifocal.survey.reference import AxisErrors
 from bifocal.survey.tolerances import judge
-from bifocal.workbook.content import SurveyContent, setup_cells
+from bifocal.workbook.content import SurveyContent, check_cells
 from bifocal.workbook.formulas.columns import (
     FORMULAS,
     FRAME_SHARES,
@@ -18,10 +14,8 @@ from bifocal.workbook.formulas.columns import (
     check_columns,
     planning_facts,
 )
-from bifocal.workbook.reference_cells import check_cells
 from bifocal.workbook.words import word
-from photocore.workbook.changing.cells import CellValue
-from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
+from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
 from photocore.workbook.making.look import DOUBT, GOOD, HEAD_FONT, WRONG, colour_where, colour_words
 from photocore.workbook.reading.grid import column_letters
 
@@ -32,7 +26,7 @@ _SENSOR = ("sensor_w", "sensor_h")
 VERDICT_LEFT = 20
 
 
-def check(builder: BookBuilder, content: SurveyContent, points: Cells) -> None:
+def check(builder: BookBuilder, content: SurveyContent) -> None:
     """Write errors at check points, their statistics and the verdict."""
     rows = content.check_rows
     sheet = builder.sheet("Check", "check_how")
@@ -40,19 +34,12 @@ def check(builder: BookBuilder, content: SurveyContent, points: Cells) -> None:
         sheet.text(f"{letter}4", f"d{axis}", HEAD_FONT)
         sheet.worksheet[f"{letter}4"].alignment = Alignment(horizontal="right")
     for letter, axis in zip("BCD", "XYZ", strict=True):
-        found = None if content.check is None else content.check.axes[axis]
-        statistics_of(sheet, letter, f"tblCheck[d{axis}]", f"check_{{}}_{axis}", found)
+        statistics_of(sheet, letter, f"tblCheck[d{axis}]", f"check_{{}}_{axis}")
     sheet.word("A9", "worst")
-    accuracy = content.check.accuracy if content.check is not None else math.nan
-    worst = None if math.isnan(accuracy) else accuracy
-    sheet.formula(
-        "B9", 'IF(COUNT(B6:D6)=0,"",MAX(B6:D6))', worst, form="0.0000", name="check_worst"
-    )
+    sheet.formula("B9", 'IF(COUNT(B6:D6)=0,"",MAX(B6:D6))', form="0.0000", name="check_worst")
     sheet.word("A10", "flagged")
-    flagged = 0 if content.check is None else len(content.check.flagged)
-    sheet.formula("B10", "SUM(tblCheck[out])", flagged, form="0", name="check_flagged")
-    columns = check_columns()
-    cells = check_cells(content, points)
+    sheet.formula("B10", "SUM(tblCheck[out])", form="0", name="check_flagged")
+    columns, cells = check_columns(), check_cells(content)
     sheet.table("tblCheck", columns, at=(CHECK_HEAD, 1), rows=rows, cells=cells)
     sheet.worksheet.column_dimensions["A"].width = 18
     for letter in ("R", "S"):
@@ -64,14 +51,12 @@ def check(builder: BookBuilder, content: SurveyContent, points: Cells) -> None:
     for formula, colour in _ROWS.items():
         formula = formula.format(out=out, sigmas=sigmas)
         colour_where(sheet.worksheet, area, formula, colour, bold=True, stop=True)
-    _verdict(sheet, content, accuracy)
+    _verdict(sheet, content)
     repeat = f"{CHECK_HEAD - 1}:{CHECK_HEAD}"
     sheet.finish(landscape=True, freeze=f"B{CHECK_HEAD + 1}", repeat=repeat)
 
 
-def statistics_of(
-    sheet: SheetBuilder, letter: str, column: str, name: str, found: AxisErrors | None
-) -> None:
+def statistics_of(sheet: SheetBuilder, letter: str, column: str, name: str) -> None:
     """Write number, RMSE, mean and largest of a column of errors, from row 5 on.
 
     Parameters
@@ -82,35 +67,29 @@ def statistics_of(
         The errors, as formulas call them.
     name : str
         Of the cells, with the statistic in braces.
-    found : AxisErrors or None
-        What they show.
     """
-    for row, (key, (body, attribute)) in enumerate(_STATISTICS.items(), start=5):
+    for row, (key, body) in enumerate(_STATISTICS.items(), start=5):
         sheet.word(f"A{row}", key)
-        value: CellValue = 0 if key == "n" else None
-        if found is not None and found.n:
-            value = getattr(found, attribute)
         form, text = "0" if key == "n" else "0.0000", body.format(column, f"{letter}5")
-        sheet.formula(f"{letter}{row}", text, value, form=form, name=name.format(key))
+        sheet.formula(f"{letter}{row}", text, form=form, name=name.format(key))
 
 
 #: Rows that are coloured: not counted, beyond three sigma, beyond two.
 _ROWS = {"{out}=1": DOUBT, "N({sigmas})>3": WRONG, "N({sigmas})>2": ("FFF2CC", "7F6000")}
-#: Statistics of errors: formula of their column and the cell of their number, attribute.
+#: Statistics of errors: formula of their column and the cell of their number.
 _STATISTICS = {
-    "n": ("COUNT({0})", "n"),
-    "rmse": ('IF({1}=0,"",SQRT(SUMSQ({0})/{1}))', "rmse"),
-    "mean": ('IF({1}=0,"",AVERAGE({0}))', "mean"),
-    "max": ('IF({1}=0,"",MAX(MAX({0}),-MIN({0})))', "max_abs"),
+    "n": "COUNT({0})",
+    "rmse": 'IF({1}=0,"",SQRT(SUMSQ({0})/{1}))',
+    "mean": 'IF({1}=0,"",AVERAGE({0}))',
+    "max": 'IF({1}=0,"",MAX(MAX({0}),-MIN({0})))',
 }
 
 
-def _verdict(sheet: SheetBuilder, content: SurveyContent, accuracy: float) -> None:
+def _verdict(sheet: SheetBuilder, content: SurveyContent) -> None:
     """Write what drawing scales the accuracy holds, beside the check table."""
     language = sheet.book.language
     holds, fails = word("holds", language), word("fails", language)
-    verdicts = judge(accuracy, content.rules)
-    unknown = math.isnan(accuracy)
+    verdicts = judge(float("nan"), content.rules)
     sheet.table(
         "tblVerdict",
         FORMULAS.columns("verdict", parts={"holds": holds, "fails": fails}),
@@ -120,9 +99,6 @@ def _verdict(sheet: SheetBuilder, content: SurveyContent, accuracy: float) -> No
             "rule": [verdict.rule.name for verdict in verdicts],
             "scale": [verdict.scale for verdict in verdicts],
             "tolerance": [verdict.tolerance * 1000.0 for verdict in verdicts],
-            "verdict": [
-                None if unknown else holds if verdict.holds else fails for verdict in verdicts
-            ],
         },
     )
     first, last = CHECK_HEAD + 1, CHECK_HEAD + len(verdicts)
@@ -133,65 +109,27 @@ def _verdict(sheet: SheetBuilder, content: SurveyContent, accuracy: float) -> No
 
 def planning(builder: BookBuilder, content: SurveyContent) -> None:
     """Write what precision to expect over the frame and where relief cannot be told from zero."""
-    sheet, cells = builder.sheet("Planning", "type"), setup_cells(content)
-    scale_name = "m_seen" if content.media_cells and not content.is_pair else "m_1"
-    scale, pitch, sigma, base = (
-        float(cells.get(name) or math.nan) for name in (scale_name, "pitch", "sigma_s", "b_lever")
-    )
-
+    sheet = builder.sheet("Planning", "type")
     facts = planning_facts(media=content.media_cells, is_pair=content.is_pair)
     lines = {line.key: line.formula for line in FORMULAS.columns("planning", facts, rows="lines")}
-    sizes = content.sensor or (math.nan, math.nan)
     sheet.word("A6", "footprint")
-    for row, (name, size) in enumerate(zip(_SENSOR, sizes, strict=True), start=4):
+    for row, (name, size) in enumerate(
+        zip(_SENSOR, content.sensor or (None, None), strict=True), start=4
+    ):
         sheet.word(f"A{row}", name)
         sheet.input(f"B{row}", size, form="0.00", name=name)
         sheet.validate(f"B{row}", title=name, prompt=word(name, builder.language), above_zero=True)
-    # By the principal distance: without it the image scale of a general pair is only nominal.
-    d1_name = "seen_1" if content.media_cells else "d_1"
-    c1, d1 = (float(cells.get(name) or math.nan) for name in ("c_1", d1_name))
-    for letter, name, size in zip("BC", _SENSOR, sizes, strict=True):
-        named, covered = name.replace("sensor", "covered"), _known(size * d1 / c1)
-        sheet.formula(f"{letter}6", lines[named], covered, form="0.00", name=named)
+    for letter, name in zip("BC", _SENSOR, strict=True):
+        covered = name.replace("sensor", "covered")
+        sheet.formula(f"{letter}6", lines[covered], form="0.00", name=covered)
     sheet.word("A7", "gsd")
-    pixel = float(cells.get("pixel_wall") or math.nan) if content.is_pair else pitch * scale
-    sheet.formula("B7", lines["gsd_mm"], _known(pixel), form="0.00", name="gsd_mm")
-    diagonal = math.hypot(*sizes) * float(cells["enlargement_1"] or 1)  # of the print, if any
+    sheet.formula("B7", lines["gsd_mm"], form="0.00", name="gsd_mm")
     sheet.word("A9", "uncertainty", HEAD_FONT)
-    shown = _uncertainty(content, sigma, scale, diagonal)
-    columns = FORMULAS.columns("planning", facts, PLANNING)
-    sheet.table("tblPlan", columns, at=(11, 1), rows=len(PLANNED_RELIEF), cells=shown)
+    columns, rows = FORMULAS.columns("planning", facts, PLANNING), len(PLANNED_RELIEF)
+    sheet.table("tblPlan", columns, at=(11, 1), rows=rows, cells={"relief_cm": PLANNED_RELIEF})
     head = 11 + len(PLANNED_RELIEF) + 4
     sheet.word(f"A{head - 2}", "over_frame", HEAD_FONT)
-    radii = [share / 200 * diagonal for share in FRAME_SHARES]
-    over_frame: Cells = {
-        "share": FRAME_SHARES,
-        "s_mm": list(map(_known, radii)),
-        "sigma_r": [_known(math.sqrt(2) * sigma * base / radius) for radius in radii],
-    }
-    rows = len(FRAME_SHARES)
-    columns = FORMULAS.columns("over_frame", facts)
-    sheet.table("tblFrame", columns, at=(head, 1), rows=rows, cells=over_frame)
+    columns, rows = FORMULAS.columns("over_frame", facts), len(FRAME_SHARES)
+    sheet.table("tblFrame", columns, at=(head, 1), rows=rows, cells={"share": FRAME_SHARES})
     sheet.worksheet.column_dimensions["A"].width = 36
     sheet.finish()
-
-
-def _known(value: float) -> float | None:
-    """Return a number; None where what it follows from is not given."""
-    return None if math.isnan(value) else value
-
-
-def _uncertainty(content: SurveyContent, sigma: float, scale: float, diagonal: float) -> Cells:
-    """Return the radii inside which a relief is below twice its standard deviation."""
-    d1, d2 = content.pair.straight_distances if content.pair else (math.nan, math.nan)
-    radii = []
-    for cm in PLANNED_RELIEF:
-        r = cm / 100
-        noise = FlagLimits().on_plane * math.sqrt(2) * sigma
-        radii.append(noise * (d1 - r) * (d2 - r) / (r * abs(d1 - d2)))
-    return {
-        "relief_cm": PLANNED_RELIEF,
-        "radius_mm": list(map(_known, radii)),
-        "radius_m": [_known(radius * scale / 1000) for radius in radii],
-        "share": [_known(200 * radius / diagonal) for radius in radii],
-    }

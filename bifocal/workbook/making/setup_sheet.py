@@ -19,7 +19,6 @@ from bifocal.workbook.formulas.setup_cells import (
     is_text,
     may_be_zero,
     number_format,
-    state,
     state_formula,
 )
 from bifocal.workbook.words import term, word
@@ -41,7 +40,7 @@ def setup_sheet(builder: BookBuilder, content: SurveyContent) -> None:
     if content.media_cells:
         words["state_scale"] = builder.word("state_scale_media")
     line = state_formula(words, is_pair=content.is_pair)
-    sheet.formula("A3", line, state(cells, words), name="setup_state", font=HEAD_FONT)
+    sheet.formula("A3", line, name="setup_state", font=HEAD_FONT)
     sheet.headings(4, ("name", "description", "value", "unit"), (15, 61, 18, 9))
     for letter, pair in zip(_COLUMNS, pair_names(content.others), strict=False):
         if content.others:
@@ -104,7 +103,7 @@ def _setup_cell(
         if own in content.links:
             sheet.formula(cell, content.links[own], value, form=form, name=own, editable=True)
         elif not typed or (own in live and is_default.get(own, False)):
-            sheet.formula(cell, live[own], value, form=form, name=own, editable=typed)
+            sheet.formula(cell, live[own], form=form, name=own, editable=typed)
         else:
             sheet.input(cell, value, form=form, name=own)
 

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-import numpy as np
 from openpyxl.chart import BarChart, Reference, Series
 from openpyxl.chart.shapes import GraphicalProperties
 from openpyxl.styles import Alignment
 
-from bifocal.survey.what_if import CHANGED, what_if
-from bifocal.workbook.content import CHART_ROWS, SurveyContent, inputs, setup_cells
-from bifocal.workbook.formulas.columns import FORMULAS
+from bifocal.workbook.content import CHART_ROWS, SurveyContent
+from bifocal.workbook.formulas.columns import CHANGED, FORMULAS
 from bifocal.workbook.formulas.setup_cells import number_format
-from photocore.arrays import FloatArray
-from photocore.workbook.changing.cells import CellValue, name_cell
 from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
 from photocore.workbook.making.live_charts import COLOURS, scatter, titled
 
@@ -26,36 +20,22 @@ _DRAWN = ("s_c", "change")
 DEFAULTS = {"d_1": 0.01, "d_2": 0.01, "c_1": 0.05, "c_2": 0.05, "pitch": 0.0}
 
 
-def what_if_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
-    """Return every column of the table of points under changes, by key."""
-    if content.table is None or content.setup is None:
-        return {}
-    changes = {**DEFAULTS, **(content.changes or {})}
-    found = what_if(content.setup.taking, content.table, changes)
-    found["s_c"] = content.table["s_c"]
-    cells = {key: inputs(column[:CHART_ROWS]) for key, column in found.items()}
-    drawn = ~np.isnan(found["change"])
-    for key in _DRAWN:
-        cells[f"plot_{key}"] = np.where(drawn, found[key], np.nan)[:CHART_ROWS].tolist()
-    return {"id": [name_cell(name) for name in content.table.ids[:CHART_ROWS]], **cells}
-
-
 def what_if_sheet(builder: BookBuilder, content: SurveyContent) -> None:
     """Write cells for the changes, their effect on every point, and two charts of it."""
-    sheet, cells = builder.sheet("WhatIf", "what_if_how"), what_if_cells(content)
+    sheet = builder.sheet("WhatIf", "what_if_how")
     changes = {**DEFAULTS, **(content.changes or {})}
     sheet.headings(FIRST - 1, ("name", "value", "change", "becomes", "max", "rms_change"))
     for letter in "CDEF":
         sheet.worksheet[f"{letter}{FIRST - 1}"].alignment = Alignment(horizontal="right")
     for row, name in enumerate(CHANGED, start=FIRST):
-        _changed(sheet, row, name, setup_cells(content).get(name), changes[name])
-        _effect(sheet, row, f"by_{name}", cells)
+        _changed(sheet, row, name, changes[name])
+        _effect(sheet, row, f"by_{name}")
     row = FIRST + len(CHANGED)
     sheet.word(f"A{row}", "all_changes")
-    _effect(sheet, row, "change", cells)
+    _effect(sheet, row, "change")
     columns = FORMULAS.columns("what_if")
     rows = min(content.point_rows, CHART_ROWS)
-    sheet.table("tblWhatIf", columns, at=(HEAD, 1), rows=rows, cells=cells, repeat=True)
+    sheet.table("tblWhatIf", columns, at=(HEAD, 1), rows=rows, cells={}, repeat=True)
     area = {"min_row": FIRST, "max_row": row}
     bars, names = BarChart(), Reference(sheet.worksheet, min_col=1, **area)
     bars.series.append(Series(Reference(sheet.worksheet, min_col=6, **area), title="r [m]"))
@@ -78,28 +58,24 @@ def what_if_sheet(builder: BookBuilder, content: SurveyContent) -> None:
     sheet.finish(landscape=True, repeat=f"{HEAD - 1}:{HEAD}")
 
 
-def _changed(sheet: SheetBuilder, row: int, name: str, value: CellValue, change: float) -> None:
+def _changed(sheet: SheetBuilder, row: int, name: str, change: float) -> None:
     """Write a value of the set-up, what is added to it, and what it becomes."""
-    known = sheet.book.words.term("setup", name)
+    wording = sheet.book.words.term("setup", name)
     form, prompt = number_format(name), sheet.book.word("what_if_how")
-    sheet.text(f"A{row}", f"{name} [{known.unit if known else ''}]")
+    sheet.text(f"A{row}", f"{name} [{wording.unit if wording else ''}]")
     text = f'IF(COUNT({name})=1,{name},"")'
-    sheet.formula(f"B{row}", text, value, form=form, name=f"now_{name}")
+    sheet.formula(f"B{row}", text, form=form, name=f"now_{name}")
     sheet.input(f"C{row}", change, form="0.0000", name=f"change_{name}")
     sheet.validate(f"C{row}", title=name, prompt=prompt, limits=(-1e4, 1e4))
-    new = value + change if isinstance(value, int | float) else None
     text = f'IF(COUNT({name})=1,{name}+N(change_{name}),"")'
-    sheet.formula(f"D{row}", text, new, form=form, name=f"new_{name}")
+    sheet.formula(f"D{row}", text, form=form, name=f"new_{name}")
 
 
-def _effect(sheet: SheetBuilder, row: int, key: str, cells: Mapping[str, list[CellValue]]) -> None:
+def _effect(sheet: SheetBuilder, row: int, key: str) -> None:
     """Write how far a change moves relief: the largest, and the root mean square."""
-    known: FloatArray = np.array([v for v in cells.get(key, ()) if v is not None], float)
     column = f"tblWhatIf[{key}]"
-    shown = (np.abs(known).max(), np.sqrt(np.mean(known**2))) if len(known) else (None, None)
     bodies = (f"MAX(MAX({column}),-MIN({column}))", f"SQRT(SUMSQ({column})/COUNT({column}))")
-    for letter, body, value in zip("EF", bodies, shown, strict=True):
+    for letter, body in zip("EF", bodies, strict=True):
         text = f'IF(COUNT({column})=0,"",{body})'
         name = f"effect_{'max' if letter == 'E' else 'rms'}_{key}"
-        value = None if value is None else float(value)
-        sheet.formula(f"{letter}{row}", text, value, form="0.0000", name=name)
+        sheet.formula(f"{letter}{row}", text, form="0.0000", name=name)

@@ -6,9 +6,11 @@ Arguments lie as rows of a table down, ranges across.
 
 from __future__ import annotations
 
+import math
+import operator
 import re
-from collections.abc import Callable, Mapping
-from functools import reduce
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache, partial, reduce
 from typing import Any
 
 import numpy as np
@@ -20,16 +22,18 @@ from photocore.workbook.calculating.values import (
     NUMBER,
     TEXT,
     TRUTH,
-    Cells,
+    CellArray,
     Unknown,
+    among,
     as_numbers,
     number_cells,
+    single,
     spread,
     text_cells,
 )
 
 
-def _compare(sign: str, one: Cells, other: Cells) -> Cells:
+def _compare(sign: str, one: CellArray, other: CellArray) -> CellArray:
     one, other = spread(one, other)
     bad = one.is_error | other.is_error
     a, b = one.numbers.copy(), other.numbers.copy()
@@ -53,8 +57,10 @@ _ARITHMETIC: Mapping[str, Callable[..., Any]] = {
 }  # fmt: skip
 
 
-def signed(sign: str, one: Cells, other: Cells) -> Cells:
+def signed(sign: str, one: CellArray, other: CellArray) -> CellArray:
     """Return what a sign makes of the cells before and behind it."""
+    if one.is_number and other.is_number and sign != "&":
+        return _of_numbers(sign, one.numbers.item(), other.numbers.item())
     if sign == "&":
         one, other = spread(one, other)
         return text_cells(one.shown() + other.shown(), one.is_error | other.is_error)
@@ -65,20 +71,55 @@ def signed(sign: str, one: Cells, other: Cells) -> Cells:
         return number_cells(_ARITHMETIC[sign](a, b), bad | worse)
 
 
-def _choice(test: Cells, yes: Cells, no: Cells | None = None) -> Cells:
-    test, yes, no = spread(test, yes, no or number_cells([[0.0]], kind=TRUTH))
+def _of_numbers(sign: str, a: float, b: float) -> CellArray:
+    """Return what a sign makes of two numbers: single cells are many, and arrays slow for them."""
+    if sign in _COMPARISONS:
+        return single(float(_PLAIN[sign](a, b)), TRUTH)
+    try:
+        value = _PLAIN[sign](a, b)
+    except (ZeroDivisionError, OverflowError):
+        value = math.nan
+    return single(value if isinstance(value, float) else math.nan)  # roots of less than 0
+
+
+_PLAIN: Mapping[str, Callable[..., Any]] = {
+    "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv,
+    "^": operator.pow, "=": operator.eq, "<>": operator.ne, "<": operator.lt, ">": operator.gt,
+    "<=": operator.le, ">=": operator.ge,
+}  # fmt: skip
+
+
+def chosen(name: str, parts: Sequence[Callable[[], CellArray]]) -> CellArray:
+    """Return what IF or IFERROR chooses; what is chosen nowhere is not calculated."""
+    no: Callable[[], CellArray]
+    if name == "IFERROR":
+        value = parts[0]()
+        if not value.is_error.any():
+            return value
+        test, yes, no = number_cells(value.is_error, kind=TRUTH), parts[1], partial(_itself, value)
+    else:
+        test, yes = parts[0](), parts[1]
+        no = parts[2] if len(parts) > 2 else partial(single, 0.0, TRUTH)
+    bad = test.is_error | (test.kinds == TEXT)
+    holds = test.numbers != 0
+    if not bad.any() and holds.all():
+        return yes()
+    if not bad.any() and not holds.any():
+        return no()
+    test, first, second = spread(test, yes(), no())
     bad, holds = test.is_error | (test.kinds == TEXT), test.numbers != 0
-    parts = ((yes.numbers, no.numbers), (yes.kinds, no.kinds), (yes.texts, no.texts))
-    numbers, kinds, texts = (np.where(holds, a, b) for a, b in parts)
-    return Cells(numbers, np.where(bad, ERROR, kinds).astype(np.uint8), texts)
+    pairs = (
+        (first.numbers, second.numbers), (first.kinds, second.kinds), (first.texts, second.texts)
+    )  # fmt: skip
+    numbers, kinds, texts = (np.where(holds, a, b) for a, b in pairs)
+    return CellArray(numbers, np.where(bad, ERROR, kinds).astype(np.uint8), texts)
 
 
-def _or_else(value: Cells, other: Cells) -> Cells:
-    return _choice(number_cells(value.is_error, kind=TRUTH), other, value)
-
-
-def _each(function: Callable[..., Any]) -> Callable[..., Cells]:
-    def apply(*given: Cells) -> Cells:
+def _each(function: Callable[..., Any]) -> Callable[..., CellArray]:
+    def apply(*given: CellArray) -> CellArray:
+        if len(given) == 1 and given[0].is_number:
+            with np.errstate(all="ignore"):
+                return single(float(function(given[0].numbers.item())))
         numbers, bad = zip(*map(as_numbers, given), strict=True)
         with np.errstate(all="ignore"):
             return number_cells(function(*numbers), reduce(np.logical_or, bad))
@@ -86,10 +127,10 @@ def _each(function: Callable[..., Any]) -> Callable[..., Cells]:
     return apply
 
 
-def _whole(function: Callable[..., Any], *, none: float = 0.0) -> Callable[..., Cells]:
+def _whole(function: Callable[..., Any], *, none: float = 0.0) -> Callable[..., CellArray]:
     """Return an aggregate of what are numbers, for each row; ``none`` where there is not one."""
 
-    def apply(*given: Cells) -> Cells:
+    def apply(*given: CellArray) -> CellArray:
         rows = max(len(one.numbers) for one in given)
         values = [np.broadcast_to(np.where(one.kinds == NUMBER, one.numbers, np.nan),
                                   (rows, one.numbers.shape[1])) for one in given]  # fmt: skip
@@ -102,19 +143,19 @@ def _whole(function: Callable[..., Any], *, none: float = 0.0) -> Callable[..., 
     return apply
 
 
-def _count(*kinds: int) -> Callable[..., Cells]:
-    def apply(*given: Cells) -> Cells:
-        counts = [np.isin(c.kinds, kinds).sum(axis=1, keepdims=True) for c in given]
+def _count(*kinds: int) -> Callable[..., CellArray]:
+    def apply(*given: CellArray) -> CellArray:
+        counts = [among(c.kinds, kinds).sum(axis=1, keepdims=True) for c in given]
         return number_cells(reduce(np.add, counts))
 
     return apply
 
 
-def _logical(all_of: bool) -> Callable[..., Cells]:
-    def apply(*given: Cells) -> Cells:
+def _logical(all_of: bool) -> Callable[..., CellArray]:
+    def apply(*given: CellArray) -> CellArray:
         parts, bad = [], []
         for one in given:
-            counts = np.isin(one.kinds, (NUMBER, TRUTH))
+            counts = among(one.kinds, (NUMBER, TRUTH))
             holds = np.where(counts, one.numbers != 0, all_of)
             parts.append(holds.all(1, keepdims=True) if all_of else holds.any(1, keepdims=True))
             bad.append(one.is_error.any(axis=1, keepdims=True))
@@ -124,27 +165,34 @@ def _logical(all_of: bool) -> Callable[..., Cells]:
     return apply
 
 
-def _sum_of_products(*given: Cells) -> Cells:
+def _sum_of_products(*given: CellArray) -> CellArray:
     bad = reduce(np.logical_or, (one.is_error for one in given))
     product = reduce(np.multiply, (np.where(c.kinds == NUMBER, c.numbers, 0.0) for c in given))
     return number_cells(product.sum(axis=1, keepdims=True), bad.any(axis=1, keepdims=True))
 
 
-def _position(value: Cells, among: Cells, _: Cells | None = None) -> Cells:
-    if len(among.numbers) > 1:
-        raise Unknown("MATCH in rows")
+@lru_cache(maxsize=8)
+def _places(area: CellArray) -> dict[Any, int]:
+    """Return where each number and text of a range stands first."""
     keys: dict[Any, int] = {}
-    parts = (among.kinds[0].tolist(), among.numbers[0].tolist(), among.texts[0].tolist())
+    parts = (area.kinds[0].tolist(), area.numbers[0].tolist(), area.texts[0].tolist())
     for i, (kind, number, text) in enumerate(zip(*parts, strict=True), start=1):
         if kind in (NUMBER, TEXT):
             keys.setdefault(text.casefold() if kind == TEXT else number, i)
+    return keys
+
+
+def _position(value: CellArray, area: CellArray, _: CellArray | None = None) -> CellArray:
+    if len(area.numbers) > 1:
+        raise Unknown("MATCH in rows")
+    keys = _places(area)
     parts = (value.kinds.ravel().tolist(), value.numbers.ravel().tolist(), value.texts.ravel())
     found = [keys.get(t.casefold() if k == TEXT else n if k != ERROR else None, np.nan)
              for k, n, t in zip(*parts, strict=True)]  # fmt: skip
     return number_cells(np.reshape(found, value.numbers.shape))
 
 
-def _entry(area: Cells, row: Cells, column: Cells | None = None) -> Cells:
+def _entry(area: CellArray, row: CellArray, column: CellArray | None = None) -> CellArray:
     down, wide = area.size
     (i, bad) = as_numbers(row)
     j = np.ones_like(i) if column is None else as_numbers(column)[0]
@@ -159,20 +207,20 @@ def _entry(area: Cells, row: Cells, column: Cells | None = None) -> Cells:
     else:
         numbers, kinds, texts = area.numbers[0][flat], area.kinds[0][flat], area.texts[0][flat]
     kinds = np.where(bad, ERROR, kinds).astype(np.uint8)
-    return Cells(numbers.reshape(shape), kinds.reshape(shape), texts.reshape(shape))
+    return CellArray(numbers.reshape(shape), kinds.reshape(shape), texts.reshape(shape))
 
 
-def _inverse(area: Cells) -> Cells:
+def _inverse(area: CellArray) -> CellArray:
     down, wide = area.size
     matrix = np.where(area.kinds == NUMBER, area.numbers, np.nan).reshape(down, wide)
     inverse = np.full((down, wide), np.nan)
     if down == wide and np.isfinite(matrix).all() and np.linalg.det(matrix) != 0:
         inverse = np.linalg.inv(matrix)
     cells = number_cells(inverse.reshape(1, -1))
-    return Cells(cells.numbers, cells.kinds, cells.texts, area.size)
+    return CellArray(cells.numbers, cells.kinds, cells.texts, area.size)
 
 
-def _counted_if(area: Cells, wanted: Cells) -> Cells:
+def _counted_if(area: CellArray, wanted: CellArray) -> CellArray:
     counts = np.zeros(wanted.numbers.shape)
     texts, kinds = wanted.shown(), wanted.kinds
     for at in np.ndindex(counts.shape):
@@ -189,14 +237,14 @@ def _counted_if(area: Cells, wanted: Cells) -> Cells:
 _CRITERION = re.compile(r"(>=|<=|<>|>|<|=)?(.*)", re.DOTALL)
 
 
-def _sum_if(area: Cells, wanted: Cells, summed: Cells) -> Cells:
+def _sum_if(area: CellArray, wanted: CellArray, summed: CellArray) -> CellArray:
     holds = _compare("=", area, wanted).numbers != 0
     terms = np.where(holds & (summed.kinds == NUMBER), summed.numbers, 0.0)
     return number_cells(terms.sum(axis=1, keepdims=True))
 
 
-def _worded(function: Callable[..., str]) -> Callable[..., Cells]:
-    def apply(text: Cells, *given: Cells) -> Cells:
+def _worded(function: Callable[..., str]) -> Callable[..., CellArray]:
+    def apply(text: CellArray, *given: CellArray) -> CellArray:
         text, *more = spread(text, *given)
         words, bad = text.shown(), reduce(np.logical_or, (c.is_error for c in (text, *more)))
         out = np.full(words.shape, "", dtype=object)
@@ -207,8 +255,8 @@ def _worded(function: Callable[..., str]) -> Callable[..., Cells]:
     return apply
 
 
-def _is(*kinds: int) -> Callable[[Cells], Cells]:
-    return lambda value: number_cells(np.isin(value.kinds, kinds), kind=TRUTH)
+def _is(*kinds: int) -> Callable[[CellArray], CellArray]:
+    return lambda value: number_cells(among(value.kinds, kinds), kind=TRUTH)
 
 
 def _half_up(values: FloatArray, places: FloatArray) -> FloatArray:
@@ -231,17 +279,26 @@ def _special(name: str) -> Callable[..., FloatArray]:
     return apply
 
 
-def _as_number(value: Cells) -> Cells:
-    is_number = np.isin(value.kinds, (NUMBER, TRUTH))
+def _as_number(value: CellArray) -> CellArray:
+    is_number = among(value.kinds, (NUMBER, TRUTH))
     return number_cells(np.where(is_number, value.numbers, 0), value.is_error)
 
 
-def _average(*given: Cells) -> Cells:
+def _average(*given: CellArray) -> CellArray:
     return signed("/", FUNCTIONS["SUM"](*given), FUNCTIONS["COUNT"](*given))
 
 
-FUNCTIONS: dict[str, Callable[..., Cells]] = {
-    "IF": _choice, "IFERROR": _or_else, "AND": _logical(True), "OR": _logical(False),
+def _chosen_of(name: str, *values: CellArray) -> CellArray:
+    return chosen(name, [partial(_itself, value) for value in values])
+
+
+def _itself(value: CellArray) -> CellArray:
+    return value
+
+
+FUNCTIONS: dict[str, Callable[..., CellArray]] = {
+    "IF": partial(_chosen_of, "IF"), "IFERROR": partial(_chosen_of, "IFERROR"),
+    "AND": _logical(True), "OR": _logical(False),
     "NOT": lambda v: number_cells(v.numbers == 0, v.is_error, kind=TRUTH),
     "ISNUMBER": _is(NUMBER), "ISERROR": _is(ERROR), "ISTEXT": _is(TEXT), "ISBLANK": _is(BLANK),
     "NA": lambda: number_cells([[np.nan]]), "PI": lambda: number_cells([[np.pi]]),

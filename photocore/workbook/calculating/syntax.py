@@ -8,7 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from photocore.workbook.calculating.values import TRUTH, Cells, Unknown, number_cells, text_cells
+from photocore.workbook.calculating.values import (
+    TRUTH,
+    CellArray,
+    Unknown,
+    number_cells,
+    text_cells,
+)
 
 Node = tuple[Any, ...]
 
@@ -33,17 +39,20 @@ class _Reader:
 
     def __init__(self, text: str) -> None:
         self.tokens: list[re.Match[str]] = []
-        self.next, position = 0, 0
-        while position < len(text.rstrip()):
+        self.signs: list[str | None] = []
+        self.next, position, end = 0, 0, len(text.rstrip())
+        while position < end:
             token = _TOKEN.match(text, position)
             if token is None:
                 raise Unknown(text[position : position + 20])
             self.tokens.append(token)
+            self.signs.append(token["sign"])
             position = token.end()
+        self.signs.append(None)
 
     def sign(self) -> str | None:
         """Return the sign that comes next, None where there is another thing."""
-        return self.tokens[self.next]["sign"] if self.next < len(self.tokens) else None
+        return self.signs[self.next]
 
     def whole(self) -> Node:
         """Return all of it."""
@@ -54,17 +63,17 @@ class _Reader:
 
     def expression(self, least: int) -> Node:
         """Return what binds more closely than a rank."""
-        left = self.operand()
-        while (sign := self.sign()) is not None:
+        node = self.operand()
+        while (sign := self.signs[self.next]) is not None:
             if sign == "%":
                 self.next += 1
-                left = ("sign", "/", left, ("value", number_cells([[100.0]])))
+                node = ("sign", "/", node, ("value", number_cells([[100.0]])))
             elif _RANK.get(sign, 0) > least:
                 self.next += 1
-                left = ("sign", sign, left, self.expression(_RANK[sign]))
+                node = ("sign", sign, node, self.expression(_RANK[sign]))
             else:
                 break
-        return left
+        return node
 
     def operand(self) -> Node:
         """Return what stands between signs."""
@@ -72,52 +81,55 @@ class _Reader:
             raise Unknown("an end too early")
         token = self.tokens[self.next]
         self.next += 1
-        match token.lastgroup and {k: v for k, v in token.groupdict().items() if v is not None}:
-            case {"sign": "-" | "+" as sign}:
-                inner = self.expression(_SIGN_RANK)
-                return (
-                    inner
-                    if sign == "+"
-                    else ("sign", "*", inner, ("value", number_cells([[-1.0]])))
-                )
-            case {"sign": "("}:
-                inner = self.expression(0)
-                if self.sign() != ")":
-                    raise Unknown("(")
-                self.next += 1
-                return inner
-            case {"number": number}:
-                return "value", number_cells([[float(number)]])
-            case {"text": text}:
-                return "value", text_cells([[str(text).replace('""', '"')]])
-            case {"error": _}:
+        match token.lastgroup:
+            case "sign":
+                return self._signed(token["sign"])
+            case "number":
+                return "value", number_cells([[float(token["number"])]])
+            case "text":
+                return "value", text_cells([[token["text"].replace('""', '"')]])
+            case "error":
                 return "value", number_cells([[np.nan]])
-            case {"table": table, **column}:
-                return "table", table, column.get("part", ""), column.get("key") or column["whole"]
-            case {"area": area, **place}:
-                title = str(place.get("quoted", place.get("sheet", ""))).replace("''", "'")
-                return "area", title, area.replace("$", "")
-            case {"function": name}:
-                return "call", name.upper().removeprefix("_XLFN."), *self.arguments()
-            case {"name": name}:
-                upper = name.upper()
+            case "key" | "whole":
+                heading = token["key"] or token["whole"]
+                return "table", token["table"], token["part"] or "", heading
+            case "area":
+                title = (token["quoted"] or token["sheet"] or "").replace("''", "'")
+                return "area", title, token["area"].replace("$", "")
+            case "function":
+                name = token["function"].upper().removeprefix("_XLFN.")
+                return "call", name, *self.arguments()
+            case _:
+                upper = token["name"].upper()
                 if upper in ("TRUE", "FALSE"):
                     return "value", number_cells([[upper == "TRUE"]], kind=TRUTH)
-                return "name", name
-        raise Unknown(token[0])
+                return "name", token["name"]
+
+    def _signed(self, sign: str) -> Node:
+        """Return what a sign or a bracket before an operand makes of it."""
+        if sign == "(":
+            inner = self.expression(0)
+            if self.sign() != ")":
+                raise Unknown("(")
+            self.next += 1
+            return inner
+        if sign not in "+-":
+            raise Unknown(sign)
+        inner = self.expression(_SIGN_RANK)
+        return inner if sign == "+" else ("sign", "*", inner, ("value", number_cells([[-1.0]])))
 
     def arguments(self) -> list[Node]:
         """Return the arguments of a function, behind its bracket."""
-        given: list[Node] = []
+        nodes: list[Node] = []
         while self.sign() != ")":
             is_blank = self.sign() == ","
-            given.append(("value", Cells.of([None])) if is_blank else self.expression(0))
+            nodes.append(("value", CellArray.of([None])) if is_blank else self.expression(0))
             if self.sign() == ",":
                 self.next += 1
             elif self.sign() != ")":
                 raise Unknown("an open bracket")
         self.next += 1
-        return given
+        return nodes
 
 
 @lru_cache(maxsize=4096)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -20,7 +23,7 @@ class Unknown(Exception):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Cells:
+class CellArray:
     """Values of cells: numbers, what each is, texts; rows of a table go down, ranges across.
 
     Attributes
@@ -38,9 +41,11 @@ class Cells:
     size: tuple[int, int] = (1, 1)
 
     @classmethod
-    def of(cls, items: list[CellValue], *, size: tuple[int, int] | None = None) -> Cells:
+    def of(cls, items: list[CellValue], *, size: tuple[int, int] | None = None) -> CellArray:
         """Return what stands in cells: across in a range of a size, down without one."""
         shape = (len(items), 1) if size is None else (1, len(items))
+        if len(items) == 1 and type(items[0]) in (float, int):
+            return single(float(items[0]))  # type: ignore[arg-type]
         kinds = [_kind(item) for item in items]
         pairs = list(zip(items, kinds, strict=True))
         numbers = [float(v) if k in (NUMBER, TRUTH) and v is not None else 0.0 for v, k in pairs]
@@ -49,6 +54,11 @@ class Cells:
             np.array(numbers).reshape(shape), np.array(kinds, dtype=np.uint8).reshape(shape),
             texts.reshape(shape), size or (1, 1),
         )  # fmt: skip
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it is a single number."""
+        return self.numbers.size == 1 and self.kinds.item() == NUMBER
 
     @property
     def is_error(self) -> BoolArray:
@@ -63,13 +73,13 @@ class Cells:
         texts[self.kinds == TRUTH] = np.where(self.numbers, "TRUE", "FALSE")[self.kinds == TRUTH]
         return texts
 
-    def at(self, rows: Any) -> Cells:
+    def at(self, rows: Any) -> CellArray:
         """Return some of the rows."""
-        return Cells(self.numbers[rows], self.kinds[rows], self.texts[rows])
+        return CellArray(self.numbers[rows], self.kinds[rows], self.texts[rows])
 
-    def across(self) -> Cells:
+    def across(self) -> CellArray:
         """Return a column of a table as a range."""
-        return Cells(self.numbers.T, self.kinds.T, self.texts.T, (len(self.numbers), 1))
+        return CellArray(self.numbers.T, self.kinds.T, self.texts.T, (len(self.numbers), 1))
 
     def items(self) -> list[CellValue]:
         """Return what cells show: an empty text for a blank text, NaN for an error."""
@@ -94,27 +104,56 @@ def _kind(item: CellValue) -> int:
 _ERRORS = {"#N/A", "#DIV/0!", "#NUM!", "#VALUE!", "#REF!", "#NAME?", "#NULL!"}
 
 
-def number_cells(numbers: ArrayLike, bad: ArrayLike = False, *, kind: int = NUMBER) -> Cells:
+def number_cells(numbers: ArrayLike, bad: ArrayLike = False, *, kind: int = NUMBER) -> CellArray:
     """Return numbers as cells: an error where they are bad or not finite."""
     values = np.asarray(numbers, dtype=np.float64)
-    values, wrong = np.broadcast_arrays(values, np.asarray(bad))
-    wrong = wrong | ~np.isfinite(values)
-    kinds = np.where(wrong, ERROR, kind).astype(np.uint8)
-    return Cells(np.where(wrong, 0.0, values), kinds, np.full(values.shape, "", dtype=object))
+    wrong = ~np.isfinite(values) | bad
+    if wrong.shape != values.shape:
+        values = np.broadcast_to(values, wrong.shape)
+    if wrong.any():
+        kinds = np.where(wrong, ERROR, kind).astype(np.uint8)
+        values = np.where(wrong, 0.0, values)
+    else:
+        kinds = np.full(values.shape, kind, dtype=np.uint8)
+    return CellArray(values, kinds, _no_texts(values.shape))
 
 
-def text_cells(texts: ArrayLike, bad: ArrayLike = False) -> Cells:
+@lru_cache(maxsize=256)
+def _no_texts(shape: tuple[int, ...]) -> np.ndarray[Any, np.dtype[np.object_]]:
+    """Return empty texts, shared by all cells of a shape: nothing writes to them."""
+    texts = np.full(shape, "", dtype=object)
+    texts.flags.writeable = False
+    return texts
+
+
+def single(value: float, kind: int = NUMBER) -> CellArray:
+    """Return one number or truth as a cell: an error where it is not finite."""
+    if not math.isfinite(value):
+        value, kind = 0.0, ERROR
+    return CellArray(np.array([[value]]), _KINDS[kind], _no_texts((1, 1)))
+
+
+#: Kinds of single cells, shared by all.
+_KINDS = [np.array([[kind]], dtype=np.uint8) for kind in range(5)]
+
+
+def among(kinds: np.ndarray[Any, np.dtype[np.uint8]], wanted: Sequence[int]) -> BoolArray:
+    """Return where a kind is one of those wanted."""
+    return np.array([kind in wanted for kind in range(5)])[kinds]
+
+
+def text_cells(texts: ArrayLike, bad: ArrayLike = False) -> CellArray:
     """Return texts as cells."""
     words = np.asarray(texts, dtype=object)
     kinds = np.where(np.broadcast_to(bad, words.shape), ERROR, TEXT).astype(np.uint8)
-    return Cells(np.zeros(words.shape), kinds, words)
+    return CellArray(np.zeros(words.shape), kinds, words)
 
 
-def spread(*cells: Cells) -> list[Cells]:
+def spread(*cells: CellArray) -> list[CellArray]:
     """Return cells in one shape, single ones and rows repeated."""
     shape = np.broadcast_shapes(*(one.numbers.shape for one in cells))
     return [
-        Cells(
+        CellArray(
             np.broadcast_to(one.numbers, shape), np.broadcast_to(one.kinds, shape),
             np.broadcast_to(one.texts, shape), one.size,
         )
@@ -122,7 +161,7 @@ def spread(*cells: Cells) -> list[Cells]:
     ]  # fmt: skip
 
 
-def as_numbers(cells: Cells) -> tuple[FloatArray, BoolArray]:
+def as_numbers(cells: CellArray) -> tuple[FloatArray, BoolArray]:
     """Return numbers for arithmetic, and where there are none; a text that is a number is one."""
     numbers, bad = cells.numbers, np.asarray(cells.is_error | (cells.kinds == TEXT))
     if (cells.kinds == TEXT).any():

@@ -1,9 +1,8 @@
-"""New workbooks whose results are live formulas that already show their numbers."""
+"""New workbooks whose results are live formulas, calculated before they are written."""
 
 from __future__ import annotations
 
 import io
-import re
 from collections.abc import Hashable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -11,6 +10,8 @@ from pathlib import Path
 
 from openpyxl import Workbook
 from openpyxl.cell import Cell
+from openpyxl.chart.data_source import StrVal
+from openpyxl.chart.title import Title
 from openpyxl.styles import Alignment, Font, PatternFill, Protection
 from openpyxl.styles.cell_style import StyleArray
 from openpyxl.utils import absolute_coordinate, get_column_letter
@@ -18,8 +19,10 @@ from openpyxl.workbook.defined_name import DefinedName
 from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.worksheet import Worksheet
 
+from photocore.workbook.calculating.calculation import Calculation
 from photocore.workbook.changing.cells import ROW_MARK, CellValue, RowText
 from photocore.workbook.changing.plain import MARK, PlainFormulas
+from photocore.workbook.making.live_charts import linked_title
 from photocore.workbook.making.live_columns import TEXT_KEYS, LiveColumn, row_formula
 from photocore.workbook.making.look import (
     BODY_FONT,
@@ -39,9 +42,10 @@ from photocore.workbook.making.look import (
     prepare_page,
 )
 from photocore.workbook.making.newbook import RowBlock, finish_book, finished_parts, new_workbook
+from photocore.workbook.making.repeated_rows import repeated_rows
 from photocore.workbook.making.sketch import Sketch
 from photocore.workbook.making.words import WordBook
-from photocore.workbook.reading.grid import TableArea, split_area
+from photocore.workbook.reading.grid import TableArea, cell_name, plain_title, split_area
 
 #: The values of a table's columns, by key.
 Cells = Mapping[str, Sequence[CellValue]]
@@ -54,12 +58,12 @@ class TableContent:
     """A table as built: its columns and their values by key."""
 
     columns: Sequence[LiveColumn]
-    cells: Cells
+    cells: dict[str, Sequence[CellValue]]
 
 
 @dataclass(slots=True, eq=False)
 class BookBuilder:
-    """A workbook under construction with the values its formula cells will show."""
+    """A workbook under construction, and what its formula cells show."""
 
     language: str
     words: WordBook
@@ -69,6 +73,7 @@ class BookBuilder:
     tables: dict[str, TableContent] = field(default_factory=dict)
     drawings: dict[str, bytes] = field(default_factory=dict)
     looks: dict[Hashable, tuple[Font | None, StyleArray]] = field(default_factory=dict)
+    _titles: list[tuple[str, str, StrVal]] = field(default_factory=list)
 
     def word(self, key: str) -> str:
         """Return a word in the language of the workbook."""
@@ -99,6 +104,44 @@ class BookBuilder:
         for sheet in self.book.worksheets:
             sheet.sheet_view.tabSelected = sheet.title == title
         self.book.calculation.fullCalcOnLoad = True
+
+    def calculate(self) -> None:
+        """Fill in what the formulas give; a cell that has a value keeps it.
+
+        Raises
+        ------
+        Unknown
+            If a formula has something that is not known.
+        """
+        repeated = {title: (block.row, block.columns) for title, block in self.blocks.items()}
+        calculation = Calculation(self.book, repeated, self.results)
+        for (title, row, column), value in calculation.values().items():
+            self.results[title][cell_name(row, column)] = value
+        for title, cell, shown in self._titles:
+            shown.v = str(self.results[title][cell])
+        for title, block in self.blocks.items():
+            columns = calculation.columns(title, block.row)
+            listed = [columns.get(i, values) for i, values in enumerate(block.columns, start=1)]
+            self.blocks[title] = replace(block, columns=listed)
+        for sheet in self.book.worksheets:
+            for table in sheet.tables.values():
+                top, left, _, _ = split_area(table.ref)
+                content = self.tables[table.name]
+                columns = calculation.columns(sheet.title, top + 1)
+                for number, described in enumerate(content.columns, start=left):
+                    if number in columns and described.kind == "formula":
+                        content.cells[described.key] = columns[number]
+
+    def linked_title(self, title: str, cell: str) -> Title:
+        """Return the title of a chart that follows a cell."""
+        shown = StrVal(idx=0, v="")
+        self._titles.append((title, cell, shown))
+        return linked_title(title, cell, shown)
+
+    def value_of(self, name: str) -> CellValue:
+        """Return what a cell with a name shows."""
+        sheet, _, cell = self.book.defined_names[name].attr_text.replace("$", "").partition("!")
+        return self.results[plain_title(sheet)].get(cell)
 
     def make_plain(self, place: str) -> None:
         """Write all formulas with A1 references only, and say so by a name that leads to a place.
@@ -191,10 +234,10 @@ class SheetBuilder:
         self.text(cell, self.book.word(key), font)
 
     def formula(
-        self, cell: str, text: str, value: CellValue, *, form: str = "", name: str = "",
+        self, cell: str, text: str, value: CellValue = None, *, form: str = "", name: str = "",
         editable: bool = False, font: Font = FORMULA_FONT,
     ) -> None:  # fmt: skip
-        """Write a formula with its value."""
+        """Write a formula; ``value`` is what it shows where `BookBuilder.calculate` cannot know."""
         target = self.worksheet[cell]
         target.value = "=" + text
         self.book.results[self.worksheet.title][cell] = value
@@ -284,13 +327,17 @@ class SheetBuilder:
             Write formulas as A1 references.
         """
         head, left = at
-        sheet, self.book.tables[name] = self.worksheet, TableContent(columns=columns, cells=cells)
+        sheet, self.book.tables[name] = (
+            self.worksheet,
+            TableContent(columns=columns, cells=dict(cells)),
+        )
         letters = {c.key: get_column_letter(left + i) for i, c in enumerate(columns)}
         for i, column in enumerate(columns):
             self._head((head, left + i), column)
             for row in range(head + 1, head + 1 + (1 if repeat else rows)):
                 cell = sheet.cell(row, left + i)
-                value = None if repeat else _at(cells, column, row - head)
+                is_live = column.kind == "formula" and column.key not in cells
+                value = None if repeat or is_live else _at(cells, column, row - head)
                 self._cell(cell.coordinate, name, column, value)
             if column.kind == "input":
                 letter = letters[column.key]
@@ -298,7 +345,7 @@ class SheetBuilder:
         sheet.row_dimensions[head - 1].height = 38
         self._add_table(name, columns, at, rows)
         if repeat:
-            block = _block(name, columns, head + 1, rows, cells, letters, short)
+            block = repeated_rows(name, columns, head + 1, rows, cells, letters, short)
             self.book.blocks[sheet.title] = block
             for i, formula in block.formulas.items():
                 sheet.cell(head + 1, left + i).value = f"={formula(head + 1)}"
@@ -431,47 +478,3 @@ _LABEL_PLACE = Alignment(wrap_text=True, vertical="bottom", horizontal="center")
 def _at(cells: Cells, column: LiveColumn, row: int) -> CellValue:
     values = cells.get(column.key, ())
     return values[row - 1] if row <= len(values) else column.spare
-
-
-def _block(
-    table: str,
-    columns: Sequence[LiveColumn],
-    first: int,
-    rows: int,
-    cells: Cells,
-    letters: Mapping[str, str],
-    short: bool,
-) -> RowBlock:
-    """Return the rows that `finish_book` makes of the prototype."""
-    listed = [list(cells.get(column.key, ())) for column in columns]
-    listed = [
-        values + [column.spare] * (rows - len(values))
-        for column, values in zip(columns, listed, strict=True)
-    ]
-    formulas = {}
-    if short:
-        for i, column in enumerate(columns):
-            if column.kind == "formula":
-                formulas[i] = short_formula(table, column.formula, letters, first - 1)
-    return RowBlock(row=first, columns=listed, formulas=formulas)
-
-
-def short_formula(table: str, text: str, letters: Mapping[str, str], head: int) -> RowText:
-    """Return a formula with A1 references.
-
-    Parameters
-    ----------
-    table : str
-        Name of the table.
-    text : str
-        The formula, with ``[@key]`` for the cell of the same row.
-    letters : mapping
-        Key to the letters of its column.
-    head : int
-        Row of the keys.
-    """
-    # The same in all rows, it takes no space in the file.
-    heads = rf"{table}\[\[#Headers\],\[(\w+)\]\]"
-    text = re.sub(heads, lambda key: f"${letters[key[1]]}${head}", text)
-    text = re.sub(r"\[@(\w+)\]", lambda key: letters[key[1]] + ROW_MARK, text)
-    return RowText(text)

@@ -33,9 +33,9 @@ def titled(text: str, size: int = _TITLE) -> Title:
     return Title(tx=Text(rich=RichText(p=[paragraph])), overlay=False)
 
 
-def linked_title(sheet: str, cell: str, text: str) -> Title:
-    """Return a title that follows a cell; ``text`` is what the cell says now."""
-    cache = StrData(ptCount=1, pt=[StrVal(idx=0, v=text)])
+def linked_title(sheet: str, cell: str, shown: StrVal) -> Title:
+    """Return a title that follows a cell; ``shown`` is what the cell says now."""
+    cache = StrData(ptCount=1, pt=[shown])
     font = CharacterProperties(sz=_TITLE, b=True)
     look = RichText(p=[Paragraph(pPr=ParagraphProperties(defRPr=font))])
     place = f"'{sheet}'!{absolute_coordinate(cell)}"

@@ -267,6 +267,14 @@ def plain_title(written: str) -> str:
     return written
 
 
+def date_of_iso(text: str) -> Value:
+    """Return a date stored as ISO text (strict workbooks), the text where it is none."""
+    try:
+        return CellDate(datetime.fromisoformat(text.strip().removesuffix("Z")), "d.m.yyyy")
+    except ValueError:
+        return text
+
+
 def date_of_serial(serial: float, *, since_1904: bool) -> datetime:
     """Return the moment a spreadsheet's day number stands for."""
     origin = datetime(1904, 1, 1) if since_1904 else datetime(1899, 12, 30)

@@ -6,7 +6,6 @@ import re
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
 from functools import cache, lru_cache, partial
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -23,6 +22,7 @@ from photocore.workbook.reading.grid import (
     TableArea,
     Value,
     column_number,
+    date_of_iso,
     date_of_serial,
     named_number,
     plain_title,
@@ -450,7 +450,7 @@ class _SheetReader:
         if kind == "e":
             return CellFault(text)
         if kind == "d":
-            return _iso_date(text)
+            return date_of_iso(text)
         return unescape(text)
 
     def string(self, index: int) -> str | None:
@@ -491,11 +491,3 @@ def _without_text(kind: str, cell: Element) -> Value | None:
         if local(child.tag) == "f" and kind != "str":
             return NotCalculated(child.text or "")
     return None
-
-
-def _iso_date(text: str) -> Value:
-    """Return a date stored as ISO text (strict workbooks)."""
-    try:
-        return CellDate(datetime.fromisoformat(text.strip().removesuffix("Z")), "d.m.yyyy")
-    except ValueError:
-        return text

@@ -18,7 +18,7 @@ def table(z):
     columns |= dict.fromkeys(("sigma_X", "sigma_Y", "sigma_r"), np.full(n, 0.01))
     return ReliefTable(
         ids=tuple(f"P{i}" for i in range(n)), columns=columns, flags=("OK",) * n,
-        standardised=np.zeros(n), formula_cells={}, image_scale=500.0,
+        standardised=np.zeros(n), of_pixels={}, image_scale=500.0,
     )  # fmt: skip
 
 

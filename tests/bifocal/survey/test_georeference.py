@@ -20,7 +20,7 @@ TURN = np.array([[np.cos(0.3), 0, np.sin(0.3)], [np.sin(0.3), 0, -np.cos(0.3)], 
 def table():
     columns = {axis: XYZ[:, i] for i, axis in enumerate("XYZ")}
     return ReliefTable(
-        ids=IDS, columns=columns, flags=("OK",) * 12, standardised=np.zeros(12), formula_cells={},
+        ids=IDS, columns=columns, flags=("OK",) * 12, standardised=np.zeros(12), of_pixels={},
         image_scale=500.0,
     )  # fmt: skip
 

@@ -55,7 +55,7 @@ def photo_set(count=4):
 def test_all_photos_together_are_the_set_of_photos():
     _, seen = picks(count=60)
     setup = SurveySetup(taking=TAKING, others=OTHERS)
-    columns, _ = of_all_photos(setup, observed(seen))
+    columns = of_all_photos(setup, observed(seen))
     solved = photo_set().intersect(list(seen * [1, -1]), sigma_px=setup.precision)
     several = (~np.isnan(seen).any(axis=2)).sum(axis=0) > 2
     found = np.stack([columns[key] for key in ("X_all", "Y_all", "r_all")], axis=-1)
@@ -69,7 +69,7 @@ def test_all_photos_together_are_the_set_of_photos():
 
 def test_every_pair_with_the_first_photo_is_midullas_formula():
     _, seen = picks()
-    columns, _ = of_all_photos(SurveySetup(taking=TAKING, others=OTHERS), observed(seen))
+    columns = of_all_photos(SurveySetup(taking=TAKING, others=OTHERS), observed(seen))
     radii = np.hypot(*seen.transpose(2, 0, 1)) * [[d / c] for c, d in LENSES]
     for k in (3, 4):
         expected = relief(radii[0], radii[k - 1], d1=17.5, d2=LENSES[k - 1][1])
@@ -156,7 +156,7 @@ def test_a_workbook_whose_near_photo_was_typed_first_has_the_same_pairs(tmp_path
         delta_d=None,
     )  # fmt: skip
     assert run("solve", path, "--out", path, "--overwrite").exit_code == 0
-    whole = of_all_photos(SurveySetup(taking=TAKING, others=OTHERS), observed(seen))[0]["r_all"]
+    whole = of_all_photos(SurveySetup(taking=TAKING, others=OTHERS), observed(seen))["r_all"]
     found = solve(path).table.columns["r_all"]
     np.testing.assert_allclose(found, whole, rtol=1e-9, atol=1e-12)
 

@@ -23,7 +23,6 @@ from bifocal import (
     Taking,
     georeference,
 )
-from bifocal.survey.check_points import check_points
 from bifocal.survey.point_survey import solve_points
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.formulas.columns import (
@@ -175,7 +174,6 @@ def ideal_content(rows=40, model="levelled", **more):
         points=points,
         table=table,
         known=known,
-        check=check_points(table, known),
         control=control,
         georeference=georeference(table, control),
         sensor=(22.7, 15.1),

@@ -9,8 +9,9 @@ import openpyxl
 import pytest
 
 from bifocal import InputError, Taking, solve
-from bifocal.survey.what_if import CHANGED, what_if
-from bifocal.workbook.making.book import write_book
+from bifocal.workbook.content import SurveyContent
+from bifocal.workbook.formulas.columns import CHANGED
+from bifocal.workbook.making.book import build, write_book
 from bifocal.workbook.template_workflow import write_template
 from tests.bifocal.workbook.test_cli_solve import put, run
 from tests.bifocal.workbook.test_survey_workbook import (
@@ -22,28 +23,39 @@ PICKS = {"id": ["a", "b"], "s1": [4.2, 9.0], "s2": [4.5, 8.9], "theta": [90, 30]
 TAKING = Taking(d1=17.5, d2=9.5, c1=35.0, c2=19.0)
 
 
+def what_if(taking, changes):
+    """Return the columns of the sheet for the two points, and its workbook."""
+    content = replace(SurveyContent.of(solve(PICKS, taking=taking)), changes=changes)
+    built = build(content)
+    return {k: np.array(v[:2], float) for k, v in built.tables["tblWhatIf"].cells.items()
+            if k != "id"}, built  # fmt: skip
+
+
 def test_a_change_gives_the_relief_that_the_changed_set_up_gives():
     changes = {"d_1": 0.03, "d_2": -0.02, "c_1": 0.1, "c_2": 0.05, "pitch": 0.0}
-    found = what_if(TAKING, solve(PICKS, taking=TAKING).table, changes)
+    cells, built = what_if(TAKING, changes)
+    before = solve(PICKS, taking=TAKING).table
     for name in CHANGED[:4]:
         key = name.replace("_", "")
         taking = replace(TAKING, **{key: getattr(TAKING, key) + changes[name]})
-        expected = solve(PICKS, taking=taking).table["r"]
-        np.testing.assert_allclose(found[f"r_{name}"], expected, rtol=1e-10)
+        by_change = solve(PICKS, taking=taking).table["r"] - before["r"]
+        np.testing.assert_allclose(cells[f"by_{name}"], by_change, rtol=1e-9)
+        assert built.value_of(f"effect_max_by_{name}") == pytest.approx(np.abs(by_change).max())
     whole = Taking(d1=17.53, d2=9.48, c1=35.1, c2=19.05)
     solved = solve(PICKS, taking=whole).table
-    np.testing.assert_allclose(found["r_new"], solved["r"], rtol=1e-10)
-    before = solve(PICKS, taking=TAKING).table
+    np.testing.assert_allclose(cells["r_new"], solved["r"], rtol=1e-10)
     moved = np.hypot(solved["X"], solved["Y"]) - np.hypot(before["X"], before["Y"])
-    np.testing.assert_allclose(found["moved"], moved, atol=1e-12)
+    np.testing.assert_allclose(cells["moved"], moved, atol=1e-12)
+    rms = np.sqrt(np.mean((solved["r"] - before["r"]) ** 2))
+    assert built.value_of("effect_rms_change") == pytest.approx(rms, rel=1e-9)
 
 
 def test_the_size_of_a_pixel_moves_points_and_leaves_their_relief():
     taking = replace(TAKING, pitch=0.004)
+    cells, _ = what_if(taking, dict.fromkeys(CHANGED, 0.0) | {"pitch": 0.00004})
     table = solve(PICKS, taking=TAKING).table
-    found = what_if(taking, table, {"pitch": 0.00004})
-    np.testing.assert_allclose(found["by_pitch"], 0, atol=1e-15)
-    np.testing.assert_allclose(found["moved"], 0.01 * np.hypot(table["X"], table["Y"]), rtol=1e-9)
+    np.testing.assert_allclose(cells["by_pitch"], 0, atol=1e-15)
+    np.testing.assert_allclose(cells["moved"], 0.01 * np.hypot(table["X"], table["Y"]), rtol=1e-9)
 
 
 def named(book, name):
@@ -66,14 +78,13 @@ def test_changes_that_were_typed_are_solved_in_place(tmp_path):
     result = run("solve", path, "--out", path, "--overwrite")
     assert result.exit_code == 0, result.stderr
     book = openpyxl.load_workbook(path, data_only=True)
-    table = solve(PICKS, taking=TAKING).table
-    found = what_if(TAKING, table, {"d_1": 0.01, "d_2": 0.1, "c_1": 0.05, "c_2": 0.05})
+    before = solve(PICKS, taking=TAKING).table["r"]
     assert named(book, "new_d_2") == pytest.approx(9.6)
-    largest = np.abs(found["by_d_2"]).max()
-    assert named(book, "effect_max_by_d_2") == pytest.approx(largest, rel=1e-9)
-    assert named(book, "effect_rms_change") == pytest.approx(
-        np.sqrt(np.mean(found["change"] ** 2)), rel=1e-9
-    )
+    by_d_2 = solve(PICKS, taking=replace(TAKING, d2=9.6)).table["r"] - before
+    assert named(book, "effect_max_by_d_2") == pytest.approx(np.abs(by_d_2).max(), rel=1e-9)
+    whole = Taking(d1=17.51, d2=9.6, c1=35.05, c2=19.05)
+    change = solve(PICKS, taking=whole).table["r"] - before
+    assert named(book, "effect_rms_change") == pytest.approx(np.sqrt(np.mean(change**2)), rel=1e-9)
 
 
 @pytest.mark.acceptance
