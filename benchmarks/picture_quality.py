@@ -76,7 +76,9 @@ def _areas(mask) -> np.ndarray:
 def tears(photo, places, measured, gsd: float) -> float:
     """Return the metres along which neighbours lie 2 px further apart, off measured steps. [m]
 
-    Of whichever photo is drawn: a picture mostly of photo 2 has hardly any of photo 1.
+    Of whichever photo is drawn: a picture mostly of photo 2 has hardly any of photo 1. castle_B has
+    214 m, 33 of them in photo 1 and the rest where photo 2 shows what a machine stands before; when
+    three quarters of it were of photo 2 it had 245 m, 5 of them in photo 1.
     """
     count = 0
     for number, (column, row, _) in enumerate(places, start=1):

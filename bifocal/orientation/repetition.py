@@ -110,10 +110,11 @@ def _periods(sheet: Sheet) -> FloatArray:
     flat = values - _smooth(values, shown, REPETITION.ground * side)
     alike = _correlation((flat, shown), (flat, shown))
     cone = int(REPETITION.cone * side) + 1
-    lags, across = np.arange(1, side), np.arange(-cone, cone + 1)
+    across = np.arange(-cone, cone + 1)
     out = []
     for turned, order in ((alike, 1), (alike.T, -1)):
-        band = np.concatenate([turned[-cone:, 1:side], turned[: cone + 1, 1:side]])
+        lags = np.arange(1, int(share.shape[order > 0] * REPETITION.longest))
+        band = np.concatenate([turned[-cone:, lags], turned[: cone + 1, lags]])
         band[np.abs(across)[:, None] > 1 + REPETITION.cone * lags] = np.nan
         band = np.nan_to_num(band, nan=-1.0)
         top = band.max(axis=0)

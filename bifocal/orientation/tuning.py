@@ -319,6 +319,10 @@ class RepetitionTuning:
     grain: float = 0.015
     #: Rows of windows are askew by no more than this. [m/m]
     cone: float = 0.06
+    #: Two windows are no repetition: a period is no longer than this, of the picture's side.
+    #: Evidence: rendered façades with a window to either side of the door are like themselves over
+    #: 0.55 of it; their common points never lay aside.
+    longest: float = 0.34
     #: Peaks of the wall's likeness to itself stand out by this.
     stands_out: float = 0.2
     #: The first of those this good is the period, of the highest.

@@ -20,6 +20,8 @@ from photocore.errors import GeometryError
 
 #: Deeper than any photo sees: most likely millimetres. [m]
 DEEPEST = 200.0
+#: Where nothing is dry and nothing shallower than this, nothing shows that the level is right. [m]
+SHORE = 3.0
 #: Lengths that differ by more than this are most likely in different units.
 MIXED_UNITS = 1000.0
 
@@ -81,8 +83,8 @@ class Outcome:
     ----------
     counts : dict of str to int
         Points per treatment.
-    max_depth, mean_change : float
-        Largest true depth and mean change of Z under water. [m]
+    max_depth, min_depth, mean_change : float
+        Largest and least true depth and mean change of Z under water. [m]
     lowest, highest : float
         Range of the given heights. [m]
     remarks : list of str
@@ -90,6 +92,7 @@ class Outcome:
 
     counts: dict[str, int] = field(default_factory=dict)
     max_depth: float = 0.0
+    min_depth: float = np.inf
     mean_change: float = 0.0
     lowest: float = np.inf
     highest: float = -np.inf
@@ -113,6 +116,7 @@ class Outcome:
             self._sum += float((result.xyz - given)[..., 2][wet].sum())
             self.mean_change = self._sum / self._wet
             self.max_depth = max(self.max_depth, float(result.depth[wet].max()))
+            self.min_depth = min(self.min_depth, float(result.depth[wet].min()))
 
     def judge(self, surface: WaterSurface, *, allow_dry: bool) -> None:
         """Raise GeometryError when nothing lies under water; note what looks like millimetres."""
@@ -152,6 +156,8 @@ class Outcome:
             )
         if self.max_depth > DEEPEST:
             self.remarks.append(remark("bathymetry.very_deep", max_depth=self.max_depth))
+        if not dry and SHORE < self.min_depth < np.inf:
+            self.remarks.append(remark("bathymetry.no_shore", min_depth=self.min_depth))
         if failed:
             hint = "" if flat else " Oblique rays through waves have many ways: try --max-angle 40."
             self.remarks.append(f"{failed} points could not be corrected and are marked so.{hint}")

@@ -14,6 +14,7 @@ from multimedia.bathymetry.soundings import DepthOffsets, depth_offsets
 from multimedia.projects.dem import Dem
 from multimedia.projects.point_tables import read_object_points
 from multimedia.projects.surface_files import read_water_surface
+from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.cloud import open_cloud
 from photocore.errors import GeometryError, located
@@ -26,6 +27,9 @@ NEIGHBOURS = 8
 FARTHEST = 3.0
 #: The mean of the neighbours is farther from it than this share of the farthest: at the rim.
 ASIDE = 0.6
+#: Soundings that are off by so many metres in the middle, and by so many times more than in another
+#: reading, mean that one.
+LARGE, FACTOR = 1.0, 10.0
 #: Side of the windows in which a DEM is read. [cells]
 WINDOW = 1024
 
@@ -100,7 +104,9 @@ def check_soundings(
     total = np.hypot(np.nan_to_num(its), own)
     total[total == 0] = np.nan
     water = read_water_surface(water_level)
-    depth = water.height_at(xyz[:, :2]) - xyz[:, 2]
+    level = water.height_at(xyz[:, :2])
+    depth = level - xyz[:, 2]
+    remarks += _other_datum(xyz[:, 2], height, level)
     with located(soundings):
         offsets = depth_offsets(offset, depth, sigmas=total, edges=edges)
     if target is not None:
@@ -112,6 +118,21 @@ def check_soundings(
     return SoundingCheck(
         offsets=offsets, count=len(offset), outside=outside, remarks=tuple(remarks)
     )
+
+
+def _other_datum(sounded: FloatArray, height: FloatArray, level: FloatArray) -> list[str]:
+    """Say whether soundings fit far better as depths, or counted from the water."""
+    readings = {
+        "soundings.depths": level - sounded,
+        "soundings.negative_depths": level + sounded,
+        "soundings.feet": 0.3048 * sounded,
+    }
+    misfit = float(np.nanmedian(np.abs(sounded - height)))
+    others = {key: float(np.nanmedian(np.abs(z - height))) for key, z in readings.items()}
+    key = min(others, key=lambda each: others[each])
+    if misfit < LARGE or others[key] > misfit / FACTOR:
+        return []
+    return [remark(key, misfit=misfit, other=others[key])]
 
 
 def _points(path: Path) -> tuple[list[str], FloatArray, FloatArray, list[str]]:

@@ -126,7 +126,7 @@ def find_targets(
             f"no particle larger than {4 * _WIDEST:g} px."
         )
     bright, noise = without_background(-grey if dark else grey, scale)
-    fit = _Fit.of_maxima(bright, noise, threshold)
+    fit = _Gaussians.of_maxima(bright, noise, threshold)
     for _ in range(_ROUNDS):
         fit = fit.settled()
         more = fit.hidden(threshold)
@@ -137,7 +137,7 @@ def find_targets(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Fit:
+class _Gaussians:
     """Gaussians on an image: per particle column, row, width [px], sum and light left [grey]."""
 
     bright: FloatArray
@@ -145,7 +145,9 @@ class _Fit:
     terms: FloatArray
 
     @classmethod
-    def of_maxima(cls, bright: FloatArray, noise: FloatArray, threshold: float | None) -> _Fit:
+    def of_maxima(
+        cls, bright: FloatArray, noise: FloatArray, threshold: float | None
+    ) -> _Gaussians:
         fit = cls(bright, noise, np.empty((0, 5)))
         return replace(fit, terms=fit.maxima(bright, threshold))
 
@@ -200,7 +202,7 @@ class _Fit:
         np.add.at(image, (rows[:, :, None], columns[:, None, :]), values)
         return image
 
-    def settled(self) -> _Fit:
+    def settled(self) -> _Gaussians:
         """Return the fit that least squares lead to, each beside what the others show."""
         fit = self
         for turn in range(_TURNS if len(self.terms) else 0):
@@ -245,7 +247,7 @@ class _Fit:
         high = more[:, 3] * _middle(more[:, 2]) > _SECOND * beside[:, 3] * _middle(beside[:, 2])
         return more[high & (apart > _SMOOTHING)]
 
-    def joined(self, more: FloatArray) -> _Fit:
+    def joined(self, more: FloatArray) -> _Gaussians:
         """Return the fit with more particles."""
         return replace(self, terms=np.vstack([self.terms, more]))
 

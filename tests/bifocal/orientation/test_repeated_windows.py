@@ -80,6 +80,14 @@ def test_a_wall_on_which_nothing_is_to_be_seen_tells_nothing(believed: float) ->
     assert found.is_certain == (believed == 0.62)
 
 
+def test_three_windows_in_a_row_are_no_repetition_but_three_storeys_are() -> None:
+    images, lenses = pair_of(plaster=2.0, aside=0.62, pitch=4.4)
+    found = repeated(images, lenses, believed=0.62)
+    assert found is not None
+    assert np.ptp(found.ends[:, 0]) < 2
+    assert np.ptp(found.ends[:, 1]) == pytest.approx(2.4 / PIXEL, abs=2)
+
+
 def test_a_wall_without_windows_in_rows_does_not_repeat_itself() -> None:
     rng = np.random.default_rng(5)
     wall = cv2.resize(rng.uniform(60, 220, (9, 12)), SIZE, interpolation=cv2.INTER_NEAREST)

@@ -203,3 +203,40 @@ def test_soundings_tell_a_wrong_index_from_a_wrong_level_by_depth(tmp_path: Path
     code, _, said = run("soundings", dem, tmp_path / "far.csv", "--water-level", 10.03)
     assert code == 1
     assert "none of 2 soundings" in said
+
+
+@pytest.mark.parametrize(
+    ("written", "said"),
+    [
+        (lambda z: 102.4 - z, "SOUNDINGS ARE DEPTHS"),
+        (lambda z: z - 102.4, "SOUNDINGS COUNT FROM THE WATER"),
+        (lambda z: z / 0.3048, "SOUNDINGS LOOK LIKE FEET"),
+        (lambda z: z, ""),
+        (lambda z: z + 2.0, ""),
+    ],
+)
+def test_soundings_of_another_datum_are_told(tmp_path: Path, written, said: str) -> None:
+    x, y = np.mgrid[0:20.0, 0:20.0].reshape(2, -1)
+    bed = 100.0 - 0.15 * x + 0.02 * y
+    table = np.column_stack([x, y, bed])
+    np.savetxt(tmp_path / "bed.csv", table, "%.3f", ",", header="X,Y,Z", comments="")
+    table[:, 2] = written(bed + np.random.default_rng(1).normal(0, 0.05, len(bed)))
+    np.savetxt(tmp_path / "s.csv", table[::9], "%.3f", ",", header="X,Y,Z", comments="")
+    code, _, told = run(
+        "soundings", tmp_path / "bed.csv", tmp_path / "s.csv", "--water-level", 102.4
+    )
+    assert code == 0, told
+    assert said in told
+    assert ("SOUNDINGS" in told) == bool(said)
+
+
+def test_a_level_that_nothing_shows_to_be_right_is_told(tmp_path: Path) -> None:
+    x, y = np.mgrid[0:20.0, 0:20.0].reshape(2, -1)
+    table = np.column_stack([x, y, 100.0 - 0.3 * x])
+    np.savetxt(tmp_path / "bed.csv", table, "%.3f", ",", header="X,Y,Z", comments="")
+    for level, doubted in ((98.0, False), (101.0, False), (118.0, True)):
+        out = tmp_path / f"{level}.csv"
+        words = ("bathymetry", tmp_path / "bed.csv", "--water-level", level, "--index", 1.34)
+        code, _, told = run(*words, "--out", out)
+        assert code == 0, told
+        assert ("No point is dry" in told) == doubted
