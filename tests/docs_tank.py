@@ -32,6 +32,7 @@ from multimedia.boards.workflow import find_boards
 from tests.builders.commands import multimedia_command as main
 from tests.multimedia.rendered_boards import Housing, chessboard, photo, poses
 from tests.multimedia.tank import LAYERS, SENSOR, cameras, control
+from tests.multimedia.targets.rendered_particles import drawn
 
 #: OpenPTV counts from a point in the water. [mm]
 LIFT = np.array([0, 0, 300.0])
@@ -79,7 +80,10 @@ def _project(views, media, xyz: np.ndarray, unit: str = "mm") -> Project:
 
 
 def _particles(folder: Path, views, glass: FlatInterface) -> None:
-    """Write the targets of thirty particles, as frame 1 and as they turn from frame 10001 on."""
+    """Write the targets of thirty particles, as frame 1 and as they turn from frame 10001 on.
+
+    Of that frame there are images, too.
+    """
     xyz = np.random.default_rng(7).uniform((-60, -50, 150), (60, 50, 250), (30, 3))
     (folder / "experiment" / "img").mkdir()
     (folder / "experiment" / "res").mkdir()
@@ -91,6 +95,9 @@ def _particles(folder: Path, views, glass: FlatInterface) -> None:
             lines = [f"{n} {x:.6f} {y:.6f} 9 3 3 99 -1" for n, (x, y) in enumerate(pixels)]
             path = folder / "experiment" / "img" / f"{camera.name}.{frame}_targets"
             path.write_text("\n".join([f"{len(lines)}", *lines, ""]))
+            if frame == 10001:
+                image = drawn(pixels - 0.5, (SENSOR.height, SENSOR.width), seed=1)
+                cv2.imwrite(str(path.with_name(f"{camera.name}.{frame}.tif")), image)
 
 
 def _variants(folder: Path, views, tank: Project) -> None:

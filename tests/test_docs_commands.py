@@ -48,6 +48,7 @@ NOT_RUN = {
     "python benchmarks/relief_ablation.py": MINUTES,
     "python benchmarks/relief_tuning.py": MINUTES,
     "python benchmarks/bench_shift.py": MINUTES,
+    "python benchmarks/bench_targets.py": MINUTES,
     "python benchmarks/bench_tracking.py": MINUTES,
     "python -m benchmarks.bench_page 100": MINUTES,
     "python -m benchmarks.peers": MINUTES,

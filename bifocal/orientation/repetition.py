@@ -43,8 +43,12 @@ class Repetition:
     is_certain: bool
 
 
+#: A wall that is narrower than this share of its length is none.
+_NARROWEST = 0.01
+
+
 def repetition(images: Images, interiors: Interiors, far: Pinhole, ties: Ties) -> Repetition | None:
-    """Return how the wall repeats itself; None where it does not.
+    """Return how the wall repeats itself; None where it does not, or is not in sight.
 
     Parameters
     ----------
@@ -53,7 +57,10 @@ def repetition(images: Images, interiors: Interiors, far: Pinhole, ties: Ties) -
         Camera 1 in a frame on the wall.
     ties : Ties
     """
-    grid, spacing = _grid(far, interiors[0].image_size)
+    covered = _grid(far, interiors[0].image_size)
+    if covered is None:
+        return None
+    grid, spacing = covered
     pixels = project(far, np.concatenate([grid, np.zeros((*grid.shape[:2], 1))], axis=-1))
     there = apply_homography(ties.homography, pixels)
     sheets: list[Sheet] = []
@@ -84,14 +91,21 @@ def repetition(images: Images, interiors: Interiors, far: Pinhole, ties: Ties) -
     return Repetition(ends=ends, is_certain=is_certain, surrounding=surrounding)
 
 
-def _grid(far: Pinhole, size: tuple[int, int]) -> tuple[FloatArray, float]:
-    """Return places of the wall over what the far photo shows of it, and their spacing."""
+def _grid(far: Pinhole, size: tuple[int, int]) -> tuple[FloatArray, float] | None:
+    """Return places of the wall over what the far photo shows of it, and their spacing.
+
+    None where it shows none of it: approximate cameras may be nonsense, which others find out.
+    """
     edge = np.linspace(0.0, 1.0, 9)
     rim = np.array([[(x, 0.0), (x, 1.0), (0.0, x), (1.0, x)] for x in edge]).reshape(-1, 2)
     rim = apply_homography(plane_from_pixel(far), rim * np.array(size))
     reach = REPETITION.reach * far.centre[2]
     rim = np.clip(rim[np.isfinite(rim).all(axis=1)], far.centre[:2] - reach, far.centre[:2] + reach)
+    if not len(rim):
+        return None
     low, high = rim.min(axis=0), rim.max(axis=0)
+    if not (high - low).min() > _NARROWEST * (high - low).max():
+        return None
     spacing = float(np.sqrt(np.prod(high - low) / REPETITION.pixels))
     x, y = np.arange(low[0], high[0], spacing), np.arange(high[1], low[1], -spacing)
     return np.stack(np.meshgrid(x, y), axis=-1), spacing

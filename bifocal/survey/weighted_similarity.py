@@ -19,9 +19,9 @@ from photocore.camera.rotation import skew
 from photocore.camera.similarity import Similarity
 from photocore.errors import GeometryError
 
-#: Turns of Gauss-Newton at most: from the unweighted fit five reach rounding, also on walls that
-#: lean or lie.
-_MOST_TURNS = 20
+#: Turns of Gauss-Newton: from the unweighted fit five reach rounding, also on walls that lean or
+#: lie. A sheet has as many for them: where control contradicts itself both stop alike.
+TURNS = 6
 #: Which of rotations about the wall's X, Y, Z and logarithm of the scale a model has.
 UNKNOWNS: Mapping[str, tuple[int, ...]] = {"2D": (2, 3), "levelled": (1, 3), "3D": (0, 1, 2, 3)}
 
@@ -117,8 +117,7 @@ def weighted_fit(
     target = np.einsum("nab,nb,nk->ak", weights, wall, near).reshape(9)
     reduced, right = normal - mixed.T @ shift, target - mixed.T @ mean
     entries = (start.rotation.T / start.scale).reshape(9)
-    size = np.inf
-    for _ in range(_MOST_TURNS):
+    for _ in range(TURNS):
         # d(R B) = omega x B, column by column; the scale multiplies all.
         matrix = entries.reshape(3, 3)
         turns = [(skew(axis) @ matrix).reshape(9) for axis in np.eye(3)]
@@ -126,10 +125,6 @@ def weighted_fit(
         spread = _inverse(design.T @ reduced @ design)
         step = np.zeros(4)
         step[unknowns] = spread @ (design.T @ (right - reduced @ entries))
-        # At rounding the steps grow no smaller.
-        if np.abs(step).max() < 1e-9 and np.abs(step).max() >= size / 2:
-            break
-        size = np.abs(step).max()
         # Cayley's rotation: exact, and to second order that of the rotation vector.
         half = skew(step[:3] / 2)
         grown = 2 / (1 + (step[:3] ** 2).sum() / 4) * half @ (matrix + half @ matrix)

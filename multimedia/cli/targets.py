@@ -18,9 +18,9 @@ from photocore.shared_options import JsonOption, OverwriteOption
 class TargetsCommand:
     """The options of ``multimedia targets``, and examples.
 
-    multimedia targets img/cam1.10001.tif img/cam2.10001.tif --out img
-    multimedia targets dive/left_*.png --project rig.toml --out targets
-    multimedia targets frames/*.png --threshold 25 --out targets.csv
+    multimedia targets img/cam1.10001.tif img/cam2.10001.tif --out targets
+    multimedia targets img/*.tif --project tank.toml --out targets
+    multimedia targets img/*.tif --threshold 25 --out targets.csv
     """
 
     images: Annotated[tuple[Path, ...], Argument()]

@@ -15,9 +15,11 @@ from photocore.workbook.making.live_book import BookBuilder
 
 #: Numbers that differ by less are alike: of what is above 1, and of what is uncertain in a number.
 ALIKE = 1e-9
-#: The sheet's turns are a fixed number: they reach rounding where control agrees to a decimetre,
-#: and end short by up to 6e-4 of sigma0 where one of 8 points is wrong by a metre.
-_TURNS_LEFT = 1e-3
+#: Turns that are cut off magnify rounding, the more the less control agrees: by so much of sigma0.
+_CUT_OFF = 1e-6
+#: Control that contradicts itself by more than this share of its extent leads nowhere, on the sheet
+#: as elsewhere: both say so, and their numbers are not compared.
+_CONTRADICTORY = 0.01
 
 #: A column's key, its cells, what was solved, and what of it is uncertain.
 _Column = tuple[str, Sequence[CellValue], FloatArray, FloatArray]
@@ -38,7 +40,7 @@ def refuse_contradictions(builder: BookBuilder, content: SurveyContent) -> None:
         numbers = np.array([v if isinstance(v, float) else np.nan for v in cells[: len(solved)]])
         allowed = ALIKE * np.fmax(np.fmax(1.0, np.abs(solved)), uncertain)
         if content.georeference is not None and key not in table.columns:
-            allowed = np.fmax(allowed, _TURNS_LEFT * content.georeference.sigma0)
+            allowed = np.fmax(allowed, _CUT_OFF * content.georeference.sigma0)
         differs = np.abs(numbers - solved) > allowed
         if key.startswith("sigma_"):  # in squares: rounding is left of points placed exactly
             differs &= np.abs(numbers**2 - solved**2) > ALIKE * (solved**2 + uncertain**2)
@@ -62,6 +64,8 @@ def _columns(builder: BookBuilder, content: SurveyContent) -> Iterator[_Column]:
         return
     placed, results = content.placed, builder.tables["tblResults"].cells
     near, sigma = placed.near, placed.sigma
+    if content.georeference.sigma0 > _CONTRADICTORY * np.nanmax(np.ptp(near, axis=0), initial=0.0):
+        return
     for i, axis in enumerate("ENH"):
         yield f"n_{axis}", cells[f"n_{axis}"], near[:, i], sigma[:, i]
         yield f"sigma_{axis}", results[f"sigma_{axis}"], sigma[:, i], table["sigma_r"]

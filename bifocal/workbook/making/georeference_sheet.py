@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from bifocal.survey.remarks import LARGEST_RESIDUAL, SCALE_SHARE
+from bifocal.survey.weighted_similarity import TURNS
 from bifocal.workbook.content import SurveyContent, control_cells
 from bifocal.workbook.formulas.columns import FORMULAS, georeference_columns
 from bifocal.workbook.formulas.space_block import STEP_FORM, SpaceBlock
@@ -16,8 +17,6 @@ from photocore.workbook.making.live_columns import LiveColumn
 from photocore.workbook.making.look import HEAD_FONT, LABEL_FONT, NOTE_FONT, WRONG, colour_where
 from photocore.workbook.reading.grid import column_letters
 
-#: Turns of the direction, each some 1e-3 as far as the one before: six reach rounding.
-TURNS = 6
 #: Row of the keys of the control points; model and parameters stand above.
 CONTROL_HEAD = 12
 #: First column and rows of the steps of the fit: above the folded columns of the table.

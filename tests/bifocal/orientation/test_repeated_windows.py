@@ -30,7 +30,7 @@ def pair_of(*, plaster, aside, pitch=1.2, seed=1, size=SIZE, pixel=PIXEL, depth=
     return images, lenses
 
 
-def repeated(images, lenses, *, believed):
+def repeated(images, lenses, *, believed, height=D1):
     """Return how the wall repeats itself, where ties believe the near camera at that X."""
     shift = np.eye(3)
     shift[0, 2] = -believed / PIXEL
@@ -39,7 +39,7 @@ def repeated(images, lenses, *, believed):
         pixels1=none, pixels2=none, seen1=none, seen2=none, homography=shift,
         on_plane=np.zeros(0, dtype=bool), tolerance=1.0,
     )  # fmt: skip
-    far = Pinhole(lenses[0].matrix, np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, D1]))
+    far = Pinhole(lenses[0].matrix, np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, height]))
     return repetition(images, lenses, far, ties)
 
 
@@ -132,3 +132,9 @@ def test_align_says_first_that_nothing_tells_which_window_is_which() -> None:
     variance = covariance_of_doubts(made.setup)
     assert variance is not None
     assert np.sqrt(variance[NAMES.index("X 2"), NAMES.index("X 2")]) > 1.1
+
+
+@pytest.mark.parametrize("height", [np.nan, -D1, 0.0])
+def test_approximate_cameras_that_see_no_wall_ask_for_no_repetition(height: float) -> None:
+    images, lenses = pair_of(aside=0.62, plaster=2.0)
+    assert repeated(images, lenses, believed=0.62, height=height) is None
