@@ -96,6 +96,8 @@ def _grid(far: Pinhole, size: tuple[int, int]) -> tuple[FloatArray, float] | Non
 
     None where it shows none of it: approximate cameras may be nonsense, which others find out.
     """
+    if not far.centre[2] > 0:
+        return None
     edge = np.linspace(0.0, 1.0, 9)
     rim = np.array([[(x, 0.0), (x, 1.0), (0.0, x), (1.0, x)] for x in edge]).reshape(-1, 2)
     rim = apply_homography(plane_from_pixel(far), rim * np.array(size))
