@@ -43,10 +43,6 @@ class Repetition:
     is_certain: bool
 
 
-#: A wall that is narrower than this share of its length is none.
-_NARROWEST = 0.01
-
-
 def repetition(images: Images, interiors: Interiors, far: Pinhole, ties: Ties) -> Repetition | None:
     """Return how the wall repeats itself; None where it does not, or is not in sight.
 
@@ -106,7 +102,7 @@ def _grid(far: Pinhole, size: tuple[int, int]) -> tuple[FloatArray, float] | Non
     if not len(rim):
         return None
     low, high = rim.min(axis=0), rim.max(axis=0)
-    if not (high - low).min() > _NARROWEST * (high - low).max():
+    if not (high - low).min() > REPETITION.narrowest * (high - low).max():
         return None
     spacing = float(np.sqrt(np.prod(high - low) / REPETITION.pixels))
     x, y = np.arange(low[0], high[0], spacing), np.arange(high[1], low[1], -spacing)

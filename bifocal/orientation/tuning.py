@@ -244,7 +244,7 @@ class SlipTuning:
     fits: float = 3.0
     #: A mirror image that lays the camera on its side, and a focal length of any size, are believed
     #: if nothing fits nearly so well.
-    clearly: float = 1.4
+    clearly: float = 1.3
     #: Beyond this control points contradict a focal length. [sigma]
     certain: float = 4.0
     #: A point that misses by more says no more. [sigma]
@@ -311,6 +311,8 @@ class RepetitionTuning:
     pixels: float = 2.0e5
     #: Of the wall so much to either side is looked at, of the far distance.
     reach: float = 1.2
+    #: What is seen of it is no narrower than this share of its length.
+    narrowest: float = 0.01
     #: Least share of the smaller picture that is common to both.
     overlap: float = 0.25
     #: Radius from which on grey values are shading, not pattern, of the picture's side.
