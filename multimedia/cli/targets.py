@@ -69,17 +69,17 @@ def command(options: TargetsCommand) -> None:
         )
     listed = [
         {
-            "image": one.image, "targets": len(one.found), "file": one.file,
-            "median_sigma_px": _median(one.found.sigma),
-            "median_diameter_px": _median(one.found.diameter),
-            "merged": int(one.found.merged.sum()),
+            "image": one.image, "targets": len(one.targets), "file": one.file,
+            "median_sigma_px": _median(one.targets.sigma),
+            "median_diameter_px": _median(one.targets.diameter),
+            "merged": int(one.targets.merged.sum()),
         }
         for one in made
     ]  # fmt: skip
     headings = ("image", "targets", "sigma [px]", "diameter [px]", "perhaps several")
     rows = [
         (
-            one.image.name, len(one.found), _shown(line["median_sigma_px"], 3),
+            one.image.name, len(one.targets), _shown(line["median_sigma_px"], 3),
             _shown(line["median_diameter_px"], 1), line["merged"],
         )
         for one, line in zip(made, listed, strict=True)

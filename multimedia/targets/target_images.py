@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -116,6 +117,8 @@ def find_targets(
             f"image: expected grey values of at least {2 * HALF + 1} x {2 * HALF + 1} pixels, "
             f"found an array of shape {grey.shape}."
         )
+    if not np.isfinite(grey).all():
+        raise InputError("image: every grey value must be a finite number.")
     positive(scale, "scale", unit="px")
     positive(smallest, "smallest", unit="px")
     if threshold is not None:
@@ -134,6 +137,30 @@ def find_targets(
             break
         fit = fit.joined(more)
     return fit.settled().images(threshold, smallest, largest)
+
+
+class _Drawn(NamedTuple):
+    """Images of n particles in windows of 9 x 9 pixels, and of all of them together.
+
+    ``columns`` and ``rows`` (n, 9) of the windows, ``where`` both as an index of (n, 9, 9) pixels,
+    ``inside`` which of these exist; ``shape`` of sum 1, ``slopes`` (n, 9, 9, 5) by the terms,
+    ``single`` what each particle shows; ``whole`` the image of all.
+    """
+
+    columns: IntArray
+    rows: IntArray
+    where: tuple[IntArray, IntArray]
+    inside: NDArray[np.bool_]
+    shape: FloatArray
+    slopes: FloatArray
+    single: FloatArray
+    whole: FloatArray
+
+    @property
+    def weight(self) -> FloatArray:
+        """Near the middle counts: what is far is another's, or the light's."""
+        relative = self.shape / self.shape.max(axis=(1, 2), keepdims=True)
+        return np.where(self.inside, relative + 0.02, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,55 +194,30 @@ class _Gaussians:
         first[:, :2], first[:, 3] = places[:, ::-1], heights / _middle(first[:, 2])
         return first
 
-    def windows(self) -> tuple[IntArray, IntArray, NDArray[np.bool_]]:
-        """Return columns (n, 9), rows (n, 9), and which of the pixels (n, 9, 9) exist."""
+    def drawn(self) -> _Drawn:
+        """Return the particles' images, each in its window and all together."""
         height, width = self.bright.shape
         beside = np.arange(-HALF, HALF + 1)
         middle = np.clip(np.rint(self.terms[:, :2]), 0, (width - 1, height - 1)).astype(int)
         columns, rows = (middle[:, axis, None] + beside for axis in (0, 1))
         inside = ((rows >= 0) & (rows < height))[:, :, None]
         inside = inside & ((columns >= 0) & (columns < width))[:, None, :]
-        return np.clip(columns, 0, width - 1), np.clip(rows, 0, height - 1), inside
-
-    def shapes(self, columns: IntArray, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return Gaussians of sum 1 in their windows (n, 9, 9), and derivatives by the terms."""
-        across, by_x, by_wide = _integrated(columns - self.terms[:, :1], self.terms[:, 2:3])
-        down, by_y, by_high = _integrated(rows - self.terms[:, 1:2], self.terms[:, 2:3])
-        shape = down[:, :, None] * across[:, None, :]
-        total = self.terms[:, 3, None, None]
-        by_width = by_high[:, :, None] * across[:, None, :] + down[:, :, None] * by_wide[:, None, :]
-        slopes = np.stack(
-            [
-                -total * down[:, :, None] * by_x[:, None, :],
-                -total * by_y[:, :, None] * across[:, None, :],
-                total * by_width,
-                shape,
-                np.ones_like(shape),
-            ],
-            axis=-1,
-        )
-        return shape, slopes
-
-    def model(self, columns: IntArray, rows: IntArray, values: FloatArray) -> FloatArray:
-        """Return the image of all particles."""
-        image = np.zeros_like(self.bright)
-        np.add.at(image, (rows[:, :, None], columns[:, None, :]), values)
-        return image
+        columns, rows = np.clip(columns, 0, width - 1), np.clip(rows, 0, height - 1)
+        shape, slopes = _shapes(self.terms, columns, rows)
+        single = np.where(inside, self.terms[:, 3, None, None] * shape, 0.0)
+        whole, where = np.zeros_like(self.bright), (rows[:, :, None], columns[:, None, :])
+        np.add.at(whole, where, single)
+        return _Drawn(columns, rows, where, inside, shape, slopes, single, whole)
 
     def settled(self) -> _Gaussians:
         """Return the fit that least squares lead to, each beside what the others show."""
         fit = self
         for turn in range(_TURNS if len(self.terms) else 0):
-            columns, rows, inside = fit.windows()
-            shape, slopes = fit.shapes(columns, rows)
-            values = np.where(inside, fit.terms[:, 3, None, None] * shape, 0.0)
-            rest = fit.bright - fit.model(columns, rows, values)
-            miss = rest[rows[:, :, None], columns[:, None, :]] - fit.terms[:, 4, None, None]
-            # Near the middle counts: what is far is another's, or the light's.
-            weight = np.where(inside, shape / shape.max(axis=(1, 2), keepdims=True) + 0.02, 0.0)
-            weighed = (slopes * weight[..., None]).reshape(len(weight), -1, 5).swapaxes(1, 2)
-            normal = weighed @ slopes.reshape(len(weight), -1, 5)
-            right = (weighed @ miss.reshape(len(weight), -1, 1))[..., 0]
+            drawn, count = fit.drawn(), len(fit.terms)
+            miss = (fit.bright - drawn.whole)[drawn.where] - fit.terms[:, 4, None, None]
+            weighed = (drawn.slopes * drawn.weight[..., None]).reshape(count, -1, 5).swapaxes(1, 2)
+            normal = weighed @ drawn.slopes.reshape(count, -1, 5)
+            right = (weighed @ miss.reshape(count, -1, 1))[..., 0]
             diagonal = np.einsum("nii->ni", normal)
             damp = 1e-6 + (0.1 if turn < 4 else 0.0)
             normal[:, range(5), range(5)] = diagonal * (1 + damp) + 1e-12
@@ -230,18 +232,11 @@ class _Gaussians:
                 break
         return fit
 
-    def rest(self) -> FloatArray:
-        """Return what the particles leave of the image."""
-        columns, rows, inside = self.windows()
-        shape, _ = self.shapes(columns, rows)
-        values = np.where(inside, self.terms[:, 3, None, None] * shape, 0.0)
-        return self.bright - self.model(columns, rows, values)
-
     def hidden(self, threshold: float | None) -> FloatArray:
         """Return first terms of particles in the flanks of others: what is left beside those."""
         if not len(self.terms):
             return self.terms
-        more = self.maxima(self.rest(), threshold)
+        more = self.maxima(self.bright - self.drawn().whole, threshold)
         apart, nearest = cKDTree(self.terms[:, :2]).query(more[:, :2])
         beside = self.terms[nearest]
         high = more[:, 3] * _middle(more[:, 2]) > _SECOND * beside[:, 3] * _middle(beside[:, 2])
@@ -255,22 +250,19 @@ class _Gaussians:
         """Return what is a particle, brightest first."""
         if not len(self.terms):
             return _NONE
-        columns, rows, inside = self.windows()
-        shape, slopes = self.shapes(columns, rows)
-        own = np.where(inside, self.terms[:, 3, None, None] * shape, 0.0)
-        where = rows[:, :, None], columns[:, None, :]
-        whole = self.model(columns, rows, own)
-        sigma = self._sigma(shape, slopes, whole[where], inside)
+        drawn = self.drawn()
+        sigma, bright = self._sigma(drawn), self.bright[drawn.where]
         height = self.terms[:, 3] * _middle(self.terms[:, 2])
-        noise = self.noise[where][:, HALF, HALF]
-        least = np.full(len(own), threshold) if threshold is not None else 2.0 * noise
+        noise = self.noise[drawn.where][:, HALF, HALF]
+        least = np.full(len(height), threshold) if threshold is not None else 2.0 * noise
         size = 4 * self.terms[:, 2]
         limits = self.bright.shape[1] - 0.5, self.bright.shape[0] - 0.5
         kept = (height > least) & (size >= max(smallest, 4 * _NARROWEST)) & (size <= largest)
         kept &= np.isfinite(sigma).all(axis=1) & (sigma < 1.0).all(axis=1)
         kept &= ((self.terms[:, :2] > -0.5) & (self.terms[:, :2] < limits)).all(axis=1)
         order = np.flatnonzero(kept)[np.argsort(-height[kept], kind="stable")]
-        lit = inside & (self.bright[where] > least[:, None, None]) & (2 * own > whole[where])
+        lit = drawn.inside & (bright > least[:, None, None])
+        lit &= 2 * drawn.single > drawn.whole[drawn.where]
         middle = float(np.median(size[kept])) if kept.any() else 0.0
         return TargetImages(
             pixels=self.terms[order, :2],
@@ -279,29 +271,24 @@ class _Gaussians:
             height=height[order],
             counts=lit.sum(axis=(1, 2))[order],
             extents=np.stack([lit.any(axis=axis).sum(axis=1) for axis in (1, 2)], axis=1)[order],
-            sums=np.where(lit, self.bright[where], 0.0).sum(axis=(1, 2))[order],
+            sums=np.where(lit, bright, 0.0).sum(axis=(1, 2))[order],
             merged=(size > _MERGED * middle)[order],
         )
 
-    def _sigma(
-        self, shape: FloatArray, slopes: FloatArray, whole: FloatArray, inside: NDArray[np.bool_]
-    ) -> FloatArray:
+    def _sigma(self, drawn: _Drawn) -> FloatArray:
         """Return standard deviations of places, shape (n, 2), by what noise does to the fit. [px]
 
         The noise of a pixel grows with its light: how much, is told by what is left over. What the
         nearest neighbour takes of the same pixels is not known of either.
         """
-        columns, rows, _ = self.windows()
-        where = rows[:, :, None], columns[:, None, :]
-        rest, noise = self.rest()[where], self.noise[where]
-        relative = shape / shape.max(axis=(1, 2), keepdims=True)
-        core = inside & (relative > 0.1)
+        whole, noise = drawn.whole[drawn.where], self.noise[drawn.where]
+        rest, weight = self.bright[drawn.where] - whole, drawn.weight
+        core = weight > 0.1
         # The median of the square of a normal variable is 0.455 of its mean.
         beyond = np.median(rest[core] ** 2) / 0.455 - np.median(noise[core] ** 2)
         gain = max(float(beyond / np.median(whole[core])), 0.0)
         variance = noise**2 + gain * whole
-        weight = np.where(inside, relative + 0.02, 0.0)
-        both = np.concatenate([slopes, self._beside(columns, rows)], axis=-1)
+        both = np.concatenate([drawn.slopes, self._beside(drawn)], axis=-1)
         # Terms of one size, whatever the grey values: what no pixel tells is then told apart.
         size = np.sqrt(np.einsum("nyxi,nyx,nyxi->ni", both, weight, both))
         both = both / np.where(size > 0, size, 1.0)[:, None, None, :]
@@ -312,14 +299,31 @@ class _Gaussians:
         misfit = (weight * rest**2).sum(axis=(1, 2)) / (weight * variance).sum(axis=(1, 2))
         return np.sqrt(variances * np.maximum(misfit, 1.0)[:, None])
 
-    def _beside(self, columns: IntArray, rows: IntArray) -> FloatArray:
+    def _beside(self, drawn: _Drawn) -> FloatArray:
         """Return derivatives of each window by the terms of its nearest neighbour."""
-        apart, nearest = cKDTree(self.terms[:, :2]).query(self.terms[:, :2], k=2)
         if len(self.terms) < 2:
-            return np.zeros((*columns.shape, columns.shape[1], 4))
-        _, slopes = replace(self, terms=self.terms[nearest[:, 1]]).shapes(columns, rows)
+            return np.zeros((*drawn.shape.shape, 4))
+        apart, nearest = cKDTree(self.terms[:, :2]).query(self.terms[:, :2], k=2)
+        _, slopes = _shapes(self.terms[nearest[:, 1]], drawn.columns, drawn.rows)
         slopes[apart[:, 1] > 2 * HALF] = 0.0
         return slopes[..., :4]
+
+
+def _shapes(terms: FloatArray, columns: IntArray, rows: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Return Gaussians of sum 1 in windows (n, 9, 9), and derivatives by their terms."""
+    across, by_x, by_wide = _integrated(columns - terms[:, :1], terms[:, 2:3])
+    down, by_y, by_high = _integrated(rows - terms[:, 1:2], terms[:, 2:3])
+    shape = down[:, :, None] * across[:, None, :]
+    total = terms[:, 3, None, None]
+    by_width = by_high[:, :, None] * across[:, None, :] + down[:, :, None] * by_wide[:, None, :]
+    slopes = [
+        -total * down[:, :, None] * by_x[:, None, :],
+        -total * by_y[:, :, None] * across[:, None, :],
+        total * by_width,
+        shape,
+        np.ones_like(shape),
+    ]
+    return shape, np.stack(slopes, axis=-1)
 
 
 def _integrated(

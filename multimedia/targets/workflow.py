@@ -26,6 +26,8 @@ from photocore.output import (
 
 #: Share of targets that may be several before that is said.
 _MANY = 0.05
+#: Share of the greatest diameter from which on it is what bounds them.
+_LARGE = 0.9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,13 +37,13 @@ class ImageTargets:
     Attributes
     ----------
     image : path
-    found : TargetImages
+    targets : TargetImages
     file : path, optional
         OpenPTV's file of them, where one is written.
     """
 
     image: Path
-    found: TargetImages
+    targets: TargetImages
     file: Path | None
 
 
@@ -93,12 +95,12 @@ def targets_of_images(
     elif out is not None:
         _refuse_repeated(images, names)
         check_all_writable(*(out / name for name in names if out.exists()), overwrite=overwrite)
-    found: list[TargetImages] = []
+    listed: list[TargetImages] = []
     for k, image in enumerate(images):
         progress(k, len(images), image.name)
         grey = read_image(image, grey=True)
         with located(image):
-            found.append(
+            listed.append(
                 find_targets(
                     grey,
                     threshold=threshold,
@@ -110,16 +112,16 @@ def targets_of_images(
             )
     progress(len(images), len(images))
     made = [
-        ImageTargets(image=image, found=one, file=None if out is None or is_table else out / name)
-        for image, one, name in zip(images, found, names, strict=True)
+        ImageTargets(image=image, targets=one, file=None if out is None or is_table else out / name)
+        for image, one, name in zip(images, listed, names, strict=True)
     ]
     if out is not None and is_table:
         write_columns(out, _columns(made), overwrite=overwrite)
     elif out is not None:
         with atomic_folder(out, overwrite=overwrite) as folder:
-            for name, one in zip(names, found, strict=True):
+            for name, one in zip(names, listed, strict=True):
                 (folder / name).write_text(_text(one, offset), encoding="utf-8")
-    return made, _remarks(made)
+    return made, _remarks(made, largest)
 
 
 def _file_name(image: Path) -> str:
@@ -150,22 +152,25 @@ def _offset(project: Path) -> float:
     return offsets.pop()
 
 
-def _text(found: TargetImages, offset: float) -> str:
+def _text(targets: TargetImages, offset: float) -> str:
     """Return the targets as OpenPTV reads them: from top to bottom, as it looks for them by row."""
-    order = np.argsort(found.pixels[:, 1], kind="stable")
+    order = np.argsort(targets.pixels[:, 1], kind="stable")
     return targets_text(
-        found.pixels[order] + offset, found.counts[order], found.extents[order], found.sums[order]
+        targets.pixels[order] + offset,
+        targets.counts[order],
+        targets.extents[order],
+        targets.sums[order],
     )
 
 
 def _columns(made: Sequence[ImageTargets]) -> dict[str, Any]:
     def joined(name: str, axis: int | None = None) -> Any:
-        parts = [getattr(one.found, name) for one in made]
+        parts = [getattr(one.targets, name) for one in made]
         return np.concatenate([part if axis is None else part[:, axis] for part in parts])
 
     return {
-        "image": [one.image.name for one in made for _ in range(len(one.found))],
-        "id": [str(k + 1) for one in made for k in range(len(one.found))],
+        "image": [one.image.name for one in made for _ in range(len(one.targets))],
+        "id": [str(k + 1) for one in made for k in range(len(one.targets))],
         "column [px]": joined("pixels", 0),
         "row [px]": joined("pixels", 1),
         "sigma_column [px]": joined("sigma", 0),
@@ -174,14 +179,19 @@ def _columns(made: Sequence[ImageTargets]) -> dict[str, Any]:
         "height": joined("height"),
         "sum": joined("sums"),
         "pixels": joined("counts").astype(float),
-        "merged": ["yes" if flag else "" for one in made for flag in one.found.merged],
+        "merged": ["yes" if flag else "" for one in made for flag in one.targets.merged],
     }
 
 
-def _remarks(made: Sequence[ImageTargets]) -> list[str]:
-    notes: list[str] = [remark("targets.none", of=one.image) for one in made if not len(one.found)]
-    merged = sum(int(one.found.merged.sum()) for one in made)
-    count = sum(len(one.found) for one in made)
+def _remarks(made: Sequence[ImageTargets], largest: float) -> list[str]:
+    notes: list[str] = [
+        remark("targets.none", of=one.image) for one in made if not len(one.targets)
+    ]
+    merged = sum(int(one.targets.merged.sum()) for one in made)
+    count = sum(len(one.targets) for one in made)
     if merged > _MANY * count:
         notes.append(remark("targets.merged", merged=merged, count=count))
+    sizes = np.concatenate([one.targets.diameter for one in made])
+    if len(sizes) and np.median(sizes) > _LARGE * largest:
+        notes.append(remark("targets.large", largest=largest))
     return notes

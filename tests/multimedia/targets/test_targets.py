@@ -25,6 +25,7 @@ from multimedia import (
 )
 from multimedia.openptv.openptv_files import read_targets
 from multimedia.targets.background import without_background
+from tests.browser import SAMPLE
 from tests.builders.commands import multimedia_command as main
 from tests.multimedia.openptv.test_particles import VIEWS, WALL
 from tests.multimedia.targets.rendered_particles import Frame, drawn, rendered
@@ -106,6 +107,7 @@ def test_a_threshold_leaves_fainter_ones_out_and_sizes_bound_what_is_taken():
         ({"scale": 0.0}, "scale"),
         ({"image": np.zeros((5, 5))}, r"shape \(5, 5\)"),
         ({"image": np.zeros((50, 50, 3))}, r"shape \(50, 50, 3\)"),
+        ({"image": np.full((50, 50), np.nan)}, "finite"),
     ],
 )
 def test_what_cannot_be_meant_is_refused(options, said):
@@ -154,6 +156,7 @@ def test_two_images_of_one_name_and_images_without_targets_are_told(tmp_path: Pa
     assert not (tmp_path / "img").exists()
     _, said = run(tmp_path / "a" / "0001.png")
     assert "no targets" in said
+    assert "edges and patches of a photo" in run(SAMPLE / "far.jpg")[1]
     _, said = run(tmp_path / "none.png", status=1)
     assert "none.png" in said
 
