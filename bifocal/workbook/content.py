@@ -17,6 +17,7 @@ from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.solved_survey import SolvedSurvey, WorldPoints
 from bifocal.survey.survey_media import SurveyMedia
+from bifocal.survey.taped import TapedDistance
 from bifocal.survey.tolerances import RULES, ToleranceRule
 from bifocal.workbook.formulas.columns import (
     adjustment_names,
@@ -63,6 +64,8 @@ class SurveyContent:
         What was measured and what came out.
     known : KnownPoints
         Check points.
+    tape : TapedDistance or None
+        A distance taped on site.
     control, georeference : KnownPoints, Georeference or None
         Control points and the transformation.
     model : str
@@ -105,6 +108,7 @@ class SurveyContent:
     points: PointObservations | None = None
     table: ReliefTable | None = None
     known: KnownPoints = field(default_factory=KnownPoints)
+    tape: TapedDistance | None = None
     control: KnownPoints = field(default_factory=KnownPoints)
     georeference: Georeference | None = None
     model: str = "auto"
@@ -128,7 +132,7 @@ class SurveyContent:
         return cls(
             language=survey.language, setup=solved.setup, pair=solved.pair,
             sigma_px=solved.sigma_px, points=solved.points, table=solved.table,
-            known=survey.known, control=survey.control,
+            known=survey.known, control=survey.control, tape=survey.tape,
             georeference=solved.georeference, model=survey.model, rules=solved.rules,
             sensor=setup.sensor, limits=setup.measuring.limits, media=solved.media,
         )  # fmt: skip

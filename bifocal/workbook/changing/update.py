@@ -22,7 +22,7 @@ from bifocal.workbook.content import CHART_ROWS, STRUCTURED_ROWS, SurveyContent
 from bifocal.workbook.formulas.columns import CHANGED
 from bifocal.workbook.formulas.setup_cells import TYPED_FORMULAS
 from bifocal.workbook.formulas.space_block import BLOCK
-from bifocal.workbook.making.book import build, unprinted_formula
+from bifocal.workbook.making.book import UNPRINTED, build, unprinted_formula
 from bifocal.workbook.making.charts import HEAD, LEFT
 from bifocal.workbook.words import word
 from photocore.errors import InputError
@@ -219,7 +219,8 @@ def _changes(editor: WorkbookEditor) -> dict[str, float] | None:
 def _print_points(editor: WorkbookEditor, count: int, language: str) -> None:
     """Print as many rows of `Points` and `Results` as hold points, unless the user chose others."""
     for name in ("Points", "Results"):
-        place, area = place_of(editor, f"unprinted_{name}"), editor.table(f"tbl{name}")
+        area = editor.table(f"tbl{name}")
+        place = place_of(editor, f"unprinted_{name}") or place_of(editor, UNPRINTED)
         if place is None or area is None:
             continue
         sheet, row, column = place

@@ -13,6 +13,7 @@ from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations, pixel_keys
 from bifocal.survey.reference import KnownPoints
 from bifocal.survey.survey_input import SurveyInput, where_of, with_measured
+from bifocal.survey.taped import TAPE, TapedDistance
 from bifocal.workbook.formulas.columns import other_keys
 from bifocal.workbook.reading.row_checks import PIXELS, POLAR, XY, check_rows
 from bifocal.workbook.reading.setup_reader import (
@@ -181,12 +182,13 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
     check = _known(survey, "Check", ("X_ref", "Y_ref", "Z_ref"))
     control = _known(survey, "Georeference", ("E", "N", "H"))
     parts = (table, setup, check, control)
-    model, language, is_ours = "auto", "en", False
+    model, language, is_ours, tape = "auto", "en", False, None
     if sheets is not None:
         asked = read_named_values(
             sheets, [Column("g_model", kind="text")], sheet="Georeference", errors=errors
         )
         model = asked.text("g_model") or "auto"
+        tape = _taped(sheets, options.decimal, errors)
         language = _language(sheets)
         is_ours = any(area.name == "tblPoints" for area in sheets.tables)
     if errors:
@@ -199,6 +201,7 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
         unit=unit,
         known=with_measured(check.points.called_as(points.ids), points),
         control=control.points.called_as(points.ids),
+        tape=tape,
         model=model,
         language=language,
         is_ours=is_ours,
@@ -209,6 +212,23 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
         control_rows=control.rows,
         remarks=tuple(dict.fromkeys(remarks)),
     )
+
+
+def _taped(
+    book: SheetFile, decimal: Decimal | None, errors: list[CellError]
+) -> TapedDistance | None:
+    """Return the distance taped on site, where its three cells are filled in."""
+    if not all(name in book.names for name in TAPE):
+        return None
+    columns = [Column(name, kind="text") for name in TAPE[:2]]
+    columns.append(Column(TAPE[2], kind="number", unit="m"))
+    cells = read_named_values(book, columns, sheet="Check", decimal=decimal, errors=errors)
+    first, second, length = cells.text(TAPE[0]), cells.text(TAPE[1]), cells.given(TAPE[2])
+    if length is not None and not 0 < length <= LARGEST:
+        errors.append(cells.error(TAPE[2], f"found {length:g} m, expected a length above zero."))
+    if length is None or not (first and second):
+        return None
+    return TapedDistance(ends=(first, second), length=length)
 
 
 def _known(survey: OpenSurvey, sheet: str, keys: tuple[str, str, str]) -> _KnownTable:
