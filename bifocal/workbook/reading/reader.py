@@ -289,6 +289,8 @@ def _read_points(survey: OpenSurvey, options: ReadOptions) -> Table:
     general = isinstance(book, SheetFile) and is_general(book)
     others = other_count(book.names) if isinstance(book, SheetFile) else 0
     followed = {*XY, *POLAR} if general else set()
+    # Points of our own sheets, and of more photos than two, may lack many numbers.
+    ours = isinstance(book, SheetFile) and any(area.name == "tblPoints" for area in book.tables)
     for shared in ((), PIXELS, XY):
         last = shared == XY
         complaints: list[CellError] = []
@@ -305,6 +307,7 @@ def _read_points(survey: OpenSurvey, options: ReadOptions) -> Table:
                 decimal=survey.decimal,
                 column_map=options.columns or None,
                 visible_only=options.visible_only,
+                whole=options.photos == 2 and not ours,
                 errors=complaints,
             )
         except InputError:
