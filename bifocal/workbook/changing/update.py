@@ -37,6 +37,7 @@ from photocore.workbook.making.newbook import RowBlock
 from photocore.workbook.making.print_area import move_print_area
 from photocore.workbook.making.repeated_rows import short_formula
 from photocore.workbook.reading.grid import (
+    TableArea,
     Value,
     column_letters,
     plain_title,
@@ -145,6 +146,8 @@ def update_book(
         own = editor.table(name)
         if own is not None:
             places = [row - own.first for row in sheet_rows]
+            if "control" in given:
+                _type_list(editor, built, own, sheet_rows)
             _table(editor, built, name, places)
             if name == "tblCheck" and "tblCompare" in built.tables:
                 _table(editor, built, "tblCompare", places, own.length)
@@ -154,6 +157,17 @@ def update_book(
     _charts(editor, built, rows)
     _log(editor, content)
     return replace(saved(editor, built, target, overwrite=overwrite), added=tuple(added))
+
+
+def _type_list(
+    editor: WorkbookEditor, built: BookBuilder, area: TableArea, rows: Sequence[int]
+) -> None:
+    """Type names and coordinates of a list into a table of check or control points."""
+    content, headings = built.tables[area.name], area.headings()
+    for column in content.columns:
+        if column.kind == "input" and column.key in headings and column.key != "use":
+            for row, value in zip(rows, content.cells.get(column.key, ()), strict=False):
+                type_value(editor, (area.sheet, row, headings[column.key]), value)
 
 
 def saved(

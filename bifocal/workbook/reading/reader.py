@@ -49,7 +49,7 @@ _SHARED = {key: key.rstrip("12") for key in (*XY, *PIXELS)}
 _OTHER = {"col1": "i", "row1": "j", "col2": "i", "row2": "j"}
 TO_DEGREES = {"deg": 1.0, "gon": 0.9, "rad": float(np.degrees(1.0))}
 TO_MM = {"mm": 1.0, "cm": 10.0, "um": 1e-3, "m": 1000.0}
-_TO_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "dm": 0.1}
+TO_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "dm": 0.1}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,7 +121,7 @@ def point_columns(*, shared: Sequence[str] = (), photos: int = 2, others: int = 
     columns = []
     for key in ("id", *XY, *POLAR, *PIXELS, "use", "code", "note", "r_measured"):
         more = [_SHARED[key], *([_OTHER[key]] if key in _OTHER else [])] if key in shared else []
-        columns.append(_understood(key, more=more, unit=_UNITS.get(key, "")))
+        columns.append(understood(key, more=more, unit=_UNITS.get(key, "")))
     columns += [Column(key, (key,), kind="number") for key in other_keys(others)]
     for key in _more_pixels(photos):
         names = [name for name in headings("columns", f"{key[:3]}1") if "1" in name]
@@ -130,7 +130,7 @@ def point_columns(*, shared: Sequence[str] = (), photos: int = 2, others: int = 
     return columns
 
 
-def _understood(
+def understood(
     key: str, *, more: Sequence[str] = (), unit: str = "", required: bool = False
 ) -> Column:
     """Return a column to read, with every heading that is understood."""
@@ -243,7 +243,7 @@ def _known(survey: OpenSurvey, sheet: str, keys: tuple[str, str, str]) -> _Known
         return _KnownTable()
     table = read_table(
         book,
-        [_understood(key, required=key == "id") for key in ("id", *keys, "use")],
+        [understood(key, required=key == "id") for key in ("id", *keys, "use")],
         name="Geo" if sheet == "Georeference" and areas else sheet,
         sheet=areas[0].sheet if areas else titles[0],
         decimal=survey.decimal,
@@ -252,7 +252,7 @@ def _known(survey: OpenSurvey, sheet: str, keys: tuple[str, str, str]) -> _Known
     faulty = {(error.sheet, error.cell) for error in errors}
     errors += table.repeated("id")
     errors += table.too_large(keys, LARGEST)
-    xyz = np.stack([table.in_unit(key, _TO_M, errors) for key in keys], axis=-1)
+    xyz = np.stack([table.in_unit(key, TO_M, errors) for key in keys], axis=-1)
     use = table.numbers("use")
     rows = [i for i, name in enumerate(table.texts("id")) if name]
     for i, name in enumerate(table.texts("id")):
@@ -391,7 +391,7 @@ def _observations(
     use = table.numbers("use")
     unit, factor = _unit_of_xy(table, errors)
     units = dict(zip(POLAR, (TO_MM, TO_MM, TO_DEGREES), strict=True))
-    units |= {key: {"px": 1.0} for key in (*PIXELS, *more)} | {"r_measured": _TO_M}
+    units |= {key: {"px": 1.0} for key in (*PIXELS, *more)} | {"r_measured": TO_M}
     columns = {key: table.in_unit(key, factors, errors) for key, factors in units.items()}
     columns |= {key: table.numbers(key) * factor for key in XY}
     texts = {"id": ids, "code": table.texts("code"), "note": table.texts("note")}
