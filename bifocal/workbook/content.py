@@ -32,6 +32,8 @@ from photocore.workbook.making.live_columns import LiveColumn
 
 #: Rows of the tables of an empty template.
 POINT_ROWS, CHECK_ROWS, CONTROL_ROWS, SPARE_ROWS = 300, 25, 12, 10
+#: Rows of an empty form that are printed: one page of `Results`.
+FORM_ROWS = 28
 #: Beyond this many points formulas are written as A1 references, which are shorter.
 STRUCTURED_ROWS = 2000
 #: The charts show the first points only.
@@ -225,6 +227,13 @@ class SurveyContent:
     def control_rows(self) -> int:
         """Rows of `Georeference`."""
         return max(CONTROL_ROWS, len(self.control) + 3)
+
+
+def printed_rows(content: SurveyContent) -> int:
+    """Return how many points are printed: all there are, or one page of an empty form."""
+    if content.points is None:
+        return min(FORM_ROWS, content.point_rows)
+    return max(len(content.points), 1)
 
 
 def inputs(values: FloatArray) -> list[CellValue]:

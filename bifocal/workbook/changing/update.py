@@ -232,7 +232,7 @@ def _changes(editor: WorkbookEditor) -> dict[str, float] | None:
 
 def _print_points(editor: WorkbookEditor, count: int, language: str) -> None:
     """Print as many rows of `Points` and `Results` as hold points, unless the user chose others."""
-    for name in ("Points", "Results"):
+    for name in ("Points", "Results", "WhatIf"):
         area = editor.table(f"tbl{name}")
         place = place_of(editor, f"unprinted_{name}") or place_of(editor, UNPRINTED)
         if place is None or area is None:
@@ -241,7 +241,8 @@ def _print_points(editor: WorkbookEditor, count: int, language: str) -> None:
         stands = editor.models(sheet, row).get(column)
         found = re.search(r">(\d+),", stands.formula if stands else "")
         head = area.area[0]
-        if found and move_print_area(editor, area.sheet, head + int(found[1]), head + count):
+        last = min(count, CHART_ROWS) if name == "WhatIf" else count
+        if found and move_print_area(editor, area.sheet, head + int(found[1]), head + last):
             formula = unprinted_formula(language, count)
             editor.put(*place, "", formula=formula, style=stands.style if stands else "")
 

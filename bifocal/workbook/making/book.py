@@ -8,7 +8,7 @@ from pathlib import Path
 from openpyxl.styles import Alignment, Protection
 
 from bifocal.survey.other_photos import CHANCE
-from bifocal.workbook.content import STRUCTURED_ROWS, SurveyContent, point_cells
+from bifocal.workbook.content import STRUCTURED_ROWS, SurveyContent, point_cells, printed_rows
 from bifocal.workbook.formulas.columns import FORMULAS, planning_facts, results_columns
 from bifocal.workbook.formulas.world_state import SITE, STATE, sentence
 from bifocal.workbook.making.agreement import refuse_contradictions
@@ -39,8 +39,6 @@ from photocore.workbook.reading.grid import column_letters
 
 #: Row of the keys in `Points` and `Results`.
 HEAD = 4
-#: Rows of an empty form that are printed: one page of `Results`.
-FORM_ROWS = 28
 #: Fill and text of each flag; the word itself always stands in the cell too.
 FLAG_COLOURS = {
     "OK": GOOD,
@@ -120,7 +118,7 @@ def _points(builder: BookBuilder, content: SurveyContent) -> None:
     facts |= {"long"} if content.point_rows > STRUCTURED_ROWS else set()
     said = sentence("points_state", builder.word, facts, note=note)
     sheet.formula("A2", said, name="points_state", font=NOTE_FONT)
-    colour_where(sheet.worksheet, "A2", f'$A$2<>"{builder.word(note)}"', WRONG)
+    colour_where(sheet.worksheet, "A2:H2", f'$A$2<>"{builder.word(note)}"', WRONG)
     sheet.worksheet.sheet_properties.outlinePr.summaryRight = True
     # Each page begins with the names: the title would be cut off there, so it heads the page.
     sheet.worksheet.oddHeader.left.text = builder.word("Points")
@@ -191,13 +189,6 @@ def _unlock_below(sheet: SheetBuilder, columns: Sequence[LiveColumn]) -> None:
         if column.kind == "input":
             whole = sheet.worksheet.column_dimensions[column_letters(number)]
             whole.protection, whole.number_format = Protection(locked=False), column.number_format
-
-
-def printed_rows(content: SurveyContent) -> int:
-    """Return how many points are printed: all there are, or one page of an empty form."""
-    if content.points is None:
-        return min(FORM_ROWS, content.point_rows)
-    return max(len(content.points), 1)
 
 
 def print_area(sheet: str, columns: int, rows: int) -> str:

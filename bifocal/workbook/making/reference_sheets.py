@@ -44,7 +44,7 @@ def check(builder: BookBuilder, content: SurveyContent) -> None:
     sheet = builder.sheet("Check", "check_how")
     said = sentence("check_state", builder.word, sheet="Check")
     sheet.formula("A2", said, name="check_state", font=NOTE_FONT)
-    colour_where(sheet.worksheet, "A2", f'$A$2<>"{builder.word("check_how")}"', WRONG)
+    colour_where(sheet.worksheet, "A2:K2", f'$A$2<>"{builder.word("check_how")}"', WRONG)
     for letter, axis in zip("BCD", "XYZ", strict=True):
         sheet.text(f"{letter}4", f"d{axis}", HEAD_FONT)
         sheet.worksheet[f"{letter}4"].alignment = Alignment(horizontal="right")
@@ -77,7 +77,7 @@ def _taped(sheet: SheetBuilder, content: SurveyContent) -> None:
     facts = planning_facts(media=content.media_cells, is_pair=content.is_pair)
     sheet.formula("A3", sentence(SITE, sheet.book.word, facts), name=SITE, font=HEAD_FONT)
     off = sentence("site_alarm", sheet.book.word)
-    colour_where(sheet.worksheet, "A3", off, WRONG)
+    colour_where(sheet.worksheet, "A3:K3", off, WRONG)
     sheet.word("F4", "tape", HEAD_FONT)
     tape = content.tape
     typed = (None, None, None) if tape is None else (*map(name_cell, tape.ends), tape.length)
