@@ -14,6 +14,7 @@ from bifocal.workbook.changing.kinds import check_kind
 from bifocal.workbook.changing.setup_update import (
     add_missing_sheets,
     chart_sheet,
+    store_functions,
     write_corrections,
     write_options,
 )
@@ -22,6 +23,7 @@ from bifocal.workbook.content import CHART_ROWS, STRUCTURED_ROWS, SurveyContent
 from bifocal.workbook.formulas.columns import CHANGED
 from bifocal.workbook.formulas.setup_cells import TYPED_FORMULAS
 from bifocal.workbook.formulas.space_block import BLOCK
+from bifocal.workbook.formulas.world_state import SITE, SPEAKING, STATE
 from bifocal.workbook.making.book import UNPRINTED, build, unprinted_formula
 from bifocal.workbook.making.charts import HEAD, LEFT
 from bifocal.workbook.words import word
@@ -120,7 +122,7 @@ def update_book(
     names = () if survey.book is None else survey.book.names
     editor = (PlainEditor if MARK in names else WorkbookEditor)(source, survey.book)
     content = replace(
-        content, functions="RELIEF_SIGMA" in editor.book.names, changes=_changes(editor)
+        content, functions=place_of(editor, "functions_state") is not None, changes=_changes(editor)
     )
     built = build(content)
     points = editor.table("tblPoints")
@@ -131,6 +133,7 @@ def update_book(
         translate(editor, built, content, survey.language)
     added = add_missing_sheets(editor, built)
     store_named_cells(editor, built, content)
+    store_functions(editor)
     write_options(editor, content, given)
     write_corrections(editor, content)
     rows = [row - points.first for row in survey.table.rows]
@@ -212,8 +215,8 @@ def _results_of(
     if isinstance(editor, PlainEditor):
         return ours, {}  # its formulas are the cells' own, none like another
     for name, defined in built.book.defined_names.items():
-        if name.startswith("unprinted_"):
-            continue  # follows how many points there were
+        if name.startswith("unprinted_") or name in SPEAKING:
+            continue  # follows how many points there were, or the version that wrote it
         sheet, _, cell = defined.attr_text.replace("$", "").partition("!")
         place = place_of(editor, name)
         if place and ":" not in cell and built.book[plain_title(sheet)][cell].data_type == "f":
@@ -260,6 +263,8 @@ def store_named_cells(editor: WorkbookEditor, built: BookBuilder, content: Surve
         if place is None:
             continue
         value = built.results[sheet].get(cell)
+        if name == "title_world" and place_of(editor, SITE) is None:  # of an older version
+            value = built.value_of(STATE)
         if name in typed and content.georeference is not None:
             shown = built.book[sheet][cell].value
             type_value(editor, place, shown if value is None else value)

@@ -11,6 +11,8 @@ from bifocal.workbook.formulas.columns import FORMULAS
 
 #: Names of the cells that judge the world coordinates, and what was measured on site.
 STATE, SITE = "world_state", "site_state"
+#: Names of all cells that hold a sentence: in workbooks of older versions they say less.
+SPEAKING = (STATE, SITE, "title_world", "check_state", "points_state")
 #: Keys of the sentences.
 _SENTENCES = (
     *("world_few", "world_bad", "world_scale", "world_large", "world_good", "world_unchecked"),
