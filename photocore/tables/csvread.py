@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 import csv
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -17,7 +16,9 @@ import numpy as np
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError
 from photocore.remarks import remark
+from photocore.tables.encodings import decoded
 from photocore.tables.headings import Match, describe, find_columns, is_summary
+from photocore.tables.lists import as_table
 from photocore.tables.model import Column
 from photocore.tables.numbers import ArrowTexts, Decimal, is_clear, plain_numbers
 from photocore.textfile import readable
@@ -93,7 +94,7 @@ class CsvFile:
 
 
 def open_csv(path: Path) -> CsvFile:
-    """Read a text file of any usual encoding.
+    """Read a text file of any usual encoding, also the lists of instruments and programs.
 
     Raises
     ------
@@ -106,20 +107,14 @@ def open_csv(path: Path) -> CsvFile:
         raise InputError(f"{path}: the file is empty; save or copy it again.")
     if content.startswith((b"PK\x03\x04", b"\xd0\xcf\x11\xe0")):
         raise InputError(f"{path}: is a workbook, not a text table; give it the ending .xlsx.")
-    remarks: list[str] = []
-    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        try:
-            text = content.decode("utf-16")
-        except UnicodeDecodeError:
-            raise InputError(f"{path}: is not a text table (broken UTF-16).") from None
-    else:
-        try:
-            text = content.decode("utf-8-sig")
-        except UnicodeDecodeError:
-            text = content.decode("cp1252", errors="replace")
-            remarks.append(remark("table.not_utf8"))
+    try:
+        text, remarks = decoded(content)
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: is not a text table (broken UTF-16).") from None
     if "\0" in text[:10_000]:
         raise InputError(f"{path}: is not a text table.")
+    text, told = as_table(text, str(path))
+    remarks += told
     first = text[: text.find("\n")].strip().strip('"') if "\n" in text else text
     delimiter = first[4:] if first.lower().startswith("sep=") and len(first) == 5 else ""
     return CsvFile(label=path.name, text=text, remarks=remarks, delimiter=delimiter)

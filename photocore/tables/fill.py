@@ -11,7 +11,7 @@ from photocore.remarks import remark
 from photocore.tables import convert
 from photocore.tables.headings import Match, unknown_unit
 from photocore.tables.model import Column, Table
-from photocore.tables.numbers import Decimal, unit_symbol
+from photocore.tables.numbers import FEET, GRAD, Decimal, unit_symbol
 from photocore.workbook.reading.grid import CellDate, CellGrid, Value, cell_name, column_letters
 
 
@@ -110,9 +110,15 @@ def refuse_unknown_units(label: str, title: str, match: Match, columns: Sequence
     errors = []
     for column in columns:
         heading = match.headings.get(column.key, "")
-        unit = "" if column.key in match.units else unknown_unit(heading)
+        unit = match.units.get(column.key, "") or unknown_unit(heading)
+        if column.key in match.units and (
+            unit not in FEET or column.unit == "m" or column.any_length
+        ):
+            continue
         if unit and column.kind in ("number", "integer"):
             message = remark("table.strange_unit", heading=heading, unit=unit)
+            if unit.casefold() in GRAD:
+                message = remark("table.which_grad", found=heading)
             cell = cell_name(match.header, match.columns[column.key])
             error = CellError(message, file=label, sheet=title, cell=cell, column=column.key)
             errors.append(error)

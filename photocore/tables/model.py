@@ -35,6 +35,8 @@ class Column:
         Whether a table without this column is refused. Blank cells are left to the caller.
     unit : str
         The unit expected when neither the heading nor the cell says one, for messages.
+    any_length : bool
+        Whether feet are taken, and made metres, although no unit is expected; as where it is "m".
     """
 
     key: str
@@ -42,6 +44,7 @@ class Column:
     kind: Kind = "number"
     required: bool = False
     unit: str = ""
+    any_length: bool = False
 
 
 @dataclass(slots=True, kw_only=True)
@@ -74,6 +77,8 @@ class Table:
         Keys whose unit every cell says itself, and no heading.
     text_cells : list of str
         Cells of a sheet whose number was typed as text: formulas do not see such numbers.
+    feet : dict
+        Key to the foot (``ft``, ``ftUS``) of each column that was converted to metres.
     """
 
     file: str
@@ -88,6 +93,7 @@ class Table:
     remarks: list[str] = field(default_factory=list)
     typed_units: set[str] = field(default_factory=set)
     text_cells: list[str] = field(default_factory=list)
+    feet: dict[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.rows)
