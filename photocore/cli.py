@@ -163,8 +163,8 @@ class LazyGroup(click.Group):
                     printed = ctx.meta.get(_PRINTED, [])
                     for text in noted_remarks():
                         # What a reader did is told once, by the command or else here.
-                        told = text.partition(": ")[2] or text
-                        if not any(told in words for words in printed):
+                        words = text.partition(": ")[2] or text
+                        if not any(words in line for line in printed):
                             remark(text)
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise

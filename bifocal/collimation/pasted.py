@@ -12,6 +12,7 @@ from bifocal.remarks import remark
 from photocore.errors import InputError
 from photocore.tables import read_table
 from photocore.tables.csvread import CsvFile
+from photocore.tables.lists import as_table
 
 #: No wall carries more.
 MOST_ROWS = 5000
@@ -25,7 +26,7 @@ def pasted_control(text: str) -> list[tuple[str, Known, Picks]]:
     InputError
         If no table is recognised, a number is none, or a row has no name.
     """
-    text = text.strip("\r\n")
+    text, _ = as_table(text.strip("\r\n"), "what was pasted")
     if not text.strip():
         raise InputError(remark("page.nothing_pasted"))
     table = read_table(CsvFile("what was pasted", _with_headings(text)), COLUMNS)

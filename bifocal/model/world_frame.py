@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,9 @@ IN_PAIR = "world"
 _OFF = float(np.sin(np.deg2rad(15)))
 #: A plane is spread at least so wide across, of its length; else its points are on a line.
 _ON_LINE = 0.02
-#: What may stand out of a wall and still tell its direction. [m]
-_BESIDE = 0.5
+#: What may lie beside the line of a wall in plan and still tell where it is. [m]
+_BESIDE = 0.003
+_ROUNDS = 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,8 +35,6 @@ class WorldFrame:
         Of the X axis, clockwise from north; 90 degrees for a level plane. [rad]
     is_upright : bool
         Whether Y is the height and r points out of the wall; else X, Y are E, N and r is H.
-    mirrored : bool
-        Whether E and N were exchanged, so that r counts the other way.
     """
 
     east: float
@@ -43,7 +42,6 @@ class WorldFrame:
     height: float
     azimuth: float
     is_upright: bool = True
-    mirrored: bool = False
 
     @property
     def axes(self) -> FloatArray:
@@ -51,13 +49,18 @@ class WorldFrame:
         if not self.is_upright:
             return np.eye(3)
         along = np.array([np.sin(self.azimuth), np.cos(self.azimuth), 0.0])
-        outwards = np.array([along[1], -along[0], 0.0]) * (-1 if self.mirrored else 1)
+        outwards = np.array([along[1], -along[0], 0.0])
         return np.array([along, [0.0, 0.0, 1.0], outwards])
 
     @property
     def origin(self) -> FloatArray:
         """E, N, H of X = Y = r = 0, shape (3,). [m]"""
         return np.array([self.east, self.north, self.height])
+
+    def exchanged(self) -> WorldFrame:
+        """Return the frame where E and N stood in each other's column; r then counts inwards."""
+        azimuth = np.pi / 2 - self.azimuth
+        return replace(self, east=self.north, north=self.east, azimuth=azimuth)
 
     def to_plane(self, world: FloatArray) -> FloatArray:
         """Return X, Y, r of E, N, H, shape (n, 3). [m]"""
@@ -72,7 +75,6 @@ class WorldFrame:
         return {
             "E": self.east, "N": self.north, "H": self.height,
             "azimuth_deg": float(np.rad2deg(self.azimuth)), "upright": self.is_upright,
-            "mirrored": self.mirrored,
         }  # fmt: skip
 
     @classmethod
@@ -104,7 +106,7 @@ class WorldFrame:
         east, north, height, azimuth = (float(held[k]) for k in ("E", "N", "H", "azimuth_deg"))
         return cls(
             east=east, north=north, height=height, azimuth=float(np.deg2rad(azimuth)),
-            is_upright=bool(held["upright"]), mirrored=bool(held["mirrored"]),
+            is_upright=bool(held["upright"]),
         )  # fmt: skip
 
 
@@ -138,12 +140,12 @@ def frame_of(world: FloatArray, picks: Sequence[FloatArray]) -> WorldFrame | Non
         X runs so that the photos show the wall from its front, whichever way they are turned; None
         where too few picks tell.
     """
-    middle = world.mean(axis=0)
     if lies_how(world) == "level":
-        return WorldFrame(east=0.0, north=0.0, height=float(np.round(middle[2], 1)),
+        height = float(np.round(world[:, 2].mean(), 1))
+        return WorldFrame(east=0.0, north=0.0, height=height,
                           azimuth=np.pi / 2, is_upright=False)  # fmt: skip
-    along = _along(world[:, :2])
-    flat = np.column_stack([(world[:, :2] - middle[:2]) @ along, world[:, 2] - middle[2]])
+    middle, along = _wall_in_plan(world[:, :2])
+    flat = np.column_stack([(world[:, :2] - middle) @ along, world[:, 2] - world[:, 2].mean()])
     turns = [
         _turn(flat[rows], pixels[rows]) for pixels in picks if (rows := _both(pixels)).sum() > 2
     ]
@@ -151,25 +153,24 @@ def frame_of(world: FloatArray, picks: Sequence[FloatArray]) -> WorldFrame | Non
     if front == 0:
         return None
     along = -along if front > 0 else along
-    start = ((world[:, :2] - middle[:2]) @ along).min()
-    east, north = middle[:2] + start * along
+    start = ((world[:, :2] - middle) @ along).min()
+    east, north = middle + start * along
     azimuth = float(np.arctan2(along[0], along[1])) % (2 * np.pi)
     return WorldFrame(east=float(east), north=float(north), height=0.0, azimuth=azimuth)
 
 
-def _along(plan: FloatArray) -> FloatArray:
-    """Return the direction of a wall in plan, whatever a few points beside it say."""
+def _wall_in_plan(plan: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a place and the direction of the line on which most of the points lie, in plan."""
     rows = np.ones(len(plan), dtype=bool)
-    along = np.array([1.0, 0.0])
-    for _ in range(3):
-        middle = np.median(plan[rows], axis=0)
-        along = np.linalg.svd(plan[rows] - plan[rows].mean(axis=0), full_matrices=False)[2][0]
+    for _ in range(_ROUNDS):
+        middle = plan[rows].mean(axis=0)
+        along = np.linalg.svd(plan[rows] - middle, full_matrices=False)[2][0]
         beside = np.abs((plan - middle) @ [-along[1], along[0]])
-        near = beside <= _BESIDE + 6 * np.median(beside)
+        near = beside <= _BESIDE + 2 * np.median(beside)
         if near.sum() < 3 or (near == rows).all():
             break
         rows = near
-    return np.asarray(along)
+    return middle, along
 
 
 def _both(pixels: FloatArray) -> BoolArray:

@@ -69,8 +69,8 @@ def of_rows(
             errors.append(table.error(k, "id", "is blank; every row needs the point's name."))
             continue
         first = places.setdefault(name, k)
-        given = np.isfinite(coordinates[k])
-        if np.any(np.abs(coordinates[k] - coordinates[first])[given] > _SAME):
+        filled = np.isfinite(coordinates[k])
+        if np.any(np.abs(coordinates[k] - coordinates[first])[filled] > _SAME):
             message = f'"{name}" has other coordinates in {table.cell(first, "id")}.'
             errors.append(table.error(k, "id", message))
         blank = np.isnan(coordinates[first])
@@ -97,15 +97,15 @@ def of_rows(
     for (name, photo_number), k in picks.items():
         made[photo_number][order.index(name)] = column[k], row[k]
     shown_names = ", ".join(names[:5])
-    told = (remark("control.other_photos", count=len(names), names=shown_names),) if names else ()
-    return ListedPoints(rows=list(places.values()), picks=made, remarks=told)
+    notes = (remark("control.other_photos", count=len(names), names=shown_names),) if names else ()
+    return ListedPoints(rows=list(places.values()), picks=made, remarks=notes)
 
 
 def without_unseen(
     picks: Sequence[FloatArray], ids: Sequence[str]
 ) -> tuple[list[FloatArray], list[str]]:
     """Return picks without those that stand for "not seen", and what is said of them."""
-    told: list[str] = []
+    notes: list[str] = []
     made: list[FloatArray] = []
     for number, pixels in enumerate(picks, start=1):
         clean = pixels.copy()
@@ -115,9 +115,9 @@ def without_unseen(
                 clean[rows] = np.nan
                 names = ", ".join(ids[row] for row in rows[:10])
                 place_words = f"{place[0]:g}, {place[1]:g}"
-                told.append(remark("control.unseen", photo=number, names=names, place=place_words))
+                notes.append(remark("control.unseen", photo=number, names=names, place=place_words))
         made.append(clean)
-    return made, told
+    return made, notes
 
 
 def in_plane_frame(
@@ -147,13 +147,13 @@ def in_plane_frame(
     if not (has_height or is_space):
         return xyz, frame, []
     world = np.column_stack([xyz[:, :2], heights if has_height else xyz[:, 2]])
-    told: list[str] = []
+    notes: list[str] = []
     plain = [bare(table.headings.get(key, "")) for key in "XY"] == ["x", "y"]
     if has_height and plain:
         if table.columns["Y"] < table.columns["X"]:
             world = world[:, [1, 0, 2]]
         geodetic = table.columns["Y"] < table.columns["X"]
-        told.append(remark(f"control.{'geodetic' if geodetic else 'x_is_east'}"))
+        notes.append(remark(f"control.{'geodetic' if geodetic else 'x_is_east'}"))
     whole = np.isfinite(world).all(axis=1)
     if frame is None:
         lies = lies_how(world[whole]) if whole.sum() > 2 else "line"
@@ -164,10 +164,10 @@ def in_plane_frame(
         frame = frame_of(world[whole], [pixels[whole] for pixels in picks])
         if frame is None:
             raise InputError(remark("control.no_front", of=table.file))
-        told.append(_described(frame))
+        notes.append(_described(frame))
     made = np.full_like(xyz, np.nan)
     made[whole] = frame.to_plane(world[whole])
-    return made, frame, told
+    return made, frame, notes
 
 
 def _described(frame: WorldFrame) -> str:

@@ -255,12 +255,10 @@ def read_control(
         raise InputError(f"{path}: no control points in the table.")
     xyz = np.column_stack([metres_of(table, key, unit) for key in ("X", "Y", "r", "H")])
     errors = _halves(table, ("col", "row") if listed and not alone else keys)
-    if errors:
-        raise WorkbookError(errors)
-    if listed:
+    if listed and not errors:
         points = of_rows(table, keys if alone else ("col", "row"), names, xyz)
     else:
-        errors += table.repeated("id") if "id" in table.present else []
+        errors += table.repeated("id") if "id" in table.present and not listed else []
         points = ListedPoints(
             rows=list(range(len(table))),
             picks=[

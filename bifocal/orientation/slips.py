@@ -205,8 +205,7 @@ def _of_control(typed: TypedOrientation, now: TrialOrientation | None) -> Iterat
         words = remark(f"slips.{slip.key}")
         yield Slip(meant=replace(typed, control=meant), words=words, mended=slip.mended)
     if (frame := control.frame) is not None and frame.is_upright:
-        east_north = replace(frame, mirrored=not frame.mirrored)
-        meant = replace(control, xyz=xyz * [1, 1, -1], frame=east_north)
+        meant = replace(control, xyz=xyz * [1, 1, -1], frame=frame.exchanged())
         yield Slip(meant=replace(typed, control=meant), words=remark("slips.east_north"))
     for key, axes in COORDINATES.items():
         meant = replace(control, xyz=axes(xyz))

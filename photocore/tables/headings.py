@@ -14,7 +14,6 @@ from photocore.tables.numbers import GRAD, UNITS, unit_symbol
 from photocore.workbook.reading.grid import (
     CellGrid,
     Value,
-    cell_name,
     column_letters,
     column_number,
 )
@@ -499,11 +498,3 @@ def _without_heading(
         if unit_of(heading):
             match.units[key] = unit_of(heading)
     return match
-
-
-def describe(grid: CellGrid, match: Match | None) -> str:
-    """Return a few words on the headings found nearest, for a message."""
-    row = match.header if match else next(iter(sorted(grid.rows)), 0)
-    cells = grid.rows.get(row, {})
-    shown = [f'"{v}" ({cell_name(row, c)})' for c, v in sorted(cells.items()) if isinstance(v, str)]
-    return ", ".join(shown[:12]) + (", ..." if len(shown) > 12 else "")

@@ -87,8 +87,8 @@ def as_table(text: str, label: str) -> tuple[str, list[str]]:
     for fits, read in lists:
         made = read(text, label) if fits else None
         if made is not None:
-            told = remark("table.list_of", program=made.program)
-            return made.as_text(), [told, *made.remarks]
+            notes = remark("table.list_of", program=made.program)
+            return made.as_text(), [notes, *made.remarks]
     return _with_commas_as_tabs(text), []
 
 
@@ -116,8 +116,8 @@ def _of_gsi(text: str, label: str) -> ListRows | None:
     if len(units) > 1:
         raise InputError(remark("table.gsi_units", of=label))
     unit = next(iter(units))
-    told = (remark("table.gsi_left_out", count=without),) if without else ()
-    return ListRows(("id", *(f"{axis} [{unit}]" for axis in "ENH")), rows, "Leica (GSI)", told)
+    notes = (remark("table.gsi_left_out", count=without),) if without else ()
+    return ListRows(("id", *(f"{axis} [{unit}]" for axis in "ENH")), rows, "Leica (GSI)", notes)
 
 
 def _of_opendronemap(text: str, label: str) -> ListRows | None:
@@ -198,8 +198,8 @@ def _of_metashape(text: str, label: str) -> ListRows | None:
         off = place is not None and place.get("enabled", "true").lower() in ("false", "0")
         use = "0" if off else "1"
         first = (marker.get("label", ""), *xyz, use)
-        seen = places.get(marker.get("id", ""), [("", "", "")])
-        rows += [(*first, *one) for one in seen]
+        shown = places.get(marker.get("id", ""), [("", "", "")])
+        rows += [(*first, *one) for one in shown]
     system = chunk.findtext("./reference") or root.findtext("./reference") or ""
     if any(any(row[1:3]) for row in rows):
         _refuse_degrees(system, label)

@@ -14,6 +14,10 @@ from photocore.errors import CellError, InputError
 from photocore.remarks import remark
 from photocore.workbook.reading.grid import cell_name, column_letters
 
+#: Columns by letter: point, northing, easting, elevation, description.
+_ORDER = re.compile(r"(?=\w{3})P?(?:NE|EN)[ZH]?D?")
+_LETTERS = {"P": "id", "Z": "H", "D": "-"}
+
 Kind = Literal["number", "integer", "flag", "text"]
 
 
@@ -233,7 +237,7 @@ def parse_column_map(text: str, keys: Sequence[str] = ()) -> dict[str, str]:
     ----------
     text : str
         ``"s1=My column, s2=C"``, or the keys in the order of the file's columns for tables
-        without headings: ``"id,X,Y"`` (``-`` skips a column).
+        without headings: ``"id,X,Y"`` (``-`` skips a column), or ``PNEZD``.
     keys : sequence of str
         The keys that exist; empty accepts any. Upper and lower case may be mixed up.
 
@@ -246,9 +250,13 @@ def parse_column_map(text: str, keys: Sequence[str] = ()) -> dict[str, str]:
     --------
     >>> parse_column_map("id, X, -, Y")
     {'id': 'A', 'X': 'B', 'Y': 'D'}
+    >>> parse_column_map("PNEZD", ("id", "E", "N", "H"))
+    {'id': 'A', 'N': 'B', 'E': 'C', 'H': 'D'}
     >>> parse_column_map("s1 = distance 1; s2=C")
     {'s1': 'distance 1', 's2': 'C'}
     """
+    if _ORDER.fullmatch(text.strip()) and text.strip() not in keys:
+        text = ",".join(_LETTERS.get(letter, letter) for letter in text.strip())
     entries = [entry.strip() for entry in re.split(r"[,;]", text)]
     named = any("=" in entry for entry in entries)
     places: dict[str, str] = {}

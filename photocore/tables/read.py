@@ -21,8 +21,15 @@ from photocore.tables.csvread import (
     unguarded,
 )
 from photocore.tables.drawing_points import model_space, named_points
-from photocore.tables.fill import fill, refuse_doubles, refuse_unknown_units, take_unit_row
-from photocore.tables.headings import Match, bare, describe, find_columns
+from photocore.tables.fill import (
+    describe,
+    fill,
+    near_headings,
+    refuse_doubles,
+    refuse_unknown_units,
+    take_unit_row,
+)
+from photocore.tables.headings import Match, bare, find_columns
 from photocore.tables.lists import drawing_as_table
 from photocore.tables.model import Column, Table
 from photocore.tables.numbers import FEET, Decimal
@@ -323,7 +330,8 @@ def _nothing_found(
     row, first = near.match.header, near.match.missing(columns)[0]
     about = {"missing": missing, "headings": describe(near.grid, near.match), "first": first}
     where = f"{book.label} › {near.grid.title}"
-    return InputError(remark("table.lacks_column", of=where, row=row, **about))
+    hint = near_headings(near.grid, near.match, columns)
+    return InputError(f"{remark('table.lacks_column', of=where, row=row, **about)}{hint}")
 
 
 def _read_text(
