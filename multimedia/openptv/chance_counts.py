@@ -66,7 +66,8 @@ def chance_counts(
     """Return what is found in frames: targets of each camera [px]."""
     count = len(content.cameras) + 1
     found, chance = np.zeros(count), np.zeros(count)
-    misfits, rays = [np.empty(0)], [np.empty(0)]
+    misfits: list[FloatArray] = [np.empty(0)]
+    rays: list[FloatArray] = [np.empty(0)]
     for targets in frames:
         seen = (content.cameras, targets, content.interfaces)
         _, numbers, misfit = correspondences(*seen, tolerance=tolerance, fewest=fewest)

@@ -49,7 +49,7 @@ class Layering(NamedTuple):
 
 
 def apparent_depths(
-    rho: FloatArray, first: FloatArray, depth: FloatArray, layering: Layering
+    rho: FloatArray, first: Any, depth: FloatArray, layering: Layering
 ) -> tuple[Any, ...]:
     """Return V, F' and t of points at rho, and which settled: layers, the air first, are rows."""
     total, q = np.add.reduce, np.zeros(len(layering.q) + 1)

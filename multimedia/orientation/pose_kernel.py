@@ -103,9 +103,10 @@ def _apparent_depth_by_loops(
     return value, slope, t, (t < STEEPEST) & (np.abs(step) <= SETTLED * t + 1e-300)
 
 
-def _apparent_depth_of(rho: Any, *others: Any) -> tuple[Any, ...]:
+def _apparent_depth_of(rho: Any, first: Any, depth: Any, layering: Layering) -> tuple[Any, ...]:
     """Return the same as `_apparent_depth_by_loops`, of many points by fewer calls of numpy."""
-    return (apparent_depths if np.ndim(rho) else _apparent_depth_by_loops)(rho, *others)
+    road = apparent_depths if np.ndim(rho) else _apparent_depth_by_loops
+    return road(rho, first, depth, layering)
 
 
 _apparent_depth = Kernel(_apparent_depth_by_loops, plain=_apparent_depth_of, inline=True)
