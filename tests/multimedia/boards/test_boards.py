@@ -27,7 +27,8 @@ from multimedia import (
 from multimedia.boards.board_points import PosedView, with_boards
 from multimedia.orientation.plate_poses import plate_pose
 from multimedia.projects.photos import read_photo
-from photocore.camera.boards import BoardView, detect_board
+from photocore.camera.boards import detect_board
+from photocore.camera.charuco import BoardView
 from tests.builders.commands import multimedia_command as main
 from tests.cases import few_by_default
 from tests.multimedia.rendered_boards import Housing, chessboard, dots, drawn, photo, poses
