@@ -48,6 +48,7 @@ from .model.points import Points
 from .model.relief_map import Quality, ReliefMap
 from .model.set_intersection import SetIntersection
 from .model.surface import FlatSurface, MapSurface, Surface
+from .model.world_frame import WorldFrame
 from .networks.set_alignment import SetAlignment, align_set
 from .orientation.alignment import Alignment
 from .orientation.control_points import Control, SiteMeasures, read_control
@@ -158,6 +159,7 @@ __all__ = [
     "WATER_SAMPLE",
     "Window",
     "WorkbookError",
+    "WorldFrame",
     "WorldPoints",
     "align",
     "align_set",

@@ -1,9 +1,9 @@
 """Turns of the slow tests: of those marked `acceptance`, a run of everything takes a third.
 
 Which third, the commit's hash says, so that landings take them all by and by, and a red run is
-red again at the same commit. Tests that recalculate with LibreOffice run every time. All run where
-files are named on the command line, where no commit is known, and with `TEST_TURN=all`, as before
-a release (`.ci/check long`); `TEST_TURN=0`, `1` or `2` names a third.
+red again at the same commit. All run where files are named on the command line, where no commit is
+known, and with `TEST_TURN=all`, as before a release (`.ci/check long`); `TEST_TURN=0`, `1` or `2`
+names a third.
 """
 
 from __future__ import annotations
@@ -50,7 +50,6 @@ def leave_out(config: pytest.Config, items: list[pytest.Item]) -> None:
         item
         for item in items
         if item.get_closest_marker("acceptance")
-        and not item.get_closest_marker("office")
         and not is_in_turn(item.nodeid, os.environ.get(TURN, "all"))
     ]
     config.hook.pytest_deselected(items=waiting)

@@ -79,4 +79,4 @@ def command(options: ParticlesCommand) -> None:
         lines.append(f"{name}: {int((found.numbers[:, k] >= 0).sum())} of {count} targets used")
     if median is not None:
         lines.append(f"median misfit {median:.2f} px")
-    print_result(data, lines, as_json=options.as_json, remarks=())
+    print_result(data, lines, as_json=options.as_json, remarks=found.remarks)

@@ -7,14 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from multimedia.openptv.correspondences import (
-    TOLERANCE,
-    correspondences,
-    expected_by_chance,
-    is_chance,
-)
+from multimedia.openptv.chance_counts import chance_counts, tolerance_remarks
+from multimedia.openptv.correspondences import TOLERANCE, correspondences, is_chance
 from multimedia.openptv.openptv_files import read_targets, rt_is_text
 from multimedia.projects.model import Project
 from multimedia.projects.point_tables import METRES, write_columns
@@ -42,6 +36,8 @@ class Particles:
         Targets of each camera.
     seen_by, chance : ndarray, shape (cameras + 1,)
         Particles by the number of cameras that saw them, and how many at most come by chance.
+    remarks : tuple of str
+        A tolerance that would do.
     """
 
     project: Project
@@ -51,6 +47,7 @@ class Particles:
     targets: tuple[int, ...]
     seen_by: FloatArray
     chance: FloatArray
+    remarks: tuple[str, ...] = ()
 
 
 def find_particles(
@@ -101,9 +98,9 @@ def find_particles(
     places = [read_targets(path).pixels for path in targets]
     frame: Any = (content.cameras, places, content.interfaces)
     xyz, numbers, misfit = correspondences(*frame, tolerance=tolerance, fewest=fewest)
-    seen_by = np.bincount((numbers >= 0).sum(axis=1), minlength=len(names) + 1).astype(float)
-    chance = expected_by_chance(*frame, tolerance=tolerance, fewest=fewest)
-    if is_chance(seen_by, chance):
+    counted = chance_counts(content, [places], tolerance, fewest)
+    chance = counted.chance
+    if is_chance(counted.found, chance):
         raise InputError(
             f"{project}: {len(xyz)} particles would be found, and {chance.sum():.0f} where the "
             "targets of the cameras have nothing to do with each other: these are chance. Are the "
@@ -111,8 +108,9 @@ def find_particles(
             "(`multimedia adjust`)? Fewer come by chance with a smaller --tolerance"
             + (f" or --fewest {len(names)}." if fewest < len(names) else ".")
         )
+    said = tolerance_remarks(content, [places], counted, fewest)
     counts = tuple(map(len, places))
-    found = Particles(content, xyz, numbers, misfit, counts, seen_by, chance)
+    found = Particles(content, xyz, numbers, misfit, counts, counted.found, chance, said)
     if out is not None:
         _write(out, found, overwrite=overwrite)
     return found

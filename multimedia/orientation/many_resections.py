@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from multimedia.media.camera import Camera
 from multimedia.media.projection import Media, as_media, refuse_pixels
-from multimedia.orientation.pose_kernel import Layering, fitted_poses
+from multimedia.orientation.pose_arrays import Layering
+from multimedia.orientation.pose_kernel import fitted_poses
 from multimedia.orientation.quick_pose import (
     LENS_ROUNDS,
     NEAR,

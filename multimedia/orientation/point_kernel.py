@@ -19,7 +19,8 @@ from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.optical_media import OpticalMedia
 from multimedia.orientation.object_rays import cofactors, times
 from multimedia.orientation.point_status import PointStatus
-from multimedia.orientation.pose_kernel import Layering, dot, less, out, seen_point
+from multimedia.orientation.pose_arrays import Layering
+from multimedia.orientation.pose_kernel import dot, less, out, seen_point
 from multimedia.orientation.quick_pose import layering_of
 from photocore.adjustment.outliers import CONTROLLED
 from photocore.arrays import BoolArray, FloatArray, IntArray

@@ -1,53 +1,33 @@
 """The pose of a camera before parallel layers, with as little as possible around the arithmetic.
 
 What `photocore.adjustment` does for any network, without its generality: 20 control points are so
-few that its bookkeeping takes longer than the sums. `point_equations` is one formula for numbers
-and for rows of numpy; only what walks over the points is written twice. `seen_points` is its half
+few that its bookkeeping takes longer than the sums. What walks over the points has a second road in
+`multimedia.orientation.pose_arrays`, without numba. `seen_points` is the half of `point_equations`
 without the pose, for points to be found.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from multimedia.orientation.pose_arrays import (
+    ROOT_STEPS,
+    SETTLED,
+    STEEPEST,
+    Layering,
+    Vector,
+    apparent_depths,
+    pose_arrays,
+    pose_steps,
+    turned_rotation,
+)
 from photocore.arrays import BoolArray, FloatArray
 from photocore.compiled import Kernel, compiled, inlined
 
 #: Steps after which the general adjustment takes over; from 20 mm and 2 degrees off it takes 4.
 MOST_STEPS = 20
-#: Halley's steps for the tangent: three settle it for nearly every ray below `STEEPEST`.
-ROOT_STEPS = 3
-#: Tangents of rays in air beyond which roots want more digits than float64 has.
-STEEPEST = 2.0
-
-
-#: Numbers, or rows of them, one of each point.
-Vector = Any
-
-
-class Layering(NamedTuple):
-    """Parallel layers as plain numbers; the first medium has the lowest index.
-
-    Attributes
-    ----------
-    point, normal : ndarray, shape (3,)
-        Of the last face; the normal towards the camera.
-    moving : bool
-        Whether both are in the camera's frame.
-    thicknesses : ndarray, shape (k,)
-        Of the inner layers.
-    k, q : ndarray, shape (k + 1,)
-        n_1 / n_i and 1 - k^2 of the inner layers and the last medium.
-    """
-
-    point: Vector
-    normal: Vector
-    moving: Any
-    thicknesses: Vector
-    k: Vector
-    q: Vector
 
 
 @inlined
@@ -92,8 +72,9 @@ def _cross(a: Vector, b: Vector) -> Vector:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@inlined
-def _apparent_depth(rho: Any, first: float, depth: Any, layering: Layering) -> tuple[Any, ...]:
+def _apparent_depth_by_loops(
+    rho: Any, first: float, depth: Any, layering: Layering
+) -> tuple[Any, ...]:
     """Return V, F' and t of a point at rho, and whether the iteration settled."""
     inner, last = layering.thicknesses, len(layering.thicknesses)
     k, q = layering.k[last], layering.q[last]
@@ -119,7 +100,16 @@ def _apparent_depth(rho: Any, first: float, depth: Any, layering: Layering) -> t
         t = t + step
     # V follows the last step by V' d(t^2) = (F' - V) dt / t.
     value = value + (slope - value) * (step / np.maximum(t, 1e-300))
-    return value, slope, t, (t < STEEPEST) & (np.abs(step) <= 1e-9 * t + 1e-300)
+    return value, slope, t, (t < STEEPEST) & (np.abs(step) <= SETTLED * t + 1e-300)
+
+
+def _apparent_depth_of(rho: Any, first: Any, depth: Any, layering: Layering) -> tuple[Any, ...]:
+    """Return the same as `_apparent_depth_by_loops`, of many points by fewer calls of numpy."""
+    road = apparent_depths if np.ndim(rho) else _apparent_depth_by_loops
+    return road(rho, first, depth, layering)
+
+
+_apparent_depth = Kernel(_apparent_depth_by_loops, plain=_apparent_depth_of, inline=True)
 
 
 @inlined
@@ -263,23 +253,11 @@ def seen_points(
     return seen, np.stack((x, y)), np.array((by_x, by_y))
 
 
-def _rows(
-    points: FloatArray, lens: FloatArray, centre: FloatArray, rotation: FloatArray, c: float,
-    layering: Layering,
-) -> tuple[bool, FloatArray, FloatArray]:  # fmt: skip
-    """Return whether all points are seen, their ideal images (2, n), and both rows (2, 7, n)."""
-    with np.errstate(all="ignore"):
-        seen, x, y, first, second = point_equations.plain(
-            points, lens, centre, rotation, c, layering
-        )
-    return bool(seen.all()), np.stack((x, y)), np.array((first, second))
-
-
 def _rows_one_by_one(
     points: FloatArray, lens: FloatArray, centre: FloatArray, rotation: FloatArray, c: float,
     layering: Layering,
 ) -> tuple[bool, FloatArray, FloatArray]:  # fmt: skip
-    """Return the same as `_rows`."""
+    """Return the same as `pose_arrays`."""
     n = points.shape[1]
     ideal, rows, all_seen = np.empty((2, n)), np.empty((2, 7, n)), True
     for i in range(n):
@@ -293,22 +271,11 @@ def _rows_one_by_one(
     return all_seen, ideal, rows
 
 
-pose_rows = Kernel(_rows_one_by_one, plain=_rows)
-
-
-def _step(rows: FloatArray, damping: float) -> tuple[FloatArray, float]:
-    """Return the damped step, and the square of how far it would move the residuals."""
-    normal = rows[0] @ rows[0].T + rows[1] @ rows[1].T
-    own, right = normal[1:, 1:], normal[1:, 0]
-    scale = 1.0 / np.sqrt(np.diag(own) + 1e-300)
-    scaled = own * scale[:, None] * scale
-    scaled.flat[::7] += damping + 1e-15
-    step = -scale * np.linalg.solve(scaled, scale * right)
-    return step, float(step @ own @ step)
+pose_rows = Kernel(_rows_one_by_one, plain=pose_arrays)
 
 
 def _step_by_loops(rows: FloatArray, damping: float) -> tuple[FloatArray, float]:
-    """Return the same as `_step`, by Cholesky's decomposition."""
+    """Return the same as `pose_steps`, by Cholesky's decomposition."""
     normal = np.zeros((7, 7))
     for axis in range(2):
         for i in range(7):
@@ -345,12 +312,11 @@ def _step_by_loops(rows: FloatArray, damping: float) -> tuple[FloatArray, float]
     return step, moved
 
 
-pose_step = Kernel(_step_by_loops, plain=_step)
+pose_step = Kernel(_step_by_loops, plain=pose_steps)
 
 
-@compiled
-def _turned(rotation: FloatArray, v: FloatArray) -> FloatArray:
-    """Return a rotation turned by a small vector, by Cayley's form: exact to second order."""
+def _turned_by_loops(rotation: FloatArray, v: FloatArray) -> FloatArray:
+    """Return the same as `turned_rotation`."""
     half = 1.0 / (1.0 + 0.25 * (v[0] ** 2 + v[1] ** 2 + v[2] ** 2))
     turned = np.empty((3, 3))
     for j in range(3):
@@ -360,6 +326,9 @@ def _turned(rotation: FloatArray, v: FloatArray) -> FloatArray:
         for i in range(3):
             turned[i, j] = axis[i] + half * (once[i] + 0.5 * twice[i])
     return turned
+
+
+turned_pose = Kernel(_turned_by_loops, plain=turned_rotation)
 
 
 @compiled
@@ -395,7 +364,7 @@ def fitted_pose(
         return 0, centre, rotation, ideal, rows
     for number in range(1, MOST_STEPS + 1):
         step, moved = pose_step(rows, damping)
-        further, turned = centre + step[:3], _turned(rotation, step[3:])
+        further, turned = centre + step[:3], turned_pose(rotation, step[3:])
         seen, new_ideal, new = pose_rows(points, lens, further, turned, c, layering)
         new_cost = (new[:, 0] ** 2).sum() if seen else np.inf
         slack = 1e-13 * cost + 10.0 * rounding * np.sqrt(count * cost) + 100.0 * count * rounding**2

@@ -11,7 +11,8 @@ from multimedia.media.camera_observations import CameraObservations, start_at
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.optical_media import OpticalMedia, StraightRays
 from multimedia.media.projection import as_media
-from multimedia.orientation.pose_kernel import Layering, fitted_pose
+from multimedia.orientation.pose_arrays import Layering
+from multimedia.orientation.pose_kernel import fitted_pose
 from multimedia.refraction.tangent import ratios
 from photocore.adjustment import Fit
 from photocore.adjustment.dense import DenseEquations

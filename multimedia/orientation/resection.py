@@ -71,6 +71,14 @@ class Resection:
         return correlations(self.covariance)
 
     @property
+    def remarks(self) -> tuple[str, ...]:
+        """What is doubtful: without redundancy nothing tells of errors, and sigmas are NaN."""
+        if self.redundancy > 0:
+            return ()
+        count = int(np.isfinite(self.residuals).all(axis=1).sum())
+        return (remark("resect.unchecked", count=count, unknowns=len(self.names)),)
+
+    @property
     def suspects(self) -> BoolArray:
         """Whether a point looks like a gross error, shape (n,)."""
         with np.errstate(invalid="ignore"):
@@ -179,9 +187,17 @@ def _fitted(camera: Camera, seen: CameraObservations, names: tuple[str, ...]) ->
 
 def _is_beyond_doubt(seen: CameraObservations, pose: Fit[NetworkState]) -> bool:
     """Whether a pose fits so well that no other can: a body with depth, tiny residuals."""
-    spread = np.linalg.svd(seen.points - seen.points.mean(axis=0), compute_uv=False)
+    spread = _spread(seen.points)
     deep = spread[2] > DEEP * spread[0]
     return bool(deep and _cost(pose) < (FITS**2) * float((seen.image**2).sum()))
+
+
+def _spread(points: FloatArray) -> FloatArray:
+    """Return how far points reach along their three main directions, the longest first."""
+    away = points - points.mean(axis=0)
+    triangle = np.linalg.qr(away, mode="r") if len(away) > 3 else away
+    spread: FloatArray = np.linalg.svd(triangle, compute_uv=False)
+    return spread
 
 
 def _best_start(camera: Camera, seen: CameraObservations) -> Fit[NetworkState]:
@@ -253,7 +269,7 @@ def _checked_points(
             raise InputError(f"{who}sigma: every standard deviation must be above zero.")
         sigmas = given / np.sqrt(np.mean(given**2))
     refuse_pixels(camera, image)
-    spread = np.linalg.svd(control - control.mean(axis=0), compute_uv=False)
+    spread = _spread(control)
     if spread[1] < 1e-6 * spread[0] or spread[0] == 0:
         raise GeometryError(
             f"{who}all control points lie on one line; a camera can turn about it freely. Use "

@@ -236,8 +236,7 @@ def _resected(
         project.cameras[k], objects.xyz[place], images.image[rows], project.interface_of(k),
         estimate=wanted, sigma=_image_sigma(project, rows),
     )  # fmt: skip
-    if result.redundancy == 0:
-        remarks.append(remark("resect.unchecked", count=len(rows), unknowns=len(result.names)))
+    remarks.extend(result.remarks)
     names = tuple(objects.ids[at] for at in place)
     suspects = [name for name, bad in zip(names, result.suspects, strict=True) if bad]
     if suspects:

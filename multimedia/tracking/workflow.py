@@ -10,12 +10,8 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import chi2
 
-from multimedia.openptv.correspondences import (
-    TOLERANCE,
-    correspondences,
-    expected_by_chance,
-    is_chance,
-)
+from multimedia.openptv.chance_counts import ChanceCounts, chance_counts, tolerance_remarks
+from multimedia.openptv.correspondences import TOLERANCE, correspondences, is_chance
 from multimedia.openptv.openptv_files import read_targets
 from multimedia.orientation.intersection import intersect
 from multimedia.projects.model import SIGMA_PIXEL, Project
@@ -53,7 +49,7 @@ class TrackedParticles:
     found, chance : float
         Particles of the frames that were held against chance, and how many come by it at most.
     remarks : tuple of str
-        What to look at: those of the tracks, and files that are lost.
+        What to look at: those of the tracks, files that are lost, a tolerance that would do.
     """
 
     project: Project
@@ -150,7 +146,8 @@ def find_tracks(
         frame: [none if path is None else read_targets(path).pixels for path in files[frame]]
         for frame in frames
     }
-    found, chance = _beyond_chance(project, content, places, tolerance, fewest)
+    tried = _tried_frames(places)
+    counted = _beyond_chance(project, content, tried, tolerance, fewest)
     with ThreadPoolExecutor(cores()) as pool:
         particles = list(
             pool.map(lambda frame: _particles(content, places[frame], tolerance, fewest), frames)
@@ -171,8 +168,10 @@ def find_tracks(
     rows = np.array([particles[t].targets[n] for t, n in zip(at, tracks.number, strict=True)])
     result = TrackedParticles(
         content, tracks, rows, (content.unit, f"{content.unit}/{'s' if rate else 'frame'}"),
-        tuple(frames), SIGMA_PIXEL * float(np.sqrt(factor)), found, chance,
-        (*_lost_files(lost), *tracks.remarks),
+        tuple(frames), SIGMA_PIXEL * float(np.sqrt(factor)),
+        float(counted.found.sum()), float(counted.chance.sum()),
+        (*_lost_files(lost), *tracks.remarks,
+         *tolerance_remarks(content, tried, counted, fewest)),
     )  # fmt: skip
     _write(result, particles, out, folder, overwrite=overwrite)
     return result
@@ -219,18 +218,20 @@ def _file(base: Path, frame: int) -> Path | None:
     return next((p for p in numbered if int(p.name[len(base.name) : -len(ENDING)]) == frame), None)
 
 
+def _tried_frames(places: dict[int, list[FloatArray]]) -> list[list[FloatArray]]:
+    """Return the targets of some frames from the first to the last."""
+    frames = sorted(places)
+    return [
+        places[frames[k]] for k in np.unique(np.linspace(0, len(frames) - 1, TESTED).astype(int))
+    ]
+
+
 def _beyond_chance(
-    project: Path, content: Project, places: dict[int, list[FloatArray]], tolerance: float,
-    fewest: int,
-) -> tuple[float, float]:  # fmt: skip
-    """Return the particles of some frames and how many come by chance; refuse what is chance."""
-    frames, count = sorted(places), len(content.cameras) + 1
-    found, chance = np.zeros(count), np.zeros(count)
-    for frame in {frames[k] for k in np.linspace(0, len(frames) - 1, TESTED).astype(int)}:
-        seen = (content.cameras, places[frame], content.interfaces)
-        _, numbers, _ = correspondences(*seen, tolerance=tolerance, fewest=fewest)
-        found += np.bincount((numbers >= 0).sum(axis=1), minlength=count)
-        chance += expected_by_chance(*seen, tolerance=tolerance, fewest=fewest)
+    project: Path, content: Project, tried: list[list[FloatArray]], tolerance: float, fewest: int
+) -> ChanceCounts:
+    """Return what is found in some frames, and how much by chance; refuse what is chance."""
+    counted = chance_counts(content, tried, tolerance, fewest)
+    found, chance = counted.found, counted.chance
     if is_chance(found, chance):
         raise InputError(
             f"{project}: {found.sum():.0f} particles would be found in {TESTED} frames, and "
@@ -239,7 +240,7 @@ def _beyond_chance(
             f"{', '.join(content.camera_names)}? Do the cameras fit them (`multimedia adjust`)? "
             "Fewer come by chance with a smaller --tolerance."
         )
-    return float(found.sum()), float(chance.sum())
+    return counted
 
 
 def _particles(

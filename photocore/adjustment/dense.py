@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import qr
 from scipy.linalg.lapack import dgeqrf
 
 from photocore.arrays import BoolArray, FloatArray
@@ -107,10 +106,14 @@ class DenseEquations:
         return list(dict.fromkeys(silent + mixed))
 
     @cached_property
-    def _inverse(self) -> FloatArray:
+    def _half_inverse(self) -> FloatArray:
         values, right, _ = self.factors
-        half = (right.T / values) / self.scale[:, None]
-        inverse: FloatArray = half @ half.T
+        half: FloatArray = (right.T / values) / self.scale[:, None]
+        return half
+
+    @cached_property
+    def _inverse(self) -> FloatArray:
+        inverse: FloatArray = self._half_inverse @ self._half_inverse.T
         return inverse
 
     @property
@@ -130,7 +133,7 @@ class DenseEquations:
     @cached_property
     def redundancy_numbers(self) -> FloatArray:
         """Share of every observation's error that shows in its own residual, shape (n,)."""
-        base = qr(self.jacobian / self.scale, mode="economic", check_finite=False)[0]
+        base = self.jacobian @ self._half_inverse
         return 1.0 - np.einsum("ij,ij->i", base, base)
 
 

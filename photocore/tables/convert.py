@@ -13,6 +13,7 @@ from photocore.errors import LARGEST
 from photocore.remarks import remark
 from photocore.tables.model import Column
 from photocore.tables.numbers import (
+    GRAD,
     Decimal,
     NumberText,
     converted,
@@ -200,6 +201,10 @@ def _typed_unit(
         if symbol and symbol == wanted:
             continue
         shown = f"{part.digits} {part.unit}"
+        if part.unit.casefold() in GRAD and wanted in ("deg", "gon", "rad"):
+            complain(index, remark("table.which_grad", found=_short(shown)))
+            del parts[index]
+            continue
         value = part.value("comma" if "," in part.digits else "point")
         number = converted(value, symbol, wanted) if value is not None and symbol else value
         advice = f"Write {number:.15g}; the" if number is not None else "The"

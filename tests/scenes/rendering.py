@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -87,7 +88,7 @@ class NamedPoint:
     seen: bool
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Rendering:
     """A bifocal pair of photos and everything that is true about it.
 
@@ -101,8 +102,8 @@ class Rendering:
         Geometry as planned, without the set-up errors.
     truth : ReliefMap
         Exact relief in the plane frame.
-    visible1, visible2 : ndarray of bool, shape of truth
-        What each camera sees of it.
+    takings : tuple of (Tracer, SceneCamera)
+        What stands before the far and the near camera, and these.
     targets, corners : tuple of NamedPoint
     """
 
@@ -111,10 +112,19 @@ class Rendering:
     pair: Pair
     nominal: Pair
     truth: ReliefMap
-    visible1: BoolArray
-    visible2: BoolArray
+    takings: tuple[tuple[Tracer, SceneCamera], tuple[Tracer, SceneCamera]]
     targets: tuple[NamedPoint, ...] = field(default=())
     corners: tuple[NamedPoint, ...] = field(default=())
+
+    @cached_property
+    def visible1(self) -> BoolArray:
+        """What the far camera sees of the truth, of its shape."""
+        return visible_from(*self.takings[0], self.truth)
+
+    @cached_property
+    def visible2(self) -> BoolArray:
+        """What the near camera sees of the truth, of its shape."""
+        return visible_from(*self.takings[1], self.truth)
 
 
 def render(
@@ -170,8 +180,7 @@ def render(
         pair=cameras.exact,
         nominal=nominal,
         truth=truth,
-        visible1=visible_from(*takings[0], truth),
-        visible2=visible_from(*takings[1], truth),
+        takings=(takings[0], takings[1]),
         targets=_named(named, tracer, cameras),
         corners=_named(scene.corners, tracer, cameras),
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from tests.scenes.tracing import Tracer
 from tests.scenes.truth import relief_truth, visible_from
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class SetRendering:
     """Photos of a scene and what is true about it.
 
@@ -28,14 +29,20 @@ class SetRendering:
         Exact geometry.
     truth : ReliefMap
         Exact relief over what the first camera has in frame.
-    visible : ndarray of bool, shape (photos, h, w)
-        What each camera sees of it.
+    tracer : Tracer
+    cameras : tuple of SceneCamera
     """
 
     images: tuple[ByteArray, ...]
     photos: PhotoSet
     truth: ReliefMap
-    visible: BoolArray
+    tracer: Tracer
+    cameras: tuple[SceneCamera, ...]
+
+    @cached_property
+    def visible(self) -> BoolArray:
+        """What each camera sees of the truth, shape (photos, h, w)."""
+        return np.stack([visible_from(self.tracer, one, self.truth) for one in self.cameras])
 
 
 def aside(camera: SceneCamera, by: float) -> SceneCamera:
@@ -71,5 +78,10 @@ def render_set(
     (x_min, y_min), (x_max, y_max) = corners.tolist()
     bounds, gsd = (x_min, y_min, x_max, y_max), (x_max - x_min) / width
     truth = relief_truth(tracer, bounds=bounds, gsd=gsd)
-    visible = np.stack([visible_from(tracer, camera, truth) for camera in cameras])
-    return SetRendering(images=images, photos=PhotoSet(photos=photos), truth=truth, visible=visible)
+    return SetRendering(
+        images=images,
+        photos=PhotoSet(photos=photos),
+        truth=truth,
+        tracer=tracer,
+        cameras=tuple(cameras),
+    )

@@ -75,16 +75,16 @@ class Tracer:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.table = face_table(scene)
+        self._boxes = np.array([body.box for body in (*scene.solids, *scene.cavities)])
 
     def bounds(self, view: View) -> FloatArray:
         """Return the view rectangle of every body, shape (bodies, 4): low, high."""
-        bodies = [*self.scene.solids, *self.scene.cavities]
-        rectangles = np.zeros((len(bodies), 4))
         bulge, steps = getattr(view, "bulge", 0.0), getattr(view, "steps", 1)
-        for i, body in enumerate(bodies):
-            seen = view.view_of(_along_edges(body.box, steps))
-            rectangles[i] = *(seen.min(0) - bulge), *(seen.max(0) + bulge)
-        return rectangles
+        if not len(self._boxes):
+            return np.zeros((0, 4))
+        edges = _along_edges(self._boxes, steps)
+        seen = view.view_of(edges.reshape(-1, 3)).reshape(*edges.shape[:2], 2)
+        return np.concatenate([seen.min(1) - bulge, seen.max(1) + bulge], axis=1)
 
     def cast(
         self, origins: FloatArray, rays: FloatArray, seen: FloatArray, bounds: FloatArray
@@ -234,8 +234,8 @@ def crossing(
     return enter, leave, which
 
 
-def _along_edges(box: FloatArray, steps: int) -> FloatArray:
-    """Return points along the edges of a box, corners included, shape (n, 3)."""
+def _along_edges(boxes: FloatArray, steps: int) -> FloatArray:
+    """Return points along the edges of boxes, corners included, shape (boxes, n, 3)."""
     share = np.linspace(0.0, 1.0, steps + 1)
     edges = []
     for axis in range(3):
@@ -243,7 +243,8 @@ def _along_edges(box: FloatArray, steps: int) -> FloatArray:
         sides[axis] = share
         grid = np.meshgrid(*sides, indexing="ij")
         edges.append(np.stack([part.ravel() for part in grid], axis=-1))
-    return np.asarray(box[0] + np.concatenate(edges) * (box[1] - box[0]))
+    low, high = boxes[:, :1], boxes[:, 1:]
+    return np.asarray(low + np.concatenate(edges) * (high - low))
 
 
 def _inside(seen: FloatArray, rectangle: FloatArray) -> BoolArray:

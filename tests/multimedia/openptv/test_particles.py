@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -120,6 +121,25 @@ def test_how_many_come_by_chance_is_said_beside_the_particles(tmp_path: Path):
     # True ones leave fewer targets to chance than the displaced frames have.
     assert wrong < found["by_chance_at_most"] < 3.5 * wrong
     assert "by chance at most" in CliRunner().invoke(main, words).stdout
+
+
+def test_a_tolerance_that_fits_the_targets_is_proposed_and_holds(tmp_path: Path):
+    _, targets, numbers = frame(250, 0.1, 150, 13)
+    words = written_frame(tmp_path, targets)
+    got = CliRunner().invoke(main, [*words, "--json"])
+    assert got.exit_code == 0, got.output
+    wide = json.loads(got.stdout)["by_chance_at_most"]
+    assert wide > 50
+    said = re.search(r"--tolerance (\S+) would do: targets are good to (\S+) px", got.stderr)
+    assert said, got.stderr
+    assert 0.3 <= float(said[1]) <= 0.7
+    assert float(said[2]) == pytest.approx(0.1, rel=0.15)
+    again = CliRunner().invoke(main, [*words, "--tolerance", said[1], "--json"])
+    found = json.loads(again.stdout)
+    assert "would do" not in again.stderr
+    assert found["by_chance_at_most"] < 0.1 * wide
+    tuples = {tuple(one["targets"]) for one in found["particles"]}
+    assert len(tuples & {tuple(row) for row in numbers.tolist()}) >= 245
 
 
 @pytest.mark.acceptance

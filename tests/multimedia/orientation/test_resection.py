@@ -274,3 +274,14 @@ def test_a_start_from_three_points_stays_with_its_own_pose(number):
     seen = project(truth, points, tank)
     starts = pose_starts.pose_starts(nothing_known(truth), points, seen, tank)
     assert min(np.abs(start.rotation - truth.rotation).max() for start in starts) < 2e-3
+
+
+def test_without_redundancy_sigmas_are_nan_and_the_resection_says_why():
+    truth, points = cameras()[0], control()[[0, 7, 22]]
+    found = resect(truth, points, project(truth, points, LAYERS), LAYERS)
+    assert np.isnan(list(found.sigmas.values())).all()
+    assert found.remarks == (
+        "3 points just determine 6 parameters; nothing checks them, and no precision can be given.",
+    )
+    four = control()[[0, 7, 22, 13]]
+    assert resect(truth, four, project(truth, four, LAYERS), LAYERS).remarks == ()
