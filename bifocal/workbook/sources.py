@@ -75,7 +75,8 @@ def measured(
 
 def _called(photos: PhotoSet | Pair | Path | str | None) -> list[tuple[str, ...]]:
     """Return what each photo may be called in a list: its file, its name, its number."""
-    files, names = ("", ""), ("far", "near")
+    files: tuple[str, ...] = ("", "")
+    names: tuple[str, ...] = ("far", "near")
     if isinstance(photos, Path | str) and Path(photos).suffix.lower() in BOOKS:
         setup = read_survey(photos).setup
         files = (setup.photo1, setup.photo2)

@@ -19,7 +19,7 @@ from photocore.tables import Column, read_table
 from photocore.tables.numbers import Decimal
 
 #: Axes of the lists that fill `Georeference` and `Check`: headings that mean them besides ours.
-_AXES = {
+_AXES: dict[str, dict[str, tuple[str, ...]]] = {
     "Georeference": {"E": (), "N": (), "H": ()},
     "Check": {"X_ref": ("X",), "Y_ref": ("Y",), "Z_ref": ("Z", "r", "relief")},
 }
@@ -66,7 +66,7 @@ def with_list(survey: SurveyInput, path: Path | str, decimal: Decimal | None) ->
         places = [i for i, name in enumerate(table.texts("id")) if name]
         listed = KnownPoints(ids=tuple(table.texts("id")[i] for i in places), xyz=xyz[places])
         listed = listed.called_as(survey.points.ids)
-        measured = (listed.rows_in(survey.points) >= 0) & np.isfinite(listed.xyz).any(axis=1)
+        measured = np.isin(listed.ids, survey.points.ids) & np.isfinite(listed.xyz).any(axis=1)
         if measured.any():
             survey = _filled(survey, sheet, listed, np.flatnonzero(measured).tolist())
             count = {"count": int(measured.sum()), "all": len(listed), "sheet": sheet}
@@ -97,12 +97,16 @@ def _filled(
     rest = [k for k in range(count, len(stands)) if stands.ids[k] not in ids]
     names = (*ids, *(stands.ids[k] for k in rest))
     merged = KnownPoints(
-        ids=names, xyz=np.array([*xyz, *stands.xyz[rest]]), use=[*use, *stands.used[rest]]
+        ids=names,
+        xyz=np.array([*xyz, *stands.xyz[rest]]),
+        use=np.array([*use, *stands.used[rest]]),
     )
     areas = () if survey.book is None else survey.book.tables
     free = max([a.first - 1 for a in areas if a.name == _TABLES[sheet]] + list(rows), default=0) + 1
     added = range(free, free + len(ids) - count) if survey.is_ours else ()
-    return replace(survey, **{field: merged, f"{field}_rows": (*rows, *added)})
+    if field == "control":
+        return replace(survey, control=merged, control_rows=(*rows, *added))
+    return replace(survey, known=merged, known_rows=(*rows, *added))
 
 
 def read_long(
@@ -143,6 +147,6 @@ def read_long(
         pixels[name] |= dict(zip(keys, places[row].tolist(), strict=True))
     if errors:
         raise WorkbookError(errors)
-    keys = [key for number in range(1, len(photos) + 1) for key in pixel_keys(number)]
-    columns = {key: [own.get(key, np.nan) for own in pixels.values()] for key in keys}
+    wide = [key for number in range(1, len(photos) + 1) for key in pixel_keys(number)]
+    columns = {key: [own.get(key, np.nan) for own in pixels.values()] for key in wide}
     return PointObservations.from_columns({"id": list(pixels), **columns})
