@@ -54,8 +54,8 @@ def with_list(survey: SurveyInput, path: Path | str, decimal: Decimal | None) ->
     """
     errors: list[CellError] = []
     columns = [understood("id", required=True)]
-    for axes in _AXES.values():
-        columns += [understood(key, more=more, unit="m") for key, more in axes.items()]
+    for headed in _AXES.values():
+        columns += [understood(key, more=more, unit="m") for key, more in headed.items()]
     table = read_table(path, columns, decimal=decimal, errors=errors)
     errors += table.repeated("id")
     axes_of = {sheet: tuple(axes) for sheet, axes in _AXES.items()}
