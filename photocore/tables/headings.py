@@ -446,12 +446,12 @@ def is_summary(cells: Mapping[int, Value], first: int, *, apart: bool = False) -
     Of a row that stands apart the first word says so: "mean of x1".
     """
     texts = (value for number, value in cells.items() if number <= first)
-    said = (
+    starts = (
         text.split()[0] if apart else text
         for text in texts
         if str(text).strip() and isinstance(text, str)
     )
-    return any(_SUMMARIES.fullmatch(bare(text)) for text in said)
+    return any(_SUMMARIES.fullmatch(bare(text)) for text in starts)
 
 
 def _forms(variants: Sequence[str]) -> list[str]:

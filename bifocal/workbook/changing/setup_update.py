@@ -71,8 +71,8 @@ def store_functions(editor: WorkbookEditor) -> None:
     """
     state = place_of(editor, "functions_state")
     cells = {} if state is None else editor.grid(state[0]).rows
-    blank = [(row, column) for row, own in sorted(cells.items())
-             for column, value in own.items() if isinstance(value, NotCalculated)]  # fmt: skip
+    blank = [(row, column) for row, values in sorted(cells.items())
+             for column, value in values.items() if isinstance(value, NotCalculated)]  # fmt: skip
     if state is None or not blank:
         return
     book, value = Calculation(load_workbook(editor.path)), None

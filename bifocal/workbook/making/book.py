@@ -116,8 +116,8 @@ def _points(builder: BookBuilder, content: SurveyContent) -> None:
         breaks.append(keys.index("pair") + 1)
     facts = planning_facts(media=content.media_cells, is_pair=content.is_pair)
     facts |= {"long"} if content.point_rows > STRUCTURED_ROWS else set()
-    said = sentence("points_state", builder.word, facts, note=note)
-    sheet.formula("A2", said, name="points_state", font=NOTE_FONT)
+    state = sentence("points_state", builder.word, facts, note=note)
+    sheet.formula("A2", state, name="points_state", font=NOTE_FONT)
     colour_where(sheet.worksheet, "A2:H2", f'$A$2<>"{builder.word(note)}"', WRONG)
     sheet.worksheet.sheet_properties.outlinePr.summaryRight = True
     # Each page begins with the names: the title would be cut off there, so it heads the page.
@@ -234,8 +234,8 @@ def _title_block(sheet: SheetBuilder) -> None:
         sheet.worksheet.merge_cells(area)
         sheet.worksheet[left].alignment = _BLOCK_PLACE
     sheet.worksheet.row_dimensions[2].height = 42
-    said = f'TRIM({UNPRINTED}&" "&{STATE}&" "&{SITE})'
-    sheet.formula("E1", said, name="title_world", font=HEAD_FONT)
+    judgement = f'TRIM({UNPRINTED}&" "&{STATE}&" "&{SITE})'
+    sheet.formula("E1", judgement, name="title_world", font=HEAD_FONT)
     off = sentence("site_alarm", book.word)
     alarm = f'OR({UNPRINTED}<>"",g_alarm=1,{off})'
     colour_where(sheet.worksheet, "E1", alarm, WRONG, stop=True)

@@ -42,8 +42,8 @@ def check(builder: BookBuilder, content: SurveyContent) -> None:
     """Write errors at check points, their statistics and the verdict."""
     rows = content.check_rows
     sheet = builder.sheet("Check", "check_how")
-    said = sentence("check_state", builder.word, sheet="Check")
-    sheet.formula("A2", said, name="check_state", font=NOTE_FONT)
+    state = sentence("check_state", builder.word, sheet="Check")
+    sheet.formula("A2", state, name="check_state", font=NOTE_FONT)
     colour_where(sheet.worksheet, "A2:K2", f'$A$2<>"{builder.word("check_how")}"', WRONG)
     for letter, axis in zip("BCD", "XYZ", strict=True):
         sheet.text(f"{letter}4", f"d{axis}", HEAD_FONT)

@@ -60,7 +60,7 @@ def with_list(survey: SurveyInput, path: Path | str, decimal: Decimal | None) ->
     errors += table.repeated("id")
     axes_of = {sheet: tuple(axes) for sheet, axes in _AXES.items()}
     errors += table.too_large([*axes_of["Georeference"], *axes_of["Check"]], LARGEST)
-    said = list(table.remarks)
+    remarks = list(table.remarks)
     for sheet, axes in axes_of.items():
         xyz = np.stack([table.in_unit(key, TO_M, errors) for key in axes], axis=-1)
         places = [i for i, name in enumerate(table.texts("id")) if name]
@@ -70,12 +70,12 @@ def with_list(survey: SurveyInput, path: Path | str, decimal: Decimal | None) ->
         if measured.any():
             survey = _filled(survey, sheet, listed, np.flatnonzero(measured).tolist())
             count = {"count": int(measured.sum()), "all": len(listed), "sheet": sheet}
-            said.append(remark("survey.list_taken", of=Path(path).name, **count))
+            remarks.append(remark("survey.list_taken", of=Path(path).name, **count))
     if errors:
         raise WorkbookError(errors)
-    if len(said) == len(table.remarks):
+    if len(remarks) == len(table.remarks):
         raise InputError(remark("survey.list_of_others", of=path))
-    return replace(survey, remarks=(*survey.remarks, *said))
+    return replace(survey, remarks=(*survey.remarks, *remarks))
 
 
 def _filled(
@@ -83,10 +83,10 @@ def _filled(
 ) -> SurveyInput:
     """Return a survey with points of a list in one of its sheets."""
     field = "control" if sheet == "Georeference" else "known"
-    stands, rows = getattr(survey, field), getattr(survey, f"{field}_rows")
+    listing, rows = getattr(survey, field), getattr(survey, f"{field}_rows")
     # Relief given beside the points stands on no sheet and comes last.
-    count = len(rows) if survey.is_ours else len(stands)
-    ids, xyz, use = list(stands.ids[:count]), list(stands.xyz[:count]), list(stands.used[:count])
+    count = len(rows) if survey.is_ours else len(listing)
+    ids, xyz, use = list(listing.ids[:count]), list(listing.xyz[:count]), list(listing.used[:count])
     for place in places:
         if listed.ids[place] in ids:
             xyz[ids.index(listed.ids[place])] = listed.xyz[place]
@@ -94,12 +94,12 @@ def _filled(
         ids.append(listed.ids[place])
         xyz.append(listed.xyz[place])
         use.append(True)
-    rest = [k for k in range(count, len(stands)) if stands.ids[k] not in ids]
-    names = (*ids, *(stands.ids[k] for k in rest))
+    rest = [k for k in range(count, len(listing)) if listing.ids[k] not in ids]
+    names = (*ids, *(listing.ids[k] for k in rest))
     merged = KnownPoints(
         ids=names,
-        xyz=np.array([*xyz, *stands.xyz[rest]]),
-        use=np.array([*use, *stands.used[rest]]),
+        xyz=np.array([*xyz, *listing.xyz[rest]]),
+        use=np.array([*use, *listing.used[rest]]),
     )
     areas = () if survey.book is None else survey.book.tables
     free = max([a.first - 1 for a in areas if a.name == _TABLES[sheet]] + list(rows), default=0) + 1
@@ -138,8 +138,8 @@ def read_long(
         stem = PurePath(photo).stem.casefold()
         numbers = [number for number, names in enumerate(called, start=1) if stem in names]
         if len(numbers) != 1:
-            known = ", ".join(names[0] for names in photos)
-            errors.append(table.error(row, "photo", remark("survey.strange_photo", known=known)))
+            listed = ", ".join(names[0] for names in photos)
+            errors.append(table.error(row, "photo", remark("survey.strange_photo", known=listed)))
             continue
         keys = pixel_keys(numbers[0])
         if keys[0] in pixels.setdefault(name, {}):
@@ -148,5 +148,5 @@ def read_long(
     if errors:
         raise WorkbookError(errors)
     wide = [key for number in range(1, len(photos) + 1) for key in pixel_keys(number)]
-    columns = {key: [own.get(key, np.nan) for own in pixels.values()] for key in wide}
+    columns = {key: [picks.get(key, np.nan) for picks in pixels.values()] for key in wide}
     return PointObservations.from_columns({"id": list(pixels), **columns})
