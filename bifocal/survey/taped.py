@@ -52,7 +52,15 @@ class TapedDistance:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TapedCheck:
-    """A taped distance beside the solved one; NaN where a point has no coordinates. [m]"""
+    """A taped distance beside the solved one.
+
+    Attributes
+    ----------
+    tape : TapedDistance
+        As measured on site.
+    solved, sigma : float
+        The same as solved, and its standard deviation; NaN where a point has no coordinates. [m]
+    """
 
     tape: TapedDistance
     solved: float
