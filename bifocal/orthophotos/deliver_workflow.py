@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.faces.faced_surface import FacedSurface
-from bifocal.files.hash_list import list_hashes
+from bifocal.files.hash_list import list_hashes, listed_hashes
 from bifocal.files.strips import write_png
 from bifocal.media import media_words
 from bifocal.model.doubts import MISFITS, check_scale, doubts_of
@@ -182,6 +182,7 @@ def deliver(
     title = wish.title or default_title(pair_path)
     name = file_name(title)
     _check_outputs(out, folder, name, (task.relief, *pair.photo_files))
+    listed_hashes(folder)  # refuses what is none, before the work
     points, remarks = _points(wish.mark or task.points)
     control, notes_on_control = _points(wish.control)
     remarks += notes_on_control
@@ -203,9 +204,8 @@ def deliver(
         if cuts:
             named = drawing.say("sections", titles="; ".join(cut.title for cut in cuts))
             drawing = replace(drawing, sections=cuts, notes=(*drawing.notes, named))
-        relief = None
-        if not isinstance(surface, FlatSurface):
-            relief = _prepared((surface, measured), reader, drawing, wish)
+        flat = isinstance(surface, FlatSurface)
+        relief = None if flat else _prepared((surface, measured), reader, drawing, wish)
         inside = out is not None and out.resolve().parent == folder.resolve()
         extra = (out.name,) if out is not None and inside else ()
         _check_free(folder, name, relief is not None, len(cuts), extra, overwrite=overwrite)
