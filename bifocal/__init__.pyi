@@ -48,6 +48,7 @@ from .model.points import Points
 from .model.relief_map import Quality, ReliefMap
 from .model.set_intersection import SetIntersection
 from .model.surface import FlatSurface, MapSurface, Surface
+from .model.world_frame import WorldFrame
 from .networks.set_alignment import SetAlignment, align_set
 from .orientation.alignment import Alignment
 from .orientation.control_points import Control, SiteMeasures, read_control
@@ -71,6 +72,8 @@ from .survey.setup import Measuring, SurveySetup, Taking
 from .survey.solved_survey import SolvedSurvey, WorldPoints
 from .survey.survey_input import SurveyInput
 from .survey.survey_media import SurveyMedia
+from .survey.taped import TapedCheck as TapedCheck
+from .survey.taped import TapedDistance as TapedDistance
 from .survey.tolerances import ToleranceRule
 from .survey.transformation_precision import TransformationPrecision
 from .workbook.reading.reader import ReadOptions
@@ -158,6 +161,7 @@ __all__ = [
     "WATER_SAMPLE",
     "Window",
     "WorkbookError",
+    "WorldFrame",
     "WorldPoints",
     "align",
     "align_set",

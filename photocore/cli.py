@@ -34,6 +34,8 @@ from photocore.textfile import odd_name
 UNFORESEEN = 70
 
 _DEBUG = "photocore.debug"
+#: What the command printed as remarks.
+_PRINTED = "photocore.printed"
 _HELP = {"-h", "--help"}
 _NO_MEMORY = "not enough memory. Use smaller images, a coarser --gsd or --bounds."
 _LOG = logging.getLogger(__name__)
@@ -158,8 +160,12 @@ class LazyGroup(click.Group):
                 try:
                     return super().invoke(ctx)
                 finally:
+                    printed = ctx.meta.get(_PRINTED, [])
                     for text in noted_remarks():
-                        remark(text)
+                        # What a reader did is told once, by the command or else here.
+                        words = text.partition(": ")[2] or text
+                        if not any(words in line for line in printed):
+                            remark(text)
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise
         except PhotogrammetryError as error:
@@ -238,6 +244,9 @@ def print_json(value: Any) -> None:
 def remark(message: str) -> None:
     """Print a remark on stderr, so that results on stdout stay clean, and log it."""
     message = _named_streams(message)
+    context = click.get_current_context(silent=True)
+    if context is not None:
+        context.meta.setdefault(_PRINTED, []).append(message)
     _LOG.info("%s", message)
     if not is_quiet():
         click.echo(message, err=True)

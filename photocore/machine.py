@@ -21,7 +21,7 @@ LIBRARIES = (
 )  # fmt: skip
 EXTRAS = {
     "lens": ("lensfunpy",), "fast": ("pyarrow", "numba"), "hdf": ("h5py",),
-    "cluster": ("dask", "distributed"),
+    "shapes": ("shapefile",), "cluster": ("dask", "distributed"),
 }  # fmt: skip
 OFFICE = ("soffice", "libreoffice")
 

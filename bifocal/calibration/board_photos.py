@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from bifocal.calibration.board_calibration import Calibration, lens_of_views
 from bifocal.model.image import as_grey
 from photocore.arrays import ByteArray
-from photocore.camera.boards import BoardView, checked_board, detect_board, find_board_size
+from photocore.camera.boards import checked_board, detect_board, find_board_size
+from photocore.camera.charuco import BoardView
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 

@@ -20,6 +20,7 @@ from photocore.textfile import file_name
 
 if TYPE_CHECKING:
     from bifocal.model.points import Points
+    from bifocal.model.world_frame import WorldFrame
     from bifocal.orthophotos.ortho_workflow import OrthoTask
     from bifocal.survey.solved_survey import SolvedSurvey
 
@@ -364,13 +365,13 @@ def _drawing_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
     )  # fmt: skip
 
 
-def known_of(job: PairJob) -> dict[str, Points]:
-    """Return the coordinates that the tables of a pair hold."""
+def known_of(job: PairJob, frame: WorldFrame | None = None) -> dict[str, Points]:
+    """Return the coordinates that the tables of a pair hold; E, N, H in a frame's X, Y, r."""
     from bifocal.orientation.control_points import known_points
 
-    said = _some(job, "unit", "columns")
+    said = _some(job, "unit", "columns") | {"names": [str(path) for path in job.photos]}
     return {
-        role: known_points(path, photos=len(job.photos), **said)
+        role: known_points(path, photos=len(job.photos), frame=frame, **said)
         for role, path in tables_of(job).items()
     }
 
@@ -378,8 +379,10 @@ def known_of(job: PairJob) -> dict[str, Points]:
 def _points_to_draw(job: PairJob, *, solved: bool) -> dict[str, Points]:
     """Return what a drawing for CAD holds: known points where they are, and as they were solved."""
     from bifocal.files.point_tables import read_survey_points
+    from bifocal.model.photo_set import pair_or_set
+    from bifocal.model.world_frame import WorldFrame
 
-    points = known_of(job)
+    points = known_of(job, WorldFrame.of(pair_or_set(job.pair_path).extra))
     if solved:
         (table,) = (job.folder / "points").glob(f"{escape(job.title)}_points.*")
         points["points"] = read_survey_points(table)[0]

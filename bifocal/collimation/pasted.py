@@ -7,12 +7,12 @@ import math
 import numpy as np
 
 from bifocal.collimation.records import Known, Picks, Pixel
-from bifocal.orientation.control_points import COLUMNS, METRES
+from bifocal.orientation.control_points import COLUMNS, metres_of
 from bifocal.remarks import remark
-from photocore.arrays import FloatArray
 from photocore.errors import InputError
-from photocore.tables import Table, read_table
+from photocore.tables import read_table
 from photocore.tables.csvread import CsvFile
+from photocore.tables.lists import as_table
 
 #: No wall carries more.
 MOST_ROWS = 5000
@@ -26,13 +26,13 @@ def pasted_control(text: str) -> list[tuple[str, Known, Picks]]:
     InputError
         If no table is recognised, a number is none, or a row has no name.
     """
-    text = text.strip("\r\n")
+    text, _ = as_table(text.strip("\r\n"), "what was pasted")
     if not text.strip():
         raise InputError(remark("page.nothing_pasted"))
     table = read_table(CsvFile("what was pasted", _with_headings(text)), COLUMNS)
     if not len(table) or len(table) > MOST_ROWS:
         raise InputError(remark("page.pasted_many", count=len(table), most=MOST_ROWS))
-    known = np.column_stack([_metres(table, key) for key in ("X", "Y", "r")])
+    known = np.column_stack([metres_of(table, key, "") for key in ("X", "Y", "r")])
     picks = np.column_stack([table.numbers(key) for key in ("col1", "row1", "col2", "row2")])
     rows = []
     for name, place, pixels in zip(table.texts("id"), known.tolist(), picks.tolist(), strict=True):
@@ -60,13 +60,6 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _metres(table: Table, key: str) -> FloatArray:
-    unit = table.units.get(key, "m")
-    if unit not in METRES:
-        raise InputError(f"{key}: the unit {unit!r} is not a length; use m, cm or mm.")
-    return np.asarray(table.numbers(key) * METRES[unit])
 
 
 def _pixel(values: list[float]) -> Pixel | None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.model.pair import Pair
+from bifocal.model.world_frame import WorldFrame
 from bifocal.networks.joint_ties import SharedPoints
 from bifocal.orientation.control_points import Control, read_control
 from bifocal.orientation.tuning import CONTROL
@@ -69,6 +70,8 @@ def named_positions(
                 path, sigma=sigma, unit=unit, columns=columns,
                 sigma_plane=None if role == "check" else CONTROL.sigma_on_wall,
                 unnamed=f"{name_of(paths[index])}, {role} ",
+                names=[photo.file for photo in pairs[index].as_given],
+                frame=WorldFrame.of(pairs[index].extra),
             )  # fmt: skip
             if pairs[index].exchanged:
                 part = part.exchanged()

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.model.photo_set import PhotoSet
+from bifocal.model.world_frame import world_entry
 from bifocal.networks.set_alignment import SetAlignment, set_alignment
 from bifocal.networks.set_orientation import orient_set
 from bifocal.orientation.align_workflow import (
@@ -78,7 +79,8 @@ def align_photo_set(
         PhotoInput(grey=read_grey(path), interior=interior_of_photo(info, known, k), name=name)
         for k, path, name, info, known in zip(numbers, paths, names, infos, lenses, strict=True)
     ]
-    control = control_of(options, [photo.interior.image_size for photo in photos])
+    sizes = [photo.interior.image_size for photo in photos]
+    control = control_of(options, sizes, [str(path) for path in paths])
     oriented = orient_set(photos, control=control, site=options.site, progress=progress)
     made = set_alignment(replace(oriented, way=way), photos, options.direction)
     made = replace(made, remarks=(*control.remarks, *made.remarks))
@@ -94,7 +96,9 @@ def align_photo_set(
         file = relative_name(path, out.parent)
         entries.append(replace(photo, file=file, name=name if alike else "", extra=extra))
     photo_set = PhotoSet(
-        photos=tuple(entries), orientation=made.photos.orientation, extra={"setup": made.setup}
+        photos=tuple(entries),
+        orientation=made.photos.orientation,
+        extra={"setup": made.setup, **world_entry(control.frame)},
     )
     photo_set.write(out, overwrite=overwrite)
     return replace(made, photos=photo_set)

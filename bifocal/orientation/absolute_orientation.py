@@ -83,7 +83,8 @@ def orient_pair(
         If the photos and measurements do not make a pair; the message says why and what to do.
     """
     media = media or PairMedia.none()
-    return _oriented(Given(photos=photos, control=control, site=site, media=media))
+    pair = _oriented(Given(photos=photos, control=control, site=site, media=media))
+    return replace(pair, frame=pair.frame or control.frame)
 
 
 def _oriented(given: Given) -> OrientedPair:
@@ -321,7 +322,8 @@ def _typed_right(
     if slip is None:
         return None
     pair = _told(replace(meant(slip.meant), settled=True), slip.words)
-    return replace(pair, exchanged=pair.exchanged != slip.meant.exchanged)
+    exchanged = pair.exchanged != slip.meant.exchanged
+    return replace(pair, exchanged=exchanged, frame=slip.meant.control.frame)
 
 
 def _told(given: Given, note: str) -> OrientedPair:

@@ -16,6 +16,7 @@ from bifocal.model.interior_orientation import Interior, lens_of_photo
 from bifocal.model.lens import Lens
 from bifocal.model.pair_media import PairMedia
 from bifocal.model.photo import FARTHEST_WALL
+from bifocal.model.world_frame import world_entry
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import Alignment, make_alignment, with_files
 from bifocal.orientation.alignment_picture import write_alignment_picture
@@ -184,7 +185,9 @@ def align_photos(
     else:
         if way == "site" and not options.auto and options.length is None:
             _check_focal((first, second))
-        control = control_of(options, (first.interior.image_size, second.interior.image_size))
+        control = control_of(
+            options, (first.interior.image_size, second.interior.image_size), (far.name, near.name)
+        )
         reading = control.remarks
         oriented = orient_pair(
             (first, second), control=control, site=options.site, media=options.media
@@ -194,6 +197,11 @@ def align_photos(
         paths, ordered = (near, far), (second, first)
     alignment = make_alignment(oriented, ordered, way=way, direction=options.direction)
     alignment = replace(alignment, remarks=(*reading, *alignment.remarks))
+    extra = {
+        **alignment.pair.extra,
+        **world_entry(None if oriented.observations.free_datum else oriented.frame),
+    }
+    alignment = replace(alignment, pair=replace(alignment.pair, extra=extra))
     if picture is not None:
         images = [photo.grey for photo in ordered if photo.grey is not None]
         write_alignment_picture(picture, alignment, (images[0], images[1]), overwrite=overwrite)
@@ -350,7 +358,9 @@ def judged_together(
     ]
 
 
-def control_of(options: AlignOptions, sizes: Sequence[tuple[int, int]]) -> Control:
+def control_of(
+    options: AlignOptions, sizes: Sequence[tuple[int, int]], files: Sequence[str]
+) -> Control:
     """Return the control points and lengths the options name, picked in photos of these sizes."""
     control = Control()
     if options.control is not None:
@@ -361,6 +371,7 @@ def control_of(options: AlignOptions, sizes: Sequence[tuple[int, int]]) -> Contr
             unit=options.unit,
             columns=options.columns,
             photos=len(sizes),
+            names=files,
         )
     if options.lengths is not None:
         if options.control is None:
@@ -382,7 +393,8 @@ def _with_length(
     ends = np.array(length[0], dtype=np.float64).reshape(2, 2)
     sigmas = np.full((2, 3), max(sigma, CONTROL.sigma_on_wall))
     unseen = np.full((2, 2), np.nan)
-    return Control(
+    return replace(
+        control,
         ids=(*control.ids, "length, one end", "length, other end"),
         xyz=np.concatenate([control.xyz, [[np.nan, np.nan, 0.0]] * 2]),
         sigma=np.concatenate([control.sigma, sigmas]),

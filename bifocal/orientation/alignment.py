@@ -379,6 +379,9 @@ def with_files(
         )
     ]
     pair = replace(
-        alignment.pair, image1=photos[0], image2=photos[1], extra={"setup": alignment.setup}
+        alignment.pair,
+        image1=photos[0],
+        image2=photos[1],
+        extra={**alignment.pair.extra, "setup": alignment.setup},
     )
     return replace(alignment, pair=pair)

@@ -9,22 +9,30 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.model.points import Points
+from bifocal.model.world_frame import WorldFrame
+from bifocal.orientation.control_lists import (
+    ListedPoints,
+    in_plane_frame,
+    is_long,
+    of_rows,
+    without_unseen,
+)
 from bifocal.orientation.tuning import CONTROL
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, Table, parse_column_map, read_table
-
-#: Length units a heading may say, in metres.
-METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0}
+from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH, PHOTOS
+from photocore.tables.numbers import METRES
 
 _ALONE = {"col1": ("col", "column", "colonna", "spalte"), "row1": ("row", "riga", "zeile")}
 COLUMNS = (
-    Column("id", ("point", "name", "punto", "punkt", "nr", "no", "number"), kind="text"),
-    Column("X", ("X_ref", "X wall", "east", "E", "X control"), unit="m"),
-    Column("Y", ("Y_ref", "Y wall", "north", "N", "Y control"), unit="m"),
+    Column("id", NAMES, kind="text"),
+    Column("X", ("X_ref", "X wall", "X control", *EAST), unit="m"),
+    Column("Y", ("Y_ref", "Y wall", "Y control", *NORTH), unit="m"),
     Column("r", ("r measured", "relief", "Z", "Z_ref", "r_ref", "rilievo", "relief measured"),
            unit="m"),
+    Column("H", HEIGHT, unit="m"),
     Column("col1", ("column1", "col far", "x far", "colonna1", "spalte1"), unit="px"),
     Column("row1", ("row far", "y far", "riga1", "zeile1"), unit="px"),
     Column("col2", ("column2", "col near", "x near", "colonna2", "spalte2"), unit="px"),
@@ -35,6 +43,14 @@ COLUMNS = (
 #: The same of one photo alone.
 ALONE = tuple(
     replace(column, aliases=(*column.aliases, *_ALONE.get(column.key, ()))) for column in COLUMNS
+)
+#: Of a row for each photo that shows a point.
+A_PHOTO = (
+    Column("photo", PHOTOS, kind="text"),
+    *(
+        Column(key, words, unit="px")
+        for key, words in zip(("col", "row"), _ALONE.values(), strict=True)
+    ),
 )
 LENGTHS = (
     Column("from", ("point 1", "da", "von", "a"), kind="text", required=True),
@@ -67,6 +83,8 @@ class Control:
         Picks in the third photo of a set and those that follow. [px]
     remarks : tuple of str
         What the reader of the table left out or used with doubt.
+    frame : WorldFrame or None
+        Where X, Y, r lie, if they were made of E, N, H.
     """
 
     ids: tuple[str, ...] = ()
@@ -78,6 +96,7 @@ class Control:
     sigma_lengths: tuple[float, ...] = ()
     more: tuple[FloatArray, ...] = ()
     remarks: tuple[str, ...] = ()
+    frame: WorldFrame | None = None
 
     def __post_init__(self) -> None:
         count = len(self.ids)
@@ -172,8 +191,12 @@ def read_control(
     columns: str | None = None,
     unnamed: str = "",
     photos: int = 2,
+    names: Sequence[str] = (),
+    frame: WorldFrame | None = None,
 ) -> Control:
     """Read control points: id, X, Y, r and their pixels col1, row1, col2, row2.
+
+    Three coordinates E, N, H of an upright wall are made X along it, Y its height, r outwards.
 
     Parameters
     ----------
@@ -192,6 +215,10 @@ def read_control(
     photos : int
         How many there are; of more than two the pixels are col3, row3 and so on, of one alone col1,
         row1, which may be called col, row.
+    names : sequence of str
+        The photos' files, for tables with a row for each photo: id, photo, col, row.
+    frame : WorldFrame, optional
+        Of the pair, for E, N, H; by default that of these points.
 
     Returns
     -------
@@ -207,9 +234,10 @@ def read_control(
     alone = photos == 1
     keys = tuple(f"{axis}{k}" for k in range(1, photos + 1) for axis in ("col", "row"))
     wanted = ALONE if alone else (*COLUMNS, *(Column(key, unit="px") for key in keys[4:]))
-    places = parse_column_map(columns, [column.key for column in wanted]) if columns else None
-    table = read_table(path, wanted, column_map=places)
-    missing = [key for key in keys if key not in table.present]
+    wanted = (*wanted, *(A_PHOTO[:1] if alone else A_PHOTO))
+    table = read_table(path, wanted, column_map=_places(columns, wanted))
+    listed = is_long(table, keys, names)
+    missing = [key for key in keys if key not in table.present and not listed]
     if missing and alone:
         raise InputError(remark("rectify.no_picks", path=path))
     if missing:
@@ -225,35 +253,54 @@ def read_control(
         raise InputError(remark("control.lone_axis", path=path, missing=lone[0]))
     if not len(table):
         raise InputError(f"{path}: no control points in the table.")
-    names = _names(table.texts("id"), unnamed)
-    xyz = np.column_stack([metres_of(table, key, unit) for key in ("X", "Y", "r")])
-    errors = table.repeated("id") if "id" in table.present else []
-    errors += _halves(table, keys)
+    xyz = np.column_stack([metres_of(table, key, unit) for key in ("X", "Y", "r", "H")])
+    errors = _halves(table, ("col", "row") if listed and not alone else keys)
+    if listed and not errors:
+        points = of_rows(table, keys if alone else ("col", "row"), names, xyz)
+    else:
+        errors += table.repeated("id") if "id" in table.present and not listed else []
+        points = ListedPoints(
+            rows=list(range(len(table))),
+            picks=[
+                np.column_stack([table.numbers(column), table.numbers(row)])
+                for column, row in zip(keys[::2], keys[1::2], strict=True)
+            ],
+        )
     if errors:
         raise WorkbookError(errors)
-    own = metres_of(table, "sigma", unit)
+    ids = _names([table.texts("id")[row] for row in points.rows], unnamed)
+    picks, unseen = without_unseen(points.picks, ids)
+    xyz, frame, placed = in_plane_frame(
+        table, xyz[points.rows, :3], xyz[points.rows, 3], picks, frame
+    )
+    own = metres_of(table, "sigma", unit)[points.rows]
     spread = np.tile(np.where(np.isfinite(own), own, sigma)[:, None], (1, 3))
     spread = np.maximum(spread, 1e-5)
     if sigma_plane is not None:
         on_wall = np.isfinite(xyz[:, :2]).all(axis=1) & np.isnan(xyz[:, 2])
         xyz[on_wall, 2] = 0.0
         spread[on_wall, 2] = sigma_plane
-    picks = [
-        np.column_stack([table.numbers(column), table.numbers(row)])
-        for column, row in zip(keys[::2], keys[1::2], strict=True)
-    ]
-    picks += [np.full((len(table), 2), np.nan)] * alone
+    picks += [np.full((len(ids), 2), np.nan)] * alone
     control = Control(
-        ids=tuple(names), xyz=xyz, sigma=spread,
-        pixels1=picks[0], pixels2=picks[1], more=tuple(picks[2:]),
+        ids=tuple(ids), xyz=xyz, sigma=spread,
+        pixels1=picks[0], pixels2=picks[1], more=tuple(picks[2:]), frame=frame,
     )  # fmt: skip
-    remarks = [f"{Path(path).name}: {text}" for text in table.remarks]
-    off = table.numbers("use") == 0
+    said = [*table.remarks, *points.remarks, *unseen, *placed]
+    remarks = [f"{Path(path).name}: {text}" for text in said]
+    off = table.numbers("use")[points.rows] == 0
     if off.any():
         control = control.only(~off)
-        listed = ", ".join(name for name, out in zip(names, off, strict=True) if out)
-        remarks.append(remark("control.switched_off", of=Path(path).name, names=listed))
+        switched = ", ".join(name for name, out in zip(ids, off, strict=True) if out)
+        remarks.append(remark("control.switched_off", of=Path(path).name, names=switched))
     return replace(control, remarks=tuple(remarks))
+
+
+def _places(columns: str | None, wanted: Sequence[Column]) -> dict[str, str] | None:
+    """Return which column is which, as a user says; E and N are understood as X and Y."""
+    if not columns:
+        return None
+    places = parse_column_map(columns, [*(column.key for column in wanted), "E", "N"])
+    return {{"E": "X", "N": "Y"}.get(key, key): place for key, place in places.items()}
 
 
 def _names(texts: Sequence[str], before: str) -> list[str]:
@@ -271,12 +318,19 @@ def _names(texts: Sequence[str], before: str) -> list[str]:
 
 
 def known_points(
-    path: Path, *, unit: str = "", columns: str | None = None, photos: int = 2
+    path: Path,
+    *,
+    unit: str = "",
+    columns: str | None = None,
+    photos: int = 2,
+    names: Sequence[str] = (),
+    frame: WorldFrame | None = None,
 ) -> Points:
     """Return the coordinates of a table of control or check points, NaN where it has none."""
     control = read_control(
-        path, sigma=0.003, sigma_plane=None, unit=unit, columns=columns, photos=photos
-    )
+        path, sigma=0.003, sigma_plane=None, unit=unit, columns=columns, photos=photos, names=names,
+        frame=frame,
+    )  # fmt: skip
     blank = ("",) * len(control.ids)
     return Points(
         ids=control.ids, xyz=control.xyz, sigma_r=control.sigma[:, 2], flags=blank, notes=blank,

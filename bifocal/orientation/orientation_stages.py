@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.model.interior_orientation import SIGMA_RADIAL, Cameras, Images, Interior
+from bifocal.model.world_frame import WorldFrame
 from bifocal.orientation import facade_lines, validation
 from bifocal.orientation.adjustment.frame_turn import family_test, line_test
 from bifocal.orientation.adjustment.pair_adjustment import (
@@ -102,6 +103,8 @@ class OrientedPair:
     aside : ndarray, shape (n, 2), or None
         A place of the far photo, and those as far away as the photos may lie aside of each other,
         on a wall that repeats itself. [ideal px]
+    frame : WorldFrame or None
+        Where the plane frame lies in E, N, H, if the control points say.
     """
 
     observations: PairObservations
@@ -115,6 +118,7 @@ class OrientedPair:
     shape: WallShape = field(default_factory=WallShape)
     lines_off: bool = False
     aside: FloatArray | None = None
+    frame: WorldFrame | None = None
 
     def readjusted(self, start: PairUnknowns | None = None, **changes: Any) -> OrientedPair:
         """Return the pair adjusted with changed observations, from here or another start."""

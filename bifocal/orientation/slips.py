@@ -204,6 +204,9 @@ def _of_control(typed: TypedOrientation, now: TrialOrientation | None) -> Iterat
         meant = replace(control, pixels1=pixels1, pixels2=pixels2)
         words = remark(f"slips.{slip.key}")
         yield Slip(meant=replace(typed, control=meant), words=words, mended=slip.mended)
+    if (frame := control.frame) is not None and frame.is_upright:
+        meant = replace(control, xyz=xyz * [1, 1, -1], frame=frame.exchanged())
+        yield Slip(meant=replace(typed, control=meant), words=remark("slips.east_north"))
     for key, axes in COORDINATES.items():
         meant = replace(control, xyz=axes(xyz))
         yield Slip(meant=replace(typed, control=meant), words=remark(f"slips.{key}"), mended=False)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path, PurePath
+from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 
@@ -13,12 +13,14 @@ from photocore.arrays import FloatArray
 from photocore.camera.pinhole import Pinhole, rays_meeting
 from photocore.cloud import open_cloud
 from photocore.errors import InputError, WorkbookError
+from photocore.names import called, nearest
 from photocore.programs.model import ForeignProject, ForeignView
 from photocore.tables import Column, Table, read_table
+from photocore.tables.axes import NAMES, PHOTOS
 
 COLUMNS = (
-    Column("id", ("point", "name", "punto", "punkt"), kind="text", required=True),
-    Column("photo", ("image", "camera", "foto", "bild"), kind="text"),
+    Column("id", NAMES, kind="text", required=True),
+    Column("photo", PHOTOS, kind="text"),
     Column("col", ("column", "colonna", "spalte"), unit="px"),
     Column("row", ("riga", "zeile"), unit="px"),
     Column("x", ("X model",)),
@@ -75,10 +77,12 @@ def _intersected(table: Table, views: tuple[ForeignView, ...]) -> dict[str, Floa
     rays: dict[str, list[tuple[Pinhole, FloatArray]]] = {}
     errors = []
     for row, (name, photo) in enumerate(zip(table.texts("id"), table.texts("photo"), strict=True)):
-        shown = _called(photo, views)
+        shown = [views[k] for k in called(photo, [view.name for view in views])]
         if len(shown) != 1:
             what = "several photos" if shown else "no photo"
-            message = f'"{photo}" is {what} of the project; name one as the project does.'
+            near = nearest(photo, [view.name for view in views])
+            hint = f' The nearest name is "{near}".' if near and not shown else ""
+            message = f'"{photo}" is {what} of the project; name one as the project does.{hint}'
             errors.append(table.error(row, "photo", message))
         elif not np.isfinite(pixels[row]).all():
             errors.append(table.error(row, "col", "column and row must both be given."))
@@ -99,16 +103,6 @@ def _intersected(table: Table, views: tuple[ForeignView, ...]) -> dict[str, Floa
             )
         points[name] = place
     return points
-
-
-def _called(photo: str, views: Sequence[ForeignView]) -> list[ForeignView]:
-    """Return the photos of a name: the whole one, else without folders, else without ending."""
-    for part in (PurePath.as_posix, lambda path: path.name, lambda path: path.stem):
-        found = [view for view in views if part(PurePath(view.name)).lower()
-                 == part(PurePath(photo)).lower()]  # fmt: skip
-        if found:
-            return found
-    return []
 
 
 def chosen(points: Mapping[str, FloatArray], names: tuple[str, ...], option: str) -> FloatArray:

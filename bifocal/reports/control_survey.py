@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import compress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from bifocal.model.pair import Pair
-from bifocal.model.photo_set import PhotoSet
+from bifocal.model.photo_set import PhotoSet, pair_or_set
+from bifocal.model.world_frame import WorldFrame
 from bifocal.orientation.control_points import Control, read_control
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import KnownPoints
@@ -77,7 +79,13 @@ def solve_control(
         If a table is unusable, a name is in both, or none has a point seen in two photos.
     """
     tables = [(path, code) for path, code in ((control, CONTROL), (check, CHECK)) if path]
-    parts = [_read(path, exchanged, unit, columns, photos) for path, _ in tables]
+    named = pair_or_set(pair_path)
+    held = named.as_given if isinstance(named, Pair) else named.photos
+    reading = {
+        "unit": unit, "columns": columns, "photos": photos, "names": [p.file for p in held],
+        "frame": WorldFrame.of(named.extra),
+    }  # fmt: skip
+    parts = [_read(path, exchanged, reading) for path, _ in tables]
     counts = np.array([len(part.ids) for part in parts], dtype=int)
     codes = np.repeat([code for _, code in tables], counts)
     ids = [name for part in parts for name in part.ids]
@@ -115,9 +123,7 @@ def is_exchanged(pair: Pair | PhotoSet, far: Path) -> bool:
     return isinstance(pair, Pair) and pair.photo_file(2).resolve() == far.resolve()
 
 
-def _read(path: Path, exchanged: bool, unit: str, columns: str | None, photos: int) -> Control:
+def _read(path: Path, exchanged: bool, reading: Mapping[str, Any]) -> Control:
     # The standard deviations are those of the orientation; here they play no part.
-    control = read_control(
-        path, sigma=0.003, sigma_plane=0.005, unit=unit, columns=columns, photos=photos
-    )
+    control = read_control(path, sigma=0.003, sigma_plane=0.005, **reading)
     return control.exchanged() if exchanged else control

@@ -25,6 +25,7 @@ class BathymetryStatus(LabelledCode):
     RAYS = 2, "rays"
     NO_SURFACE = 3, "outside the water surface"
     FAILED = 4, "failed"
+    OUTSIDE = 5, "outside the area"
 
 
 def status_labels(status: IntArray) -> list[str]:

@@ -51,6 +51,10 @@ class Job:
     sigma_direction : float or None
         Of measured rays, 1e-4 unless given. [rad]
     nodata : float or None
+    area : Path or None
+        Polygons of the water, GeoJSON or a shapefile: what lies outside stays as it is.
+    classes : tuple of int
+        Classes of a LAS cloud that are corrected; by default all.
     allow_dry : bool
         Accept data without a single point under water.
     overwrite : bool
@@ -71,6 +75,8 @@ class Job:
     rays: bool = False
     sigma_direction: float | None = None
     nodata: float | None = None
+    area: Path | None = None
+    classes: tuple[int, ...] = ()
     allow_dry: bool = False
     overwrite: bool = False
 
@@ -131,6 +137,8 @@ class Outcome:
             )
         failed = self.counts.get(BathymetryStatus.FAILED.label, 0)
         dry = self.counts.get(BathymetryStatus.DRY.label, 0)
+        if self.counts.get(BathymetryStatus.OUTSIDE.label, 0) == sum(self.counts.values()):
+            raise GeometryError(remark("bathymetry.all_outside"))
         flat = isinstance(surface, Plane)
         if failed and not (self._wet or dry or allow_dry):
             raise GeometryError(

@@ -16,11 +16,13 @@ from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, Table, read_table
+from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH, PHOTOS
+from photocore.tables.numbers import METRES
 
 _XYZ = (
-    Column("X", ("x", "x0", "xc", "east", "easting", "e"), required=True, unit="m"),
-    Column("Y", ("y", "y0", "yc", "north", "northing", "n"), required=True, unit="m"),
-    Column("Z", ("z", "z0", "zc", "height", "altitude", "elevation", "h"), required=True, unit="m"),
+    Column("X", ("x", "x0", "xc", *EAST), required=True, unit="m"),
+    Column("Y", ("y", "y0", "yc", *NORTH), required=True, unit="m"),
+    Column("Z", ("z", "z0", "zc", *HEIGHT), required=True, unit="m"),
 )
 _TIME = Column("time", ("date", "datetime", "timestamp", "t", "ora", "zeit"), kind="text")
 #: The date of EXIF data, which no other program writes with colons.
@@ -76,7 +78,9 @@ def read_camera_positions(path: Path | str) -> CameraPositions:
             ids=tuple(camera.name for camera in cameras),
             centres=np.array([camera.centre for camera in cameras]),
         )
-    name = Column("id", ("camera", "image", "photo", "label", "name", "file"), kind="text")
+    name = Column(
+        "id", ("camera", "image", "photo", "photo id", "file", *PHOTOS, *NAMES), kind="text"
+    )
     table = read_table(path, (name, *_XYZ, _TIME))
     if not len(table):
         raise InputError(f"{path}: holds no camera.")
@@ -209,11 +213,18 @@ def _numbers(table: Table, keys: tuple[str, ...], errors: Sequence[CellError] = 
     WorkbookError
         If a cell is blank or infinite, or there are errors already; all of them are named.
     """
-    values = np.column_stack([table.numbers(key) for key in keys])
+    complaints = list(errors)
+    lengths = {key for key in keys if table.units.get(key, "s") != "s"}
+    values = np.column_stack(
+        [
+            table.in_unit(key, METRES, complaints) if key in lengths else table.numbers(key)
+            for key in keys
+        ]
+    )
     blank = [
         table.error(int(row), keys[column], "is blank; expected a number.")
         for row, column in np.argwhere(~np.isfinite(values))
     ]
-    if errors or blank:
-        raise WorkbookError([*errors, *blank])
+    if complaints or blank:
+        raise WorkbookError([*complaints, *blank])
     return values

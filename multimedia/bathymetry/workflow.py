@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.sparse import csr_array
 
+from multimedia.bathymetry.bounds import CLASS, Bounds, read_bounds
 from multimedia.bathymetry.corrected_points import (
     CorrectedPoints,
     Precision,
@@ -46,7 +47,7 @@ from photocore.tables import write_csv
 MARK = "refraction"
 #: What a corrected cloud gains: numpy type and description.
 _GAINED = {
-    MARK: ("u1", "0 dry 1 nadir 2 rays 3 4 none"),
+    MARK: ("u1", "0 dry 1 nadir 2 rays 3 4 5 none"),
     "water_depth": ("f4", "true depth under water"),
     **dict.fromkeys(("sigma_X", "sigma_Y", "sigma_Z"), ("f4", "standard deviation")),
 }
@@ -70,7 +71,7 @@ def correct_file(job: Job, *, progress: Progress = no_progress) -> Outcome:
     InputError, GeometryError
         If anything is wrong with the data; the target is then not written.
     """
-    tables = (job.cameras, job.visibility, job.trajectory)
+    tables = (job.cameras, job.visibility, job.trajectory, job.area)
     check_not_input(job.target, job.source, job.water_level, *tables)
     check_writable(job.target, overwrite=job.overwrite)
     checked_water_index(job.index)
@@ -97,6 +98,9 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
     if cloud.has(MARK):
         raise InputError(remark("bathymetry.corrected_already", of=job.source, mark=MARK))
     cameras = read_camera_positions(job.cameras) if job.cameras else None
+    bounds = read_bounds(job.area, job.classes)
+    if bounds.classes and not cloud.has(CLASS):
+        raise InputError(remark("bathymetry.no_classes", of=job.source, name=CLASS))
     water = _water(job, cameras)
     surface = water.surface
     correct, remarks = _corrector(job, cloud, water, cameras)
@@ -106,7 +110,8 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
         name: kind for name, kind in _GAINED.items() if is_precise or not name.startswith("sigma")
     }
     spoken = job.source.suffix.lower() not in (".ply", ".las", ".laz")
-    numbers = ("X0", "Y0", "Z0", "gps_time") if job.beams else ()
+    numbers = [*(("X0", "Y0", "Z0", "gps_time") if job.beams else ())]
+    numbers += [CLASS] if bounds.classes else []
     texts = ("id", "cameras") if job.cameras else ()
     done = 0
     with cloud.copy(job.target, gained, overwrite=job.overwrite) as write:
@@ -118,6 +123,9 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
                     "programs write where they know none; leave these points out."
                 )
             result = correct(piece)
+            if bounds:
+                inside = bounds.hold(piece.xyz, piece.numbers.get(CLASS))
+                result = bounds.applied(piece.xyz, result, inside, job.precision.point)
             outcome.add(piece.xyz, result)
             status = status_labels(result.status) if spoken else result.status
             sigma = () if result.sigma is None else result.sigma.T
@@ -263,8 +271,9 @@ def _sensor_positions(job: Job, cloud: Cloud) -> Callable[[CloudPiece], FloatArr
 def _correct_dem(job: Job, progress: Progress) -> Outcome:
     """Correct an elevation model window by window."""
     check_ending(job.target, "a DEM is written as .tif.", ".tif", ".tiff")
-    if job.beams or job.visibility:
+    if job.beams or job.visibility or job.classes:
         raise InputError(remark("bathymetry.cells_of_dem", of=job.source))
+    bounds = read_bounds(job.area, ())
     with Dem(job.source, nodata=job.nodata) as dem:
         if "REFRACTION_INDEX" in dem.tags:
             raise InputError(f"{job.source}: has been corrected for refraction already.")
@@ -272,7 +281,7 @@ def _correct_dem(job: Job, progress: Progress) -> Outcome:
         water = _water(job, cameras, dem.crs)
         surface = water.surface
         is_level = isinstance(surface, Plane) and abs(surface.normal[2]) == 1.0
-        if not dem.has_position and (cameras is not None or not is_level):
+        if not dem.has_position and (cameras is not None or bounds or not is_level):
             raise InputError(remark("bathymetry.dem_nowhere", of=job.source))
         outcome = Outcome(remarks=list(water.remarks))
         if cameras is not None:
@@ -290,7 +299,7 @@ def _correct_dem(job: Job, progress: Progress) -> Outcome:
             margin = 0  # widened when a window needs more, and kept for the next
             for number, window in enumerate(windows, start=1):
                 bands_of, margin = _correct_window(
-                    job, dem, window, water, cameras, outcome, margin
+                    job, dem, window, water, cameras, bounds, outcome, margin
                 )
                 write(window, bands_of)
                 progress(number, len(windows), "DEM windows")
@@ -306,6 +315,7 @@ def _correct_window(
     window: Window,
     water: _Water,
     cameras: CameraPositions | None,
+    bounds: Bounds,
     outcome: Outcome,
     margin: int,
 ) -> tuple[FloatArray, int]:
@@ -324,6 +334,8 @@ def _correct_window(
             rise=water.rise,
             precision=job.precision,
         )
+        if bounds:
+            result = bounds.applied(points, result, bounds.hold(points), job.precision.point)
         move = np.full((*known.shape, 2), np.nan)
         move[known] = (result.xyz - points)[:, :2] @ np.linalg.inv(dem.xy_from_pixel[:, :2]).T
         reach = int(np.ceil(np.nanmax(np.abs(move), initial=0.0)))
@@ -356,6 +368,8 @@ def _correct_window(
 
 def _correct_rays(job: Job) -> Outcome:
     """Refract and intersect a table of measured rays."""
+    if job.area is not None or job.classes:
+        raise InputError(remark("bathymetry.bounds_of_rays", of=job.source))
     check_ending(job.target, "intersected rays are written as .csv.", ".csv")
     if job.nodata is not None:
         raise InputError(f"{job.source}: --nodata is for the cells of a DEM, these are rays.")

@@ -12,7 +12,7 @@ from multimedia.orientation.plate_poses import plate_pose
 from multimedia.projects.model import ImagePoints, ObjectPoints, Project
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.camera.boards import BoardView
+from photocore.camera.charuco import BoardView
 from photocore.errors import ConvergenceError, GeometryError, InputError
 
 

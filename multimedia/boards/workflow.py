@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,8 @@ from multimedia.projects.photos import read_photo
 from multimedia.projects.project_file import project_files, read_project, write_project
 from multimedia.remarks import remark
 from photocore.arrays import ByteArray, positive
-from photocore.camera.boards import BoardView, checked_board, detect_board, find_board_size
+from photocore.camera.boards import checked_board, detect_board, find_board_size
+from photocore.camera.charuco import BoardView, seen_markers
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import check_ending, check_not_input, check_writable
@@ -41,6 +43,11 @@ class DetectedBoards:
     project: Project
     views: tuple[PosedView, ...]
     without: tuple[str, ...]
+
+    @property
+    def layouts(self) -> dict[str, int]:
+        """How many photos show a ChArUco board of each dictionary and layout."""
+        return dict(Counter(each.view.layout for each in self.views if each.view.layout))
 
     @property
     def next_command(self) -> str:
@@ -181,6 +188,14 @@ def _why_not(grey: ByteArray, pattern: str, board: tuple[int, int]) -> str:
                 f"shows {columns}x{rows} inner corners, not {board[0]}x{board[1]}: another board, "
                 "or part of it is hidden"
             )
+    if pattern == "charuco":
+        most = max(seen_markers(grey, board[0] * board[1]), key=lambda m: len(m[2]), default=None)
+        if most is not None:
+            low, high = most.numbers.min(), most.numbers.max()
+            return remark(
+                "boards.other_charuco", count=len(most.numbers), dictionary=most.dictionary,
+                low=low, high=high, columns=board[0], rows=board[1],
+            )  # fmt: skip
     least = "at least six corners of it" if pattern == "charuco" else "all of it"
     return f"shows no {pattern} of {board[0]}x{board[1]}; {least} must be seen, sharp"
 

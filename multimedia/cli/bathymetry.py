@@ -86,6 +86,12 @@ class BathymetryCommand:
     none]"""
     nodata: Annotated[float | None, Typed(Number(finite=False), "VALUE")] = None
     """Height that marks empty cells of a DEM [m]. [default: as the file says]"""
+    area: Annotated[Path | None, Typed(unit="FILE")] = None
+    """Polygons of the water, .geojson or .shp (extra shapes) in the reference system of IN: what
+    lies outside, behind a dike or in a pool of its own, stays as it is. [default: none]"""
+    classes: Annotated[tuple[int, ...], Typed(click.IntRange(0, 255), "CLASS", flag="--class")] = ()
+    """Correct only points of this class of a LAS cloud, such as 40, bathymetric point; repeat it.
+    [default: all classes]"""
     allow_dry: bool = False
     """Accept data without a point under water. [off]"""
     cog: RasterCogOption = False

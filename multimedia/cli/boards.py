@@ -64,11 +64,13 @@ def command(options: BoardsCommand) -> None:
     counts = _counts(found)
     data = {
         "file": options.out, "photos": len(options.photos), "found": len(found.views),
-        "cameras": counts, "left_out": list(found.without), "adjust": found.next_command,
+        "cameras": counts, "layouts": found.layouts, "left_out": list(found.without),
+        "adjust": found.next_command,
     }  # fmt: skip
     rows = [(name, boards, points) for name, (boards, points) in counts.items()]
     lines = [
         text_table(("camera", "boards", "points"), rows),
+        *(f"{count} photos show ChArUco {name}" for name, count in found.layouts.items()),
         f"Written: {options.out}\nNext: multimedia adjust {options.out} {found.next_command}",
     ]
     notes = [f"Left out: {line}" for line in found.without]

@@ -13,19 +13,20 @@ from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, Table, open_tables, read_table, write_csv
+from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH
 
 #: Metres per unit of length that a heading may name.
 METRES: Mapping[str, float] = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "km": 1e3}
 
-_ID = Column("id", ("point", "name", "no", "nr", "number", "punkt", "punto", "pnt"), kind="text")
+_ID = Column("id", NAMES, kind="text")
 _GROUP = Column("group", ("set", "plate", "frame", "gruppe", "gruppo", "code"), kind="text")
 _PHOTO = ("cam", "image", "photo", "kamera", "bild", "foto", "fotocamera")
 _CAMERA = Column("camera", _PHOTO, kind="text", required=True)
 _OBJECT = (
     _ID,
-    Column("X", ("E", "easting", "Rechtswert"), required=True),
-    Column("Y", ("N", "northing", "Hochwert"), required=True),
-    Column("Z", ("H", "height", "depth", "elevation", "Höhe", "quota"), required=True),
+    Column("X", EAST, required=True, any_length=True),
+    Column("Y", NORTH, required=True, any_length=True),
+    Column("Z", (*HEIGHT, "depth"), required=True, any_length=True),
     Column("sigma_X", ("sX", "std X")),
     Column("sigma_Y", ("sY", "std Y")),
     Column("sigma_Z", ("sZ", "std Z")),

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import cv2
 import numpy as np
 
 from photocore.arrays import ByteArray, FloatArray
+from photocore.camera.charuco import BoardView, detect_charuco
 from photocore.errors import InputError
 from photocore.remarks import remark
 
@@ -21,25 +21,6 @@ _DULL = 160
 PATTERNS = ("chessboard", "circles", "asymmetric-circles", "charuco")
 #: Fewer corners each way are not told from the pattern of a window. OpenCV takes no fewer.
 LEAST_CORNERS = 3
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class BoardView:
-    """The board as one photo shows it.
-
-    Attributes
-    ----------
-    name : str
-        Of the photo.
-    board : ndarray, shape (n, 3)
-        Points on the board, z = 0. [squares]
-    pixels : ndarray, shape (n, 2)
-        Where they are seen. [px]
-    """
-
-    name: str
-    board: FloatArray
-    pixels: FloatArray
 
 
 def checked_board(pattern: str, board: tuple[int, int] | None) -> tuple[int, int]:
@@ -96,7 +77,7 @@ def _detected(image: ByteArray, name: str, pattern: str, size: tuple[int, int]) 
     """Return the board's points; None when it is not found whole."""
     columns, rows = size
     if pattern == "charuco":
-        return _detect_charuco(image, name, size)
+        return detect_charuco(image, name, size)
     if pattern == "chessboard":
         flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
         seen, corners = cv2.findChessboardCorners(_reduced(image)[0], size, flags=flags)
@@ -171,22 +152,3 @@ def _refined(image: ByteArray, corners: Any, size: tuple[int, int]) -> FloatArra
         image, np.array(corners[:, None], order="C"), (window, window), (-1, -1), criteria
     )
     return np.asarray(refined, dtype=np.float64).reshape(-1, 2)
-
-
-def _detect_charuco(image: ByteArray, name: str, size: tuple[int, int]) -> BoardView | None:
-    """Return the ChArUco corners seen, over the common dictionaries; at least six."""
-    best: BoardView | None = None
-    for dictionary in (
-        cv2.aruco.DICT_4X4_250, cv2.aruco.DICT_5X5_250, cv2.aruco.DICT_6X6_250,
-        cv2.aruco.DICT_ARUCO_ORIGINAL,
-    ):  # fmt: skip
-        board = cv2.aruco.CharucoBoard(
-            size, 1.0, 0.7, cv2.aruco.getPredefinedDictionary(dictionary)
-        )
-        corners, ids, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(image)
-        if ids is not None and len(ids) >= 6 and (best is None or len(ids) > len(best.pixels)):
-            points = np.asarray(board.getChessboardCorners(), dtype=np.float64)[np.ravel(ids)]
-            best = BoardView(
-                name=name, board=points, pixels=np.asarray(corners, float).reshape(-1, 2)
-            )
-    return best

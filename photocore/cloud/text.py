@@ -19,14 +19,16 @@ import numpy as np
 from photocore.arrays import FloatArray
 from photocore.cloud.model import PIECE, Cloud, CloudPiece, NewAttributes, PieceWriter
 from photocore.errors import LARGEST, CellError, InputError, WorkbookError
+from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH
 from photocore.tables.headings import bare
+from photocore.tables.rows import COMMENTS
 
 #: Headings of each coordinate and of the columns other commands ask for.
 HEADINGS: dict[str, tuple[str, ...]] = {
-    "X": ("x", "e", "east", "easting", "ost", "est"),
-    "Y": ("y", "n", "north", "northing", "nord"),
-    "Z": ("z", "h", "height", "elevation", "altitude", "sfmz", "hoehe", "höhe", "quota"),
-    "id": ("id", "point", "pointid", "name", "punkt", "punto"),
+    "X": ("x", *map(bare, EAST)),
+    "Y": ("y", *map(bare, NORTH)),
+    "Z": ("z", "sfmz", *map(bare, HEIGHT)),
+    "id": ("id", *map(bare, NAMES)),
     "cameras": ("cameras", "images", "photos"),
     "sigma_Z": ("sigmaz", "sigmah", "sz"),
     "X0": ("x0", "sensorx"),
@@ -34,6 +36,7 @@ HEADINGS: dict[str, tuple[str, ...]] = {
     "Z0": ("z0", "sensorz"),
     "gps_time": ("gpstime", "time", "t"),
 }
+_WORDS = re.compile(r"\w+")
 #: Decimals of a corrected coordinate: a nanometre, far below any measurement.
 DECIMALS = 9
 
@@ -48,6 +51,11 @@ class TextCloud(Cloud):
             with self._open() as file:
                 lines = (line for line in file if line.strip())
                 first, second = next(lines, ""), next(lines, "")
+                self._notes = 0
+                while first.lstrip().startswith(COMMENTS) and (
+                    second.lstrip().startswith(COMMENTS) or len(_WORDS.findall(first)) < 3
+                ):
+                    first, second, self._notes = second, next(lines, ""), self._notes + 1
         except UnicodeDecodeError:
             raise InputError(f"{path}: is not a text file.") from None
         if not first:
@@ -61,7 +69,9 @@ class TextCloud(Cloud):
         self._names = (
             names if self._headed else ["X", "Y", "Z", *map(str, range(4, 1 + len(names)))]
         )
-        places = {bare(name): place for place, name in reversed(list(enumerate(self._names)))}
+        numbered = list(enumerate(self._names))[::-1]
+        places = {bare(part): k for k, name in numbered for part in name.split("/")}
+        places |= {bare(name): k for k, name in numbered}
         self._columns = {
             key: next(places[form] for form in forms if form in places)
             for key, forms in HEADINGS.items()
@@ -106,7 +116,7 @@ class TextCloud(Cloud):
         wanted = [*"XYZ", *(key for key in numbers if key in self._columns)]
         with self._open() as file:
             rows = self._rows(file)
-            if self._headed:
+            for _ in range(self._notes + self._headed):
                 next(rows)
             while piece := list(islice(rows, PIECE)):
                 errors: list[CellError] = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
@@ -12,6 +13,7 @@ from photocore.errors import LARGEST
 from photocore.remarks import remark
 from photocore.tables.model import Column
 from photocore.tables.numbers import (
+    GRAD,
     Decimal,
     NumberText,
     converted,
@@ -186,15 +188,23 @@ def _typed_unit(
         has_bare |= len(symbols) < len(parts)
         if len(set(symbols.values())) == 1 and not has_bare:
             return next(iter(symbols.values()))
-        complain(min(symbols), _unlike_units(parts, symbols, has_bare=has_bare))
-        for index in symbols:
-            del parts[index]
-        return ""
+        common, count = Counter(symbols.values()).most_common(1)[0]
+        if has_bare or 2 * count <= len(symbols):
+            complain(min(symbols), _unlike_units(parts, symbols, has_bare=has_bare))
+            for index in symbols:
+                del parts[index]
+            return ""
+        _typed_unit(parts, common, complain, has_bare=False)
+        return common
     for index, symbol in symbols.items():
         part = parts[index]
         if symbol and symbol == wanted:
             continue
         shown = f"{part.digits} {part.unit}"
+        if part.unit.casefold() in GRAD and wanted in ("deg", "gon", "rad"):
+            complain(index, remark("table.which_grad", found=_short(shown)))
+            del parts[index]
+            continue
         value = part.value("comma" if "," in part.digits else "point")
         number = converted(value, symbol, wanted) if value is not None and symbol else value
         advice = f"Write {number:.15g}; the" if number is not None else "The"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 import csv
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -17,9 +16,12 @@ import numpy as np
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError
 from photocore.remarks import remark
-from photocore.tables.headings import Match, describe, find_columns, is_summary
+from photocore.tables.encodings import decoded
+from photocore.tables.fill import describe, near_headings
+from photocore.tables.headings import Match, find_columns, is_summary
+from photocore.tables.lists import as_table
 from photocore.tables.model import Column
-from photocore.tables.numbers import ArrowTexts, Decimal, is_clear, plain_numbers
+from photocore.tables.numbers import ArrowTexts, Decimal, is_clear, plain_numbers, take_apart
 from photocore.textfile import readable
 from photocore.workbook.reading.grid import CellGrid, SheetFile, Value, cell_name
 
@@ -93,7 +95,7 @@ class CsvFile:
 
 
 def open_csv(path: Path) -> CsvFile:
-    """Read a text file of any usual encoding.
+    """Read a text file of any usual encoding, also the lists of instruments and programs.
 
     Raises
     ------
@@ -106,20 +108,14 @@ def open_csv(path: Path) -> CsvFile:
         raise InputError(f"{path}: the file is empty; save or copy it again.")
     if content.startswith((b"PK\x03\x04", b"\xd0\xcf\x11\xe0")):
         raise InputError(f"{path}: is a workbook, not a text table; give it the ending .xlsx.")
-    remarks: list[str] = []
-    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        try:
-            text = content.decode("utf-16")
-        except UnicodeDecodeError:
-            raise InputError(f"{path}: is not a text table (broken UTF-16).") from None
-    else:
-        try:
-            text = content.decode("utf-8-sig")
-        except UnicodeDecodeError:
-            text = content.decode("cp1252", errors="replace")
-            remarks.append(remark("table.not_utf8"))
+    try:
+        text, remarks = decoded(content)
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: is not a text table (broken UTF-16).") from None
     if "\0" in text[:10_000]:
         raise InputError(f"{path}: is not a text table.")
+    text, notes = as_table(text, str(path))
+    remarks += notes
     first = text[: text.find("\n")].strip().strip('"') if "\n" in text else text
     delimiter = first[4:] if first.lower().startswith("sep=") and len(first) == 5 else ""
     return CsvFile(label=path.name, text=text, remarks=remarks, delimiter=delimiter)
@@ -154,7 +150,11 @@ def find_in_text(
         wanted = missing or [c.key for c in columns if c.required] or [c.key for c in columns]
         shown = describe(grid, match)
         about = {"missing": ", ".join(wanted), "headings": shown or "absent", "first": wanted[0]}
-        raise InputError(remark("table.no_column", of=file.label, **about))
+        first = next((record for record in file.records(delimiter, sample=True) if record), [])
+        if sum(take_apart(field) is not None for field in first) > 2:
+            raise InputError(remark("table.no_headings", of=file.label, row=" ".join(first[:6])))
+        near = near_headings(grid, match, columns)
+        raise InputError(f"{remark('table.no_column', of=file.label, **about)}{near}")
     return grid, match, delimiter
 
 

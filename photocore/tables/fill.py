@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from photocore.errors import CellError, InputError, WorkbookError
+from photocore.names import nearest
 from photocore.remarks import remark
 from photocore.tables import convert
-from photocore.tables.headings import Match, unknown_unit
+from photocore.tables.headings import Match, bare, unknown_unit
 from photocore.tables.model import Column, Table
-from photocore.tables.numbers import Decimal, unit_symbol
+from photocore.tables.numbers import FEET, GRAD, Decimal, unit_symbol
 from photocore.workbook.reading.grid import CellDate, CellGrid, Value, cell_name, column_letters
 
 
@@ -110,9 +111,15 @@ def refuse_unknown_units(label: str, title: str, match: Match, columns: Sequence
     errors = []
     for column in columns:
         heading = match.headings.get(column.key, "")
-        unit = "" if column.key in match.units else unknown_unit(heading)
+        unit = match.units.get(column.key, "") or unknown_unit(heading)
+        if column.key in match.units and (
+            unit not in FEET or column.unit == "m" or column.any_length
+        ):
+            continue
         if unit and column.kind in ("number", "integer"):
             message = remark("table.strange_unit", heading=heading, unit=unit)
+            if unit.casefold() in GRAD:
+                message = remark("table.which_grad", found=heading)
             cell = cell_name(match.header, match.columns[column.key])
             error = CellError(message, file=label, sheet=title, cell=cell, column=column.key)
             errors.append(error)
@@ -129,3 +136,22 @@ def take_unit_row(grid: CellGrid, match: Match) -> None:
         match.first += 1
         for key, symbol in symbols.items():
             match.units.setdefault(key, symbol)
+
+
+def describe(grid: CellGrid, match: Match | None) -> str:
+    """Return a few words on the headings found nearest, for a message."""
+    row = match.header if match else next(iter(sorted(grid.rows)), 0)
+    cells = grid.rows.get(row, {})
+    shown = [f'"{v}" ({cell_name(row, c)})' for c, v in sorted(cells.items()) if isinstance(v, str)]
+    return ", ".join(shown[:12]) + (", ..." if len(shown) > 12 else "")
+
+
+def near_headings(grid: CellGrid, match: Match | None, columns: Sequence[Column]) -> str:
+    """Return a sentence on each heading that is like one which is missing; empty without any."""
+    cells = grid.rows.get(match.header if match else next(iter(sorted(grid.rows)), 0), {})
+    used = set(match.columns.values()) if match else set()
+    words = [word for c in columns if match is None or c.key not in match.columns
+             for word in (c.key, *c.aliases) if len(word) > 2]  # fmt: skip
+    texts = [str(v) for n, v in sorted(cells.items()) if n not in used and isinstance(v, str)]
+    near = [(text, nearest(bare(text), words)) for text in texts if len(text) > 2]
+    return "".join(f" {remark('table.near_heading', heading=t, near=n)}" for t, n in near[:3] if n)

@@ -10,27 +10,28 @@ from functools import lru_cache
 
 from photocore.remarks import remark
 from photocore.tables.model import Column
-from photocore.tables.numbers import UNITS, unit_symbol
+from photocore.tables.numbers import GRAD, UNITS, unit_symbol
 from photocore.workbook.reading.grid import (
     CellGrid,
     Value,
-    cell_name,
     column_letters,
     column_number,
 )
 
 _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
-_LOOSE_UNIT = re.compile(r"[\s_,]+(mm|cm|m|px|pixel|deg|°|gon|rad)$", re.IGNORECASE)
+_LOOSE_UNIT = re.compile(r"[\s_,]+(mm|cm|m|ft|ftus|px|pixel|deg|°|gon|rad)$", re.IGNORECASE)
 #: Ends a unit: square metres and the like.
 _POWER = re.compile(r"(?:[²³]|\^?[23])$")
 #: Units people measure in that no command takes.
 _FOREIGN = frozenset(
-    ("ft", "feet", "foot", "in", "inch", "inches", "yd", "yard", "yards", "mi", "mile", "miles",
+    (*GRAD, "in", "inch", "inches", "yd", "yard", "yards", "mi", "mile", "miles",
      "furlong", "furlongs", "mil", "mils", "arcsec", "arcmin", "mgon", "mrad")
 )  # fmt: skip
 #: What may stand in square brackets besides lengths, angles and pixels.
 _NO_LENGTHS = frozenset(("1", "–", "s", "‰"))
 _DROPPED = re.compile(r"[\s_.\-:/'\"`´]+")
+#: What a heading begins with where its row is a comment.
+_COMMENT = re.compile(r"^\s*(?:#|//)\s*(?=\w)")
 _PHOTO = re.compile(
     r"\b(?:image|photo|picture|foto|bild|immagine|aufnahme|camera|kamera|fotocamera)\s*([12])\b"
 )
@@ -99,10 +100,10 @@ class Match:
 def bare(text: str) -> str:
     """Return a heading without unit, case, blanks and punctuation.
 
-    >>> bare("S_1 [mm]"), bare("Distanza radiale 1 (mm)")
-    ('s1', 'distanzaradiale1')
+    >>> bare("S_1 [mm]"), bare("Distanza radiale 1 (mm)"), bare("#Label")
+    ('s1', 'distanzaradiale1', 'label')
     """
-    text = unicodedata.normalize("NFKC", text).casefold()
+    text = _COMMENT.sub("", unicodedata.normalize("NFKC", text).casefold())
     return _DROPPED.sub("", _UNIT.sub("", text))
 
 
@@ -122,8 +123,8 @@ def unknown_unit(text: str) -> str:
     What stands in square brackets is a unit; in round ones it may be any word, so only units that
     people use elsewhere count there.
 
-    >>> unknown_unit("s1 [furlong]"), unknown_unit("E (ft)"), unknown_unit("cov [m²]")
-    ('furlong', 'ft', '')
+    >>> unknown_unit("s1 [furlong]"), unknown_unit("E (yd)"), unknown_unit("cov [m²]")
+    ('furlong', 'yd', '')
     >>> unknown_unit("X (east)"), unknown_unit("scale [1]")
     ('', '')
     """
@@ -325,6 +326,11 @@ def _assign(
     match = Match(columns=dict(fixed), first=header + 1, header=header)
     taken: dict[int, str] = {number: key for key, number in fixed.items()}
     forms = {number: _forms(variants) for number, variants in texts.items()}
+    # "X/Easting" is X as well as Easting, where nothing else is.
+    lowest = {number: _UNIT.sub("", variants[-1]) for number, variants in texts.items()}
+    parts = {
+        n: {bare(p) for p in text.split("/")} if "/" in text else () for n, text in lowest.items()
+    }
     keys = {column.key: bare(column.key) for column in columns}
     aliases = {column.key: {bare(alias) for alias in column.aliases} for column in columns}
 
@@ -349,6 +355,10 @@ def _assign(
         (by_column, lambda key, number: key in map(str.strip, texts[number])),
         (by_column, lambda key, number: keys[key] in forms[number]),
         (by_number, lambda key, number: not aliases[key].isdisjoint(forms[number])),
+        (
+            by_number,
+            lambda key, number: any(p == keys[key] or p in aliases[key] for p in parts[number]),
+        ),
     )
     matched = [len(match.columns)]
     for pairs, fits in ways:
@@ -430,10 +440,18 @@ def _are_names(heading: Value, number: int, rows: Sequence[Mapping[int, Value]])
     return 0 < len(rows) == plain == len(set(texts))
 
 
-def is_summary(cells: Mapping[int, Value], first: int) -> bool:
-    """Whether a row says left of a column, or in it, that it is the mean, sum or like of others."""
+def is_summary(cells: Mapping[int, Value], first: int, *, apart: bool = False) -> bool:
+    """Whether a row says left of a column, or in it, that it is the mean, sum or like of others.
+
+    Of a row that stands apart the first word says so: "mean of x1".
+    """
     texts = (value for number, value in cells.items() if number <= first)
-    return any(isinstance(text, str) and _SUMMARIES.fullmatch(bare(text)) for text in texts)
+    starts = (
+        text.split()[0] if apart else text
+        for text in texts
+        if str(text).strip() and isinstance(text, str)
+    )
+    return any(_SUMMARIES.fullmatch(bare(text)) for text in starts)
 
 
 def _forms(variants: Sequence[str]) -> list[str]:
@@ -488,11 +506,3 @@ def _without_heading(
         if unit_of(heading):
             match.units[key] = unit_of(heading)
     return match
-
-
-def describe(grid: CellGrid, match: Match | None) -> str:
-    """Return a few words on the headings found nearest, for a message."""
-    row = match.header if match else next(iter(sorted(grid.rows)), 0)
-    cells = grid.rows.get(row, {})
-    shown = [f'"{v}" ({cell_name(row, c)})' for c, v in sorted(cells.items()) if isinstance(v, str)]
-    return ", ".join(shown[:12]) + (", ..." if len(shown) > 12 else "")

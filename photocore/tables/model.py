@@ -14,6 +14,10 @@ from photocore.errors import CellError, InputError
 from photocore.remarks import remark
 from photocore.workbook.reading.grid import cell_name, column_letters
 
+#: Columns by letter: point, northing, easting, elevation, description.
+_ORDER = re.compile(r"(?=\w{3})P?(?:NE|EN)[ZH]?D?")
+_LETTERS = {"P": "id", "Z": "H", "D": "-"}
+
 Kind = Literal["number", "integer", "flag", "text"]
 
 
@@ -35,6 +39,8 @@ class Column:
         Whether a table without this column is refused. Blank cells are left to the caller.
     unit : str
         The unit expected when neither the heading nor the cell says one, for messages.
+    any_length : bool
+        Whether feet are taken, and made metres, although no unit is expected; as where it is "m".
     """
 
     key: str
@@ -42,6 +48,7 @@ class Column:
     kind: Kind = "number"
     required: bool = False
     unit: str = ""
+    any_length: bool = False
 
 
 @dataclass(slots=True, kw_only=True)
@@ -74,6 +81,8 @@ class Table:
         Keys whose unit every cell says itself, and no heading.
     text_cells : list of str
         Cells of a sheet whose number was typed as text: formulas do not see such numbers.
+    feet : dict
+        Key to the foot (``ft``, ``ftUS``) of each column that was converted to metres.
     """
 
     file: str
@@ -88,6 +97,7 @@ class Table:
     remarks: list[str] = field(default_factory=list)
     typed_units: set[str] = field(default_factory=set)
     text_cells: list[str] = field(default_factory=list)
+    feet: dict[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -227,7 +237,7 @@ def parse_column_map(text: str, keys: Sequence[str] = ()) -> dict[str, str]:
     ----------
     text : str
         ``"s1=My column, s2=C"``, or the keys in the order of the file's columns for tables
-        without headings: ``"id,X,Y"`` (``-`` skips a column).
+        without headings: ``"id,X,Y"`` (``-`` skips a column), or ``PNEZD``.
     keys : sequence of str
         The keys that exist; empty accepts any. Upper and lower case may be mixed up.
 
@@ -240,9 +250,13 @@ def parse_column_map(text: str, keys: Sequence[str] = ()) -> dict[str, str]:
     --------
     >>> parse_column_map("id, X, -, Y")
     {'id': 'A', 'X': 'B', 'Y': 'D'}
+    >>> parse_column_map("PNEZD", ("id", "E", "N", "H"))
+    {'id': 'A', 'N': 'B', 'E': 'C', 'H': 'D'}
     >>> parse_column_map("s1 = distance 1; s2=C")
     {'s1': 'distance 1', 's2': 'C'}
     """
+    if _ORDER.fullmatch(text.strip()) and text.strip() not in keys:
+        text = ",".join(_LETTERS.get(letter, letter) for letter in text.strip())
     entries = [entry.strip() for entry in re.split(r"[,;]", text)]
     named = any("=" in entry for entry in entries)
     places: dict[str, str] = {}

@@ -18,19 +18,32 @@ Evidence = Literal["point", "comma", "none", "grouped comma", "grouped point"]
 
 #: Units people type, as they are written in headings; spelling to stable symbol.
 _SPELLINGS = {"um": "µm μm um", "px": "px pixel pixels pix", "degC": "°c"}
-_SPELLINGS |= {"deg": "° deg degree degrees grad gradi"}
-_SPELLINGS |= {unit: unit for unit in ("mm", "cm", "dm", "m", "km", "gon", "rad", "%", "nm", "-")}
+_SPELLINGS |= {"deg": "° deg degree degrees gradi", "gon": "gon gons"}
+#: The foot of 0.3048 m, and that of the United States' surveys, 2 ppm longer.
+_SPELLINGS |= {"ft": "ft feet foot ift intft internationalfeet internationalfoot"}
+_SPELLINGS |= {"ftUS": "ftus usft sft ussft ussurveyfeet ussurveyfoot surveyfeet surveyfoot"}
+_SPELLINGS |= {unit: unit for unit in ("mm", "cm", "dm", "m", "km", "rad", "%", "nm", "-")}
 UNITS = {word: unit for unit, words in _SPELLINGS.items() for word in words.split()}
-_METRES = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "km": 1e3}
+#: Metres in each unit of length.
+METRES = {"m": 1.0, "um": 1e-6, "mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "km": 1e3}
+FEET = {"ft": 0.3048, "ftUS": 1200 / 3937}
+METRES |= FEET
 _SPACES = dict.fromkeys(map(ord, "\u00a0\u2007\u2009\u202f\u2002\u2003"), " ")
 _MINUS = dict.fromkeys(map(ord, "\u2212\u2012\u2013\ufe63\uff0d"), "-")
 _NUMBER = re.compile(
     r"(?P<number>[+-]?(?:\d[\d.,' \u2019]*|[.,]\d+)(?:[eE][+-]?\d+)?)"
     r"\s*(?P<unit>[^\d\s.,'+-][^\d.,]*|)"
 )
+_JOINTS = re.compile(r"[\s_-]+")
 _PLAIN = re.compile(r"[+-]?[0-9]+([.,][0-9]*)?")
 #: The exponent as Fortran writes it.
 _FORTRAN = re.compile(r"(?<=[\d.,])[dD](?=[+-]?\d+\s*$)")
+#: Degrees, minutes and seconds: 12°30'15.5".
+_DMS = re.compile(
+    r"([+-]?)(\d{1,3})\s*[°dD]\s*(\d{1,2})\s*['′’m]\s*(?:(\d{1,2}(?:[.,]\d+)?)\s*(?:\"|″|”|''|s))?"
+)
+#: Units of angles that mean degrees to some and gon to others.
+GRAD = frozenset(("g", "gr", "grad", "grads"))
 #: Thousands: groups of three digits with one kind of separator between them.
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}([.,' \u2019])\d{3}(\1\d{3})*(?=$|[eE])")
 
@@ -80,7 +93,7 @@ class NumberText:
 
 
 def take_apart(text: str) -> NumberText | None:
-    """Return the parts of a text that looks like a number with or without unit, else None.
+    r"""Return the parts of a text that looks like a number with or without unit, else None.
 
     >>> take_apart("−1 250,5 mm")
     NumberText(digits='-1250,5', unit='mm', evidence='comma')
@@ -88,13 +101,15 @@ def take_apart(text: str) -> NumberText | None:
     43.0
     >>> take_apart("n/a") is None
     True
+    >>> take_apart("12°30'36''")
+    NumberText(digits='12.51', unit='°', evidence='point')
     """
     if plain := _PLAIN.fullmatch(text):
         return NumberText(text, "", _evidence(text) if plain[1] else "none")
     clean = _FORTRAN.sub("e", text.translate(_SPACES).translate(_MINUS).strip())
     match = _NUMBER.fullmatch(clean)
     if match is None:
-        return None
+        return _of_degrees(clean)
     digits = match["number"].strip()
     for blank in (" ", "'", "\u2019"):
         if blank in digits:
@@ -103,6 +118,19 @@ def take_apart(text: str) -> NumberText | None:
                 return None
             digits = whole.replace(blank, "") + mark + rest
     return NumberText(digits, match["unit"].strip(), _evidence(digits))
+
+
+def _of_degrees(text: str) -> NumberText | None:
+    """Return an angle in degrees, minutes and seconds as a number of degrees."""
+    match = _DMS.fullmatch(text)
+    if match is None:
+        return None
+    sign, degrees, minutes, seconds = match.groups()
+    parts = float(minutes), float((seconds or "0").replace(",", "."))
+    if max(parts) >= 60:
+        return None
+    digits = f"{sign}{float(degrees) + parts[0] / 60 + parts[1] / 3600:.12f}".rstrip("0")
+    return NumberText(f"{digits}0" if digits.endswith(".") else digits, "°", "point")
 
 
 def _evidence(digits: str) -> Evidence:
@@ -123,16 +151,17 @@ def _evidence(digits: str) -> Evidence:
 def unit_symbol(text: str) -> str:
     """Return the stable symbol of a unit, empty when it is not a known unit.
 
-    >>> unit_symbol("[Pixel]"), unit_symbol("furlong")
-    ('px', '')
+    >>> unit_symbol("[Pixel]"), unit_symbol("furlong"), unit_symbol("US survey feet")
+    ('px', '', 'ftUS')
     """
-    return UNITS.get(text.strip(" []().").casefold(), "")
+    word = text.strip(" []().").casefold()
+    return UNITS.get(word) or UNITS.get(_JOINTS.sub("", word), "")
 
 
 def converted(value: float, unit: str, wanted: str) -> float | None:
     """Return a length in another unit, None where the two do not convert."""
-    if unit in _METRES and wanted in _METRES:
-        return float(f"{value * _METRES[unit] / _METRES[wanted]:.15g}")
+    if unit in METRES and wanted in METRES:
+        return float(f"{value * METRES[unit] / METRES[wanted]:.15g}")
     return None
 
 

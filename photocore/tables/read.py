@@ -7,7 +7,10 @@ from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
+import numpy as np
+
 from photocore.errors import CellError, InputError, WorkbookError
+from photocore.provenance import note_remark
 from photocore.remarks import remark
 from photocore.tables.csvread import (
     CsvFile,
@@ -17,10 +20,19 @@ from photocore.tables.csvread import (
     too_wide,
     unguarded,
 )
-from photocore.tables.fill import fill, refuse_doubles, refuse_unknown_units, take_unit_row
-from photocore.tables.headings import Match, bare, describe, find_columns
+from photocore.tables.drawing_points import model_space, named_points
+from photocore.tables.fill import (
+    describe,
+    fill,
+    near_headings,
+    refuse_doubles,
+    refuse_unknown_units,
+    take_unit_row,
+)
+from photocore.tables.headings import Match, bare, find_columns
+from photocore.tables.lists import drawing_as_table
 from photocore.tables.model import Column, Table
-from photocore.tables.numbers import Decimal
+from photocore.tables.numbers import FEET, Decimal
 from photocore.tables.rows import DataRows, block_above, data_rows
 from photocore.textfile import check_name
 from photocore.workbook.reading.grid import CellGrid, SheetFile, TableArea, Value, cell_name
@@ -28,6 +40,10 @@ from photocore.workbook.reading.package import check_header
 
 Source = Path | str | SheetFile | CsvFile
 
+#: Endings of text tables, and of the lists that instruments and programs write.
+_TEXTS = (".csv", ".tsv", ".txt", ".gsi", ".points", ".xml", ".geojson", ".json", ".asc", ".xyz")
+#: What programs write where nothing was measured.
+_BLANK = -9999
 #: Rows with content that are read beyond the limit: titles, notes, headings above the table.
 _MARGIN = 1000
 
@@ -38,7 +54,8 @@ def open_tables(path: Path | str, *, max_rows: int = 100_000) -> SheetFile | Csv
     Parameters
     ----------
     path : path
-        An .xlsx, .xlsm, .ods, .csv, .tsv or .txt file.
+        An .xlsx, .xlsm, .ods, .csv, .tsv or .txt file; or a list of points as instruments and
+        programs write them (`photocore.tables.lists`), .dxf too.
     max_rows : int
         Rows of a sheet after which reading stops; text files have no limit.
 
@@ -49,8 +66,11 @@ def open_tables(path: Path | str, *, max_rows: int = 100_000) -> SheetFile | Csv
     """
     path = Path(path)
     ending = path.suffix.lower()
-    if ending in (".csv", ".tsv", ".txt"):
+    if ending in _TEXTS:
         return open_csv(path)
+    if ending == ".dxf":
+        points = named_points(model_space(path), path)
+        return CsvFile(path.name, drawing_as_table(points, str(path)))
     check_name(path)
     if not path.exists():
         raise InputError(f"{path}: no such file.")
@@ -78,6 +98,7 @@ def read_table(
     column_map: Mapping[str, str] | None = None,
     max_rows: int = 100_000,
     visible_only: bool = False,
+    whole: bool = False,
     errors: list[CellError] | None = None,
 ) -> Table:
     """Read a table, found by name, then by its headings, wherever it stands.
@@ -101,6 +122,9 @@ def read_table(
         Most rows of a workbook's table; text files have no limit.
     visible_only : bool
         Leave hidden and filtered rows out instead of using them with a remark.
+    whole : bool
+        Take a row apart from the table, with less than half the numbers of the one before, for a
+        note.
     errors : list, optional
         Gathers the bad cells instead of raising, to report those of several tables together.
 
@@ -132,9 +156,9 @@ def read_table(
     refuse_unknown_units(book.label, place.grid.title, place.match, columns)
     take_unit_row(place.grid, place.match)
     if isinstance(book, CsvFile):
-        table = _read_text(book, place, columns, decimal, complaints)
+        table = _read_text(book, place, columns, decimal, complaints, whole=whole)
     else:
-        rows = data_rows(place.grid, place.match, columns, visible_only=visible_only)
+        rows = data_rows(place.grid, place.match, columns, visible_only=visible_only, whole=whole)
         if place.grid.truncated or len(rows.rows) > max_rows:
             raise InputError(
                 remark("table.too_long", of=f"{book.label} › {place.grid.title}", count=max_rows)
@@ -142,14 +166,42 @@ def read_table(
         table = _new_table(book, place, rows)
         _refuse_merged(table, place.grid, complaints)
         fill(table, columns, _cells(place, rows), decimal, complaints)
+    _settle(table, columns)
     guessed = place.match.guessed
     if guessed in table.remarks and ("" in table.texts("id") or table.repeated("id")):
         table.values["id"], table.present = [""] * len(table), table.present - {"id"}
         del table.columns["id"], table.headings["id"]
         table.remarks.remove(guessed)
+    for text in table.remarks:
+        note_remark(f"{book.label}: {text}")
     if errors is None and complaints:
         raise WorkbookError(complaints)
     return table
+
+
+def _settle(table: Table, columns: Sequence[Column]) -> None:
+    """Make metres of feet, and blanks of the number that stands for a blank."""
+    for column in columns:
+        key, unit = column.key, table.units.get(column.key, "")
+        if column.kind != "number":
+            continue
+        numbers = table.numbers(key)
+        blank = numbers == _BLANK
+        if blank.any():
+            table.values[key] = numbers = np.where(blank, np.nan, numbers)
+            about = {"column": table.headings.get(key) or key, "count": int(blank.sum())}
+            table.remarks.append(remark("table.blank_number", number=_BLANK, **about))
+        if unit in FEET and (column.unit == "m" or column.any_length):
+            table.values[key], table.units[key] = numbers * FEET[unit], "m"
+            table.feet[key] = unit
+    units = sorted(set(table.feet.values()))
+    if units:
+        about = {"keys": ", ".join(table.headings.get(key) or key for key in table.feet)}
+        table.remarks.append(
+            remark(f"table.feet_{'us' if units == ['ftUS'] else 'plain'}", **about)
+        )
+    if len(units) > 1:
+        raise InputError(remark("table.two_feet", of=table.file))
 
 
 @dataclass(slots=True)
@@ -282,7 +334,8 @@ def _nothing_found(
     row, first = near.match.header, near.match.missing(columns)[0]
     about = {"missing": missing, "headings": describe(near.grid, near.match), "first": first}
     where = f"{book.label} › {near.grid.title}"
-    return InputError(remark("table.lacks_column", of=where, row=row, **about))
+    hint = near_headings(near.grid, near.match, columns)
+    return InputError(f"{remark('table.lacks_column', of=where, row=row, **about)}{hint}")
 
 
 def _read_text(
@@ -291,6 +344,8 @@ def _read_text(
     columns: Sequence[Column],
     decimal: Decimal | None,
     errors: list[CellError],
+    *,
+    whole: bool,
 ) -> Table:
     """Read a text table, on the quick road where all of its rows are plain."""
     match, proven = place.match, {}
@@ -298,7 +353,7 @@ def _read_text(
     plain = plain_rows(file, place.delimiter, width, match, columns, decimal)
     if plain is None:
         place = replace(place, grid=file.grid(place.delimiter, most=None))
-        rows = data_rows(place.grid, match, columns, visible_only=False)
+        rows = data_rows(place.grid, match, columns, visible_only=False, whole=whole)
         table = _new_table(file, place, rows)
         cells = _cells(place, rows)
         if match.header:

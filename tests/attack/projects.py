@@ -48,7 +48,7 @@ _PROJECT_TEXT: list[tuple[str, str, str, str]] = [
 ]
 _PICKS: list[tuple[str, str, str]] = [
     ("A,DSC_0.png", "A,DSC_9.png", "DSC_9"), ("A,DSC_0.png,", "A,DSC_0.png,x", "col"),
-    ("photo", "picture", "photo, col, row"), ("A,DSC_0.png", "Q,DSC_0.png", "point Q"),
+    ("photo", "plate", "photo, col, row"), ("A,DSC_0.png", "Q,DSC_0.png", "point Q"),
 ]  # fmt: skip
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,8 +15,8 @@ from bifocal.workbook.reading.setup_reader import LARGEST
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, read_table
+from photocore.tables.drawing_points import model_space, named_points
 from photocore.tables.numbers import Decimal
-from photocore.textfile import check_file
 
 #: Headings of image viewers: pixels, rows down.
 _COLUMNS = (
@@ -27,8 +26,6 @@ _COLUMNS = (
     Column("col", aliases=("column", "col1", "col2", "i", "u", "pixel x"), unit="px"),
     Column("row", aliases=("row1", "row2", "line", "j", "v", "pixel y"), unit="px"),
 )
-#: A text further from a point than this share of the drawing is not its name.
-_NEAR = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -156,15 +153,9 @@ def _of_table(path: Path, decimal: Decimal | None) -> PickList:
 
 def _of_drawing(path: Path) -> PickList:
     """Return the picks of a drawing."""
-    model = _model_space(path)
-    texts = [
-        (entity.plain_text() if entity.dxftype() == "MTEXT" else entity.dxf.text, _insert(entity))
-        for entity in model.query("TEXT MTEXT")
-    ]
-    texts = [(text.strip(), place) for text, place in texts if text.strip()]
-    points = [tuple(entity.dxf.location)[:2] for entity in model.query("POINT")]
-    named = _named(path, points, texts) if points else texts
-    places: FloatArray = np.array([place for _, place in named]).reshape(-1, 2)
+    model = model_space(path)
+    named = named_points(model, path)
+    places: FloatArray = np.array([place[:2] for _, place in named]).reshape(-1, 2)
     unit = ""
     images = list(model.query("IMAGE"))
     if len(images) > 1:
@@ -177,51 +168,6 @@ def _of_drawing(path: Path) -> PickList:
     else:
         unit = "mm"
     return PickList(ids=tuple(name for name, _ in named), places=places, unit=unit, file=path)
-
-
-def _model_space(path: Path) -> Any:
-    """Return the model space of a drawing."""
-    import ezdxf
-
-    check_file(path, folder=", expected a drawing.")
-    try:
-        return ezdxf.readfile(path).modelspace()
-    except (ezdxf.DXFError, OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: is no DXF drawing that can be read ({error}).") from error
-
-
-def _insert(entity: Any) -> tuple[float, float]:
-    """Return the place of a text: its alignment point where it has one."""
-    dxf = entity.dxf
-    moved = entity.dxftype() == "TEXT" and (dxf.halign or dxf.valign)
-    place = dxf.align_point if moved and dxf.hasattr("align_point") else dxf.insert
-    return float(place[0]), float(place[1])
-
-
-def _named(
-    path: Path, points: list[tuple[float, ...]], texts: list[tuple[str, tuple[float, float]]]
-) -> list[tuple[str, tuple[float, float]]]:
-    """Return each point with the nearest text, nearest couples first, each text once."""
-    if len(texts) < len(points):
-        raise InputError(
-            remark("survey.texts_beside", of=path, points=len(points), texts=len(texts))
-        )
-    size = max(np.ptp(np.array(points), axis=0).max(), 1e-9)
-    couples = sorted(
-        (math.dist(point, place), i, j)
-        for i, point in enumerate(points)
-        for j, (_, place) in enumerate(texts)
-    )
-    names: dict[int, int] = {}
-    taken: set[int] = set()
-    for distance, i, j in couples:
-        if i not in names and j not in taken:
-            if len(points) > 1 and distance > _NEAR * size:
-                x, y = points[i]
-                raise InputError(f"{path}: the point at {x:g}, {y:g} has no name beside it.")
-            names[i] = j
-            taken.add(j)
-    return [(texts[names[i]][0], (point[0], point[1])) for i, point in enumerate(points)]
 
 
 def _pixels_of_image(image: Any, places: FloatArray) -> FloatArray:

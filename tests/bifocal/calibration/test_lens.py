@@ -17,7 +17,8 @@ from bifocal.calibration.lens_database import lens_from_database
 from bifocal.calibration.plumb_line import calibrate_from_lines, find_straight_edges
 from bifocal.calibration.workflow import undistorted
 from bifocal.model.interior_orientation import lens_of_photo
-from photocore.camera.boards import BoardView, detect_board, find_board_size
+from photocore.camera.boards import detect_board, find_board_size
+from photocore.camera.charuco import BoardView
 from tests.bifocal.calibration.known_lens import BROWN, GRID, MATRIX, brown_by_hand
 from tests.builders.commands import bifocal_command as main
 

@@ -27,7 +27,8 @@ from multimedia import (
 from multimedia.boards.board_points import PosedView, with_boards
 from multimedia.orientation.plate_poses import plate_pose
 from multimedia.projects.photos import read_photo
-from photocore.camera.boards import BoardView, detect_board
+from photocore.camera.boards import detect_board
+from photocore.camera.charuco import BoardView
 from tests.builders.commands import multimedia_command as main
 from tests.cases import few_by_default
 from tests.multimedia.rendered_boards import Housing, chessboard, dots, drawn, photo, poses
@@ -191,6 +192,42 @@ def _image(points: np.ndarray) -> np.ndarray:
     return np.array(found)
 
 
+@pytest.mark.parametrize("size", [(6, 4), (5, 5)], ids=str)
+@pytest.mark.parametrize("legacy", [False, True], ids=["new", "legacy"])
+@pytest.mark.parametrize(
+    ("dictionary", "side"), [("7X7_50", 0.6), ("APRILTAG_36h11", 0.75), ("4X4_100", 0.5)]
+)
+def test_charuco_of_any_dictionary_and_layout_has_its_corners_in_place(
+    dictionary, side, legacy, size
+) -> None:
+    family = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{dictionary}"))
+    board = cv2.aruco.CharucoBoard(size, 1.0, side, family)
+    board.setLegacyPattern(legacy)
+    drawing = board.generateImage((60 * size[0], 60 * size[1]))
+    image = cv2.copyMakeBorder(drawing, 30, 30, 30, 30, cv2.BORDER_CONSTANT, value=255)
+    view = detect_board(image, "x", pattern="charuco", size=size)
+    assert view is not None
+    assert len(view.board) == (size[0] - 1) * (size[1] - 1)
+    assert np.abs(view.pixels - (60.0 * view.board[:, :2] + 29.5)).max() < 0.3
+    even = size[1] % 2 == 0
+    assert view.layout.endswith("legacy layout") == (legacy and even)
+    assert view.layout.startswith(dictionary.split("_")[0])
+
+
+def test_markers_that_lie_otherwise_than_on_the_board_are_named(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("housing.toml").write_text(housing())
+    for k in range(3):
+        cv2.imwrite(f"b{k}.png", cv2.resize(np.round(255 * charuco(6, 4)), (480, 360)))
+    words = ["boards", "housing.toml", "b0.png", "b1.png", "b2.png", "--pattern", "charuco"]
+    words += ["--square", "24", "--out", "out.toml", "--board"]
+    result = CliRunner().invoke(main, [*words, "7x4"])
+    assert result.exit_code == 1
+    assert "b0.png: shows 12 markers of 4X4_250, 0 to 11, but not as they lie" in result.stderr
+    result = CliRunner().invoke(main, [*words, "6x4"])
+    assert "3 photos show ChArUco 4X4_250" in result.output
+
+
 SENSOR = Sensor(width=1280, height=1024, pixel_size=np.array([0.006, 0.006]))
 PORT = FlatInterface(
     layers=Layers(indices=(1.0, 1.5, 1.337), thicknesses=(8.0,)), point=(0.0, 0.0, -46.0),
@@ -274,6 +311,20 @@ def test_boards_of_two_cameras_get_one_numbering_and_adjust() -> None:
     )  # fmt: skip
     result = bundle_adjust(one, Unknowns(plates=("0", "1", "2"), fixed_cameras=("left",)))
     assert result.sigma0 < 1e-9
+
+
+def test_square_boards_turned_by_quarters_get_one_numbering() -> None:
+    grid = np.mgrid[0:7, 0:7].T.reshape(-1, 2)
+    board = np.column_stack([grid, 0 * grid[:, 0]]) * 1.0
+    quarter = np.column_stack([6.0 - board[:, 1], board[:, 0], board[:, 2]])
+    given = rig()
+    for right in (quarter, 6.0 * np.array([1, 1, 0]) - quarter):
+        views = seen_by(given, {"left": board, "right": right}, board)[:2]
+        made = with_boards(given, views, square=30.0, numbered=False)
+        seen, _ = made.image_points.grid(("left", "right"), made.object_points.ids)
+        apart = seen[0] - seen[1]
+        assert np.ptp(apart[:, 0]) < 0.5 * np.ptp(seen[0, :, 0])
+        assert np.ptp(apart[:, 1]) < 0.5 * np.ptp(seen[0, :, 1])
 
 
 @pytest.mark.parametrize("rows", few_by_default([5, 8], 8))

@@ -1,0 +1,178 @@
+"""Lists of control points: a row a photo made one a point, and E, N, H made a wall's X, Y, r."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bifocal.model.world_frame import WorldFrame, frame_of, lies_how
+from bifocal.remarks import remark
+from photocore.arrays import FloatArray
+from photocore.errors import CellError, InputError, WorkbookError
+from photocore.names import called, nearest
+from photocore.tables import Table
+from photocore.tables.headings import bare
+
+#: Coordinates of one point in several rows may differ by this much. [m]
+_SAME = 1e-6
+#: Pixels that programs write for "not seen", where several points have them.
+_UNSEEN = ((0.0, 0.0), (-1.0, -1.0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ListedPoints:
+    """Points of a table, and where each is seen.
+
+    Attributes
+    ----------
+    rows : list of int
+        The row of the table that stands for each point.
+    picks : list of ndarray, shape (n, 2)
+        In each photo, NaN where not seen. [px]
+    remarks : tuple of str
+    """
+
+    rows: list[int]
+    picks: list[FloatArray]
+    remarks: tuple[str, ...] = ()
+
+
+def is_long(table: Table, keys: Sequence[str], photos: Sequence[str]) -> bool:
+    """Whether a table has a row for each photo that shows a point, not one for each point."""
+    if "photo" not in table.present or not photos:
+        return False
+    if len(photos) == 1:
+        fits = any(called(name, photos) for name in table.texts("photo") if name)
+        return set(keys) <= table.present and (fits or bool(table.repeated("id")))
+    return {"col", "row"} <= table.present and not set(keys) & table.present
+
+
+def of_rows(
+    table: Table, keys: Sequence[str], photos: Sequence[str], coordinates: FloatArray
+) -> ListedPoints:
+    """Return the points of a table with a row a photo; ``coordinates`` are filled in by name.
+
+    Raises
+    ------
+    InputError, WorkbookError
+        If no row is of these photos, or rows contradict each other.
+    """
+    column, row = (table.numbers(key) for key in keys)
+    places: dict[str, int] = {}
+    picks: dict[tuple[str, int], int] = {}
+    errors: list[CellError] = []
+    strange: list[str] = []
+    for k, (name, photo) in enumerate(zip(table.texts("id"), table.texts("photo"), strict=True)):
+        if not name:
+            errors.append(table.error(k, "id", "is blank; every row needs the point's name."))
+            continue
+        first = places.setdefault(name, k)
+        filled = np.isfinite(coordinates[k])
+        if np.any(np.abs(coordinates[k] - coordinates[first])[filled] > _SAME):
+            message = f'"{name}" has other coordinates in {table.cell(first, "id")}.'
+            errors.append(table.error(k, "id", message))
+        blank = np.isnan(coordinates[first])
+        coordinates[first, blank] = coordinates[k, blank]
+        shown = called(photo, photos) if photo else []
+        if len(shown) > 1:
+            message = f'"{photo}" may be {" or ".join(photos[n] for n in shown)}.'
+            errors.append(table.error(k, "photo", message))
+        elif not shown:
+            strange += [photo] if photo else []
+        elif picks.setdefault((name, shown[0]), k) != k:
+            before = table.cell(picks[name, shown[0]], "id")
+            message = f'"{name}" is picked in this photo in {before} already.'
+            errors.append(table.error(k, "photo", message))
+    if errors:
+        raise WorkbookError(errors)
+    names = list(dict.fromkeys(strange))
+    if not picks:
+        near = next((n for p in photos if (n := nearest(p, names))), "-")
+        about = {"photos": ", ".join(photos), "listed": ", ".join(names[:5]), "near": near}
+        raise InputError(remark("control.no_such_photo", of=table.file, **about))
+    order = list(places)
+    made = [np.full((len(order), 2), np.nan) for _ in photos]
+    for (name, photo_number), k in picks.items():
+        made[photo_number][order.index(name)] = column[k], row[k]
+    shown_names = ", ".join(names[:5])
+    notes = (remark("control.other_photos", count=len(names), names=shown_names),) if names else ()
+    return ListedPoints(rows=list(places.values()), picks=made, remarks=notes)
+
+
+def without_unseen(
+    picks: Sequence[FloatArray], ids: Sequence[str]
+) -> tuple[list[FloatArray], list[str]]:
+    """Return picks without those that stand for "not seen", and what is said of them."""
+    notes: list[str] = []
+    made: list[FloatArray] = []
+    for number, pixels in enumerate(picks, start=1):
+        clean = pixels.copy()
+        for place in _UNSEEN:
+            rows = np.flatnonzero((pixels == place).all(axis=1))
+            if len(rows) > 1:
+                clean[rows] = np.nan
+                names = ", ".join(ids[row] for row in rows[:10])
+                place_words = f"{place[0]:g}, {place[1]:g}"
+                notes.append(remark("control.unseen", photo=number, names=names, place=place_words))
+        made.append(clean)
+    return made, notes
+
+
+def in_plane_frame(
+    table: Table, xyz: FloatArray, heights: FloatArray, picks: Sequence[FloatArray],
+    frame: WorldFrame | None,
+) -> tuple[FloatArray, WorldFrame | None, list[str]]:  # fmt: skip
+    """Return X, Y, r, and the frame in which they are E, N, H where the table holds these.
+
+    Parameters
+    ----------
+    table : Table
+        With the headings.
+    xyz, heights : ndarray, shape (n, 3), (n,)
+        X, Y, r as the headings say, and the column H. [m]
+    picks : sequence of ndarray, shape (n, 2)
+        [px]
+    frame : WorldFrame or None
+        That of a pair; by default that of these points.
+
+    Raises
+    ------
+    InputError
+        If E, N, H lie on a line or slope, or no photo tells the wall's front.
+    """
+    has_height = bool(np.isfinite(heights).any()) and not np.isfinite(xyz[:, 2]).any()
+    is_space = bare(table.headings.get("r", "")).startswith("z") and not has_height
+    if not (has_height or is_space):
+        return xyz, frame, []
+    world = np.column_stack([xyz[:, :2], heights if has_height else xyz[:, 2]])
+    notes: list[str] = []
+    plain = [bare(table.headings.get(key, "")) for key in "XY"] == ["x", "y"]
+    if has_height and plain:
+        if table.columns["Y"] < table.columns["X"]:
+            world = world[:, [1, 0, 2]]
+        geodetic = table.columns["Y"] < table.columns["X"]
+        notes.append(remark(f"control.{'geodetic' if geodetic else 'x_is_east'}"))
+    whole = np.isfinite(world).all(axis=1)
+    if frame is None:
+        lies = lies_how(world[whole]) if whole.sum() > 2 else "line"
+        if is_space and lies != "upright":
+            return xyz, None, []
+        if lies in ("line", "sloping"):
+            raise InputError(remark(f"control.{lies}", of=table.file))
+        frame = frame_of(world[whole], [pixels[whole] for pixels in picks])
+        if frame is None:
+            raise InputError(remark("control.no_front", of=table.file))
+        notes.append(_described(frame))
+    made = np.full_like(xyz, np.nan)
+    made[whole] = frame.to_plane(world[whole])
+    return made, frame, notes
+
+
+def _described(frame: WorldFrame) -> str:
+    """Return what is said of a frame that was found."""
+    if not frame.is_upright:
+        return remark("control.level", height=frame.height)
+    about = {"east": frame.east, "north": frame.north, "azimuth": np.rad2deg(frame.azimuth)}
+    return remark("control.upright", **about)
