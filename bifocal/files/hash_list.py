@@ -27,10 +27,10 @@ def listed_hashes(folder: Path) -> dict[str, str]:
     if not path.exists():
         return {}
     text = path.read_text(encoding="utf-8", errors="surrogateescape")
-    found = [_LINE.fullmatch(line) for line in text.splitlines()]
-    if not all(found):
+    matches = [_LINE.fullmatch(line) for line in text.splitlines()]
+    if not all(matches):
         raise InputError(f"{path}: is no list of hashes; move it away, or deliver elsewhere.")
-    return {one[1]: one[0] for one in found if one and (folder / one[1]).is_file()}
+    return {one[1]: one[0] for one in matches if one and (folder / one[1]).is_file()}
 
 
 def list_hashes(folder: Path, names: Iterable[str]) -> str:

@@ -394,14 +394,14 @@ class PhotoSet:
         return np.column_stack([plane, np.zeros(len(plane))])
 
 
-def ray_angles(one: Photo, other: Photo, xyz: ArrayLike) -> FloatArray:
+def ray_angles(first: Photo, second: Photo, xyz: ArrayLike) -> FloatArray:
     """Return by how much the rays of two photos part at points (X, Y, r), shape (...,). [rad]
 
     Through media the cameras count that see alike near their axes.
     """
     points = as_points(xyz, "xyz", dimension=3)
     ways = []
-    for photo in (one, other):
+    for photo in (first, second):
         foot = straight(photo.foot)
         ways.append(points - [*foot.nadir, foot.distance])
     across = np.linalg.norm(np.cross(*ways), axis=-1)
