@@ -44,8 +44,10 @@ class SolveCommand:
     """File of the pair, or of a set of photos, for points in raw pixels, or a survey workbook for
     its set-up.  [default: the workbook's own set-up]"""
     control: Annotated[Path | None, Typed(TABLE, "LIST")] = None
-    """Table of points from the field: id with E, N, H fills Georeference, with X, Y, Z or r [m]
-    Check.  [default: what stands there]"""
+    """Points from the field, a table or list of an instrument (GSI, ...): id with E, N, H fills
+    Georeference, with X, Y, Z or r [m] Check.  [default: what stands there]"""
+    control_order: Annotated[str | None, Typed(unit="MAP")] = None
+    """Columns of a list without headings: PNEZD, PENZD, "id,E,N,H".  [default: found by heading]"""
     as_json: JsonOption = False
     columns: Annotated[str | None, Typed(unit="MAP")] = None
     """Which column is which: "id=A,s1=My heading" or "id,x1,y1,x2,y2" for tables without

@@ -32,6 +32,7 @@ def solve(
     taking: Taking | None = None,
     measuring: Measuring | None = None,
     control: Path | str | None = None,
+    control_order: str | None = None,
     adjust_setup: bool = False,
     model: str | None = None,
     scale_tolerance: float = SCALE_TOLERANCE,
@@ -59,6 +60,8 @@ def solve(
     control : path, optional
         Table of points from the field, beside those of the workbook: id with E, N, H for control
         points, with X, Y, Z or r for check points. [m]
+    control_order : str, optional
+        Columns of a list without headings: ``"PNEZD"``, ``"id,E,N,H"``.
     adjust_setup : bool
         Correct the orientation by points of the reference plane (code PLANE, r = 0).
     model : {"auto", "levelled", "3D", "2D"}, optional
@@ -110,7 +113,7 @@ def solve(
     options = replace(reading or ReadOptions(), given=tuple(cells_of(asked)), photos=count)
     survey, path = measured(source, options, given.get("unit"), photos or pair)
     if control is not None:
-        survey = with_list(survey, control, options.decimal)
+        survey = with_list(survey, control, options.decimal, control_order)
     if photos is not None:
         return _solved_of_set(survey, photos, path, asked, rules=judged, adjust=adjust_setup)
     survey, pair = set_up(survey, pair, given, options)

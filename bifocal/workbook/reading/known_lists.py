@@ -8,19 +8,22 @@ from pathlib import Path, PurePath
 
 import numpy as np
 
+from bifocal.model.photo import FARTHEST_WALL
 from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations, pixel_keys
 from bifocal.survey.reference import KnownPoints
 from bifocal.survey.survey_input import SurveyInput
 from bifocal.workbook.reading.reader import TO_M, understood
 from bifocal.workbook.reading.setup_reader import LARGEST
+from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
-from photocore.tables import Column, read_table
+from photocore.tables import Column, Table, parse_column_map, read_table
+from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH
 from photocore.tables.numbers import Decimal
 
 #: Axes of the lists that fill `Georeference` and `Check`: headings that mean them besides ours.
 _AXES: dict[str, dict[str, tuple[str, ...]]] = {
-    "Georeference": {"E": (), "N": (), "H": ()},
+    "Georeference": {"E": EAST, "N": NORTH, "H": HEIGHT},
     "Check": {"X_ref": ("X",), "Y_ref": ("Y",), "Z_ref": ("Z", "r", "relief")},
 }
 #: Names of the tables of both sheets.
@@ -33,7 +36,9 @@ _LONG = (
 )
 
 
-def with_list(survey: SurveyInput, path: Path | str, decimal: Decimal | None) -> SurveyInput:
+def with_list(
+    survey: SurveyInput, path: Path | str, decimal: Decimal | None, order: str | None = None
+) -> SurveyInput:
     """Return a survey whose control and check points are those of a list, too.
 
     Names that are there already take the coordinates of the list; points that were not measured
@@ -43,9 +48,12 @@ def with_list(survey: SurveyInput, path: Path | str, decimal: Decimal | None) ->
     ----------
     survey : SurveyInput
     path : path
-        Table with id and E, N, H (control points), or X, Y, Z or r on the wall (check points).
+        Table or list of an instrument with id and E, N, H (control points), or X, Y, Z or r on the
+        wall (check points); X, Y, Z that lie further off than a wall reaches are E, N, H.
     decimal : {"point", "comma"}, optional
         Decimal separator of numbers typed as text.
+    order : str, optional
+        Which column is which, ``PNEZD`` for example, as `photocore.tables.parse_column_map` has it.
 
     Raises
     ------
@@ -53,17 +61,19 @@ def with_list(survey: SurveyInput, path: Path | str, decimal: Decimal | None) ->
         If the list cannot be read, or no point of it was measured.
     """
     errors: list[CellError] = []
-    columns = [understood("id", required=True)]
+    columns = [understood("id", more=NAMES, required=True)]
     for headed in _AXES.values():
         columns += [understood(key, more=more, unit="m") for key, more in headed.items()]
-    table = read_table(path, columns, decimal=decimal, errors=errors)
-    errors += table.repeated("id")
+    names = parse_column_map(order, [column.key for column in columns]) if order else None
+    table = read_table(path, columns, decimal=decimal, column_map=names, errors=errors)
     axes_of = {sheet: tuple(axes) for sheet, axes in _AXES.items()}
     errors += table.too_large([*axes_of["Georeference"], *axes_of["Check"]], LARGEST)
     remarks = list(table.remarks)
     for sheet, axes in axes_of.items():
         xyz = np.stack([table.in_unit(key, TO_M, errors) for key in axes], axis=-1)
-        places = [i for i, name in enumerate(table.texts("id")) if name]
+        places = _first_rows(table, xyz, errors)
+        if np.nanmax(np.abs(xyz), initial=0.0) > FARTHEST_WALL:
+            sheet = "Georeference"
         listed = KnownPoints(ids=tuple(table.texts("id")[i] for i in places), xyz=xyz[places])
         listed = listed.called_as(survey.points.ids)
         measured = np.isin(listed.ids, survey.points.ids) & np.isfinite(listed.xyz).any(axis=1)
@@ -76,6 +86,17 @@ def with_list(survey: SurveyInput, path: Path | str, decimal: Decimal | None) ->
     if len(remarks) == len(table.remarks):
         raise InputError(remark("survey.list_of_others", of=path))
     return replace(survey, remarks=(*survey.remarks, *remarks))
+
+
+def _first_rows(table: Table, xyz: FloatArray, errors: list[CellError]) -> list[int]:
+    """Return the first row of each name: lists of picks name a point once a photo."""
+    rows: dict[str, int] = {}
+    for row, name in enumerate(table.texts("id")):
+        first = rows.setdefault(name, row)
+        if not np.array_equal(xyz[row], xyz[first], equal_nan=True):
+            message = f'"{name}" has other coordinates in {table.cell(first, "id")}.'
+            errors.append(table.error(row, "id", message))
+    return [row for name, row in rows.items() if name]
 
 
 def _filled(

@@ -67,6 +67,51 @@ def test_x_y_and_relief_of_a_list_fill_check_below_the_prepared_rows_too(tmp_pat
     assert str(book["Check"]["I42"].value).startswith("=")
 
 
+def gsi(name, *place):
+    words = (f"8{i}..00+{round(1000 * v):08d} " for i, v in enumerate(place, start=1))
+    return f"110001+{name:0>8} {''.join(words)}\n"
+
+
+@pytest.mark.parametrize(
+    ("form", "order"),
+    [
+        (lambda n, e, no, h: f"{n},{no},{e},{h},CORNER\n", "PNEZD"),
+        (lambda n, e, no, h: f"{n},{e},{no},{h},CORNER\n", "PENZD"),
+        (gsi, None),
+        (
+            lambda n, e, no, h: f"{e} {no} {h} 10 20 far.jpg {n}\n{e} {no} {h} 1 2 near.jpg {n}\n",
+            None,
+        ),
+    ],
+    ids=["PNEZD", "PENZD", "GSI", "gcp_list"],
+)
+def test_lists_of_instruments_and_programs_fill_georeference(form, order, tmp_path):
+    lines = [form(n, 1000 + x, 2000 - r, 50 + y) for n, x, y, r in WALL]
+    head = "EPSG:25832\n" if "1.jpg" in lines[0] else ""
+    (tmp_path / "field.txt").write_text(head + "".join(lines), encoding="utf-8")
+    path = fill(tmp_path / "s.xlsx", rows(WALL))
+    solved = bifocal.solve(path, control=tmp_path / "field.txt", control_order=order)
+    near = [[1000 + x, 2000 - r, 50 + y] for _, x, y, r in WALL]
+    np.testing.assert_allclose(solved.world, near, atol=1e-6)
+    assert solved.georeference.used.sum() == len(WALL)
+
+
+def test_x_y_z_that_no_wall_reaches_are_taken_for_the_world(tmp_path):
+    path = fill(tmp_path / "s.xlsx", rows(WALL))
+    lines = [(n, 1000 + x, 2000 - r, 50 + y) for n, x, y, r in WALL]
+    field = listed(tmp_path / "world.csv", ("Name", "X", "Y", "Z"), lines)
+    solved = bifocal.solve(path, control=field)
+    assert solved.georeference.used.sum() == len(WALL)
+    assert not len(solved.check.ids)
+
+
+def test_a_point_of_two_coordinates_is_named(tmp_path):
+    lines = [("P1", 1, 2, 3), ("P1", 1, 2, 4)]
+    field = listed(tmp_path / "two.csv", ("id", "E", "N", "H"), lines)
+    with pytest.raises(WorkbookError, match=r'"P1" has other coordinates in'):
+        bifocal.solve(fill(tmp_path / "s.xlsx"), control=field)
+
+
 def test_a_list_of_other_points_is_refused(tmp_path):
     path = fill(tmp_path / "s.xlsx")
     field = listed(tmp_path / "far.csv", ("id", "E", "N", "H"), [("Z", 1, 2, 3)])
