@@ -212,7 +212,7 @@ def rectify_photo(
     else:
         wish = DeliverTask(
             title=given["title"] or path.stem, camera=in_language(words, given["language"]),
-            control=_drawn(control),
+            control=_drawn(control), hashes=True,
             **{key: given[key] for key in ("scale", "dpi", "paper", "mark", "language")},
         )  # fmt: skip
         done = deliver(pair, folder, task, wish, out=out, overwrite=overwrite, progress=progress)
