@@ -130,8 +130,9 @@ def command(
         if folder is not None and scale is not None:
             wish = DeliverTask(title=title or default_title(source, pair), **drawing)
             done = deliver(
-                source, folder, task, wish, out=out, overwrite=overwrite, progress=progress
-            )
+                source, folder, task, wish, out=out, world_file=tfw, overwrite=overwrite,
+                progress=progress,
+            )  # fmt: skip
             result = done.ortho
             files = {"folder": str(folder), "files": list(done.files), "sheet": done.sheet}
         else:
