@@ -40,8 +40,8 @@ Faces, FlagLimits, FlatSurface, Foot, Grid, Intersection, KnownPoints, Layers, M
 MediaPath, NamedPoints, Occluder, OrientationCheck, Pinhole, PlanePicks, PointObservations,
 Progress, ProjectedPoints, ProjectOptions, ProjectPhotos, RadialDivision, RankedPair, Rectification,
 Registration, ReliefTable, SetAlignment, SetIntersection, Similarity, suggest_faces, Surface,
-SurveyInput, SurveyMedia, SurveySetup, ToleranceRule, TransformationPrecision, Window, WorldFrame,
-WorldPoints.
+SurveyInput, SurveyMedia, SurveySetup, TapedCheck, TapedDistance, ToleranceRule,
+TransformationPrecision, Window, WorldFrame, WorldPoints.
 
 Errors are one family with one message each that says what is wrong, where, and how to mend it:
 PhotogrammetryError > InputError (a ValueError) > CellError, WorkbookError, MissingExtraError;

@@ -72,6 +72,8 @@ from .survey.setup import Measuring, SurveySetup, Taking
 from .survey.solved_survey import SolvedSurvey, WorldPoints
 from .survey.survey_input import SurveyInput
 from .survey.survey_media import SurveyMedia
+from .survey.taped import TapedCheck as TapedCheck
+from .survey.taped import TapedDistance as TapedDistance
 from .survey.tolerances import ToleranceRule
 from .survey.transformation_precision import TransformationPrecision
 from .workbook.reading.reader import ReadOptions

@@ -23,7 +23,7 @@ def command(survey: tuple[Path, ...], out: Path | None, as_json: bool, **options
     SURVEY is a survey workbook, or any table (.xlsx, .xlsm, .ods, .csv) with the headings id and
     x1 y1 x2 y2, or s1 s2 theta, or col1 row1 col2 row2 (raw pixels, with --pair; of a set of photos
     col3 row3 and more, blank where not seen).
-    - is a table on stdin.
+    - is a table on stdin. Raw pixels may also stand in a row a photo: id, photo, col, row.
     Or give two lists of picks, of photo 1 and of photo 2 (.csv, .xlsx, .dxf), joined by the names
     of the points, with --pair: a pair file, or a survey workbook for its set-up.
     """

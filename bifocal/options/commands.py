@@ -33,6 +33,7 @@ class SolveCommand:
     bifocal solve picks.csv --pair wall.photos.json --json
     bifocal solve far.dxf near.dxf --pair setup.xlsx --out result.xlsx
     bifocal solve distances.csv --d1 17.5 --d2 9.5 --c1 35 --c2 19 --out result.csv
+    bifocal solve survey.xlsx --control station.csv --out survey.xlsx --overwrite
     bifocal solve old.xlsx --columns "id=A,s1=distance far,s2=D" --d1 17.5 --d2 9.5
     """
 
@@ -42,6 +43,11 @@ class SolveCommand:
     pair: Annotated[Path | None, Typed(unit="PAIR.pair.json")] = None
     """File of the pair, or of a set of photos, for points in raw pixels, or a survey workbook for
     its set-up.  [default: the workbook's own set-up]"""
+    control: Annotated[Path | None, Typed(TABLE, "LIST")] = None
+    """Points from the field, a table or list of an instrument (GSI, ...): id with E, N, H fills
+    Georeference, with X, Y, Z or r [m] Check.  [default: what stands there]"""
+    control_order: Annotated[str | None, Typed(unit="MAP")] = None
+    """Columns of a list without headings: PNEZD, PENZD, "id,E,N,H".  [default: found by heading]"""
     as_json: JsonOption = False
     columns: Annotated[str | None, Typed(unit="MAP")] = None
     """Which column is which: "id=A,s1=My heading" or "id,x1,y1,x2,y2" for tables without

@@ -6,6 +6,6 @@ other. It exchanges or converts what was typed in other units (`units`), correct
 by points of the plane (`orientation_check`), and calls `point_survey`, where Eqs. (1) to (7) run;
 its columns are prepared by `radii`, `refracted_radii` and `image_shift`. More than two photos are
 `other_photos` and `set_survey`. Then the world: `georeferencing`, by `weighted_similarity`, its
-worth by `transformation_precision`. Last the judgement: `check_points`, `tolerances`, `basis`,
-`remarks`; `results` are its words.
+worth by `transformation_precision`. Last the judgement: `check_points`, `taped`, `tolerances`,
+`basis`, `remarks`; `results` are its words.
 """

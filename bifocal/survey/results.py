@@ -110,6 +110,7 @@ def _head(solution: SolvedSurvey) -> dict[str, Any]:
             "missing": list(solution.check.missing),
             "flagged": dict(solution.check.flagged),
         },
+        "taped": _taped(solution),
         "georeference": _georeference(solution),
         "setup_check": _orientation_check(solution),
         "sigma_px": solution.sigma_px,
@@ -165,6 +166,11 @@ def _georeference(solution: SolvedSurvey) -> dict[str, Any] | None:
     }
 
 
+def _taped(solution: SolvedSurvey) -> dict[str, Any] | None:
+    taped = solution.taped
+    return None if taped is None else {**asdict(taped), "scale": taped.scale}
+
+
 def _orientation_check(solution: SolvedSurvey) -> dict[str, Any] | None:
     check = solution.orientation_check
     if check is None:
@@ -214,6 +220,12 @@ def summary(solution: SolvedSurvey) -> list[str]:
     doubt = f"; of only {compared} {_points(compared)}" if few < FEW else ""
     doubt += f", {few} of them on one axis" if few < min(compared, FEW) else ""
     lines += [f"Drawing scale, {line}{doubt}" for line in verdict_lines(solution)]
+    taped = solution.taped
+    if taped is not None and math.isfinite(taped.solved):
+        lines.append(
+            f"Taped {' - '.join(taped.tape.ends)}: {taped.tape.length:.4f} m, solved "
+            f"{taped.solved:.4f} m, scale {taped.scale:.4f}, sigma {taped.sigma:.4f} m"
+        )
     geo = solution.georeference
     if geo is not None:
         used = int(geo.used.sum())

@@ -19,6 +19,7 @@ from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.survey_input import SurveyInput
 from bifocal.survey.survey_media import SurveyMedia
+from bifocal.survey.taped import TapedCheck
 from bifocal.survey.tolerances import RULES, ToleranceRule
 from photocore.arrays import FloatArray
 
@@ -154,6 +155,12 @@ class SolvedSurvey:
     def placed(self) -> WorldPoints:
         """The points in the world."""
         return WorldPoints(self.table, self.georeference)
+
+    @property
+    def taped(self) -> TapedCheck | None:
+        """The distance taped on site beside the solved one; None without one."""
+        tape = self.survey.tape
+        return None if tape is None else tape.compared(self.table)
 
     @property
     def world(self) -> FloatArray:

@@ -106,6 +106,7 @@ def solve_survey(
         *check.remarks,
         *unused_remarks(unused, Check=survey.known, Georeference=survey.control),
         *opposite_signs_remark(table, known),
+        *(survey.tape.compared(table).remarks if survey.tape else ()),
         *world_remarks,
     )
     return SolvedSurvey(

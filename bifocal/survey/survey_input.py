@@ -9,6 +9,7 @@ import numpy as np
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import KnownPoints
 from bifocal.survey.setup import SurveySetup
+from bifocal.survey.taped import TapedDistance
 from photocore.tables import Table
 from photocore.workbook.reading.grid import SheetFile
 
@@ -27,6 +28,8 @@ class SurveyInput:
         Unit of x1..y2 that the headings say; empty where they say none.
     known, control : KnownPoints
         Check points and control points.
+    tape : TapedDistance or None
+        A distance between two points that was taped on site.
     model : str
         Georeference model asked for.
     language : str
@@ -51,6 +54,7 @@ class SurveyInput:
     unit: str = ""
     known: KnownPoints
     control: KnownPoints = field(default_factory=KnownPoints)
+    tape: TapedDistance | None = None
     model: str = "auto"
     language: str = "en"
     is_ours: bool = False

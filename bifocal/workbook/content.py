@@ -17,6 +17,7 @@ from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.solved_survey import SolvedSurvey, WorldPoints
 from bifocal.survey.survey_media import SurveyMedia
+from bifocal.survey.taped import TapedDistance
 from bifocal.survey.tolerances import RULES, ToleranceRule
 from bifocal.workbook.formulas.columns import (
     adjustment_names,
@@ -31,6 +32,8 @@ from photocore.workbook.making.live_columns import LiveColumn
 
 #: Rows of the tables of an empty template.
 POINT_ROWS, CHECK_ROWS, CONTROL_ROWS, SPARE_ROWS = 300, 25, 12, 10
+#: Rows of an empty form that are printed: one page of `Results`.
+FORM_ROWS = 28
 #: Beyond this many points formulas are written as A1 references, which are shorter.
 STRUCTURED_ROWS = 2000
 #: The charts show the first points only.
@@ -63,6 +66,8 @@ class SurveyContent:
         What was measured and what came out.
     known : KnownPoints
         Check points.
+    tape : TapedDistance or None
+        A distance taped on site.
     control, georeference : KnownPoints, Georeference or None
         Control points and the transformation.
     model : str
@@ -105,6 +110,7 @@ class SurveyContent:
     points: PointObservations | None = None
     table: ReliefTable | None = None
     known: KnownPoints = field(default_factory=KnownPoints)
+    tape: TapedDistance | None = None
     control: KnownPoints = field(default_factory=KnownPoints)
     georeference: Georeference | None = None
     model: str = "auto"
@@ -130,7 +136,7 @@ class SurveyContent:
         return cls(
             language=survey.language, setup=solved.setup, pair=solved.pair,
             sigma_px=solved.sigma_px, points=solved.points, table=solved.table,
-            known=survey.known, control=survey.control,
+            known=survey.known, control=survey.control, tape=survey.tape,
             georeference=placed, model=survey.model, rules=solved.rules,
             sensor=setup.sensor, limits=setup.measuring.limits, media=solved.media,
         )  # fmt: skip
@@ -223,6 +229,13 @@ class SurveyContent:
     def control_rows(self) -> int:
         """Rows of `Georeference`."""
         return max(CONTROL_ROWS, len(self.control) + 3)
+
+
+def printed_rows(content: SurveyContent) -> int:
+    """Return how many points are printed: all there are, or one page of an empty form."""
+    if content.points is None:
+        return min(FORM_ROWS, content.point_rows)
+    return max(len(content.points), 1)
 
 
 def inputs(values: FloatArray) -> list[CellValue]:

@@ -18,9 +18,10 @@ from bifocal.survey.observations import PointObservations
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.survey_input import SurveyInput, with_measured
 from bifocal.survey.units import refuse_far_stations
+from bifocal.workbook.reading.known_lists import read_long
 from bifocal.workbook.reading.pick_lists import joined, left_over, read_picks
 from bifocal.workbook.reading.reader import ReadOptions, read_survey
-from photocore.errors import GeometryError, InputError
+from photocore.errors import GeometryError, InputError, WorkbookError
 from photocore.jsonfile import read_object
 
 Lists = tuple[Path | str, Path | str]
@@ -29,8 +30,16 @@ Source = Path | str | PointObservations | SurveyInput | Matches | Mapping[str, A
 BOOKS = (".xlsx", ".xlsm", ".ods")
 
 
-def measured(source: Source, options: ReadOptions, unit: str | None) -> tuple[SurveyInput, Path]:
-    """Return what was measured, and the file it stands in."""
+def measured(
+    source: Source,
+    options: ReadOptions,
+    unit: str | None,
+    photos: PhotoSet | Pair | Path | str | None,
+) -> tuple[SurveyInput, Path]:
+    """Return what was measured, and the file it stands in.
+
+    A table with a row a photo is told by what these photos are called.
+    """
     if isinstance(source, tuple):
         first, second = (read_picks(path, options.decimal) for path in source)
         survey = SurveyInput.of_points(joined(first, second, unit))
@@ -51,7 +60,37 @@ def measured(source: Source, options: ReadOptions, unit: str | None) -> tuple[Su
         return source, Path(source.table.file)
     if not isinstance(source, Path | str):
         raise InputError(remark("survey.no_source", kind=type(source).__name__))
-    return read_survey(source, options), Path(source)
+    try:
+        return read_survey(source, options), Path(source)
+    except WorkbookError:
+        raise
+    except InputError:
+        points = read_long(source, _called(photos), options.decimal)
+        if points is None:
+            raise
+    survey = SurveyInput.of_points(points)
+    where = Path(source).name
+    return replace(survey, setup=replace(survey.setup, where=where)), Path(source)
+
+
+def _called(photos: PhotoSet | Pair | Path | str | None) -> list[tuple[str, ...]]:
+    """Return what each photo may be called in a list: its file, its name, its number."""
+    files: tuple[str, ...] = ("", "")
+    names: tuple[str, ...] = ("far", "near")
+    if isinstance(photos, Path | str) and Path(photos).suffix.lower() in BOOKS:
+        setup = read_survey(photos).setup
+        files = (setup.photo1, setup.photo2)
+    elif isinstance(photos, Path | str):
+        photos = Pair.read(photos)
+    if isinstance(photos, Pair):
+        files = (photos.image1.file, photos.image2.file)
+    if isinstance(photos, PhotoSet):
+        files = tuple(photo.file for photo in photos.photos)
+        names = tuple(photos.names)
+    return [
+        (name, file, str(number), f"photo {number}")
+        for number, (name, file) in enumerate(zip(names, files, strict=True), start=1)
+    ]
 
 
 def set_or_pair(

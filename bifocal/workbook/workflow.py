@@ -19,6 +19,7 @@ from bifocal.survey.survey_media import SurveyMedia
 from bifocal.survey.tolerances import RULES, ToleranceRule, as_rule
 from bifocal.survey.units import refuse_not_above_zero
 from bifocal.workbook.formulas.setup_cells import cells_of
+from bifocal.workbook.reading.known_lists import with_list
 from bifocal.workbook.reading.reader import ReadOptions
 from bifocal.workbook.sources import Source, given_pair, measured, set_or_pair, set_up
 from photocore.errors import InputError
@@ -30,6 +31,8 @@ def solve(
     pair: PhotoSet | Pair | Path | str | None = None,
     taking: Taking | None = None,
     measuring: Measuring | None = None,
+    control: Path | str | None = None,
+    control_order: str | None = None,
     adjust_setup: bool = False,
     model: str | None = None,
     scale_tolerance: float = SCALE_TOLERANCE,
@@ -43,9 +46,10 @@ def solve(
     source : path, mapping, Matches, PointObservations, SurveyInput or tuple of two paths
         A survey workbook or table (``.xlsx .xlsm .ods .csv``), or columns by key: ``id`` and
         ``x1 y1 x2 y2`` [mm or px], or ``s1 s2`` [mm] and ``theta`` [deg], or ``col1 row1 col2
-        row2`` [px], of a set of photos more; each of shape (n,), NaN where blank. Two paths: the
-        picks of photo 1 and of photo 2 (`bifocal.workbook.reading.pick_lists.read_picks`), joined
-        by name. What `bifocal.match` gives goes with its ``pair``.
+        row2`` [px], of a set of photos more; each of shape (n,), NaN where blank. A table may also
+        have ``id photo col row``, a row a photo. Two paths: the picks of photo 1 and of photo 2
+        (`bifocal.workbook.reading.pick_lists.read_picks`), joined by name. What `bifocal.match`
+        gives goes with its ``pair``.
     pair : Pair, PhotoSet or path, optional
         Pair, set of photos or the file of either, for raw pixels, or a survey workbook whose
         set-up, check and control points are taken; default the workbook's own set-up.
@@ -53,6 +57,11 @@ def solve(
         Distances [m], principal distances [mm] and the like, in place of those of `Setup`.
     measuring : Measuring, optional
         Unit and precision of what was measured, in place of those of `Setup`.
+    control : path, optional
+        Table of points from the field, beside those of the workbook: id with E, N, H for control
+        points, with X, Y, Z or r for check points. [m]
+    control_order : str, optional
+        Columns of a list without headings: ``"PNEZD"``, ``"id,E,N,H"``.
     adjust_setup : bool
         Correct the orientation by points of the reference plane (code PLANE, r = 0).
     model : {"auto", "levelled", "3D", "2D"}, optional
@@ -97,11 +106,14 @@ def solve(
     given = given_of(taking) | given_of(measuring)
     refuse_not_above_zero(**given, scale_tolerance=scale_tolerance)
     judged = tuple(as_rule(rule) for rule in rules) or RULES
-    asked = given | {n: v for n, v in (("pair", pair), ("model", model)) if v is not None}
+    more = {"pair": pair, "model": model, "control": control}
+    asked = given | {name: value for name, value in more.items() if value is not None}
     photos, pair = set_or_pair(pair)
     count = 2 if photos is None else len(photos)
     options = replace(reading or ReadOptions(), given=tuple(cells_of(asked)), photos=count)
-    survey, path = measured(source, options, given.get("unit"))
+    survey, path = measured(source, options, given.get("unit"), photos or pair)
+    if control is not None:
+        survey = with_list(survey, control, options.decimal, control_order)
     if photos is not None:
         return _solved_of_set(survey, photos, path, asked, rules=judged, adjust=adjust_setup)
     survey, pair = set_up(survey, pair, given, options)
@@ -145,13 +157,14 @@ def _solved_of_set(
     InputError
         If an option goes with pairs alone, or there are no points.
     """
-    names = {"pair", "model", *(f.name for f in fields(Measuring))}
+    names = {"pair", "model", "control", *(f.name for f in fields(Measuring))}
     idle = ["adjust_setup"] if adjust else [name for name in asked if name not in names]
     if idle:
         raise InputError(remark("survey.not_of_a_set", option=idle[0], count=len(photos)))
     if not len(survey.points):
         raise InputError(f"{survey.where}: there is no point. Fill in the measured points.")
-    given = {name: value for name, value in asked.items() if name not in ("pair", "model")}
+    others = ("pair", "model", "control")
+    given = {name: value for name, value in asked.items() if name not in others}
     said = (*photos.remarks, *survey.remarks)
     survey = replace(
         survey,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
@@ -187,10 +188,14 @@ def _typed_unit(
         has_bare |= len(symbols) < len(parts)
         if len(set(symbols.values())) == 1 and not has_bare:
             return next(iter(symbols.values()))
-        complain(min(symbols), _unlike_units(parts, symbols, has_bare=has_bare))
-        for index in symbols:
-            del parts[index]
-        return ""
+        common, count = Counter(symbols.values()).most_common(1)[0]
+        if has_bare or 2 * count <= len(symbols):
+            complain(min(symbols), _unlike_units(parts, symbols, has_bare=has_bare))
+            for index in symbols:
+                del parts[index]
+            return ""
+        _typed_unit(parts, common, complain, has_bare=False)
+        return common
     for index, symbol in symbols.items():
         part = parts[index]
         if symbol and symbol == wanted:

@@ -440,10 +440,18 @@ def _are_names(heading: Value, number: int, rows: Sequence[Mapping[int, Value]])
     return 0 < len(rows) == plain == len(set(texts))
 
 
-def is_summary(cells: Mapping[int, Value], first: int) -> bool:
-    """Whether a row says left of a column, or in it, that it is the mean, sum or like of others."""
+def is_summary(cells: Mapping[int, Value], first: int, *, apart: bool = False) -> bool:
+    """Whether a row says left of a column, or in it, that it is the mean, sum or like of others.
+
+    Of a row that stands apart the first word says so: "mean of x1".
+    """
     texts = (value for number, value in cells.items() if number <= first)
-    return any(isinstance(text, str) and _SUMMARIES.fullmatch(bare(text)) for text in texts)
+    starts = (
+        text.split()[0] if apart else text
+        for text in texts
+        if str(text).strip() and isinstance(text, str)
+    )
+    return any(_SUMMARIES.fullmatch(bare(text)) for text in starts)
 
 
 def _forms(variants: Sequence[str]) -> list[str]:

@@ -98,6 +98,7 @@ def read_table(
     column_map: Mapping[str, str] | None = None,
     max_rows: int = 100_000,
     visible_only: bool = False,
+    whole: bool = False,
     errors: list[CellError] | None = None,
 ) -> Table:
     """Read a table, found by name, then by its headings, wherever it stands.
@@ -121,6 +122,9 @@ def read_table(
         Most rows of a workbook's table; text files have no limit.
     visible_only : bool
         Leave hidden and filtered rows out instead of using them with a remark.
+    whole : bool
+        Take a row apart from the table, with less than half the numbers of the one before, for a
+        note.
     errors : list, optional
         Gathers the bad cells instead of raising, to report those of several tables together.
 
@@ -152,9 +156,9 @@ def read_table(
     refuse_unknown_units(book.label, place.grid.title, place.match, columns)
     take_unit_row(place.grid, place.match)
     if isinstance(book, CsvFile):
-        table = _read_text(book, place, columns, decimal, complaints)
+        table = _read_text(book, place, columns, decimal, complaints, whole=whole)
     else:
-        rows = data_rows(place.grid, place.match, columns, visible_only=visible_only)
+        rows = data_rows(place.grid, place.match, columns, visible_only=visible_only, whole=whole)
         if place.grid.truncated or len(rows.rows) > max_rows:
             raise InputError(
                 remark("table.too_long", of=f"{book.label} › {place.grid.title}", count=max_rows)
@@ -340,6 +344,8 @@ def _read_text(
     columns: Sequence[Column],
     decimal: Decimal | None,
     errors: list[CellError],
+    *,
+    whole: bool,
 ) -> Table:
     """Read a text table, on the quick road where all of its rows are plain."""
     match, proven = place.match, {}
@@ -347,7 +353,7 @@ def _read_text(
     plain = plain_rows(file, place.delimiter, width, match, columns, decimal)
     if plain is None:
         place = replace(place, grid=file.grid(place.delimiter, most=None))
-        rows = data_rows(place.grid, match, columns, visible_only=False)
+        rows = data_rows(place.grid, match, columns, visible_only=False, whole=whole)
         table = _new_table(file, place, rows)
         cells = _cells(place, rows)
         if match.header:

@@ -44,11 +44,19 @@ class RowSorter:
         What they are.
     headings : mapping
         The cells of the heading row, by column.
+    whole : bool
+        Whether a row that stands apart with less than half the numbers of the one before is a note.
     """
 
     def __init__(
-        self, match: Match, columns: Sequence[Column], headings: Mapping[int, Value]
+        self,
+        match: Match,
+        columns: Sequence[Column],
+        headings: Mapping[int, Value],
+        *,
+        whole: bool = False,
     ) -> None:
+        self.whole, self.count = whole, 0
         kinds = {column.key: column.kind for column in columns}
         self.columns = match.columns
         self.text = {n for key, n in match.columns.items() if kinds[key] == "text"}
@@ -77,10 +85,12 @@ class RowSorter:
         if has_text and all(bare(str(cells.get(n, ""))) == h for n, h in self.headings.items()):
             self.previous = row
             return False
-        if row != self.previous + 1 and self.numeric and not self.numeric & cells.keys():
+        count = len(self.numeric & cells.keys())
+        lacks = not count or (self.whole and 2 * count < self.count)
+        if row != self.previous + 1 and self.numeric and lacks:
             self.left_out.append(row)
             return False
-        self.previous = row
+        self.previous, self.count = row, count
         return True
 
     def remarks(self) -> list[str]:
@@ -99,7 +109,12 @@ def label(value: Value) -> str:
 
 
 def data_rows(
-    grid: CellGrid, match: Match, columns: Sequence[Column], *, visible_only: bool
+    grid: CellGrid,
+    match: Match,
+    columns: Sequence[Column],
+    *,
+    visible_only: bool,
+    whole: bool = False,
 ) -> DataRows:
     """Return the rows of a table that hold data.
 
@@ -113,9 +128,11 @@ def data_rows(
         What was asked for.
     visible_only : bool
         Leave hidden rows out.
+    whole : bool
+        As of `RowSorter`.
     """
     data = DataRows()
-    sorter = RowSorter(match, columns, grid.rows.get(match.header, {}))
+    sorter = RowSorter(match, columns, grid.rows.get(match.header, {}), whole=whole)
     sorter.block = block_above(grid, match)
     hidden = 0
     for row in sorted(grid.rows):
@@ -132,7 +149,9 @@ def data_rows(
     after = 0
     for index in reversed(range(len(data.rows))):
         row = data.rows[index]
-        if after == row + 1 or len(data.rows) == 1 or not is_summary(grid.rows[row], named):
+        apart = index > 0 and data.rows[index - 1] != row - 1
+        is_point = after == row + 1 or len(data.rows) == 1
+        if is_point or not is_summary(grid.rows[row], named, apart=apart):
             after = row
             continue
         del data.rows[index], data.blocks[index]

@@ -48,7 +48,7 @@ from photocore.workbook.reading.grid import column_letters, quoted_title, split_
 #: Name of the headings of the results in a workbook of the user's own.
 MARK = "bifocal_results"
 #: What a survey is for: these columns come first, the steps to them are folded away behind.
-_RESULTS = ("r", "X", "Y", "sigma_r", "flag", "E", "N", "H")
+_RESULTS = ("r", "flag", "X", "Y", "sigma_r", "E", "N", "H")
 #: Under which headings raw pixels stand, where an ideal pair takes them for coordinates.
 _RAW = {"x1": "col1", "y1": "row1", "x2": "col2", "y2": "row2"}
 

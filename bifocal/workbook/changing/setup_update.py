@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
+
+from openpyxl import load_workbook
 
 from bifocal.remarks import remark
 from bifocal.workbook.content import SurveyContent, setup_cells
@@ -12,11 +15,13 @@ from bifocal.workbook.formulas.setup_cells import TITLE_BLOCK, cells_of, formula
 from bifocal.workbook.making.charts import HEAD, KEYS, LEFT
 from bifocal.workbook.words import word
 from photocore.errors import InputError
+from photocore.workbook.calculating.calculation import Calculation
+from photocore.workbook.calculating.values import Unknown
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.changing.editor import WorkbookEditor
 from photocore.workbook.changing.named_cells import place_of
 from photocore.workbook.making.live_book import BookBuilder
-from photocore.workbook.reading.grid import cell_name, quoted_title, with_names
+from photocore.workbook.reading.grid import NotCalculated, cell_name, quoted_title, with_names
 
 #: Options that have no cell of their own; those of the distances depend on each other.
 _OTHERS = {"d1", "d2", "pair", "rules", "adjust_setup"}
@@ -57,6 +62,25 @@ def chart_sheet(editor: WorkbookEditor) -> str | None:
 def add_sheets(editor: WorkbookEditor, built: BookBuilder, titles: Mapping[str, str]) -> None:
     """Add sheets of a survey workbook behind all others; by their titles, what to call them."""
     editor.add_sheets(built.parts(), {t: editor.free_title(w) for t, w in titles.items()})
+
+
+def store_functions(editor: WorkbookEditor) -> None:
+    """Store what the sheet `Functions` shows where another program saved it without results.
+
+    A function that only its name knows shows what the cells above it calculate.
+    """
+    state = place_of(editor, "functions_state")
+    cells = {} if state is None else editor.grid(state[0]).rows
+    blank = [(row, column) for row, values in sorted(cells.items())
+             for column, value in values.items() if isinstance(value, NotCalculated)]  # fmt: skip
+    if state is None or not blank:
+        return
+    book, value = Calculation(load_workbook(editor.path)), None
+    for row, column in blank:
+        if (row, column) != state[1:]:
+            with suppress(Unknown):
+                value = book.value(state[0], row, column)
+            editor.set_result(state[0], row, column, value)
 
 
 def write_options(editor: WorkbookEditor, content: SurveyContent, given: Mapping[str, Any]) -> None:

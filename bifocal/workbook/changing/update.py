@@ -14,6 +14,7 @@ from bifocal.workbook.changing.kinds import check_kind
 from bifocal.workbook.changing.setup_update import (
     add_missing_sheets,
     chart_sheet,
+    store_functions,
     write_corrections,
     write_options,
 )
@@ -22,7 +23,8 @@ from bifocal.workbook.content import CHART_ROWS, STRUCTURED_ROWS, SurveyContent
 from bifocal.workbook.formulas.columns import CHANGED
 from bifocal.workbook.formulas.setup_cells import TYPED_FORMULAS
 from bifocal.workbook.formulas.space_block import BLOCK
-from bifocal.workbook.making.book import build, unprinted_formula
+from bifocal.workbook.formulas.world_state import SITE, SPEAKING, STATE
+from bifocal.workbook.making.book import UNPRINTED, build, unprinted_formula
 from bifocal.workbook.making.charts import HEAD, LEFT
 from bifocal.workbook.words import word
 from photocore.errors import InputError
@@ -37,6 +39,7 @@ from photocore.workbook.making.newbook import RowBlock
 from photocore.workbook.making.print_area import move_print_area
 from photocore.workbook.making.repeated_rows import short_formula
 from photocore.workbook.reading.grid import (
+    TableArea,
     Value,
     column_letters,
     plain_title,
@@ -119,7 +122,7 @@ def update_book(
     names = () if survey.book is None else survey.book.names
     editor = (PlainEditor if MARK in names else WorkbookEditor)(source, survey.book)
     content = replace(
-        content, functions="RELIEF_SIGMA" in editor.book.names, changes=_changes(editor)
+        content, functions=place_of(editor, "functions_state") is not None, changes=_changes(editor)
     )
     built = build(content)
     points = editor.table("tblPoints")
@@ -130,6 +133,7 @@ def update_book(
         translate(editor, built, content, survey.language)
     added = add_missing_sheets(editor, built)
     store_named_cells(editor, built, content)
+    store_functions(editor)
     write_options(editor, content, given)
     write_corrections(editor, content)
     rows = [row - points.first for row in survey.table.rows]
@@ -145,6 +149,8 @@ def update_book(
         own = editor.table(name)
         if own is not None:
             places = [row - own.first for row in sheet_rows]
+            if "control" in given:
+                _type_list(editor, built, own, sheet_rows)
             _table(editor, built, name, places)
             if name == "tblCheck" and "tblCompare" in built.tables:
                 _table(editor, built, "tblCompare", places, own.length)
@@ -154,6 +160,17 @@ def update_book(
     _charts(editor, built, rows)
     _log(editor, content)
     return replace(saved(editor, built, target, overwrite=overwrite), added=tuple(added))
+
+
+def _type_list(
+    editor: WorkbookEditor, built: BookBuilder, area: TableArea, rows: Sequence[int]
+) -> None:
+    """Type names and coordinates of a list into a table of check or control points."""
+    content, headings = built.tables[area.name], area.headings()
+    for column in content.columns:
+        if column.kind == "input" and column.key in headings and column.key != "use":
+            for row, value in zip(rows, content.cells.get(column.key, ()), strict=False):
+                type_value(editor, (area.sheet, row, headings[column.key]), value)
 
 
 def saved(
@@ -198,8 +215,8 @@ def _results_of(
     if isinstance(editor, PlainEditor):
         return ours, {}  # its formulas are the cells' own, none like another
     for name, defined in built.book.defined_names.items():
-        if name.startswith("unprinted_"):
-            continue  # follows how many points there were
+        if name.startswith("unprinted_") or name in SPEAKING:
+            continue  # follows how many points there were, or the version that wrote it
         sheet, _, cell = defined.attr_text.replace("$", "").partition("!")
         place = place_of(editor, name)
         if place and ":" not in cell and built.book[plain_title(sheet)][cell].data_type == "f":
@@ -218,15 +235,17 @@ def _changes(editor: WorkbookEditor) -> dict[str, float] | None:
 
 def _print_points(editor: WorkbookEditor, count: int, language: str) -> None:
     """Print as many rows of `Points` and `Results` as hold points, unless the user chose others."""
-    for name in ("Points", "Results"):
-        place, area = place_of(editor, f"unprinted_{name}"), editor.table(f"tbl{name}")
+    for name in ("Points", "Results", "WhatIf"):
+        area = editor.table(f"tbl{name}")
+        place = place_of(editor, f"unprinted_{name}") or place_of(editor, UNPRINTED)
         if place is None or area is None:
             continue
         sheet, row, column = place
         stands = editor.models(sheet, row).get(column)
         found = re.search(r">(\d+),", stands.formula if stands else "")
         head = area.area[0]
-        if found and move_print_area(editor, area.sheet, head + int(found[1]), head + count):
+        last = min(count, CHART_ROWS) if name == "WhatIf" else count
+        if found and move_print_area(editor, area.sheet, head + int(found[1]), head + last):
             formula = unprinted_formula(language, count)
             editor.put(*place, "", formula=formula, style=stands.style if stands else "")
 
@@ -244,6 +263,8 @@ def store_named_cells(editor: WorkbookEditor, built: BookBuilder, content: Surve
         if place is None:
             continue
         value = built.results[sheet].get(cell)
+        if name == "title_world" and place_of(editor, SITE) is None:  # of an older version
+            value = built.value_of(STATE)
         if name in typed and content.georeference is not None:
             shown = built.book[sheet][cell].value
             type_value(editor, place, shown if value is None else value)

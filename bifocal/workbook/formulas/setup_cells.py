@@ -193,6 +193,15 @@ def is_above_zero(name: str) -> bool:
     return name in cells_of(stated)
 
 
+def sensible_limits(name: str) -> tuple[float, float] | None:
+    """Return the least and the largest number that can be meant, where a sheet knows them."""
+    for limits, names in FORMULAS.content["setup"]["limits"].items():
+        if name in names.split():
+            low, high = map(float, limits.split())
+            return low, high
+    return None
+
+
 def may_be_zero(name: str) -> bool:
     """Tell whether a length of media may be zero: a window, or a camera at it."""
     return name in HEIGHTS or name.startswith("thick_")

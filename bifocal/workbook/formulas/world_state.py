@@ -1,40 +1,52 @@
-"""The sentence that says whether the world coordinates can be trusted: a live formula."""
+"""What the sheets say of themselves while somebody types: sentences that are live formulas."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Collection
 
-from bifocal.survey.remarks import SCALE_SHARE
+from bifocal.survey.remarks import SCALE_SHARE, WIDEST_ANGLE
+from bifocal.survey.taped import TAPED_SIGMAS
+from bifocal.workbook.formulas.columns import FORMULAS
 
-#: Name of its cell, and the keys of its sentences.
-STATE = "world_state"
-STATES = ("world_few", "world_bad", "world_scale", "world_large", "world_good", "world_unchecked")
-#: What stands in the braces of the sentences.
-_LIVE = {
-    "n": "g_n",
-    "k": "ROUND(g_k,4)",
-    "s": 'IF(ISNUMBER(g_sigma0),ROUND(g_sigma0,4),"?")',
-    "v": "ROUND(MAX(tblGeo[v]),4)",
-    "name": "INDEX(tblGeo[id],MATCH(MAX(tblGeo[v]),tblGeo[v],0))",
-    "worst": 'INDEX(tblGeo[id],MATCH("CHECK",tblGeo[fit],0))',
-    "off": 'ROUND(INDEX(tblGeo[v],MATCH("CHECK",tblGeo[fit],0)),4)',
-}
-
-
-def world_state_formula(words: Mapping[str, str]) -> str:
-    """Return the formula; ``words`` are the sentences by their keys."""
-    few, bad, scale, large, good, unchecked = (_live(words[key]) for key in STATES)
-    off = f"ABS(g_k-1)>{SCALE_SHARE:g}"
-    named = f'IF(COUNTIF(tblGeo[fit],"CHECK")>0,{bad},IF({off},"",{large}))'
-    wrong = f'TRIM(IF({off},{scale},"")&" "&{named})'
-    right = f'{good}&IF(N(g_spare)<1," "&{unchecked},"")'
-    placed = f"IF(ISNUMBER(g_k),IF(g_alarm=1,{wrong},{right}),{few})"
-    return f'IF(COUNT(tblGeo[E])=0,"",{placed})'
+#: Names of the cells that judge the world coordinates, and what was measured on site.
+STATE, SITE = "world_state", "site_state"
+#: Names of all cells that hold a sentence: in workbooks of older versions they say less.
+SPEAKING = (STATE, SITE, "title_world", "check_state", "points_state")
+#: Keys of the sentences.
+_SENTENCES = (
+    *("world_few", "world_bad", "world_scale", "world_large", "world_good", "world_unchecked"),
+    *("points_wide", "points_twice", "names_unknown"),
+    *("tape_good", "tape_bad", "tape_unknown", "site_unchecked"),
+)
 
 
-def _live(sentence: str) -> str:
-    """Return a sentence as a formula, what stands in braces as live values."""
-    parts = re.split(r"\{(\w+)\}", sentence)
-    texts = (f'"{part}"' if i % 2 == 0 else _LIVE[part] for i, part in enumerate(parts))
-    return "&".join(text for text in texts if text != '""')
+def sentence(
+    key: str,
+    word: Callable[[str], str],
+    facts: Collection[str] = (),
+    *,
+    sheet: str = "Geo",
+    note: str = "check_how",
+) -> str:
+    """Return the formula of a sentence of `formulas.toml`, ``[states]``.
+
+    Parameters
+    ----------
+    key : str
+        Which one.
+    word : callable
+        Returns a sentence in the language of the workbook by its key.
+    facts : collection of str
+        What holds.
+    sheet : str
+        The table whose names are looked up in `Points`, without "tbl".
+    note : str
+        The line of help where nothing is wrong.
+    """
+    parts = {name: word(name) for name in _SENTENCES}
+    parts |= {"note": word(note)}
+    parts |= {"share": f"{SCALE_SHARE:g}", "most_sigmas": f"{TAPED_SIGMAS:g}", "sheet": sheet}
+    parts |= {"wide": f"{math.tan(math.radians(WIDEST_ANGLE)):.9g}"}
+    lines = FORMULAS.columns("states", facts, parts, rows="lines")
+    return next(line.formula for line in lines if line.key == key)

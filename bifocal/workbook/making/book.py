@@ -8,9 +8,9 @@ from pathlib import Path
 from openpyxl.styles import Alignment, Protection
 
 from bifocal.survey.other_photos import CHANCE
-from bifocal.workbook.content import STRUCTURED_ROWS, SurveyContent, point_cells
-from bifocal.workbook.formulas.columns import FORMULAS, results_columns
-from bifocal.workbook.formulas.world_state import STATE
+from bifocal.workbook.content import STRUCTURED_ROWS, SurveyContent, point_cells, printed_rows
+from bifocal.workbook.formulas.columns import FORMULAS, planning_facts, results_columns
+from bifocal.workbook.formulas.world_state import SITE, STATE, sentence
 from bifocal.workbook.making.agreement import refuse_contradictions
 from bifocal.workbook.making.charts import charts
 from bifocal.workbook.making.compare_sheet import compare
@@ -28,6 +28,7 @@ from photocore.workbook.making.look import (
     DOUBT,
     GOOD,
     HEAD_FONT,
+    NOTE_FONT,
     WARN_FONT,
     WRONG,
     colour_where,
@@ -38,8 +39,6 @@ from photocore.workbook.reading.grid import column_letters
 
 #: Row of the keys in `Points` and `Results`.
 HEAD = 4
-#: Rows of an empty form that are printed: one page of `Results`.
-FORM_ROWS = 28
 #: Fill and text of each flag; the word itself always stands in the cell too.
 FLAG_COLOURS = {
     "OK": GOOD,
@@ -50,6 +49,8 @@ FLAG_COLOURS = {
     "OFF-RADIAL": WRONG,
     "CHECK": DOUBT,
 }
+#: Name of the warning that points stand below the rows that are printed, or below the table.
+UNPRINTED = "unprinted_Points"
 #: Scale of the sheet `Points` on paper: labels stay above 8 pt. [%]
 _SCALE = 92
 #: Name of the column `use` of `Points`, for rules of other sheets, which may not name a table.
@@ -113,6 +114,11 @@ def _points(builder: BookBuilder, content: SurveyContent) -> None:
     breaks = [keys.index("note") + 2, keys.index("x_c") + 1]
     if content.others:
         breaks.append(keys.index("pair") + 1)
+    facts = planning_facts(media=content.media_cells, is_pair=content.is_pair)
+    facts |= {"long"} if content.point_rows > STRUCTURED_ROWS else set()
+    state = sentence("points_state", builder.word, facts, note=note)
+    sheet.formula("A2", state, name="points_state", font=NOTE_FONT)
+    colour_where(sheet.worksheet, "A2:H2", f'$A$2<>"{builder.word(note)}"', WRONG)
     sheet.worksheet.sheet_properties.outlinePr.summaryRight = True
     # Each page begins with the names: the title would be cut off there, so it heads the page.
     sheet.worksheet.oddHeader.left.text = builder.word("Points")
@@ -185,13 +191,6 @@ def _unlock_below(sheet: SheetBuilder, columns: Sequence[LiveColumn]) -> None:
             whole.protection, whole.number_format = Protection(locked=False), column.number_format
 
 
-def printed_rows(content: SurveyContent) -> int:
-    """Return how many points are printed: all there are, or one page of an empty form."""
-    if content.points is None:
-        return min(FORM_ROWS, content.point_rows)
-    return max(len(content.points), 1)
-
-
 def print_area(sheet: str, columns: int, rows: int) -> str:
     """Return the cells of `Points` or `Results` that are printed."""
     return f"A{1 if sheet == 'Results' else HEAD - 1}:{column_letters(columns)}{HEAD + rows}"
@@ -207,10 +206,10 @@ def unprinted_formula(language: str, rows: int) -> str:
 
 def _printed(sheet: SheetBuilder, area: str, content: SurveyContent) -> None:
     """Print only the rows that hold points, and say so where points stand below them."""
-    name = sheet.worksheet.title
     sheet.worksheet.print_area = area
-    formula = unprinted_formula(sheet.book.language, printed_rows(content))
-    sheet.formula("E1", formula, name=f"unprinted_{name}", font=WARN_FONT)
+    if sheet.worksheet.title == "Points":  # the sentence on Results repeats it
+        formula = unprinted_formula(sheet.book.language, printed_rows(content))
+        sheet.formula("E1", formula, name=UNPRINTED, font=WARN_FONT)
 
 
 _BLOCK_PLACE = Alignment(wrap_text=True, vertical="top")
@@ -235,12 +234,16 @@ def _title_block(sheet: SheetBuilder) -> None:
         sheet.worksheet.merge_cells(area)
         sheet.worksheet[left].alignment = _BLOCK_PLACE
     sheet.worksheet.row_dimensions[2].height = 42
-    sheet.formula("H1", STATE, name="title_world", font=HEAD_FONT)
-    colour_where(sheet.worksheet, "H1", "g_alarm=1", WRONG)
-    for area in ("E1:G1", "H1:O1"):
-        sheet.worksheet.merge_cells(area)
-        sheet.worksheet[area[:2]].alignment = _BLOCK_PLACE
-    sheet.worksheet.row_dimensions[1].height = 40
+    judgement = f'TRIM({UNPRINTED}&" "&{STATE}&" "&{SITE})'
+    sheet.formula("E1", judgement, name="title_world", font=HEAD_FONT)
+    off = sentence("site_alarm", book.word)
+    alarm = f'OR({UNPRINTED}<>"",g_alarm=1,{off})'
+    colour_where(sheet.worksheet, "E1", alarm, WRONG, stop=True)
+    colour_where(sheet.worksheet, "E1", f'AND(COUNT(tape_typed)=0,{SITE}<>"")', DOUBT)
+    sheet.worksheet.merge_cells("E1:O1")
+    sheet.worksheet["A1"].alignment = Alignment(vertical="center")
+    sheet.worksheet["E1"].alignment = Alignment(wrap_text=True, vertical="center")
+    sheet.worksheet.row_dimensions[1].height = 28
 
 
 def _log(builder: BookBuilder, content: SurveyContent) -> None:

@@ -26,6 +26,8 @@ HEAD = 4
 #: Column of the first chart data: far enough right to stay out of the charts' way.
 LEFT = 16
 KEYS = ("X", "Y", "s_c", "sigma_r")
+#: Of the print: 57 rows, and the four charts' width, go on a page; labels stay above 8 pt. [%]
+_SCALE = 90
 #: Edges between which errors at check points are counted, in sigmas; the outer ones hold all.
 _BINS = (-99, -3, -2, -1, 0, 1, 2, 3, 99)
 
@@ -64,8 +66,10 @@ def charts(builder: BookBuilder, content: SurveyContent) -> None:
     _checked(sheet, content, last + 4)
     sheet.finish()
     sheet.worksheet.print_area = "A1:J115"
+    # A page fitted to its width goes by no break: the third chart would be cut by the first page.
+    sheet.worksheet.sheet_properties.pageSetUpPr.fitToPage = False
+    sheet.worksheet.page_setup.scale = _SCALE
     sheet.worksheet.row_breaks.append(Break(id=57))
-    sheet.worksheet.page_setup.fitToHeight = 2
 
 
 def _checked(sheet: SheetBuilder, content: SurveyContent, head: int) -> None:
@@ -178,4 +182,4 @@ def _errors(builder: BookBuilder, content: SurveyContent) -> None:
     chart.x_axis.tickLblPos, chart.y_axis.title = "low", titled("dZ [m]", 1000)
     chart.y_axis.number_format = "General"
     chart.height, chart.width = 7, 16
-    builder.book["Charts"].add_chart(chart, "A58")
+    builder.book["Charts"].add_chart(chart, "A59")

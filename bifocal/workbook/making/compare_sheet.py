@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from openpyxl.styles import Alignment
 
-from bifocal.workbook.content import SurveyContent
+from bifocal.workbook.content import CHECK_ROWS, SurveyContent
 from bifocal.workbook.formulas.columns import compare_columns, compared
 from bifocal.workbook.making.reference_sheets import statistics_of
 from bifocal.workbook.making.setup_sheet import pair_names
@@ -33,3 +33,5 @@ def compare(builder: BookBuilder, content: SurveyContent) -> None:
     sheet.table("tblCompare", columns, at=(HEAD, 1), rows=content.check_rows, cells={})
     sheet.worksheet.column_dimensions["A"].width = 26
     sheet.finish(landscape=True, freeze=f"B{HEAD + 1}", repeat=f"{HEAD - 1}:{HEAD}")
+    if content.check_rows <= CHECK_ROWS:  # else a page of headings alone follows
+        sheet.worksheet.page_setup.fitToHeight = 1

@@ -11,7 +11,7 @@ from bifocal.survey.weighted_similarity import TURNS
 from bifocal.workbook.content import SurveyContent, control_cells
 from bifocal.workbook.formulas.columns import FORMULAS, georeference_columns
 from bifocal.workbook.formulas.space_block import STEP_FORM, SpaceBlock
-from bifocal.workbook.formulas.world_state import STATE, STATES, world_state_formula
+from bifocal.workbook.formulas.world_state import STATE, sentence
 from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
 from photocore.workbook.making.live_columns import LiveColumn
 from photocore.workbook.making.look import HEAD_FONT, LABEL_FONT, NOTE_FONT, WRONG, colour_where
@@ -50,8 +50,7 @@ def georeference(builder: BookBuilder, content: SurveyContent) -> None:
     head = FORMULAS.columns("georeference", parts={"last": str(TURNS)})
     for cell, line in zip(_HEAD, head, strict=True):
         sheet.formula(cell, line.formula, form=line.number_format, name=line.key)
-    words = {key: builder.word(key) for key in STATES}
-    sheet.formula("A2", world_state_formula(words), name=STATE, font=HEAD_FONT)
+    sheet.formula("A2", sentence(STATE, builder.word), name=STATE, font=HEAD_FONT)
     colour_where(sheet.worksheet, "A2", "g_alarm=1", WRONG)
     space = SpaceBlock(sheet, blank=geo is None or geo.model != "3D")
     _write_steps(sheet, FORMULAS.columns("georeference", rows="steps", parts=_parts(space)))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from openpyxl.styles import Alignment
 
+from bifocal.model.photo import FARTHEST_WALL
+from bifocal.survey.taped import TAPE
 from bifocal.survey.tolerances import judge
 from bifocal.workbook.content import SurveyContent, check_cells
 from bifocal.workbook.formulas.columns import (
@@ -14,9 +16,19 @@ from bifocal.workbook.formulas.columns import (
     check_columns,
     planning_facts,
 )
+from bifocal.workbook.formulas.world_state import SITE, sentence
 from bifocal.workbook.words import word
+from photocore.workbook.changing.cells import name_cell
 from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
-from photocore.workbook.making.look import DOUBT, GOOD, HEAD_FONT, WRONG, colour_where, colour_words
+from photocore.workbook.making.look import (
+    DOUBT,
+    GOOD,
+    HEAD_FONT,
+    NOTE_FONT,
+    WRONG,
+    colour_where,
+    colour_words,
+)
 from photocore.workbook.reading.grid import column_letters
 
 #: Row of the keys of the check table; statistics stand above.
@@ -30,6 +42,9 @@ def check(builder: BookBuilder, content: SurveyContent) -> None:
     """Write errors at check points, their statistics and the verdict."""
     rows = content.check_rows
     sheet = builder.sheet("Check", "check_how")
+    state = sentence("check_state", builder.word, sheet="Check")
+    sheet.formula("A2", state, name="check_state", font=NOTE_FONT)
+    colour_where(sheet.worksheet, "A2:K2", f'$A$2<>"{builder.word("check_how")}"', WRONG)
     for letter, axis in zip("BCD", "XYZ", strict=True):
         sheet.text(f"{letter}4", f"d{axis}", HEAD_FONT)
         sheet.worksheet[f"{letter}4"].alignment = Alignment(horizontal="right")
@@ -39,6 +54,7 @@ def check(builder: BookBuilder, content: SurveyContent) -> None:
     sheet.formula("B9", 'IF(COUNT(B6:D6)=0,"",MAX(B6:D6))', form="0.0000", name="check_worst")
     sheet.word("A10", "flagged")
     sheet.formula("B10", "SUM(tblCheck[out])", form="0", name="check_flagged")
+    _taped(sheet, content)
     columns, cells = check_columns(), check_cells(content)
     sheet.table("tblCheck", columns, at=(CHECK_HEAD, 1), rows=rows, cells=cells)
     sheet.worksheet.column_dimensions["A"].width = 18
@@ -54,6 +70,32 @@ def check(builder: BookBuilder, content: SurveyContent) -> None:
     _verdict(sheet, content)
     repeat = f"{CHECK_HEAD - 1}:{CHECK_HEAD}"
     sheet.finish(landscape=True, freeze=f"B{CHECK_HEAD + 1}", repeat=repeat)
+
+
+def _taped(sheet: SheetBuilder, content: SurveyContent) -> None:
+    """Write cells for one distance taped on site, what it is calculated as, and what that says."""
+    facts = planning_facts(media=content.media_cells, is_pair=content.is_pair)
+    sheet.formula("A3", sentence(SITE, sheet.book.word, facts), name=SITE, font=HEAD_FONT)
+    off = sentence("site_alarm", sheet.book.word)
+    colour_where(sheet.worksheet, "A3:K3", off, WRONG)
+    sheet.word("F4", "tape", HEAD_FONT)
+    tape = content.tape
+    typed = (None, None, None) if tape is None else (*map(name_cell, tape.ends), tape.length)
+    limits = (0.001, FARTHEST_WALL)
+    for row, (key, value) in enumerate(zip(TAPE, typed, strict=True), start=5):
+        sheet.word(f"F{row}", key)
+        is_length = key == TAPE[-1]
+        sheet.input(f"I{row}", value, form="0.0000" if is_length else "@", name=key)
+        prompt = sheet.book.word("tape_how")
+        sheet.validate(f"I{row}", title=key, prompt=prompt, limits=limits if is_length else None)
+    for place, line in zip(_TAPE_PLACES, FORMULAS.columns("states", rows="tape"), strict=True):
+        if place[0] == "I":
+            sheet.word(f"F{place[1:]}", line.key)
+        sheet.formula(place, line.formula, form=line.form, name=line.key)
+
+
+#: Where the taped distance is compared: components in columns that are folded away.
+_TAPE_PLACES = ("L7", "M7", "N7", "I8", "I9", "I10")
 
 
 def statistics_of(sheet: SheetBuilder, letter: str, column: str, name: str) -> None:

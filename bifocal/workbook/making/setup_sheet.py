@@ -19,6 +19,7 @@ from bifocal.workbook.formulas.setup_cells import (
     is_text,
     may_be_zero,
     number_format,
+    sensible_limits,
     state_formula,
 )
 from bifocal.workbook.words import term, word
@@ -129,5 +130,7 @@ def _validate(sheet: SheetBuilder, cell: str, name: str, prompt: str) -> None:
         limits = INDEX_LIMITS if name.startswith("index_") else _NUMBERS
         if may_be_zero(name):
             limits = (0.0, _NUMBERS[1])
-        above_zero = is_above_zero(name)
+        sensible = sensible_limits(name)
+        limits = sensible or limits
+        above_zero = is_above_zero(name) and not sensible
         sheet.validate(cell, title=name, prompt=prompt, above_zero=above_zero, limits=limits)

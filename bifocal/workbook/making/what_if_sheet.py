@@ -6,11 +6,12 @@ from openpyxl.chart import BarChart, Reference, Series
 from openpyxl.chart.shapes import GraphicalProperties
 from openpyxl.styles import Alignment
 
-from bifocal.workbook.content import CHART_ROWS, SurveyContent
+from bifocal.workbook.content import CHART_ROWS, SurveyContent, printed_rows
 from bifocal.workbook.formulas.columns import CHANGED, FORMULAS
 from bifocal.workbook.formulas.setup_cells import number_format
 from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
 from photocore.workbook.making.live_charts import COLOURS, scatter, titled
+from photocore.workbook.reading.grid import column_letters
 
 #: Rows of the changes, of the charts, and of the keys of the table.
 FIRST, CHARTS, HEAD = 5, 12, 30
@@ -56,6 +57,9 @@ def what_if_sheet(builder: BookBuilder, content: SurveyContent) -> None:
         chart.height, chart.width = 8, 12.5
         sheet.worksheet.add_chart(chart, place)
     sheet.finish(landscape=True, repeat=f"{HEAD - 1}:{HEAD}")
+    printed = HEAD + min(printed_rows(content), CHART_ROWS)
+    # The second chart reaches over the columns of the table.
+    sheet.worksheet.print_area = f"A1:{column_letters(len(columns) + 2)}{printed}"
 
 
 def _changed(sheet: SheetBuilder, row: int, name: str, change: float) -> None:

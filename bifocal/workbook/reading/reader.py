@@ -13,6 +13,7 @@ from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations, pixel_keys
 from bifocal.survey.reference import KnownPoints
 from bifocal.survey.survey_input import SurveyInput, where_of, with_measured
+from bifocal.survey.taped import TAPE, TapedDistance
 from bifocal.workbook.formulas.columns import other_keys
 from bifocal.workbook.reading.row_checks import PIXELS, POLAR, XY, check_rows
 from bifocal.workbook.reading.setup_reader import (
@@ -48,7 +49,7 @@ _SHARED = {key: key.rstrip("12") for key in (*XY, *PIXELS)}
 _OTHER = {"col1": "i", "row1": "j", "col2": "i", "row2": "j"}
 TO_DEGREES = {"deg": 1.0, "gon": 0.9, "rad": float(np.degrees(1.0))}
 TO_MM = {"mm": 1.0, "cm": 10.0, "um": 1e-3, "m": 1000.0}
-_TO_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "dm": 0.1}
+TO_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "dm": 0.1}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,7 +121,7 @@ def point_columns(*, shared: Sequence[str] = (), photos: int = 2, others: int = 
     columns = []
     for key in ("id", *XY, *POLAR, *PIXELS, "use", "code", "note", "r_measured"):
         more = [_SHARED[key], *([_OTHER[key]] if key in _OTHER else [])] if key in shared else []
-        columns.append(_understood(key, more=more, unit=_UNITS.get(key, "")))
+        columns.append(understood(key, more=more, unit=_UNITS.get(key, "")))
     columns += [Column(key, (key,), kind="number") for key in other_keys(others)]
     for key in _more_pixels(photos):
         names = [name for name in headings("columns", f"{key[:3]}1") if "1" in name]
@@ -129,7 +130,7 @@ def point_columns(*, shared: Sequence[str] = (), photos: int = 2, others: int = 
     return columns
 
 
-def _understood(
+def understood(
     key: str, *, more: Sequence[str] = (), unit: str = "", required: bool = False
 ) -> Column:
     """Return a column to read, with every heading that is understood."""
@@ -181,12 +182,13 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
     check = _known(survey, "Check", ("X_ref", "Y_ref", "Z_ref"))
     control = _known(survey, "Georeference", ("E", "N", "H"))
     parts = (table, setup, check, control)
-    model, language, is_ours = "auto", "en", False
+    model, language, is_ours, tape = "auto", "en", False, None
     if sheets is not None:
         asked = read_named_values(
             sheets, [Column("g_model", kind="text")], sheet="Georeference", errors=errors
         )
         model = asked.text("g_model") or "auto"
+        tape = _taped(sheets, options.decimal, errors)
         language = _language(sheets)
         is_ours = any(area.name == "tblPoints" for area in sheets.tables)
     if errors:
@@ -199,6 +201,7 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
         unit=unit,
         known=with_measured(check.points.called_as(points.ids), points),
         control=control.points.called_as(points.ids),
+        tape=tape,
         model=model,
         language=language,
         is_ours=is_ours,
@@ -209,6 +212,23 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
         control_rows=control.rows,
         remarks=tuple(dict.fromkeys(remarks)),
     )
+
+
+def _taped(
+    book: SheetFile, decimal: Decimal | None, errors: list[CellError]
+) -> TapedDistance | None:
+    """Return the distance taped on site, where its three cells are filled in."""
+    if not all(name in book.names for name in TAPE):
+        return None
+    columns = [Column(name, kind="text") for name in TAPE[:2]]
+    columns.append(Column(TAPE[2], kind="number", unit="m"))
+    cells = read_named_values(book, columns, sheet="Check", decimal=decimal, errors=errors)
+    first, second, length = cells.text(TAPE[0]), cells.text(TAPE[1]), cells.given(TAPE[2])
+    if length is not None and not 0 < length <= LARGEST:
+        errors.append(cells.error(TAPE[2], f"found {length:g} m, expected a length above zero."))
+    if length is None or not (first and second):
+        return None
+    return TapedDistance(ends=(first, second), length=length)
 
 
 def _known(survey: OpenSurvey, sheet: str, keys: tuple[str, str, str]) -> _KnownTable:
@@ -223,7 +243,7 @@ def _known(survey: OpenSurvey, sheet: str, keys: tuple[str, str, str]) -> _Known
         return _KnownTable()
     table = read_table(
         book,
-        [_understood(key, required=key == "id") for key in ("id", *keys, "use")],
+        [understood(key, required=key == "id") for key in ("id", *keys, "use")],
         name="Geo" if sheet == "Georeference" and areas else sheet,
         sheet=areas[0].sheet if areas else titles[0],
         decimal=survey.decimal,
@@ -232,7 +252,7 @@ def _known(survey: OpenSurvey, sheet: str, keys: tuple[str, str, str]) -> _Known
     faulty = {(error.sheet, error.cell) for error in errors}
     errors += table.repeated("id")
     errors += table.too_large(keys, LARGEST)
-    xyz = np.stack([table.in_unit(key, _TO_M, errors) for key in keys], axis=-1)
+    xyz = np.stack([table.in_unit(key, TO_M, errors) for key in keys], axis=-1)
     use = table.numbers("use")
     rows = [i for i, name in enumerate(table.texts("id")) if name]
     for i, name in enumerate(table.texts("id")):
@@ -269,6 +289,8 @@ def _read_points(survey: OpenSurvey, options: ReadOptions) -> Table:
     general = isinstance(book, SheetFile) and is_general(book)
     others = other_count(book.names) if isinstance(book, SheetFile) else 0
     followed = {*XY, *POLAR} if general else set()
+    # Points of our own sheets, and of more photos than two, may lack many numbers.
+    ours = isinstance(book, SheetFile) and any(area.name == "tblPoints" for area in book.tables)
     for shared in ((), PIXELS, XY):
         last = shared == XY
         complaints: list[CellError] = []
@@ -285,6 +307,7 @@ def _read_points(survey: OpenSurvey, options: ReadOptions) -> Table:
                 decimal=survey.decimal,
                 column_map=options.columns or None,
                 visible_only=options.visible_only,
+                whole=options.photos == 2 and not ours,
                 errors=complaints,
             )
         except InputError:
@@ -368,7 +391,7 @@ def _observations(
     use = table.numbers("use")
     unit, factor = _unit_of_xy(table, errors)
     units = dict(zip(POLAR, (TO_MM, TO_MM, TO_DEGREES), strict=True))
-    units |= {key: {"px": 1.0} for key in (*PIXELS, *more)} | {"r_measured": _TO_M}
+    units |= {key: {"px": 1.0} for key in (*PIXELS, *more)} | {"r_measured": TO_M}
     columns = {key: table.in_unit(key, factors, errors) for key, factors in units.items()}
     columns |= {key: table.numbers(key) * factor for key in XY}
     texts = {"id": ids, "code": table.texts("code"), "note": table.texts("note")}

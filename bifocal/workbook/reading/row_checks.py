@@ -10,6 +10,7 @@ from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations, pixel_keys
 from photocore.errors import CellError
 from photocore.tables import Table
+from photocore.workbook.making.live_columns import TEXT_KEYS
 
 XY, POLAR = ("x1", "y1", "x2", "y2"), ("s1", "s2", "theta")
 PIXELS = ("col1", "row1", "col2", "row2")
@@ -23,6 +24,9 @@ def check_rows(
 ) -> None:
     """Complain about points without a name, measured on one photo only, or with s <= 0."""
     ids, used, polar = points.ids, points.use, points.polar
+    # What is wrong with a whole column is said once, not of every point.
+    failed = {key for _, key in faulty if key in table.values and key not in TEXT_KEYS}
+    failed = {key for key in failed if np.isnan(table.numbers(key)).all()}
     for row in range(len(table)):
         if used[row] and not ids[row] and (table.cell(row, "id"), "id") not in faulty:
             errors.append(table.error(row, "id", "the point has no name; give it one."))
@@ -43,7 +47,7 @@ def check_rows(
             partly &= np.isnan(xy).all(axis=1)
         for row in np.flatnonzero(partly).tolist():
             lacking = [key for i, key in enumerate(keys) if not given[row, i]]
-            if any((table.cell(row, key), key) in faulty for key in lacking):
+            if any(key in failed or (table.cell(row, key), key) in faulty for key in lacking):
                 continue  # its own complaint stands already
             errors.append(table.error(row, lacking[0], _incomplete(ids[row], keys, lacking)))
     for i, key in enumerate(("s1", "s2")):

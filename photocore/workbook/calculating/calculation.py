@@ -302,6 +302,9 @@ class Calculation:
         kind, *parts = nodes[0]
         if kind == "table" and parts[1] == "Headers":
             return number_cells([[self._table(parts[0]).head]])
+        if kind == "table" and not parts[1]:
+            table = self._table(parts[0])
+            return number_cells(np.arange(table.head + 1.0, table.last + 1)[None, :])
         if kind == "area" and ":" not in parts[1]:
             return number_cells([[split_cell(parts[1])[0]]])
         raise Unknown("ROW")

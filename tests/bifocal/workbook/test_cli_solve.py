@@ -64,8 +64,8 @@ def fill(path, table=None, setup=SETUP, **sheets):
 
 
 def put(book, name, value):
-    cell = book.defined_names[name].attr_text.split("!")[1].replace("$", "")
-    book["Setup"][cell] = value
+    sheet, _, cell = book.defined_names[name].attr_text.replace("$", "").partition("!")
+    book[sheet.strip("'")][cell] = value
 
 
 def solved(path, *options):

@@ -218,6 +218,36 @@ def test_a_mean_or_a_sum_is_no_point(book, word):
     assert "Row 6 is left out: a mean, a sum or the like is no point." in survey.remarks
 
 
+@pytest.mark.parametrize(
+    ("tail", "said"),
+    [
+        ([("mean of x1", 2.1)], "lack numbers: row 7"),
+        ([("Scarto quadratico medio", 0.1, 0.2, 0.3, 0.4)], "Row 7 is left out"),
+        ([(), *(("d1", 17.5), ("d2", 9.5), ("c1", 35), ("c2", 19))], "lack numbers: row 8, 9, 10"),
+    ],
+)
+def test_what_stands_apart_below_the_points_is_none_and_is_said(book, tail, said):
+    path = book(Picks=named([*WALL], tail=[(), *tail]))
+    solved = bifocal.solve(path, **({} if len(tail) > 1 else OPTIONS))
+    assert solved.table.ids == tuple(WALL)
+    assert solved.table["r"] == pytest.approx(RELIEF)
+    assert any(said in remark for remark in solved.remarks)
+
+
+def test_a_point_that_lacks_a_number_is_none_the_less_complained_of(book):
+    for tail in ([(), ("E", 1.0, 2.0, None, 3.0)], [("E", 1.0)]):
+        with pytest.raises(WorkbookError, match="point E lacks"):
+            bifocal.solve(book(Picks=named([*WALL], tail=tail)), **OPTIONS)
+
+
+def test_a_column_of_unlike_units_is_complained_of_once(book):
+    cells = ["2.1 mm", "2.2 cm", "2.3 mm", "2.4 cm"]
+    rows = [(f"P{i}", cell, 1.0, 2.4, 1.2) for i, cell in enumerate(cells)]
+    with pytest.raises(WorkbookError) as caught:
+        bifocal.solve(book(Picks=[("id", *XY), *rows]), **OPTIONS)
+    assert str(caught.value).count("Picks!") == 1
+
+
 def test_a_point_called_like_a_mean_among_others_stays(book):
     names = ("Media", "Total", "Max", "Z")
     assert read_survey(book(Misure=named(names))).points.ids == names

@@ -15,6 +15,7 @@ from bifocal.equations import plane_coordinates, relief_displacement
 from bifocal.precision import sigma_relief
 from bifocal.workbook.formulas.columns import FUNCTIONS
 from bifocal.workbook.template_workflow import write_template
+from tests.bifocal.workbook.test_cli_solve import SETUP, put, run
 from tests.builders.commands import bifocal_command as main
 from tests.recalculate import recalculated
 from tests.workbook_lint import lint
@@ -167,3 +168,24 @@ def test_a_workbook_with_functions_is_solved_in_place_and_translated(tmp_path):
     assert solved.defined_names["RELIEF"].attr_text == book.defined_names["RELIEF"].attr_text
     assert "Kamera" in solved["Functions"]["B7"].value
     assert "kennt kein LAMBDA" in solved["Functions"]["A3"].value
+
+
+@pytest.mark.parametrize("plain", [False, True], ids=["named", "plain"])
+def test_functions_saved_by_another_program_show_what_their_own_inputs_give(plain, tmp_path):
+    path = tmp_path / "s.xlsx"
+    write_template(path, rows=8, functions=True, plain=plain)
+    book = openpyxl.load_workbook(path)
+    for name, value in SETUP.items():
+        put(book, name, value)
+    for column, value in enumerate(("A", 4.2424, 0, 4.4706, 0), start=1):
+        book["Points"].cell(5, column, value)
+    book["Functions"]["C7"], book["Functions"]["C8"] = 35 * 2 / 16.0, 19 * 2 / 8.0
+    book.save(path)  # without any result
+    assert run("solve", path, "--out", path, "--overwrite").exit_code == 0
+    formulas = openpyxl.load_workbook(path)["Functions"]
+    shown = openpyxl.load_workbook(path, data_only=True)["Functions"]
+    cells = [c.coordinate for row in formulas.iter_rows() for c in row if c.data_type == "f"]
+    assert len(cells) > 20
+    assert all(shown[cell].value is not None for cell in cells)
+    # A point 2 m off the nadir that stands out by 1.5 m: by the cells, and by the function.
+    assert [shown[cell].value for cell in ("C12", "C13")] == pytest.approx([1.5, 1.5], rel=1e-12)

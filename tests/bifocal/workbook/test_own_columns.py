@@ -11,7 +11,7 @@ from tests.builders.commands import bifocal_command as main
 from tests.recalculate import recalculated
 from tests.workbook_lint import lint
 
-FIRST = ["r [m]", "X [m]", "Y [m]", "sigma_r [m]", "flag"]
+FIRST = ["r [m]", "flag", "X [m]", "Y [m]", "sigma_r [m]"]
 
 
 @pytest.fixture

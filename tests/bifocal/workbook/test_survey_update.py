@@ -10,7 +10,11 @@ from openpyxl.drawing.image import Image
 from PIL import Image as Picture
 
 from tests.bifocal.workbook.test_cli_solve import POINTS, SETUP, fill, put, rows, run, write_csv
-from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached, parts
+from tests.bifocal.workbook.test_survey_workbook import (
+    assert_recalculated_equals_cached,
+    named,
+    parts,
+)
 
 #: Heights a millimetre off: the residuals of exact points are rounding, which has no equal.
 WORLD = [
@@ -179,3 +183,16 @@ def test_limits_typed_in_setup_decide_the_flags(tmp_path):
     flags = openpyxl.load_workbook(out, data_only=True)["Results"]
     assert flags["N5"].value == "ON-PLANE"
     assert SETUP["c_1"] == 35
+
+
+def test_sentences_that_an_older_version_wrote_are_no_changes_by_hand(tmp_path):
+    path = fill(tmp_path / "s.xlsx")
+    book = openpyxl.load_workbook(path)
+    named(book, "title_world").value = "=world_state"
+    for name in ("site_state", "tape_from", "tape_typed", "check_state", "points_state"):
+        del book.defined_names[name]
+    book.save(path)
+    found = run("solve", path, "--out", path, "--overwrite")
+    assert "changed by hand" not in found.stderr
+    shown = openpyxl.load_workbook(path, data_only=True)
+    assert not named(shown, "title_world").value

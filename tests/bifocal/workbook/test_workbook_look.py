@@ -70,6 +70,30 @@ def test_results_are_one_page_for_a_client(books):
     assert "metres" in values["J2"].value
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_no_chart_is_cut_by_the_end_of_a_page(name, books):
+    sheet = books[name][1]["Charts"]
+    assert not sheet.sheet_properties.pageSetUpPr.fitToPage  # programs then go by no break
+    (end,) = (line.id for line in sheet.row_breaks.brk)
+    height = {row: sheet.row_dimensions[row].height or 13.5 for row in range(1, 116)}
+    paper = 841.9 - 72 * (sheet.page_margins.top + sheet.page_margins.bottom)
+    for rows in (range(1, end + 1), range(end + 1, 116)):
+        assert sum(height[row] for row in rows) * scale_of(sheet) < paper
+    for chart in sheet._charts:
+        first = chart.anchor._from.row
+        bottom = sum(height[row] for row in range(1, first + 1)) + chart.height * 72 / 2.54
+        on_first = first < end
+        assert (bottom < sum(height[row] for row in range(1, end + 1))) == on_first
+        assert first > end or on_first  # not on the break itself, where its edge would show
+
+
+def test_forms_print_no_page_after_page_of_headings(tmp_path):
+    write_template(tmp_path / "t.xlsx", photos=3, what_if=True)
+    book = openpyxl.load_workbook(tmp_path / "t.xlsx")
+    assert book["Compare"].page_setup.fitToHeight == 1
+    assert book["WhatIf"].print_area == "'WhatIf'!$A$1:$V$58"
+
+
 def test_the_title_block_says_what_is_typed_on_setup(tmp_path):
     block = {"project": "Palazzo Nuovo", "surveyor": "Ada", "survey_date": "3 May 2026"}
     content = ideal_content(26, title_block=block)
@@ -317,7 +341,7 @@ def test_the_printed_rows_follow_the_points_and_all_rows_are_seen(filled):
     book = openpyxl.load_workbook(filled)
     assert book["Results"].print_area == "'Results'!$A$1:$O$44"
     assert book["Points"].print_area == "'Points'!$A$3:$AU$44"
-    assert book["Results"]["E1"].value.startswith('=IF(COUNTA(tblPoints[id])>40,"Altri punti')
+    assert book["Points"]["E1"].value.startswith('=IF(COUNTA(tblPoints[id])>40,"Altri punti')
     assert "Mancano ancora" in book["Setup"]["A3"].value
     light = openpyxl.load_workbook(filled, read_only=True, data_only=True)
     rows = list(light["Points"].iter_rows(min_row=5, values_only=True))

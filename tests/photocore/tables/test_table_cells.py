@@ -55,6 +55,13 @@ def test_the_unit_of_a_cell_is_never_applied_to_the_others(book, cells, message)
     assert str(caught.value).count("Sheet1!") == 1
 
 
+def test_one_cell_of_another_unit_is_the_one_complained_of(book):
+    rows = [("id", "s1"), ("P1", "12 mm"), ("P2", "13 mm"), ("P3", "1.4 cm")]
+    with pytest.raises(WorkbookError, match=r"B4 \(s1\): found \"1.4 cm\".* Write 14;") as caught:
+        read_table(book(rows), [POLAR[0], Column("s1")])
+    assert str(caught.value).count("Sheet1!") == 1
+
+
 @pytest.mark.parametrize(
     ("cell", "message"),
     [

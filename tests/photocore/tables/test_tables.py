@@ -179,7 +179,7 @@ def test_blocks_with_repeated_headings_and_gaps_are_one_table(book):
     table = read_table(book(rows), POLAR)
     assert table.texts("id") == ["P1", "P2", "P3"]
     assert table.remarks == [
-        "Left out as notes, since they stand apart and hold no number: row 9, 10."
+        "Left out as notes, since they stand apart and lack numbers: row 9, 10."
     ]
 
 

@@ -1,0 +1,173 @@
+"""Lists beside a survey: control and check points of the field, and picks in a row a photo."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path, PurePath
+
+import numpy as np
+
+from bifocal.model.photo import FARTHEST_WALL
+from bifocal.remarks import remark
+from bifocal.survey.observations import PointObservations, pixel_keys
+from bifocal.survey.reference import KnownPoints
+from bifocal.survey.survey_input import SurveyInput
+from bifocal.workbook.reading.reader import TO_M, understood
+from bifocal.workbook.reading.setup_reader import LARGEST
+from photocore.arrays import FloatArray
+from photocore.errors import CellError, InputError, WorkbookError
+from photocore.tables import Column, Table, parse_column_map, read_table
+from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH
+from photocore.tables.numbers import Decimal
+
+#: Axes of the lists that fill `Georeference` and `Check`: headings that mean them besides ours.
+_AXES: dict[str, dict[str, tuple[str, ...]]] = {
+    "Georeference": {"E": EAST, "N": NORTH, "H": HEIGHT},
+    "Check": {"X_ref": ("X",), "Y_ref": ("Y",), "Z_ref": ("Z", "r", "relief")},
+}
+#: Names of the tables of both sheets.
+_TABLES = {"Georeference": "tblGeo", "Check": "tblCheck"}
+_LONG = (
+    Column("id", ("point", "name", "punto", "punkt", "label"), kind="text", required=True),
+    Column("photo", ("image", "camera", "foto", "bild"), kind="text", required=True),
+    Column("col", ("column", "colonna", "spalte", "x"), unit="px", required=True),
+    Column("row", ("riga", "zeile", "y"), unit="px", required=True),
+)
+
+
+def with_list(
+    survey: SurveyInput, path: Path | str, decimal: Decimal | None, order: str | None = None
+) -> SurveyInput:
+    """Return a survey whose control and check points are those of a list, too.
+
+    Names that are there already take the coordinates of the list; points that were not measured
+    are left out.
+
+    Parameters
+    ----------
+    survey : SurveyInput
+    path : path
+        Table or list of an instrument with id and E, N, H (control points), or X, Y, Z or r on the
+        wall (check points); X, Y, Z that lie further off than a wall reaches are E, N, H.
+    decimal : {"point", "comma"}, optional
+        Decimal separator of numbers typed as text.
+    order : str, optional
+        Which column is which, ``PNEZD`` for example, as `photocore.tables.parse_column_map` has it.
+
+    Raises
+    ------
+    InputError, WorkbookError
+        If the list cannot be read, or no point of it was measured.
+    """
+    errors: list[CellError] = []
+    columns = [understood("id", more=NAMES, required=True)]
+    for headed in _AXES.values():
+        columns += [understood(key, more=more, unit="m") for key, more in headed.items()]
+    names = parse_column_map(order, [column.key for column in columns]) if order else None
+    table = read_table(path, columns, decimal=decimal, column_map=names, errors=errors)
+    axes_of = {sheet: tuple(axes) for sheet, axes in _AXES.items()}
+    errors += table.too_large([*axes_of["Georeference"], *axes_of["Check"]], LARGEST)
+    remarks = list(table.remarks)
+    for sheet, axes in axes_of.items():
+        xyz = np.stack([table.in_unit(key, TO_M, errors) for key in axes], axis=-1)
+        places = _first_rows(table, xyz, errors)
+        if np.nanmax(np.abs(xyz), initial=0.0) > FARTHEST_WALL:
+            sheet = "Georeference"
+        listed = KnownPoints(ids=tuple(table.texts("id")[i] for i in places), xyz=xyz[places])
+        listed = listed.called_as(survey.points.ids)
+        measured = np.isin(listed.ids, survey.points.ids) & np.isfinite(listed.xyz).any(axis=1)
+        if measured.any():
+            survey = _filled(survey, sheet, listed, np.flatnonzero(measured).tolist())
+            count = {"count": int(measured.sum()), "all": len(listed), "sheet": sheet}
+            remarks.append(remark("survey.list_taken", of=Path(path).name, **count))
+    if errors:
+        raise WorkbookError(errors)
+    if len(remarks) == len(table.remarks):
+        raise InputError(remark("survey.list_of_others", of=path))
+    return replace(survey, remarks=(*survey.remarks, *remarks))
+
+
+def _first_rows(table: Table, xyz: FloatArray, errors: list[CellError]) -> list[int]:
+    """Return the first row of each name: lists of picks name a point once a photo."""
+    rows: dict[str, int] = {}
+    for row, name in enumerate(table.texts("id")):
+        first = rows.setdefault(name, row)
+        if not np.array_equal(xyz[row], xyz[first], equal_nan=True):
+            message = f'"{name}" has other coordinates in {table.cell(first, "id")}.'
+            errors.append(table.error(row, "id", message))
+    return [row for name, row in rows.items() if name]
+
+
+def _filled(
+    survey: SurveyInput, sheet: str, listed: KnownPoints, places: Sequence[int]
+) -> SurveyInput:
+    """Return a survey with points of a list in one of its sheets."""
+    field = "control" if sheet == "Georeference" else "known"
+    listing, rows = getattr(survey, field), getattr(survey, f"{field}_rows")
+    # Relief given beside the points stands on no sheet and comes last.
+    count = len(rows) if survey.is_ours else len(listing)
+    ids, xyz, use = list(listing.ids[:count]), list(listing.xyz[:count]), list(listing.used[:count])
+    for place in places:
+        if listed.ids[place] in ids:
+            xyz[ids.index(listed.ids[place])] = listed.xyz[place]
+            continue
+        ids.append(listed.ids[place])
+        xyz.append(listed.xyz[place])
+        use.append(True)
+    rest = [k for k in range(count, len(listing)) if listing.ids[k] not in ids]
+    names = (*ids, *(listing.ids[k] for k in rest))
+    merged = KnownPoints(
+        ids=names,
+        xyz=np.array([*xyz, *listing.xyz[rest]]),
+        use=np.array([*use, *listing.used[rest]]),
+    )
+    areas = () if survey.book is None else survey.book.tables
+    free = max([a.first - 1 for a in areas if a.name == _TABLES[sheet]] + list(rows), default=0) + 1
+    added = range(free, free + len(ids) - count) if survey.is_ours else ()
+    if field == "control":
+        return replace(survey, control=merged, control_rows=(*rows, *added))
+    return replace(survey, known=merged, known_rows=(*rows, *added))
+
+
+def read_long(
+    path: Path | str, photos: Sequence[Sequence[str]], decimal: Decimal | None
+) -> PointObservations | None:
+    """Return the points of a table with a row a photo; None where a file is no such table.
+
+    Parameters
+    ----------
+    path : path
+        Table of id, photo, col, row. [px]
+    photos : sequence of sequence of str
+        What each photo is called: name, file, number.
+
+    Raises
+    ------
+    WorkbookError
+        Naming every row whose photo is none of these, or that repeats another.
+    """
+    errors: list[CellError] = []
+    try:
+        table = read_table(path, _LONG, decimal=decimal, errors=errors)
+    except InputError:
+        return None
+    called = [{PurePath(name).stem.casefold() for name in names if name} for names in photos]
+    pixels: dict[str, dict[str, float]] = {}
+    places = np.stack([table.numbers("col"), table.numbers("row")], axis=-1)
+    for row, (name, photo) in enumerate(zip(table.texts("id"), table.texts("photo"), strict=True)):
+        stem = PurePath(photo).stem.casefold()
+        numbers = [number for number, names in enumerate(called, start=1) if stem in names]
+        if len(numbers) != 1:
+            listed = ", ".join(names[0] for names in photos)
+            errors.append(table.error(row, "photo", remark("survey.strange_photo", known=listed)))
+            continue
+        keys = pixel_keys(numbers[0])
+        if keys[0] in pixels.setdefault(name, {}):
+            errors.append(table.error(row, "id", remark("survey.picked_before", name=name)))
+        pixels[name] |= dict(zip(keys, places[row].tolist(), strict=True))
+    if errors:
+        raise WorkbookError(errors)
+    wide = [key for number in range(1, len(photos) + 1) for key in pixel_keys(number)]
+    columns = {key: [picks.get(key, np.nan) for picks in pixels.values()] for key in wide}
+    return PointObservations.from_columns({"id": list(pixels), **columns})
