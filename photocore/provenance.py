@@ -27,8 +27,6 @@ from photocore.installation import DISTRIBUTION
 _CHUNK = 1 << 20
 #: A file changed within this time may change again without its time stamp showing it. [s]
 RACY_SECONDS = 2.0
-#: List of the hashes of files beside it, as ``sha256sum`` writes and checks it.
-SUMS = "SHA256SUMS"
 _CHANGED = "BIFOCAL_CHANGED_PHOTOS"
 
 

@@ -216,7 +216,7 @@ def rectify_photo(
     else:
         wish = DeliverTask(
             title=given["title"] or path.stem, camera=in_language(words, given["language"]),
-            control=_drawn(control),
+            control=_drawn(control), hashes=True,
             **{key: given[key] for key in ("scale", "dpi", "paper", "mark", "language")},
         )  # fmt: skip
         done = deliver(

@@ -17,6 +17,7 @@ from typing import Any
 from bifocal.campaigns.pair_steps import FIRST_STEP, PRODUCTS, PairJob
 from bifocal.campaigns.step_store import FORMAT, RECORD, read_record, record_key
 from bifocal.campaigns.workflow import facade
+from bifocal.files.hash_list import SUMS
 from bifocal.files.point_tables import read_survey_points
 from bifocal.model.pair import Pair
 from bifocal.options import FILES
@@ -26,7 +27,7 @@ from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.jsonfile import read_object
 from photocore.output import temporary_folder
-from photocore.provenance import SUMS, file_hash, program
+from photocore.provenance import file_hash, program
 from photocore.textfile import check_name, read_text
 from photocore.workbook.reading.package import UNPACKING, check_names
 

@@ -62,7 +62,8 @@ class OrthoCommand:
     gsd: GsdOption = None
     picture: PictureOptions = field(default_factory=PictureOptions)
     folder: Annotated[Path | None, Typed(unit="DIR", flag="--deliver")] = None
-    """Write GeoTIFF, PNG, DXF and PDF, of the relief too, into a folder. Needs --scale."""
+    """Write GeoTIFF, PNG, DXF and PDF, of the relief too, and their hashes for `bifocal verify`,
+    into a folder. Needs --scale."""
     drawing: DrawingOptions = field(default_factory=DrawingOptions)
     control: Path | None = None
     """Table of control points to draw."""
@@ -128,7 +129,8 @@ def command(
     files: dict[str, object] = {}
     with progress_bar("orthophoto", quiet=as_json) as progress:
         if folder is not None and scale is not None:
-            wish = DeliverTask(title=title or default_title(source, pair), **drawing)
+            title = title or default_title(source, pair)
+            wish = DeliverTask(title=title, hashes=True, **drawing)
             done = deliver(
                 source, folder, task, wish, out=out, world_file=tfw, overwrite=overwrite,
                 progress=progress,

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.faces.faced_surface import FacedSurface
+from bifocal.files.hash_list import list_hashes, listed_hashes
 from bifocal.files.strips import write_png
 from bifocal.media import media_words
 from bifocal.model.doubts import MISFITS, check_scale, doubts_of
@@ -69,10 +70,8 @@ from photocore.textfile import file_name
 DPI = 254.0
 #: Every picture is written with its world file, for the web, for CAD and on a sheet.
 PICTURE_ENDINGS = ("tif", "tfw", "png", "dxf", "pdf")
-#: What is no part of the name of a pair's file.
 _PAIR_ENDINGS = (".pair.json", ".photos.json", ".json", ".xlsx", ".xlsm")
-#: Names shorter than this say nothing as a title: the folder's is taken.
-_SHORT = 3
+_SHORT = 3  # shorter names say nothing as a title
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,6 +108,8 @@ class DeliverTask:
     checked : (int, float, float), optional
         Independent check points, and their RMSE in X, Y (the worse) and in relief [m]: told by the
         sheet in place of the standard deviations.
+    hashes : bool
+        List the files' SHA-256 in ``SHA256SUMS``, for ``bifocal verify``.
     """
 
     scale: float
@@ -125,6 +126,7 @@ class DeliverTask:
     language: str = "en"
     camera: str = ""
     checked: tuple[int, float, float] | None = None
+    hashes: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -183,6 +185,7 @@ def deliver(
     title = wish.title or default_title(pair_path)
     name = file_name(title)
     _check_outputs(out, folder, name, (task.relief, *pair.photo_files))
+    listed_hashes(folder)  # refuses what is none, before the work
     points, remarks = _points(wish.mark or task.points)
     control, notes_on_control = _points(wish.control)
     remarks += notes_on_control
@@ -204,9 +207,8 @@ def deliver(
         if cuts:
             named = drawing.say("sections", titles="; ".join(cut.title for cut in cuts))
             drawing = replace(drawing, sections=cuts, notes=(*drawing.notes, named))
-        relief = None
-        if not isinstance(surface, FlatSurface):
-            relief = _prepared((surface, measured), reader, drawing, wish)
+        flat = isinstance(surface, FlatSurface)
+        relief = None if flat else _prepared((surface, measured), reader, drawing, wish)
         inside = out is not None and out.resolve().parent == folder.resolve()
         copies = [] if out is None else [out, out.with_suffix(".tfw")][: 1 + world_file]
         extra = tuple(path.name for path in copies) if inside else ()
@@ -234,10 +236,12 @@ def deliver(
             original = place / f"{name}.{'tfw' if path.suffix == '.tfw' else 'tif'}"
             if target != original:
                 shutil.copyfile(original, target)
-        files = tuple(sorted(item.name for item in place.iterdir()))
-    path = out or folder / f"{name}.tif"
-    result = replace(result, path=path, remarks=(*result.remarks, *remarks))
-    return Delivery(ortho=result, files=files, sheet=sheet.name)
+        files = {item.name for item in place.iterdir()}
+    if wish.hashes:
+        files.add(list_hashes(folder, files))
+    remarks = (*result.remarks, *remarks)
+    result = replace(result, path=out or folder / f"{name}.tif", remarks=remarks)
+    return Delivery(ortho=result, files=tuple(sorted(files)), sheet=sheet.name)
 
 
 def _check_outputs(

@@ -53,6 +53,10 @@ class Registration:
         Relief of the most frequent surface. [m]
     false_relief_per_scale : float
         Constant false relief per 0.1 % of error in the relative scale of the photos. [m]
+    base : float
+        Distance of the cameras along the wall where it is larger than that across it, else 0. [m]
+    false_relief_per_shift : float
+        Constant false relief per pixel by which photo 2 is off along that line. [m]
     """
 
     matched: float
@@ -62,6 +66,8 @@ class Registration:
     systematic: float
     wall: float
     false_relief_per_scale: float
+    base: float = 0.0
+    false_relief_per_shift: float = 0.0
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -74,6 +80,10 @@ class Registration:
             told.append(remark("relief.no_exact_fit", miss=self.across_median, **about))
         if self.matched < 0.5:
             told.append(remark("relief.few_matched", share=self.matched))
+        if self.base:
+            shift = 100 * self.false_relief_per_shift  # of 0.1 px, in mm
+            told.append(remark("relief.shift_along_base", base=self.base, relief=shift))
+            return tuple(told)
         if 0.3 * per_scale < abs(self.wall) < 15 * per_scale:
             share = 100 * self.wall / per_scale * 1e-3
             told.append(remark("relief.flat_surface", wall=1000 * self.wall, share=share))
@@ -109,6 +119,7 @@ def check_registration(frame: Frame, measured: Measurement) -> Registration:
         about = {"miss": median, "most": REGISTRATION.refuse_px, "x": shift[0], "y": shift[1]}
         raise GeometryError(remark("relief.not_registered", turn=np.degrees(rotation), **about))
     d1, d2 = frame.distances
+    base, per_shift = _along_wall(frame)
     return Registration(
         matched=share,
         across_median=median,
@@ -117,7 +128,24 @@ def check_registration(frame: Frame, measured: Measurement) -> Registration:
         systematic=systematic,
         wall=_mode(relief[use]),
         false_relief_per_scale=float(false_relief_of_scale(1e-3, d1=d1, d2=d2)),
+        base=base,
+        false_relief_per_shift=per_shift,
     )
+
+
+def _along_wall(frame: Frame) -> tuple[float, float]:
+    """Return `Registration.base` and `Registration.false_relief_per_shift`. [m]
+
+    A point at P with relief r is moved by ``(P - N) r / d`` in either photo; Midulla, Eq. (1).
+    """
+    (first, second), (d1, d2) = (frame.foot(1).nadir, frame.foot(2).nadir), frame.distances
+    base = float(np.linalg.norm(np.subtract(first, second)))
+    if base <= abs(d1 - d2):
+        return 0.0, 0.0
+    xmin, ymin, xmax, ymax = frame.grid.bounds
+    middle = np.array([xmin + xmax, ymin + ymax]) / 2
+    per_relief = np.linalg.norm((middle - second) / d2 - (middle - first) / d1)
+    return base, float(frame.grid.gsd / per_relief)
 
 
 def _systematic(

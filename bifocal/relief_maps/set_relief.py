@@ -17,7 +17,7 @@ from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.model.image import as_grey
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
-from bifocal.model.photo_set import PhotoSet
+from bifocal.model.photo_set import WIDEST, PhotoSet, ray_angles
 from bifocal.relief_maps.dense_matching import DenseRelief, pair_relief
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import common_bounds
@@ -45,8 +45,6 @@ class PairingTuning:
     places: int = 24
     #: A pair is measured if it is among the best at more than this share of the places.
     least_share: float = 0.03
-    #: Rays that part by more per relief show too different sides of things to be matched.
-    widest: float = 0.8
     #: Of two photos equally far from the wall one counts as farther by this share.
     #: Evidence: 0.01 mm at 10 m.
     farther: float = 1e-06
@@ -238,7 +236,12 @@ def _of_set(
     names = photos.names
     worst = max(made.values(), key=lambda one: one.registration.systematic)
     judged = [one.registration.false_relief_per_scale for one in made.values()]
-    registration = replace(worst.registration, false_relief_per_scale=min(judged))
+    wide = all(one.registration.base for one in made.values())
+    registration = replace(
+        worst.registration,
+        false_relief_per_scale=min(judged),
+        base=worst.registration.base if wide else 0.0,
+    )
     return DenseRelief(
         r=bands.r, sigma=bands.sigma, quality=bands.quality, plane_from_pixel=grid.plane_from_pixel,
         registration=registration, working_gsd=worst.working_gsd,
@@ -300,13 +303,14 @@ def _best_pairs(
         axis=-1,
     ).reshape(-1, 2)
     xy = places * [part.gsd, -part.gsd] + [part.x0, part.y0]
+    xyz0 = np.column_stack([xy, np.zeros(len(xy))])
     pixel = [_pixel(photo, grey, xy) for photo, grey in zip(photos.photos, greys, strict=True)]
     pairs, sigmas = [], []
     for one, other in combinations(range(len(photos)), 2):
         away = np.linalg.norm(_parallax(photos, one, other, xy), axis=-1)
         with np.errstate(divide="ignore", invalid="ignore"):
             sigma = np.hypot(pixel[one], pixel[other]) / away
-        sigma[~(away < PAIRING.widest)] = np.inf
+        sigma[ray_angles(photos.photos[one], photos.photos[other], xyz0) > WIDEST] = np.inf
         sigma[~np.isfinite(sigma)] = np.inf
         pairs.append((one, other))
         sigmas.append(sigma)

@@ -10,6 +10,7 @@ import pytest
 
 from bifocal import SAMPLE, GeometryError, InputError, Lens, Pair, Photo, PhotoSet
 from bifocal.model.orientation_precision import CAMERA, names_of
+from bifocal.model.photo_set import ray_angles
 
 METRES = np.array([[0.004, 0, -6.0], [0, -0.004, 4.0], [0, 0, 1.0]])
 SIZE = (3001, 2001)
@@ -100,6 +101,18 @@ def test_pairs_are_ranked_by_what_they_tell_of_relief():
     elsewhere = replace(photo(5.0), plane_from_pixel=moved, nadir=[100.0, 0.0])
     photos = (photo(17.5), photo(17.5, 2.0), elsewhere)
     assert PhotoSet(photos=photos).pairs() == ()
+
+
+def test_a_pair_whose_rays_part_too_far_comes_after_those_that_match():
+    apart = [photo(9.0, -5.0), photo(8.9, 4.0), photo(8.8, 0.0)]
+    ranked = PhotoSet(photos=tuple(apart)).pairs()
+    sigmas = {pair[:2]: pair.sigma_r for pair in ranked}
+    assert min(sigmas, key=sigmas.get) == (0, 1)  # the most precise, if anything matched
+    assert [pair[:2] for pair in ranked] == [(0, 2), (1, 2), (0, 1)]
+    # 45 degrees to one side and to the other: a right angle.
+    assert ray_angles(photo(5.0, -5.0), photo(5.0, 5.0), [0.0, 0.0, 0.0]) == pytest.approx(
+        np.pi / 2
+    )
 
 
 def test_a_photo_sees_what_is_in_its_frame():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from dataclasses import replace
@@ -15,6 +16,7 @@ from click.testing import CliRunner
 from PIL import Image
 
 from bifocal import Grid, ReliefMap, write_image
+from bifocal.campaigns.verification import verify
 from bifocal.model.geotiff import create_raster
 from tests.bifocal.orthophotos.ortho_command import GSD, page_of, relief_of, run
 from tests.builders.commands import bifocal_command as main
@@ -86,6 +88,23 @@ def test_sigma_and_quality_lie_beside_the_delivered_relief(wall: Path) -> None:
     assert (found.quality[:, hidden] == 3).all()
     assert (found.quality[:, x > -1.25] == 1).all()
     np.testing.assert_allclose(found.sigma[:, hidden], 0.02)
+
+
+def test_a_delivered_folder_is_verified_and_keeps_the_hashes_of_others(wall: Path) -> None:
+    (wall / "d").mkdir()
+    (wall / "d" / "letter.txt").write_text("Dear Sir")
+    digest = hashlib.sha256(b"Dear Sir").hexdigest()
+    (wall / "d" / "SHA256SUMS").write_text(f"{digest}  letter.txt\n{digest}  lost.txt\n")
+    done = run(wall, "--plane", "--deliver", "d", "--scale", "1:50", "--dpi", "25", "--json")
+    assert done.exit_code == 0, done.output
+    assert "SHA256SUMS" in json.loads(done.stdout)["files"]
+    found = verify(wall / "d")
+    assert found.same
+    assert {one.file for one in found.files} == {path.name for path in (wall / "d").iterdir()}
+    with (wall / "d" / "Torre_est.dxf").open("a") as file:
+        file.write(" ")
+    wrong = [one.file for one in verify(wall / "d").files if one.state != "unchanged"]
+    assert wrong == ["Torre_est.dxf"]
 
 
 @pytest.mark.acceptance
@@ -241,7 +260,9 @@ def test_any_file_of_an_earlier_delivery_is_refused_before_the_work(
         (wall / "d" / name).write_text("mine")
         done = run(wall, *words)
         assert done.exit_code == 1
-        assert f"{name}: exists already; add --overwrite" in done.stderr
+        listed = name == "SHA256SUMS"  # lines of others would stay, but these are none
+        why = "is no list of hashes" if listed else "exists already; add --overwrite"
+        assert f"{name}: {why}" in done.stderr
         assert (wall / "d" / name).read_text() == "mine"
         (wall / "d" / name).unlink()
 

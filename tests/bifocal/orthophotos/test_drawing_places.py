@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import ezdxf
 import pytest
+from click.testing import CliRunner
 
+from bifocal import SAMPLE
 from bifocal.files.dxf import add_line, new_drawing, save_drawing
+from tests.builders.commands import bifocal_command
 
 FAR = (652345.0, 6862123.0)
 
@@ -31,3 +34,19 @@ def test_a_line_that_ends_where_it_begins_is_closed_and_holds_each_corner_once()
     closed, opened = model.query("LWPOLYLINE")
     assert (closed.closed, len(closed)) == (True, 3)
     assert (opened.closed, len(opened)) == (False, 3)
+
+
+@pytest.mark.parametrize("place", ["o.tif", "drawing/o.tif"])
+def test_a_world_file_that_is_wanted_beside_the_picture_is_there_with_a_drawing_too(
+    tmp_path, place
+):
+    words = [
+        "ortho", str(SAMPLE / "facade.pair.json"), "--plane", "--gsd", "0.1", "--scale", "1:200",
+        "--out", str(tmp_path / place), "--tfw", "--deliver", str(tmp_path / "drawing"),
+    ]  # fmt: skip
+    done = CliRunner().invoke(bifocal_command, words)
+    assert done.exit_code == 0, done.stderr
+    beside = (tmp_path / place).with_suffix(".tfw").read_text()
+    delivered = [path for path in (tmp_path / "drawing").glob("*.tfw") if path.stem != "o"]
+    assert [path.read_text() for path in delivered] == [beside]
+    assert float(beside.split()[0]) == 0.1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from bifocal.relief_maps.dense_matching import _resampled
 from bifocal.relief_maps.forward_projection import PROJECTION, MapBands
 from bifocal.relief_maps.frame import common_bounds, make_frame, working_grid
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
+from bifocal.relief_maps.registration import _along_wall
 from bifocal.relief_maps.relief_files import hatched, shaded
 from multimedia import GeometryError, InputError
 from photocore.shrinkage import shrink_noise
@@ -400,3 +402,30 @@ def test_a_preview_hatches_what_is_not_measured():
     np.testing.assert_array_equal(picture[:, :20], grey[:, :20])
     assert (np.ptp(picture[:, 20:], axis=-1) < 0.2).all()
     assert len(np.unique(picture[:, 20:, 0])) == 2
+
+
+def test_photos_from_beside_each_other_are_told_what_a_shift_along_the_base_does():
+    feet, distances = np.array([[-1.0, 0.5], [4.0, 0.5]]), (10.0, 9.0)
+    grid = Grid.from_bounds((0.0, -1.0, 4.0, 3.0), gsd=0.01)
+    frame = SimpleNamespace(
+        foot=lambda number: SimpleNamespace(nadir=feet[number - 1]), distances=distances, grid=grid
+    )
+    base, relief = _along_wall(frame)
+    assert base == pytest.approx(5.0)
+    # Rays to one place of the plane in photo 1, and a pixel beside it in photo 2.
+    place = np.array([2.0, 1.0])
+    away = (place - feet[1]) / distances[1] - (place - feet[0]) / distances[0]
+    shifted = place - grid.gsd * away / np.linalg.norm(away)
+    ways = [place - feet[0], shifted - feet[1]]
+    heights = np.linspace(-0.1, 0.1, 200_001)
+    at = [
+        foot + np.outer((d - heights) / d, way)
+        for foot, way, d in zip(feet, ways, distances, strict=True)
+    ]
+    nearest = heights[np.linalg.norm(at[0] - at[1], axis=1).argmin()]
+    assert abs(nearest) == pytest.approx(relief, rel=0.01)
+
+    beside = replace(result().registration, base=base, false_relief_per_shift=relief)
+    assert beside.remarks[-1].startswith("the cameras stand 5.0 m apart along the wall")
+    assert f"shifts by {100 * relief:.1f} mm" in beside.remarks[-1]
+    assert not any("relative scale" in one for one in beside.remarks)

@@ -87,7 +87,7 @@ def gsi(name, *place):
 )
 def test_lists_of_instruments_and_programs_fill_georeference(form, order, tmp_path):
     lines = [form(n, 1000 + x, 2000 - r, 50 + y) for n, x, y, r in WALL]
-    head = "EPSG:25832\n" if "1.jpg" in lines[0] else ""
+    head = "EPSG:25832\n" if "far.jpg" in lines[0] else ""
     (tmp_path / "field.txt").write_text(head + "".join(lines), encoding="utf-8")
     path = fill(tmp_path / "s.xlsx", rows(WALL))
     solved = bifocal.solve(path, control=tmp_path / "field.txt", control_order=order)
