@@ -12,6 +12,7 @@ from photocore.errors import InputError, WorkbookError
 from photocore.tables import Column, open_tables, parse_column_map, read_table
 from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH, PHOTOS
 from photocore.tables.encodings import decoded
+from photocore.textfile import read_text
 
 COLUMNS = (
     Column("id", NAMES, kind="text"),
@@ -251,3 +252,17 @@ def test_grad_is_asked_for_whether_it_is_degrees_or_gon(tmp_path, text):
     path.write_text(text, encoding="utf-8")
     with pytest.raises(WorkbookError, match="Write deg or gon into the heading"):
         read_table(path, [Column("id", kind="text"), Column("theta", unit="deg")])
+
+
+def test_cells_with_formulas_beside_them_keep_their_feet_and_their_minus_9999(tmp_path):
+    (tmp_path / "a.csv").write_text("id,E [ft],N\nP1,10,-9999\n")
+    table = read_table(tmp_path / "a.csv", COLUMNS, as_typed=True)
+    assert rows(table, "E", "N") == [(10.0, -9999.0)]
+    assert table.units == {"E": "ft"}
+
+
+def test_a_pointer_of_git_lfs_is_called_so(tmp_path):
+    path = tmp_path / "reconstruction.json"
+    path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n")
+    with pytest.raises(InputError, match="pointer of Git LFS"):
+        read_text(path, "project")
