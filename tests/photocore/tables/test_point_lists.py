@@ -8,7 +8,7 @@ import ezdxf
 import numpy as np
 import pytest
 
-from photocore.errors import InputError, WorkbookError
+from photocore.errors import InputError, PhotogrammetryError, WorkbookError
 from photocore.tables import Column, open_tables, parse_column_map, read_table
 from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH, PHOTOS
 from photocore.tables.encodings import decoded
@@ -266,3 +266,44 @@ def test_a_pointer_of_git_lfs_is_called_so(tmp_path):
     path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n")
     with pytest.raises(InputError, match="pointer of Git LFS"):
         read_text(path, "project")
+
+
+LISTS = {
+    "a.gsi": "*110001+000000000000A110 81..10+0000000000652345 82..10+0000000006862123\n" * 2,
+    "gcp_list.txt": "EPSG:32632\n544256.7 5320919.9 5.5 3044.25 2622.5 IMG_0525.jpg gcp01\n",
+    "far.points": "#CRS: LOCAL\nmapX,mapY,sourceX,sourceY,enable\n1.25,2.5,100.5,-200.5,1\n",
+    "markers.xml": MARKERS,
+    "shots.geojson": shots(translation=[544256.7, 5320919.9, 305.5], X=1, Y=2.5),
+}
+
+
+@pytest.mark.parametrize("name", LISTS)
+def test_a_damaged_list_is_read_or_refused_in_words(tmp_path, name):
+    chance = np.random.default_rng(11)
+    pieces = [
+        "",
+        "x",
+        "-",
+        "NaN",
+        "1e400",
+        '"',
+        "[",
+        "]",
+        "{}",
+        "null",
+        "true",
+        "7",
+        "\t",
+        "\n",
+        "<",
+    ]
+    for _ in range(150):
+        text = LISTS[name]
+        for _ in range(chance.integers(1, 4)):
+            start = int(chance.integers(len(text)))
+            end = start + int(chance.integers(0, 9))
+            text = text[:start] + str(chance.choice(pieces)) + text[end:]
+        try:
+            read(tmp_path, name, text)
+        except PhotogrammetryError:
+            continue
