@@ -395,8 +395,9 @@ def _observations(
     units = dict(zip(POLAR, (TO_MM, TO_MM, TO_DEGREES), strict=True))
     turn = 2 * np.pi / np.radians(TO_DEGREES.get(table.units.get("theta", "deg"), 1.0))
     for row in np.flatnonzero(np.abs(table.numbers("theta")) > turn + 1e-9).tolist():
-        about = {"angle": float(table.numbers("theta")[row]), "turn": float(turn)}
-        errors.append(table.error(row, "theta", remark("survey.beyond_a_turn", **about)))
+        angle = float(table.numbers("theta")[row])
+        message = remark("survey.beyond_a_turn", angle=angle, turn=float(turn))
+        errors.append(table.error(row, "theta", message))
     units |= {key: {"px": 1.0} for key in (*PIXELS, *more)} | {"r_measured": TO_M}
     columns = {key: table.in_unit(key, factors, errors) for key, factors in units.items()}
     columns |= {key: table.numbers(key) * factor for key in XY}
