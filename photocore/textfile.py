@@ -14,6 +14,9 @@ from typing import Any
 from photocore.errors import InputError
 from photocore.provenance import note
 
+#: First words of what Git LFS leaves in the place of a file.
+_LFS = "version https://git-lfs.github.com/spec/"
+
 
 def check_name(path: Path) -> None:
     """Refuse a name that no file can have, whether there is one or not.
@@ -55,7 +58,10 @@ def read_text(path: Path, what: str, *, form: str = "") -> str:
     """
     with readable(path, what, missing=what):
         try:
-            return path.read_text(encoding="utf-8-sig")
+            text = path.read_text(encoding="utf-8-sig")
+            if text.startswith(_LFS):
+                raise InputError(f"{path}: is the pointer of Git LFS, not the file; git lfs pull.")
+            return text
         except UnicodeDecodeError:
             raise InputError(f"{path}: is not a text file, expected a {what}{form}.") from None
 

@@ -59,6 +59,7 @@ def make_desk(folder: Path) -> None:
     rows = _points()
     _pair(folder, "wall", (0, SIZE[0]), ("far.jpg", "near.jpg"))
     _table(folder / "points.csv", [row for row in rows if row[0] in CONTROL])
+    _station(folder / "station_pair.csv", [row for row in rows if row[0] in CONTROL])
     _table(folder / "check.csv", [row for row in rows if row[0] not in CONTROL])
     for name, part in PARTS.items():
         _pair(folder, name, part, (f"{name}_far.jpg", f"{name}_near.jpg"))
@@ -161,6 +162,18 @@ def _points() -> list[list[float | str]]:
         ]
         for name, *pixels, relief in picks
     ]
+
+
+def _station(path: Path, rows: list[list[float | str]]) -> None:
+    """Write points as a total station has them: E, N, H of a wall in azimuth 37.3 degrees."""
+    along = np.array([np.sin(np.deg2rad(37.3)), np.cos(np.deg2rad(37.3))])
+    lines = ["Punkt,E,N,H,col1,row1,col2,row2"]
+    for name, x, y, r, *pixels in rows:
+        east, north = [652345.0, 6862123.0] + x * along + r * along[::-1] * [1, -1]
+        lines.append(
+            ",".join([name, f"{east:.4f}", f"{north:.4f}", f"{250 + y:.4f}", *map(str, pixels)])
+        )
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def _inside(rows: list[list[float | str]], part: tuple[int, int]) -> list[list[float | str]]:

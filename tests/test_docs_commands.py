@@ -19,6 +19,7 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal import SAMPLE, PageServer
+from tests.bifocal.orientation.test_docs_control import LINES as CONTROL_LINES
 from tests.builders.commands import bifocal_command as bifocal
 from tests.builders.commands import multimedia_command as multimedia
 from tests.docs_desk import make_desk
@@ -75,6 +76,10 @@ NOT_RUN = {
     "bifocal align far.jpg near.jpg --auto --distance1 3.5 --focal1 35 --focal2 19 --sensor-width "
     "22.7 --indices 1,1.337 --depth 0.6 --wall 1480,910 --out pond.pair.json":
         "wants photos through a surface of water; test_common_points_through_media.py has them",
+    **dict.fromkeys(
+        (line for _, line in CONTROL_LINES if "points.csv" not in line),
+        "wants a program's list; test_docs_control.py has one for each line",
+    ),
     **dict.fromkeys(IN_PART, "names options, is no whole line"),
 }  # fmt: skip
 

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.image import as_grey, as_photo
 from bifocal.model.interior_orientation import Interior
+from bifocal.model.photo import FARTHEST_WALL
 from bifocal.model.photo_alone import PhotoAlone
 from bifocal.model.points import Points
 from bifocal.model.surface import FlatSurface
@@ -198,6 +199,9 @@ def rectify_photo(
         rectangle=rectangle, length=length and (np.reshape(length[:4], (2, 2)), length[4]),
         sigma_pick=given["sigma_pick"], sigma=given["sigma_control"],
     )  # fmt: skip
+    away = float(photo.camera.centre[2])
+    if away > FARTHEST_WALL and not given["unit"]:
+        raise InputError(remark("rectify.far_away", of=path.name, distance=away))
     pair = photo.as_pair(str(path.resolve()))
     keys = ("gsd", "bounds", "interpolation", "overviews", "any_size", "scale")
     task = OrthoTask.from_given({key: given[key] for key in keys})
@@ -215,7 +219,10 @@ def rectify_photo(
             control=_drawn(control), hashes=True,
             **{key: given[key] for key in ("scale", "dpi", "paper", "mark", "language")},
         )  # fmt: skip
-        done = deliver(pair, folder, task, wish, out=out, overwrite=overwrite, progress=progress)
+        done = deliver(
+            pair, folder, task, wish, out=out, world_file=world_file, overwrite=overwrite,
+            progress=progress,
+        )  # fmt: skip
         ortho = done.ortho
     told = _told(photo, ortho, relief, scale)
     return replace(told, delivery=done, remarks=(*reading, *told.remarks))

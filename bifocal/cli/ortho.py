@@ -132,8 +132,9 @@ def command(
             title = title or default_title(source, pair)
             wish = DeliverTask(title=title, hashes=True, **drawing)
             done = deliver(
-                source, folder, task, wish, out=out, overwrite=overwrite, progress=progress
-            )
+                source, folder, task, wish, out=out, world_file=tfw, overwrite=overwrite,
+                progress=progress,
+            )  # fmt: skip
             result = done.ortho
             files = {"folder": str(folder), "files": list(done.files), "sheet": done.sheet}
         else:

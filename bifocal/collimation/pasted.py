@@ -32,6 +32,8 @@ def pasted_control(text: str) -> list[tuple[str, Known, Picks]]:
     table = read_table(CsvFile("what was pasted", _with_headings(text)), COLUMNS)
     if not len(table) or len(table) > MOST_ROWS:
         raise InputError(remark("page.pasted_many", count=len(table), most=MOST_ROWS))
+    if np.isfinite(table.numbers("H")).any() and not np.isfinite(table.numbers("r")).any():
+        raise InputError(remark("page.pasted_heights"))
     known = np.column_stack([metres_of(table, key, "") for key in ("X", "Y", "r")])
     picks = np.column_stack([table.numbers(key) for key in ("col1", "row1", "col2", "row2")])
     rows = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -54,11 +54,32 @@ def save_drawing(drawing: Any, path: Path) -> None:
         if value:
             # A line of a DXF ends at a line break, and has no more than 255 characters in R2010.
             drawing.header.custom_vars.append(name[:255], " ".join(value.split())[:255])
+    _show_all(drawing)
     # ezdxf adds the classes of a drawing from a set, in an order that changes from run to run.
     for name in sorted(drawing.entitydb.dxf_types_in_use()):
         drawing.classes.add_class(name)
     with _reproducible():
         drawing.saveas(path)
+
+
+def _show_all(drawing: Any) -> None:
+    """Say where the drawing lies, so that it opens on what is drawn, wherever that is."""
+    from ezdxf import bbox
+
+    model = drawing.modelspace()
+    box = bbox.extents(model, fast=True)
+    if not box.has_data:
+        return
+    model.reset_extents(box.extmin, box.extmax)
+    height = 1.15 * max(float(box.size.y), 0.5 * float(box.size.x), 0.1)
+    drawing.set_modelspace_vport(height=height, center=(box.center.x, box.center.y))
+
+
+def add_line(model: Any, points: FloatArray | Sequence[Any], style: Mapping[str, Any]) -> None:
+    """Draw a line through points; one that ends where it begins is closed."""
+    places = [tuple(point) for point in points]
+    is_closed = len(places) > 3 and places[0] == places[-1]
+    model.add_lwpolyline(places[:-1] if is_closed else places, close=is_closed, dxfattribs=style)
 
 
 @contextmanager

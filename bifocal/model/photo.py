@@ -101,12 +101,14 @@ class Photo:
     def __post_init__(self) -> None:
         set_ = object.__setattr__
         matrix = read_only(self.plane_from_pixel, "plane_from_pixel", shape=(3, 3))
-        scaled = matrix / (np.abs(matrix).max() or 1.0)
+        set_(self, "nadir", read_only(self.nadir, "nadir", shape=(2,)))
+        # In a national grid, far from 0, 0, what counts is the shape about the nadir.
+        near = matrix - np.outer(np.append(self.nadir, 0.0), matrix[2])
+        scaled = near / (np.abs(near).max() or 1.0)
         # The image is some 1e4 px across: what matters is rank after bringing it to unit size.
         if abs(np.linalg.det(scaled @ np.diag([1e4, 1e4, 1.0]))) < 1e-12:
             raise GeometryError(remark("photo.singular"))
         set_(self, "plane_from_pixel", matrix)
-        set_(self, "nadir", read_only(self.nadir, "nadir", shape=(2,)))
         set_(self, "distance", positive(self.distance, "distance", unit="m"))
         for name, most in (("nadir", OUTERMOST), ("distance", FARTHEST)):
             if np.max(np.abs(getattr(self, name))) > most:

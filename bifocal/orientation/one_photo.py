@@ -133,6 +133,8 @@ def by_rectangle(
     if len(corners) != 4:
         raise InputError(f"--rectangle: {len(corners)} corners; a rectangle has four.")
 
+    begun, start = _begun_at(corners), ""
+
     def cornered(width: float, height: float) -> Control:
         xyz = np.array([[0, height, 0], [width, height, 0], [width, 0, 0], [0.0, 0, 0]])
         return Control(
@@ -151,7 +153,10 @@ def by_rectangle(
 
     width, height = (positive(side, "--rectangle", unit="m") for side in sides)
     if misfit(height, width) < min(SLIPS.fits, misfit(width, height) / SLIPS.better):
-        raise GeometryError(remark("rectify.sides", width=width, height=height))
+        if begun % 2:  # clockwise from another corner, the sides are then as typed
+            corners, start = np.roll(corners, begun, axis=0), remark("rectify.begun_aside")
+        else:
+            raise GeometryError(remark("rectify.sides", width=width, height=height))
 
     def proportions() -> str:
         def misfits(factors: FloatArray) -> FloatArray:
@@ -178,7 +183,17 @@ def by_rectangle(
             raise GeometryError(words) from None
         raise
     words = proportions() if photo.sigma0 > SLIPS.doubted else ""
-    return replace(photo, remarks=(words, *photo.remarks)) if words else photo
+    if begun == 2:
+        start = remark("rectify.begun_below")
+    said = [text for text in (start, words) if text]
+    return replace(photo, remarks=(*said, *photo.remarks)) if said else photo
+
+
+def _begun_at(corners: FloatArray) -> int:
+    """Return by how many corners a rectangle was begun after its upper left one, as seen."""
+    square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    flat = (corners - corners.mean(axis=0)) / np.ptp(corners, axis=0).clip(1e-9)
+    return int(np.argmax([(np.roll(flat, k, axis=0) * square).sum() for k in range(4)]))
 
 
 def by_control(control: Control, interior: Interior, *, sigma_pick: float) -> OrientedPhoto:

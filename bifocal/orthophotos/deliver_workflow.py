@@ -159,6 +159,7 @@ def deliver(
     wish: DeliverTask,
     *,
     out: Path | None = None,
+    world_file: bool = False,
     overwrite: bool = False,
     progress: Progress = no_progress,
 ) -> Delivery:
@@ -168,6 +169,8 @@ def deliver(
     ----------
     out : Path, optional
         Where the orthophoto is wanted besides.
+    world_file : bool
+        Whether that one has a ``.tfw`` beside it, as the one in the folder has.
 
     Raises
     ------
@@ -207,10 +210,11 @@ def deliver(
         flat = isinstance(surface, FlatSurface)
         relief = None if flat else _prepared((surface, measured), reader, drawing, wish)
         inside = out is not None and out.resolve().parent == folder.resolve()
-        extra = (out.name,) if out is not None and inside else ()
+        copies = [] if out is None else [out, out.with_suffix(".tfw")][: 1 + world_file]
+        extra = tuple(path.name for path in copies) if inside else ()
         _check_free(folder, name, relief is not None, len(cuts), extra, overwrite=overwrite)
-        if out is not None and not inside:
-            copy = stack.enter_context(atomic_path(out, overwrite=overwrite))
+        outside = [] if inside else copies
+        targets = [stack.enter_context(atomic_path(p, overwrite=overwrite)) for p in outside]
         place = stack.enter_context(atomic_folder(folder, overwrite=overwrite))
         result = make_ortho(
             pair_path, place / f"{name}.tif", task, world_file=True, progress=progress
@@ -228,8 +232,10 @@ def deliver(
         for number, cut in enumerate(cuts, start=1):
             for writer, ending in ((write_section_dxf, "dxf"), (write_section_svg, "svg")):
                 writer(place / f"{name}_section{number}.{ending}", cut, drawing=drawing)
-        if out is not None and extra != (f"{name}.tif",):
-            shutil.copyfile(place / f"{name}.tif", place / out.name if inside else copy)
+        for path, target in zip(copies, targets or [place / one for one in extra], strict=True):
+            original = place / f"{name}.{'tfw' if path.suffix == '.tfw' else 'tif'}"
+            if target != original:
+                shutil.copyfile(original, target)
         files = {item.name for item in place.iterdir()}
     if wish.hashes:
         files.add(list_hashes(folder, files))

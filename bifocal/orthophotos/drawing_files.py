@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.files.dxf import add_text, dashed, new_drawing, save_drawing, turned
+from bifocal.files.dxf import add_line, add_text, dashed, new_drawing, save_drawing, turned
 from bifocal.model.points import Points
 from bifocal.orthophotos.contour_lines import contour_labels
 from bifocal.orthophotos.drawing import TABLES, Drawing, PrintSheet, Section
@@ -36,7 +36,7 @@ def write_drawing(path: Path, drawing: Drawing, sheet: PrintSheet, image_name: s
         TABLES["layers"], point_style=34, point_size=3 * drawing.scale / 1000
     )
     grid = drawing.grid
-    xmin, ymin, xmax, ymax = grid.bounds
+    xmin, ymin = grid.bounds[:2]
     if image_name is not None:
         definition = document.add_image_def(
             filename=image_name, size_in_pixel=(grid.width, grid.height)
@@ -71,9 +71,6 @@ def write_drawing(path: Path, drawing: Drawing, sheet: PrintSheet, image_name: s
         for measured, line in cut.in_space():
             layer = "BIFOCAL_SECTIONS" if measured else "BIFOCAL_SECTIONS_GUESSED"
             model.add_polyline3d(line.tolist(), dxfattribs={"layer": layer})
-    document.set_modelspace_vport(
-        height=1.15 * (ymax - ymin), center=((xmin + xmax) / 2, (ymin + ymax) / 2)
-    )
     _lay_out(document, drawing, sheet)
     name_layers(document, drawing.layers, drawing.language)
     with atomic_path(path, overwrite=False) as temporary:
@@ -93,7 +90,7 @@ def _contours(model: Any, drawing: Drawing, paper: float) -> None:
         layer = "BIFOCAL_CONTOURS_INDEX" if contour.index else "BIFOCAL_CONTOURS"
         style: dict[str, Any] = {"layer": layer, "elevation": contour.level}
         style["lineweight"] = 25 if contour.index else 9
-        model.add_lwpolyline(contour.line.tolist(), dxfattribs=style)
+        add_line(model, contour.line.tolist(), style)
     for label in contour_labels(drawing.contours, drawing.scale):
         # Above the line, for nothing hides the line behind a text of CAD.
         turn, lift = math.radians(label.angle), (0.36 * CONTOURS.label_size + SHEET.above) * paper

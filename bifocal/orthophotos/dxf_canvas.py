@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from bifocal.files.dxf import add_text, dashed, turned
+from bifocal.files.dxf import add_line, add_text, dashed, turned
 from bifocal.orthophotos.canvas import BLACK, Colour, Pen, Place
 
 #: Widths that drawings know, in hundredths of a millimetre.
@@ -31,7 +31,7 @@ class DxfCanvas:
         style = self._style(pen)
         if pen.dashes:
             style |= dashed(self.space, "DASHED", sum(pen.dashes) * self.unit)
-        self.space.add_lwpolyline(self._scaled(points), dxfattribs=style)
+        add_line(self.space, self._scaled(points), style)
 
     def area(self, corners: Sequence[Place], pen: Pen) -> None:
         """Fill a triangle or a four-sided polygon."""

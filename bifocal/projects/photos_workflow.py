@@ -201,7 +201,9 @@ def _frame(
     """Return the wall's frame, points of it, the frame's covariance, its scale, what to say."""
     named = {} if options.points is None else read_points(options.points, project.views)
     if options.control is not None:
-        frame, covariance, fits = by_control(named, options.control, options.sigma_control)
+        frame, covariance, fits = by_control(
+            named, options.control, options.sigma_control, project.views
+        )
         places = np.array(list(named.values()))
         return frame, places, covariance, remark("projects.by_control"), [fits]
     points = sparse_points(project, options.cloud)

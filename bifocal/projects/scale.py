@@ -7,13 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
+from bifocal.model.lens import Lens
 from bifocal.model.orientation_precision import CAMERA
+from bifocal.orientation.control_lists import in_plane_frame
 from bifocal.orientation.control_points import COLUMNS, metres_of
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
+from photocore.camera.pinhole import Pinhole, project
 from photocore.camera.rotation import skew
 from photocore.camera.similarity import Similarity, fit_similarity
 from photocore.errors import InputError, WorkbookError
+from photocore.programs.model import ForeignView
+from photocore.provenance import note_remark
 from photocore.tables import read_table
 
 #: Control points that miss by more than this share of their extent are not those that were picked.
@@ -21,7 +26,7 @@ MOST_MISS = 0.02
 
 
 def by_control(
-    points: dict[str, FloatArray], path: Path, sigma: float
+    points: dict[str, FloatArray], path: Path, sigma: float, views: Sequence[ForeignView] = ()
 ) -> tuple[Similarity, FloatArray, str]:
     """Return the frame of control points, its covariance (`of_cameras`), and how well it fits.
 
@@ -30,19 +35,29 @@ def by_control(
     points : dict
         Named points in the project's frame.
     path : path
-        Table of the same: id, X, Y, r [m], sigma; r blank: on the wall.
+        Table of the same: id, X, Y, r [m], sigma; r blank: on the wall. Or id, E, N, H.
     sigma : float
         Standard deviation of a coordinate, where the table has none. [m]
+    views : sequence of ForeignView
+        Photos that tell the front of an upright wall in E, N, H.
 
     Raises
     ------
     InputError, GeometryError
         If fewer than three points are in both, or they do not fit.
     """
-    table = read_table(path, [one for one in COLUMNS if one.key in ("id", "X", "Y", "r", "sigma")])
+    keys = ("id", "X", "Y", "r", "H", "sigma")
+    table = read_table(path, [one for one in COLUMNS if one.key in keys])
     if errors := table.repeated("id"):
         raise WorkbookError(errors)
     xyz = np.column_stack([metres_of(table, key, "") for key in ("X", "Y", "r")])
+    blank = np.full(3, np.nan)
+    places = np.array([points.get(name, blank) for name in table.texts("id")]).reshape(-1, 3)
+    cameras = [Pinhole(Lens(**v.lens._asdict()).camera_matrix, v.rotation, v.centre) for v in views]
+    picks = [project(camera, places) for camera in cameras]
+    xyz, _, notes = in_plane_frame(table, xyz, metres_of(table, "H", ""), picks, None)
+    for text in notes:
+        note_remark(f"{path.name}: {text}")
     xyz[np.isnan(xyz[:, 2]), 2] = 0.0
     rows = [row for row, name in enumerate(table.texts("id"))
             if name in points and np.isfinite(xyz[row]).all()]  # fmt: skip

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from bifocal.model.world_frame import WorldFrame
 from bifocal.remarks import remark
 from bifocal.survey.tolerances import Verdict
 from bifocal.survey.transformation_precision import TransformationPrecision
@@ -178,7 +179,8 @@ class Georeference:
     world_from_wall : Similarity
         X, Y, Z on the wall to E, N, H.
     model : str
-        ``"2D"``, ``"levelled"`` or ``"3D"``.
+        ``"2D"``, ``"levelled"`` or ``"3D"``; ``"frame"``: the pair's own control points were E, N,
+        H.
     residuals : ndarray, shape (n, 3)
         Known minus computed E, N, H, also of points left out; NaN where unknown. [m]
     solved : ndarray, shape (n, 3)
@@ -219,6 +221,19 @@ class Georeference:
     covariance: FloatArray | None = None
     near: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     precision: TransformationPrecision | None = None
+
+    @classmethod
+    def of_frame(cls, frame: WorldFrame) -> Georeference:
+        """Return the place of a wall whose plane frame was made of E, N, H; it rests on no fit."""
+        none, whole = np.zeros((0, 3)), np.floor(frame.origin)
+        place = Similarity(
+            scale=1.0, rotation=frame.axes.T, source_centre=np.zeros(3), target_centre=frame.origin
+        )
+        return cls(
+            ids=(), world_from_wall=place, model="frame", residuals=none, solved=none,
+            used=np.zeros(0, dtype=bool), bad=(), sigma0=np.nan, redundancy=0, origin=whole,
+            offset=frame.origin - whole,
+        )  # fmt: skip
 
     def covariance_of(
         self,

@@ -229,6 +229,8 @@ def summary(solution: SolvedSurvey) -> list[str]:
     geo = solution.georeference
     if geo is not None:
         used = int(geo.used.sum())
+        if geo.model == "frame":
+            return [*lines, "Georeference: as the pair's own control points were E, N, H"]
         spread = "no redundancy" if math.isnan(geo.sigma0) else f"sigma0 {geo.sigma0:.4f} m"
         lines.append(
             f"Georeference: {geo.model}, {used} {_points(used)}, {spread}, scale "

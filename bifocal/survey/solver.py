@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from bifocal.model.homography import apply_homography
 from bifocal.model.hypotheses import SCALE_TOLERANCE
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
+from bifocal.model.world_frame import WorldFrame
 from bifocal.remarks import remark
 from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
@@ -93,7 +95,7 @@ def solve_survey(
     unused = points.unused
     known, control = survey.known.without(unused), survey.control.without(unused)
     check = check_points(table, known, rules)
-    world, world_remarks = _placed(control, table, survey.model)
+    world, world_remarks = _placed(control, table, survey.model, pair.extra)
     plane = arranged.check
     remarks = (
         *survey.remarks,
@@ -158,7 +160,7 @@ def solve_survey_of_set(
     unused = points.unused
     known, control = survey.known.without(unused), survey.control.without(unused)
     check = check_points(table, known, rules)
-    world, world_remarks = _placed(control, table, survey.model)
+    world, world_remarks = _placed(control, table, survey.model, photos.extra)
     remarks = (
         *survey.remarks, *said, *off, *check.remarks,
         *unused_remarks(unused, Check=survey.known, Georeference=survey.control),
@@ -172,11 +174,12 @@ def solve_survey_of_set(
 
 
 def _placed(
-    control: KnownPoints, table: ReliefTable, model: str
+    control: KnownPoints, table: ReliefTable, model: str, extra: Mapping[str, Any]
 ) -> tuple[Georeference | None, list[str]]:
-    """Return the wall in the world, where there are control points, and remarks on it."""
+    """Return the wall in the world, and remarks on it: by control points, or as the pair's were."""
     if not control.used.any() or np.isnan(control.xyz).all():
-        return None, []
+        frame = WorldFrame.of(extra)
+        return None if frame is None else Georeference.of_frame(frame), []
     world = georeference(table, control, model=model)
     return world, georeference_remarks(world, control, table, is_auto=model == "auto")
 

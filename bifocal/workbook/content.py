@@ -131,11 +131,13 @@ class SurveyContent:
     def of(cls, solved: SolvedSurvey) -> SurveyContent:
         """Return what the workbook shows of a solved survey."""
         survey, setup = solved.survey, solved.survey.setup
+        # The sheet's formulas place a wall by control points of the sheet alone.
+        placed = solved.georeference if survey.control.used.any() else None
         return cls(
             language=survey.language, setup=solved.setup, pair=solved.pair,
             sigma_px=solved.sigma_px, points=solved.points, table=solved.table,
             known=survey.known, control=survey.control, tape=survey.tape,
-            georeference=solved.georeference, model=survey.model, rules=solved.rules,
+            georeference=placed, model=survey.model, rules=solved.rules,
             sensor=setup.sensor, limits=setup.measuring.limits, media=solved.media,
         )  # fmt: skip
 

@@ -83,7 +83,15 @@ def read_shift_input(
     """
     book = open_tables(path)
     _refuse_survey(book)
-    table = read_table(book, COLUMNS, name="Multimedia", sheet=sheet, decimal=decimal)  # type: ignore[arg-type]
+    typed = isinstance(book, SheetFile)
+    table = read_table(
+        book,
+        COLUMNS,
+        name="Multimedia",
+        sheet=sheet,
+        decimal=decimal,  # type: ignore[arg-type]
+        as_typed=typed,
+    )
     if not {"R", "ZP"} <= table.present and not {"X", "Y", "Z"} <= table.present:
         raise InputError(remark("shift.no_columns", of=table.file))
     units = {table.units[key] for key in ("X", "Y", "Z", "R", "ZP") if key in table.units}

@@ -145,8 +145,13 @@ def _of_opendronemap(text: str, label: str) -> ListRows | None:
 
 def _of_qgis(text: str, label: str) -> ListRows | None:
     """Return points of the georeferencer of QGIS; it counts from the corner, rows down negative."""
-    table = [*csv.reader(StringIO(text))]
-    head = next(k for k, fields in enumerate(table) if "mapX" in fields)
+    try:
+        table = [*csv.reader(StringIO(text))]
+    except csv.Error:
+        return None
+    head = next((k for k, fields in enumerate(table) if "mapX" in fields), None)
+    if head is None:
+        return None
     kind = "pixel" if "pixelX" in table[head] else "source"
     wanted = ("mapX", "mapY", f"{kind}X", f"{kind}Y")
     if not {*wanted} <= {*table[head]}:
@@ -188,7 +193,8 @@ def _of_metashape(text: str, label: str) -> ListRows | None:
     for node in chunk.findall(".//marker[@marker_id]"):
         for at in node.findall("location"):
             # Metashape counts from the corner of the first pixel.
-            pixel = [f"{float(at.get(axis, 'nan')) - 0.5:.10g}" for axis in "xy"]
+            texts = [at.get(axis, "") for axis in "xy"]
+            pixel = [f"{float(t) - 0.5:.10g}" if _is_number(t) else t for t in texts]
             photo = photos.get(at.get("camera_id"), "")
             places.setdefault(node.get("marker_id", ""), []).append((photo, *pixel))
     rows: list[Sequence[object]] = []
@@ -219,11 +225,14 @@ def _of_geojson(text: str, label: str) -> ListRows | None:
     if not isinstance(features, list):
         raise InputError(remark("table.no_points", of=label))
     kept: list[dict[str, object]] = []
+    is_local = False
     for feature in features:
         geometry = feature.get("geometry") if isinstance(feature, dict) else None
         if not isinstance(geometry, dict) or geometry.get("type") != "Point":
             continue
-        about = feature.get("properties") or {}
+        about = feature.get("properties")
+        about = about if isinstance(about, dict) else {}
+        is_local |= "translation" in about
         place: Any = about.get("translation") or geometry.get("coordinates")
         if not _are_numbers(place):
             raise InputError(remark("table.no_points", of=label))
@@ -235,12 +244,11 @@ def _of_geojson(text: str, label: str) -> ListRows | None:
         kept.append({"id": name, **rest, **axes})
     if not kept:
         raise InputError(remark("table.no_points", of=label))
-    if all("translation" not in (f.get("properties") or {}) for f in features):
+    if not is_local:
         _refuse_degrees(json.dumps(held.get("crs", "")), label, kept)
     headings = tuple(dict.fromkeys(key for row in kept for key in row))
     rows: list[Sequence[object]] = [[row.get(key, "") for key in headings] for row in kept]
-    program = "WebODM" if "translation" in (features[0].get("properties") or {}) else "GeoJSON"
-    return ListRows(headings, rows, program)
+    return ListRows(headings, rows, "WebODM" if is_local else "GeoJSON")
 
 
 _NAMES = frozenset(map(bare, ("id", "filename", *NAMES)))
@@ -278,7 +286,8 @@ def _refuse_degrees(system: str, label: str, rows: Sequence[Mapping[str, Any]] =
         Naming what to export instead.
     """
     is_place = False
-    if rows and system in ('""', "null") and all("X" in row and "Y" in row for row in rows):
+    bare_places = all(_is_number(str(row.get(axis))) for row in rows for axis in "XY")
+    if rows and system in ('""', "null") and bare_places:
         spans = [[float(row[axis]) for row in rows] for axis in "XY"]
         within = all(max(map(abs, s)) <= most for s, most in zip(spans, (180, 90), strict=True))
         is_place = within and max(max(s) - min(s) for s in spans) < _PLACE

@@ -99,6 +99,7 @@ def read_table(
     max_rows: int = 100_000,
     visible_only: bool = False,
     whole: bool = False,
+    as_typed: bool = False,
     errors: list[CellError] | None = None,
 ) -> Table:
     """Read a table, found by name, then by its headings, wherever it stands.
@@ -125,6 +126,8 @@ def read_table(
     whole : bool
         Take a row apart from the table, with less than half the numbers of the one before, for a
         note.
+    as_typed : bool
+        Keep feet and -9999 as they stand in the cells, for formulas beside them that use these.
     errors : list, optional
         Gathers the bad cells instead of raising, to report those of several tables together.
 
@@ -166,7 +169,8 @@ def read_table(
         table = _new_table(book, place, rows)
         _refuse_merged(table, place.grid, complaints)
         fill(table, columns, _cells(place, rows), decimal, complaints)
-    _settle(table, columns)
+    if not as_typed:
+        _settle(table, columns)
     guessed = place.match.guessed
     if guessed in table.remarks and ("" in table.texts("id") or table.repeated("id")):
         table.values["id"], table.present = [""] * len(table), table.present - {"id"}

@@ -247,6 +247,7 @@ def _known(survey: OpenSurvey, sheet: str, keys: tuple[str, str, str]) -> _Known
         name="Geo" if sheet == "Georeference" and areas else sheet,
         sheet=areas[0].sheet if areas else titles[0],
         decimal=survey.decimal,
+        as_typed=True,
         errors=errors,
     )
     faulty = {(error.sheet, error.cell) for error in errors}
@@ -308,6 +309,7 @@ def _read_points(survey: OpenSurvey, options: ReadOptions) -> Table:
                 column_map=options.columns or None,
                 visible_only=options.visible_only,
                 whole=options.photos == 2 and not ours,
+                as_typed=isinstance(book, SheetFile),
                 errors=complaints,
             )
         except InputError:
@@ -391,6 +393,11 @@ def _observations(
     use = table.numbers("use")
     unit, factor = _unit_of_xy(table, errors)
     units = dict(zip(POLAR, (TO_MM, TO_MM, TO_DEGREES), strict=True))
+    turn = 2 * np.pi / np.radians(TO_DEGREES.get(table.units.get("theta", "deg"), 1.0))
+    for row in np.flatnonzero(np.abs(table.numbers("theta")) > turn + 1e-9).tolist():
+        angle = float(table.numbers("theta")[row])
+        message = remark("survey.beyond_a_turn", angle=angle, turn=float(turn))
+        errors.append(table.error(row, "theta", message))
     units |= {key: {"px": 1.0} for key in (*PIXELS, *more)} | {"r_measured": TO_M}
     columns = {key: table.in_unit(key, factors, errors) for key, factors in units.items()}
     columns |= {key: table.numbers(key) * factor for key in XY}

@@ -8,10 +8,11 @@ import ezdxf
 import numpy as np
 import pytest
 
-from photocore.errors import InputError, WorkbookError
+from photocore.errors import InputError, PhotogrammetryError, WorkbookError
 from photocore.tables import Column, open_tables, parse_column_map, read_table
 from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH, PHOTOS
 from photocore.tables.encodings import decoded
+from photocore.textfile import read_text
 
 COLUMNS = (
     Column("id", NAMES, kind="text"),
@@ -251,3 +252,58 @@ def test_grad_is_asked_for_whether_it_is_degrees_or_gon(tmp_path, text):
     path.write_text(text, encoding="utf-8")
     with pytest.raises(WorkbookError, match="Write deg or gon into the heading"):
         read_table(path, [Column("id", kind="text"), Column("theta", unit="deg")])
+
+
+def test_cells_with_formulas_beside_them_keep_their_feet_and_their_minus_9999(tmp_path):
+    (tmp_path / "a.csv").write_text("id,E [ft],N\nP1,10,-9999\n")
+    table = read_table(tmp_path / "a.csv", COLUMNS, as_typed=True)
+    assert rows(table, "E", "N") == [(10.0, -9999.0)]
+    assert table.units == {"E": "ft"}
+
+
+def test_a_pointer_of_git_lfs_is_called_so(tmp_path):
+    path = tmp_path / "reconstruction.json"
+    path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n")
+    with pytest.raises(InputError, match="pointer of Git LFS"):
+        read_text(path, "project")
+
+
+LISTS = {
+    "a.gsi": "*110001+000000000000A110 81..10+0000000000652345 82..10+0000000006862123\n" * 2,
+    "gcp_list.txt": "EPSG:32632\n544256.7 5320919.9 5.5 3044.25 2622.5 IMG_0525.jpg gcp01\n",
+    "far.points": "#CRS: LOCAL\nmapX,mapY,sourceX,sourceY,enable\n1.25,2.5,100.5,-200.5,1\n",
+    "markers.xml": MARKERS,
+    "shots.geojson": shots(translation=[544256.7, 5320919.9, 305.5], X=1, Y=2.5),
+}
+
+
+@pytest.mark.parametrize("name", LISTS)
+def test_a_damaged_list_is_read_or_refused_in_words(tmp_path, name):
+    chance = np.random.default_rng(11)
+    pieces = [
+        "",
+        "x",
+        "-",
+        "NaN",
+        "1e400",
+        '"',
+        "[",
+        "]",
+        "{}",
+        "null",
+        "true",
+        "7",
+        "\t",
+        "\n",
+        "<",
+    ]
+    for _ in range(150):
+        text = LISTS[name]
+        for _ in range(chance.integers(1, 4)):
+            start = int(chance.integers(len(text)))
+            end = start + int(chance.integers(0, 9))
+            text = text[:start] + str(chance.choice(pieces)) + text[end:]
+        try:
+            read(tmp_path, name, text)
+        except PhotogrammetryError:
+            continue
