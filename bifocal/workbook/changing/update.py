@@ -23,7 +23,7 @@ from bifocal.workbook.content import CHART_ROWS, STRUCTURED_ROWS, SurveyContent
 from bifocal.workbook.formulas.columns import CHANGED, results_columns
 from bifocal.workbook.formulas.setup_cells import TYPED_FORMULAS
 from bifocal.workbook.formulas.space_block import BLOCK
-from bifocal.workbook.formulas.world_state import SITE, SPEAKING, STATE
+from bifocal.workbook.formulas.world_state import SPEAKING, STATE
 from bifocal.workbook.making.book import UNPRINTED, build, unprinted_formula
 from bifocal.workbook.making.charts import HEAD, LEFT
 from bifocal.workbook.words import word
@@ -266,7 +266,7 @@ def store_named_cells(editor: WorkbookEditor, built: BookBuilder, content: Surve
         if place is None:
             continue
         value = built.results[sheet].get(cell)
-        if name == "title_world" and place_of(editor, SITE) is None:  # of an older version
+        if name == "title_world" and not _is_judged(editor, place):  # of an older version
             value = built.value_of(STATE)
         if name in typed and content.georeference is not None:
             shown = built.book[sheet][cell].value
@@ -277,6 +277,12 @@ def store_named_cells(editor: WorkbookEditor, built: BookBuilder, content: Surve
             is_text = isinstance(editor.value_at(*place), str)
             if is_text and _is_number(value):
                 editor.set_value(*place, value)
+
+
+def _is_judged(editor: WorkbookEditor, place: tuple[str, int, int]) -> bool:
+    """Whether the sentence on `Results` repeats more than that of the world coordinates."""
+    model = editor.models(place[0], place[1]).get(place[2])
+    return model is not None and "TRIM(" in model.formula
 
 
 def _store_block(editor: WorkbookEditor, results: Mapping[str, CellValue], cells: str) -> None:
