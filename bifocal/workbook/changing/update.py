@@ -20,7 +20,7 @@ from bifocal.workbook.changing.setup_update import (
 )
 from bifocal.workbook.changing.translate import translate
 from bifocal.workbook.content import CHART_ROWS, STRUCTURED_ROWS, SurveyContent
-from bifocal.workbook.formulas.columns import CHANGED
+from bifocal.workbook.formulas.columns import CHANGED, results_columns
 from bifocal.workbook.formulas.setup_cells import TYPED_FORMULAS
 from bifocal.workbook.formulas.space_block import BLOCK
 from bifocal.workbook.formulas.world_state import SITE, SPEAKING, STATE
@@ -129,6 +129,9 @@ def update_book(
     if points is None:
         raise InputError(f"{source}: has lost its table tblPoints; write to a new workbook.")
     check_kind(source, survey, content)
+    if "sigma_E" not in points.headings():
+        columns = results_columns(is_pair=content.is_pair, older=True)
+        built.tables["tblResults"] = replace(built.tables["tblResults"], columns=columns)
     if other_words := content.language != survey.language:
         translate(editor, built, content, survey.language)
     added = add_missing_sheets(editor, built)

@@ -18,7 +18,7 @@ FORMULAS = FormulaBook(__package__)
 #: The functions with names of `bifocal template --functions`, a table each.
 FUNCTIONS = FormulaBook(__package__, "functions")
 #: E, N, H from a whole-metre origin: columns that refer to the sheet `Georeference`.
-NEAR = ("n_E", "n_N", "n_H", "cov_EN")
+NEAR = ("n_E", "n_N", "n_H", "cov_EN", "shared", "sigma_E", "sigma_N", "sigma_H")
 #: What the sheet `WhatIf` changes: distances [m], principal distances [mm], size of a pixel [mm].
 CHANGED = ("d_1", "d_2", "c_1", "c_2", "pitch")
 #: World coordinates carry no more than so many digits: what is below is no contradiction.
@@ -152,7 +152,7 @@ def _layers(media: int) -> dict[str, str]:
     return {"last": str(media), "glass": "".join(glass), "plates": plates}
 
 
-def results_columns(*, is_pair: bool) -> tuple[LiveColumn, ...]:
+def results_columns(*, is_pair: bool, older: bool = False) -> tuple[LiveColumn, ...]:
     """Return the columns of `Results`: what a survey found, on the wall and in the world.
 
     Parameters
@@ -160,8 +160,11 @@ def results_columns(*, is_pair: bool) -> tuple[LiveColumn, ...]:
     is_pair : bool
         Whether `Points` keeps the covariances of the picks for one pixel, and apart from them what
         the photos' orientation adds: on the wall, and once placed in the world.
+    older : bool
+        Whether `Points` lacks the sigmas of E, N, H, as older versions wrote it.
     """
-    return FORMULAS.columns("results", {"pair"} if is_pair else (), placed_parts())
+    facts = {name for name, holds in (("pair", is_pair), ("older", older)) if holds}
+    return FORMULAS.columns("results", facts, placed_parts())
 
 
 def georeference_columns(*, is_pair: bool) -> tuple[LiveColumn, ...]:

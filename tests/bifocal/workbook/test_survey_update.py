@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import zipfile
+from functools import partial
 
 import openpyxl
 import pytest
 from openpyxl.drawing.image import Image
 from PIL import Image as Picture
 
+from bifocal.workbook.formulas.columns import FORMULAS, results_columns
+from bifocal.workbook.making import book as making
+from bifocal.workbook.template_workflow import write_template
 from tests.bifocal.workbook.test_cli_solve import POINTS, SETUP, fill, put, rows, run, write_csv
 from tests.bifocal.workbook.test_survey_workbook import (
     assert_recalculated_equals_cached,
@@ -196,3 +200,31 @@ def test_sentences_that_an_older_version_wrote_are_no_changes_by_hand(tmp_path):
     assert "changed by hand" not in found.stderr
     shown = openpyxl.load_workbook(path, data_only=True)
     assert not named(shown, "title_world").value
+
+
+def test_a_workbook_whose_points_lack_sigmas_of_the_world_keeps_its_own_formulas(
+    tmp_path, monkeypatch
+):
+    path, fresh = tmp_path / "s.xlsx", fill(tmp_path / "t.xlsx", Georeference=WORLD)
+    with monkeypatch.context() as older:
+        listed = FORMULAS.content["rows"]
+        older.setitem(listed, "near", listed["near"][:2])
+        older.setattr(making, "results_columns", partial(results_columns, older=True))
+        write_template(path, rows=2)
+    book = openpyxl.load_workbook(path)
+    for name, value in SETUP.items():
+        put(book, name, value)
+    for title, lines, first in (("Points", rows(POINTS), 5), ("Georeference", WORLD, 13)):
+        for row, line in enumerate(lines, start=first):
+            for column, value in enumerate(line, start=1):
+                book[title].cell(row, column, value)
+    book.save(path)
+    for one in (path, fresh):
+        found = run("solve", one, "--out", one, "--overwrite")
+        assert "changed by hand" not in found.stderr
+    formulas = openpyxl.load_workbook(path)["Results"]
+    sheets = [openpyxl.load_workbook(one, data_only=True)["Results"] for one in (path, fresh)]
+    for row in (5, 8):
+        assert "g_z_E" in str(formulas.cell(row, 11).value)
+        sigmas = [[sheet.cell(row, column).value for column in (11, 12, 13)] for sheet in sheets]
+        assert sigmas[0] == pytest.approx(sigmas[1], rel=1e-9)

@@ -340,7 +340,7 @@ def test_the_printed_rows_follow_the_points_and_all_rows_are_seen(filled):
     solve(filled, "--lang", "it")
     book = openpyxl.load_workbook(filled)
     assert book["Results"].print_area == "'Results'!$A$1:$O$44"
-    assert book["Points"].print_area == "'Points'!$A$3:$AU$44"
+    assert book["Points"].print_area == "'Points'!$A$3:$AY$44"
     assert book["Points"]["E1"].value.startswith('=IF(COUNTA(tblPoints[id])>40,"Altri punti')
     assert "Mancano ancora" in book["Setup"]["A3"].value
     light = openpyxl.load_workbook(filled, read_only=True, data_only=True)
