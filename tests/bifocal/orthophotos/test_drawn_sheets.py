@@ -177,8 +177,8 @@ def test_out_may_lie_in_the_folder_that_a_delivery_makes(wall: Path) -> None:
     assert not (wall / "d" / "Other.tif").exists()
     same = run(wall, *few[:-1], "e", "--out", "e/Torre_est.tif")
     assert same.exit_code == 0, same.output
-    assert sorted(p.suffix for p in (wall / "e").iterdir()) == [
-        ".dxf", ".pdf", ".png", ".tfw", ".tif"
+    assert sorted(p.suffix or p.name for p in (wall / "e").iterdir()) == [
+        ".dxf", ".pdf", ".png", ".tfw", ".tif", "SHA256SUMS"
     ]  # fmt: skip
 
 
