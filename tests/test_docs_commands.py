@@ -36,6 +36,10 @@ MINUTES = "minutes of processor time"
 SERVES = "serves until it is stopped; its options are read below"
 #: Commands of the pages that are not run, and why.
 NOT_RUN = {
+    "bifocal solve survey.xlsx --control station.csv --out survey.xlsx --overwrite":
+        "the tests of lists for a workbook run it",
+    "bifocal solve survey.xlsx --control station.gsi --out survey.xlsx --overwrite":
+        "the tests of lists for a workbook run it",
     "python3 -m venv .venv && .venv/bin/pip install -q . && .venv/bin/bifocal demo --overwrite":
         ELSEWHERE,
     'python3 -m venv .venv && .venv/bin/pip install -q ".[test]" && .venv/bin/pytest': ELSEWHERE,
