@@ -18,17 +18,26 @@ def plain_name(text: str) -> str:
     return unicodedata.normalize("NFC", text).casefold().strip().replace("\\", "/")
 
 
-def called(name: str, names: Sequence[str]) -> list[int]:
+def called(name: str, names: Sequence[str | Sequence[str]]) -> list[int]:
     """Return which of the names are meant: whole, else without folders, else without ending.
+
+    One that has several is listed with all of them.
 
     Examples
     --------
     >>> called("img_1.jpg", ["a/IMG_1.JPG", "IMG_2.JPG"]), called("IMG_3", ["IMG_1.JPG"])
     ([0], [])
+    >>> called("2", [("far", "1"), ("near", "2")])
+    [1]
     """
+    each = [(one,) if isinstance(one, str) else one for one in names]
     wanted = PurePath(plain_name(name))
     for form in _FORMS:
-        fits = [k for k, one in enumerate(names) if form(PurePath(plain_name(one))) == form(wanted)]
+        fits = [
+            k
+            for k, forms in enumerate(each)
+            if any(one and form(PurePath(plain_name(one))) == form(wanted) for one in forms)
+        ]
         if fits:
             return fits
     return []

@@ -95,7 +95,8 @@ def command(
     transition.
     """
     from bifocal.faces.faces_files import faces_path, keep_faces
-    from bifocal.orthophotos.deliver_workflow import DeliverTask, default_title, deliver
+    from bifocal.files.pair_names import default_title
+    from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver
     from bifocal.orthophotos.ortho_workflow import OrthoTask, basis_in_words, make_ortho
     from bifocal.workbook.pair_workflow import is_workbook, points_of, read_photos
 

@@ -18,6 +18,7 @@ from bifocal.collimation.shapes import shapes_from
 from bifocal.collimation.stated_media import media_from_dict
 from bifocal.faces.faces_files import faces_path
 from bifocal.faces.suggestions import suggest_faces
+from bifocal.files.pair_names import default_title
 from bifocal.matching.matching import MatchSettings
 from bifocal.model.geotiff import gsd_at_scale
 from bifocal.model.orientation_precision import NAMES
@@ -33,7 +34,7 @@ from bifocal.orientation.align_workflow import (
     alignment_as_dict,
 )
 from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orthophotos.deliver_workflow import DPI, DeliverTask, default_title, deliver
+from bifocal.orthophotos.deliver_workflow import DPI, DeliverTask, deliver
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
 from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
 from bifocal.reports.content import ReportTask

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.faces.faces import BreakLine, Face, Faces, Occluder
+from bifocal.files.pair_names import without_ending
 from bifocal.model.photo import Photo
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
@@ -24,7 +25,6 @@ ENDING = ".faces.geojson"
 NONE = "none"
 #: No façade goes deeper behind its wall, in distances of the near camera.
 DEEPEST = 10.0
-_PAIR_ENDINGS = (".pair.json", ".photos.json", ".json", ".xlsx", ".xlsm")
 
 
 def read_faces(path: Path) -> Faces:
@@ -51,8 +51,7 @@ def beside(source: Path | str) -> Path:
     'site/wall.faces.geojson'
     """
     path = Path(source)
-    ending = next((end for end in _PAIR_ENDINGS if path.name.lower().endswith(end)), "")
-    return path.with_name(path.name[: len(path.name) - len(ending)] + ENDING)
+    return path.with_name(without_ending(path.name) + ENDING)
 
 
 def faces_path(given: Path | None, *sources: object) -> Path | None:

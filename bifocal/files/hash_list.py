@@ -21,12 +21,15 @@ def listed_hashes(folder: Path) -> dict[str, str]:
     Raises
     ------
     InputError
-        If what is called so is no such list.
+        If what is called so is no such list, or cannot be read.
     """
     path = folder / SUMS
-    if not path.exists():
+    try:
+        text = path.read_text(encoding="utf-8", errors="surrogateescape")
+    except FileNotFoundError:
         return {}
-    text = path.read_text(encoding="utf-8", errors="surrogateescape")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error}).") from error
     matches = [_LINE.fullmatch(line) for line in text.splitlines()]
     if not all(matches):
         raise InputError(f"{path}: is no list of hashes; move it away, or deliver elsewhere.")

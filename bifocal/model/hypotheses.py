@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from photocore.arrays import FloatArray
-from photocore.tables.numbers import FEET
 
 #: Picks of the same points in two photos, each of shape (n, 2), and the photos' sizes. [px]
 Picks = tuple[FloatArray, FloatArray]
@@ -67,8 +66,6 @@ COORDINATES: dict[str, Callable[[FloatArray], FloatArray]] = {
     "control_x": lambda xyz: xyz * [-1, 1, 1],
     "control_xy": lambda xyz: xyz[:, [1, 0, 2]],
     "control_r": lambda xyz: xyz * [1, 1, -1],
-    "control_feet": lambda xyz: xyz * FEET["ft"],
-    "control_metres": lambda xyz: xyz / FEET["ft"],
 }
 #: Typed over meant lengths, by the unit they were measured in; 2: of a radius for a diameter.
 FACTORS = {"mm": 1000.0, "cm": 100.0, "dm": 10.0, "ft": 1 / 0.3048, "double": 2.0}

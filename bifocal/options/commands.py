@@ -33,7 +33,7 @@ class SolveCommand:
     bifocal solve picks.csv --pair wall.photos.json --json
     bifocal solve far.dxf near.dxf --pair setup.xlsx --out result.xlsx
     bifocal solve distances.csv --d1 17.5 --d2 9.5 --c1 35 --c2 19 --out result.csv
-    bifocal solve survey.xlsx --control station.csv --out survey.xlsx --overwrite
+    bifocal solve survey.xlsx --control station_pair.csv --out survey.xlsx --overwrite
     bifocal solve old.xlsx --columns "id=A,s1=distance far,s2=D" --d1 17.5 --d2 9.5
     """
 

@@ -13,7 +13,7 @@ from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.names import called, nearest
 from photocore.tables import Table
-from photocore.tables.headings import bare
+from photocore.tables.heading_words import bare
 
 #: Coordinates of one point in several rows may differ by this much. [m]
 _SAME = 1e-6
@@ -50,9 +50,16 @@ def is_long(table: Table, keys: Sequence[str], photos: Sequence[str]) -> bool:
 
 
 def of_rows(
-    table: Table, keys: Sequence[str], photos: Sequence[str], coordinates: FloatArray
+    table: Table,
+    keys: Sequence[str],
+    photos: Sequence[str | Sequence[str]],
+    coordinates: FloatArray,
+    *,
+    all_known: bool = False,
 ) -> ListedPoints:
     """Return the points of a table with a row a photo; ``coordinates`` are filled in by name.
+
+    Rows of other photos are left out and named; with ``all_known`` they are errors.
 
     Raises
     ------
@@ -60,6 +67,7 @@ def of_rows(
         If no row is of these photos, or rows contradict each other.
     """
     column, row = (table.numbers(key) for key in keys)
+    titles = [one if isinstance(one, str) else one[0] for one in photos]
     places: dict[str, int] = {}
     picks: dict[tuple[str, int], int] = {}
     errors: list[CellError] = []
@@ -77,7 +85,10 @@ def of_rows(
         coordinates[first, blank] = coordinates[k, blank]
         shown = called(photo, photos) if photo else []
         if len(shown) > 1:
-            message = f'"{photo}" may be {" or ".join(photos[n] for n in shown)}.'
+            message = f'"{photo}" may be {" or ".join(titles[n] for n in shown)}.'
+            errors.append(table.error(k, "photo", message))
+        elif not shown and all_known:
+            message = remark("survey.strange_photo", known=", ".join(titles))
             errors.append(table.error(k, "photo", message))
         elif not shown:
             strange += [photo] if photo else []
@@ -89,8 +100,8 @@ def of_rows(
         raise WorkbookError(errors)
     names = list(dict.fromkeys(strange))
     if not picks:
-        near = next((n for p in photos if (n := nearest(p, names))), "-")
-        about = {"photos": ", ".join(photos), "listed": ", ".join(names[:5]), "near": near}
+        near = next((n for title in titles if (n := nearest(title, names))), "-")
+        about = {"photos": ", ".join(titles), "listed": ", ".join(names[:5]), "near": near}
         raise InputError(remark("control.no_such_photo", of=table.file, **about))
     order = list(places)
     made = [np.full((len(order), 2), np.nan) for _ in photos]

@@ -95,6 +95,8 @@ def check_units(cameras: Cameras, site: SiteMeasures, *, lenses_known: bool = Fa
             raise InputError(remark("refused.too_far", **meant, **about))
         if unit := unit_of(measured / distance, within=0.1) if lenses_known else "":
             raise InputError(remark("refused.tape_unit", unit=unit, **about))
+        if lenses_known and unit_of(distance / measured, within=0.1) == "ft":
+            raise InputError(remark("refused.control_unit", unit="ft", **about))
         for factor, unit in _UNITS:
             if 0.8 < distance / measured / factor < 1.25:
                 raise InputError(remark("refused.control_unit", unit=unit, **about))

@@ -13,6 +13,7 @@ import numpy as np
 
 from bifocal.faces.faced_surface import FacedSurface
 from bifocal.files.hash_list import list_hashes, listed_hashes
+from bifocal.files.pair_names import default_title
 from bifocal.files.strips import write_png
 from bifocal.media import media_words
 from bifocal.model.doubts import MISFITS, check_scale, doubts_of
@@ -25,7 +26,7 @@ from bifocal.model.geotiff import (
 )
 from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
-from bifocal.model.photo_set import PhotoSet, pair_or_set
+from bifocal.model.photo_set import PhotoSet
 from bifocal.model.photos_of_set import PhotosOfSet
 from bifocal.model.points import Points
 from bifocal.model.relief_map import Quality, measured_part
@@ -70,8 +71,6 @@ from photocore.textfile import file_name
 DPI = 254.0
 #: Every picture is written with its world file, for the web, for CAD and on a sheet.
 PICTURE_ENDINGS = ("tif", "tfw", "png", "dxf", "pdf")
-_PAIR_ENDINGS = (".pair.json", ".photos.json", ".json", ".xlsx", ".xlsm")
-_SHORT = 3  # shorter names say nothing as a title
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -274,31 +273,6 @@ def _check_free(
     for path in map(folder.joinpath, names):
         if path.exists():
             check_writable(path, overwrite=overwrite)
-
-
-def default_title(source: Pair | PhotoSet | Path, path: Path | None = None) -> str:
-    """Return the name of a pair; of a nameless one that of its file, or of the file's folder.
-
-    The folder's where there is no file, or one called ``w`` or the like.
-
-    Parameters
-    ----------
-    source : Pair, PhotoSet or Path
-    path : Path, optional
-        Where a pair was read from.
-    """
-    path = source if isinstance(source, Path) else path
-    pair = pair_or_set(source)
-    if pair.extra.get("name"):
-        return str(pair.extra["name"])
-    stem = path.name if path else ""
-    # A name may have dots of its own: S. Maria.pair.json.
-    ending = next((end for end in _PAIR_ENDINGS if stem.lower().endswith(end)), "")
-    stem = stem[: len(stem) - len(ending)]
-    if len(stem) >= _SHORT:
-        return stem
-    folder = (path.parent if path else pair.folder).resolve().name
-    return folder if len(folder) >= _SHORT else "wall"
 
 
 def _with_shares(drawing: Drawing, basis: Mapping[str, float], *, hatch: bool) -> Drawing:

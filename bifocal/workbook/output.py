@@ -25,7 +25,7 @@ from bifocal.workbook.template_workflow import MOST_ROWS, log_row
 from photocore.errors import InputError
 from photocore.output import check_not_input, relative_name
 from photocore.tables import write_csv
-from photocore.tables.headings import bare
+from photocore.tables.heading_words import bare
 from photocore.workbook.making.newbook import check_new_workbook
 
 #: Sheets of a survey workbook, as `bare` writes them.

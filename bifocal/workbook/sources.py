@@ -65,12 +65,11 @@ def measured(
     except WorkbookError:
         raise
     except InputError:
-        points = read_long(source, _called(photos), options.decimal)
-        if points is None:
+        long = read_long(source, _called(photos), options.decimal)
+        if long is None:
             raise
-    survey = SurveyInput.of_points(points)
-    where = Path(source).name
-    return replace(survey, setup=replace(survey.setup, where=where)), Path(source)
+    setup = replace(long.setup, where=Path(source).name)
+    return replace(long, setup=setup), Path(source)
 
 
 def _called(photos: PhotoSet | Pair | Path | str | None) -> list[tuple[str, ...]]:

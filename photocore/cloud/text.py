@@ -20,7 +20,7 @@ from photocore.arrays import FloatArray
 from photocore.cloud.model import PIECE, Cloud, CloudPiece, NewAttributes, PieceWriter
 from photocore.errors import LARGEST, CellError, InputError, WorkbookError
 from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH
-from photocore.tables.headings import bare
+from photocore.tables.heading_words import bare
 from photocore.tables.rows import COMMENTS
 
 #: Headings of each coordinate and of the columns other commands ask for.

@@ -1,6 +1,6 @@
 """Words above coordinates and names, in English, Italian, German and French: one list for all.
 
-Case, blanks, punctuation and units do not matter (`photocore.tables.headings.bare`).
+Case, blanks, punctuation and units do not matter (`photocore.tables.heading_words.bare`).
 """
 
 from __future__ import annotations

@@ -10,7 +10,8 @@ from photocore.errors import CellError, InputError, WorkbookError
 from photocore.names import nearest
 from photocore.remarks import remark
 from photocore.tables import convert
-from photocore.tables.headings import Match, bare, unknown_unit
+from photocore.tables.heading_words import bare, unknown_unit
+from photocore.tables.headings import Match
 from photocore.tables.model import Column, Table
 from photocore.tables.numbers import FEET, GRAD, Decimal, unit_symbol
 from photocore.workbook.reading.grid import CellDate, CellGrid, Value, cell_name, column_letters

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import re
-import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 
 from photocore.remarks import remark
+from photocore.tables.heading_words import (
+    bare,
+    forms_of,
+    numbered,
+    unit_of,
+    unknown_unit,
+    without_unit,
+)
 from photocore.tables.model import Column
-from photocore.tables.numbers import GRAD, UNITS, unit_symbol
 from photocore.workbook.reading.grid import (
     CellGrid,
     Value,
@@ -18,20 +23,6 @@ from photocore.workbook.reading.grid import (
     column_number,
 )
 
-_UNIT = re.compile(r"\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
-_LOOSE_UNIT = re.compile(r"[\s_,]+(mm|cm|m|ft|ftus|px|pixel|deg|°|gon|rad)$", re.IGNORECASE)
-#: Ends a unit: square metres and the like.
-_POWER = re.compile(r"(?:[²³]|\^?[23])$")
-#: Units people measure in that no command takes.
-_FOREIGN = frozenset(
-    (*GRAD, "in", "inch", "inches", "yd", "yard", "yards", "mi", "mile", "miles",
-     "furlong", "furlongs", "mil", "mils", "arcsec", "arcmin", "mgon", "mrad")
-)  # fmt: skip
-#: What may stand in square brackets besides lengths, angles and pixels.
-_NO_LENGTHS = frozenset(("1", "–", "s", "‰"))
-_DROPPED = re.compile(r"[\s_.\-:/'\"`´]+")
-#: What a heading begins with where its row is a comment.
-_COMMENT = re.compile(r"^\s*(?:#|//)\s*(?=\w)")
 _PHOTO = re.compile(
     r"\b(?:image|photo|picture|foto|bild|immagine|aufnahme|camera|kamera|fotocamera)\s*([12])\b"
 )
@@ -94,48 +85,6 @@ class Match:
     def missing(self, columns: Sequence[Column]) -> list[str]:
         """Return the keys of required columns that were not found."""
         return [c.key for c in columns if c.required and c.key not in self.columns]
-
-
-@lru_cache(maxsize=10_000)
-def bare(text: str) -> str:
-    """Return a heading without unit, case, blanks and punctuation.
-
-    >>> bare("S_1 [mm]"), bare("Distanza radiale 1 (mm)"), bare("#Label")
-    ('s1', 'distanzaradiale1', 'label')
-    """
-    text = _COMMENT.sub("", unicodedata.normalize("NFKC", text).casefold())
-    return _DROPPED.sub("", _UNIT.sub("", text))
-
-
-def unit_of(text: str) -> str:
-    """Return the unit a heading says in brackets or at its end, as a stable symbol.
-
-    >>> unit_of("s1 [mm]"), unit_of("theta"), unit_of("x far px")
-    ('mm', '', 'px')
-    """
-    unit = _UNIT.search(text) or _LOOSE_UNIT.search(text)
-    return unit_symbol(unit[1]) if unit else ""
-
-
-def unknown_unit(text: str) -> str:
-    """Return the unit a heading says where it is none that is known, else an empty text.
-
-    What stands in square brackets is a unit; in round ones it may be any word, so only units that
-    people use elsewhere count there.
-
-    >>> unknown_unit("s1 [furlong]"), unknown_unit("E (yd)"), unknown_unit("cov [m²]")
-    ('furlong', 'yd', '')
-    >>> unknown_unit("X (east)"), unknown_unit("scale [1]")
-    ('', '')
-    """
-    said = _UNIT.search(text)
-    if said is None:
-        return ""
-    word = said[1].strip(" .")
-    base = _POWER.sub("", word).casefold()
-    if said[0].lstrip().startswith("("):
-        return word if base in _FOREIGN else ""
-    return "" if not word or base in UNITS or base in _NO_LENGTHS else word
 
 
 def find_columns(
@@ -265,8 +214,8 @@ def _heading_texts(
         for column in sorted(set(lower) | set(single)):
             group, own = groups.get(column, ""), lower.get(column, "")
             if own:
-                numbered = [_numbered(own, digits[group])] if group in digits else []
-                double[column] = [*numbered, f"{group} {own}".strip(), own]
+                titled = [numbered(own, digits[group])] if group in digits else []
+                double[column] = [*titled, f"{group} {own}".strip(), own]
             else:
                 double[column] = [upper[column]]
         headings.append((double, row + 1))
@@ -291,12 +240,6 @@ def _photo_digits(groups: Sequence[str]) -> dict[str, str]:
     if not digits and len(set(focal.values())) == len(focal) == 2:
         return {group: "12"[length == min(focal.values())] for group, length in focal.items()}
     return digits
-
-
-def _numbered(text: str, digit: str) -> str:
-    """Return a heading with a digit in front of its unit: ``x [mm]`` of photo 1 is ``x1 [mm]``."""
-    unit = _UNIT.search(text)
-    return f"{text[: unit.start()]}{digit}{unit[0]}" if unit else f"{text.strip()}{digit}"
 
 
 def _filled_right(
@@ -325,9 +268,9 @@ def _assign(
     """Give each column asked for a heading: as the user says, by key, then by alias in order."""
     match = Match(columns=dict(fixed), first=header + 1, header=header)
     taken: dict[int, str] = {number: key for key, number in fixed.items()}
-    forms = {number: _forms(variants) for number, variants in texts.items()}
+    forms = {number: forms_of(variants) for number, variants in texts.items()}
     # "X/Easting" is X as well as Easting, where nothing else is.
-    lowest = {number: _UNIT.sub("", variants[-1]) for number, variants in texts.items()}
+    lowest = {number: without_unit(variants[-1]) for number, variants in texts.items()}
     parts = {
         n: {bare(p) for p in text.split("/")} if "/" in text else () for n, text in lowest.items()
     }
@@ -452,18 +395,6 @@ def is_summary(cells: Mapping[int, Value], first: int, *, apart: bool = False) -
         if str(text).strip() and isinstance(text, str)
     )
     return any(_SUMMARIES.fullmatch(bare(text)) for text in starts)
-
-
-def _forms(variants: Sequence[str]) -> list[str]:
-    forms = []
-    for text in variants:
-        form = bare(text)
-        if form and form not in forms:
-            forms.append(form)
-        loose = bare(_LOOSE_UNIT.sub("", _UNIT.sub("", text).strip()))
-        if loose and loose not in forms:
-            forms.append(loose)
-    return forms or [""]
 
 
 def _without_heading(

@@ -19,7 +19,7 @@ from xml.etree import ElementTree
 from photocore.errors import InputError
 from photocore.remarks import remark
 from photocore.tables.axes import NAMES
-from photocore.tables.headings import bare
+from photocore.tables.heading_words import bare
 
 #: A word of a Leica instrument: what, about it, sign, data of 8 or 16 signs.
 _GSI_WORD = re.compile(r"(\d\d)([\d.]{4})([+-])(\w{16}|\w{8})(?=\s|$)")

@@ -11,7 +11,7 @@ from photocore.errors import CellError, InputError, WorkbookError
 from photocore.remarks import remark
 from photocore.tables import convert
 from photocore.tables.csvread import CsvFile
-from photocore.tables.headings import bare, unit_of, unknown_unit
+from photocore.tables.heading_words import bare, unit_of, unknown_unit
 from photocore.tables.model import Column, NamedValues
 from photocore.tables.numbers import Decimal, converted, take_apart
 from photocore.tables.read import Source, open_tables

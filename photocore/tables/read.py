@@ -29,7 +29,8 @@ from photocore.tables.fill import (
     refuse_unknown_units,
     take_unit_row,
 )
-from photocore.tables.headings import Match, bare, find_columns
+from photocore.tables.heading_words import bare
+from photocore.tables.headings import Match, find_columns
 from photocore.tables.lists import drawing_as_table
 from photocore.tables.model import Column, Table
 from photocore.tables.numbers import FEET, Decimal

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from photocore.remarks import remark
-from photocore.tables.headings import Match, bare, is_summary
+from photocore.tables.heading_words import bare
+from photocore.tables.headings import Match, is_summary
 from photocore.tables.model import Column
 from photocore.workbook.reading.grid import CellGrid, Value
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path, PurePath
+from pathlib import Path
 
 import numpy as np
 
 from bifocal.model.photo import FARTHEST_WALL
+from bifocal.orientation.control_lists import of_rows, without_unseen
+from bifocal.orientation.control_points import A_PHOTO
 from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations, pixel_keys
 from bifocal.survey.reference import KnownPoints
@@ -28,12 +30,7 @@ _AXES: dict[str, dict[str, tuple[str, ...]]] = {
 }
 #: Names of the tables of both sheets.
 _TABLES = {"Georeference": "tblGeo", "Check": "tblCheck"}
-_LONG = (
-    Column("id", ("point", "name", "punto", "punkt", "label"), kind="text", required=True),
-    Column("photo", ("image", "camera", "foto", "bild"), kind="text", required=True),
-    Column("col", ("column", "colonna", "spalte", "x"), unit="px", required=True),
-    Column("row", ("riga", "zeile", "y"), unit="px", required=True),
-)
+_LONG = tuple(replace(column, required=True) for column in (Column("id", NAMES, "text"), *A_PHOTO))
 
 
 def with_list(
@@ -132,7 +129,7 @@ def _filled(
 
 def read_long(
     path: Path | str, photos: Sequence[Sequence[str]], decimal: Decimal | None
-) -> PointObservations | None:
+) -> SurveyInput | None:
     """Return the points of a table with a row a photo; None where a file is no such table.
 
     Parameters
@@ -152,22 +149,15 @@ def read_long(
         table = read_table(path, _LONG, decimal=decimal, errors=errors)
     except InputError:
         return None
-    called = [{PurePath(name).stem.casefold() for name in names if name} for names in photos]
-    pixels: dict[str, dict[str, float]] = {}
-    places = np.stack([table.numbers("col"), table.numbers("row")], axis=-1)
-    for row, (name, photo) in enumerate(zip(table.texts("id"), table.texts("photo"), strict=True)):
-        stem = PurePath(photo).stem.casefold()
-        numbers = [number for number, names in enumerate(called, start=1) if stem in names]
-        if len(numbers) != 1:
-            listed = ", ".join(names[0] for names in photos)
-            errors.append(table.error(row, "photo", remark("survey.strange_photo", known=listed)))
-            continue
-        keys = pixel_keys(numbers[0])
-        if keys[0] in pixels.setdefault(name, {}):
-            errors.append(table.error(row, "id", remark("survey.picked_before", name=name)))
-        pixels[name] |= dict(zip(keys, places[row].tolist(), strict=True))
     if errors:
         raise WorkbookError(errors)
-    wide = [key for number in range(1, len(photos) + 1) for key in pixel_keys(number)]
-    columns = {key: [picks.get(key, np.nan) for picks in pixels.values()] for key in wide}
-    return PointObservations.from_columns({"id": list(pixels), **columns})
+    points = of_rows(table, ("col", "row"), photos, np.empty((len(table), 0)), all_known=True)
+    ids = [table.texts("id")[row] for row in points.rows]
+    picks, unseen = without_unseen(points.picks, ids)
+    pixels = {
+        key: pixel[:, axis]
+        for number, pixel in enumerate(picks, start=1)
+        for axis, key in enumerate(pixel_keys(number))
+    }
+    survey = SurveyInput.of_points(PointObservations.from_columns({"id": ids, **pixels}))
+    return replace(survey, remarks=(*survey.remarks, *table.remarks, *unseen))

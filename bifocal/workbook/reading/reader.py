@@ -34,7 +34,7 @@ from photocore.tables import (
     read_named_values,
     read_table,
 )
-from photocore.tables.headings import bare
+from photocore.tables.heading_words import bare
 from photocore.tables.model import Kind
 from photocore.tables.numbers import Decimal
 from photocore.workbook.making.live_columns import TEXT_KEYS

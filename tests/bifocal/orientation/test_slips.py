@@ -344,6 +344,15 @@ def test_a_tape_in_feet_is_named_where_lens_and_control_agree() -> None:
         )
 
 
+def test_control_in_feet_is_named_by_a_taped_distance_alone() -> None:
+    points = control()
+    points = replace(points, xyz=points.xyz / 0.3048)
+    with pytest.raises(InputError, match=r"are in ft: .* --distance1 says 16 m"):
+        orient_pair(photos(), control=points, site=SiteMeasures(distance1=16.0))
+    made = orient_pair(photos(), control=points, site=SiteMeasures())
+    assert made.adjusted.cameras[0].centre[2] == pytest.approx(16 / 0.3048, rel=0.01)
+
+
 def many(seed: int) -> Control:
     """Return sixteen points, half of them off the wall, as many on either side of the middle."""
     rng = np.random.default_rng(seed)

@@ -105,6 +105,10 @@ def test_a_delivered_folder_is_verified_and_keeps_the_hashes_of_others(wall: Pat
         file.write(" ")
     wrong = [one.file for one in verify(wall / "d").files if one.state != "unchanged"]
     assert wrong == ["Torre_est.dxf"]
+    (wall / "e" / "SHA256SUMS").mkdir(parents=True)
+    done = run(wall, "--plane", "--deliver", "e", "--scale", "1:50", "--dpi", "25")
+    assert (done.exit_code, [*(wall / "e").iterdir()]) == (1, [wall / "e" / "SHA256SUMS"])
+    assert "SHA256SUMS: cannot be read" in done.stderr
 
 
 @pytest.mark.acceptance

@@ -152,7 +152,7 @@ def test_picks_in_a_row_a_photo_are_those_of_a_row_a_point(tmp_path):
     ("line", "said"),
     [
         (("C", "DSC_1", 1, 2), "expected one of far, near"),
-        (("A", "far", 1, 2), "A is picked in this"),
+        (("A", "far", 1, 2), 'A" is picked in this photo'),
     ],
 )
 def test_a_row_of_a_strange_photo_or_a_second_pick_is_named(line, said, tmp_path):
@@ -160,3 +160,11 @@ def test_a_row_of_a_strange_photo_or_a_second_pick_is_named(line, said, tmp_path
     with pytest.raises(WorkbookError, match=said) as caught:
         bifocal.solve(long, pair=a_pair())
     assert "long.csv" in str(caught.value)
+
+
+def test_pixels_that_programs_write_for_not_seen_are_no_picks_in_a_row_a_photo(tmp_path):
+    unseen = [(name, "near", -1, -1) for name in ("C", "D")]
+    picks = [*PICKS, ("C", "far", 50, 60), ("D", "far", 60, 70), *unseen]
+    found = bifocal.solve(picked(tmp_path / "long.csv", picks), pair=a_pair())
+    assert np.isnan(found.table["r"][2:]).all()
+    assert any("C, D" in text for text in found.remarks)

@@ -1,0 +1,91 @@
+"""The words of a heading: its bare form, the unit it says, and the forms it may be known by."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Sequence
+from functools import lru_cache
+
+from photocore.tables.numbers import GRAD, UNITS, unit_symbol
+
+_UNIT = re.compile(r"\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
+_LOOSE_UNIT = re.compile(r"[\s_,]+(mm|cm|m|ft|ftus|px|pixel|deg|°|gon|rad)$", re.IGNORECASE)
+#: Ends a unit: square metres and the like.
+_POWER = re.compile(r"(?:[²³]|\^?[23])$")
+#: Units people measure in that no command takes.
+_FOREIGN = frozenset(
+    (*GRAD, "in", "inch", "inches", "yd", "yard", "yards", "mi", "mile", "miles",
+     "furlong", "furlongs", "mil", "mils", "arcsec", "arcmin", "mgon", "mrad")
+)  # fmt: skip
+#: What may stand in square brackets besides lengths, angles and pixels.
+_NO_LENGTHS = frozenset(("1", "–", "s", "‰"))
+_DROPPED = re.compile(r"[\s_.\-:/'\"`´]+")
+#: What a heading begins with where its row is a comment.
+_COMMENT = re.compile(r"^\s*(?:#|//)\s*(?=\w)")
+
+
+@lru_cache(maxsize=10_000)
+def bare(text: str) -> str:
+    """Return a heading without unit, case, blanks and punctuation.
+
+    >>> bare("S_1 [mm]"), bare("Distanza radiale 1 (mm)"), bare("#Label")
+    ('s1', 'distanzaradiale1', 'label')
+    """
+    text = _COMMENT.sub("", unicodedata.normalize("NFKC", text).casefold())
+    return _DROPPED.sub("", _UNIT.sub("", text))
+
+
+def unit_of(text: str) -> str:
+    """Return the unit a heading says in brackets or at its end, as a stable symbol.
+
+    >>> unit_of("s1 [mm]"), unit_of("theta"), unit_of("x far px")
+    ('mm', '', 'px')
+    """
+    unit = _UNIT.search(text) or _LOOSE_UNIT.search(text)
+    return unit_symbol(unit[1]) if unit else ""
+
+
+def unknown_unit(text: str) -> str:
+    """Return the unit a heading says where it is none that is known, else an empty text.
+
+    What stands in square brackets is a unit; in round ones it may be any word, so only units that
+    people use elsewhere count there.
+
+    >>> unknown_unit("s1 [furlong]"), unknown_unit("E (yd)"), unknown_unit("cov [m²]")
+    ('furlong', 'yd', '')
+    >>> unknown_unit("X (east)"), unknown_unit("scale [1]")
+    ('', '')
+    """
+    said = _UNIT.search(text)
+    if said is None:
+        return ""
+    word = said[1].strip(" .")
+    base = _POWER.sub("", word).casefold()
+    if said[0].lstrip().startswith("("):
+        return word if base in _FOREIGN else ""
+    return "" if not word or base in UNITS or base in _NO_LENGTHS else word
+
+
+def without_unit(text: str) -> str:
+    """Return a heading without the unit in brackets at its end."""
+    return _UNIT.sub("", text)
+
+
+def numbered(text: str, digit: str) -> str:
+    """Return a heading with a digit in front of its unit: ``x [mm]`` of photo 1 is ``x1 [mm]``."""
+    unit = _UNIT.search(text)
+    return f"{text[: unit.start()]}{digit}{unit[0]}" if unit else f"{text.strip()}{digit}"
+
+
+def forms_of(variants: Sequence[str]) -> list[str]:
+    """Return the bare forms a heading may be known by, the strictest first."""
+    forms = []
+    for text in variants:
+        form = bare(text)
+        if form and form not in forms:
+            forms.append(form)
+        loose = bare(_LOOSE_UNIT.sub("", _UNIT.sub("", text).strip()))
+        if loose and loose not in forms:
+            forms.append(loose)
+    return forms or [""]
