@@ -72,8 +72,9 @@ def command(
     """Take over the cameras of another program's finished project as a set of photos of a wall.
 
     PROJECT is a folder or file of COLMAP (text or binary), Metashape (cameras exported as XML),
-    OpenDroneMap or OpenSfM (reconstruction.json), AliceVision or Meshroom (.sfm), OpenMVG
-    (sfm_data.json) or Bundler (bundle.out). The wall is the largest façade among its points, or
+    OpenDroneMap or OpenSfM (reconstruction.json), AliceVision or Meshroom (.sfm, or its cache),
+    OpenMVG (sfm_data.json), Bundler (bundle.out), RealityCapture or RealityScan (XMP, CSV),
+    VisualSFM (.nvm) or NeRF (transforms.json). The wall is the largest façade among its points, or
     goes through points that are named (--wall), or is that of control points (--control). With --to
     PROJECT is a set of photos or a pair, and OUT a folder for the other program.
     """

@@ -20,7 +20,8 @@ from multimedia.media.camera import Camera
 from multimedia.projects.model import Project
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.camera.lensformats import FISHEYE_KEY, LensData, opencv_values
+from photocore.camera.lensdata import LensData
+from photocore.camera.lensformats import FISHEYE_KEY, opencv_values
 from photocore.camera.rotation import checked_rotation, rotation_from_vector
 from photocore.errors import InputError
 from photocore.output import atomic_folder, atomic_path

@@ -20,7 +20,7 @@ from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.camera.distortion import Brown, Convention
 from photocore.camera.fisheye import TERMS, Fisheye
-from photocore.camera.lensformats import LensData
+from photocore.camera.lensdata import LensData
 from photocore.camera.rotation import nearest_rotation
 from photocore.errors import InputError
 

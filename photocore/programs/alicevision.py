@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from photocore.arrays import FloatArray
-from photocore.camera.lensformats import LensData, lens_data
+from photocore.camera.lensdata import LensData, lens_data
 from photocore.camera.rotation import checked_rotation, nearest_rotation
 from photocore.errors import InputError
 from photocore.programs.json_values import JsonValue

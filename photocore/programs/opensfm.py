@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from photocore.camera.lensformats import LensData, lens_data
+from photocore.camera.lensdata import LensData, lens_data
 from photocore.camera.rotation import rotation_from_vector
 from photocore.errors import InputError
 from photocore.programs.json_values import JsonValue

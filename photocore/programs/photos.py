@@ -43,11 +43,12 @@ class PhotoFinder:
             yield Path(name)
         for folder in self.folders:
             for part in dict.fromkeys((own.as_posix(), own.name)):
-                if not Path(part).is_absolute():
-                    yield folder / part
-            if own.suffix.lower() not in _ENDINGS:  # Metashape's labels have no ending
-                for ending in (*_ENDINGS, *map(str.upper, _ENDINGS)):
-                    yield folder / f"{own.name}{ending}"
+                if Path(part).is_absolute():
+                    continue
+                yield folder / part
+                if own.suffix.lower() not in _ENDINGS:  # Metashape's labels have no ending
+                    for ending in (*_ENDINGS, *map(str.upper, _ENDINGS)):
+                        yield folder / f"{part}{ending}"
 
     def size(self, name: str) -> tuple[int, int]:
         """Return width and height of a photo [px]; its project does not tell them.
