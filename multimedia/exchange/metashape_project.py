@@ -31,9 +31,12 @@ def read_metashape(path: Path, *, pitch: float, unit: str) -> Project:
     """
     read = read_metashape_project(path)
     cameras = tuple(
-        camera_of(v.lens, v.rotation, -v.rotation @ v.centre, pitch=pitch, name=v.name)
+        camera_of(
+            v.lens._replace(camera_matrix=v.camera.matrix), v.rotation, -v.rotation @ v.centre,
+            pitch=pitch, name=v.name,
+        )
         for v in read.views
-    )
+    )  # fmt: skip
     said = (
         () if read.metres else ("the chunk has no transform: its frame and scale are arbitrary.",)
     )

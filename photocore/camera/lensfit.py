@@ -23,7 +23,8 @@ _COUNTS = (5, 8, 12)
 _STEEPEST = 1.5
 _SQUARE = np.eye(2)
 
-Mapping1D = Mapping2D = Callable[[FloatArray], FloatArray]
+Mapping1D = Callable[[FloatArray], FloatArray]
+Mapping2D = Callable[[FloatArray], FloatArray]
 
 
 def equidistant(radius: FloatArray) -> FloatArray:
@@ -53,13 +54,13 @@ class FittedLens(NamedTuple):
 
 
 def fitted_lens(
-    ideal_from_seen: Mapping2D, size: Sequence[float], source: str, *, fisheye: bool = False
+    ideal_from_pixels: Mapping2D, size: Sequence[float], source: str, *, fisheye: bool = False
 ) -> FittedLens:
     """Return OpenCV's lens that is nearest to another model.
 
     Parameters
     ----------
-    ideal_from_seen : callable
+    ideal_from_pixels : callable
         Pixels to (x, y) at depth 1, shape (n, 2), NaN where there is none; of a fisheye to the
         angle from the axis, in the direction of (x, y). [rad]
     size : sequence of float
@@ -77,26 +78,25 @@ def fitted_lens(
     from scipy.optimize import least_squares
 
     axes = [np.linspace(-0.5, side - 0.5, _GRID) for side in size]
-    seen = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
-    ideal = ideal_from_seen(seen)
-    used = np.isfinite(ideal).all(axis=1)
-    if fisheye:
-        used[used] = np.hypot(*ideal[used].T) < _STEEPEST
-    ideal, seen = ideal[used], seen[used]
-    middle = [np.polyfit(ideal[:, k], seen[:, k], 1) for k in range(2)] if len(seen) > 50 else []
+    pixels = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+    ideal = ideal_from_pixels(pixels)
+    angle = np.hypot(ideal[:, 0], ideal[:, 1])  # NaN where there is none
+    used = angle < (_STEEPEST if fisheye else np.inf)
+    ideal, pixels = ideal[used], pixels[used]
+    middle = (
+        [np.polyfit(ideal[:, k], pixels[:, k], 1) for k in range(2)] if len(pixels) > 50 else []
+    )
     best = FittedLens(lens_data([1, 1], [0, 0], [], size, source), np.inf)
     for count in ((4,) if fisheye else _COUNTS) if middle else ():
         fit = least_squares(
-            lambda p, n=count: (_seen(p, n, ideal, fisheye=fisheye) - seen).ravel(),
+            lambda p, n=count: (_seen(p, n, ideal, fisheye=fisheye) - pixels).ravel(),
             [middle[0][0], middle[1][0], middle[0][1], middle[1][1], *[0.0] * count],
             "3-point", x_scale="jac", ftol=1e-12, xtol=1e-12, gtol=None, max_nfev=100,
         )  # fmt: skip
         miss = float(np.hypot(*fit.fun.reshape(-1, 2).T).max())
         if miss < best.residual and min(fit.x[:2]) > 0:
-            focal, centre, terms = np.split(fit.x, [2, 4])
-            lens = lens_data(
-                *map(np.ndarray.tolist, (focal, centre, terms)), size, source, fisheye=fisheye
-            )
+            values = fit.x.tolist()
+            lens = lens_data(values[:2], values[2:4], values[4:], size, source, fisheye=fisheye)
             best = FittedLens(lens, miss)
         if best.residual <= UNSAID / 100:
             break
@@ -143,23 +143,23 @@ def brown_lens(
             return FittedLens(lens_data(focal, centre, terms, size, source, fisheye=fisheye))
     matrix = np.diag(focal) @ shear
 
-    def seen(at: FloatArray) -> FloatArray:
+    def bent(at: FloatArray) -> FloatArray:
         x, y = at[..., 0], at[..., 1]
         square, both = x * x + y * y, 2.0 * x * y
         factor, more = 1.0 + square * np.polyval([k4, k3, k2, k1], square), (p4, p3, 1.0)
-        bent_x = x * factor + (p1 * both + p2 * (square + 2 * x * x)) * np.polyval(more, square)
-        bent_y = y * factor + (p2 * both + p1 * (square + 2 * y * y)) * np.polyval(more, square)
-        return np.stack([bent_x, bent_y], axis=-1) @ matrix.T + centre
+        new_x = x * factor + (p1 * both + p2 * (square + 2 * x * x)) * np.polyval(more, square)
+        new_y = y * factor + (p2 * both + p1 * (square + 2 * y * y)) * np.polyval(more, square)
+        return np.stack([new_x, new_y], axis=-1) @ matrix.T + centre
 
     def ideal(pixels: FloatArray) -> FloatArray:
         at, step = (pixels - centre) @ np.linalg.inv(matrix).T, 1e-6
         with np.errstate(all="ignore"):
             for _ in range(50):  # Newton
-                slopes = [(seen(at + step * axis) - seen(at - step * axis)) / (2.0 * step)
+                slopes = [(bent(at + step * axis) - bent(at - step * axis)) / (2.0 * step)
                           for axis in np.eye(2)]  # fmt: skip
-                miss = pixels - seen(at)
+                miss = pixels - bent(at)
                 at = at + (inverse_2x2(np.stack(slopes, axis=-1)) @ miss[..., None])[..., 0]
-            at[~(np.abs(pixels - seen(at)) < 1e-7).all(axis=-1)] = np.nan
+            at[~(np.abs(pixels - bent(at)) < 1e-7).all(axis=-1)] = np.nan
             if angle is not None:
                 radius = np.hypot(at[:, 0], at[:, 1])
                 at = at * np.where(radius > 0, angle(radius) / radius, 1.0)[:, None]

@@ -53,7 +53,7 @@ def read_reality_xmp(folder: Path, photos: PhotoFinder) -> ForeignProject:
         turn = _numbers(values, "Rotation", 9, path).reshape(3, 3)
         turn = checked_rotation(turn, f"{path}: Rotation", tolerance=1e-5)
         kind = values.get("DistortionModel", "perspective").lower()
-        terms = np.zeros(6)
+        terms: FloatArray = np.zeros(6)
         if kind.startswith("brown"):
             terms = _numbers(values, "DistortionCoeficients", 6, path)
         elif kind != "perspective":
@@ -69,8 +69,8 @@ def read_reality_xmp(folder: Path, photos: PhotoFinder) -> ForeignProject:
         views.append(ForeignView(path.stem, fit.lens, nearest_rotation(turn), centre))
     if not views:
         raise InputError(remark("programs.no_pose", of=folder))
-    said = (f"{unposed} photos without a pose of their own left out.",) if unposed else ()
-    return ForeignProject("RealityCapture", tuple(views), remarks=(*said, *fits))
+    remarks = (f"{unposed} photos without a pose of their own left out.",) if unposed else ()
+    return ForeignProject("RealityCapture", tuple(views), remarks=(*remarks, *fits))
 
 
 def _values(path: Path) -> dict[str, str]:

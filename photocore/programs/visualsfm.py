@@ -47,7 +47,7 @@ def read_visualsfm(path: Path, photos: PhotoFinder, part: str | None = None) -> 
         place += 1 + points
     if not models:
         raise InputError(remark("programs.no_pose", of=path))
-    name, said = chosen_part({key: len(held[0]) for key, held in models.items()}, part, path)
+    name, remarks = chosen_part({key: len(held[0]) for key, held in models.items()}, part, path)
     views, fits = [], dict[str, None]()
     for line in models[name][0]:
         words = line.rsplit(maxsplit=10)
@@ -59,9 +59,9 @@ def read_visualsfm(path: Path, photos: PhotoFinder, part: str | None = None) -> 
         rotation = rotation_from_quaternion(values[1:5], f"{path}: camera {photo}, quaternion")
         views.append(ForeignView(photo, fit.lens, rotation, values[5:8]))
         fits |= dict.fromkeys(fit.remarks)
-    points = [floats_of_words(line.split()[:3], path, "point") for line in models[name][1]]
-    xyz = np.array(points).reshape(-1, 3)
-    return ForeignProject("VisualSFM", tuple(views), xyz, remarks=(*said, *fits))
+    places = [floats_of_words(line.split()[:3], path, "point") for line in models[name][1]]
+    xyz = np.array(places).reshape(-1, 3)
+    return ForeignProject("VisualSFM", tuple(views), xyz, remarks=(*remarks, *fits))
 
 
 def _count(lines: list[str], place: int, path: Path) -> int:
