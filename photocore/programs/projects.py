@@ -64,8 +64,8 @@ def read_foreign_project(
                 {name: count_images(place) for name, place in models.items()}, part, path
             )
             return read_colmap_project(models[name])._replace(remarks=remarks)
-        found = [place for place in map(path.joinpath, _PLACES) if _is_model(place)]
-        found += sorted(path.glob("*.nvm"))
+        places = [*map(path.joinpath, _PLACES), *sorted(path.glob("*.nvm"))]
+        found = [place for place in places if _is_model(place)]
         if not found and (caches := _meshroom(path)):
             sizes = {name: count for name, (_, count) in caches.items()}
             name, remarks = chosen_part(sizes, part, path)

@@ -130,9 +130,9 @@ def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
 
 def _turn(axis: int, angle: float) -> FloatArray:
     """Return the turn about an axis, right-handed."""
-    matrix, (one, other) = np.eye(3), ((axis + 1) % 3, (axis + 2) % 3)
-    matrix[one, one] = matrix[other, other] = np.cos(angle)
-    matrix[other, one], matrix[one, other] = np.sin(angle), -np.sin(angle)
+    matrix, (first, second) = np.eye(3), ((axis + 1) % 3, (axis + 2) % 3)
+    matrix[first, first] = matrix[second, second] = np.cos(angle)
+    matrix[second, first], matrix[first, second] = np.sin(angle), -np.sin(angle)
     return matrix
 
 
