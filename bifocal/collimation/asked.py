@@ -37,13 +37,14 @@ def goodness(session: Session) -> dict[str, Any] | None:
 def measured(session: Session, names: Sequence[str]) -> dict[str, float | None]:
     """Return distances and angles between points."""
     session.pictures.needed_pair()
-    places = []
+    points, results = [], session.results
     for name in names:
         point = session.state.points.get(name)
         if point is None:
             raise InputError(remark("page.no_point", name=name))
-        place = None if session.results is None else session.results.place(point)
-        if place is None:
+        if results is None or not point.is_complete:
             raise InputError(remark("page.point_in_one", name=name))
-        places.append(place)
-    return measure(places)
+        points.append(point)
+    if results is None or len(points) < 2:
+        raise InputError(remark("page.measure_of_two"))
+    return measure(*results.joint(points))

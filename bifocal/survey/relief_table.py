@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from bifocal.model.pair import Pair
 from photocore.arrays import FloatArray, IntArray
@@ -94,6 +95,19 @@ class ReliefTable:
         if rows is not None:
             values = np.concatenate([values, np.full((1, *values.shape[1:]), np.nan)])[rows]
         return self.pair.effect_of_orientation(values) if self.pair is not None else values
+
+    def joint_covariance(self, rows: Sequence[int]) -> FloatArray | None:
+        """Covariance of X, Y, r of some rows together, shape (3 n, 3 n); None if unknown. [m²]
+
+        The orientation moves neighbours alike: what is between them is known better than they are.
+        """
+        if (own := self.own_covariance) is None:
+            return None
+        joint: FloatArray = block_diag(*own[list(rows)])
+        if (effect := self.effect_of_orientation(np.array(rows))) is not None:
+            common = effect.reshape(3 * len(rows), -1)
+            joint += common @ common.T
+        return joint
 
 
 def symmetric(columns: Mapping[str, FloatArray], prefix: str = "cov_") -> FloatArray:
