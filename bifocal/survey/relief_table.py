@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from bifocal.model.pair import Pair
 from photocore.arrays import FloatArray, IntArray
@@ -101,11 +100,14 @@ class ReliefTable:
 
         The orientation moves neighbours alike: what is between them is known better than they are.
         """
-        if (own := self.own_covariance) is None:
+        if (of_picks := self.own_covariance) is None:
             return None
-        joint: FloatArray = block_diag(*own[list(rows)])
+        count = len(rows)
+        blocks = np.zeros((count, 3, count, 3))
+        blocks[range(count), :, range(count)] = of_picks[list(rows)]
+        joint: FloatArray = blocks.reshape(3 * count, 3 * count)
         if (effect := self.effect_of_orientation(np.array(rows))) is not None:
-            common = effect.reshape(3 * len(rows), -1)
+            common = effect.reshape(3 * count, -1)
             joint += common @ common.T
         return joint
 
