@@ -22,6 +22,7 @@ from bifocal.orientation.align_workflow import interior_of_photo
 from photocore.errors import PhotogrammetryError
 from photocore.images import ImageInfo
 from photocore.jsonfile import plain
+from photocore.remarks import LEVELS, level_of
 
 
 def state_of(session: Session) -> dict[str, Any]:
@@ -56,6 +57,7 @@ def state_of(session: Session) -> dict[str, Any]:
             ),
             "good": _how_good(session),
             "advice": _advice(session, live),
+            "levels": _levels(session),
             "points": _points(session),
             "lines": [
                 {"name": x.name, "layer": x.layer, "points": list(x.points), "closed": x.closed}
@@ -246,8 +248,6 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
             }
         )
     centre = np.asarray(pair.zoom_centre)
-    found = (session.proposal or {}).get("report", {}).get("remarks", ())
-    remarks = dict.fromkeys((*pair.remarks, *found))
     return plain(
         {
             "name": str(pair.extra.get("name") or session.files.stem),
@@ -265,9 +265,25 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
             "current": proposal_is_current(session),
             "scaled": not _unscaled(session),
             "report": session.proposal and session.proposal["report"],
-            "remarks": [without_options(said, session.spoken) for said in remarks],
+            "remarks": [without_options(said, session.spoken) for said in _remarks(session)],
         }
     )
+
+
+def _remarks(session: Session) -> list[str]:
+    """Return what is said of the pair, the worst first."""
+    pair, report = session.pictures.pair, (session.proposal or {}).get("report", {})
+    remarks = dict.fromkeys((*(pair.remarks if pair else ()), *report.get("remarks", ())))
+    return sorted(remarks, key=lambda text: LEVELS.index(level_of(text)))
+
+
+def _levels(session: Session) -> dict[str, str]:
+    """Return how much each remark weighs that is more than a hint, by its words."""
+    weights = {
+        without_options(text, session.spoken): level_of(text)
+        for text in (*_remarks(session), session.pick_doubt or "")
+    }
+    return {words: level for words, level in weights.items() if level != "hint"}
 
 
 def _control(session: Session, live: LiveOrientation | None) -> list[dict[str, Any]]:
@@ -319,8 +335,8 @@ def _advice(session: Session, live: LiveOrientation | None) -> list[str]:
         running = any(job.quiet and job.state == "running" for job in session.jobs.jobs.values())
         return [say("advice", "looking", language)] if running else list(live.advice)
     # What was found contradictory or unknown is said first.
-    told = "".join((session.proposal or {}).get("report", {}).get("remarks", ())[:1])
-    first = without_options(told, language)
+    worst = _remarks(session)[:1] if session.proposal else ()
+    first = "".join(without_options(text, language) for text in worst if level_of(text) != "hint")
     hints = live.advice if live and session.state.control else ()
     if session.proposal is not None:
         next_step = "length" if _unscaled(session) else "accept"

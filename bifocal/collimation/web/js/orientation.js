@@ -207,8 +207,8 @@ export class OrientationStage {
     keyedRows(this.tapes, state.tapes, { key: ({ from, to }) => `${from}\t${to}`,
       signature: JSON.stringify, build: (tape) => this.#tapeRow(tape) });
     for (const [list, lines] of [[this.advice, state.advice], [this.remarks, state.pair?.remarks ?? []]]) {
-      keyedRows(list, lines, { key: (text) => text, signature: (text) => text,
-        build: (text) => h("li", {}, text) });
+      keyedRows(list, lines, { key: (text) => text, signature: (text) => `${state.levels[text]} ${text}`,
+        build: (text) => h("li", { "data-level": state.levels[text] }, text) });
     }
     const remarks = state.pair?.remarks?.length ?? 0;
     this.fold.hidden = !remarks;
