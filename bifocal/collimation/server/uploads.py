@@ -63,11 +63,11 @@ def take_photos(
                 raise InputError(remark("page.same_photo", name=info.path.name))
         if len(kept) < 2:  # else far and near are known
             infos = far_first(infos)
-        made: list[Path] = []
+        copies: list[Path] = []
         try:
-            return tuple(i.path if i.path in kept else _kept(folder, i.path, made) for i in infos)
+            return tuple(i.path if i.path in kept else _kept(folder, i.path, copies) for i in infos)
         except BaseException:  # all of them, or none
-            for path in made:
+            for path in copies:
                 path.unlink(missing_ok=True)
             raise
 
@@ -140,7 +140,7 @@ def _refuse_bomb(path: Path) -> None:
         )
 
 
-def _kept(folder: Path, path: Path, made: list[Path]) -> Path:
+def _kept(folder: Path, path: Path, copies: list[Path]) -> Path:
     """Copy a photo into the folder and list it; one that lies there already is not copied again."""
     target = folder / path.name
     if target.is_file() and _same(target, path):
@@ -148,7 +148,7 @@ def _kept(folder: Path, path: Path, made: list[Path]) -> Path:
     target = free_path(folder, path.stem, path.suffix)
     with atomic_path(target, overwrite=False) as temporary:
         shutil.copyfile(path, temporary)
-    made.append(target)
+    copies.append(target)
     return target
 
 
