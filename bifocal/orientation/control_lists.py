@@ -117,7 +117,7 @@ def without_unseen(
 ) -> tuple[list[FloatArray], list[str]]:
     """Return picks without those that stand for "not seen", and what is said of them."""
     notes: list[str] = []
-    made: list[FloatArray] = []
+    cleaned: list[FloatArray] = []
     for number, pixels in enumerate(picks, start=1):
         clean = pixels.copy()
         for place in _UNSEEN:
@@ -127,8 +127,8 @@ def without_unseen(
                 names = ", ".join(ids[row] for row in rows[:10])
                 place_words = f"{place[0]:g}, {place[1]:g}"
                 notes.append(remark("control.unseen", photo=number, names=names, place=place_words))
-        made.append(clean)
-    return made, notes
+        cleaned.append(clean)
+    return cleaned, notes
 
 
 def in_plane_frame(
@@ -176,9 +176,9 @@ def in_plane_frame(
         if frame is None:
             raise InputError(remark("control.no_front", of=table.file))
         notes.append(_described(frame))
-    made = np.full_like(xyz, np.nan)
-    made[whole] = frame.to_plane(world[whole])
-    return made, frame, notes
+    plane = np.full_like(xyz, np.nan)
+    plane[whole] = frame.to_plane(world[whole])
+    return plane, frame, notes
 
 
 def _described(frame: WorldFrame) -> str:

@@ -68,7 +68,7 @@ def faces(heights: FloatArray, pixels: FloatArray, *, band: float) -> list[WallF
         offset = float(np.median(heights[members]))
         if members.sum() < 0.05 * count:
             break
-        if all(abs(offset - other.offset) > WALLS.faces_apart * band for other in planes):
+        if all(abs(offset - face.offset) > WALLS.faces_apart * band for face in planes):
             planes.append(
                 WallFace(
                     offset, float(members.sum() / count), _midst(pixels, np.flatnonzero(members))
@@ -83,9 +83,9 @@ def _midst(pixels: FloatArray, members: IntArray) -> tuple[float, float]:
     radius = 0.03 * float(np.linalg.norm(np.ptp(pixels, axis=0)))
     some = members[:: max(1, len(members) // 400)]
     close = np.linalg.norm(pixels[some, None] - pixels[None], axis=2) < radius
-    own = np.zeros(len(pixels))
-    own[members] = 1.0
-    best = pixels[some[int((close @ (2 * own - 1)).argmax())]]
+    inside = np.zeros(len(pixels))
+    inside[members] = 1.0
+    best = pixels[some[int((close @ (2 * inside - 1)).argmax())]]
     return float(round(best[0])), float(round(best[1]))
 
 
