@@ -48,7 +48,7 @@ class SetMatches:
         """Write the points as a text table that ``bifocal solve --pair`` takes."""
         numbers = range(1, len(self.pixels) + 1)
         heads = [f"{axis}{number} [px]" for number in numbers for axis in ("col", "row")]
-        picks = np.concatenate([own.T for own in self.pixels])
+        picks = np.concatenate([pixels.T for pixels in self.pixels])
         columns = {"id": list(self.ids), **dict(zip(heads, picks, strict=True))}
         formats = dict.fromkeys(heads, ".4f")
         write_csv(path, {**columns, "code": list(self.kinds)}, formats=formats, overwrite=overwrite)

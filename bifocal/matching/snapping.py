@@ -216,8 +216,8 @@ def _refined(values: FloatArray, start: FloatArray, size: float) -> tuple[FloatA
             return None
         if turn > 4 and np.abs(step[:2]).max() < 1e-3:
             break
-    left = max(float(np.sqrt((weight * rest**2).sum() / weight.sum())), SNAPPING.noise)
-    sigma = left * float(np.sqrt(np.linalg.inv(normal)[[0, 1], [0, 1]].max()))
+    noise = max(float(np.sqrt((weight * rest**2).sum() / weight.sum())), SNAPPING.noise)
+    sigma = noise * float(np.sqrt(np.linalg.inv(normal)[[0, 1], [0, 1]].max()))
     mean = float(np.mean([one, opposite]))
     power = float(np.mean([(one - mean) ** 2, (opposite - mean) ** 2]))
     symmetry = 1.0 - float((weight * rest**2).sum() / weight.sum()) / max(2 * power, 1e-9)

@@ -169,8 +169,8 @@ def align_photos(
     infos = image_info(far), image_info(near)
     greys = read_greys(far, near, in_water=bool(options.media))
     interiors = [
-        interior_of_photo(info, known, number)
-        for number, (info, known) in enumerate(zip(infos, options.lenses, strict=True), start=1)
+        interior_of_photo(info, lens, number)
+        for number, (info, lens) in enumerate(zip(infos, options.lenses, strict=True), start=1)
     ]
     interiors = judged_together(infos, interiors)
     if options.one_lens and all(interior.is_assumed for interior in interiors):

@@ -94,9 +94,9 @@ class Given:
     @property
     def enough(self) -> bool:
         """Whether control points alone orient both cameras."""
-        known, control = self.control.positioned, self.control
+        positioned, control = self.control.positioned, self.control
         return all(
-            (known & np.isfinite(pixels).all(axis=1)).sum() >= 4
+            (positioned & np.isfinite(pixels).all(axis=1)).sum() >= 4
             for pixels in (control.pixels1, control.pixels2)
         )
 

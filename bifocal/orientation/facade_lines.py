@@ -230,12 +230,12 @@ def facade_directions(
     out = []
     for name, axis in (("upright", 1), ("level", 0)):
         near = np.abs(normals[:, axis]) < np.sin(np.deg2rad(LINES.astray))
-        found, scatter, count = _common_direction(normals[near], length[near], part[near], axis)
+        direction, scatter, count = _common_direction(normals[near], length[near], part[near], axis)
         if count >= LINES.fewest:
             sigma = float(np.sqrt(2.0) * np.hypot(BUILT, scatter))
             out.append(
                 FacadeDirection(
-                    camera=number, name=name, direction=axes.T @ found, sigma=sigma, count=count
+                    camera=number, name=name, direction=axes.T @ direction, sigma=sigma, count=count
                 )
             )
     return out

@@ -43,16 +43,16 @@ def media_in_words(adjusted: AdjustedPair, given: PairMedia) -> tuple[str, ...]:
 def media_remarks(adjusted: AdjustedPair, given: PairMedia) -> tuple[str, ...]:
     """Return which unknowns of the media the data do not carry, or cannot tell from others."""
     media = adjusted.media
-    told = []
+    remarks = []
     factor = max(adjusted.sigma0, 1.0)
     for row, name in _estimated(adjusted, media):
         prior, sigma = given.sigmas[name], float(np.sqrt(adjusted.of_unknowns[row, row]))
         if sigma > UNCARRIED * prior * factor:
-            told.append(_hardly_carried(name, given.value(name), prior))
+            remarks.append(_hardly_carried(name, given.value(name), prior))
         if (twin := _twin(adjusted, media, row)) and twin[1] > ALIKE:
             about = {"name": name, "twin": twin[0], "correlation": twin[1]}
-            told.append(remark("orientation.hardly_told_apart", **about))
-    return tuple(told)
+            remarks.append(remark("orientation.hardly_told_apart", **about))
+    return tuple(remarks)
 
 
 def refuse_impossible_media(adjusted: AdjustedPair, given: PairMedia) -> None:

@@ -185,8 +185,8 @@ def by_rectangle(
     words = proportions() if photo.sigma0 > SLIPS.doubted else ""
     if begun == 2:
         start = remark("rectify.begun_below")
-    said = [text for text in (start, words) if text]
-    return replace(photo, remarks=(*said, *photo.remarks)) if said else photo
+    remarks = [text for text in (start, words) if text]
+    return replace(photo, remarks=(*remarks, *photo.remarks)) if remarks else photo
 
 
 def _begun_at(corners: FloatArray) -> int:

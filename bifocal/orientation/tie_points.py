@@ -162,8 +162,8 @@ def with_wall(
         rough = WALLS.rough_band * float(state.cameras[0].centre[2])
         on_wall = observations.wall & np.isfinite(xyz).all(axis=1) & np.isfinite(metres)
         face = replace(face, roughness=rough, chance=on_wall.astype(float))
-    seen = observations.tie1[face.members]
-    cell = np.floor(seen / (0.1 * max(observations.interiors[0].image_size)))
+    members = observations.tie1[face.members]
+    cell = np.floor(members / (0.1 * max(observations.interiors[0].image_size)))
     cells = len(np.unique(cell, axis=0))
     if face.chance.sum() < TIES.fewest_on_wall or cells < TIES.fewest_cells:
         return replace(

@@ -191,8 +191,8 @@ def straightened(
 def _open(adjusted: AdjustedPair, size: tuple[int, int]) -> float:
     """Return how much the uncertainty of cameras and media bends a flat wall, root mean square."""
     columns, rows = np.meshgrid(np.linspace(0, size[0], 12), np.linspace(0, size[1], 8))
-    seen = np.column_stack([columns.ravel(), rows.ravel()])
-    flat = adjusted.media.on_plane(0, adjusted.cameras[0], seen)
+    pixels = np.column_stack([columns.ravel(), rows.ravel()])
+    flat = adjusted.media.on_plane(0, adjusted.cameras[0], pixels)
     seen1, seen2 = (view.pixels for view in views_of(adjusted, flat))
     values, vectors = np.linalg.eigh(adjusted.of_unknowns)
     factor = vectors * np.sqrt(np.maximum(values, 0.0))
