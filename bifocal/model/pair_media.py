@@ -216,12 +216,12 @@ class PairMedia:
         port = None if first is None else (first, first if second is None else second)
         layers = Layers(indices=tuple(indices), thicknesses=tuple(thicknesses))
         media = cls(layers=layers, port=port, depth=depth, normals=normals)
-        sigmas, known = {}, dict(priors or {})
-        for name in (*estimate, *known):
+        sigmas, usual_sigmas = {}, dict(priors or {})
+        for name in (*estimate, *usual_sigmas):
             start = media.value(name) if name in media._allowed and name not in LEANS else 0.0
             usual = SIGMA_LEAN if name in LEANS else max(typical_sigma(name, start), 1e-6)
             for unknown in _unknowns(name):
-                sigmas[unknown] = known.get(name, usual)
+                sigmas[unknown] = usual_sigmas.get(name, usual)
         return replace(media, sigmas=sigmas)
 
     @property

@@ -387,9 +387,9 @@ class PhotoSet:
             if photo.image_size is None:  # as wide as a usual lens sees
                 places.append(photo.nadir + (grid - 0.5) * photo.distance)
             else:
-                seen = photo.plane_from_pixels(grid * photo.image_size - 0.5)
-                ahead = photo.sees_ahead(seen, photo.image_size[::-1])
-                places.append(seen[ahead & np.isfinite(seen).all(axis=1)])
+                on_plane = photo.plane_from_pixels(grid * photo.image_size - 0.5)
+                ahead = photo.sees_ahead(on_plane, photo.image_size[::-1])
+                places.append(on_plane[ahead & np.isfinite(on_plane).all(axis=1)])
         plane = np.concatenate(places)
         return np.column_stack([plane, np.zeros(len(plane))])
 

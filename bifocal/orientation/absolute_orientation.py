@@ -228,7 +228,7 @@ def _with_words(pair: OrientedPair, given: Given, remarks: tuple[str, ...]) -> O
     """Return the pair with all that is to be told of it, doubts first; refuse what is none."""
     validation.check_determined(pair.adjusted)
     validation.check_movement(pair.adjusted)
-    told = (
+    sentences = (
         *model_remarks(pair, given.site),
         *filter(None, [given.pick_verdict.words, *(i.doubt for i in given.interiors)]),
         *remarks,
@@ -239,7 +239,7 @@ def _with_words(pair: OrientedPair, given: Given, remarks: tuple[str, ...]) -> O
         *distance_remarks(pair),
     )
     assumed = (*pair.assumed, *assumptions(pair.observations, given.site))
-    return replace(pair, remarks=told, assumed=assumed)
+    return replace(pair, remarks=sentences, assumed=assumed)
 
 
 def _bend(observations: PairObservations, state: PairUnknowns) -> WallShape:

@@ -104,12 +104,12 @@ def of_rows(
         about = {"photos": ", ".join(titles), "listed": ", ".join(names[:5]), "near": near}
         raise InputError(remark("control.no_such_photo", of=table.file, **about))
     order = list(places)
-    made = [np.full((len(order), 2), np.nan) for _ in photos]
+    pixels = [np.full((len(order), 2), np.nan) for _ in photos]
     for (name, photo_number), k in picks.items():
-        made[photo_number][order.index(name)] = column[k], row[k]
+        pixels[photo_number][order.index(name)] = column[k], row[k]
     shown_names = ", ".join(names[:5])
     notes = (remark("control.other_photos", count=len(names), names=shown_names),) if names else ()
-    return ListedPoints(rows=list(places.values()), picks=made, remarks=notes)
+    return ListedPoints(rows=list(places.values()), picks=pixels, remarks=notes)
 
 
 def without_unseen(

@@ -437,8 +437,8 @@ def _with_named_wall(pair: OrientedPair) -> OrientedPair:
     if spread[1] < 0.1 * spread[0]:
         return pair
     # Points said to be on the wall, not measured against it, leave its roughness alone.
-    own = float(np.median(sigma[on])) if height[on].any() else 0.0
-    usual = float(np.hypot(own, wall_roughness(observations, pair.adjusted)))
+    noise = float(np.median(sigma[on])) if height[on].any() else 0.0
+    usual = float(np.hypot(noise, wall_roughness(observations, pair.adjusted)))
     tolerance = (usual / float(np.sqrt(on.sum())), usual / float(spread[1]))
     walled = with_wall(observations, pair.adjusted, tolerance)
     if not walled.wall.any():

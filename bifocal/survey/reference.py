@@ -153,13 +153,13 @@ class CheckResult:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What the user should know about the names, and points that are not counted."""
-        said: list[str] = []
+        sentences: list[str] = []
         if self.missing:
-            said.append(remark("survey.no_such_check", names=", ".join(self.missing[:10])))
+            sentences.append(remark("survey.no_such_check", names=", ".join(self.missing[:10])))
         if self.flagged:
             named = ", ".join(f"{name} ({flag})" for name, flag in list(self.flagged.items())[:10])
-            said.append(remark("survey.flagged_check", count=len(self.flagged), names=named))
-        return tuple(said)
+            sentences.append(remark("survey.flagged_check", count=len(self.flagged), names=named))
+        return tuple(sentences)
 
     @property
     def accuracy(self) -> float:

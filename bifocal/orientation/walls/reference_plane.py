@@ -336,8 +336,8 @@ def _extent(places: FloatArray, chance: FloatArray) -> float:
     likelier = np.minimum(chance, 1 - 1e-9) / np.maximum(1 - chance, 1e-9) * (1 - whole) / whole
     share = np.full(len(cells), 0.5)
     for _ in range(30):
-        own = share[which] * likelier / (share[which] * likelier + 1 - share[which])
-        share = np.bincount(which, own, len(cells)) / count
+        belonging = share[which] * likelier / (share[which] * likelier + 1 - share[which])
+        share = np.bincount(which, belonging, len(cells)) / count
     full = share > 0.5 * np.quantile(share, 0.9)
     if full.sum() < 3:
         return 0.0
