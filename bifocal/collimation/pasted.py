@@ -54,7 +54,7 @@ def _with_headings(text: str) -> str:
     fields = [field.strip() for field in first.split(delimiter)]
     if len(fields) < 2 or not any(_is_number(field) for field in fields[1:]):
         return text
-    keys = [column.key for column in COLUMNS][: len(fields)]
+    keys = [column.key for column in COLUMNS if column.key != "H"][: len(fields)]
     return f"{delimiter.join(keys)}\n{text}"
 
 
