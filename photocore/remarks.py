@@ -22,6 +22,10 @@ from photocore.workbook.making.words import LANGUAGES
 WORDS = "word."
 #: By this key JSON files hold what their remarks are made of.
 KEYS = "remark_keys"
+#: How much a remark weighs, the worst first.
+LEVELS = ("stop", "alarm", "doubt", "hint")
+#: Tables of `remarks.toml` that list the keys of a level other than ``doubt``, which is the rule.
+_LISTED = {"alarms": "alarm", "hints": "hint"}
 #: Remarks that are remembered, the latest; and the shortest text that may hold one.
 _REMEMBERED, _SHORTEST = 4_000, 5
 
@@ -36,7 +40,8 @@ class Remark(str):
     values : mapping
         What fills its blanks.
     level : str
-        ``stop`` where nothing was made, ``doubt`` where what was made may be wrong, ``hint``.
+        One of `LEVELS`: ``stop`` where nothing was made, ``alarm`` where what was made is wrong if
+        nothing is done, ``doubt`` where it may be, ``hint``.
     """
 
     key: str
@@ -96,6 +101,17 @@ def keys_in(text: str) -> set[str]:
     return {told.key for _, told in _within(text)}
 
 
+def level_of(text: str) -> str:
+    """Return the worst level of the remarks that a text holds; ``hint`` where it holds none.
+
+    Examples
+    --------
+    >>> level_of(f"survey.xlsx: {Remarks('bifocal')('survey.off_radial_more', count=3)}")
+    'doubt'
+    """
+    return min((told.level for _, told in _within(text)), key=LEVELS.index, default="hint")
+
+
 def with_keys(value: dict[str, Any]) -> dict[str, Any]:
     """Return an object for JSON with keys, values and levels of all remarks that its texts hold."""
     held: dict[str, Any] = {}
@@ -124,7 +140,9 @@ def learn(value: Any) -> None:
     held = value.get(KEYS) if isinstance(value, dict) else None
     for text, told in (held if isinstance(held, dict) else {}).items():
         if isinstance(told, dict) and isinstance(told.get("values"), dict):
-            _remembered(text, str(told.get("key")), told["values"], str(told.get("level")))
+            level = told.get("level")
+            level = level if level in LEVELS else "doubt"
+            _remembered(text, str(told.get("key")), told["values"], level)
 
 
 def _plain(value: Any) -> Any:
@@ -146,7 +164,8 @@ class Remarks:
     *packages : str
         Each with a file `remarks.toml` of tables ``[section.name]``, each of which holds one text
         with blanks a language. A blank is a format field; ``!s`` says that its value is itself
-        looked up. A table ``[hints]`` lists the keys of those that are no more than hints.
+        looked up. Tables ``[alarms]`` and ``[hints]`` list the keys of those that are more or less
+        than a doubt.
 
     Examples
     --------
@@ -167,21 +186,24 @@ class Remarks:
         found: dict[str, dict[str, str]] = {}
         for package in self.packages:
             for section, entries in packaged(package, "remarks").items():
-                if section != "hints":
+                if section not in _LISTED:
                     found |= {f"{section}.{name}": words for name, words in entries.items()}
         return found
 
     @cached_property
-    def hints(self) -> set[str]:
-        """Keys of remarks that are no more than hints."""
-        listed = (packaged(package, "remarks").get("hints", {}) for package in self.packages)
-        return {key for table in listed for key in table.get("keys", ())}
+    def levels(self) -> dict[str, str]:
+        """Levels by key, of remarks that are no plain doubts."""
+        return {
+            key: level
+            for package in self.packages
+            for table, level in _LISTED.items()
+            for key in packaged(package, "remarks").get(table, {}).get("keys", ())
+        }
 
     def __call__(self, key: str, /, *, of: object = "", **values: Any) -> Remark:
         """Return a remark by its key, its blanks filled, behind the place that it is about."""
         words = self.texts[key]["en"].format(**values)
-        level = "hint" if key in self.hints else "doubt"
-        told = _remembered(words, key, values, level)
+        told = _remembered(words, key, values, self.levels.get(key, "doubt"))
         if not of:
             return told
         placed = Remark(f"{of}: {words}")

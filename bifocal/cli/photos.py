@@ -81,17 +81,17 @@ def command(
     from bifocal.projects.colmap_workflow import export_photos
     from bifocal.projects.photos_workflow import ProjectOptions, photos_from_project
 
-    options = ProjectOptions(**{key: said for key, said in given.items() if said is not None})
+    options = ProjectOptions(**{key: value for key, value in given.items() if value is not None})
     if to is not None:
         if options != ProjectOptions():
             raise click.UsageError("--to: takes a set of photos as it is; leave out other options.")
         export_photos(project, out, overwrite=overwrite)
         remark(f"COLMAP model written to {out}")
         return
-    made = photos_from_project(project, out, options, overwrite=overwrite)
+    result = photos_from_project(project, out, options, overwrite=overwrite)
     data = {
-        "program": made.program,
-        "scale": made.scale,
+        "program": result.program,
+        "scale": result.scale,
         "photos": [
             {
                 "name": photo.name,
@@ -99,10 +99,10 @@ def command(
                 "distance": photo.distance,
                 "nadir": photo.nadir,
             }
-            for photo in made.photos.photos
+            for photo in result.photos.photos
         ],
     }
-    print_result(data, _lines(made), as_json=as_json, remarks=made.remarks)
+    print_result(data, _lines(result), as_json=as_json, remarks=result.remarks)
     if not as_json:
         remark(f"Set of photos written to {out}")
 

@@ -18,10 +18,10 @@ def oriented_live(session: Session) -> LiveOrientation | None:
     state, infos = session.state, session.pictures.infos
     if len(infos) != 2:
         return None
-    pair, said = session.pictures.pair, session.spoken
-    facts = (dict(state.control), dict(state.tapes), state.setup, state.lenses, said, id(pair))
+    pair, language = session.pictures.pair, session.spoken
+    facts = (dict(state.control), dict(state.tapes), state.setup, state.lenses, language, id(pair))
     if session.orientation is None or session.orientation[0] != facts:
-        session.orientation = facts, live_orientation(state, infos, said, pair)
+        session.orientation = facts, live_orientation(state, infos, language, pair)
     return session.orientation[1]
 
 
@@ -37,13 +37,14 @@ def goodness(session: Session) -> dict[str, Any] | None:
 def measured(session: Session, names: Sequence[str]) -> dict[str, float | None]:
     """Return distances and angles between points."""
     session.pictures.needed_pair()
-    places = []
+    points, results = [], session.results
     for name in names:
         point = session.state.points.get(name)
         if point is None:
             raise InputError(remark("page.no_point", name=name))
-        place = None if session.results is None else session.results.place(point)
-        if place is None:
+        if results is None or not point.is_complete:
             raise InputError(remark("page.point_in_one", name=name))
-        places.append(place)
-    return measure(places)
+        points.append(point)
+    if results is None or len(points) < 2:
+        raise InputError(remark("page.measure_of_two"))
+    return measure(*results.joint(points))

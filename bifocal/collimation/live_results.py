@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -66,7 +66,6 @@ class LiveResults:
     limits: FlagLimits = field(default_factory=FlagLimits)
     setup: SurveySetup | None = None
     _rows: dict[_Key, dict[str, Any]] = field(default_factory=dict, init=False)
-    _places: dict[_Key, tuple[FloatArray, FloatArray]] = field(default_factory=dict, init=False)
 
     def solve(self, points: Iterable[PickedPoint]) -> None:
         """Solve all points whose picks are new, at once."""
@@ -75,7 +74,6 @@ class LiveResults:
         if not new:
             return
         table = self._solved(observations(new))
-        covariance = table.covariance
         for row, point in enumerate(new):
             misfit = table.of_pixels.get("misfit_px")
             self._rows[_key(point)] = plain(
@@ -87,8 +85,6 @@ class LiveResults:
                     and point.type != "doubtful",
                 }
             )
-            if covariance is not None:
-                self._places[_key(point)] = table.xyz[row], covariance[row]
 
     def _solved(self, seen: PointObservations) -> ReliefTable:
         if self.setup is None:
@@ -102,7 +98,12 @@ class LiveResults:
         self.solve([point])
         return self._rows.get(_key(point))
 
-    def place(self, point: PickedPoint) -> tuple[FloatArray, FloatArray] | None:
-        """Return X, Y, r [m], shape (3,), and their covariance [m²]; None if incomplete."""
-        self.solve([point])
-        return self._places.get(_key(point))
+    def joint(self, points: Sequence[PickedPoint]) -> tuple[FloatArray, FloatArray]:
+        """Return X, Y, r of complete points [m], shape (n, 3), and their covariance together [m²].
+
+        Shape (3 n, 3 n), NaN where it is not known.
+        """
+        table = self._solved(observations(points))
+        joint = table.joint_covariance(range(len(points)))
+        size = 3 * len(points)
+        return table.xyz, np.full((size, size), np.nan) if joint is None else joint

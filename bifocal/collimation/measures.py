@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from bifocal.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.errors import InputError
-
-#: X, Y, r of a point and their covariance.
-Place = tuple[FloatArray, FloatArray]
 
 
-def measure(places: Sequence[Place]) -> dict[str, float | None]:
+def measure(xyz: FloatArray, covariance: FloatArray) -> dict[str, float | None]:
     """Return what is measured between points in their order.
 
     Parameters
     ----------
-    places : sequence of (ndarray of shape (3,), ndarray of shape (3, 3))
-        X, Y, r [m] and their covariance [m²]; points count as independent of each other, since
-        each has its own picks. What the orientation leaves open is common to all, and not in it.
+    xyz : ndarray, shape (n, 3)
+        X, Y, r of the points. [m]
+    covariance : ndarray, shape (3 n, 3 n)
+        Of them all together. [m²]
 
     Returns
     -------
@@ -31,33 +26,20 @@ def measure(places: Sequence[Place]) -> dict[str, float | None]:
         with ``sigma_...`` [m]: slope distance, its part level (along X and r), the rise Y, and the
         step in relief; ``inclination`` [deg] of the line above the level. ``length`` along all
         points [m]. With three points or more ``angle`` at the second one. [deg]
-
-    Raises
-    ------
-    InputError
-        If there are fewer than two points.
     """
-    if len(places) < 2:
-        raise InputError(remark("page.measure_of_two"))
-    xyz = np.array([place[0] for place in places])
-    covariances = [place[1] for place in places]
-    whole = np.zeros((3 * len(places), 3 * len(places)))
-    for row, covariance in enumerate(covariances):
-        whole[3 * row : 3 * row + 3, 3 * row : 3 * row + 3] = covariance
-    ends = np.array([xyz[0], xyz[-1]])
-    pair = np.zeros((6, 6))
-    pair[:3, :3], pair[3:, 3:] = covariances[0], covariances[-1]
+    ends, of_ends = xyz[[0, -1]], np.r_[0:3, -3:0]
+    of_both = covariance[np.ix_(of_ends, of_ends)]
     out: dict[str, float | None] = {}
     for name, function in (
         ("distance", _distance), ("horizontal", _horizontal), ("vertical", _vertical),
         ("depth", _depth), ("inclination", _inclination),
     ):  # fmt: skip
-        out[name], out[f"sigma_{name}"] = _with_sigma(function, ends, pair)
+        out[name], out[f"sigma_{name}"] = _with_sigma(function, ends, of_both)
     out["sigma"] = out["sigma_distance"]
-    out["length"], out["sigma_length"] = _with_sigma(_length, xyz, whole)
+    out["length"], out["sigma_length"] = _with_sigma(_length, xyz, covariance)
     out["angle"], out["sigma_angle"] = (None, None)
-    if len(places) > 2:
-        out["angle"], out["sigma_angle"] = _with_sigma(_angle, xyz[:3], whole[:9, :9])
+    if len(xyz) > 2:
+        out["angle"], out["sigma_angle"] = _with_sigma(_angle, xyz[:3], covariance[:9, :9])
     return out
 
 

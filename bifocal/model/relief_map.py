@@ -94,11 +94,11 @@ class ReliefMap(Gridded):
     def from_relief(cls, r: ArrayLike, *, plane_from_pixel: ArrayLike) -> ReliefMap:
         """Return a map of given relief with zero sigma: finite pixels count as measured."""
         relief = np.asarray(r, dtype=np.float32)
-        known = np.isfinite(relief)
+        finite = np.isfinite(relief)
         return cls(
             r=relief,
-            sigma=np.where(known, np.float32(0), np.float32(np.nan)),
-            quality=np.where(known, Quality.MEASURED, Quality.UNKNOWN).astype(np.uint8),
+            sigma=np.where(finite, np.float32(0), np.float32(np.nan)),
+            quality=np.where(finite, Quality.MEASURED, Quality.UNKNOWN).astype(np.uint8),
             plane_from_pixel=np.asarray(plane_from_pixel, dtype=np.float64),
         )
 
@@ -198,8 +198,8 @@ class ReliefMap(Gridded):
         """
         bilinear, _ = self._interpolated(self.r, positions, order=1)
         nearest, inside = self._interpolated(self.r, positions, order=0)
-        known = np.where(np.isfinite(bilinear), bilinear, nearest)
-        return np.where(inside, known, np.nan)
+        values = np.where(np.isfinite(bilinear), bilinear, nearest)
+        return np.where(inside, values, np.nan)
 
     def sample_quality(self, positions: ArrayLike) -> ByteArray:
         """Return the `Quality` of the nearest pixel, shape (...); UNKNOWN outside the map."""
@@ -231,12 +231,12 @@ def told_pixels(reader: RasterReader) -> Fetch | None:
 
 def measured_part(reader: RasterReader) -> MapSurface | None:
     """Return what of an open relief map was measured or drawn; None where it does not say."""
-    told = told_pixels(reader)
-    if told is None:
+    measured = told_pixels(reader)
+    if measured is None:
         return None
 
     def fetch(*window: int) -> Float32Array:
-        return np.where(told(*window) > 0, reader.read_floats(*window), np.float32("nan"))
+        return np.where(measured(*window) > 0, reader.read_floats(*window), np.float32("nan"))
 
     with suppress(InputError):  # nothing was
         return MapSurface(reader.grid, fetch)

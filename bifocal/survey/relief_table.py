@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,6 +94,22 @@ class ReliefTable:
         if rows is not None:
             values = np.concatenate([values, np.full((1, *values.shape[1:]), np.nan)])[rows]
         return self.pair.effect_of_orientation(values) if self.pair is not None else values
+
+    def joint_covariance(self, rows: Sequence[int]) -> FloatArray | None:
+        """Covariance of X, Y, r of some rows together, shape (3 n, 3 n); None if unknown. [m²]
+
+        The orientation moves neighbours alike: what is between them is known better than they are.
+        """
+        if (of_picks := self.own_covariance) is None:
+            return None
+        count = len(rows)
+        blocks = np.zeros((count, 3, count, 3))
+        blocks[range(count), :, range(count)] = of_picks[list(rows)]
+        joint: FloatArray = blocks.reshape(3 * count, 3 * count)
+        if (effect := self.effect_of_orientation(np.array(rows))) is not None:
+            common = effect.reshape(3 * count, -1)
+            joint += common @ common.T
+        return joint
 
 
 def symmetric(columns: Mapping[str, FloatArray], prefix: str = "cov_") -> FloatArray:

@@ -19,7 +19,7 @@ class TargetsCommand:
     """The options of ``multimedia targets``, and examples.
 
     multimedia targets img/cam1.10001.tif img/cam2.10001.tif --out targets
-    multimedia targets img/*.tif --project tank.toml --out targets
+    multimedia targets img/*.tif --project tank.toml --out targets --overwrite
     multimedia targets img/*.tif --threshold 25 --out targets.csv
     """
 

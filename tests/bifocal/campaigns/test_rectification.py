@@ -256,7 +256,9 @@ def test_a_drawing_says_what_relief_does(church: Path, data_dir: Path) -> None:
         done = CliRunner().invoke(bifocal_command, line.split())
     assert done.exit_code == 0, done.output
     names = {path.name for path in (church / "drawing").iterdir()}
-    assert names == {"far.tif", "far.tfw", "far.png", "far.dxf", "far.pdf"}
+    assert names == {
+        "far.tif", "far.tfw", "far.png", "far.dxf", "far.pdf", "SHA256SUMS",
+    }  # fmt: skip
     assert cv2.imread(str(church / "drawing" / "far.png")).shape[1] > 1000
     page = page_of(church / "drawing" / "far.pdf")
     assert "Ciò che sporge di 20 cm è spostato fino a 2" in page

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import io
 import json
+from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 from PIL import Image
 
-from bifocal import SAMPLE, InputError, Lens, Pair, read_image
+from bifocal import SAMPLE, InputError, Lens, Pair, PointObservations, read_image
 from bifocal.collimation.measures import measure
 from bifocal.collimation.pyramids import TILE, level_size, max_level
 from bifocal.matching.snapping import snap
 from bifocal.matching.suggestions import radial_line, suggest
+from bifocal.model.orientation_precision import NAMES
+from bifocal.survey.point_survey import solve_points
+from bifocal.survey.relief_table import ReliefTable
 from tests.bifocal.collimation.page_truth import SPOILT, true_pixels
 from tests.cases import few_by_default
 from tests.page_session import client_of, opened, sample_folder
@@ -329,8 +333,7 @@ def test_levels_halve_without_a_shift() -> None:
 
 def test_measures_of_a_right_triangle() -> None:
     # (0, 0, 0), (3, 0, 0), (3, 4, 0): hypotenuse 5, right angle; 1 mm in every coordinate.
-    places = [(np.array(p, float), 1e-6 * np.eye(3)) for p in ((0, 0, 0), (3, 0, 0), (3, 4, 0))]
-    found = measure(places)
+    found = measure(np.array([[0.0, 0, 0], [3, 0, 0], [3, 4, 0]]), 1e-6 * np.eye(9))
     assert found["distance"] == pytest.approx(5.0, abs=1e-12)
     assert found["sigma_distance"] == pytest.approx(0.001 * np.sqrt(2), rel=1e-6)
     assert (found["horizontal"], found["vertical"]) == pytest.approx((3.0, 4.0), abs=1e-12)
@@ -340,5 +343,22 @@ def test_measures_of_a_right_triangle() -> None:
     expected = np.degrees(0.001 * np.sqrt(2 * (1 / 9 + 1 / 16)))
     assert found["sigma_angle"] == pytest.approx(expected, rel=1e-5)
     assert found["inclination"] == pytest.approx(np.degrees(np.arctan2(4, 3)), abs=1e-9)
-    with pytest.raises(InputError, match="two points"):
-        measure(places[:1])
+
+
+def test_what_moves_all_points_alike_is_not_in_their_distance(sample) -> None:
+    pair, _ = sample
+    pixels = np.array([true_pixels()[name] for name in ("T01", "T14", "T20")])
+
+    def found(moved: float) -> tuple[ReliefTable, dict[str, float | None]]:
+        """Both cameras may lie aside by so many metres, together."""
+        row = np.array([float(name.startswith("X ")) for name in NAMES]) * moved
+        other = replace(pair, orientation=np.outer(row, row))
+        seen = PointObservations(ids=("a", "b", "c"), pixels1=pixels[:, 0], pixels2=pixels[:, 1])
+        table = solve_points(other, seen)
+        return table, measure(table.xyz, table.joint_covariance([0, 1, 2]))
+
+    (exact, still), (loose, moving) = found(1e-9), found(0.5)
+    np.testing.assert_allclose(loose["sigma_X"], 0.5, rtol=0.01)
+    assert exact["sigma_X"].max() < 0.01
+    assert moving["sigma_distance"] == pytest.approx(still["sigma_distance"], rel=1e-6)
+    assert moving["sigma_angle"] == pytest.approx(still["sigma_angle"], rel=1e-6)

@@ -11,7 +11,9 @@ import pytest
 from bifocal import SAMPLE, Pair, ReliefMap
 from bifocal.collimation.job_tasks import finish, task_of
 from bifocal.collimation.product_graph import causes_of, out_of_date
+from bifocal.collimation.wording import without_options
 from bifocal.files.made_from import MadeFrom
+from bifocal.remarks import remark
 from tests.page_session import client_of, opened, pick_both, sample_folder, sample_picks
 
 DOOR = [[600.0, 400.0, -0.5], [800.0, 400.0, -0.5], [800.0, 700.0, -0.5]]
@@ -110,16 +112,37 @@ def control(session, name, x, at):
         )  # fmt: skip
 
 
+def proposed(session, **report):
+    """Let *Align* end with the sample's pair, and what it has to report."""
+    task = task_of(session, "align", {}) | {"causes": causes_of(session, "align")}
+    task["out"] = str(session.files.folder / "facade.proposed.pair.json")
+    shutil.copyfile(SAMPLE / "facade.pair.json", task["out"])
+    finish(session, task, {"remarks": [], "control": [], **report})
+
+
+def test_the_worst_that_is_known_of_a_pair_stands_first_and_says_how_bad_it_is(tmp_path):
+    folder = sample_folder(tmp_path)
+    (folder / "facade.pair.json").rename(folder / "kept.json")
+    with opened(folder / "far.jpg", folder / "near.jpg") as session:
+        alarm = remark("orientation.misses_lines", sigma=3.0, reason="anything")
+        proposed(session, remarks=["A tip.", str(remark("rectify.no_picks", path="a")), str(alarm)])
+        state = client_of(session).get("/api/state").json()
+        words = without_options(alarm)
+        assert state["advice"][0] == state["pair"]["remarks"][0] == words
+        assert state["pair"]["remarks"][-1] == "A tip."
+        assert state["levels"][words] == "alarm"
+        assert "A tip." not in state["levels"]
+        # Of a tip alone the next step stands first.
+        proposed(session, remarks=["A tip."])
+        assert "A tip." not in client_of(session).get("/api/state").json()["advice"]
+
+
 def test_control_changed_after_align_is_said_and_counts_again_when_taken_back(tmp_path):
     folder = sample_folder(tmp_path)
     (folder / "facade.pair.json").rename(folder / "kept.json")
     with opened(folder / "far.jpg", folder / "near.jpg") as session:
         control(session, "K1", 1.0, (300.0, 300.0))
-        task = task_of(session, "align", {}) | {"causes": causes_of(session, "align")}
-        task["out"] = str(folder / "facade.proposed.pair.json")
-        shutil.copyfile(SAMPLE / "facade.pair.json", task["out"])
-        report = {"id": "K1", "residual_px": [0.1, 0.1, 0.1, 0.1]}
-        finish(session, task, {"remarks": [], "control": [report]})
+        proposed(session, control=[{"id": "K1", "residual_px": [0.1, 0.1, 0.1, 0.1]}])
         client = client_of(session)
 
         def shown():

@@ -177,7 +177,7 @@ export class OrientationStage {
       pick: (item, one) => this.picker.pick(item, one), selected: this.picker.selected });
     for (const item of control) {
       const [pixel, off] = [this.picker.pick(item, image), item.residual?.[image]];
-      if (pixel && off) drawing.residual(context, pane.screen(image, pixel), off.map((one) => one * STRETCHED), "#ff6b6b");
+      if (pixel && off) drawing.residual(context, pane.screen(image, pixel), off.map((one) => one * STRETCHED), drawing.DOUBT);
     }
     const { cursor } = this.picker;
     if (cursor?.pane === pane) drawing.cursor(context, pane, cursor.place, image);
@@ -207,8 +207,8 @@ export class OrientationStage {
     keyedRows(this.tapes, state.tapes, { key: ({ from, to }) => `${from}\t${to}`,
       signature: JSON.stringify, build: (tape) => this.#tapeRow(tape) });
     for (const [list, lines] of [[this.advice, state.advice], [this.remarks, state.pair?.remarks ?? []]]) {
-      keyedRows(list, lines, { key: (text) => text, signature: (text) => text,
-        build: (text) => h("li", {}, text) });
+      keyedRows(list, lines, { key: (text) => text, signature: (text) => `${state.levels[text]} ${text}`,
+        build: (text) => h("li", { "data-level": state.levels[text] }, text) });
     }
     const remarks = state.pair?.remarks?.length ?? 0;
     this.fold.hidden = !remarks;
