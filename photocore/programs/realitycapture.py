@@ -28,6 +28,8 @@ from photocore.textfile import read_text
 
 _SPACE = "capturingreality.com/ns/xcr"
 _TABLE = ("name", "x", "y", "alt", "heading", "pitch", "roll", "f")
+#: No photos of a wall stand as near as that in metres: longitudes and latitudes do (2 km).
+_DEGREES = 0.02
 _TERMS = ("k1", "k2", "k3", "k4", "t1", "t2")
 
 
@@ -115,6 +117,13 @@ def read_reality_table(path: Path, photos: PhotoFinder) -> ForeignProject:
         views.append(ForeignView(row["name"], fit.lens, TURN @ world.T, values[:3]))
     if not views:
         raise InputError(remark("programs.no_pose", of=path))
+    plan = np.array([view.centre[:2] for view in views])
+    if (
+        len(views) > 1
+        and (np.abs(plan) <= [180, 90]).all()
+        and np.ptp(plan, axis=0).max() < _DEGREES
+    ):
+        raise InputError(remark("programs.reality_degrees", of=path))
     return ForeignProject("RealityCapture", tuple(views), remarks=tuple(fits))
 
 

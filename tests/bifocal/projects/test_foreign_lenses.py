@@ -124,6 +124,11 @@ def test_a_radial_fourth_term_of_realitycapture_is_fitted(tmp_path: Path) -> Non
     path.write_text("#name,x,y,z\none.jpg,0,0,0\n")
     with pytest.raises(InputError, match="lacks alt, heading"):
         read_foreign_project(path, PhotoFinder(path))
+    Image.new("L", SIZE).save(tmp_path / "two.jpg")
+    rows = "one.jpg,9.182312,45.46,130,0,0,0,24,0,0,0\ntwo.jpg,9.182401,45.46,131,0,0,0,24,0,0,0"
+    path.write_text(f"{head}\n{rows}\n")
+    with pytest.raises(InputError, match="are longitudes and latitudes"):
+        read_foreign_project(path, PhotoFinder(path))
 
 
 def test_labels_alike_are_told_apart_by_their_groups_or_both_named(tmp_path: Path) -> None:
