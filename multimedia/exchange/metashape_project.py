@@ -37,12 +37,12 @@ def read_metashape(path: Path, *, pitch: float, unit: str) -> Project:
         )
         for v in read.views
     )  # fmt: skip
-    said = (
+    notes = (
         () if read.metres else ("the chunk has no transform: its frame and scale are arbitrary.",)
     )
     return Project(
         cameras=cameras, sigma_image=0.5 * pitch, unit=unit, name=path.stem,
-        extra={"source": "Metashape"}, remarks=(*read.remarks, *said),
+        extra={"source": "Metashape"}, remarks=(*read.remarks, *notes),
     )  # fmt: skip
 
 

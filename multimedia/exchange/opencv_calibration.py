@@ -56,9 +56,9 @@ def read_opencv(path: Path, *, pitch: float, unit: str) -> Project:
     cameras: list[Camera] = []
     remarks: list[str] = []
     for file in files:
-        found, said = _cameras(file, opencv_values(file).get, pitch)
-        cameras += found
-        remarks += said
+        of_file, notes = _cameras(file, opencv_values(file).get, pitch)
+        cameras += of_file
+        remarks += notes
     if not cameras:
         raise InputError(f"{path}: holds no calibration ({', '.join(ENDINGS)}).")
     return Project(
@@ -113,8 +113,8 @@ def _cameras(path: Path, get: _Get, pitch: float) -> tuple[list[Camera], list[st
         size = np.array([width.item(), height.item()])
     if size is None or size.size != 2:
         raise InputError(f"{path}: lacks image_width and image_height; add both.")
-    said = get(FISHEYE_KEY)
-    fisheye = said is not None and bool(np.any(said))
+    flag = get(FISHEYE_KEY)
+    fisheye = flag is not None and bool(np.any(flag))
     turn, shift = _first(get, *_TURN), _first(get, *_SHIFT)
     numbers = ("1", "2") if _first(get, "K1", "M1", "camera_matrix1") is not None else ("",)
     cameras = []

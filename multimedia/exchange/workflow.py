@@ -98,11 +98,11 @@ def convert(
     kind, project = read_any(source, pitch=pixel_size, unit=unit)
     if wanted == "project":
         write_project(target, project, overwrite=overwrite)
-        said: tuple[str, ...] = ()
+        notes: tuple[str, ...] = ()
     else:
-        said = _WRITERS[wanted](target, project, overwrite=overwrite)
+        notes = _WRITERS[wanted](target, project, overwrite=overwrite)
     return Conversion(
-        project=project, source=kind, target=wanted, remarks=(*project.remarks, *said)
+        project=project, source=kind, target=wanted, remarks=(*project.remarks, *notes)
     )
 
 

@@ -242,14 +242,16 @@ def _cost(
         for camera, seen in zip(project.cameras, image, strict=True)
     ]
     scales = np.array([ours.scale for ours, _ in views])
-    there = sensor.image_from_pixel(pixels) / scales[:, None, None]
-    own = intersect(project.cameras, image, project.interfaces).xyz
+    moved_image = sensor.image_from_pixel(pixels) / scales[:, None, None]
+    original = intersect(project.cameras, image, project.interfaces).xyz
     media = [None if len(set(wall.indices)) == 1 else wall for _, wall in views]
-    moved = intersect([ours.camera for ours, _ in views], there, media).xyz
-    miss = np.linalg.norm(moved - own, axis=1)
+    moved = intersect([ours.camera for ours, _ in views], moved_image, media).xyz
+    miss = np.linalg.norm(moved - original, axis=1)
     if not np.isfinite(miss).any():
         return []
-    checks = zip(known_misses(project, ids, own), known_misses(project, ids, moved), strict=False)
+    checks = zip(
+        known_misses(project, ids, original), known_misses(project, ids, moved), strict=False
+    )
     return [
         f"Points in space move by {np.sqrt(np.nanmean(miss**2)):.3g} {project.unit} (RMS), "
         f"{np.nanmax(miss):.3g} at most."
@@ -342,15 +344,17 @@ def _cameras(
         name = Path(image.replace("\\", "/")).name.split(".")[0] or f"cam{number}"
         if name in {camera.name for camera in cameras}:
             name = f"{name}_{number}"
-        camera, glass, said = read_camera(path, sensor=control.sensor, name=name)
-        remarks += said
+        camera, glass, notes = read_camera(path, sensor=control.sensor, name=name)
+        remarks += notes
         cameras.append(camera)
         if not np.any(glass) or len(set(indices)) == 1:  # of one index all is one medium
             media_of.append("")
             continue
         wall = glass_interface(glass, indices, control.thickness)
         place = [wall.point, wall.normal]
-        same = [k for k, other in media.items() if np.allclose(place, [other.point, other.normal])]
+        same = [
+            k for k, medium in media.items() if np.allclose(place, [medium.point, medium.normal])
+        ]
         if not same:
             same = [f"wall{len(media) + 1}"]
             media[same[0]] = wall
@@ -454,9 +458,9 @@ def particle_points(experiment: Experiment) -> tuple[ObjectPoints, ImagePoints]:
                 f"rt_is: target {int(number.max())} of {camera.name} does not exist; its _targets "
                 f"file holds {len(targets.pixels)}. Positions and targets are of other frames."
             )
-        seen = np.flatnonzero(number >= 0)
-        cameras += [camera.name] * len(seen)
-        names += [ids[row] for row in seen]
-        image.append(camera.sensor.image_from_pixel(targets.pixels[number[seen]]))
+        rows = np.flatnonzero(number >= 0)
+        cameras += [camera.name] * len(rows)
+        names += [ids[row] for row in rows]
+        image.append(camera.sensor.image_from_pixel(targets.pixels[number[rows]]))
     images = ImagePoints(cameras=tuple(cameras), ids=tuple(names), image=np.concatenate(image))
     return ObjectPoints(ids=ids, xyz=experiment.particles), images

@@ -125,8 +125,8 @@ def read_camera(path: Path, *, sensor: Sensor, name: str) -> tuple[Camera, Float
         If numbers are missing or angles and matrix contradict each other.
     """
     values = _numbers(path, 3 + 3 + 9 + 2 + 1, "X0 Y0 Z0, angles, matrix, xh yh, c")
-    rotation, said = _rotation(path, values[3:6], values[6:15].reshape(3, 3))
-    remarks = [*said]
+    rotation, notes = _rotation(path, values[3:6], values[6:15].reshape(3, 3))
+    remarks = [*notes]
     glass = values[18:21] if len(values) >= 21 else np.zeros(3)
     if not np.any(glass):
         remarks.append(f"{path.name}: no glass vector; the camera looks through no interface.")

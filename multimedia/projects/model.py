@@ -155,9 +155,9 @@ class Project:
         object.__setattr__(self, "media_of", tuple(self.media_of) or ("",) * len(self.cameras))
         for camera, name in zip(self.cameras, self.media_of, strict=True):
             if name and name not in self.media:
-                known = ", ".join(self.media) or "none"
+                names = ", ".join(self.media) or "none"
                 raise InputError(
-                    f"camera {camera.name}: its media {name!r} are not described; known: {known}."
+                    f"camera {camera.name}: its media {name!r} are not described; known: {names}."
                 )
         strange = sorted(set(self.image_points.cameras) - set(self.camera_names))
         if strange:

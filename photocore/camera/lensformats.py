@@ -92,15 +92,15 @@ def colmap_lens(words: Sequence[str], path: Path, *, more: bool = False) -> tupl
         Whether anything may follow the parameters.
     """
     _, model, *numbers = words
-    known = _COLMAP.get(model)
-    count = known[0] if known and more else len(numbers) - 2
+    form = _COLMAP.get(model)
+    count = form[0] if form and more else len(numbers) - 2
     try:
         width, height, *p = (float(item) for item in numbers[: 2 + count])
     except ValueError:
         raise InputError(f"{path}: {' '.join(words)!r} is not a COLMAP camera line.") from None
-    if known is None or len(p) != known[0]:
+    if form is None or len(p) != form[0]:
         raise InputError(f"{path}: COLMAP camera {model} with {len(p)} parameters is not read.")
-    _, (fx, fy, cx, cy), terms = known
+    _, (fx, fy, cx, cy), terms = form
     if not (p[fx] > 0 and p[fy] > 0):
         raise InputError(f"{path}: the focal lengths must be above zero [px].")
     lens = LensData(
@@ -256,50 +256,50 @@ def opencv_values(path: Path) -> dict[str, FloatArray]:
 
 
 def _json_values(path: Path) -> dict[str, FloatArray]:
-    found: dict[str, FloatArray] = {}
+    values: dict[str, FloatArray] = {}
     for key, value in read_object(path, what="OpenCV calibration").items():
         if key in _NAMED and value in _FISHEYES:
-            found[FISHEYE_KEY] = np.ones(1)
+            values[FISHEYE_KEY] = np.ones(1)
         elif isinstance(value, Mapping) and {"rows", "cols", "data"} <= value.keys():
-            found[key] = _table(path, key, value["data"], [value["rows"], value["cols"]])
+            values[key] = _table(path, key, value["data"], [value["rows"], value["cols"]])
         elif isinstance(value, list) or is_finite_number(value):
-            found[key] = _table(path, key, value, None)
-    return found
+            values[key] = _table(path, key, value, None)
+    return values
 
 
 def _xml_values(path: Path, text: str) -> dict[str, FloatArray]:
     root = xml_root(path, text)
     if root.tag != "opencv_storage":
         raise InputError(f"{path}: is not an OpenCV calibration file.")
-    found = {}
+    values = {}
     for node in root:
         words = (node.findtext("data") or node.text or "").split()
         if node.find("data") is not None:
             shape = [node.findtext("rows"), node.findtext("cols")]
-            found[node.tag] = _table(path, node.tag, words, shape)
+            values[node.tag] = _table(path, node.tag, words, shape)
         elif words and all(map(_is_number, words)):
-            found[node.tag] = np.array([float(word) for word in words])
-    return found
+            values[node.tag] = np.array([float(word) for word in words])
+    return values
 
 
 def _yaml_values(path: Path, text: str) -> dict[str, FloatArray]:
     if not re.search(r"^\w+:", text, re.MULTILINE):
         raise InputError(f"{path}: is not an OpenCV calibration file.")
-    found: dict[str, FloatArray] = {}
+    values: dict[str, FloatArray] = {}
     named = rf"^(?:{'|'.join(_NAMED)}):\s*[\"']?(?:{'|'.join(_FISHEYES)})\b"
     if re.search(named, text, re.MULTILINE):
-        found[FISHEYE_KEY] = np.ones(1)
+        values[FISHEYE_KEY] = np.ones(1)
     for match in _YAML.finditer(text):
         words = (match["number"] or match["list"] or match["data"] or "").replace(",", " ").split()
         if match["rows"] is not None:
             shape = [match["rows"], match["cols"]]
-            found[match["key"]] = _table(path, match["key"], words, shape)
+            values[match["key"]] = _table(path, match["key"], words, shape)
         elif words and all(map(_is_number, words)):
-            found[match["key"]] = np.array([float(word) for word in words])
+            values[match["key"]] = np.array([float(word) for word in words])
     for key in re.findall(r"^(\w+):[ \t]*!!opencv-matrix", text, re.MULTILINE):
-        if key not in found:
+        if key not in values:
             raise InputError(f"{path}: the matrix {key} is damaged; export the calibration again.")
-    return found
+    return values
 
 
 def _is_number(word: str) -> bool:
