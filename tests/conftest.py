@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from zipfile import ZipFile
 
 # Tests run one process per core: threads inside each would only get in each other's way.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -27,7 +28,9 @@ import pytest  # noqa: E402
 from hypothesis import settings  # noqa: E402
 
 from photocore import cli  # noqa: E402
+from photocore.workbook.reading import package  # noqa: E402
 from tests import equipment, turns  # noqa: E402
+from tests.workbook_schema import schema_faults  # noqa: E402
 
 # The same examples on every machine and in every run: a red test is then a change of the code.
 settings.register_profile("same", derandomize=True, deadline=None)
@@ -95,6 +98,24 @@ def _observed_commands() -> Iterator[tuple[list[str], list[subprocess.Popen]]]:
         patch.setattr(cli, "unforeseen_message", noted_message)
         patch.setattr(subprocess.Popen, "__init__", noted_start)
         yield said, started
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _books_by_the_schemas() -> Iterator[None]:
+    """Hold every part of a workbook that is written against the schemas, but what was there."""
+    check = package._refuse_damage
+
+    def checked(path: Path, old: ZipFile, target: Path, changed: dict[str, bytes | None]) -> None:
+        check(path, old, target, changed)
+        for name, data in changed.items():
+            if data and name.startswith("xl/") and name.endswith(".xml"):
+                before = schema_faults(old.read(name)) if name in old.namelist() else []
+                faults = [fault for fault in schema_faults(data) if fault not in before]
+                assert not faults, f"{path}, {name}: {faults}"
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(package, "_refuse_damage", checked)
+        yield
 
 
 class Unforeseen:

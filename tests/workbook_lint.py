@@ -1,27 +1,32 @@
 """Faults in a workbook that make Excel offer to repair it, or that show as errors elsewhere.
 
-No validator on the package index finds these; each rule stands for a prompt or an error that was
-seen in a spreadsheet program.
+Beside what the schemas say, each rule stands for a prompt or an error that was seen in a
+spreadsheet program.
 """
 
 from __future__ import annotations
 
+import posixpath
 import re
 import zipfile
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from xml.etree import ElementTree
 
 from photocore.workbook.reading.grid import TableArea, cell_name, split_area, split_cell
-from photocore.workbook.reading.package import local, new_parser, open_package, read_part
+from photocore.workbook.reading.package import open_package
 from photocore.workbook.reading.xlsx import (
-    SheetPart,
     Workbook,
     read_directory,
     read_shared_strings,
     read_tables,
 )
+from tests.workbook_schema import schema_faults
+
+_MAIN = "{http://schemas.openxmlformats.org/spreadsheetml/2006/main}"
+_TYPES = "[Content_Types].xml"
 
 _LIKE_A_CELL = re.compile(r"[A-Za-z]{1,3}\d{1,7}|[rR]\d*[cC]\d*|[rR]\d*|[cC]\d*")
 _NAME = re.compile(r"[A-Za-z_\\À-ɏ][\w.\\]*")
@@ -44,7 +49,6 @@ class _SheetFacts:
     rules: list[str] = field(default_factory=list)
     cells: list[tuple[int, int]] = field(default_factory=list)
     merged: list[tuple[int, int, int, int]] = field(default_factory=list)
-    validations: list[dict[str, str]] = field(default_factory=list)
     styles: set[int] = field(default_factory=set)
 
 
@@ -65,54 +69,40 @@ def lint(path: Path | str) -> list[str]:
     with open_package(path) as package:
         book = read_directory(path, package)
         tables = {sheet.title: read_tables(path, package, sheet) for sheet in book.sheets}
-        faults = [*_package_faults(path, package), *_name_faults(book, tables)]
+        faults = [*_package_faults(package), *_name_faults(book, tables)]
         shared = read_shared_strings(path, package, book)
-        formats = _count(path, package, book, "styles", "cellXfs", "xf")
+        styles = next((t for kind, t in book.relations.values() if kind == "styles"), "")
+        known = ElementTree.fromstring(package.read(styles)).find(_MAIN + "cellXfs")
         for sheet in book.sheets:
-            facts = _read(path, package, sheet, shared)
+            facts = _facts(ElementTree.fromstring(package.read(sheet.part)), shared)
             found = [
-                *_order_faults(facts, formats),
+                *_order_faults(facts, 1 if known is None else len(known)),
                 *_formula_faults(facts, book.names),
                 *_rule_faults(facts),
-                *_table_faults(path, package, tables[sheet.title], facts),
+                *_table_faults(package, tables[sheet.title], facts),
             ]
             faults += [f"{sheet.title}: {fault}" for fault in found]
     return faults
 
 
-def _package_faults(path: Path, package: zipfile.ZipFile) -> Iterator[str]:
-    """Yield parts without content type and relations that lead nowhere."""
-    import posixpath
-
-    parts = set(package.namelist())
-    known: set[str] = set()
-    endings: set[str] = set()
-
-    def start(name: str, attributes: dict[str, str]) -> None:
-        if local(name) == "Override":
-            known.add(attributes["PartName"].lstrip("/"))
-        elif local(name) == "Default":
-            endings.add(attributes["Extension"].lower())
-
-    scan_part(path, package, "[Content_Types].xml", start=start)
-    for part in sorted(parts - known - {"[Content_Types].xml"}):
+def _package_faults(package: zipfile.ZipFile) -> Iterator[str]:
+    """Yield what the schemas refuse, parts without content type and relations that lead nowhere."""
+    parts, kinds = set(package.namelist()), ElementTree.fromstring(package.read(_TYPES))
+    typed = {e.get("PartName", "/").lstrip("/") for e in kinds if e.get("PartName")}
+    endings = {e.get("Extension", "").lower() for e in kinds}
+    for part in sorted(parts - typed - {_TYPES}):
         if part.rpartition(".")[2].lower() not in endings:
             yield f"the part {part} has no content type"
-    for part in sorted(known - parts):
+    for part in sorted(typed - parts):
         yield f"the part {part} has a content type but is missing"
-    for part in sorted(p for p in parts if p.endswith(".rels")):
+    for part in sorted(p for p in parts if p.endswith((".rels", ".xml"))):
+        yield from (f"{part}: {fault}" for fault in schema_faults(package.read(part)))
         folder = posixpath.dirname(posixpath.dirname(part))
-        targets: list[str] = []
-
-        def relation(name: str, attributes: dict[str, str], targets: list[str] = targets) -> None:
-            if local(name) == "Relationship" and attributes.get("TargetMode") != "External":
-                targets.append(attributes["Target"])
-
-        scan_part(path, package, part, start=relation)
-        for target in targets:
-            whole = target[1:] if target.startswith("/") else posixpath.join(folder, target)
-            if posixpath.normpath(whole) not in parts:
-                yield f"{part} leads to {target}, which is missing"
+        for relation in ElementTree.fromstring(package.read(part)) if part.endswith("rels") else ():
+            whole = posixpath.join("/", folder, relation.get("Target", ""))
+            inside = relation.get("TargetMode") != "External"
+            if inside and posixpath.normpath(whole).lstrip("/") not in parts:
+                yield f"{part} leads to {relation.get('Target')}, which is missing"
 
 
 def _name_faults(book: Workbook, tables: dict[str, list[TableArea]]) -> Iterator[str]:
@@ -197,27 +187,21 @@ def formula_faults(formula: str) -> Iterator[str]:
 
 
 def _rule_faults(facts: _SheetFacts) -> Iterator[str]:
-    """Yield faults of conditional formats and validations."""
+    """Yield faults of the formulas of conditional formats and validations."""
     for formula in facts.rules:
         if re.search(r"\w\[", _TEXTS.sub("''", formula)):
             yield f"a rule may not name a table: {formula:.80}"
         for fault in formula_faults(formula):
             yield f"rule: {fault}: {formula:.80}"
-    for attributes in facts.validations:
-        for key, most in (("promptTitle", 32), ("errorTitle", 32), ("prompt", 255), ("error", 255)):
-            if len(attributes.get(key, "")) > most:
-                yield f"the {key} of a validation is longer than {most} characters"
-        if len(attributes.get("list", "")) > 257:
-            yield "the list of a validation is longer than 255 characters"
 
 
 def _table_faults(
-    path: Path, package: zipfile.ZipFile, tables: list[TableArea], facts: _SheetFacts
+    package: zipfile.ZipFile, tables: list[TableArea], facts: _SheetFacts
 ) -> Iterator[str]:
     """Yield faults of the named tables of a sheet."""
     for index, table in enumerate(tables):
         top, left, bottom, right = table.area
-        columns, filters = table.columns, _filters(path, package, table)
+        columns, root = table.columns, ElementTree.fromstring(package.read(table.part))
         if bottom - top < table.header_rows + table.totals_rows:
             yield f"the table {table.name} has no row of data"
         if len(columns) != right - left + 1:
@@ -232,8 +216,8 @@ def _table_faults(
                 yield f'{cell}: the heading "{name}" has characters that need care in formulas'
             if table.header_rows and facts.texts.get(cell) != name:
                 yield f'{cell}: holds {facts.texts.get(cell)!r}, but its table column is "{name}"'
-        for reference in filters:
-            area = split_area(reference)
+        for element in root.iter(_MAIN + "autoFilter"):
+            area = split_area(element.get("ref", ""))
             if area[:2] != (top, left) or area[3] != right or area[2] != bottom - table.totals_rows:
                 yield f"the filter of the table {table.name} has another range"
         for other in tables[index + 1 :]:
@@ -243,98 +227,28 @@ def _table_faults(
             yield f"the table {table.name} holds merged cells"
 
 
-def _filters(path: Path, package: zipfile.ZipFile, table: TableArea) -> list[str]:
-    """Return the range of a table's filter, if it has one."""
-    found: list[str] = []
-
-    def start(name: str, attributes: dict[str, str]) -> None:
-        if local(name) == "autoFilter":
-            found.append(attributes.get("ref", ""))
-
-    scan_part(path, package, table.part, start=start)
-    return found
-
-
-def _read(path: Path, package: zipfile.ZipFile, sheet: SheetPart, shared: list[str]) -> _SheetFacts:
+def _facts(root: ElementTree.Element, shared: list[str]) -> _SheetFacts:
     """Return the facts of one sheet."""
-    facts = _SheetFacts()
-    text: list[str] = []
-    cell, kind_of_cell, inside = "", "", ""
-    row = column = 0
-
-    def start(name: str, attributes: dict[str, str]) -> None:
-        nonlocal cell, kind_of_cell, inside, row, column
-        kind = local(name)
-        if kind == "row":
-            row, column = int(attributes.get("r", row + 1)), 0
-        elif kind == "c":
-            row, column = split_cell(attributes["r"]) if "r" in attributes else (row, column + 1)
-            cell, kind_of_cell = cell_name(row, column), attributes.get("t", "n")
+    facts, row, column = _SheetFacts(), 0, 0
+    for line in root.iter(_MAIN + "row"):
+        row, column = int(line.get("r", row + 1)), 0
+        for cell in line:
+            row, column = split_cell(cell.get("r") or cell_name(row, column + 1))
+            place, kind, text = cell_name(row, column), cell.get("t", "n"), None
             facts.cells.append((row, column))
-            facts.styles.add(int(attributes.get("s", "0")))
-        elif kind in ("v", "f", "t", "formula", "formula1", "formula2"):
-            inside = kind
-            text.clear()
-        elif kind == "mergeCell":
-            facts.merged.append(split_area(attributes["ref"]))
-        elif kind == "dataValidation":
-            facts.validations.append(dict(attributes))
-
-    def end(name: str) -> None:
-        nonlocal inside
-        kind = local(name)
-        if kind != inside:
-            return
-        inside = ""
-        found = "".join(text)
-        if kind == "f" and found:
-            facts.formulas[cell] = found
-        elif kind == "t":
-            facts.texts[cell] = found
-        elif kind == "v":
-            known = kind_of_cell == "s" and int(found) < len(shared)
-            facts.texts[cell] = shared[int(found)] if known else None
-            if kind_of_cell == "str":
-                facts.texts[cell] = found
-        elif kind == "formula1" and found.startswith('"'):
-            facts.validations[-1]["list"] = found
-        elif kind.startswith("formula"):
-            facts.rules.append(found)
-
-    def collect(data: str) -> None:
-        if inside:
-            text.append(data)
-
-    scan_part(path, package, sheet.part, start=start, end=end, text=collect)
+            facts.styles.add(int(cell.get("s", "0")))
+            for part in cell.iter():
+                if part.tag == _MAIN + "f" and part.text:
+                    facts.formulas[place] = part.text
+                elif part.tag == _MAIN + "t":
+                    text = part.text
+                elif part.tag == _MAIN + "v" and kind in ("s", "str"):
+                    text = shared[int(part.text)] if kind == "s" else part.text
+            facts.texts[place] = text
+    facts.merged = [split_area(cell.get("ref", "")) for cell in root.iter(_MAIN + "mergeCell")]
+    rules = (e.text or "" for e in root.iter() if e.tag.startswith(_MAIN + "formula"))
+    facts.rules = [rule for rule in rules if not rule.startswith('"')]
     return facts
-
-
-def scan_part(path, package, name, *, start, end=None, text=None) -> None:
-    """Send one XML part through handlers."""
-    parser = new_parser(path, name, start=start, end=end)
-    parser.CharacterDataHandler = text
-    parser.Parse(read_part(path, package, name), True)
-
-
-def _count(
-    path: Path, package: zipfile.ZipFile, book: Workbook, part: str, outer: str, inner: str
-) -> int:
-    """Return how many elements another one holds in a part."""
-    target = next((t for kind, t in book.relations.values() if kind == part), "")
-    count, inside = 0, False
-
-    def start(name: str, attributes: dict[str, str]) -> None:  # noqa: ARG001
-        nonlocal count, inside
-        inside |= local(name) == outer
-        count += inside and local(name) == inner
-
-    def end(name: str) -> None:
-        nonlocal inside
-        inside &= local(name) != outer
-
-    if target in package.namelist():
-        scan_part(path, package, target, start=start, end=end)
-    return max(count, 1)
 
 
 def _overlap(first: tuple[int, int, int, int], second: tuple[int, int, int, int]) -> bool:

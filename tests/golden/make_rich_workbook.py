@@ -194,8 +194,10 @@ def parts(prefix: str = "") -> dict[str, bytes]:
         ),
         "xl/drawings/vmlDrawing1.vml": '<xml xmlns:v="urn:v"><v:shape id="_x0000_s1025"/></xml>',
         "xl/charts/chart1.xml": f'<c:chartSpace xmlns:c="{DRAWING}/chart"><c:chart><c:plotArea>'
-        "<c:scatterChart><c:ser><c:xVal><c:numRef><c:f>Points!$B$3:$B$4</c:f></c:numRef></c:xVal>"
-        "</c:ser></c:scatterChart></c:plotArea></c:chart></c:chartSpace>",
+        '<c:scatterChart><c:scatterStyle/><c:ser><c:idx val="0"/><c:order val="0"/>'
+        "<c:xVal><c:numRef><c:f>Points!$B$3:$B$4</c:f></c:numRef></c:xVal>"
+        '</c:ser><c:axId val="1"/><c:axId val="2"/></c:scatterChart></c:plotArea></c:chart>'
+        "</c:chartSpace>",
         "xl/ctrlProps/ctrlProp1.xml": f'<formControlPr xmlns="{X14}" objectType="Button"/>',
         "xl/slicers/slicer1.xml": f'<slicers xmlns="{X14}"><slicer name="id" cache="Slicer_id"/>'
         "</slicers>",
