@@ -134,9 +134,9 @@ def held_back(relief: Float32Array, support: BoolArray, distance: float) -> Floa
         )[:height, :width]
         for band in bounds
     )
-    known = ~support & (low <= high)
+    bounded = ~support & (low <= high)
     held = np.minimum(np.maximum(relief, low - slack), high + slack)
-    return np.where(known, held, relief)
+    return np.where(bounded, held, relief)
 
 
 def _surroundings(relief: Float32Array, support: BoolArray, side: int) -> _Range:
@@ -213,8 +213,8 @@ def most_falling(frame: Frame, typical: float = 0.0) -> float | Float32Array:
     if frame.sideways:
         x, y = frame.from_centre()
         own_x, own_y = offsets(frame.grid.shape, frame.grid.pixel_of(frame.foot(2).nadir))
-        own = np.maximum(np.sqrt(own_x * own_x + own_y * own_y), np.float32(1))
-        share = np.minimum(np.float32(share) * np.sqrt(x * x + y * y) / own, np.float32(1))
+        steepness = np.maximum(np.sqrt(own_x * own_x + own_y * own_y), np.float32(1))
+        share = np.minimum(np.float32(share) * np.sqrt(x * x + y * y) / steepness, np.float32(1))
     precise = edges.precision(typical)
     limit = EVIDENCE.falls_away * share**EVIDENCE.falls_power
     return precise * limit + (1 - precise) * EVIDENCE.falls_away_imprecise
