@@ -17,7 +17,6 @@ from bifocal.model.grid import Grid, Gridded
 from bifocal.model.surface import Fetch, MapSurface
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray, as_points, read_only
 from photocore.errors import InputError
-from photocore.plots import new_axes
 from photocore.raster import BLOCK
 
 
@@ -142,13 +141,9 @@ class ReliefMap(Gridded):
         InputError
             If matplotlib is not installed.
         """
-        if axes is None:
-            axes = new_axes()
-        xmin, ymin, xmax, ymax = self.grid.bounds
-        drawn = axes.imshow(self.r, extent=(xmin, xmax, ymin, ymax))
-        axes.set(xlabel="X [m]", ylabel="Y [m]")
-        axes.figure.colorbar(drawn, ax=axes, label="r [m]")
-        return axes
+        drawn = self._drawn(self.r, axes)
+        drawn.figure.colorbar(drawn, ax=drawn.axes, label="r [m]")
+        return drawn.axes
 
     def write(
         self, path: Path | str, *, overwrite: bool = False, tags: Mapping[str, str] | None = None

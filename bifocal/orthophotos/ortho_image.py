@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,6 +112,23 @@ class Orthophoto(Gridded):
     def valid(self) -> BoolArray:
         """Pixels that show something, shape (height, width)."""
         return shows(self.source)
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw the picture on the wall, what is empty left out, and return the axes.
+
+        Parameters
+        ----------
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; by default a new figure.
+
+        Raises
+        ------
+        InputError
+            If matplotlib is not installed.
+        """
+        colours = self.image.reshape(*self.shape, -1) / np.iinfo(self.image.dtype).max
+        colours = np.broadcast_to(colours, (*self.shape, 3))
+        return self._drawn(np.dstack([colours, self.valid]), axes).axes
 
     def write(self, path: Path | str, *, overwrite: bool = False) -> None:
         """Write a GeoTIFF of the plane frame: colours, then the `Source` of each pixel.
