@@ -273,7 +273,7 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
 def _remarks(session: Session) -> list[str]:
     """Return what is said of the pair, the worst first."""
     pair, report = session.pictures.pair, (session.proposal or {}).get("report", {})
-    remarks = dict.fromkeys((*(pair.remarks if pair else ()), *report.get("remarks", ())))
+    remarks = dict.fromkeys((*report.get("remarks", ()), *(pair.remarks if pair else ())))
     return sorted(remarks, key=lambda text: LEVELS.index(level_of(text)))
 
 
