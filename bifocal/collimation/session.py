@@ -90,14 +90,10 @@ class Session:
         self.journal = Journal(files.journal)
         try:
             pair = pair_of(files)
-            photos_of_pair = (
-                files.photos[:2] if pair is None else (pair.photo_file(1), pair.photo_file(2))
-            )
+            both = files.photos[:2] if pair is None else (pair.photo_file(1), pair.photo_file(2))
             # What a journal says beside another pair is of no use.
-            same = {path.resolve() for path in photos_of_pair} == {
-                p.resolve() for p in files.photos[:2]
-            }
-            photos = (*photos_of_pair, *(files.photos[2:] if same else ()))
+            same = {path.resolve() for path in both} == {p.resolve() for p in files.photos[:2]}
+            photos = (*both, *(files.photos[2:] if same else ()))
             self.pictures = Pictures(files.folder / f".{files.stem}.tiles", photos, pair)
             self.results = None if pair is None else self._results(pair)
             self.products = Products(files)

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from bifocal.remarks import remark
 from photocore.arrays import Float32Array, FloatArray, positive
 from photocore.errors import InputError
-from photocore.plots import new_axes
 
 #: xmin, ymin, xmax, ymax: outer edges of pixels. [m]
 Bounds = tuple[float, float, float, float]
@@ -233,9 +232,8 @@ class Gridded(ABC):
         return self.grid.bounds
 
     def _drawn(self, values: FloatArray, axes: Any) -> Any:
-        """Draw values where they are on the wall, without axes in a new figure."""
+        """Draw values where they are on the wall; return what matplotlib made of them."""
         xmin, ymin, xmax, ymax = self.bounds
-        axes = new_axes() if axes is None else axes
         axes.set(xlabel="X [m]", ylabel="Y [m]")
         return axes.imshow(values, extent=(xmin, xmax, ymin, ymax))
 

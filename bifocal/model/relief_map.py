@@ -17,6 +17,7 @@ from bifocal.model.grid import Grid, Gridded
 from bifocal.model.surface import Fetch, MapSurface
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray, as_points, read_only
 from photocore.errors import InputError
+from photocore.plots import Drawable
 from photocore.raster import BLOCK
 
 
@@ -36,7 +37,7 @@ TOLD = (Quality.MEASURED, Quality.DRAWN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ReliefMap(Gridded):
+class ReliefMap(Gridded, Drawable):
     """Relief of a wall as seen square on: pixel (column, row) is a point (X, Y) of the plane.
 
     Attributes
@@ -128,22 +129,8 @@ class ReliefMap(Gridded):
                     quality = np.clip(np.nan_to_num(band), 0, 255).astype(np.uint8)
             return replace(exact, sigma=sigma, quality=quality)
 
-    def plot(self, axes: Any = None) -> Any:
-        """Draw the relief over the wall, and return the axes.
-
-        Parameters
-        ----------
-        axes : matplotlib.axes.Axes, optional
-            Where to draw; by default a new figure.
-
-        Raises
-        ------
-        InputError
-            If matplotlib is not installed.
-        """
-        drawn = self._drawn(self.r, axes)
-        drawn.figure.colorbar(drawn, ax=drawn.axes, label="r [m]")
-        return drawn.axes
+    def _draw(self, axes: Any) -> None:
+        axes.figure.colorbar(self._drawn(self.r, axes), ax=axes, label="r [m]")
 
     def write(
         self, path: Path | str, *, overwrite: bool = False, tags: Mapping[str, str] | None = None

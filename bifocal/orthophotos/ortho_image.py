@@ -16,6 +16,7 @@ from bifocal.model.grid import Gridded
 from bifocal.model.image import ImageArray
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.errors import InputError
+from photocore.plots import Drawable
 
 Interpolation = Literal["nearest", "linear", "cubic", "lanczos"]
 INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
@@ -83,7 +84,7 @@ class OrthoOptions:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Orthophoto(Gridded):
+class Orthophoto(Gridded, Drawable):
     """An orthophoto in memory.
 
     Attributes
@@ -113,22 +114,10 @@ class Orthophoto(Gridded):
         """Pixels that show something, shape (height, width)."""
         return shows(self.source)
 
-    def plot(self, axes: Any = None) -> Any:
-        """Draw the picture on the wall, what is empty left out, and return the axes.
-
-        Parameters
-        ----------
-        axes : matplotlib.axes.Axes, optional
-            Where to draw; by default a new figure.
-
-        Raises
-        ------
-        InputError
-            If matplotlib is not installed.
-        """
+    def _draw(self, axes: Any) -> None:
         colours = self.image.reshape(*self.shape, -1) / np.iinfo(self.image.dtype).max
         colours = np.broadcast_to(colours, (*self.shape, 3))
-        return self._drawn(np.dstack([colours, self.valid]), axes).axes
+        self._drawn(np.dstack([colours, self.valid]), axes)
 
     def write(self, path: Path | str, *, overwrite: bool = False) -> None:
         """Write a GeoTIFF of the plane frame: colours, then the `Source` of each pixel.

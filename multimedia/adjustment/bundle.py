@@ -153,8 +153,8 @@ def prepare(project: Project, unknowns: Unknowns) -> tuple[Bundle, tuple[str, ..
     sigma = np.zeros((len(ids), 3))
     plate_of = np.full(len(ids), -1, dtype=np.int64)
     keep = [k for k, name in enumerate(control.ids) if name in place]
-    rows_known = [place[control.ids[k]] for k in keep]
-    points[rows_known], sigma[rows_known] = control.xyz[keep], control.sigma[keep]
+    with_control = [place[control.ids[k]] for k in keep]
+    points[with_control], sigma[with_control] = control.xyz[keep], control.sigma[keep]
     for plate, name in enumerate(unknowns.plates):
         on = [place[control.ids[k]] for k in keep if control.groups[k] == name]
         if len(on) < 3:

@@ -182,8 +182,8 @@ class _Exposure:
             numbers[:, k] = self.seen(k, points)
         enough = (numbers >= 0).sum(axis=1) >= self.fewest - 2
         one, two, points, numbers = one[enough], two[enough], points[enough], numbers[enough]
-        for k, targets_own in ((a, one), (b, two)):
-            numbers[:, k] = np.where(self.seen(k, points) == targets_own, targets_own, -1)
+        for k, numbered in ((a, one), (b, two)):
+            numbers[:, k] = np.where(self.seen(k, points) == numbered, numbered, -1)
         return numbers[(numbers[:, [a, b]] >= 0).all(axis=1)]
 
     def seen(self, camera: int, points: FloatArray) -> IntArray:

@@ -21,10 +21,9 @@ _GRID = 17
 _COUNTS = (5, 8, 12)
 #: Rays further from a fisheye's axis meet no plane. [rad]
 _STEEPEST = 1.5
-_SQUARE = np.eye(2)
+_NO_SHEAR = np.eye(2)
 
-Mapping1D = Callable[[FloatArray], FloatArray]
-Mapping2D = Callable[[FloatArray], FloatArray]
+Function = Callable[[FloatArray], FloatArray]
 
 
 def equidistant(radius: FloatArray) -> FloatArray:
@@ -54,7 +53,7 @@ class FittedLens(NamedTuple):
 
 
 def fitted_lens(
-    ideal_from_pixels: Mapping2D, size: Sequence[float], source: str, *, fisheye: bool = False
+    ideal_from_pixels: Function, size: Sequence[float], source: str, *, fisheye: bool = False
 ) -> FittedLens:
     """Return OpenCV's lens that is nearest to another model.
 
@@ -113,8 +112,8 @@ def brown_lens(
     size: Sequence[float],
     source: str,
     *,
-    angle: Mapping1D | None = None,
-    shear: FloatArray = _SQUARE,
+    angle: Function | None = None,
+    shear: FloatArray = _NO_SHEAR,
 ) -> FittedLens:
     """Return a lens of Brown's terms beyond OpenCV's: exact where it has them, else fitted.
 
@@ -136,8 +135,8 @@ def brown_lens(
         Of distorted coordinates before focal lengths; of ideal ones it is left to the camera.
     """
     (k1, k2, k3, k4), (p1, p2, p3, p4) = radial, tangential
-    fisheye, square_axes = angle is not None, bool((shear == _SQUARE).all())
-    if not (any((p1, p2, p3, p4)) if fisheye else any((k4, p3, p4))) and square_axes:
+    fisheye, is_square = angle is not None, bool((shear == _NO_SHEAR).all())
+    if not (any((p1, p2, p3, p4)) if fisheye else any((k4, p3, p4))) and is_square:
         terms = [k1, k2, k3, k4] if fisheye else [k1, k2, p1, p2, k3]
         if angle in (None, equidistant):
             return FittedLens(lens_data(focal, centre, terms, size, source, fisheye=fisheye))

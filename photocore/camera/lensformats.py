@@ -16,7 +16,7 @@ import numpy as np
 
 from photocore.arrays import FloatArray, is_finite_number
 from photocore.camera.lensdata import LensData
-from photocore.camera.lensfit import UNSAID, FittedLens, Mapping1D, brown_lens, equidistant
+from photocore.camera.lensfit import UNSAID, FittedLens, Function, brown_lens, equidistant
 from photocore.camera.pinhole import camera_matrix
 from photocore.errors import LARGEST, InputError
 from photocore.jsonfile import read_object
@@ -143,7 +143,7 @@ def xml_root(path: Path, text: str) -> ElementTree.Element:
 
 
 #: Angles from the axis by the projected radius, of Metashape's kinds of sensors.
-_ANGLES: dict[str, Mapping1D | None] = {
+_ANGLES: dict[str, Function | None] = {
     "frame": None,
     "perspective": None,
     "fisheye": equidistant,

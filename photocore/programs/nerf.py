@@ -39,9 +39,8 @@ def read_nerf(path: Path, value: JsonValue, photos: PhotoFinder) -> ForeignProje
         if matrix.shape not in ((3, 4), (4, 4)):
             raise frame["transform_matrix"].wrong("4 x 4 numbers")
         turn = checked_rotation(matrix[:3, :3], f"{path}: matrix of {name}", tolerance=1e-4)
-        both = JsonValue(dict(value.items()) | dict(frame.items()), frame.where)
-        both = JsonValue({key: one.value for key, one in both.value.items()}, frame.where)
-        lens = _lens(both, name, path, photos)
+        keys = {key: one.value for key, one in (*value.items(), *frame.items())}
+        lens = _lens(JsonValue(keys, frame.where), name, path, photos)
         views.append(ForeignView(name, lens, TURN @ nearest_rotation(turn).T, matrix[:3, 3]))
     if not views:
         raise InputError(remark("programs.no_pose", of=path))
