@@ -239,10 +239,10 @@ def _hidden(
 def _seen_past(doubtful: BoolArray, measured: BoolArray) -> BoolArray:
     """Return what only the space below thin things hides, around which both photos measured."""
     side = (VISIBILITY.seen_past, VISIBILITY.seen_past)
-    far_share, near_share = (
+    doubtful_share, measured_share = (
         cv2.blur(mask.astype(np.float32), side) for mask in (doubtful, doubtful & measured)
     )
-    return doubtful & (near_share > np.float32(VISIBILITY.share_seen) * far_share)
+    return doubtful & (measured_share > np.float32(VISIBILITY.share_seen) * doubtful_share)
 
 
 def _behind(around: _Surroundings, largest: float) -> BoolArray:

@@ -145,11 +145,11 @@ def _surroundings(relief: Float32Array, support: BoolArray, side: int) -> _Range
     rows, columns = -(-height // side), -(-width // side)
     edge = ((0, rows * side - height), (0, columns * side - width))
     blocks = (rows, side, columns, side)
-    known = np.pad(support, edge).reshape(blocks)
+    inside = np.pad(support, edge).reshape(blocks)
     values = np.pad(relief, edge).reshape(blocks)
-    enough = known.sum((1, 3)) >= EVIDENCE.fewest
-    low = np.where(known, values, np.inf).min((1, 3))
-    high = np.where(known, values, -np.inf).max((1, 3))
+    enough = inside.sum((1, 3)) >= EVIDENCE.fewest
+    low = np.where(inside, values, np.inf).min((1, 3))
+    high = np.where(inside, values, -np.inf).max((1, 3))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
     # OpenCV pads by what changes nothing; infinities stay where no block around says anything.
     return _Range(

@@ -139,10 +139,10 @@ def with_swept(frame: Frame, matched: Measurement) -> tuple[Measurement, BoolArr
     every = np.s_[: 2 * half.grid.height : 2, : 2 * half.grid.width : 2]
     coarse = _Level(half, fine.relief[every], fine.valid[every], fine.support[every])
     guess = _guessed(coarse)
-    found = _refined(fine, guess, _taken(coarse, guess))
-    accepted = _large(_taken(fine, found))
+    hypothesis = _refined(fine, guess, _taken(coarse, guess))
+    accepted = _large(_taken(fine, hypothesis))
     swept: dict[str, Any] = {
-        "r": found.relief,
+        "r": hypothesis.relief,
         "loop": 0,
         "across": 0,
         "sigma_px": HYPOTHESIS.sigma,

@@ -284,9 +284,9 @@ def _epipolar(observations: PairObservations, state: PairUnknowns, which: BoolAr
     misfit = ((x2 @ matrix) * x1).sum(1) / length[:, 0]
     # e = s / n, so de = (ds - e dn) / n, with dn = (line . d line) / n.
     share2, share1 = misfit[:, None] * line2 / length, misfit[:, None] * line1 / length
-    second, right = x2.copy(), x1.copy()
-    second[:, :2] -= share2
-    by_matrix = second[:, :, None] * right[:, None, :]
+    left, right = x2.copy(), x1.copy()
+    left[:, :2] -= share2
+    by_matrix = left[:, :, None] * right[:, None, :]
     by_matrix[:, :, :2] -= x2[:, :, None] * share1[:, None, :]
     by_matrix /= length[:, :, None]
     by = np.zeros((len(x1), len(NAMES)))
