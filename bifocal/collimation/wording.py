@@ -17,6 +17,7 @@ _ADVICE = tuple(
     (re.compile(pattern), instead)
     for pattern, instead in (
         (rf" \({_OPTION}(?:(?:,| or| and| o| e| oder| und) {_OPTION})*\)", ""),
+        (rf" \(`bifocal \w+`(?:, {_OPTION})?\)", ""),
         (rf"[:;] {_OPTION} [a-z][^;.]*", ""),
         (rf"(?:, give| and give| with|, indicare| con| mit) {_OPTION}", ""),
         (rf", {_OPTION}(?: angeben|(?=\)))", ""),
@@ -41,6 +42,8 @@ def without_options(text: str, language: str = "en") -> str:
     '35% of it is empty.'
     >>> without_options("Distortion (calibrate, give --lens), or refraction. Check it.")
     'Distortion (calibrate), or refraction. Check it.'
+    >>> without_options("A calibrated lens (`bifocal calibrate`, --lens) is more reliable.")
+    'A calibrated lens is more reliable.'
     >>> without_options("+12 mm, 30 % (--wall 120,130): name a spot with --wall COL,ROW.")
     '+12 mm, 30 %: name a spot.'
     >>> from bifocal.remarks import remark

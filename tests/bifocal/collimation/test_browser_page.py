@@ -208,7 +208,7 @@ def test_the_stages_are_tabs_that_say_what_is_missing(page: Driver) -> None:
     tab = page.tab.get_by_role("tab", selected=True)
     assert "pick the first point" in str(tab.text_content())
     page.keys("PageDown")
-    assert "run the relief" in str(page.tab.get_by_role("tab", selected=True).text_content())
+    assert "make the package" in str(page.tab.get_by_role("tab", selected=True).text_content())
     page.tab.get_by_role("tab", selected=True).focus()
     page.keys("ArrowLeft")
     assert page.tab.get_by_role("tabpanel").get_attribute("id") == "stage-points"

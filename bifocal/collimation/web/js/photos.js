@@ -43,6 +43,7 @@ export class PhotosStage {
         h("ul", {}, [1, 2, 3, 4, 5, 6].map((number) => h("li", {}, t(`start.bring.${number}`)))),
         h("div", { class: "row" }, button(t("start.print"), () => window.print(), { class: "quiet", testid: "print" }))),
       h("div", { class: "card" }, h("h2", {}, t("start.recent")), this.recent));
+    this.actions = { choose: () => this.input.click() };
     this.alone = new Alone(app);
     this.exchangePlace = h("div", { class: "row" });
     this.others = h("div", { class: "cards", testid: "other-photos" });
@@ -122,12 +123,6 @@ export class PhotosStage {
     this.zone.classList.remove("busy");
     this.input.value = "";
     return undefined;
-  }
-
-  status(state) {
-    if (state.photos.length < 2) return { text: t(state.photos.length ? "status.photos.second" : "status.photos.drop") };
-    const open = state.photos.flatMap(({ missing }) => missing).length;
-    return open && !state.pair ? { text: t("status.photos.missing", { open }) } : { done: true, text: t("status.done") };
   }
 
   update(state) {

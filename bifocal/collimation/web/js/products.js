@@ -27,6 +27,8 @@ export class ProductsStage {
     this.value = h("p", { class: "value", role: "status", testid: "relief-value" });
     this.range = new Range((low, high) => { this.limits = [low, high]; this.#showRelief(); });
     this.shapes = new Shapes(app, this);
+    const make = () => this.deliver.click();
+    this.actions = { make, again: make, download: () => this.download.click() };
     this.loupe = new Loupe();
     this.profile = new Profile(app, () => this.pane?.paint(), () => {
       this.pane?.mounted();
@@ -114,16 +116,6 @@ export class ProductsStage {
         labelled(t("deliver.scale"), this.scale), labelled(t("deliver.sheet"), this.sheet)),
       h("div", { class: "row" }, this.deliver, this.download), this.deliverState, this.app.jobBox("deliver"),
       h("details", { testid: "files" }, this.count, this.files));
-  }
-
-  status(state) {
-    if (!state.pair?.accepted) return { text: t("status.points.pair") };
-    if (!state.products.relief) return { text: t("status.products.relief") };
-    if (!state.products.ortho) return { text: t("status.products.ortho") };
-    if (!state.products.files.some(({ name }) => name.endsWith(".pdf")) || Object.keys(state.products.stale).length) {
-      return { text: t("status.products.deliver") };
-    }
-    return { done: true, text: t("status.done") };
   }
 
   async prepare(state) {
