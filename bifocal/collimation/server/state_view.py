@@ -20,6 +20,7 @@ from bifocal.collimation.wording import say, without_options
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
 from bifocal.orientation.align_workflow import interior_of_photo
+from bifocal.survey.tolerances import SCALES
 from photocore.errors import PhotogrammetryError
 from photocore.images import ImageInfo
 from photocore.jsonfile import plain
@@ -57,6 +58,7 @@ def state_of(session: Session) -> dict[str, Any]:
             "scale": _drawn_length(session),
             "looking": is_looking(session),
             "good": _how_good(session),
+            "drawing_scale": _drawing_scale(session),
             "steps": {
                 stage: asdict(step) | ({"text": sentence} if stage == "orientation" else {})
                 for stage, step in steps.items()
@@ -202,12 +204,18 @@ def _drawn_length(session: Session) -> dict[str, Any] | None:
 def _how_good(session: Session) -> str:
     """Say in a line how good relief is; nothing where that is not known."""
     good = None if is_unscaled(session) else goodness(session)
-    if good is None or good["middle"] is None or good["rim"] is None:
+    if good is None or None in (good["middle"], good["rim"], good["place"]):
         return ""
     language, scale = session.spoken, good["scale"]
     verdict = say("good", "holds" if scale else "none", language, scale=scale)
-    middle, rim = (1000 * good[key] for key in ("middle", "rim"))
-    return say("good", "relief", language, middle=middle, rim=rim, verdict=verdict)
+    lengths = {key: 1000 * good[key] for key in ("middle", "rim", "place")}
+    return say("good", "relief", language, **lengths, verdict=verdict)
+
+
+def _drawing_scale(session: Session) -> int | None:
+    """Return the finest drawing scale that holds, else the coarsest there is; None: not known."""
+    good = None if is_unscaled(session) else goodness(session)
+    return None if good is None else good["scale"] or SCALES[-1]
 
 
 def _missing(info: ImageInfo, typed: Mapping[str, float | None], language: str) -> list[str]:

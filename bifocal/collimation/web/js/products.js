@@ -11,18 +11,24 @@ import { photoMark, wallMark } from "./tiles.js";
 import { Pane, pictureLayer, pixelView, tileLayer } from "./viewer.js";
 import { t } from "./words/words.js";
 
-const SCALES = ["1:10", "1:20", "1:25", "1:50", "1:100", "1:200"];
+const SCALES = [10, 20, 25, 50, 100, 200, 500];
 const SHEETS = ["A4", "A3", "A2", "A1", "A0"];
 const GRADES = ["fast", "standard", "best"];
 const ASK_MS = 80;
 
+/** What is looked at, one at a time. */
+const VIEWS = ["ortho", "relief", "photo"];
+const frameOf = ([left, top, right, bottom]) => [[left, top], [right, bottom]];
+
 /** Bytes of a file, in the unit that leaves digits to read. */
-const size = (bytes) => (bytes < 1e5 ? `${(bytes / 1e3).toFixed(1)} kB` : `${(bytes / 1e6).toFixed(1)} MB`);
+const size = (bytes) => (bytes < 1e5 ? `${number(bytes / 1e3, 1)} kB` : `${number(bytes / 1e6, 1)} MB`);
 
 export class ProductsStage {
   constructor(app) {
     this.app = app;
     this.swipe = 1;
+    this.shown = "photo";
+    this.made = new Set();
     this.photos = h("div", { class: "viewer" });
     this.value = h("p", { class: "value", role: "status", testid: "relief-value" });
     this.range = new Range((low, high) => { this.limits = [low, high]; this.#showRelief(); });
@@ -35,7 +41,7 @@ export class ProductsStage {
       this.pane?.fit();
     });
     this.element = h("div", { class: "stage work", id: "stage-products" },
-      h("div", { class: "table-top" }, this.#bar(), this.photos, this.profile.element),
+      h("div", { class: "table-top" }, this.#bar(), this.photos, this.range.element, this.profile.element),
       h("aside", { class: "panel" }, this.#deliverBox(), this.#reliefBox(), this.#orthoBox(),
         this.shapes.element, this.loupe.element));
   }
@@ -46,7 +52,9 @@ export class ProductsStage {
         oninput: () => changed(input.value / 100) });
       return h("span", { class: "slider" }, h("label", { for: id }, t(`products.${id}`)), input);
     };
-    this.opacity = 0.6;
+    this.opacity = 1;
+    this.views = Object.fromEntries(VIEWS.map((view) => [view, button(t(`products.${view}`), () => this.look(view),
+      { testid: `view-${view}` })]));
     const toggle = (key, testid, changed) => {
       const made = button(t(key), () => {
         const on = made.getAttribute("aria-pressed") !== "true";
@@ -56,12 +64,19 @@ export class ProductsStage {
       return made;
     };
     return h("div", { class: "layer-bar", role: "toolbar", "aria-label": t("layer.bar") },
-      range("relief-opacity", "60", (value) => { this.opacity = value; this.#apply(); }),
-      range("ortho-swipe", "100", (value) => { this.swipe = value; this.#apply(); }),
-      toggle("relief.hatch", "relief-hatch", (on) => { this.hatched = on; this.#showRelief(); }),
+      h("div", { class: "segments", role: "group", "aria-label": t("products.view") }, Object.values(this.views)),
+      this.veil = range("relief-opacity", "100", (value) => { this.opacity = value; this.#apply(); }),
+      this.curtain = range("ortho-swipe", "100", (value) => { this.swipe = value; this.#apply(); }),
+      this.hatch = toggle("relief.hatch", "relief-hatch", (on) => { this.hatched = on; this.#showRelief(); }),
       toggle("relief.points", "relief-points", (on) => { this.picks = on; }),
       button(t("profile.draw"), () => this.profile.begin(), { class: "quiet", testid: "profile" }),
       this.value);
+  }
+
+  /** Show one product, or the far photo on the wall; the others only as far as it is drawn aside. */
+  look(view) {
+    this.shown = view;
+    this.#apply();
   }
 
   /** A product: its picture, what it is good for, its size, what makes it. */
@@ -100,8 +115,8 @@ export class ProductsStage {
 
   #deliverBox() {
     const same = (names) => Object.fromEntries(names.map((name) => [name, name]));
-    this.scale = choice({ label: t("deliver.scale"), options: same(SCALES), value: "1:50",
-      save: () => {}, testid: "deliver-scale" });
+    this.scale = choice({ label: t("deliver.scale"), options: same(SCALES.map((scale) => `1:${scale}`)), value: "1:50",
+      save: () => { this.chosen = true; }, testid: "deliver-scale" });
     this.sheet = choice({ label: t("deliver.sheet"), options: { auto: t("deliver.auto"), ...same(SHEETS) },
       save: () => {}, testid: "deliver-sheet" });
     this.deliver = button(t("deliver.run"), () => this.app.job("deliver", { scale: this.scale.value, quality: this.grade.value,
@@ -143,6 +158,14 @@ export class ProductsStage {
     this.ortho = image && this.#orthoLayer(ortho, image, state.photos);
     this.reliefMark = `${done.length}-${state.revision}`;
     this.#showRelief();
+    // What was made last is looked at first.
+    const newest = ["ortho", "relief"].find((kind) => state.products[kind] && !this.made.has(kind));
+    this.made = new Set(["ortho", "relief"].filter((kind) => state.products[kind]));
+    if (newest) {
+      this.look(newest);
+      this.pane.frameTo(frameOf(this.#edges(state.products[newest].bounds)));
+      this.pane.fit();
+    }
   }
 
   /** The relief in the colours that were chosen, above photo and orthophoto. */
@@ -158,7 +181,7 @@ export class ProductsStage {
 
   /** Whether what lies under the pointer is the orthophoto, where X and Y are true. */
   get onOrtho() {
-    return Boolean(this.ortho) && this.swipe > 0.5;
+    return this.shown === "ortho" && Boolean(this.ortho) && this.swipe > 0.5;
   }
 
   #makePane(state) {
@@ -170,7 +193,7 @@ export class ProductsStage {
     this.pane.frameTo(this.wall.frameOf(1, state.photos[0]));
     this.pane.addEventListener("hover", ({ detail }) => this.#ask(detail.pixel));
     this.pane.addEventListener("pick", ({ detail }) => this.#click(this.pane.unplace(detail.pixel)));
-    this.photos.replaceChildren(this.pane.element, this.range.element);
+    this.photos.replaceChildren(this.pane.element);
     this.pane.mounted();
   }
 
@@ -216,8 +239,20 @@ export class ProductsStage {
   }
 
   #apply() {
+    const there = { photo: this.wallLayer, ortho: this.ortho, relief: this.relief };
+    // What is no longer there gives way to what is.
+    if (!there[this.shown]) this.shown = "photo";
+    const whole = this.swipe === 1 && (this.shown !== "relief" || this.opacity === 1);
+    for (const [view, layer] of Object.entries(there)) {
+      this.views[view].setAttribute("aria-pressed", String(view === this.shown));
+      this.views[view].disabled = !layer;
+      layer?.setVisible(view === this.shown || (view === "photo" && !whole));
+    }
+    this.curtain.hidden = this.shown === "photo";
+    this.veil.hidden = this.hatch.hidden = this.range.element.hidden = this.shown !== "relief";
     this.relief?.setOpacity(this.opacity);
     this.photos.style.setProperty("--ortho-cut", `${100 * (1 - this.swipe)}%`);
+    this.pane?.mounted();
   }
 
   #draw(context, pane) {
@@ -255,6 +290,7 @@ export class ProductsStage {
     this.prepare(state).catch((error) => this.app.refuse(error));
     const { relief, ortho, files, stale } = state.products;
     setText(this.deliverState, stale.deliver ?? "");
+    this.#tellScale(state.drawing_scale);
     this.picks &&= Boolean(relief);
     const pixels = (product) => (product.cols ? `${product.cols} × ${product.rows} px` : "");
     this.range.show(relief);
@@ -280,6 +316,16 @@ export class ProductsStage {
     keyedRows(this.files, files, { key: ({ name }) => name, signature: JSON.stringify,
       build: ({ name, bytes: own }) => h("li", {}, h("a", { href: `download/${encodeURIComponent(name)}`, download: "" }, name),
         h("span", { class: "hint" }, ` ${size(own)}`)) });
+  }
+
+  /** The finest scale that holds is chosen; finer ones say that they are too fine. */
+  #tellScale(finest) {
+    if (!finest || this.finest === finest) return;
+    this.finest = finest;
+    SCALES.forEach((scale, index) => {
+      setText(this.scale.options[index], scale < finest ? t("deliver.fine", { scale }) : `1:${scale}`);
+    });
+    if (!this.chosen) this.scale.value = `1:${finest}`;
   }
 
   get activePane() {

@@ -125,7 +125,7 @@ export class Shapes {
   #row({ name, kind, corners, relief, width, height, area, length }) {
     const level = numberInput({ label: t("shape.relief", { name }), size: "6", save: (r) =>
       this.app.send("shape.set", { name, kind, corners: corners.map(([c, row]) => [c, row, r ?? 0]) }) });
-    fill(level, relief === undefined ? null : +number(relief, 3));
+    fill(level, relief === undefined ? null : Math.round(1000 * relief) / 1000);
     const size = [width && `${number(width, 3)} × ${number(height, 3)} m`, area && `${number(area, 3)} m²`,
       kind === "break" && length && `${number(length, 3)} m`].filter(Boolean).join(" · ");
     return h("tr", { onpointerenter: () => { this.hot = name; this.stage.pane?.paint(); }, onpointerleave: () => { this.hot = null; this.stage.pane?.paint(); } },
