@@ -174,6 +174,12 @@ class Driver:
     def click(self, testid: str) -> None:
         self.tab.get_by_test_id(testid).click()
 
+    def unfold(self, testid: str) -> None:
+        """Open a fold of the page where it is closed."""
+        fold = self.tab.get_by_test_id(testid)
+        if fold.get_attribute("open") is None:
+            fold.locator("summary").click()
+
     def keys(self, *keys: str) -> None:
         for key in keys:
             self.tab.keyboard.press(key)

@@ -344,6 +344,7 @@ def test_what_is_refused_stays_as_it_was_typed(page: Driver) -> None:
     page.keys("Enter")
     page.settled("state.control.some(({ name }) => name === 'K')")
     page.click("mode-photos")
+    page.unfold("site")
     site = page.tab.get_by_label("Far distance d1")
     # The page drawn anew while the answer is on its way takes nothing away either.
     page.tab.evaluate(SLOW_COMMAND)

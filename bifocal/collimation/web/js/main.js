@@ -1,6 +1,7 @@
 /** The page: its four stages, what they share, and what outsiders may ask of it. */
 import { Connection, Refusal } from "./connection.js";
 import { h, setText } from "./dom.js";
+import { draggable } from "./dragging.js";
 import { button, choice } from "./fields.js";
 import { KEYS, listen } from "./keys.js";
 import { OrientationStage } from "./orientation.js";
@@ -219,6 +220,8 @@ class App {
   follow(pane, picker, taker = picker) {
     pane.addEventListener("pick", ({ detail }) => taker.click(pane, detail.pixel));
     pane.addEventListener("hover", ({ detail }) => picker.hover(pane, detail.pixel));
+    draggable(pane, { find: (place) => picker.markAt(pane, place),
+      move: (image, place) => picker.drag(pane, image, place), drop: (image, place) => picker.drop(pane, image, place) });
   }
 
   async job(kind, options = {}) {

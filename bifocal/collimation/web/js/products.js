@@ -1,5 +1,6 @@
 /** Stage 4: relief and orthophoto run, looked at, delivered. */
 import { h, keyedRows, number, parseNumber, setText } from "./dom.js";
+import { draggable } from "./dragging.js";
 import * as drawing from "./drawing.js";
 import { button, choice, labelled, numberInput } from "./fields.js";
 import { Wall } from "./geometry.js";
@@ -119,8 +120,10 @@ export class ProductsStage {
       save: () => { this.chosen = true; }, testid: "deliver-scale" });
     this.sheet = choice({ label: t("deliver.sheet"), options: { auto: t("deliver.auto"), ...same(SHEETS) },
       save: () => {}, testid: "deliver-sheet" });
+    this.title = h("input", { type: "text", maxlength: "120", autocomplete: "off", placeholder: t("deliver.titleHint"), testid: "deliver-title" });
     this.deliver = button(t("deliver.run"), () => this.app.job("deliver", { scale: this.scale.value, quality: this.grade.value,
-      image: this.source.value, sheet: this.sheet.value === "auto" ? null : this.sheet.value }), { testid: "deliver" });
+      image: this.source.value, sheet: this.sheet.value === "auto" ? null : this.sheet.value, title: this.title.value.trim(),
+      sections: this.profile.kept }), { testid: "deliver" });
     this.deliverState = h("p", { class: "hint", testid: "deliver-state" });
     this.files = h("ul", { class: "files" });
     this.count = h("summary", {});
@@ -129,6 +132,7 @@ export class ProductsStage {
     return h("section", { class: "card" }, h("h2", {}, t("deliver.title")),
       h("p", { class: "hint" }, t("deliver.hint")), h("div", { class: "fields" },
         labelled(t("deliver.scale"), this.scale), labelled(t("deliver.sheet"), this.sheet)),
+      labelled(t("deliver.heading"), this.title),
       h("div", { class: "row" }, this.deliver, this.download), this.deliverState, this.app.jobBox("deliver"),
       h("details", { testid: "files" }, this.count, this.files));
   }
@@ -192,6 +196,8 @@ export class ProductsStage {
       painter: (context, pane) => this.#draw(context, pane) });
     this.pane.frameTo(this.wall.frameOf(1, state.photos[0]));
     this.pane.addEventListener("hover", ({ detail }) => this.#ask(detail.pixel));
+    draggable(this.pane, { find: (place) => this.shapes.cornerAt(place),
+      move: (mark, place) => this.shapes.drag(mark, place), drop: (mark, place) => this.shapes.drop(mark, place) });
     this.pane.addEventListener("pick", ({ detail }) => this.#click(this.pane.unplace(detail.pixel)));
     this.photos.replaceChildren(this.pane.element);
     this.pane.mounted();
@@ -218,6 +224,11 @@ export class ProductsStage {
     } catch (error) {
       return this.app.refuse(error);
     }
+  }
+
+  /** Take back the last corner; null where none is in hand. */
+  get remove() {
+    return this.shapes.corners?.length ? () => this.shapes.back() : null;
   }
 
   /** Leave what is half done. */
