@@ -261,14 +261,15 @@ class Driver:
                 self.settled("true")
 
     def finished(self, kind: str) -> dict[str, Any]:
-        """Wait until a job has ended; return it."""
+        """Wait until a job that a hand began has ended; return it."""
         self.tab.wait_for_function(
-            "(kind) => !['running', undefined].includes("
-            "bifocal.state().jobs.filter((job) => job.kind === kind).at(-1)?.state)",
+            "(kind) => !['running', undefined].includes(bifocal.state().jobs"
+            ".filter((job) => job.kind === kind && !job.quiet).at(-1)?.state)",
             arg=kind,
             timeout=8 * PATIENCE,
         )
-        return next(job for job in reversed(self.state["jobs"]) if job["kind"] == kind)
+        jobs = [job for job in self.state["jobs"] if job["kind"] == kind and not job["quiet"]]
+        return dict(jobs[-1])
 
     def frames(self) -> list[float]:
         """Return how long the frames take while the photos are dragged and zoomed. [ms]"""
