@@ -39,6 +39,14 @@ class ControlParameters:
         Air, glass, water as the file says.
     thickness : float
         Of the glass. [mm]
+    orientations : tuple of str
+        The .ori file of each camera; none: named after the calibration images.
+    body : str
+        File of the calibration body; "": beside it, or of a usual name.
+    stems : tuple of str
+        Of the file names of the positions of a body moved from plane to plane.
+    manual : tuple of (list of str, ndarray)
+        Points clicked by hand in each calibration image: ids and pixels.
     """
 
     images: tuple[str, ...]
@@ -47,6 +55,10 @@ class ControlParameters:
     field: int
     indices: tuple[float, ...]
     thickness: float
+    orientations: tuple[str, ...] = ()
+    body: str = ""
+    stems: tuple[str, ...] = ()
+    manual: tuple[tuple[list[str], FloatArray], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
