@@ -378,10 +378,10 @@ def _cameras(
     return cameras, media, tuple(media_of), remarks
 
 
-def _body(roots: Sequence[Path], known: str) -> tuple[ObjectPoints, str]:
+def _body(roots: Sequence[Path], file: str) -> tuple[ObjectPoints, str]:
     """Return the calibration body that cal_ori.par names or of a usual name, and its file."""
-    names = [known, *_BODIES]
-    listed = None if known else _find(roots, "cal_ori.par")
+    names = [file, *_BODIES]
+    listed = None if file else _find(roots, "cal_ori.par")
     if listed is not None:
         first = listed.read_text(encoding="utf-8", errors="replace").splitlines()[:1]
         names = [*first, *names]
