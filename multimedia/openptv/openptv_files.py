@@ -197,6 +197,27 @@ def read_targets(path: Path, *, field: int = 0) -> DetectedTargets:
     )
 
 
+def read_blobs(path: Path) -> dict[int, FloatArray]:
+    """Read MyPTV's blobs: lines of row, column, two sides, area, frame; pixels by frame.
+
+    Raises
+    ------
+    InputError
+        If a line has other than six numbers, or a frame is no whole one.
+    """
+    lines = [line for line in read_text(path, "file of MyPTV").splitlines() if line.strip()]
+    for number, line in enumerate(lines, start=1):
+        if len(line.split()) != 6:
+            raise InputError(remark("tracks.blobs", of=path, line=number, size=len(line.split())))
+    values = floats_of_words(" ".join(lines).split(), path, "value {}")
+    table = values.reshape(-1, 6)
+    frames = table[:, 5].astype(np.int64)
+    if (frames != table[:, 5]).any():
+        number = int(np.argmax(frames != table[:, 5])) + 1
+        raise InputError(f"{path}, line {number}: the frame must be a whole number.")
+    return {int(frame): table[frames == frame, 1::-1] for frame in np.unique(frames)}
+
+
 def targets_text(pixels: FloatArray, counts: IntArray, extents: IntArray, sums: FloatArray) -> str:
     """Return the content of a _targets file.
 
