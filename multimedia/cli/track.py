@@ -30,8 +30,8 @@ class TrackCommand:
 
     project: ProjectOption
     targets: tuple[Path, ...]
-    """What the _targets files of a camera begin with, up to the number of the frame; once per
-    camera, in the order of PROJECT."""
+    """What the _targets files of a camera begin with, up to the number of the frame, or MyPTV's
+    file of its blobs; once per camera, in the order of PROJECT."""
     first: Annotated[int | None, Typed(click.IntRange(min=0))] = None
     """First frame.  [default: the first of all cameras]"""
     last: Annotated[int | None, Typed(click.IntRange(min=0))] = None

@@ -20,7 +20,7 @@ from multimedia.openptv.openptv_files import DetectedTargets
 from multimedia.openptv.plane_matching import PlaneMatch, choose_sets
 from multimedia.openptv.target_matching import FIRST_RADIUS, is_chance, match_targets
 from multimedia.orientation.resection import resect
-from multimedia.projects.model import ImagePoints, ObjectPoints, Project
+from multimedia.projects.model import ImagePoints, ObjectPoints, Project, place_name
 from multimedia.projects.project_file import read_project, write_project
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import PhotogrammetryError
@@ -138,20 +138,8 @@ def _control(experiment: Experiment, k: int, least_pixels: int, radius: float) -
     if not planes.labels and listed:
         targets = _from_targets(experiment, k, least_pixels, radius)
         return replace(targets, remarks=(*notes, *targets.remarks))
-    ids = [name_of(place) for place in planes.xyz]
+    ids = [place_name(place) for place in planes.xyz]
     return _CameraControl(ids=ids, image=planes.image, remarks=notes, planes=planes)
-
-
-def name_of(place: FloatArray) -> str:
-    """Return the name of a point of a plane: the same for all cameras, whatever their numbers.
-
-    The numbers in .fix count what a camera saw, from 0: they mean another point in each of them.
-
-    >>> name_of(np.array([5.0, -7.5, -0.0]))
-    'X5Y-7.5Z0'
-    """
-    rounded = np.round(place, 6) + 0.0
-    return "".join(f"{axis}{v:.10g}" for axis, v in zip("XYZ", rounded.tolist(), strict=True))
 
 
 def _with_planes(experiment: Experiment, control: Sequence[_CameraControl]) -> ObjectPoints:
