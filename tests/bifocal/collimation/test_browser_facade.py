@@ -98,7 +98,6 @@ def test_a_facade_from_two_photos_to_the_drawing_by_clicks_alone(
         page.click("face")
         for x, y in ((-0.6, 0.2), (0.6, 0.2), (0.6, 1.8)):
             page.tab.mouse.click(*page.screen(1, true_pixel(1, (x, y, 0.0))))
-            page.tab.wait_for_timeout(700)
         page.click("face-close")
         shape = page.settled("state.shapes.length === 1")["shapes"][0]
         assert shape["kind"] == "face"

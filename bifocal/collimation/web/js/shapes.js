@@ -17,7 +17,7 @@ const GRIP = 8;
 export class Shapes {
   /** `stage`: the products, whose pane and wall it draws on. */
   constructor(app, stage) {
-    Object.assign(this, { app, stage, corners: null, hot: null, snapping: true, dragged: null });
+    Object.assign(this, { app, stage, corners: null, hot: null, snapping: true, dragged: null, latest: Promise.resolve() });
     this.kind = choice({ label: t("shape.kind"), testid: "face-kind", save: () => {},
       options: Object.fromEntries(KINDS.map((kind) => [kind, t(`shape.${kind}`)])) });
     this.begin = button(t("shape.draw"), () => this.arm(), { class: "quiet", testid: "face", "aria-pressed": "false" });
@@ -93,12 +93,27 @@ export class Shapes {
     return true;
   }
 
-  /** A click at a pixel of the wall's grid, while a shape is in hand. */
-  async click(spot) {
+  /** A click at a pixel of the wall's grid, while a shape is in hand; one after the other. */
+  click(spot) {
+    return this.#next(() => this.#take(spot));
+  }
+
+  /** Close the shape in hand, once all its corners are there. */
+  finish() {
+    return this.#next(() => this.#keep());
+  }
+
+  #next(action) {
+    this.latest = this.latest.then(action).catch((error) => this.app.refuse(error));
+    return this.latest;
+  }
+
+  async #take(spot) {
     const { corners } = this;
+    if (!corners) return undefined;
     const place = this.stage.pane.place(spot);
     const first = corners[0] && this.stage.pane.place(this.#shown(corners[0]));
-    if (corners.length > 2 && Math.hypot(first[0] - place[0], first[1] - place[1]) < CLOSE) return this.finish();
+    if (corners.length > 2 && Math.hypot(first[0] - place[0], first[1] - place[1]) < CLOSE) return this.#keep();
     const corner = await this.#corner(spot).catch((error) => this.app.refuse(error));
     if (!corner || this.corners !== corners) return undefined;
     corners.push(corner);
@@ -124,7 +139,7 @@ export class Shapes {
   }
 
   /** Corners -> a shape of the survey: a face has one relief, that which lies most within. */
-  async finish() {
+  async #keep() {
     const { corners } = this;
     const kind = this.kind.value;
     if (!corners || corners.length < (kind === "break" ? 2 : 3)) return this.app.say(t("shape.few"), "warning");
