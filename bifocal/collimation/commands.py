@@ -292,6 +292,18 @@ def _control_use(state: SurveyState, command: Fields) -> list[Change]:
 
 
 def _length_set(state: SurveyState, command: Fields) -> list[Change]:
+    return [_drawn_length(state, command, "length")]
+
+
+def _length_check(state: SurveyState, command: Fields) -> list[Change]:
+    """Draw a taped length that gives no scale, and so checks it."""
+    number = 1
+    while (free := f"K{number}") in state.scale:
+        number += 1
+    return [_drawn_length(state, command, command.get("name") or free)]
+
+
+def _drawn_length(state: SurveyState, command: Fields, name: str) -> Change:
     a, b = command["ends"]
     if max(abs(a[0] - b[0]), abs(a[1] - b[1])) < 2:
         raise FieldError(remark("page.length_ends"))
@@ -301,11 +313,12 @@ def _length_set(state: SurveyState, command: Fields) -> list[Change]:
         image=command["image"], ends=tupled(command["ends"]), length=command["length"],
         sigma=command.get("sigma"),
     )  # fmt: skip
-    return [Change("scale", "length", state.scale.get("length"), drawn)]
+    return Change("scale", name, state.scale.get(name), drawn)
 
 
-def _length_delete(state: SurveyState, command: Fields) -> list[Change]:  # noqa: ARG001
-    return [Change("scale", "length", state.scale.get("length"), None)]
+def _length_delete(state: SurveyState, command: Fields) -> list[Change]:
+    name = command.get("name") or "length"
+    return [Change("scale", name, state.scale.get(name), None)]
 
 
 def _wall_set(state: SurveyState, command: Fields) -> list[Change]:
@@ -416,6 +429,7 @@ _RECORDS: dict[Any, Callable[[SurveyState, Fields], list[Change]]] = {
     "control.use": _control_use,
     "control.add": _control_add,
     "length.set": _length_set,
+    "length.check": _length_check,
     "length.delete": _length_delete,
     "wall.set": _wall_set,
     "control.paste": _control_paste,

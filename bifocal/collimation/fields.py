@@ -141,6 +141,12 @@ _ROW = {
 _NAME = {"name": text_of}
 _PIXEL = {"image": image_of, "column?": number_of, "row?": number_of}
 _PLACE = {"X?": number_of, "Y?": number_of, "r?": number_of}
+_LENGTH = {
+    "image": image_of,
+    "ends": _of([_PICK, _PICK], "two pixels"),
+    "length": positive_of,
+    "sigma?": positive_of,
+}
 _TAPE = {"from": text_of, "to": text_of}
 #: Fields of every command of the page; those with ? may be left out, others are not taken over.
 COMMANDS: Mapping[str, Mapping[str, Reader]] = {
@@ -167,13 +173,9 @@ COMMANDS: Mapping[str, Mapping[str, Reader]] = {
     "tape.set": {**_TAPE, "length?": positive_of, "sigma?": positive_of},
     "tape.delete": _TAPE,
     "control.use": {**_NAME, "use": _FLAG},
-    "length.set": {
-        "image": image_of,
-        "ends": _of([_PICK, _PICK], "two pixels"),
-        "length": positive_of,
-        "sigma?": positive_of,
-    },
-    "length.delete": {},
+    "length.set": _LENGTH,
+    "length.check": {"name?": _if_any(text_of), **_LENGTH},
+    "length.delete": {"name?": _if_any(text_of)},
     "wall.set": {"column?": number_of, "row?": number_of},
     "photo.set": {"image": image_of, "focal_mm?": positive_of, "sensor_width_mm?": positive_of},
     "setup.set": {f"{key}?": _index if key in INDICES else positive_of for key in SETUP},

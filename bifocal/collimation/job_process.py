@@ -21,6 +21,7 @@ from bifocal.faces.suggestions import suggest_faces
 from bifocal.files.pair_names import default_title
 from bifocal.matching.matching import MatchSettings
 from bifocal.model.geotiff import gsd_at_scale
+from bifocal.model.length_checks import LengthCheck
 from bifocal.model.orientation_precision import NAMES
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
@@ -246,7 +247,10 @@ def _deliver(task: Task, progress: Progress) -> dict[str, Any]:
             files_of_kind[kind] = [Path(before["out"]).name]
     pair = _source(task)
     title = task["title"] or default_title(pair, path)
-    wish = DeliverTask(title=title, mark=_path(task["mark"]), **{"scale": 50.0, **task["drawing"]})
+    wish = DeliverTask(
+        title=title, mark=_path(task["mark"]), lengths=tuple(_lengths(task).values()),
+        **{"scale": 50.0, **task["drawing"]},
+    )  # fmt: skip
     done = deliver(
         pair, out, _ortho_task(task), wish, overwrite=task["overwrite"],
         progress=_within(progress, 0.65, 0.9),
@@ -273,12 +277,16 @@ def _documents(task: Task, title: str, progress: Progress) -> list[str]:
         del names["3d"]
     about = ReportTask(
         title=title, language=language, scale=task["drawing"].get("scale"), relief=relief,
-        ortho=ortho, view=names.get("3d"),
+        ortho=ortho, view=names.get("3d"), lengths=_lengths(task),
     )  # fmt: skip
     # A set tells of all its photos; a workbook of points that two of them show.
     source = _path(task["set"]) or _path(task["mark"]) or Path(task["pair"])
     report_of(source, names["report"], about, overwrite=task["overwrite"])
     return [path.name for path in names.values()]
+
+
+def _lengths(task: Task) -> dict[str, LengthCheck]:
+    return {name: LengthCheck(**check) for name, check in task["lengths"].items()}
 
 
 def _suggest(task: Task, progress: Progress) -> dict[str, Any]:

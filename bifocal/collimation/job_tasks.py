@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.collimation.drawing import write_points_drawing
+from bifocal.collimation.drawn_lengths import check_lengths
 from bifocal.collimation.fields import FieldError, positive_of, tupled
 from bifocal.collimation.jobs import PageJob
 from bifocal.collimation.live_orientation import control_of, lenses_of, site_of
@@ -168,6 +169,10 @@ def _deliver_options(session: Session, options: Options, pair: Options) -> dict[
         "before": before,
         "relief": surface["relief"],
         "ortho": str(ortho.resolve()),
+        "lengths": {
+            name: asdict(check)
+            for name, check in check_lengths(session.state, session.pictures.needed_pair()).items()
+        },
         "drawing": {
             **_said(options, "scale", "dpi", "sheet", "sections"),
             "language": session.spoken,

@@ -48,7 +48,7 @@ MOST_ANSWERS = 10_000
 #: Commands that bring picks of the photos.
 _PICKING = ("point.pick", "points.add", "control.pick", "control.paste")
 #: Commands that name what they make, where they are not told.
-_NAMING = ("point.pick", "control.set", "control.pick", "shape.set")
+_NAMING = ("point.pick", "control.set", "control.pick", "shape.set", "length.check")
 
 
 class Session:

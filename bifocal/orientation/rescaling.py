@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from bifocal import rays
 from bifocal.model.doubts import MISFITS, RIVALS, doubts_of
-from bifocal.model.orientation_precision import CAMERA, NAMES, pinhole, pixel_rates
+from bifocal.model.length_checks import length_on_wall
+from bifocal.model.orientation_precision import CAMERA, NAMES, pinhole
 from bifocal.model.pair import Pair
 from bifocal.model.pair_media import PairMedia
 from bifocal.orientation.alignment import aside, deviations_of
@@ -22,10 +22,6 @@ from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.walls.reference_plane import WallFace, rivals_in_words, zero_sigma
 from photocore.arrays import FloatArray, positive
-from photocore.errors import GeometryError
-
-#: Precision of the ends of a length that are clicked on a photo. [px]
-SIGMA_END = 1.0
 
 
 def scaled_by_distance(pair: Pair, number: int, distance: float, *, sigma: float) -> Pair:
@@ -78,19 +74,7 @@ def scaled_by_length(
         If the ends coincide.
     """
     positive(length, "length", unit="m")
-    photo = pair.photo(number)
-    places = rays.object_rays(photo.plane_from_pixels(ends), photo.foot).position
-    apart = places[1] - places[0]
-    now = float(np.linalg.norm(apart))
-    if not now > 0 or np.hypot(*(ends[1] - ends[0])) < 2 * SIGMA_END:
-        raise GeometryError("the ends of the length coincide: pick them farther apart.")
-    xyz = np.column_stack([places, np.zeros(2)])
-    by_point, by_camera = pixel_rates((pair.image1, pair.image2), xyz)
-    rows = slice(2 * number - 2, 2 * number)
-    inverse = np.linalg.inv(by_point[:, rows, :2])
-    moved = -inverse @ by_camera[:, rows]
-    by_orientation = (apart / now**2) @ (moved[1] - moved[0])
-    of_ends = float(np.sqrt((((apart / now) @ inverse) ** 2).sum())) * SIGMA_END
+    now, by_orientation, of_ends = length_on_wall(pair, number, ends)
     relative = float(np.hypot(sigma / length, of_ends / now))
     return _scaled(pair, length / now, by_orientation, relative)
 

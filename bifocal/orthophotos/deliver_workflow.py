@@ -25,6 +25,7 @@ from bifocal.model.geotiff import (
     gsd_at_scale,
 )
 from bifocal.model.grid import Grid
+from bifocal.model.length_checks import LengthCheck, agreement
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
 from bifocal.model.photos_of_set import PhotosOfSet
@@ -107,6 +108,8 @@ class DeliverTask:
     checked : (int, float, float), optional
         Independent check points, and their RMSE in X, Y (the worse) and in relief [m]: told by the
         sheet in place of the standard deviations.
+    lengths : sequence of LengthCheck
+        Lengths taped on site that check the scale; the sheet tells how they agree.
     hashes : bool
         List the files' SHA-256 in ``SHA256SUMS``, for ``bifocal verify``.
     """
@@ -125,6 +128,7 @@ class DeliverTask:
     language: str = "en"
     camera: str = ""
     checked: tuple[int, float, float] | None = None
+    lengths: Sequence[LengthCheck] = ()
     hashes: bool = False
 
 
@@ -472,6 +476,7 @@ def _notes(
     return (
         say("pixel", size=grid.gsd * 1000, dpi=dpi_at_scale(grid.gsd, wish.scale)),
         say(words, **lengths),
+        *((say("lengths_checked", **agreement(wish.lengths)),) if wish.lengths else ()),
         *((say("misfit"),) if misfit else ()),
         wish.camera or cameras,
         *((say("media", media=media_words(pair.layers)),) if pair.layers else ()),

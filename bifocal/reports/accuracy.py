@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from bifocal.model.doubts import MISFITS, doubts_of
+from bifocal.model.length_checks import agreement
 from bifocal.remarks import in_language
 from bifocal.reports.content import PairContent
 from bifocal.survey.reference import CheckResult
@@ -33,10 +34,12 @@ def accuracy_blocks(content: PairContent, say: Words) -> Iterator[Block]:
     if doubts:
         details = tuple(in_language(text, content.task.language) for text in doubts)
         yield Banner(text=say("misfit"), details=details, good=False)
+    yield from _length_blocks(content, say)
     solution = content.solution
     check = None if solution is None else solution.check
     if check is None or not np.isfinite(check.accuracy):
-        yield Banner(text=say("verdict_none"))
+        if not content.task.lengths:
+            yield Banner(text=say("verdict_none"))
         return
     yield _banner(content, check, say)
     yield _verdict_table(check, say)
@@ -45,6 +48,26 @@ def accuracy_blocks(content: PairContent, say: Words) -> Iterator[Block]:
     hidden = int(np.isfinite(check.errors).any(axis=1).sum()) - MOST_POINTS
     if hidden > 0:
         yield Paragraph(text=say("more_points", n=hidden), small=True)
+
+
+def _length_blocks(content: PairContent, say: Words) -> Iterator[Block]:
+    """Yield how lengths taped on site agree with the pair."""
+    lengths = content.task.lengths
+    if not lengths:
+        return
+    agreed = agreement(tuple(lengths.values()))
+    yield Banner(text=say("lengths_checked", **agreed), good=agreed["agree"] == agreed["count"])
+    yield TextTable(
+        headings=[say(key) for key in ("length", "taped", "found", "error_mm", "sigma_mm")],
+        rows=[
+            [
+                name, f"{one.taped:.3f}", f"{one.measured:.3f}", f"{1000 * one.difference:+.1f}",
+                f"{1000 * one.sigma:.1f}",
+            ]
+            for name, one in lengths.items()
+        ],
+        caption=say("lengths_drawn"),
+    )  # fmt: skip
 
 
 def verdict_in_words(content: PairContent) -> list[str]:

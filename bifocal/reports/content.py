@@ -18,6 +18,7 @@ from bifocal.files.strips import ROWS, colour_strips
 from bifocal.model.doubts import check_scale
 from bifocal.model.geotiff import RasterReader
 from bifocal.model.grid import Bounds
+from bifocal.model.length_checks import LengthCheck
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.model.photo_set import PhotoSet, pair_or_set
@@ -112,6 +113,8 @@ class ReportTask:
         Client, place, surveyor and the like, by the names of `bifocal.options.PROJECT`.
     steps : tuple of StepTold
         How what the report shows was made.
+    lengths : mapping of str to LengthCheck
+        Lengths taped on site that check the scale, by their names.
     """
 
     #: What is given as it is typed.
@@ -130,6 +133,7 @@ class ReportTask:
     view: Path | None = None
     project: Mapping[str, str] = field(default_factory=dict)
     steps: tuple[StepTold, ...] = ()
+    lengths: Mapping[str, LengthCheck] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -10,6 +10,7 @@ import numpy as np
 
 from bifocal.collimation.asked import goodness, oriented_live
 from bifocal.collimation.commands import lens_ratio
+from bifocal.collimation.drawn_lengths import lengths_shown
 from bifocal.collimation.fields import SETUP
 from bifocal.collimation.live_orientation import LiveOrientation, lenses_of
 from bifocal.collimation.next_steps import advice_of, is_looking, is_unscaled, next_steps
@@ -56,6 +57,9 @@ def state_of(session: Session) -> dict[str, Any]:
             ],
             "live": _live(live),
             "scale": _drawn_length(session),
+            "check_lengths": lengths_shown(
+                state, None if is_unscaled(session) else session.pictures.pair
+            ),
             "looking": is_looking(session),
             "good": _how_good(session),
             "drawing_scale": _drawing_scale(session),

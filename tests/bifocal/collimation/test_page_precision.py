@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bifocal import Pair
+from bifocal.collimation.job_tasks import task_of
 from bifocal.collimation.uncertainty import PRINT, how_good, places_sigma
+from bifocal.model.length_checks import LengthCheck
+from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver
+from bifocal.orthophotos.ortho_workflow import OrthoTask
+from bifocal.reports.content import ReportTask
+from bifocal.reports.workflow import report_of
 from tests.page_session import client_of, opened, proposed, sample_folder, two_photos
 
 
@@ -35,3 +42,46 @@ def test_without_a_scale_no_drawing_scale_is_chosen(tmp_path) -> None:
     with opened(two_photos(tmp_path)) as session:
         proposed(session, tmp_path)
         assert client_of(session).get("/api/state").json()["drawing_scale"] is None
+
+
+def test_every_further_taped_length_checks_the_scale_and_is_told_in_the_package(tmp_path) -> None:
+    scale, check = [[300.0, 250.0], [1200.0, 240.0]], [[310.0, 690.0], [1200.0, 260.0]]
+    with opened(two_photos(tmp_path)) as session:
+        client = client_of(session)
+        proposed(session, tmp_path)
+        drawn = {"op": "length.check", "image": 1, "ends": check, "length": 7.2}
+        assert session.command(drawn)["name"] == "K1"
+        (shown,) = client.get("/api/state").json()["check_lengths"]
+        assert "measured" not in shown  # there is no scale yet
+        session.command({"op": "length.set", "image": 1, "ends": scale, "length": 6.64})
+        pair = session.pictures.pair
+        truth = np.linalg.norm(np.diff(pair.image1.plane_from_pixels(check), axis=0))
+        (shown,) = client.get("/api/state").json()["check_lengths"]
+        assert shown["difference"] == pytest.approx(truth - 7.2)
+        session.command({**drawn, "name": "K1", "length": float(truth)})
+        session.command({**drawn, "length": 5.0})
+        assert [one["name"] for one in client.get("/api/state").json()["check_lengths"]] == [
+            "K1",
+            "K2",
+        ]
+        session.command({"op": "length.delete", "name": "K2"})
+        session.command({"op": "undo"})
+        assert session.pictures.pair.d1 == pair.d1  # what checks gives no scale
+        session.command({"op": "align.accept"})
+        told = task_of(session, "deliver", {})["lengths"]
+        assert told["K1"]["measured"] == pytest.approx(truth)
+        assert set(told) == {"K1", "K2"}
+
+
+def test_sheet_and_report_say_how_many_taped_lengths_agree(tmp_path) -> None:
+    checks = {"K1": LengthCheck(taped=3.0, measured=3.004, sigma=0.005),
+              "K2": LengthCheck(taped=2.0, measured=2.1, sigma=0.005)}  # fmt: skip
+    pair = sample_folder(tmp_path) / "facade.pair.json"
+    report_of(pair, tmp_path / "r.html", ReportTask(language="it", lengths=checks))
+    text = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "1 di 2 lunghezze misurate sul posto concordano, scarto massimo 100 mm" in text
+    assert "+100.0" in text
+    wish = DeliverTask(scale=200, lengths=tuple(checks.values()), language="it")
+    deliver(Pair.read(pair), tmp_path / "out", OrthoTask(gsd=0.05), wish)
+    (drawing,) = (tmp_path / "out").glob("*.dxf")
+    assert "1 di 2 lunghezze misurate sul posto concordano" in drawing.read_text(encoding="utf-8")

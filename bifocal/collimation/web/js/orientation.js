@@ -46,7 +46,7 @@ export class OrientationStage {
     this.target = h("p", { class: "target", role: "status" });
     this.exchangePlace = h("div", { class: "row" });
     this.element = h("div", { class: "stage work", id: "stage-orientation" }, this.photos,
-      h("aside", { class: "side" }, h("div", { class: "panel" }, this.target, this.wallCard.element, this.loupe.element,
+      h("aside", { class: "side" }, h("div", { class: "panel" }, this.target, this.wallCard.element, this.wallCard.checkCard, this.loupe.element,
         this.#controlTable(), this.#tapeTable(), this.#tellResult(), this.exchangePlace), this.#result()));
   }
 

@@ -10,11 +10,12 @@ import { t } from "./words/words.js";
 
 const SHEET = "rgb(60, 220, 130)";
 const LENGTH_INK = "#ffe14d";
+const CHECK_INK = "#b9f27c";
 
 export class WallCard {
   /** `stage`: the orientation, whose panes and picker it shares. */
   constructor(stage) {
-    Object.assign(this, { stage, app: stage.app, tool: null, ends: [], image: 1, dismissed: false });
+    Object.assign(this, { stage, app: stage.app, tool: null, ends: [], image: 1, dismissed: false, checking: false });
     this.state = h("p", { class: "wall-state", role: "status", testid: "wall-state" });
     this.length = h("input", { type: "text", inputmode: "decimal", autocomplete: "off", id: "wall-length",
       testid: "length-value", size: "7" });
@@ -25,13 +26,24 @@ export class WallCard {
       this.drawButton, h("label", { for: "wall-length" }, t("wall.length")),
       h("span", { class: "with-unit short" }, this.length, h("span", { class: "unit" }, "m")),
       h("button", { type: "submit", class: "quiet", testid: "length-set" }, t("wall.set")));
+    this.checkLength = h("input", { type: "text", inputmode: "decimal", autocomplete: "off", id: "check-length",
+      testid: "check-value", size: "7" });
+    this.agreement = h("p", { class: "hint", role: "status", testid: "check-agreement" });
+    this.checks = h("tbody");
+    this.checkCard = h("section", { class: "card", hidden: true, testid: "checks" }, h("h2", {}, t("check.title")), this.agreement,
+      h("table", { class: "grid" }, this.checks),
+      h("form", { class: "row", onsubmit: (event) => { event.preventDefault(); this.#check(); } },
+        button(t("check.draw"), () => this.arm("check"), { class: "quiet", testid: "check-draw" }),
+        h("label", { for: "check-length" }, t("wall.length")),
+        h("span", { class: "with-unit short" }, this.checkLength, h("span", { class: "unit" }, "m")),
+        h("button", { type: "submit", class: "quiet", testid: "check-set" }, t("check.set"))));
     this.element = h("section", { class: "card wall-card", hidden: true }, h("h2", {}, t("wall.title")), this.state,
       this.form, h("div", { class: "row" }, this.faceButton, this.faces));
   }
 
   /** The next clicks are the ends of the length, or a spot on the wall. */
   arm(tool) {
-    Object.assign(this, { tool, ends: [], dismissed: false });
+    Object.assign(this, { tool, ends: [], dismissed: false, checking: tool === "check" });
     this.stage.refresh();
   }
 
@@ -72,8 +84,9 @@ export class WallCard {
     if (ends.length === 2) {
       // What is typed next is the length.
       this.tool = null;
-      this.length.value = "";
-      this.length.focus();
+      const input = this.checking ? this.checkLength : this.length;
+      input.value = "";
+      input.focus();
     }
     this.stage.refresh();
     const radius = this.stage.picker.reach;
@@ -99,7 +112,37 @@ export class WallCard {
     return undefined;
   }
 
+  /** A length that gives no scale, and so checks it. */
+  async #check() {
+    const length = parseNumber(this.checkLength.value);
+    if (!this.checking || this.ends.length < 2) return this.arm("check");
+    if (!(length > 0)) return this.app.say(t("wall.number"), "warning");
+    if (await this.app.send("length.check", { image: this.image, ends: this.ends, length })) {
+      Object.assign(this, { ends: [], checking: false });
+      this.checkLength.value = "";
+      this.checkLength.blur();
+      this.stage.refresh();
+    }
+    return undefined;
+  }
+
+  #tellChecks({ pair, check_lengths: checks }) {
+    this.checkCard.hidden = !pair?.scaled;
+    const told = checks.filter(({ measured }) => Number.isFinite(measured));
+    const most = Math.max(...told.map(({ difference }) => 1000 * Math.abs(difference)), 0);
+    setText(this.agreement, told.length ? t("check.agreement", { agree: told.filter(({ agrees }) => agrees).length,
+      count: told.length, most: number(most, 0) }) : t("check.hint"));
+    keyedRows(this.checks, checks, { key: ({ name }) => name, signature: JSON.stringify,
+      build: ({ name, length, difference, sigma_difference: sigma, agrees }) => h("tr", {}, h("th", { scope: "row" }, name),
+        h("td", { class: "number" }, `${number(length, 3)} m`),
+        h("td", { class: agrees || !Number.isFinite(difference) ? "number" : "number warn" },
+          Number.isFinite(difference) ? `${difference > 0 ? "+" : ""}${number(1000 * difference, 0)} ± ${number(1000 * sigma, 0)} mm` : ""),
+        h("td", {}, button("×", () => this.app.send("length.delete", { name }),
+          { class: "icon", "aria-label": t("list.deleteOf", { name }) }))) });
+  }
+
   update(state) {
+    this.#tellChecks(state);
     const { pair, scale, looking } = state;
     const found = pair && pair.accepted === false && pair.report?.free_scale;
     const failed = state.jobs.filter(({ kind }) => kind === "align").at(-1);
@@ -115,7 +158,7 @@ export class WallCard {
     if (scale && document.activeElement !== this.length && this.ends.length < 2) this.length.value = number(scale.length, 3);
     // The one thing that is asked is asked at once.
     if (found && !pair.scaled && !state.control.length && !this.tool && !this.ends.length && !this.dismissed) this.tool = "length";
-    if (!found) Object.assign(this, { tool: null, ends: [] });
+    if (!found && !this.checking) Object.assign(this, { tool: null, ends: [] });
     const others = found ? pair.report.planes.slice(1, 4) : [];
     keyedRows(this.faces, others, { key: ({ pixel }) => String(pixel), signature: JSON.stringify,
       build: ({ offset, share, pixel: [column, row] }) => h("li", {}, button(
@@ -142,15 +185,20 @@ export class WallCard {
       const frame = [[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]];
       drawing.sheet(context, pane, { frame, lines: this.#grid(pair)[pane.image - 1], outlines }, SHEET);
     }
+    for (const check of this.app.state.check_lengths) this.#drawLength(context, pane, check, CHECK_INK);
     const drawn = this.ends.length ? { image: this.image, ends: this.ends } : scale;
+    this.#drawLength(context, pane, drawn, LENGTH_INK);
+    if (this.spot && pane.image === 1) drawing.centre(context, pane.screen(1, this.spot), t("wall.here"));
+  }
+
+  #drawLength(context, pane, drawn, ink) {
     if (drawn?.image === pane.image) {
       const places = drawn.ends.map((end) => pane.screen(pane.image, end));
-      drawing.polyline(context, LENGTH_INK, places, { width: 2.5 });
+      drawing.polyline(context, ink, places, { width: 2.5 });
       for (const place of places) drawing.marker(context, pane.image, place);
       const [a, b] = places;
       const text = drawn.length ? `${number(drawn.length, 3)} m` : t("wall.howLong");
-      if (b) drawing.label(context, text, [(a[0] + b[0]) / 2 + 8, (a[1] + b[1]) / 2 - 8], LENGTH_INK);
+      if (b) drawing.label(context, text, [(a[0] + b[0]) / 2 + 8, (a[1] + b[1]) / 2 - 8], ink);
     }
-    if (this.spot && pane.image === 1) drawing.centre(context, pane.screen(1, this.spot), t("wall.here"));
   }
 }

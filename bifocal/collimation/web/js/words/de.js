@@ -404,4 +404,9 @@ export default {
   "profile.keep": "In die Zeichnung",
   "profile.kept": "Schnitte in der Zeichnung beim nächsten Erzeugen: {count}",
   "profile.times": "{times}-fach überhöht",
+  "check.title": "Längen, die den Maßstab prüfen",
+  "check.hint": "Jede weitere gemessene Länge: auf einem Foto zeichnen, eintippen.",
+  "check.draw": "Zeichnen",
+  "check.set": "Prüfen",
+  "check.agreement": "{agree} von {count} stimmen, größte Abweichung {most} mm.",
 };

@@ -404,4 +404,9 @@ export default {
   "profile.keep": "Into the drawing",
   "profile.kept": "Sections in the drawing at the next run: {count}",
   "profile.times": "heights {times} times",
+  "check.title": "Lengths that check the scale",
+  "check.hint": "Every further length that you taped: draw it on a photo, type it.",
+  "check.draw": "Draw",
+  "check.set": "Check",
+  "check.agreement": "{agree} of {count} agree, the largest difference is {most} mm.",
 };

@@ -404,4 +404,9 @@ export default {
   "profile.keep": "Nel disegno",
   "profile.kept": "Sezioni nel disegno alla prossima creazione: {count}",
   "profile.times": "quote ingrandite {times} volte",
+  "check.title": "Lunghezze che verificano la scala",
+  "check.hint": "Ogni altra lunghezza misurata: tracciala su una foto, scrivila.",
+  "check.draw": "Traccia",
+  "check.set": "Verifica",
+  "check.agreement": "{agree} di {count} concordano, scarto massimo {most} mm.",
 };
