@@ -54,9 +54,8 @@ class Assets:
         data = self._files.get(name)
         if data is None:
             raise HTTPException(404, "there is no such page.")
-        headers = {
-            "etag": self._tags[name], "cache-control": "private, no-cache", "vary": "accept-encoding",
-        }  # fmt: skip
+        headers = {"etag": self._tags[name], "cache-control": "private, no-cache"}
+        headers["vary"] = "accept-encoding"
         if request.headers.get("if-none-match") == headers["etag"]:
             return Response(status_code=304, headers=headers)
         if "gzip" in request.headers.get("accept-encoding", ""):

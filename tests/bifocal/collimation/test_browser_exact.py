@@ -7,7 +7,6 @@ import json
 import math
 import shutil
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -130,5 +129,4 @@ def test_what_is_seen_is_where_the_click_counts(
                 page.keys("0")
                 zoomed(page, pixel, zoom)
                 off = displacement(page, photo, pixel, ratio)
-                print(stage, ratio, zoom, np.round(off, 4).tolist())
                 assert np.hypot(*off) < WITHIN, (zoom, pixel)

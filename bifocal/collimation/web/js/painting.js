@@ -69,7 +69,8 @@ class TileLayer extends Layer {
     for (const frames of [this.frames.slice(0, 1), this.frames.slice(1)]) clip(context, pane, ratio, frames);
     const [x, y, width, height] = [...corner.map((place, axis) => place + first[axis] * across),
       ...end.map((stop, axis) => (stop - first[axis]) * across)];
-    context.imageSmoothingQuality = "high";
+    // Chromium places what it smooths simply to 1/32 px only, and is six times slower at it well.
+    context.imageSmoothingQuality = pane.moving ? "low" : "high";
     context.drawImage(this.sheet, x, y, width, height);
   }
 

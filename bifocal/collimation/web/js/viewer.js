@@ -5,6 +5,8 @@ import { steer } from "./view.js";
 export { pictureLayer, tileLayer } from "./painting.js";
 export { pixelView } from "./view.js";
 
+const SETTLED_MS = 100;
+
 /** Two panes in a viewer beside each other, or above where pictures come out clearly larger. */
 export function spread(viewer, width, height) {
   const { clientWidth: w, clientHeight: h } = viewer;
@@ -31,7 +33,7 @@ export class Pane extends EventTarget {
       this.#tell("hover", [clientX - left, clientY - top]);
     });
     this.element.addEventListener("pointerleave", () => this.#tell("hover", null));
-    this.moved = () => this.repaint();
+    this.moved = () => this.#move();
     view.addEventListener("change", this.moved);
     this.resized = new ResizeObserver(() => this.#resize());
     this.resized.observe(this.element);
@@ -89,7 +91,7 @@ export class Pane extends EventTarget {
   dispose() {
     this.resized.disconnect();
     this.view.removeEventListener("change", this.moved);
-    cancelAnimationFrame(this.waiting);
+    clearTimeout(this.settling);
     this.view.rest();
     const { layers } = this;
     this.setLayers([]);
@@ -138,6 +140,17 @@ export class Pane extends EventTarget {
   repaint() {
     this.stale = true;
     this.paint();
+  }
+
+  /** Draw fast as long as the view moves, and well as soon as it rests. */
+  #move() {
+    this.moving = true;
+    clearTimeout(this.settling);
+    this.settling = setTimeout(() => {
+      this.moving = false;
+      this.repaint();
+    }, SETTLED_MS);
+    this.repaint();
   }
 
   #tell(type, pixel) {
