@@ -130,3 +130,82 @@ def test_what_is_seen_is_where_the_click_counts(
                 zoomed(page, pixel, zoom)
                 off = displacement(page, photo, pixel, ratio)
                 assert np.hypot(*off) < WITHIN, (zoom, pixel)
+
+
+#: Where a view has come to, in CSS pixels, thrown at 1 and 0.6 of them a millisecond.
+THROWN = """async () => {
+  const { View } = await import(new URL("js/view.js", document.baseURI));
+  const view = new View(4000, 3000), [x, y] = view.centre;
+  view.coast([1, 0.6]);
+  for (let still = 0, last; still < 5; still = last === view.centre[0] ? still + 1 : 0) {
+    last = view.centre[0];
+    await new Promise((done) => setTimeout(done, 40));
+  }
+  return [(x - view.centre[0]) * view.zoom, (y - view.centre[1]) * view.zoom];
+}"""
+
+
+def test_the_wheel_and_the_hand_keep_what_is_under_the_pointer(
+    browser: Any, server: Served
+) -> None:
+    with tab_of(browser, server, reduced_motion="no-preference") as page:
+        page.empty()
+        x, y = (round(value) for value in page.still(1, (900.0, 400.0)))
+        under = page.photo(1, (x, y))
+        before = page.screen(1, (1000.0, 400.0))[0] - page.screen(1, (900.0, 400.0))[0]
+        page.tab.mouse.move(x, y)
+        for _ in range(3):
+            page.tab.mouse.wheel(0, -100)
+            page.still(1, under)
+        assert math.dist(page.screen(1, under), (x, y)) < 0.01
+        after = page.screen(1, (1000.0, 400.0))[0] - page.screen(1, (900.0, 400.0))[0]
+        assert after / before == pytest.approx(2.0, abs=1e-6)
+        page.tab.mouse.down()
+        page.tab.mouse.move(x + 90, y + 60, steps=6)
+        assert math.dist(page.screen(1, under), (x + 90, y + 60)) < 0.01
+        page.tab.mouse.up()
+        assert not page.state["points"]  # a drag is no click
+        # The speed halves every 139 ms and ends at 0.05 px a millisecond: 191 px in all.
+        right, down = page.tab.evaluate(THROWN)
+        assert right == pytest.approx(191.0, abs=9.5)
+        assert down / right == pytest.approx(0.6, abs=1e-9)
+
+
+#: Tiles of one pixel, of which every third does not come at first; how many are kept, and fetched.
+STORE = """async () => {
+  const { TileStore } = await import(new URL("js/tiles.js", document.baseURI));
+  const canvas = new OffscreenCanvas(1, 1);
+  canvas.getContext("2d");
+  const blob = await canvas.convertToBlob(), real = [window.fetch, window.setTimeout];
+  const soon = () => new Promise((done) => real[1].call(window, done, 0));
+  const asked = new Map();
+  window.setTimeout = (done) => real[1].call(window, done, 0);
+  window.fetch = async (path, ...rest) => {
+    if (!path.startsWith("made-up")) return real[0].call(window, path, ...rest);
+    asked.set(path, (asked.get(path) ?? 0) + 1);
+    if (asked.size % 3 === 0 && asked.get(path) === 1) throw new TypeError("away");
+    return new Response(blob);
+  };
+  const store = new TileStore("made-up", { version: "1" }, () => {});
+  let most = 0;
+  for (let k = 0; k < 300; k += 6) {
+    const places = [0, 1, 2, 3, 4, 5].map((j) => [0, k + j, 0]);
+    while (places.some((place) => !store.get(...place))) {
+      store.load(places);
+      await soon();
+    }
+    most = Math.max(most, store.kept.size);
+  }
+  [window.fetch, window.setTimeout] = real;
+  return [asked.size, most, Math.max(...asked.values())];
+}"""
+
+
+def test_the_last_tiles_are_kept_and_those_that_did_not_come_asked_for_anew(
+    browser: Any, server: Served
+) -> None:
+    with tab_of(browser, server) as page:
+        fetched, kept, tries = page.tab.evaluate(STORE)
+        assert fetched == 300
+        assert kept == 96
+        assert tries == 2
