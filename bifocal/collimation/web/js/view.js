@@ -158,7 +158,7 @@ export function steer(element, view, middle, clicked) {
     view.rest();
     return view.zoomAbout(offset(at(event)), view.zoom * factor);
   };
-  for (const [type, act] of Object.entries({ pointerdown: down, pointermove: move, pointerup: up, pointercancel: up })) {
+  for (const [type, act] of Object.entries({ pointerdown: down, pointermove: move, pointerup: up, lostpointercapture: up })) {
     element.addEventListener(type, act);
   }
   element.addEventListener("wheel", wheel, { passive: false });

@@ -20,8 +20,8 @@ export class Pane extends EventTarget {
   constructor({ label, view, frame, painter }) {
     super();
     Object.assign(this, { view, frame, painter, width: 0, height: 0, shift: [0, 0], layers: [] });
-    const [width, height] = view.size;
-    this.extent = [-0.5, -0.5, width - 0.5, height - 0.5];
+    this.whole = [-0.5, -0.5, ...view.size.map((extent) => extent - 0.5)];
+    this.extent = this.whole;
     this.canvas = h("canvas", { class: "drawing", "aria-hidden": "true" });
     // Of whole pixels: the browser stretches what is drawn over fractions of one.
     this.ground = h("div", { class: "ground" }, this.canvas);
@@ -103,7 +103,7 @@ export class Pane extends EventTarget {
   frameTo(frame) {
     if (!frame.length) return;
     const [columns, rows] = [0, 1].map((axis) => frame.map((pixel) => pixel[axis]));
-    const [left, top, right, bottom] = [-0.5, -0.5, this.view.size[0] - 0.5, this.view.size[1] - 0.5];
+    const [left, top, right, bottom] = this.whole;
     this.extent = [Math.max(Math.min(...columns), left), Math.max(Math.min(...rows), top),
       Math.min(Math.max(...columns), right), Math.min(Math.max(...rows), bottom)];
   }
