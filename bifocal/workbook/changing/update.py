@@ -37,7 +37,7 @@ from photocore.workbook.making.live_book import BookBuilder
 from photocore.workbook.making.live_columns import TEXT_KEYS, row_formula
 from photocore.workbook.making.newbook import RowBlock
 from photocore.workbook.making.print_area import move_print_area
-from photocore.workbook.making.repeated_rows import short_formula
+from photocore.workbook.making.repeated_rows import named_columns, short_formula
 from photocore.workbook.reading.grid import (
     TableArea,
     Value,
@@ -213,6 +213,7 @@ def _results_of(
                 if not _lacks(editor, row_formula(name, column.formula)):
                     short = short_formula(name, column.formula, letters, area.area[0])
                     ours.add(normal(short(area.first)))
+                    ours.add(normal(named_columns(short(area.first), editor.named)))
                 own = (headings[column.key], area.first, area.area[2])
                 places.setdefault(area.sheet, []).append(own)
     if isinstance(editor, PlainEditor):
@@ -366,7 +367,8 @@ def _table(
         if _lacks(editor, text):
             formula = None
         elif length > STRUCTURED_ROWS:
-            formula = short_formula(area.name, escape(column.formula), letters, area.area[0])
+            named = named_columns(escape(column.formula), editor.named)
+            formula = short_formula(area.name, named, letters, area.area[0])
         shown = ["" if value is None else value for value in values]
         filled.append(NewColumn(number, shown, style, formula))
     editor.fill_rows(area.sheet, first, filled)

@@ -96,6 +96,8 @@ def build(content: SurveyContent) -> BookBuilder:
     _log(builder, content)
     if content.functions:
         functions_sheet(builder, named=not content.plain)
+    if content.point_rows > STRUCTURED_ROWS and not content.plain:
+        builder.name_columns()
     builder.calculate()
     if content.table is not None:
         refuse_contradictions(builder, content)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 
 from photocore.workbook.changing.cells import ROW_MARK, CellValue, RowText
 from photocore.workbook.making.live_columns import LiveColumn
 from photocore.workbook.making.newbook import RowBlock
+
+#: A whole column of a table: its name without ``tbl``, and its heading.
+COLUMN = re.compile(r"tbl(\w+)\[(\w+)\]")
 
 
 def repeated_rows(
@@ -52,3 +55,25 @@ def short_formula(table: str, text: str, letters: Mapping[str, str], head: int) 
     text = re.sub(heads, lambda key: f"${letters[key[1]]}${head}", text)
     text = re.sub(r"\[@(\w+)\]", lambda key: letters[key[1]] + ROW_MARK, text)
     return RowText(text)
+
+
+def named_columns(text: str, names: Container[str]) -> str:
+    """Return a formula with whole columns of tables called by names, where there are such names.
+
+    A file has a formula once for all rows only where it leads to names and cells of its own sheet.
+
+    >>> named_columns("INDEX(tblPoints[X],2)+SUM(tblGeo[w])", {"points_X"})
+    'INDEX(points_X,2)+SUM(tblGeo[w])'
+    """
+    return COLUMN.sub(
+        lambda at: name if (name := column_name(*at.groups())) in names else at[0], text
+    )
+
+
+def column_name(table: str, key: str) -> str:
+    """Return the name of a whole column of a table.
+
+    >>> column_name("Points", "X")
+    'points_X'
+    """
+    return f"{table.lower()}_{key}"
