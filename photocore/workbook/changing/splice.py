@@ -29,7 +29,7 @@ from photocore.workbook.reading.xmltext import quoted, unescaped
 
 _TAG = re.compile(rb"""<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*(/?)>""")
 #: New rows are kept in pieces of so many bytes, each of which is let go by itself.
-_PIECE = 2**24
+_PIECE = 2**25
 _INLINE = re.compile(r"\s*<(?:\w+:)?t(?:\s[^>]*)?>([^<]*)</(?:\w+:)?t>\s*")
 
 
