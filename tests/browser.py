@@ -146,7 +146,8 @@ class Driver:
 
     def __init__(self, browser: Any, server: Served, **context: Any) -> None:
         size = {"width": 1280, "height": 720}
-        calm = {"viewport": size, "reduced_motion": "reduce"}  # no frames for transitions
+        # No frames for transitions; Chromium's own choice were light.
+        calm = {"viewport": size, "reduced_motion": "reduce", "color_scheme": "dark"}
         self.server = server
         self.context = browser.new_context(**(calm | context))
         self.requests: list[str] = []

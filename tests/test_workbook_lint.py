@@ -127,11 +127,14 @@ def test_headings_with_brackets_line_breaks_or_a_twin_are_found(found):
 def test_rules_that_name_tables_and_long_prompts_are_found(found):
     def change(_, sheet, __):
         rule = DataValidation(type="custom", formula1="tblPoints[s1]>0", prompt="x" * 300)
-        rule.add("B2")
-        sheet.add_data_validation(rule)
+        choices = DataValidation(type="list", formula1=f'"{",".join(["choice"] * 40)}"')
+        for validation in (rule, choices):
+            validation.add("B2")
+            sheet.add_data_validation(validation)
 
     faults = found(change)
     assert any("a rule may not name a table" in fault for fault in faults)
+    assert any("the list of a validation is longer" in fault for fault in faults)
     assert any('dataValidation prompt="xxx' in fault for fault in faults)
 
 

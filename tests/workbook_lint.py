@@ -189,6 +189,8 @@ def formula_faults(formula: str) -> Iterator[str]:
 def _rule_faults(facts: _SheetFacts) -> Iterator[str]:
     """Yield faults of the formulas of conditional formats and validations."""
     for formula in facts.rules:
+        if formula.startswith('"'):
+            yield "the list of a validation is longer than 255 characters"
         if re.search(r"\w\[", _TEXTS.sub("''", formula)):
             yield f"a rule may not name a table: {formula:.80}"
         for fault in formula_faults(formula):
@@ -246,8 +248,8 @@ def _facts(root: ElementTree.Element, shared: list[str]) -> _SheetFacts:
                     text = shared[int(part.text)] if kind == "s" else part.text
             facts.texts[place] = text
     facts.merged = [split_area(cell.get("ref", "")) for cell in root.iter(_MAIN + "mergeCell")]
-    rules = (e.text or "" for e in root.iter() if e.tag.startswith(_MAIN + "formula"))
-    facts.rules = [rule for rule in rules if not rule.startswith('"')]
+    rules = [e.text or "" for e in root.iter() if e.tag.startswith(_MAIN + "formula")]
+    facts.rules = [rule for rule in rules if not rule.startswith('"') or len(rule) > 257]
     return facts
 
 

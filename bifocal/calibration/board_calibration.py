@@ -185,11 +185,11 @@ def _solve_brown(
     _refuse_undetermined(matrix)
     order = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
     sigmas = dict(zip(order, np.ravel(deviations).tolist(), strict=False))
-    wanted = {n: v for n, v in sigmas.items() if n in names or n in order[:4]}
+    sigmas_of = {n: v for n, v in sigmas.items() if n in names or n in order[:4]}
     lens = Lens(
         camera_matrix=matrix, coefficients=np.ravel(terms)[:5], image_size=size, sigma0=float(rms)
     )
-    return _LensFit(name=name, lens=lens, deviations=wanted, per_view=np.ravel(per_view))
+    return _LensFit(name=name, lens=lens, deviations=sigmas_of, per_view=np.ravel(per_view))
 
 
 def _solve_fisheye(views: Sequence[BoardView], size: tuple[int, int]) -> _LensFit:
@@ -208,9 +208,11 @@ def _solve_fisheye(views: Sequence[BoardView], size: tuple[int, int]) -> _LensFi
     per_view = []
     normal = np.zeros((8, 8))
     for view, turn, shift in zip(views, turns, shifts, strict=True):
-        seen, jacobian = cv2.fisheye.projectPoints(view.board[None], turn, shift, matrix, terms)
-        left = seen.reshape(-1, 2) - view.pixels
-        per_view.append(np.sqrt((left**2).sum() / len(left)))
+        projected, jacobian = cv2.fisheye.projectPoints(
+            view.board[None], turn, shift, matrix, terms
+        )
+        misses = projected.reshape(-1, 2) - view.pixels
+        per_view.append(np.sqrt((misses**2).sum() / len(misses)))
         # Columns of OpenCV's jacobian: f (2), c (2), k (4), rotation (3), shift (3), skew.
         inner, outer = jacobian[:, :8], jacobian[:, 8:14]
         mixed = inner.T @ outer

@@ -185,9 +185,9 @@ def _profile(
     for corner in ((0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1)):
         pixels = np.rint(centre + steps[:, None] * (np.array(corner) - centre)).astype(int)
         radius = np.linalg.norm(pixels - centre, axis=1)
-        seen = mapped[pixels[:, 1], pixels[:, 0]].astype(np.float64) - centre
+        away = mapped[pixels[:, 1], pixels[:, 0]].astype(np.float64) - centre
         ideal.append(radius)
-        factor.append(np.linalg.norm(seen, axis=1) / radius)
+        factor.append(np.linalg.norm(away, axis=1) / radius)
     reach = float(np.hypot(*centre))
     radius, ratio = np.concatenate(ideal) / reach, np.concatenate(factor)
     # ptlens: powers 0..3 of the radius; poly3, poly5: 0, 2 and 4. Weighted by radius, since the

@@ -121,13 +121,13 @@ def calibrate_from_lines(
         return np.concatenate([_off_line(lens.undistort(line)) for line in usable])
 
     solution = least_squares(straightness, np.zeros(2), loss="soft_l1", f_scale=0.5)
-    left = straightness(solution.x)
-    freedom = max(len(left) - 2 * len(usable) - 2, 1)
+    rest = straightness(solution.x)
+    freedom = max(len(rest) - 2 * len(usable) - 2, 1)
     normal = solution.jac.T @ solution.jac
     if np.linalg.cond(normal) > 1e12 or normal[0, 0] < 1e-6:
         raise GeometryError(remark("calibration.central_lines"))
-    sigmas = np.sqrt(np.diag(np.linalg.inv(normal)) * (left**2).sum() / freedom)
-    before, after = (float(np.sqrt(np.mean(v**2))) for v in (straightness(np.zeros(2)), left))
+    sigmas = np.sqrt(np.diag(np.linalg.inv(normal)) * (rest**2).sum() / freedom)
+    before, after = (float(np.sqrt(np.mean(v**2))) for v in (straightness(np.zeros(2)), rest))
     lens = replace(
         lens_of(solution.x * units),
         sigma0=after,

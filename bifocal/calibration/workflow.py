@@ -111,9 +111,9 @@ def write_database_lens(
     """Write the lens file of the lens database for a photo; see `lens_from_database`."""
     check_not_input(out, image)
     check_writable(out, overwrite=overwrite)
-    known = lens_from_database(image, **names)
-    known.lens.write(out, overwrite=overwrite)
-    return known.lens, (known.remark,)
+    entry = lens_from_database(image, **names)
+    entry.lens.write(out, overwrite=overwrite)
+    return entry.lens, (entry.remark,)
 
 
 @all_or_none()
@@ -151,9 +151,9 @@ def undistort_images(
     for done, (path, target) in enumerate(zip(images, targets, strict=True)):
         progress(done, len(images), path.name)
         if one is None:
-            known = lens_from_database(path, **names)
-            current = known.lens
-            remarks.append(f"{path.name}: {known.remark}")
+            entry = lens_from_database(path, **names)
+            current = entry.lens
+            remarks.append(f"{path.name}: {entry.remark}")
         else:
             current = one
         check_size(current, path)
@@ -198,8 +198,8 @@ def _seen_at(lens: Lens, top: int, size: tuple[int, int]) -> tuple[FloatArray, F
     """Return columns and rows where a strip of ideal pixels is seen, single precision. [px]"""
     if lens.model == "radial":
         columns, rows = np.meshgrid(np.arange(size[0]), np.arange(top, top + size[1]))
-        seen = lens.distort(np.stack([columns, rows], axis=-1)).astype(np.float32)
-        return np.ascontiguousarray(seen[..., 0]), np.ascontiguousarray(seen[..., 1])
+        pixels = lens.distort(np.stack([columns, rows], axis=-1)).astype(np.float32)
+        return np.ascontiguousarray(pixels[..., 0]), np.ascontiguousarray(pixels[..., 1])
     matrix, terms = np.array(lens.camera_matrix), np.array(lens.coefficients)
     strip = matrix.copy()
     strip[1, 2] -= top
@@ -218,10 +218,10 @@ def _common_size(images: Sequence[Path]) -> tuple[int, int]:
         raise InputError("name at least one photo.")
     sizes = {path: image_info(path).size for path in images}
     first = sizes[images[0]]
-    other = [path for path, size in sizes.items() if size != first]
-    if other:
+    odd = [path for path, size in sizes.items() if size != first]
+    if odd:
         raise InputError(
-            f"{other[0]}: is {sizes[other[0]][0]} x {sizes[other[0]][1]} px, {images[0]} is "
+            f"{odd[0]}: is {sizes[odd[0]][0]} x {sizes[odd[0]][1]} px, {images[0]} is "
             f"{first[0]} x {first[1]} px; all photos must come from one camera, not cropped, held "
             "the same way."
         )

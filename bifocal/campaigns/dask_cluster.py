@@ -143,8 +143,8 @@ class _Crew:
             not _see_folder(self.client, self.address, self.folder, sorted(new)) or self.ship
         )
         way = "photos are sent to them" if self.ship else "they see the survey's folder"
-        told = f"workers {len(self.workers)}, pairs at once {self.threads}; {way}"
-        self.listener.heard(f"--scheduler {self.address}: {told}")
+        crew = f"workers {len(self.workers)}, pairs at once {self.threads}; {way}"
+        self.listener.heard(f"--scheduler {self.address}: {crew}")
 
 
 def _reporting(work: Any, given: Any, name: str, topic: str) -> Any:
@@ -179,16 +179,21 @@ def _see_folder(client: Any, address: str, folder: Path, workers: Sequence[str])
     probe = folder / f".seen-by-all-{mark[:8]}"
     try:
         probe.write_text(mark, encoding="utf-8")
-        found = client.run(_look, str(probe.absolute()), workers=list(workers))
+        answers = client.run(_look, str(probe.absolute()), workers=list(workers))
     except ImportError as error:
         raise InputError(remark("campaign.worker_without", address=address, error=error)) from None
     finally:
         probe.unlink(missing_ok=True)
-    for worker, (version, _) in found.items():
+    for worker, (version, _) in answers.items():
         if version != program():
-            other = {"address": address, "worker": worker, "version": version, "own": program()}
-            raise InputError(remark("campaign.other_version", **other))
-    return all(content == mark for _, content in found.values())
+            worker_program = {
+                "address": address,
+                "worker": worker,
+                "version": version,
+                "own": program(),
+            }
+            raise InputError(remark("campaign.other_version", **worker_program))
+    return all(content == mark for _, content in answers.values())
 
 
 def _look(path: str) -> tuple[str, str]:

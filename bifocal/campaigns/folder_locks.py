@@ -22,7 +22,7 @@ _OURS = re.compile(r"(\S+ \d+)?")
 def locked(folders: Sequence[Path]) -> Iterator[None]:
     """Keep other processes out of folders; a lock whose process is gone counts for nothing."""
     mine = f"{socket.gethostname()} {os.getpid()}"
-    taken: list[Path] = []
+    locks: list[Path] = []
     try:
         for folder in folders:
             try:
@@ -33,7 +33,7 @@ def locked(folders: Sequence[Path]) -> Iterator[None]:
                     raise InputError(remark("campaign.other_run", of=folder, who=who, file=path))
                 if path.exists() and not _OURS.fullmatch(path.read_text("utf-8", "replace")):
                     raise InputError(f"{path}: is not this program's; move it away.")
-                taken.append(path)
+                locks.append(path)
                 path.write_text(mine, encoding="utf-8")
             except OSError as error:
                 raise InputError(
@@ -41,7 +41,7 @@ def locked(folders: Sequence[Path]) -> Iterator[None]:
                 ) from error
         yield
     finally:
-        for path in taken:
+        for path in locks:
             with suppress(OSError):
                 path.unlink()
 

@@ -28,10 +28,10 @@ def refuse_other_delivery(job: PairJob) -> None:
     hashes = FileHashes(job.folder / ".hashes.json")
     now = {hashes(path) for path in job.photos}
     for record in _records(job).values():
-        told = [tuple(record["inputs"][role]) for role in photo_roles(record["inputs"])]
-        then = {digest for _, digest in told}
+        inputs = [tuple(record["inputs"][role]) for role in photo_roles(record["inputs"])]
+        then = {digest for _, digest in inputs}
         if not (then <= now or now <= then):
-            photos = ", ".join(name for name, _ in told)
+            photos = ", ".join(name for name, _ in inputs)
             raise InputError(remark("campaign.other_delivery", of=job.folder, photos=photos))
 
 
@@ -59,22 +59,22 @@ def remove_leftovers(job: PairJob, made: Collection[str]) -> tuple[str, ...]:
     for name in records.keys() & set(made):
         inputs |= records[name]["inputs"]
     standing: dict[str, Mapping[str, str]] = {}
-    said = []
+    sentences = []
     for name, record in records.items():
-        known = {role: inputs.get(role, told) for role, told in record["inputs"].items()}
+        current = {role: inputs.get(role, recorded) for role, recorded in record["inputs"].items()}
         if name in made or (
-            name not in in_vain and known == record["inputs"] and _follows(record, standing)
+            name not in in_vain and current == record["inputs"] and _follows(record, standing)
         ):
             standing[name] = record["outputs"]
             continue
         hashes = FileHashes(job.folder / ".hashes.json")
-        left = remove_made(job.folder / name, record["outputs"], hashes)
-        removed = [one for one in record["outputs"] if one not in left]
+        staying = remove_made(job.folder / name, record["outputs"], hashes)
+        removed = [one for one in record["outputs"] if one not in staying]
         if removed:
-            said.append(f"{name}: {remark('campaign.removed', files=', '.join(removed))}")
-        if left:
-            said.append(f"{name}: {remark('campaign.stays', files=', '.join(left))}")
-    return tuple(said)
+            sentences.append(f"{name}: {remark('campaign.removed', files=', '.join(removed))}")
+        if staying:
+            sentences.append(f"{name}: {remark('campaign.stays', files=', '.join(staying))}")
+    return tuple(sentences)
 
 
 def _records(job: PairJob) -> dict[str, dict[str, Any]]:

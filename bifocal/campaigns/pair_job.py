@@ -149,7 +149,7 @@ def run_steps(
     done: list[str] = []
     kept: list[str] = []
     remarks: list[str] = []
-    told: list[str] = []
+    sentences: list[str] = []
     records: dict[str, StepRecord] = {}
     failed = message = ""
     try:
@@ -168,8 +168,8 @@ def run_steps(
                     )
                 done.append(step.name)
             records[step.name] = record
-            new = untold(told, record.remarks)
-            told += new
+            new = untold(sentences, record.remarks)
+            sentences += new
             remarks += [f"{step.name}: {remark}" for remark in new]
         failed = ""
     except Exception as error:  # one fault, whatever it is, must not stop the other pairs

@@ -96,10 +96,10 @@ class PairJob:
 
     def __post_init__(self) -> None:
         """Take the faces kept beside the pair, where none are given and they are not refused."""
-        given = self.files.get("faces")
+        typed_path = self.files.get("faces")
         beside = self.folder / FIRST_STEP / f"{self.title}{MADE[FIRST_STEP]}"
-        faces = faces_path(given, beside, self.pair_path)
-        if faces != given:
+        faces = faces_path(typed_path, beside, self.pair_path)
+        if faces != typed_path:
             rest = {role: path for role, path in self.files.items() if role != "faces"}
             object.__setattr__(self, "files", rest | ({"faces": faces} if faces else {}))
 
@@ -116,18 +116,18 @@ class PairJob:
     @property
     def pair_path(self) -> Path:
         """The pair file that relief and drawings are made with."""
-        own = self.product("align")
-        return own if self.joint is None else self.joint / own.name
+        alone = self.product("align")
+        return alone if self.joint is None else self.joint / alone.name
 
     def product(self, step: str) -> Path:
         """Return the file that a step makes before all others."""
-        made = SET_ENDING if self.more and step == FIRST_STEP else MADE[step]
-        return self.folder / step / f"{self.title}{made}"
+        ending = SET_ENDING if self.more and step == FIRST_STEP else MADE[step]
+        return self.folder / step / f"{self.title}{ending}"
 
     def ortho_path(self, steps: Sequence[str]) -> Path | None:
         """Return the orthophoto that these steps make, that of the drawing first."""
-        made = (step for step in ("drawing", "ortho") if step in steps)
-        return next(map(self.product, made), None)
+        steps_with = (step for step in ("drawing", "ortho") if step in steps)
+        return next(map(self.product, steps_with), None)
 
     def memory(self) -> int:
         """Return the memory it needs at most; that of small photos where they cannot be read.
@@ -148,20 +148,20 @@ class PairJob:
 
 def steps_of(job: PairJob) -> list[Step]:
     """Return the steps that make the products of a pair, in order."""
-    wanted = set(job.products)
+    products = set(job.products)
     steps = [_align_step(job)]
-    if wanted & {"relief", "ortho", "drawing", "view"}:
+    if products & {"relief", "ortho", "drawing", "view"}:
         steps.append(_relief_step(job))
-    if "points" in wanted and {"control", "check"} & set(job.files):
+    if "points" in products and {"control", "check"} & set(job.files):
         steps.append(_points_step(job))
-    if "ortho" in wanted:
+    if "ortho" in products:
         steps.append(_ortho_step(job))
-    if "drawing" in wanted:
+    if "drawing" in products:
         steps.append(_drawing_step(job, tuple(step.name for step in steps)))
-    if "view" in wanted:
+    if "view" in products:
         steps.append(_view_step(job, tuple(step.name for step in steps)))
     steps = [replace(step, command=_command(job, step)) for step in steps]
-    if "report" in wanted:
+    if "report" in products:
         report = _report_step(job, tuple(steps))
         steps.append(replace(report, command=_command(job, report)))
     return steps
@@ -175,15 +175,17 @@ def _command(job: PairJob, step: Step) -> str:
     if step.name in job.told:
         return job.told[step.name].command
     photos = _named(job)
-    wanted = OF_STEP[step.name]
+    keys_of_step = OF_STEP[step.name]
     everything = {**job.files, **job.options}
-    said = {key: everything[key] for key in OF_PAIR if key in wanted and key in everything}
+    settings = {
+        key: everything[key] for key in OF_PAIR if key in keys_of_step and key in everything
+    }
     if job.way == "facade":
-        return " ".join(["bifocal facade", *(p.name for p in photos.values()), *typed(said)])
+        return " ".join(["bifocal facade", *(p.name for p in photos.values()), *typed(settings)])
     keys = [f'{role} = "{path.name}"' for role, path in photos.items()]
     if job.more:
         keys = [f"photos = {[path.name for path in job.photos]}"]
-    keys += [*typed(said, in_file=True), *(["joint = true"] if job.joint else [])]
+    keys += [*typed(settings, in_file=True), *(["joint = true"] if job.joint else [])]
     return f"bifocal survey, pair {job.name}: {', '.join(keys)}"
 
 
@@ -216,14 +218,14 @@ def _align_step(job: PairJob) -> Step:
         from bifocal.orientation.align_workflow import AlignOptions, align_photos
 
         out = place / job.product("align").name
-        told = AlignOptions.from_given({**options, **files})
+        align_options = AlignOptions.from_given({**options, **files})
         if job.more:
             from bifocal.networks.set_workflow import align_photo_set
 
-            return align_photo_set(job.photos, out, told, progress=progress).remarks
+            return align_photo_set(job.photos, out, align_options, progress=progress).remarks
         picture = out.with_suffix("").with_suffix(".pair.png")
-        made = align_photos(job.far, job.near, out, told, picture=picture)
-        return tuple(dict.fromkeys((*made.pair.remarks, *made.remarks)))
+        alignment = align_photos(job.far, job.near, out, align_options, picture=picture)
+        return tuple(dict.fromkeys((*alignment.pair.remarks, *alignment.remarks)))
 
     return Step(name=FIRST_STEP, files={**_named(job), **files}, options=options, make=make)
 
@@ -369,9 +371,9 @@ def known_of(job: PairJob, frame: WorldFrame | None = None) -> dict[str, Points]
     """Return the coordinates that the tables of a pair hold; E, N, H in a frame's X, Y, r."""
     from bifocal.orientation.control_points import known_points
 
-    said = _some(job, "unit", "columns") | {"names": [str(path) for path in job.photos]}
+    reading = _some(job, "unit", "columns") | {"names": [str(path) for path in job.photos]}
     return {
-        role: known_points(path, photos=len(job.photos), frame=frame, **said)
+        role: known_points(path, photos=len(job.photos), frame=frame, **reading)
         for role, path in tables_of(job).items()
     }
 
@@ -416,13 +418,15 @@ def _report_step(job: PairJob, before: tuple[Step, ...]) -> Step:
         records = {name: job.told.get(name) or read_record(job.folder / name) for name in earlier}
         if not options["times"]:
             records = {}
-        told = tuple(
+        steps = tuple(
             StepTold.of(step.name, {**step.options, **_tables(step)}, records.get(step.name))
             for step in before
         )
-        said = {key: options[key] for key in ReportTask.PLAIN if key in options} | tables_of(job)
+        settings = {key: options[key] for key in ReportTask.PLAIN if key in options} | tables_of(
+            job
+        )
         task = ReportTask(
-            **said, far=job.far, steps=told,
+            **settings, far=job.far, steps=steps,
             project={name: options[name] for name in PROJECT if name in options},
             relief=job.product("relief") if "relief" in earlier else None,
             ortho=job.ortho_path(earlier), view=job.product("view") if "view" in earlier else None,
@@ -439,10 +443,10 @@ def proven(job: PairJob) -> list[str]:
     from bifocal.reports.accuracy import verdict_in_words
     from bifocal.reports.content import ReportTask, read_content
 
-    said: dict[str, Any] = {k: job.options[k] for k in ReportTask.PLAIN if k in job.options}
+    settings: dict[str, Any] = {k: job.options[k] for k in ReportTask.PLAIN if k in job.options}
     if "drawing" in job.products:
-        said.setdefault("scale", SCALE)
-    task = ReportTask(**(said | tables_of(job)), far=job.far)
+        settings.setdefault("scale", SCALE)
+    task = ReportTask(**(settings | tables_of(job)), far=job.far)
     return verdict_in_words(read_content(job.pair_path, task, pictures=False))
 
 

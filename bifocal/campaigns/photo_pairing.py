@@ -84,14 +84,14 @@ def pair_photos(
         if shared >= _SHARED:
             # Neighbours by name, as cameras number what they take, are likelier a pair.
             candidates.append((shared / (1.0 + 0.1 * (j - i - 1)), i, j, shared))
-    pairs, taken = [], set()
+    pairs, paired = [], set()
     for _, i, j, shared in sorted(candidates, key=lambda c: (-c[0], c[1], c[2])):
-        if i in taken or j in taken:
+        if i in paired or j in paired:
             continue
-        taken |= {i, j}
+        paired |= {i, j}
         pairs.append((i, _ordered(infos[i], infos[j], shared)))
-    left = [info.path for k, info in enumerate(infos) if k not in taken]
-    return [pair for _, pair in sorted(pairs, key=lambda p: p[0])], left
+    alone = [info.path for k, info in enumerate(infos) if k not in paired]
+    return [pair for _, pair in sorted(pairs, key=lambda p: p[0])], alone
 
 
 def _may_pair(first: ImageInfo, second: ImageInfo) -> bool:
@@ -113,10 +113,10 @@ def _focal_lengths(first: ImageInfo, second: ImageInfo) -> tuple[float | None, f
 
 def _ordered(first: ImageInfo, second: ImageInfo, shared: int) -> PhotoPair:
     a, b = _focal_lengths(first, second)
-    known = bool(a and b)
+    certain = bool(a and b)
     if a and b and b > a:
         first, second = second, first
-    return PhotoPair(far=first.path, near=second.path, shared=shared, certain=known)
+    return PhotoPair(far=first.path, near=second.path, shared=shared, certain=certain)
 
 
 def _shared(first: Features, second: Features) -> int:

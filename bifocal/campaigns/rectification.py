@@ -224,8 +224,8 @@ def rectify_photo(
             progress=progress,
         )  # fmt: skip
         ortho = done.ortho
-    told = _told(photo, ortho, relief, scale)
-    return replace(told, delivery=done, remarks=(*reading, *told.remarks))
+    rectified = _told(photo, ortho, relief, scale)
+    return replace(rectified, delivery=done, remarks=(*reading, *rectified.remarks))
 
 
 def _drawn(control: Control | None) -> Points | None:
@@ -302,8 +302,8 @@ def _places(pair: PhotoAlone, grid: Grid) -> FloatArray:
     mesh = np.meshgrid(np.linspace(xmin, xmax, 41), np.linspace(ymin, ymax, 41))
     places, size = np.stack(mesh, axis=-1).reshape(-1, 2), np.array(photo.image_size)
     pixels = photo.pixels_from_plane(places)
-    seen = ((pixels >= -0.5) & (pixels <= size - 0.5)).all(axis=1)
-    seen &= photo.sees_ahead(places, tuple(size[::-1]))
-    if not seen.any():
+    inside = ((pixels >= -0.5) & (pixels <= size - 0.5)).all(axis=1)
+    inside &= photo.sees_ahead(places, tuple(size[::-1]))
+    if not inside.any():
         raise InputError(remark("ortho.nothing_in_common"))
-    return places[seen]
+    return places[inside]

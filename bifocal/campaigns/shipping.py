@@ -57,9 +57,9 @@ def found_anywhere(job: PairJob) -> PairJob:
 def _moved(job: PairJob, there: Callable[[Path], Path]) -> PairJob:
     """Return a job with its files and folders elsewhere."""
     files = {role: there(path) for role, path in job.files.items()}
-    own: dict[str, Any] = {name: there(getattr(job, name)) for name in ("folder", "far", "near")}
-    own["more"] = tuple(map(there, job.more))
-    return replace(job, files=files, joint=job.joint and there(job.joint), **own)
+    paths: dict[str, Any] = {name: there(getattr(job, name)) for name in ("folder", "far", "near")}
+    paths["more"] = tuple(map(there, job.more))
+    return replace(job, files=files, joint=job.joint and there(job.joint), **paths)
 
 
 def packed(job: PairJob) -> Parcel:
@@ -124,8 +124,8 @@ def unpacked(job: PairJob, delivery: ShippedPair) -> PairOutcome:
 
 def _steps(folder: Path) -> list[Path]:
     """Return the folders of steps that were made."""
-    found = folder.iterdir() if folder.is_dir() else ()
-    return sorted(path for path in found if path.is_dir() and path.name[0] != ".")
+    entries = folder.iterdir() if folder.is_dir() else ()
+    return sorted(path for path in entries if path.is_dir() and path.name[0] != ".")
 
 
 def _content(path: Path) -> bytes:

@@ -72,10 +72,10 @@ class Step:
 
     def described(self) -> str:
         """Return what was typed for the step, and what held where nothing was, in one line."""
-        said = self.command or "; ".join(["bifocal survey", *typed(self.options, in_file=True)])
+        command = self.command or "; ".join(["bifocal survey", *typed(self.options, in_file=True)])
         unsaid = defaults_of(self.name, {**self.options, **self.files})
-        told = ", ".join(typed(unsaid, in_file=True))
-        return f"{said}; step {self.name}" + (f"; by default {told}" if told else "")
+        defaults = ", ".join(typed(unsaid, in_file=True))
+        return f"{command}; step {self.name}" + (f"; by default {defaults}" if defaults else "")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -216,20 +216,20 @@ def remove_made(folder: Path, made: Mapping[str, str], hashes: FileHashes) -> li
         Files that the step made, and their SHA-256.
     hashes : FileHashes
     """
-    left = []
+    kept = []
     for name in _files(folder):
         path = folder / name
         if made.get(name.as_posix()) == hashes(path):
             with suppress(OSError):  # open in another program
                 path.unlink()
                 continue
-        left.append(name.as_posix())
+        kept.append(name.as_posix())
     (folder / RECORD).unlink()
     inside = sorted((path for path in folder.rglob("*") if path.is_dir()), reverse=True)
     for path in (*inside, folder):
         with suppress(OSError):  # not empty
             path.rmdir()
-    return left
+    return kept
 
 
 @contextmanager
@@ -273,12 +273,12 @@ def _written_aside(parent: Path, name: str) -> Iterator[Path]:
 
 def clean(parent: Path) -> None:
     """Remove what a killed run left half-written, and put back what it was about to replace."""
-    for left in [path for path in parent.glob(".*") if _bears_mark(path)]:
-        name, aside, _ = left.name[1:].rpartition(_OLD)
+    for old in [path for path in parent.glob(".*") if _bears_mark(path)]:
+        name, aside, _ = old.name[1:].rpartition(_OLD)
         if aside and not (parent / name).exists():
-            (left.rename(parent / name) / MARK).unlink()
+            (old.rename(parent / name) / MARK).unlink()
         else:
-            shutil.rmtree(left, ignore_errors=True)
+            shutil.rmtree(old, ignore_errors=True)
 
 
 def _mark(folder: Path, name: str) -> None:
@@ -302,8 +302,8 @@ def _umask() -> int:
 
 def _files(folder: Path) -> list[Path]:
     """Return the files of a folder, relative, without the record and the mark, in order."""
-    found = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
-    return sorted(path for path in found if path.name not in (RECORD, MARK))
+    paths = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
+    return sorted(path for path in paths if path.name not in (RECORD, MARK))
 
 
 def _changed_files(
@@ -358,15 +358,15 @@ def _publish(place: Path, folder: Path, old: StepRecord | None, *, overwrite: bo
     """Put a finished folder in place of the old one; what the user added moves over."""
     aside = folder.with_name(_OLD.join(place.name.rsplit(_WRITING, 1)))
     if folder.exists():
-        known = {*(old.outputs if old else ()), RECORD, MARK}
+        listed = {*(old.outputs if old else ()), RECORD, MARK}
         for path in folder.rglob("*"):
-            there = place / path.relative_to(folder)
-            if path.relative_to(folder).as_posix() in known:
+            target = place / path.relative_to(folder)
+            if path.relative_to(folder).as_posix() in listed:
                 continue
             if path.is_dir() and not path.is_symlink():
-                there.mkdir(exist_ok=True)
-            elif not there.exists():
-                shutil.copy2(path, there, follow_symlinks=False)
+                target.mkdir(exist_ok=True)
+            elif not target.exists():
+                shutil.copy2(path, target, follow_symlinks=False)
             elif not overwrite:
                 raise InputError(remark("campaign.foreign", of=path))
         _mark(folder, aside.name)

@@ -34,21 +34,21 @@ WHOLE = ("joint", "mosaic")
 
 def mosaic_wanted(path: Path) -> dict[str, Any] | None:
     """Return the options of the mosaic that a checked survey file asks for; None: it wants none."""
-    said = _parsed(path).get("mosaic")
-    return _options_of_mosaic(said, []) if isinstance(said, dict) else {} if said else None
+    mosaic = _parsed(path).get("mosaic")
+    return _options_of_mosaic(mosaic, []) if isinstance(mosaic, dict) else {} if mosaic else None
 
 
 def _options_of_mosaic(said: Mapping[str, Any], faults: list[str]) -> dict[str, Any]:
     """Return what is said of the mosaic, noting what is wrong."""
-    known, found = options_of(MosaicCommand), {}
+    options, values = options_of(MosaicCommand), {}
     for key, value in said.items():
         try:
             if key not in OF_MOSAIC:
                 raise ValueError(f"no such key there, but {', '.join(OF_MOSAIC)}")
-            found[key] = known[key].read(value)
+            values[key] = options[key].read(value)
         except ValueError as error:
             faults.append(f"above the pairs: mosaic, {key} = {value!r}: expected {error}.")
-    return found
+    return values
 
 
 def read_survey_file(
@@ -179,28 +179,28 @@ def _entries(
     data: Mapping[str, Any], base: Path, where: str, faults: list[str]
 ) -> dict[str, dict[str, Any]]:
     """Return files, options and products of a table, noting what is wrong."""
-    found: dict[str, dict[str, Any]] = {"files": {}, "options": {}, "products": {}}
+    entries: dict[str, dict[str, Any]] = {"files": {}, "options": {}, "products": {}}
     for key, value in data.items():
         if key in FILES:
             if _is_name(value):
-                found["files"][key] = base / value
+                entries["files"][key] = base / value
             elif value != "":
                 faults.append(f"{where}: {key} = {value!r}: expected the name of a file.")
         elif key == "products":
             if not isinstance(value, list) or set(map(str, value)) - set(PRODUCTS):
                 faults.append(f"{where}: products: expected some of {', '.join(PRODUCTS)}.")
             else:
-                found["products"][key] = tuple(name for name in PRODUCTS if name in value)
+                entries["products"][key] = tuple(name for name in PRODUCTS if name in value)
         elif key in OF_PAIR:
             try:
-                found["options"][key] = OF_PAIR[key].read(value)
+                entries["options"][key] = OF_PAIR[key].read(value)
             except ValueError as error:
                 faults.append(f"{where}: {key} = {value!r}: expected {error}.")
         else:
             near = get_close_matches(key, [*OF_PAIR, "products"], n=1)
             hint = f" Did you mean {near[0]}?" if near else ""
             faults.append(f"{where}: there is no key {key!r}.{hint}")
-    return found
+    return entries
 
 
 def _job(
@@ -213,7 +213,7 @@ def _job(
 ) -> PairJob | None:
     base, out = folders
     rest = {key: value for key, value in entry.items() if key not in OF_PHOTOS}
-    own = _entries(rest, base, where, faults)
+    entries = _entries(rest, base, where, faults)
     photos = entry.get("photos", [entry.get(key) for key in ("far", "near")])
     if not isinstance(photos, list) or len(photos) < 2 or not all(map(_is_name, photos)):
         faults.append(f"{where}: far and near, or a list photos, must name its photos.")
@@ -227,10 +227,10 @@ def _job(
     if not name.strip() or not name.isprintable():
         faults.append(f"{where}: name = {name!r}: expected a name that can be read.")
     far, near, *more = (base / str(photo) for photo in photos)
-    products = own["products"].get("products") or common["products"].get("products")
+    products = entries["products"].get("products") or common["products"].get("products")
     return PairJob(
         name=name, folder=out / file_name(name), far=far, near=near, more=tuple(more),
-        files={**common["files"], **own["files"]},
-        options={**common["options"], **own["options"]},
+        files={**common["files"], **entries["files"]},
+        options={**common["options"], **entries["options"]},
         **({"products": products} if products else {}),
     )  # fmt: skip

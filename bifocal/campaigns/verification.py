@@ -92,10 +92,12 @@ class Verification:
 
     def lines(self) -> list[str]:
         """Return one line a file, and what else was checked."""
-        said = (*self.files, *self.remade)
-        told = [f"{one.state:11} {one.file}{f' ({one.why})' if one.why else ''}" for one in said]
-        told += [point.sentence() for point in self.worked]
-        return [*told, f"Digest of the delivery: {self.digest}"]
+        files = (*self.files, *self.remade)
+        sentences = [
+            f"{one.state:11} {one.file}{f' ({one.why})' if one.why else ''}" for one in files
+        ]
+        sentences += [point.sentence() for point in self.worked]
+        return [*sentences, f"Digest of the delivery: {self.digest}"]
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -240,14 +242,14 @@ def _listed(
     # What went in may lie beside what came out; photos of two folders may have one name.
     sources = [file for data in records.values() for file in _inputs(data).values()]
     for name, digest in hashes.items():
-        known = [one for source, one in sources if source == PurePosixPath(name).name]
-        if known:
-            yield name, digest if digest in known else known[0]
+        digests = [one for source, one in sources if source == PurePosixPath(name).name]
+        if digests:
+            yield name, digest if digest in digests else digests[0]
         if PurePosixPath(name).name == SUMS:
             yield name, ""
             for line in filter(None, read_text(folder / name, "list of hashes").splitlines()):
-                told, _, file = line.partition(" ")
-                yield _inside(name, file[1:]), told.lower()
+                stated, _, file = line.partition(" ")
+                yield _inside(name, file[1:]), stated.lower()
     for name, data in records.items():
         yield name, ""
         for file, digest in data.get("outputs", {}).items():
@@ -309,13 +311,13 @@ def _worked(
     for name in (one for one in hashes if one.endswith("_report.html")):
         title = PurePosixPath(name).name.removesuffix("_report.html")
         pairs, points = [], []
-        for other in hashes:
+        for file in hashes:
             # Damaged ones are told of as changed files; the point then fails.
             with suppress(InputError):
-                if _is_pair_of(title, other):
-                    pairs.append(Pair.read(folder / other))
-                if PurePosixPath(other).name in (f"{title}_points.xlsx", f"{title}_points.csv"):
-                    points.append(read_survey_points(folder / other)[0].xyz)
+                if _is_pair_of(title, file):
+                    pairs.append(Pair.read(folder / file))
+                if PurePosixPath(file).name in (f"{title}_points.xlsx", f"{title}_points.csv"):
+                    points.append(read_survey_points(folder / file)[0].xyz)
         point = None
         with suppress(InputError, UnicodeDecodeError):
             page = (folder / name).read_text(encoding="utf-8")
@@ -323,7 +325,7 @@ def _worked(
         if (
             point is not None
             and "/" not in name
-            and not any(_is_pair_of(title, other) for other in listed)
+            and not any(_is_pair_of(title, file) for file in listed)
         ):
             raise InputError(remark("campaign.part_of_delivery", of=path, report=name))
         if point is not None:
@@ -366,16 +368,16 @@ def _job(
     """Return the work that the records of a pair tell of, with copies of all that went in."""
     pair = next((name for name in steps[FIRST_STEP]["outputs"] if name.endswith(_PAIR)), "")
     options = {key: value for data in steps.values() for key, value in data["options"].items()}
-    wanted = {role: file for data in steps.values() for role, file in _inputs(data).items()}
+    inputs = {role: file for data in steps.values() for role, file in _inputs(data).items()}
     photos = Pair.read(folder / FIRST_STEP / pair)
-    if not {"far", "near"} <= set(wanted):
+    if not {"far", "near"} <= set(inputs):
         raise InputError(f"{folder / FIRST_STEP / RECORD}: lacks the photos; it may not.")
     # The pair file names the photos as seen from its folder: they must lie there again.
     ways = [photos.image1.file, photos.image2.file]
     up = min(max(way.count("..") for way in ways), 32)
     home = place.joinpath(*["up"] * up, "delivery")
     files: dict[str, Path] = {}
-    for role, (name, digest) in wanted.items():
+    for role, (name, digest) in inputs.items():
         way = next((way for way in ways if PurePosixPath(way).name == name), "")
         target = Path(os.path.normpath(home / FIRST_STEP / way))
         if role not in ("far", "near") or not way or not target.is_relative_to(place):
@@ -388,7 +390,7 @@ def _job(
         far=files.pop("far"), near=files.pop("near"), date=steps[FIRST_STEP]["date"],
         files={role: path for role, path in files.items() if role in FILES},
         options={key: value for key, value in options.items() if key != "title"},
-        told={step: told for step in steps if (told := read_record(folder / step))},
+        told={step: record for step in steps if (record := read_record(folder / step))},
         products=tuple(product for product in PRODUCTS if product in steps),
     )  # fmt: skip
 

@@ -28,8 +28,8 @@ def joint_step(jobs: Sequence[PairJob]) -> Step:
         parts |= tables_of(job)
         files |= {f"{job.title} {role}": path for role, path in parts.items()}
     # One unit and precision of the tables for all: the survey file holds no two.
-    said = next((job for job in jobs if tables_of(job)), jobs[0]).options
-    options = {name: said[name] for name in JOINT_OPTIONS if name in said}
+    settings = next((job for job in jobs if tables_of(job)), jobs[0]).options
+    options = {name: settings[name] for name in JOINT_OPTIONS if name in settings}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.networks.joint_workflow import JointTask, adjust_pairs

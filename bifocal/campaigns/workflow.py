@@ -106,11 +106,11 @@ class SurveyResult:
 
     def lines(self) -> list[str]:
         """Return what was made, and what failed and how to mend it, for people."""
-        made = sum(bool(outcome.done) and not outcome.failed_step for outcome in self.outcomes)
+        finished = sum(bool(outcome.done) and not outcome.failed_step for outcome in self.outcomes)
         failed = sum(bool(outcome.failed_step) for outcome in self.outcomes)
-        kept = len(self.outcomes) - made - failed
+        kept = len(self.outcomes) - finished - failed
         lines = [
-            f"{pairs_in_words(len(self.outcomes))}: {made} made, {kept} kept as they were, "
+            f"{pairs_in_words(len(self.outcomes))}: {finished} made, {kept} kept as they were, "
             f"{failed} failed; {_duration(self.seconds)}."
         ]
         for outcome in self.together:
@@ -161,9 +161,9 @@ def begin_survey(
     from bifocal.campaigns.photo_pairing import pair_photos, write_survey_file
 
     check_writable(out, overwrite=overwrite)
-    pairs, left = pair_photos(folder, progress=progress)
-    write_survey_file(out, folder, pairs, left, overwrite=overwrite)
-    return len(pairs), len(left)
+    pairs, unpaired = pair_photos(folder, progress=progress)
+    write_survey_file(out, folder, pairs, unpaired, overwrite=overwrite)
+    return len(pairs), len(unpaired)
 
 
 def plan_survey(
@@ -290,9 +290,9 @@ def _without_leftovers(job: PairJob, made: PairOutcome) -> PairOutcome:
     """
     if made.failed_step and not (job.overwrite and made.done):
         return made
-    said = remove_leftovers(job, (*made.done, *made.kept))
-    message = "\n".join((made.message, *said)) if made.failed_step else made.message
-    return replace(made, message=message, remarks=(*made.remarks, *said))
+    sentences = remove_leftovers(job, (*made.done, *made.kept))
+    message = "\n".join((made.message, *sentences)) if made.failed_step else made.message
+    return replace(made, message=message, remarks=(*made.remarks, *sentences))
 
 
 def _aligned(
@@ -396,8 +396,8 @@ class _Count(Listener):
         what = f"FAILED at {outcome.failed_step}" if outcome.failed_step else "made"
         total = len(self.shares) - self.kept
         behind = sum(self.shares.values()) - self.kept
-        left = (time.perf_counter() - self.start) * (total - behind) / max(behind, 1e-3)
-        rest = f"; about {_duration(left)} left" if behind < total else ""
+        remaining = (time.perf_counter() - self.start) * (total - behind) / max(behind, 1e-3)
+        rest = f"; about {_duration(remaining)} left" if behind < total else ""
         self.tell(
             f"[{len(self.outcomes)}/{len(self.shares)}] {outcome.name}: {what} in "
             f"{_duration(outcome.seconds)}{rest}"
@@ -445,15 +445,15 @@ def facade_job(
     unknown = [product for product in products or () if product not in PRODUCTS]
     if unknown:
         raise InputError(f"--products: {unknown[0]!r} is none of {', '.join(PRODUCTS)}.")
-    said = {key: value for key, value in (given or {}).items() if OF_PAIR[key].is_said(value)}
+    settings = {key: value for key, value in (given or {}).items() if OF_PAIR[key].is_said(value)}
     return PairJob(
         name=name or out.resolve().name,
         folder=out,
         far=far,
         near=near,
         more=more,
-        files={role: path for role, path in said.items() if role in FILES},
-        options={key: value for key, value in said.items() if key not in FILES},
+        files={role: path for role, path in settings.items() if role in FILES},
+        options={key: value for key, value in settings.items() if key not in FILES},
         way="facade",
         products=tuple(p for p in PRODUCTS if p in products) if products else MOST_PRODUCTS,
         overwrite=overwrite,
@@ -471,8 +471,8 @@ def facade(
         Where a step fails: with what it said. What was made before stays and counts. If the folder
         holds a delivery made from other photos, which is not to be overwritten.
     """
-    if (fresh := not job.folder.exists()) and (told := refusal(job)):
-        raise InputError(told)
+    if (fresh := not job.folder.exists()) and (why := refusal(job)):
+        raise InputError(why)
     check_files(job)
     refuse_other_delivery(job)
     outcome = run_survey([job], machines=machines, progress=progress).outcomes[0]

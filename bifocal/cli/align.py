@@ -112,9 +112,9 @@ def _align_set(
         raise click.UsageError("--picture: is drawn of pairs; leave it out with a set of photos.")
     options = AlignOptions.from_given(given)
     with progress_bar("align", quiet=as_json) as progress:
-        made = align_photo_set(photos, out, options, overwrite=overwrite, progress=progress)
-    lines = (*made.words, *(f"Assumed: {text}." for text in made.setup["assumed"]))
-    print_result(set_as_dict(made), lines, as_json=as_json, remarks=made.remarks)
+        alignment = align_photo_set(photos, out, options, overwrite=overwrite, progress=progress)
+    lines = (*alignment.words, *(f"Assumed: {text}." for text in alignment.setup["assumed"]))
+    print_result(set_as_dict(alignment), lines, as_json=as_json, remarks=alignment.remarks)
     if not as_json:
         remark(f"Set of {len(photos)} photos written to {out}")
 
@@ -130,16 +130,16 @@ def _align_workbook(
     from bifocal.workbook.pair_workflow import write_pair
 
     context = click.get_current_context()
-    given = [
+    typed = [
         parameter.opts[0] if parameter.name != "near" else str(near)
         for parameter in context.command.params
         if parameter.name not in WITH_WORKBOOK
         and context.get_parameter_source(parameter.name or "") is ParameterSource.COMMANDLINE
     ]
-    if given:
+    if typed:
         raise click.UsageError(
-            f"{given[0]}: {book.name} states the set-up, which is taken as it is typed. Leave "
-            f"{given[0]} out, or give both photos to register them."
+            f"{typed[0]}: {book.name} states the set-up, which is taken as it is typed. Leave "
+            f"{typed[0]} out, or give both photos to register them."
         )
     pair = write_pair(book, out, sigma_distance=sigma, overwrite=overwrite)
     data = {
@@ -188,10 +188,10 @@ def _found(alignment: Alignment) -> Iterator[str]:
     setup = alignment.setup
     if "focal_given_px" in setup:
         pairs = zip(setup["focal_px"], setup["focal_given_px"], strict=True)
-        found = ", ".join(
+        focals = ", ".join(
             f"{f:.1f} px (given {g:.1f}, {100 * (f / g - 1):+.2f} %)" for f, g in pairs
         )
-        yield f"Focal lengths found: {found}."
+        yield f"Focal lengths found: {focals}."
     zones = setup.get("wall_relief_mm") or []
     if zones:
         parts = "; ".join(f"{z['zone']} {z['median']:+.1f} ± {z['spread']:.1f}" for z in zones)

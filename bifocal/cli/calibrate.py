@@ -72,18 +72,18 @@ def command(
         lens, notes = lenses.write_database_lens(images[0], out, overwrite=overwrite, **options)
         data, text = lens.to_dict(), [f"Lens: {lens.source}"]
     elif straight_edges or lines is not None:
-        found, notes = lenses.calibrate_from_edges(
+        fit, notes = lenses.calibrate_from_edges(
             images, out, lines=lines, focal_px=focal_px, overwrite=overwrite
         )
-        k1, k2 = found.lens.coefficients[:2]
+        k1, k2 = fit.lens.coefficients[:2]
         text = [
-            f"{found.lines} lines; straight to {found.rms_before:.2f} px before, "
-            f"{found.rms_after:.2f} px after the correction",
-            f"k1 = {k1:+.5f} (sigma {found.sigma_k1:.5f}), k2 = {k2:+.5f} ({found.sigma_k2:.5f})"
-            if found.straightens
+            f"{fit.lines} lines; straight to {fit.rms_before:.2f} px before, "
+            f"{fit.rms_after:.2f} px after the correction",
+            f"k1 = {k1:+.5f} (sigma {fit.sigma_k1:.5f}), k2 = {k2:+.5f} ({fit.sigma_k2:.5f})"
+            if fit.straightens
             else "no distortion: k1 = k2 = 0",
         ]
-        data = found.lens.to_dict()
+        data = fit.lens.to_dict()
     else:
         with progress_bar("Calibrating", quiet=as_json) as progress:
             result = lenses.calibrate_from_boards(

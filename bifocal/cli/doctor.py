@@ -36,12 +36,12 @@ def command(options: DoctorCommand) -> None:
     from photocore.workbook.changing.recalculation import examination_lines, examine
 
     if options.book is None:
-        found = diagnosis()
-        print_result(found, diagnosis_lines(found), as_json=options.as_json)
+        report = diagnosis()
+        print_result(report, diagnosis_lines(report), as_json=options.as_json)
         return
-    found = examine(options.book, office())
-    print_result(found, examination_lines(found, office()), as_json=options.as_json)
-    if found["faults"] or found["differ"]:
+    report = examine(options.book, office())
+    print_result(report, examination_lines(report, office()), as_json=options.as_json)
+    if report["faults"] or report["differ"]:
         raise InputError(f"{options.book}: not as a spreadsheet program would leave it; {_MENDED}")
 
 

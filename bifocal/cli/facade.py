@@ -86,8 +86,8 @@ def command(
     """
     from bifocal.campaigns.workflow import facade, facade_job
 
-    own = {name: given.pop(name) for name in ("name", "products", "overwrite")}
-    job = facade_job(far, near, out, more=more, given=given, **own)
+    naming = {name: given.pop(name) for name in ("name", "products", "overwrite")}
+    job = facade_job(far, near, out, more=more, given=given, **naming)
     with progress_bar("facade", quiet=as_json) as progress:
         outcome = facade(job, progress=progress)
     print_result(outcome.to_dict(), _lines(job, outcome), as_json=as_json, remarks=outcome.remarks)

@@ -48,7 +48,7 @@ def command(options: HandoverCommand) -> None:
     """
     from bifocal.reports.handover import HandoverTask, write_handover
 
-    told = write_handover(
+    facts = write_handover(
         options.pair,
         options.out,
         HandoverTask(
@@ -60,5 +60,5 @@ def command(options: HandoverCommand) -> None:
         ),
         overwrite=options.overwrite,
     )
-    line = f"{options.out} written, {told['bytes'] / 1e6:.1f} MB."
-    print_result(told, (line,), as_json=options.as_json, remarks=told["remarks"])
+    line = f"{options.out} written, {facts['bytes'] / 1e6:.1f} MB."
+    print_result(facts, (line,), as_json=options.as_json, remarks=facts["remarks"])

@@ -79,21 +79,21 @@ def command(options: MatchCommand) -> None:
         targets=options.what != "features",
     )
     if photos is not None:
-        told = match_set_file(photos, options.out, settings, overwrite=options.overwrite)
-        shown = _set_lines(told)
+        facts = match_set_file(photos, options.out, settings, overwrite=options.overwrite)
+        shown = _set_lines(facts)
         print_result(
-            {**told, "out": options.out}, shown, as_json=options.as_json, remarks=photos.remarks
+            {**facts, "out": options.out}, shown, as_json=options.as_json, remarks=photos.remarks
         )
         return
-    found = match_photos(
+    matches = match_photos(
         source if is_workbook(options.pair) else options.pair,
         options.out,
         settings,
         language=options.language,
         overwrite=options.overwrite,
     )
-    summary = match_summary(*found)
-    notes = (*found[0].remarks, *_remarks(summary["kinds"], options.what))
+    summary = match_summary(*matches)
+    notes = (*matches[0].remarks, *_remarks(summary["kinds"], options.what))
     print_result(
         {**summary, "out": options.out}, _lines(summary), as_json=options.as_json, remarks=notes
     )

@@ -111,21 +111,26 @@ def command(
     source = read_photos(pair)
     drawn = given["faces"]
     given["faces"] = faces_path(drawn, pair)
-    own: Path | Points | None = points
+    points_used: Path | Points | None = points
     if relief is None and points is None and plane is None and is_workbook(pair):
-        own = points_of(pair)
+        points_used = points_of(pair)
     breaklines = [line.split(",") for line in given.pop("breaklines")]
-    if breaklines and own is None:
+    if breaklines and points_used is None:
         raise click.UsageError("--breakline joins measured points; give their table by --points.")
     for name in (*DRAWING[4:], "control"):
         by_default = drawing[name] == OF_PAIR[name].attributes.get("default")
         if drawing[name] and not by_default and folder is None:
             flag = OF_PAIR[name].flag
             raise click.UsageError(f"{flag} is drawn into a folder; give --deliver DIR.")
-    if relief is None and own is None and plane is None:
+    if relief is None and points_used is None and plane is None:
         remark("No relief given: the wall is taken as flat (as with --plane).")
     task = OrthoTask.from_given(
-        given, relief=relief, points=own, breaklines=breaklines, plane=plane or 0.0, scale=scale
+        given,
+        relief=relief,
+        points=points_used,
+        breaklines=breaklines,
+        plane=plane or 0.0,
+        scale=scale,
     )
     files: dict[str, object] = {}
     with progress_bar("orthophoto", quiet=as_json) as progress:
@@ -149,8 +154,8 @@ def command(
         f"{result.path}: {grid.width} x {grid.height} px of {grid.gsd * 1000:g} mm; "
         f"{100 * (1 - shares['none']):.1f} % covered, {100 * shares['hidden']:.1f} % hidden"
     ]
-    if told := basis_in_words(result.basis):
-        lines.append(f"Of the picture {told}")
+    if basis := basis_in_words(result.basis):
+        lines.append(f"Of the picture {basis}")
     if files:
         lines.append(f"{folder}: {', '.join(done.files)} (sheet {done.sheet})")
     print_result(result.to_dict() | files, lines, as_json=as_json, remarks=remarks)

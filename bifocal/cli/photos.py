@@ -72,25 +72,26 @@ def command(
     """Take over the cameras of another program's finished project as a set of photos of a wall.
 
     PROJECT is a folder or file of COLMAP (text or binary), Metashape (cameras exported as XML),
-    OpenDroneMap or OpenSfM (reconstruction.json), AliceVision or Meshroom (.sfm), OpenMVG
-    (sfm_data.json) or Bundler (bundle.out). The wall is the largest façade among its points, or
+    OpenDroneMap or OpenSfM (reconstruction.json), AliceVision or Meshroom (.sfm, or its cache),
+    OpenMVG (sfm_data.json), Bundler (bundle.out), RealityCapture or RealityScan (XMP, CSV),
+    VisualSFM (.nvm) or NeRF (transforms.json). The wall is the largest façade among its points, or
     goes through points that are named (--wall), or is that of control points (--control). With --to
     PROJECT is a set of photos or a pair, and OUT a folder for the other program.
     """
     from bifocal.projects.colmap_workflow import export_photos
     from bifocal.projects.photos_workflow import ProjectOptions, photos_from_project
 
-    options = ProjectOptions(**{key: said for key, said in given.items() if said is not None})
+    options = ProjectOptions(**{key: value for key, value in given.items() if value is not None})
     if to is not None:
         if options != ProjectOptions():
             raise click.UsageError("--to: takes a set of photos as it is; leave out other options.")
         export_photos(project, out, overwrite=overwrite)
         remark(f"COLMAP model written to {out}")
         return
-    made = photos_from_project(project, out, options, overwrite=overwrite)
+    result = photos_from_project(project, out, options, overwrite=overwrite)
     data = {
-        "program": made.program,
-        "scale": made.scale,
+        "program": result.program,
+        "scale": result.scale,
         "photos": [
             {
                 "name": photo.name,
@@ -98,10 +99,10 @@ def command(
                 "distance": photo.distance,
                 "nadir": photo.nadir,
             }
-            for photo in made.photos.photos
+            for photo in result.photos.photos
         ],
     }
-    print_result(data, _lines(made), as_json=as_json, remarks=made.remarks)
+    print_result(data, _lines(result), as_json=as_json, remarks=result.remarks)
     if not as_json:
         remark(f"Set of photos written to {out}")
 

@@ -47,11 +47,11 @@ def command(
         )
     grid, data = done.ortho.grid, done.to_dict()
     size = f"{grid.width} x {grid.height} px of {grid.gsd * 1000:g} mm"
-    told = [*done.words, f"{out or folder}: {size}"]
+    sentences = [*done.words, f"{out or folder}: {size}"]
     if done.delivery is not None:
-        made = done.delivery
-        data |= {"folder": str(folder), "files": list(made.files), "sheet": made.sheet}
-        told.append(f"{folder}: {', '.join(made.files)} (sheet {made.sheet})")
-    print_result(data, told, as_json=as_json)
+        delivery = done.delivery
+        data |= {"folder": str(folder), "files": list(delivery.files), "sheet": delivery.sheet}
+        sentences.append(f"{folder}: {', '.join(delivery.files)} (sheet {delivery.sheet})")
+    print_result(data, sentences, as_json=as_json)
     for note in done.remarks:  # what relief does comes before all else
         remark(note)

@@ -73,13 +73,13 @@ def command(pair_file: Path, as_json: bool, **wishes: Any) -> None:
     from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
     from bifocal.workbook.pair_workflow import read_photos
 
-    given = wishes["faces"]
-    wishes["faces"] = faces_path(given, pair_file)
+    faces = wishes["faces"]
+    wishes["faces"] = faces_path(faces, pair_file)
     with progress_bar("Relief", quiet=as_json) as progress:
         summary, remarks = relief_of_pair(
             read_photos(pair_file), ReliefJob(**wishes), progress=progress
         )
-    remarks = (*remarks, *keep_faces(given, pair_file))
+    remarks = (*remarks, *keep_faces(faces, pair_file))
     data = summary | {"remarks": list(remarks)}
     print_result(data, _lines(summary), as_json=as_json, remarks=remarks)
 

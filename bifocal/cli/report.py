@@ -59,11 +59,11 @@ def command(source: Path, out: Path, overwrite: bool, **options: Any) -> None:
     from bifocal.reports.workflow import ReportTask, report_of
 
     project = {name: value for name in PROJECT if (value := options.pop(name)) is not None}
-    given: dict[str, Any] = {
+    paths: dict[str, Any] = {
         "unit": options.pop("unit") or "",
         "language": options.pop("language") or "",
     }
-    task = ReportTask(**options, **given, project=project)
+    task = ReportTask(**options, **paths, project=project)
     with progress_bar("report") as progress:
         for text in report_of(source, out, task, overwrite=overwrite, progress=progress):
             remark(text)

@@ -55,10 +55,10 @@ def command(survey: tuple[Path, ...], out: Path | None, as_json: bool, **options
     for text in solution.remarks:
         remark(text)
     if out is not None:
-        said = write_result(out, solution, language=language, overwrite=overwrite)
+        note = write_result(out, solution, language=language, overwrite=overwrite)
         count = len(solution.table)
         noun = "point" if count == 1 else "points"
-        remark(f"{out}: {count} {noun} written{'; ' + said if said else '.'}")
+        remark(f"{out}: {count} {noun} written{'; ' + note if note else '.'}")
     if as_json:
         print_json(solution_json(solution))
         return

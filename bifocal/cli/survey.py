@@ -67,13 +67,15 @@ def command(
     if folder is not None:
         survey = survey or folder / "survey.toml"
         with progress_bar("photos", quiet=as_json) as progress:
-            found, left = begin_survey(survey, folder, overwrite=overwrite, progress=progress)
+            count, photos_left = begin_survey(
+                survey, folder, overwrite=overwrite, progress=progress
+            )
         tell_written(survey)
         lines = [
-            f"{pairs_in_words(found)}; {left} of the photos in none.",
+            f"{pairs_in_words(count)}; {photos_left} of the photos in none.",
             f"Say in {survey} how each is controlled, then: bifocal survey {survey} --dry-run",
         ]
-        data = {"survey": str(survey), "pairs": found, "left": left}
+        data = {"survey": str(survey), "pairs": count, "left": photos_left}
         print_result(data, lines, as_json=as_json)
         return
     if survey is None:
@@ -99,9 +101,9 @@ def command(
         return
     if machines["ship"] and not machines["scheduler"]:
         raise click.UsageError("--ship goes with --scheduler.")
-    given: dict[str, Any] = {"machines": Machines(**machines), "mosaic": mosaic_wanted(survey)}
+    settings: dict[str, Any] = {"machines": Machines(**machines), "mosaic": mosaic_wanted(survey)}
     with progress_bar("survey", quiet=as_json) as progress:
-        result = run_survey(pairs, progress=progress, tell=remark, **given)
+        result = run_survey(pairs, progress=progress, tell=remark, **settings)
     result = result.in_words(in_survey_words)
     print_result(result.to_dict(), result.lines(), as_json=as_json)
     if result.failed:

@@ -40,9 +40,9 @@ def command(options: VerifyCommand) -> None:
     from bifocal.campaigns.verification import verify
 
     with progress_bar("verify", quiet=options.as_json) as progress:
-        found = verify(
+        verification = verify(
             options.delivery, remake=options.remake, sources=options.sources, progress=progress
         )
-    print_result(found.to_dict(), found.lines(), as_json=options.as_json)
-    if not found.same:
-        raise InputError(f"{options.delivery}: is not what was made: {found.summary()}.")
+    print_result(verification.to_dict(), verification.lines(), as_json=options.as_json)
+    if not verification.same:
+        raise InputError(f"{options.delivery}: is not what was made: {verification.summary()}.")

@@ -18,10 +18,10 @@ def oriented_live(session: Session) -> LiveOrientation | None:
     state, infos = session.state, session.pictures.infos
     if len(infos) != 2:
         return None
-    pair, said = session.pictures.pair, session.spoken
-    facts = (dict(state.control), dict(state.tapes), state.setup, state.lenses, said, id(pair))
+    pair, language = session.pictures.pair, session.spoken
+    facts = (dict(state.control), dict(state.tapes), state.setup, state.lenses, language, id(pair))
     if session.orientation is None or session.orientation[0] != facts:
-        session.orientation = facts, live_orientation(state, infos, said, pair)
+        session.orientation = facts, live_orientation(state, infos, language, pair)
     return session.orientation[1]
 
 

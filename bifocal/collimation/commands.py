@@ -134,8 +134,8 @@ def _type(state: SurveyState, command: Fields) -> list[Change]:
 
 def _reference(state: SurveyState, command: Fields) -> list[Change]:
     before = _named("points", state, command)
-    known = _known(command, before.reference)
-    after = replace(before, reference=None if known == (None, None, None) else known)
+    coordinates = _known(command, before.reference)
+    after = replace(before, reference=None if coordinates == (None, None, None) else coordinates)
     return [Change("points", before.name, before, after)]
 
 
@@ -199,8 +199,8 @@ def _control_name(state: SurveyState, command: Fields) -> str:
 def _control_set(state: SurveyState, command: Fields) -> list[Change]:
     name = _control_name(state, command)
     before = state.control.get(name)
-    known = _known(command, before.known if before else None)
-    after = replace(before or PickedControl(name=name, order=state.next_order()), known=known)
+    coordinates = _known(command, before.known if before else None)
+    after = replace(before or PickedControl(name=name, order=state.next_order()), known=coordinates)
     return [Change("control", name, before, after)]
 
 
@@ -236,22 +236,26 @@ def _control_delete(state: SurveyState, command: Fields) -> list[Change]:
 
 def _control_paste(state: SurveyState, command: Fields) -> list[Change]:
     changes = []
-    for name, known, picks in pasted_control(command["text"].encode("utf-8", "replace").decode()):
+    for name, coordinates, picks in pasted_control(
+        command["text"].encode("utf-8", "replace").decode()
+    ):
         before = state.control.get(name)
         start = before or PickedControl(name=name, order=state.next_order())
         both = (picks[0] or start.picks[0], picks[1] or start.picks[1])
-        changes.append(Change("control", name, before, replace(start, known=known, picks=both)))
+        changes.append(
+            Change("control", name, before, replace(start, known=coordinates, picks=both))
+        )
     return changes
 
 
 def _control_add(state: SurveyState, command: Fields) -> list[Change]:
     """Add targets that a job found, to be given their coordinates; taken names get another."""
-    changes, taken = [], set(state.control)
+    changes, names = [], set(state.control)
     for entry in command["control"]:
         name = entry["name"]
-        while name in taken:
+        while name in names:
             name = f"{name}b"
-        taken.add(name)
+        names.add(name)
         point = PickedControl(name=name, order=state.next_order(), picks=tupled(entry["picks"]))
         changes.append(Change("control", name, None, point))
     return changes
@@ -316,10 +320,10 @@ def _lens_set(state: SurveyState, command: Fields) -> None:
 
 
 def _setup_set(state: SurveyState, command: Fields) -> None:
-    given = {key: command[key] for key in command if key in SETUP}
-    if not given:
+    fields = {key: command[key] for key in command if key in SETUP}
+    if not fields:
         raise InputError(f"nothing to set; known are {', '.join(SETUP)}.")
-    state.setup |= given
+    state.setup |= fields
 
 
 def _exchange(state: SurveyState, command: Fields) -> None:
@@ -372,15 +376,15 @@ def lens_ratio(*photos: Fields) -> float | None:
 
 def _points_add(state: SurveyState, command: Fields) -> list[Change]:
     """Add points that a job found; names that are taken get another number."""
-    found = command["points"]
-    if len(found) + len(state.points) > MOST_POINTS:
+    entries = command["points"]
+    if len(entries) + len(state.points) > MOST_POINTS:
         raise InputError(f"points: a survey holds at most {MOST_POINTS}.")
-    changes, taken = [], set(state.points)
-    for entry in found:
+    changes, names = [], set(state.points)
+    for entry in entries:
         name = entry["name"]
-        while name in taken:
+        while name in names:
             name = f"{name}b"
-        taken.add(name)
+        names.add(name)
         point = PickedPoint(
             name=name, order=state.next_order(), picks=tupled(entry["picks"]),
             code=(entry.get("code") or "")[:LONGEST_NAME], note=(entry.get("note") or "")[:200],

@@ -38,14 +38,14 @@ def fields_of_exchange(session: SurveyOnPage) -> dict[str, Any]:
         raise InputError(remark("page.give_photos"))
     if file is not None and not products.is_own(file):
         raise InputError(remark("page.begun_with_pair", name=file.name))
-    made = {name: kind for name, kind in products.made.items() if kind in _ORIENTED}
-    told: dict[str, Any] = {
-        "step": True, "made": made,
-        "causes": {kind: dict(products.causes.get(kind, {})) for kind in {*made.values()}},
+    files = {name: kind for name, kind in products.made.items() if kind in _ORIENTED}
+    fields: dict[str, Any] = {
+        "step": True, "made": files,
+        "causes": {kind: dict(products.causes.get(kind, {})) for kind in {*files.values()}},
     }  # fmt: skip
-    told |= _proposal_now(session)
+    fields |= _proposal_now(session)
     if (pair := session.pictures.pair) is not None:
-        told["corners"] = {
+        fields["corners"] = {
             shape.name: [
                 [*pixel, corner[2]]
                 for pixel, corner in zip(
@@ -55,7 +55,7 @@ def fields_of_exchange(session: SurveyOnPage) -> dict[str, Any]:
             ]
             for shape in session.state.shapes.values()
         }  # fmt: skip
-    return told
+    return fields
 
 
 def exchange_step(
@@ -153,9 +153,9 @@ def follow_exchange(session: SurveyOnPage, changes: list[Change]) -> None:
 
 def put_aside(session: SurveyOnPage) -> None:
     """Show the photos the other way round; what was made of their orientation stays on the disk."""
-    made = [name for name, kind in session.products.made.items() if kind in _ORIENTED]
-    if made:
-        session.note_made(ASIDE, made)
+    files = [name for name, kind in session.products.made.items() if kind in _ORIENTED]
+    if files:
+        session.note_made(ASIDE, files)
     session.pictures.show_photos([info.path for info in session.pictures.infos][::-1])
 
 

@@ -92,8 +92,8 @@ class FirstOrientation:
         self._held = pair, held
         if len(held - before) < FEWEST_AT_ONCE and not session.pick_doubt:
             return
-        seen = observations(point for point in points if point.use)
-        words = verdict_of_picks(pair, seen.pixels1, seen.pixels2).words
+        picks = observations(point for point in points if point.use)
+        words = verdict_of_picks(pair, picks.pixels1, picks.pixels2).words
         with session.lock:
             if words != session.pick_doubt:
                 session.pick_doubt = words

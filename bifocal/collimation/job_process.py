@@ -65,12 +65,12 @@ def main() -> int:
     task = json.loads(sys.stdin.read())
     out = sys.stdout
     sys.stdout = sys.stderr  # nothing but our lines on the pipe
-    told = 0.0
+    last = 0.0
 
     def progress(done: float, total: float, what: str = "") -> None:
-        nonlocal told
-        if monotonic() - told > _OFTEN:
-            told = monotonic()
+        nonlocal last
+        if monotonic() - last > _OFTEN:
+            last = monotonic()
             share = min(max(done / total, 0.0), 1.0) if total > 0 else 0.0
             tell({"progress": share, "message": what})
 
@@ -130,35 +130,37 @@ def _join(task: Task, progress: Progress) -> dict[str, Any]:
         control, site = _path(task["control"]), SiteMeasures()
         if control is None:
             control = Path(folder) / "points.csv"
-            pair, own = read_pair(task["pair"]), NAMES.index("Z 1")
-            known = None if pair.orientation is None else pair.orientation[own, own]
+            pair, distance_row = read_pair(task["pair"]), NAMES.index("Z 1")
+            variance = (
+                None if pair.orientation is None else pair.orientation[distance_row, distance_row]
+            )
             site = SiteMeasures(
                 sigma_control=_frame(pair, control, len(photos)), distance1=pair.d1,
-                sigma=site.sigma if known is None else max(float(np.sqrt(known)), 1e-4),
+                sigma=site.sigma if variance is None else max(float(np.sqrt(variance)), 1e-4),
             )  # fmt: skip
         options = AlignOptions(
             lenses=(first, second), other_lenses=others, site=site, control=control,
             lengths=_path(task["lengths"]),
         )  # fmt: skip
-        made = align_photo_set(photos, out, options, overwrite=True, progress=progress)
-    lenses = {photo.extra.get("lens") for photo in made.photos.photos} - {None}
+        alignment = align_photo_set(photos, out, options, overwrite=True, progress=progress)
+    lenses = {photo.extra.get("lens") for photo in alignment.photos.photos} - {None}
     # Of points that the program chose nobody can mend the picks.
-    told = made.remarks if task["control"] else ()
-    return {"remarks": [*made.words, *told], "lenses": sorted(lenses)}
+    of_control = alignment.remarks if task["control"] else ()
+    return {"remarks": [*alignment.words, *of_control], "lenses": sorted(lenses)}
 
 
 def _frame(pair: Pair, table: Path, photos: int) -> float:
     """Write points of a pair, spread over it, as control points; return their precision. [m]"""
-    _, found = match_pair_file(pair, MatchSettings(count=FRAME, features=True))
-    solved = pair.intersect(found.pixels1, found.pixels2)
+    _, matches = match_pair_file(pair, MatchSettings(count=FRAME, features=True))
+    solved = pair.intersect(matches.pixels1, matches.pixels2)
     sigma = np.sqrt(np.trace(solved.covariance, axis1=1, axis2=2) / 3)
     good = np.array([flag in ("OK", "ON-PLANE") for flag in solved.flags]) & (sigma > 0)
     columns: dict[str, Any] = {
-        "id": [name for name, keep in zip(found.ids, good, strict=True) if keep]
+        "id": [name for name, keep in zip(matches.ids, good, strict=True) if keep]
     }
     columns |= dict(zip(("X [m]", "Y [m]", "r [m]"), solved.xyz[good].T, strict=True))
     blank = np.full(int(good.sum()), np.nan)
-    pixels = [*found.pixels1[good].T, *found.pixels2[good].T, *[blank] * (2 * photos - 4)]
+    pixels = [*matches.pixels1[good].T, *matches.pixels2[good].T, *[blank] * (2 * photos - 4)]
     names = [f"{axis}{number} [px]" for number in range(1, photos + 1) for axis in ("col", "row")]
     write_csv(table, columns | dict(zip(names, pixels, strict=True)), overwrite=True)
     return float(np.median(sigma[good])) if good.any() else SiteMeasures().sigma_control
@@ -166,10 +168,10 @@ def _frame(pair: Pair, table: Path, photos: int) -> float:
 
 def _rectify(task: Task, progress: Progress) -> dict[str, Any]:
     """Bring one photo alone to scale, with drawings."""
-    given = {name: one.fixed_default for name, one in options_of(RectifyCommand).items()}
-    given |= {"scale": 50.0, **task, "corners": np.ravel(task["corners"])}
+    settings = {name: one.fixed_default for name, one in options_of(RectifyCommand).items()}
+    settings |= {"scale": 50.0, **task, "corners": np.ravel(task["corners"])}
     done = rectify_photo(
-        Path(task["photo"]), Path(task["out"]), given, folder=Path(task["folder"]),
+        Path(task["photo"]), Path(task["out"]), settings, folder=Path(task["folder"]),
         overwrite=task["overwrite"], progress=progress,
     )  # fmt: skip
     assert done.delivery is not None
@@ -199,10 +201,10 @@ def _match(task: Task, progress: Progress) -> dict[str, Any]:
 def _targets(task: Task, progress: Progress) -> dict[str, Any]:
     """Return the targets that both photos show."""
     try:
-        found = _match({**task, "count": 5000, "features": False}, progress)
+        matches = _match({**task, "count": 5000, "features": False}, progress)
     except GeometryError:  # too few to check the pair by
         return {"points": []}
-    return {"points": [one for one in found["points"] if one["code"] != "feature"]}
+    return {"points": [one for one in matches["points"] if one["code"] != "feature"]}
 
 
 def _relief(task: Task, progress: Progress) -> dict[str, Any]:
@@ -215,11 +217,11 @@ def _relief(task: Task, progress: Progress) -> dict[str, Any]:
 
 
 def _ortho_task(task: Task) -> OrthoTask:
-    said = dict(task["options"])
-    if "scale" in said:
-        said.setdefault("gsd", gsd_at_scale(task["dpi"] or DPI, said["scale"]))
+    settings = dict(task["options"])
+    if "scale" in settings:
+        settings.setdefault("gsd", gsd_at_scale(task["dpi"] or DPI, settings["scale"]))
     return OrthoTask.from_given(
-        said, relief=_path(task["relief"]), faces=faces_path(None, task["pair"]),
+        settings, relief=_path(task["relief"]), faces=faces_path(None, task["pair"]),
     )  # fmt: skip
 
 
@@ -236,12 +238,12 @@ def _deliver(task: Task, progress: Progress) -> dict[str, Any]:
     path, out = Path(task["pair"]), Path(task["out"])
     if task["mark"] and not Path(task["mark"]).is_file():  # it could not be written
         task = {**task, "mark": None}
-    made: dict[str, list[str]] = {}
-    told: list[str] = []
+    files_of_kind: dict[str, list[str]] = {}
+    sentences: list[str] = []
     for kind, first, last in (("relief", 0.0, 0.5), ("ortho", 0.5, 0.65)):
         if before := task.get("before", {}).get(kind):
-            told += _WORKS[kind](before, _within(progress, first, last))["remarks"]
-            made[kind] = [Path(before["out"]).name]
+            sentences += _WORKS[kind](before, _within(progress, first, last))["remarks"]
+            files_of_kind[kind] = [Path(before["out"]).name]
     pair = _source(task)
     title = task["title"] or default_title(pair, path)
     wish = DeliverTask(title=title, mark=_path(task["mark"]), **{"scale": 50.0, **task["drawing"]})
@@ -250,8 +252,8 @@ def _deliver(task: Task, progress: Progress) -> dict[str, Any]:
         progress=_within(progress, 0.65, 0.9),
     )  # fmt: skip
     files = [*done.files, *_documents(task, title, _within(progress, 0.9, 1.0))]
-    told += [text for text in done.ortho.remarks if text not in told]
-    return {"files": files, "made": made, "sheet": done.sheet, "remarks": told}
+    sentences += [text for text in done.ortho.remarks if text not in sentences]
+    return {"files": files, "made": files_of_kind, "sheet": done.sheet, "remarks": sentences}
 
 
 def _documents(task: Task, title: str, progress: Progress) -> list[str]:
@@ -284,8 +286,8 @@ def _suggest(task: Task, progress: Progress) -> dict[str, Any]:
     progress(0.0, 1.0)
     pair = read_pair(task["pair"])
     images = [read_grey(pair.photo_file(number)) for number in (1, 2)]
-    found = suggest_faces(ReliefMap.read(Path(task["relief"])), [pair.image1, pair.image2], images)
-    return {"shapes": shapes_from(found, pair)}
+    faces = suggest_faces(ReliefMap.read(Path(task["relief"])), [pair.image1, pair.image2], images)
+    return {"shapes": shapes_from(faces, pair)}
 
 
 def _within(progress: Progress, first: float, last: float) -> Progress:

@@ -44,13 +44,13 @@ def start_job(session: Session, kind: str, options: Options, *, quiet: bool = Fa
     """
 
     def task() -> dict[str, Any]:
-        told = task_of(session, kind, options) | {"quiet": quiet}
-        told["causes"] = causes_of(session, kind)
+        job_task = task_of(session, kind, options) | {"quiet": quiet}
+        job_task["causes"] = causes_of(session, kind)
         if kind == "align":  # what was proposed before stays: an exchange may bring it back
             # What makes way for this may still be writing its own.
             stem = f"{session.products.stem}.{'found' if quiet else 'proposed'}"
-            told["out"] = str(free_path(session.files.folder.resolve(), stem, ".pair.json"))
-        return told
+            job_task["out"] = str(free_path(session.files.folder.resolve(), stem, ".pair.json"))
+        return job_task
 
     # The drawing shows the points as the workbook has them; its writer needs the survey's lock.
     return session.jobs.start(
@@ -104,8 +104,8 @@ def task_of(session: Session, kind: str, options: Options) -> dict[str, Any]:
 
 def _relief_task(session: Session, options: Options) -> dict[str, Any]:
     out = session.products.place("relief", ".relief.tif")
-    said = _said(options, "gsd", "bounds", "quality")
-    return {"out": str(out), "overwrite": session.products.is_own(out), "options": said}
+    settings = _said(options, "gsd", "bounds", "quality")
+    return {"out": str(out), "overwrite": session.products.is_own(out), "options": settings}
 
 
 def _ortho_task(session: Session) -> dict[str, Any]:
@@ -115,16 +115,16 @@ def _ortho_task(session: Session) -> dict[str, Any]:
 
 def _said(options: Options, *keys: str) -> dict[str, Any]:
     """Return options of a command that are typed on the page, by the command's names."""
-    said = {}
+    settings = {}
     for key in keys:
         option = OF_PAIR["paper" if key == "sheet" else key]
         if options.get(key) in (None, ""):
             continue
         try:
-            said[option.name] = option.typed(options[key])
+            settings[option.name] = option.typed(options[key])
         except ValueError as error:
             raise FieldError(f"{key}: expected {error}.") from None
-    return said
+    return settings
 
 
 def _ortho_options(session: Session, options: Options) -> dict[str, Any]:
@@ -143,8 +143,8 @@ def _deliver_options(session: Session, options: Options, pair: Options) -> dict[
     """Return what drawings and documents are told, and what is made before them."""
     products = session.products
     folder = products.folder / f"{products.stem}-delivered"
-    own = any(kind == "deliver" for kind in products.made.values())
-    if folder.exists() and not own:
+    is_delivery = any(kind == "deliver" for kind in products.made.values())
+    if folder.exists() and not is_delivery:
         folder = free_path(products.folder, f"{products.stem}-delivered")
     title = options.get("title") or ""
     if not isinstance(title, str) or len(title) > 120:
@@ -162,7 +162,7 @@ def _deliver_options(session: Session, options: Options, pair: Options) -> dict[
     ortho = products.current("ortho") or products.place("ortho", ".ortho.tif")
     return {
         "out": str(folder),
-        "overwrite": own,
+        "overwrite": is_delivery,
         "title": title,
         "stem": products.stem,
         "before": before,
@@ -183,11 +183,11 @@ def _align_task(session: Session, options: Options) -> dict[str, Any]:
     if len(infos) != 2:
         raise InputError(remark("page.give_photos"))
     control, site = control_of(state), site_of(state)
-    given = [site.distance1, site.distance2, site.delta_d]
+    distances = [site.distance1, site.distance2, site.delta_d]
     way = options.get("way") or ("control" if len(control.ids) else "auto")
-    way = _through_media(session, way, given)
+    way = _through_media(session, way, distances)
     # One measure alone multiplies all lengths, whenever it is typed.
-    free = way == "auto" and sum(map(bool, given)) < 2 and not control.lengths
+    free = way == "auto" and sum(map(bool, distances)) < 2 and not control.lengths
     if free:
         site = replace(site, distance1=NOMINAL, distance2=None, delta_d=None)
     tables: dict[str, Path | None] = {"control": None, "lengths": None}
@@ -215,12 +215,16 @@ def _join_task(session: Session) -> dict[str, Any]:
     tables: dict[str, Path | None] = {"control": None, "lengths": None}
     if (measured & np.isfinite(control.xyz[:, :2]).all(axis=1)).sum() >= 4:
         tables = _write_control(session, control, photos=len(session.all_photos))
-    for number, known in zip((1, 2), lenses_of(session.state), strict=True):
-        found = pair.extra.get("setup", {}).get("focal_px")
-        told = known.focal or photos.infos[number - 1].focal_pixels
+    for number, typed_lens in zip((1, 2), lenses_of(session.state), strict=True):
+        focals = pair.extra.get("setup", {}).get("focal_px")
+        focal = typed_lens.focal or photos.infos[number - 1].focal_pixels
         # What the pair found of a lens of which no file tells.
-        known = known if told or not found else KnownLens(focal=found[number - 1], pixel_size=1.0)
-        lenses.append(known)
+        typed_lens = (
+            typed_lens
+            if focal or not focals
+            else KnownLens(focal=focals[number - 1], pixel_size=1.0)
+        )
+        lenses.append(typed_lens)
     return {
         "photos": [str(path.resolve()) for path in session.all_photos],
         "out": str(products.place("set", "-set.photos.json").resolve()),
@@ -240,19 +244,19 @@ def _rectify_task(session: Session, options: Options) -> dict[str, Any]:
         raise FieldError(remark("page.rectangle"))
     out = session.products.place("rectified", "-rectified.tif")
     folder = session.products.folder / f"{session.products.stem}-rectified"
-    own = any(kind == "rectified" for kind in session.products.made.values())
-    if folder.exists() and not own:
+    is_delivery = any(kind == "rectified" for kind in session.products.made.values())
+    if folder.exists() and not is_delivery:
         folder = free_path(session.products.folder, folder.name)
-    known = session.state.lenses.get(1, {})
+    lens = session.state.lenses.get(1, {})
     return {
         "photo": str(infos[0].path.resolve()),
         "out": str(out.resolve()),
         "folder": str(folder.resolve()),
-        "overwrite": own,
+        "overwrite": is_delivery,
         "corners": corners,
         "rectangle": sides,
-        "focal": known.get("focal_mm"),
-        "sensor_width": known.get("sensor_width_mm"),
+        "focal": lens.get("focal_mm"),
+        "sensor_width": lens.get("sensor_width_mm"),
         "language": session.spoken,
         **_said(options, "scale"),
     }
@@ -333,29 +337,29 @@ def _same(task: Options, *causes: str) -> dict[str, str]:
 def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any]) -> str:
     """Take over what a job made; return what the user should know."""
     kind = task["kind"]
-    told = " ".join(without_options(said, session.spoken) for said in result.get("remarks", ()))
+    message = " ".join(without_options(text, session.spoken) for text in result.get("remarks", ()))
     if kind == "align":
         if task.get("quiet") and len(control_of(session.state).ids):
             discard_pair(Path(task["out"]))
             return ""  # the user took it in hand meanwhile
         causes = _same(task, "control", *(() if task["free_scale"] else ("site",)))
         session.propose(Path(task["out"]), {**result, "causes": causes})
-        return told
+        return message
     if kind == "join":
         path = Path(task["out"])
         session.note_made("set", [*result["lenses"], path.name])
         session.join(path)
-        return told
+        return message
     if kind == "rectify":
         drawn = [f"{Path(task['folder']).name}/{name}" for name in result["files"]]
         session.note_made("rectified", [*drawn, Path(task["out"]).name])
-        return " ".join(without_options(said, session.spoken) for said in result["words"][:2])
+        return " ".join(without_options(text, session.spoken) for text in result["words"][:2])
     if kind == "match":
         session.command({"op": "points.add", "points": result["points"]})
         return ""
     if kind == "targets":
-        known = {point.picks for point in session.state.control.values()}
-        new = [one for one in result["points"] if tupled(one["picks"]) not in known]
+        picks = {point.picks for point in session.state.control.values()}
+        new = [one for one in result["points"] if tupled(one["picks"]) not in picks]
         if new:
             session.command({"op": "control.add", "control": new})
         return say("targets", "found" if new else "none", session.spoken, count=len(new))
@@ -381,4 +385,4 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
         causes |= {cause: now[cause] for cause in ("relief", "ortho")}
     session.note_made(kind, names, causes)
     session.show_products()
-    return told
+    return message

@@ -223,14 +223,14 @@ class JobRunner:
             return answer
         for line in process.stdout:
             try:
-                told = json.loads(line)
-                learn(told)
+                event = json.loads(line)
+                learn(event)
             except ValueError:
                 continue
-            if "progress" in told and job.state == "running":
-                job.progress, job.message = told["progress"], told["message"]
+            if "progress" in event and job.state == "running":
+                job.progress, job.message = event["progress"], event["message"]
                 self._tell(job)
-            answer = told
+            answer = event
         return answer
 
     def _finish(self, job: PageJob, finish: Callable[[], str]) -> None:

@@ -61,7 +61,7 @@ def site_of(state: SurveyState) -> SiteMeasures:
     """Return the distances that were measured on site."""
     setup = state.setup
     sigmas = [setup.get(f"sigma_{name}") for name in ("d", "d1", "d2", "delta_d")]
-    given = [sigma for sigma in sigmas if sigma]
+    typed = [sigma for sigma in sigmas if sigma]
     spot = state.wall.get("spot")
     site = SiteMeasures(
         distance1=setup.get("d1"), distance2=setup.get("d2"), delta_d=setup.get("delta_d"),
@@ -69,7 +69,7 @@ def site_of(state: SurveyState) -> SiteMeasures:
     )  # fmt: skip
     if all((site.distance1, site.distance2, site.delta_d)):
         site = replace(site, delta_d=None)
-    return replace(site, sigma=max(given)) if given else site
+    return replace(site, sigma=max(typed)) if typed else site
 
 
 def lenses_of(state: SurveyState) -> tuple[KnownLens, KnownLens]:
@@ -130,8 +130,8 @@ def live_orientation(
         return LiveOrientation(deviations={}, residuals={}, advice=tuple(hints))
     try:
         interiors = [
-            interior_of_photo(info, known, number)
-            for number, (info, known) in enumerate(
+            interior_of_photo(info, lens, number)
+            for number, (info, lens) in enumerate(
                 zip(infos, lenses_of(state), strict=True), start=1
             )
         ]
@@ -142,8 +142,8 @@ def live_orientation(
             media=media_of(state.setup, pair),
         )
     except PhotogrammetryError as error:
-        told = without_options(str(error), language)
-        return LiveOrientation(error=told, deviations={}, residuals={}, advice=(*hints, told))
+        message = without_options(str(error), language)
+        return LiveOrientation(error=message, deviations={}, residuals={}, advice=(*hints, message))
     adjusted = oriented.adjusted
     residuals = adjusted.control_residuals
     if oriented.exchanged:
@@ -229,9 +229,9 @@ def _most_help(oriented: OrientedPair, language: str) -> list[str]:
 def _control_rows(oriented: OrientedPair, place: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the rates of a control point's four pixels by all `names_of`, and their covariance."""
     rows, by_points = [], []
-    for number, seen in enumerate(views_of(oriented.adjusted, place)):
-        rows.append(rates_of(seen, np.zeros((1, 2, 2)), number)[0])
-        by_points.append(seen.by_point[0])
+    for number, point_view in enumerate(views_of(oriented.adjusted, place)):
+        rows.append(rates_of(point_view, np.zeros((1, 2, 2)), number)[0])
+        by_points.append(point_view.by_point[0])
     by_point = np.concatenate(by_points)
     noise = np.eye(4) * oriented.observations.sigma_pick**2
     noise += by_point @ by_point.T * SiteMeasures().sigma_control ** 2

@@ -34,10 +34,12 @@ def pasted_control(text: str) -> list[tuple[str, Known, Picks]]:
         raise InputError(remark("page.pasted_many", count=len(table), most=MOST_ROWS))
     if np.isfinite(table.numbers("H")).any() and not np.isfinite(table.numbers("r")).any():
         raise InputError(remark("page.pasted_heights"))
-    known = np.column_stack([metres_of(table, key, "") for key in ("X", "Y", "r")])
+    coordinates = np.column_stack([metres_of(table, key, "") for key in ("X", "Y", "r")])
     picks = np.column_stack([table.numbers(key) for key in ("col1", "row1", "col2", "row2")])
     rows = []
-    for name, place, pixels in zip(table.texts("id"), known.tolist(), picks.tolist(), strict=True):
+    for name, place, pixels in zip(
+        table.texts("id"), coordinates.tolist(), picks.tolist(), strict=True
+    ):
         if not name:
             raise InputError(remark("page.pasted_nameless"))
         x, y, r = (None if math.isnan(value) else value for value in place)
@@ -52,7 +54,7 @@ def _with_headings(text: str) -> str:
     fields = [field.strip() for field in first.split(delimiter)]
     if len(fields) < 2 or not any(_is_number(field) for field in fields[1:]):
         return text
-    keys = [column.key for column in COLUMNS][: len(fields)]
+    keys = [column.key for column in COLUMNS if column.key != "H"][: len(fields)]
     return f"{delimiter.join(keys)}\n{text}"
 
 

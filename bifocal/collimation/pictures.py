@@ -149,17 +149,17 @@ class Pictures:
 
     def suggest(self, image: int, pixel: Pixel) -> dict[str, Any]:
         """Return where the other photo shows a pick, with the line on which it must lie."""
-        found = suggest(self.needed_pair(), self.photos(), image, np.array(pixel))
+        suggestion = suggest(self.needed_pair(), self.photos(), image, np.array(pixel))
         return plain(
             {
-                "column": found.pixel[0],
-                "row": found.pixel[1],
-                "quality": found.quality,
-                "score": found.score,
-                "sigma_px": found.sigma_px,
-                "misfit_px": found.misfit_px,
-                "kept": found.kept,
-                "others": [{"column": place[0], "row": place[1]} for place in found.others],
+                "column": suggestion.pixel[0],
+                "row": suggestion.pixel[1],
+                "quality": suggestion.quality,
+                "score": suggestion.score,
+                "sigma_px": suggestion.sigma_px,
+                "misfit_px": suggestion.misfit_px,
+                "kept": suggestion.kept,
+                "others": [{"column": place[0], "row": place[1]} for place in suggestion.others],
                 "line": self.line(image, pixel),
             }
         )
@@ -217,5 +217,5 @@ def _ortho_pixels(path: Path) -> ImageArray:
 
 def _facts(path: Path) -> tuple[str, int, int]:
     """Return what tells whether a picture is still the same."""
-    known = path.stat()
-    return path.name, known.st_size, known.st_mtime_ns
+    facts = path.stat()
+    return path.name, facts.st_size, facts.st_mtime_ns

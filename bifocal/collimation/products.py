@@ -177,9 +177,9 @@ class Products:
         """
         relief = self.relief()
         with self._shading:
-            asked = id(relief), low, high, hatched
-            if self._overlay is None or self._overlay[0] != asked:
-                self._overlay = asked, _shaded(relief, low, high, hatched=hatched)
+            mark = id(relief), low, high, hatched
+            if self._overlay is None or self._overlay[0] != mark:
+                self._overlay = mark, _shaded(relief, low, high, hatched=hatched)
             return self._overlay[1]
 
     def value(self, x: float, y: float) -> dict[str, float | None]:
@@ -228,10 +228,10 @@ def _grid_facts(path: Path) -> dict[str, Any]:
 
 def relief_limits(relief: ReliefMap) -> tuple[float, float]:
     """Return the relief at both ends of the colours. [m]"""
-    known = relief.r[np.isfinite(relief.r)]
-    if not len(known):
+    finite = relief.r[np.isfinite(relief.r)]
+    if not len(finite):
         return 0.0, 0.0
-    low, high = np.percentile(known, [0.5, 99.5])
+    low, high = np.percentile(finite, [0.5, 99.5])
     return float(low), float(high)
 
 
@@ -246,15 +246,15 @@ def _shaded(relief: ReliefMap, low: float | None, high: float | None, *, hatched
     grid = Grid(x0=fine.x0, y0=fine.y0, gsd=fine.gsd * step, width=width, height=height)
     measured = None
     if hatched:
-        told = np.isin(relief.quality[::step, ::step], TOLD)
-        if told.any():
-            measured = MapSurface.of_array(np.where(told, r, np.float32("nan")), grid)
+        measured_pixels = np.isin(relief.quality[::step, ::step], TOLD)
+        if measured_pixels.any():
+            measured = MapSurface.of_array(np.where(measured_pixels, r, np.float32("nan")), grid)
     # Lines as on a sheet on which a pixel is a third of a millimetre.
-    picture, known = shaded(
+    picture, alpha = shaded(
         MapSurface.of_array(r, grid), grid, limits=span, measured=measured,
         scale=grid.gsd * 3000,
     )  # fmt: skip
-    return _png(np.dstack([picture[..., ::-1], known]))
+    return _png(np.dstack([picture[..., ::-1], alpha]))
 
 
 def colours() -> list[str]:
@@ -265,12 +265,12 @@ def colours() -> list[str]:
 
 def _histogram(relief: ReliefMap) -> dict[str, Any]:
     """Return how often which relief occurs: ``from``, ``to`` [m] and ``counts``."""
-    known = relief.r[np.isfinite(relief.r)]
-    if not len(known):
+    finite = relief.r[np.isfinite(relief.r)]
+    if not len(finite):
         return {"from": 0.0, "to": 0.0, "counts": []}
-    low, high = (float(value) for value in np.percentile(known, [0.1, 99.9]))
+    low, high = (float(value) for value in np.percentile(finite, [0.1, 99.9]))
     low, high = min(low, -0.01), max(high, 0.01)
-    counts, _ = np.histogram(known, bins=BINS, range=(low, high))
+    counts, _ = np.histogram(finite, bins=BINS, range=(low, high))
     return {"from": low, "to": high, "counts": counts.tolist()}
 
 

@@ -112,8 +112,11 @@ def _of_pair(source: Path, workbook: Path | None) -> SurveyFiles:
     pair, shown = source, []
     if isinstance(photos, PhotoSet):
         best, pair = best_pair(photos), _best_of(photos, source)
-        own = [best.photo_file(1), best.photo_file(2)]
-        shown = [*own, *(one.path for one in photos.photos if one.path not in own)]
+        pair_photos = [best.photo_file(1), best.photo_file(2)]
+        shown = [
+            *pair_photos,
+            *(one.path for one in photos.photos if one.path not in pair_photos),
+        ]
     stem = pair.name.removesuffix(".json").removesuffix(".pair")
     book = _workbook(workbook or pair.parent / f"{stem}.xlsx")
     files = SurveyFiles(
@@ -159,9 +162,9 @@ class JoinedSet:
 def _holds(photos: PhotoSet, pair: Pair, files: Sequence[Path]) -> bool:
     """Whether a set is one of these photos, and a pair two of them as the set has them."""
     names = {photo.path.resolve() for photo in photos.photos}
-    known = [photo.plane_from_pixel for photo in photos.photos]
+    homographies = [photo.plane_from_pixel for photo in photos.photos]
     return names == {path.resolve() for path in files} and all(
-        any(np.array_equal(photo.plane_from_pixel, one) for one in known)
+        any(np.array_equal(photo.plane_from_pixel, one) for one in homographies)
         for photo in (pair.image1, pair.image2)
     )
 
@@ -169,16 +172,16 @@ def _holds(photos: PhotoSet, pair: Pair, files: Sequence[Path]) -> bool:
 def _of_photos(photos: tuple[Path, ...], workbook: Path | None) -> SurveyFiles:
     for number, photo in enumerate(photos):
         image_info(photo)
-        if any(photo.samefile(other) for other in photos[:number]):
+        if any(photo.samefile(earlier) for earlier in photos[:number]):
             raise InputError(f"{photo}: is given twice; give the far and the near photo.")
     book = _workbook(workbook or photos[0].parent / "survey.xlsx")
     files = SurveyFiles(folder=book.parent, stem=book.stem, workbook=book, photos=photos)
     if workbook is not None and _names_photos(book) and last_opened(files.journal) is None:
         pair = read_pair(book)
-        own = [pair.photo_file(1), pair.photo_file(2)]
-        if not all(a.is_file() and a.samefile(b) for a, b in zip(own, photos, strict=False)):
+        two = [pair.photo_file(1), pair.photo_file(2)]
+        if not all(a.is_file() and a.samefile(b) for a, b in zip(two, photos, strict=False)):
             raise InputError(
-                f"{book}: its photos (photo_1, photo_2) are {own[0].name} and {own[1].name}, not "
+                f"{book}: its photos (photo_1, photo_2) are {two[0].name} and {two[1].name}, not "
                 f"{photos[0].name} and {photos[1].name}; give the workbook alone, or another one."
             )
         return replace(files, pair=book)
@@ -211,10 +214,10 @@ def _of_folder(folder: Path, workbook: Path | None) -> SurveyFiles:
     journals = [path for path in names if path.name.endswith(_JOURNAL) and last_opened(path)]
     pairs = [path for path in names if path.name.endswith(_PAIR)]
     photos = [path for path in names if path.suffix.lower() in PHOTOS]
-    for found, what in ((journals, "surveys"), (pairs, "pair files")):
-        if len(found) > 1:
-            shown = ", ".join(path.name for path in found[:5])
-            raise InputError(f"{folder}: holds {len(found)} {what} ({shown}); name one.")
+    for candidates, what in ((journals, "surveys"), (pairs, "pair files")):
+        if len(candidates) > 1:
+            shown = ", ".join(path.name for path in candidates[:5])
+            raise InputError(f"{folder}: holds {len(candidates)} {what} ({shown}); name one.")
     if journals:
         stem = journals[0].name.removesuffix(_JOURNAL)
         book = _workbook(workbook or folder / f"{stem}.xlsx")

@@ -242,9 +242,9 @@ class SurveyState:
 
     def free_name(self, prefix: str = "P") -> str:
         """Return the next unused name of points and control points."""
-        taken = self.points.keys() | self.control.keys()
+        names = self.points.keys() | self.control.keys()
         number = len(self.points if prefix == "P" else self.control) + 1
-        while f"{prefix}{number:02d}" in taken:
+        while f"{prefix}{number:02d}" in names:
             number += 1
         return f"{prefix}{number:02d}"
 

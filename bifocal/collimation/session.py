@@ -90,10 +90,10 @@ class Session:
         self.journal = Journal(files.journal)
         try:
             pair = pair_of(files)
-            own = files.photos[:2] if pair is None else (pair.photo_file(1), pair.photo_file(2))
+            both = files.photos[:2] if pair is None else (pair.photo_file(1), pair.photo_file(2))
             # What a journal says beside another pair is of no use.
-            same = {path.resolve() for path in own} == {p.resolve() for p in files.photos[:2]}
-            photos = (*own, *(files.photos[2:] if same else ()))
+            same = {path.resolve() for path in both} == {p.resolve() for p in files.photos[:2]}
+            photos = (*both, *(files.photos[2:] if same else ()))
             self.pictures = Pictures(files.folder / f".{files.stem}.tiles", photos, pair)
             self.results = None if pair is None else self._results(pair)
             self.products = Products(files)
@@ -238,8 +238,8 @@ class Session:
         if not self.files.pair_is_workbook or self.proposal is not None:
             return
         pair = pair_of(self.files)
-        known = self.pictures.pair
-        if pair is None or (known is not None and typed_of(pair) == typed_of(known)):
+        pair_shown = self.pictures.pair
+        if pair is None or (pair_shown is not None and typed_of(pair) == typed_of(pair_shown)):
             return
         photos = [pair.photo_file(1), pair.photo_file(2)]
         if photos != [info.path for info in self.pictures.infos]:
@@ -322,8 +322,8 @@ class Session:
             "pair": relative_name(pair, folder) if pair else None,
             "photos": [relative_name(path, folder) for path in self.all_photos],
         }
-        known = [old for old in self.journal.records if old["op"] == "files"]
-        if not known or {key: known[-1].get(key) for key in record} != record:
+        earlier = [old for old in self.journal.records if old["op"] == "files"]
+        if not earlier or {key: earlier[-1].get(key) for key in record} != record:
             self._write(record)
             self.journal.records.append(record)
 
@@ -340,14 +340,14 @@ class Session:
             If it is impossible, or could not be written to the journal; nothing changed then.
         """
         with self.lock:
-            known = command.get("id")
-            if isinstance(known, str) and known in self.answered:
-                return self.answered[known]
+            command_id = command.get("id")
+            if isinstance(command_id, str) and command_id in self.answered:
+                return self.answered[command_id]
             result = self._checked(fields_of(command))
             self.follow_scale()
             self._faces.keep(self.pictures.pair, self.files.pair)
-            if isinstance(known, str):
-                self._remember_answer(known, result)
+            if isinstance(command_id, str):
+                self._remember_answer(command_id, result)
             self.changed()
             return result
 
@@ -475,9 +475,9 @@ class Session:
 
     def set_precision(self, sigma_px: float | None, limits: FlagLimits) -> None:
         """Let the results follow the precision and limits of the workbook."""
-        known = self.results
-        if known is not None and (known.sigma_px, known.limits) != (sigma_px, limits):
-            self.results = replace(known, sigma_px=sigma_px, limits=limits)
+        results = self.results
+        if results is not None and (results.sigma_px, results.limits) != (sigma_px, limits):
+            self.results = replace(results, sigma_px=sigma_px, limits=limits)
 
     def _write(self, record: Mapping[str, Any]) -> None:
         stamp = datetime.now(UTC).isoformat(timespec="milliseconds")

@@ -28,8 +28,8 @@ OUTLINES = "outlines"
 
 def places_of(pair: Pair, corners: Sequence[Sequence[float]]) -> FloatArray:
     """Return X, Y, r of corners (column, row, r) of photo 1, shape (n, 3). [m]"""
-    given = np.array(corners, dtype=np.float64)
-    return _at_relief(pair, given[:, :2], given[:, 2])
+    array = np.array(corners, dtype=np.float64)
+    return _at_relief(pair, array[:, :2], array[:, 2])
 
 
 def _at_relief(pair: Pair, pixels: FloatArray, relief: FloatArray) -> FloatArray:
@@ -65,9 +65,9 @@ def relief_within(pair: Pair, relief: ReliefMap, pixels: FloatArray) -> float | 
     grid = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
     ring = pixels.astype(np.float32)
     inside = [cv2.pointPolygonTest(ring, tuple(map(float, place)), False) >= 0 for place in grid]
-    found = met(pair, relief, grid[np.array(inside)])[:, 2] if any(inside) else np.array([])
-    known = found[np.isfinite(found)]
-    return float(np.median(known)) if len(known) else None
+    relief_met = met(pair, relief, grid[np.array(inside)])[:, 2] if any(inside) else np.array([])
+    finite = relief_met[np.isfinite(relief_met)]
+    return float(np.median(finite)) if len(finite) else None
 
 
 def outlines_of(state: SurveyState, pair: Pair) -> dict[str, dict[str, Any]]:
@@ -111,23 +111,23 @@ def keep_faces(state: SurveyState, pair: Pair, file: Path) -> None:
 
 def shapes_from(faces: Faces, pair: Pair) -> list[dict[str, Any]]:
     """Return faces of a file or a suggestion as the page draws them: name, kind, corners, mends."""
-    found: list[dict[str, Any]] = []
+    shapes: list[dict[str, Any]] = []
     for face in faces.faces:
         plane = np.zeros(3) if face.plane is None else face.plane
         ring = face.rings[0]
         relief = plane[0] + ring @ plane[1:]
-        found.append(
+        shapes.append(
             {"name": face.name, "kind": "face", "mends": face.mends}
             | _drawn(pair, np.column_stack([ring, relief]))
         )
     for edge in faces.breaks:
         places = np.column_stack([edge.line[:, :2], np.nan_to_num(edge.line[:, 2])])
-        found.append({"name": edge.name, "kind": "break"} | _drawn(pair, places))
+        shapes.append({"name": edge.name, "kind": "break"} | _drawn(pair, places))
     for one in faces.occluders:
         ring = one.rings[0]
         places = np.column_stack([ring, np.zeros(len(ring))])
-        found.append({"name": one.name, "kind": "occluder"} | _drawn(pair, places))
-    return found
+        shapes.append({"name": one.name, "kind": "occluder"} | _drawn(pair, places))
+    return shapes
 
 
 def commands_for(faces: Faces, state: SurveyState, pair: Pair) -> list[dict[str, Any]]:

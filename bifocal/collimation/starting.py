@@ -90,7 +90,7 @@ def reopen(number: int, home: Path | None = None) -> str:
         text=True, start_new_session=True,
     )  # fmt: skip
     assert page.stdout is not None
-    told: dict[str, Any] = json.loads(page.stdout.readline() or "{}")
-    if "url" not in told:
+    answer: dict[str, Any] = json.loads(page.stdout.readline() or "{}")
+    if "url" not in answer:
         raise InputError(remark("page.no_recent"))
-    return str(told["url"])
+    return str(answer["url"])

@@ -67,10 +67,10 @@ class TileStore:
 
     def info(self, name: str) -> dict[str, Any] | None:
         """Return what a viewer needs to know of a picture; None where there is none."""
-        known = self._sources.get(name)
-        if known is None:
+        entry = self._sources.get(name)
+        if entry is None:
             return None
-        source, version = known
+        source, version = entry
         return {
             "width": source.size[0],
             "height": source.size[1],
@@ -81,10 +81,10 @@ class TileStore:
 
     def tile(self, name: str, level: int, column: int, row: int) -> tuple[bytes, str] | None:
         """Return a tile as JPEG and its version; None where there is none."""
-        known = self._sources.get(name)
-        if known is None or not 0 <= level <= max_level(known[0].size):
+        entry = self._sources.get(name)
+        if entry is None or not 0 <= level <= max_level(entry[0].size):
             return None
-        source, version = known
+        source, version = entry
         width, height = level_size(source.size, level)
         if not (0 <= column * TILE < width and 0 <= row * TILE < height):
             return None

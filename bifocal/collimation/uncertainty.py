@@ -37,13 +37,15 @@ def relief_sigma(pictures: Pictures, results: LiveResults, computed: int = COMPU
     x = xmin + (np.arange(width) + 0.5) * (xmax - xmin) / width
     y = ymax - (np.arange(height) + 0.5) * (ymax - ymin) / height
     plane = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    seen = [pair.photo(number).pixels_from_plane(plane) for number in (1, 2)]
+    projected = [pair.photo(number).pixels_from_plane(plane) for number in (1, 2)]
     inside = np.ones(len(plane), dtype=bool)
-    for pixels, info in zip(seen, pictures.infos, strict=True):
+    for pixels, info in zip(projected, pictures.infos, strict=True):
         inside &= (pixels > -0.5).all(axis=1) & (pixels < np.array(info.size) - 0.5).all(axis=1)
     sigma = np.full(len(plane), np.nan)
     if inside.any():
-        solved = pair.intersect(seen[0][inside], seen[1][inside], sigma_px=results.sigma_px)
+        solved = pair.intersect(
+            projected[0][inside], projected[1][inside], sigma_px=results.sigma_px
+        )
         sigma[inside] = solved.sigma[:, 2]
     return sigma.reshape(height, width)
 
@@ -80,10 +82,10 @@ def uncertainty_picture(pictures: Pictures, results: LiveResults) -> bytes:
     height, width = sigma.shape
     factor = SHOWN / max(height, width)
     size = (round(width * factor), round(height * factor))
-    known = np.isfinite(sigma)
-    filled = np.where(known, sigma, np.nanmax(sigma) if known.any() else 1.0)
+    finite = np.isfinite(sigma)
+    filled = np.where(finite, sigma, np.nanmax(sigma) if finite.any() else 1.0)
     smooth = cv2.resize(np.log(filled), size, interpolation=cv2.INTER_CUBIC)
-    shown = cv2.resize(known.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
+    shown = cv2.resize(finite.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
     picture = np.zeros((size[1], size[0], 4), np.uint8)
     picture[(smooth > np.log(limit)) & shown] = _SHADE
     return cv2.imencode(".png", picture)[1].tobytes()

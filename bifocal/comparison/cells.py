@@ -35,31 +35,31 @@ def difference_of(before: ReliefMap, after: ReliefMap) -> tuple[ReliefMap, BoolA
         measured = relief.quality == Quality.MEASURED
         if (relief.sigma[measured] < 0).any() or (np.abs(relief.r[measured]) > LARGEST).any():
             raise InputError(remark("compare.no_relief"))
-    base, other = (before, after) if before.gsd >= after.gsd else (after, before)
-    other = _on_grid(other, base.grid)
+    base, finer = (before, after) if before.gsd >= after.gsd else (after, before)
+    finer = _on_grid(finer, base.grid)
     sign = 1 if base is before else -1
-    r = sign * (other.r.astype(np.float64) - base.r)
+    r = sign * (finer.r.astype(np.float64) - base.r)
     variance = np.zeros(r.shape)
-    for one in (base, other):
+    for one in (base, finer):
         variance += one.sigma.astype(np.float64) ** 2 + _beside_steps(one) ** 2
-    known = (base.quality == Quality.MEASURED) & (other.quality == Quality.MEASURED)
-    known &= np.isfinite(r) & np.isfinite(variance)
-    if not known.any():
+    both = (base.quality == Quality.MEASURED) & (finer.quality == Quality.MEASURED)
+    both &= np.isfinite(r) & np.isfinite(variance)
+    if not both.any():
         raise InputError(remark("compare.nothing_in_common"))
     remarks: list[str] = []
-    if not (np.nan_to_num(base.sigma[known]).any() and np.nan_to_num(other.sigma[known]).any()):
-        spread = max(1.4826 * float(np.median(np.abs(r[known]))), 1e-6)
+    if not (np.nan_to_num(base.sigma[both]).any() and np.nan_to_num(finer.sigma[both]).any()):
+        spread = max(1.4826 * float(np.median(np.abs(r[both]))), 1e-6)
         variance += spread**2
         remarks.append(remark("compare.no_sigma", sigma=1000 * spread))
-    two = _two_surfaces(base, other, np.sqrt(variance), known)
-    known &= ~two
+    two = _two_surfaces(base, finer, np.sqrt(variance), both)
+    both &= ~two
     if two.any():
         remarks.append(remark("compare.two_surfaces", area=float(two.sum()) * base.gsd**2))
-    unknown = np.where(known, 0.0, np.nan)
+    unknown = np.where(both, 0.0, np.nan)
     difference = ReliefMap(
         r=np.asarray(r + unknown, np.float32),
         sigma=np.asarray(np.sqrt(variance) + unknown, np.float32),
-        quality=known * np.uint8(Quality.MEASURED), plane_from_pixel=base.plane_from_pixel,
+        quality=both * np.uint8(Quality.MEASURED), plane_from_pixel=base.plane_from_pixel,
     )  # fmt: skip
     return difference, two, remarks
 
@@ -86,8 +86,8 @@ def _two_surfaces(
     for dy in offsets:
         for dx in offsets[np.hypot(offsets, dy) <= reach]:
             for k, here in enumerate((other, base)):
-                there = padded[k][rows + reach + dy, columns + reach + dx]
-                met[k] += np.abs(there - here.r[rows, columns]) <= tolerance
+                shifted = padded[k][rows + reach + dy, columns + reach + dx]
+                met[k] += np.abs(shifted - here.r[rows, columns]) <= tolerance
     two = np.zeros_like(known)
     two[rows, columns] = (met >= CHANGE.met * len(offsets) ** 2).all(axis=0)
     return two
@@ -106,12 +106,12 @@ def _on_grid(relief: ReliefMap, grid: Grid) -> ReliefMap:
 
 def _beside_steps(relief: ReliefMap) -> FloatArray:
     """Return half of what the relief varies among eight neighbours beyond its noise. [m]"""
-    known, square = np.isfinite(relief.r), np.ones((3, 3), np.uint8)
-    high = cv2.dilate(np.where(known, relief.r, np.float32(-np.inf)), square)
-    low = cv2.erode(np.where(known, relief.r, np.float32(np.inf)), square)
+    finite, square = np.isfinite(relief.r), np.ones((3, 3), np.uint8)
+    high = cv2.dilate(np.where(finite, relief.r, np.float32(-np.inf)), square)
+    low = cv2.erode(np.where(finite, relief.r, np.float32(np.inf)), square)
     with np.errstate(invalid="ignore"):
         beyond = high.astype(np.float64) - low - 5 * relief.sigma
-    return np.asarray(np.where(known, np.maximum(beyond, 0.0) / 2, np.nan))
+    return np.asarray(np.where(finite, np.maximum(beyond, 0.0) / 2, np.nan))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -141,11 +141,11 @@ class Cells:
 
         measured = difference.quality == Quality.MEASURED
         share = averaged(1.0)
-        known = share >= 0.5
+        covered = share >= 0.5
         with np.errstate(divide="ignore", invalid="ignore"):
             z = np.clip(difference.r / difference.sigma, -CHANGE.clip, CHANGE.clip)
             parts = [
-                np.where(known, averaged(part) / share, 0.0)
+                np.where(covered, averaged(part) / share, 0.0)
                 for part in (difference.r, difference.sigma, z)
             ]
         squared = float(np.mean(z[measured] ** 2))
@@ -154,7 +154,7 @@ class Cells:
             x0=grid.x0 + half, y0=grid.y0 - half, gsd=grid.gsd * side, width=columns, height=rows
         )
         return cls(
-            grid=coarse, known=known, difference=parts[0], sigma=parts[1], z=parts[2],
+            grid=coarse, known=covered, difference=parts[0], sigma=parts[1], z=parts[2],
             least=1 / min(1.0, max(squared, 0.05)),
         )  # fmt: skip
 

@@ -156,10 +156,10 @@ def _wrapped(side: int) -> FloatArray:
 
 def _fitted(squares: FloatArray, share: FloatArray) -> FloatArray:
     """Return the sigma of averages as a function of the share of their patch that is known."""
-    known = np.isfinite(share)
-    if not known.any():
+    finite = np.isfinite(share)
+    if not finite.any():
         return share
-    terms = np.stack([np.ones(int(known.sum())), 1 / share[known]], axis=-1)
-    found = np.linalg.lstsq(terms, squares[known], rcond=None)[0]
-    variance = found[0] + found[1] / share
-    return np.sqrt(np.maximum(variance, 0.25 * float(squares[known].mean())))
+    terms = np.stack([np.ones(int(finite.sum())), 1 / share[finite]], axis=-1)
+    terms_fitted = np.linalg.lstsq(terms, squares[finite], rcond=None)[0]
+    variance = terms_fitted[0] + terms_fitted[1] / share
+    return np.sqrt(np.maximum(variance, 0.25 * float(squares[finite].mean())))

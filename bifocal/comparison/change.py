@@ -296,16 +296,16 @@ class _Outlined:
         deviations; what no outline shows is the proven part itself.
         """
         averages = [np.nan_to_num(part) for part in self.patches.averages(self.cells.difference)]
-        numbered, made = np.zeros_like(labels), list[ChangedRegion]()
+        numbered, changes = np.zeros_like(labels), list[ChangedRegion]()
         parts = [labels == number for number in range(1, int(labels.max()) + 1)]
         for part in sorted(parts, key=lambda one: -np.abs(averages[0][one]).max()):
             inner, level = self._outline(part & (numbered == 0), averages, numbered == 0)
             if inner is None or (one := self._region(part, inner, averages, level)) is None:
                 continue
-            numbered[inner & self.cells.known] = len(made) + 1
-            made.append(replace(one, number=len(made) + 1))
-        order = sorted(made, key=lambda one: -abs(one.volume))
-        ranks = np.zeros(len(made) + 1, np.int64)
+            numbered[inner & self.cells.known] = len(changes) + 1
+            changes.append(replace(one, number=len(changes) + 1))
+        order = sorted(changes, key=lambda one: -abs(one.volume))
+        ranks = np.zeros(len(changes) + 1, np.int64)
         for rank, one in enumerate(order, start=1):
             ranks[one.number] = rank
         ordered = tuple(replace(one, number=int(ranks[one.number])) for one in order)
@@ -319,17 +319,17 @@ class _Outlined:
 
         if not part.any():
             return None, 0
-        known, last = self.cells.known, int(self.sizes[part][np.abs(self.test[part]).argmax()])
+        measured, last = self.cells.known, int(self.sizes[part][np.abs(self.test[part]).argmax()])
         outlines = []
         for level in range(last + 1):
             change = averages[level] * np.sign(self.test[part][0])
             edge = max(CHANGE.outline * float(change[part].max()), 2 * self._own(part, level))
-            spread_out, _ = label((change >= edge) & known & free)
+            spread_out, _ = label((change >= edge) & measured & free)
             outlines.append(np.isin(spread_out, np.setdiff1d(spread_out[part], [0])))
-        changed = np.where(known, self.cells.difference, 0.0)
+        changed = np.where(measured, self.cells.difference, 0.0)
         whole = outlines[last] | part
         for level, inner in enumerate(outlines):
-            rest = whole & ~inner & known
+            rest = whole & ~inner & measured
             spread = self.by_chance.variance_of_sum(np.where(rest, self.cells.sigma, 0.0)) ** 0.5
             if inner.any() and abs(float(changed[rest].sum())) <= CHANGE.held * float(spread):
                 return binary_fill_holes(inner) & free, level
@@ -343,7 +343,7 @@ class _Outlined:
         self, part: BoolArray, inner: BoolArray, averages: Sequence[FloatArray], level: int
     ) -> ChangedRegion | None:
         """Return a region, its number not yet given; None if its volume is within its sigma."""
-        cells, own, cell = self.cells, self._own(part, level), self.cells.grid.gsd**2
+        cells, sigma, cell = self.cells, self._own(part, level), self.cells.grid.gsd**2
         way = float(np.sign(self.test[part][0]))
         change = averages[level] * way
         # What the outline cuts off lies within a patch of it, and chance adds nothing there.
@@ -362,8 +362,8 @@ class _Outlined:
             return None
         peak = float(change[part].max())
         near = _wider(inner) & cells.known
-        edge = max(CHANGE.outline * peak, 2 * own)
-        wide, narrow = (int((near & (change >= edge + sign * own)).sum()) for sign in (-1, 1))
+        edge = max(CHANGE.outline * peak, 2 * sigma)
+        wide, narrow = (int((near & (change >= edge + sign * sigma)).sum()) for sign in (-1, 1))
         # How far a change reaches that fades out, no outline knows better than this.
         fading = int((inner & cells.known & (change < 2 * edge)).sum())
         moved = np.maximum(averages[0] * way, 0)[inner]
@@ -375,7 +375,7 @@ class _Outlined:
             area=area,
             sigma_area=max(cell, float(np.hypot((wide - narrow) / 2, fading / 2)) * cell),
             volume=volume, sigma_volume=spread, mean=volume / area, sigma_mean=spread / area,
-            largest=peak * way, sigma_largest=own,
+            largest=peak * way, sigma_largest=sigma,
             measured=float(cells.known[inner].mean()),
             probability=self.by_chance.probability(float(np.abs(self.test[part]).max())),
         )  # fmt: skip

@@ -91,9 +91,9 @@ def _draw_map(figure: Any, done: Comparison, say: Words) -> None:
     styles = packaged(__package__, "styles")
     step = max(1, -(-max(done.difference.shape) // _SIDE))
     r, region = 1000 * done.difference.r[::step, ::step], done.region[::step, ::step]
-    known = np.abs(r[np.isfinite(r)])
+    finite = np.abs(r[np.isfinite(r)])
     largest = max((1000 * abs(one.largest) for one in done.regions), default=0.0)
-    reach = max(float(np.percentile(known, 95)), largest, 0.01)
+    reach = max(float(np.percentile(finite, 95)), largest, 0.01)
     image = axes.imshow(
         r, extent=figures.extent_of(bounds), vmin=-reach, vmax=reach, **styles["difference"]
     )
@@ -110,11 +110,11 @@ def _draw_histogram(figure: Any, done: Comparison, say: Words) -> None:
     """Draw how often which difference is, significant regions dark."""
     axes, styles = figure.add_axes((0.1, 0.2, 0.86, 0.72)), packaged(__package__, "styles")
     r = 1000 * done.difference.r.astype(float)
-    known = np.isfinite(r)
-    reach = max(float(np.percentile(np.abs(r[known]), 99)), 0.01)
+    finite = np.isfinite(r)
+    reach = max(float(np.percentile(np.abs(r[finite]), 99)), 0.01)
     edges = np.linspace(-reach, reach, 61)
-    axes.hist(r[known], edges, **styles["all"])
-    if (changed := known & (done.region > 0)).any():
+    axes.hist(r[finite], edges, **styles["all"])
+    if (changed := finite & (done.region > 0)).any():
         axes.hist(r[changed], edges, **styles["changed"])
     axes.set_yscale("log")
     axes.set_xlabel(say("axis"), fontsize=8)

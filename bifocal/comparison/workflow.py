@@ -46,20 +46,20 @@ class ComparedFiles:
     def lines(self) -> list[str]:
         """Return what people are told."""
         done = self.comparison
-        told = [f"Compared  {done.compared:.1f} m2; errors hang together over "
+        sentences = [f"Compared  {done.compared:.1f} m2; errors hang together over "
                 f"{done.correlation_length:.2f} m"]  # fmt: skip
         if any(done.sigma_trend):
-            told.append(f"Common    {1000 * done.trend[0]:+.2f} mm, taken off")
+            sentences.append(f"Common    {1000 * done.trend[0]:+.2f} mm, taken off")
         area, least = done.patches[1]
-        told.append(f"Proven    from {1000 * least:.1f} mm over {area:.2g} m2")
-        told.append(f"Regions   {len(done.regions) or 'none: no change is proven'}")
-        told += [
+        sentences.append(f"Proven    from {1000 * least:.1f} mm over {area:.2g} m2")
+        sentences.append(f"Regions   {len(done.regions) or 'none: no change is proven'}")
+        sentences += [
             f"  {one.number}  X {one.X:.2f}  Y {one.Y:.2f}  {one.area:.3f} m2  "
             f"{1000 * one.mean:+.1f} +- {1000 * one.sigma_mean:.1f} mm  "
             f"{1000 * one.volume:+.2f} +- {1000 * one.sigma_volume:.2f} dm3"
             for one in done.regions[:10]
         ]
-        return [*told, f"Written   {self.folder}: {', '.join(self.files)}"]
+        return [*sentences, f"Written   {self.folder}: {', '.join(self.files)}"]
 
     def to_dict(self) -> dict[str, Any]:
         """Return it for ``--json``."""

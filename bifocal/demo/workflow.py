@@ -95,9 +95,9 @@ def run_demo(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: cannot be made ({error.strerror}).") from error
-    taken = [name for name, _ in sample.files if (folder / name).exists()]
-    if taken and not overwrite:
-        raise InputError(remark("demo.taken", of=folder, names=", ".join(taken[:3])))
+    existing = [name for name, _ in sample.files if (folder / name).exists()]
+    if existing and not overwrite:
+        raise InputError(remark("demo.taken", of=folder, names=", ".join(existing[:3])))
     progress(0.0, 1.0, "surveying targets in the workbook")
     for name in sample.given:
         with atomic_path(folder / name, overwrite=True) as path:
@@ -121,10 +121,10 @@ def run_demo(
         dpi = dpi_at_scale(file.grid.gsd, sample.sheet_scale)
         write_png(folder / "ortho.png", file, dpi=dpi, overwrite=True)
     progress(1.0, 1.0, "done")
-    median, share, known = _against_truth(ReliefMap.read(folder / "relief.tif"), sample)
+    median, share, share_known = _against_truth(ReliefMap.read(folder / "relief.tif"), sample)
     return DemoResult(
         folder=folder, files=sample.files, ids=ids, true=true, found=relief, sigma=sigma,
-        flags=flags, map_median=median, map_share=share, map_known=known, limit=sample.limit,
+        flags=flags, map_median=median, map_share=share, map_known=share_known, limit=sample.limit,
         neglect=_cost_of_neglect(Pair.read(pair_file), sample),
     )  # fmt: skip
 
@@ -159,9 +159,9 @@ def _against_truth(relief: ReliefMap, sample: Sample) -> tuple[float, float, flo
     """Return median error, share beyond the limit and share known, where both cameras see."""
     places, true = _seen_truth(sample)
     measured = relief.sample(places)
-    known = np.isfinite(measured)
-    error = np.abs(measured - true)[known]
-    return float(np.median(error)), float((error > sample.limit).mean()), float(known.mean())
+    finite = np.isfinite(measured)
+    error = np.abs(measured - true)[finite]
+    return float(np.median(error)), float((error > sample.limit).mean()), float(finite.mean())
 
 
 def _cost_of_neglect(pair: Pair, sample: Sample) -> float | None:

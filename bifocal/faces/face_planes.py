@@ -156,13 +156,13 @@ def _within(face: Face, surface: Surface) -> tuple[FloatArray, float]:
     """Return known relief within a face, off its edges where it is broad enough, and their step."""
     left, bottom, right, top = bounds_of(np.concatenate(face.rings))
     step = max(right - left, top - bottom) / PLANES.places
-    own = getattr(surface, "grid", None)
-    step = max(step, own.gsd if own is not None else 0.0)
+    surface_grid = getattr(surface, "grid", None)
+    step = max(step, surface_grid.gsd if surface_grid is not None else 0.0)
     grid = Grid.from_bounds((left, bottom, right, top), gsd=step)
     mask = inside(face.rings, grid)
     relief = surface.window(grid)
     core = mask.copy()
-    reach = round(PLANES.off_edge * (own.gsd if own is not None else 0.0) / step)
+    reach = round(PLANES.off_edge * (surface_grid.gsd if surface_grid is not None else 0.0) / step)
     for shift in (reach, -reach) if reach else ():
         for axis in (0, 1):
             core &= np.roll(mask, shift, axis)

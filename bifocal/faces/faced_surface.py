@@ -45,11 +45,11 @@ class FacedSurface:
 
     def __init__(self, surface: Surface, faces: Faces, measured: Surface | None = None) -> None:
         self.surface, self.faces = surface, faces
-        found = [(face, placed(face, surface, measured)) for face in faces.faces]
-        self.placed = tuple(one for _, one in found if one is not None)
-        self.unplaced = tuple(face.name or "?" for face, one in found if one is None)
-        own = getattr(surface, "grid", None)
-        self.reach = 0.0 if own is None else EDGES.reach * own.gsd
+        pairs = [(face, placed(face, surface, measured)) for face in faces.faces]
+        self.placed = tuple(one for _, one in pairs if one is not None)
+        self.unplaced = tuple(face.name or "?" for face, one in pairs if one is None)
+        surface_grid = getattr(surface, "grid", None)
+        self.reach = 0.0 if surface_grid is None else EDGES.reach * surface_grid.gsd
         self._shapes = [
             *(ring for one in self.placed for ring in one.face.rings),
             *(edge.line[:, :2] for edge in faces.breaks),
@@ -110,11 +110,11 @@ class FacedSurface:
             wall = self._wall_around(one)
             share = (first.distance - one.relief) / (first.distance - wall)
             back = (foot.distance - wall) / (foot.distance - one.relief)
-            seen = tuple(
+            rings = tuple(
                 foot.nadir + (first.nadir + (ring - first.nadir) * share - foot.nadir) * back
                 for ring in one.rings
             )
-            mask |= inside(seen, grid)
+            mask |= inside(rings, grid)
         return mask
 
     def _wall_around(self, one: Occluder) -> float:
@@ -124,8 +124,8 @@ class FacedSurface:
         step = max(right - left, top - bottom) / EDGES.places
         around = Grid.from_bounds((left - x, bottom - y, right + x, top + y), gsd=step)
         relief = self.surface.window(around)[~inside(one.rings, around)]
-        known = relief[np.isfinite(relief)]
-        return float(np.median(known)) if known.size else 0.0
+        finite = relief[np.isfinite(relief)]
+        return float(np.median(finite)) if finite.size else 0.0
 
     def labels(self, grid: Grid) -> IntArray:
         """Return which face of `placed` a grid's pixels lie on, counted from 1; 0 for none."""
@@ -158,12 +158,12 @@ def faced(relief: _Map, faces: Faces | None) -> tuple[_Map, FacedSurface | None]
     if not faces:
         return relief, None
     grid = relief.grid
-    known = MapSurface.of_array(relief.r, grid)
+    map_surface = MapSurface.of_array(relief.r, grid)
     measured: Surface | None = None
     if (relief.quality == Quality.MEASURED).any():
         only = np.where(relief.quality == Quality.MEASURED, relief.r, np.float32(np.nan))
         measured = MapSurface.of_array(only, grid)
-    surface = FacedSurface(known, faces, measured)
+    surface = FacedSurface(map_surface, faces, measured)
     r, sigma, quality = (np.array(band) for band in (relief.r, relief.sigma, relief.quality))
     for column, row, part in grid.tiles(EDGES.tile):
         cut = np.s_[row : row + part.height, column : column + part.width]
@@ -184,8 +184,8 @@ def faced(relief: _Map, faces: Faces | None) -> tuple[_Map, FacedSurface | None]
 
 def _noise(sigma: Float32Array) -> float:
     """Return what the best of the pixels within a face are known to, orientation included."""
-    known = sigma[np.isfinite(sigma)]
-    return float(np.quantile(known, EDGES.best)) if known.size else 0.0
+    finite = sigma[np.isfinite(sigma)]
+    return float(np.quantile(finite, EDGES.best)) if finite.size else 0.0
 
 
 def _touch(one: Bounds, other: Bounds) -> bool:
@@ -222,29 +222,29 @@ def _without_ramps(
         return
     beside, away = _nearest(plane, face)
     outside = ~face & np.isfinite(relief)
-    own, distance = _nearest(relief, outside & (away > reach))
+    nearest, distance = _nearest(relief, outside & (away > reach))
     band = outside & (away <= reach) & (distance <= 2 * reach + 2)
-    ramp = band & _of_other_side(relief, own, beside, least)
-    relief[ramp] = own[ramp]
+    ramp = band & _of_other_side(relief, nearest, beside, least)
+    relief[ramp] = nearest[ramp]
 
 
 def _break(relief: Float32Array, grid: Grid, edge: BreakLine, reach: float) -> None:
     """Keep the two sides of a break line apart, in place."""
     away, side, level = _beside(edge.line, grid, 3 * reach)
     least = grid.gsd * reach / EDGES.reach
-    known = np.isfinite(relief)
-    near = {s: _nearest(relief, (side == s) & (away > reach) & known)[0] for s in (-1, 1)}
+    finite = np.isfinite(relief)
+    near = {s: _nearest(relief, (side == s) & (away > reach) & finite)[0] for s in (-1, 1)}
     result = relief.copy()
     for s in (-1, 1):
-        own, other = near[s], near[-s]
-        band = (side == s) & (away <= reach) & known
-        mixed = band & _of_other_side(relief, own, other, least)
-        result[mixed] = own[mixed]
+        near_side, far_side = near[s], near[-s]
+        band = (side == s) & (away <= reach) & finite
+        mixed = band & _of_other_side(relief, near_side, far_side, least)
+        result[mixed] = near_side[mixed]
         # Of a given relief of the edge the side that is nearer to it runs up to it.
         with np.errstate(invalid="ignore"):
-            runs_up = band & (np.abs(level - own) < np.abs(level - other))
-        rise = (level - own) * (1 - away / np.float32(reach))
-        result[runs_up] = (own + rise)[runs_up]
+            runs_up = band & (np.abs(level - near_side) < np.abs(level - far_side))
+        rise = (level - near_side) * (1 - away / np.float32(reach))
+        result[runs_up] = (near_side + rise)[runs_up]
     np.copyto(relief, result)
 
 

@@ -128,21 +128,21 @@ class Faces:
         items = data.get("features", [data])
         if not isinstance(items, list):
             raise InputError(remark("faces.no_features"))
-        found: dict[str, list[Any]] = {"face": [], "break": [], "occluder": []}
+        shapes: dict[str, list[Any]] = {"face": [], "break": [], "occluder": []}
         for number, item in enumerate(items, start=1):
             try:
                 kind, shape = _shape_of(item)
-                found[kind].append(shape)
+                shapes[kind].append(shape)
             except (KeyError, TypeError, ValueError, AttributeError) as error:
                 raise InputError(remark("faces.unusable", number=number, why=_why(error))) from None
-        return cls(*(tuple(found[kind]) for kind in ("face", "break", "occluder")))
+        return cls(*(tuple(shapes[kind]) for kind in ("face", "break", "occluder")))
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as a GeoJSON object."""
         features = [*map(_face_feature, self.faces)]
         for edge in self.breaks:
-            known = np.isfinite(edge.line[:, 2]).all()
-            line = edge.line if known else edge.line[:, :2]
+            has_relief = np.isfinite(edge.line[:, 2]).all()
+            line = edge.line if has_relief else edge.line[:, :2]
             features.append(_feature("break", edge.name, "LineString", line.tolist()))
         for one in self.occluders:
             more = {} if one.relief is None else {"relief": one.relief}
@@ -181,10 +181,10 @@ def inside(rings: tuple[Ring, ...], grid: Grid) -> BoolArray:
 
 def _shape_of(item: Mapping[str, Any]) -> tuple[Kind, Face | BreakLine | Occluder]:
     """Return the kind and what a feature holds."""
-    said = {**item, **(item.get("properties") or {})}
+    entry = {**item, **(item.get("properties") or {})}
     geometry = item.get("geometry") or item
-    kind, form, parts = said["kind"], geometry["type"], geometry["coordinates"]
-    name = str(said.get("name") or "")
+    kind, form, parts = entry["kind"], geometry["type"], geometry["coordinates"]
+    name = str(entry.get("name") or "")
     if kind == "break":
         if form != "LineString":
             raise ValueError("LineString")
@@ -196,22 +196,24 @@ def _shape_of(item: Mapping[str, Any]) -> tuple[Kind, Face | BreakLine | Occlude
     corners = [_opened(_corners(part, 3)) for part in parts]
     rings = tuple(np.ascontiguousarray(ring[:, :2]) for ring in corners)
     if kind == "occluder":
-        return "occluder", Occluder(name=name, rings=rings, relief=_number(said, "relief"))
-    relief = _number(said, "relief")
+        return "occluder", Occluder(name=name, rings=rings, relief=_number(entry, "relief"))
+    relief = _number(entry, "relief")
     points: FloatArray = np.empty((0, 4))
     plane: FloatArray | None = None
-    if (given := said.get("plane", None if relief is None else [relief, 0.0, 0.0])) is not None:
-        plane = as_floats(given, "plane")
+    if (
+        plane_given := entry.get("plane", None if relief is None else [relief, 0.0, 0.0])
+    ) is not None:
+        plane = as_floats(plane_given, "plane")
         if plane.shape != (3,) or not (np.abs(plane) <= LARGEST).all():
             raise ValueError("plane")
-    if said.get("points"):
-        rows = [[*row, np.nan][:4] for row in said["points"]]
+    if entry.get("points"):
+        rows = [[*row, np.nan][:4] for row in entry["points"]]
         points = as_floats(rows, "points")
     elif plane is None and np.isfinite(corners[0][:, 2]).all():  # drawn in three dimensions
         points = np.column_stack([corners[0], np.full(len(corners[0]), np.nan)])
     if plane is None and len(points) and (len(points) < 3 or not np.isfinite(points[:, :3]).all()):
         raise ValueError("points")
-    sigma, mends = _number(said, "sigma"), _number(said, "mends")
+    sigma, mends = _number(entry, "sigma"), _number(entry, "mends")
     if sigma is not None:
         positive(sigma, "sigma", unit="m")
     return "face", Face(

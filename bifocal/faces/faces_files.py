@@ -87,9 +87,9 @@ def check_faces(faces: Faces | None, photos: Sequence[Photo]) -> tuple[str, ...]
         r = face.points[:, 2]
         if face.plane is not None:
             r = face.plane[0] + corners @ face.plane[1:]
-        known = r[np.isfinite(r)]
-        if len(known) and not (-DEEPEST * near < known.min() and known.max() < near):
-            about = {"name": face.name, "low": known.min(), "high": known.max(), "near": near}
+        finite = r[np.isfinite(r)]
+        if len(finite) and not (-DEEPEST * near < finite.min() and finite.max() < near):
+            about = {"name": face.name, "low": finite.min(), "high": finite.max(), "near": near}
             raise InputError(remark("faces.beyond", **about))
         low, high = corners.min(axis=0), corners.max(axis=0)
         if len(shown) == len(photos) and not any(
@@ -135,7 +135,7 @@ def _read_drawing(path: Path) -> Faces:
     metres = 1.0
     if drawing.units:
         metres = float(units.conversion_factor(units.InsertUnits(drawing.units), units.M))
-    found: dict[str, list[Any]] = {layer: [] for layer in LAYERS}
+    shapes: dict[str, list[Any]] = {layer: [] for layer in LAYERS}
     for entity in drawing.modelspace().query("LINE LWPOLYLINE POLYLINE"):
         layer = next((word for word in LAYERS if word in entity.dxf.layer.upper()), None)
         if layer is None:
@@ -145,15 +145,15 @@ def _read_drawing(path: Path) -> Faces:
         name = f"{entity.dxf.layer} {entity.dxf.handle}"
         if layer == "BREAK":
             line = np.vstack([corners, corners[:1]]) if closed else corners
-            found[layer].append(BreakLine(name=name, line=_without_zero(line)))
+            shapes[layer].append(BreakLine(name=name, line=_without_zero(line)))
             continue
         if not closed or len(corners) < 3:
             raise InputError(remark("faces.not_closed", path=path, name=name))
         rings = (np.ascontiguousarray(corners[:, :2]),)
-        found[layer].append(
+        shapes[layer].append(
             Occluder(name=name, rings=rings) if layer == "OCCLUDER" else _face(name, rings, corners)
         )
-    return Faces(*(tuple(found[layer]) for layer in LAYERS))
+    return Faces(*(tuple(shapes[layer]) for layer in LAYERS))
 
 
 def _corners(entity: Any) -> tuple[FloatArray, bool]:

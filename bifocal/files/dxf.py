@@ -47,10 +47,10 @@ def new_drawing(
 
 def save_drawing(drawing: Any, path: Path) -> None:
     """Write a drawing with its provenance among its properties, else the same every time."""
-    made = provenance()
-    known = [("Program", made.program), ("Date", made.date), ("Command", made.command)]
-    known += [(f"Input {name}", f"SHA-256 {digest}") for name, digest in made.inputs]
-    for name, value in known:
+    origin = provenance()
+    properties = [("Program", origin.program), ("Date", origin.date), ("Command", origin.command)]
+    properties += [(f"Input {name}", f"SHA-256 {digest}") for name, digest in origin.inputs]
+    for name, value in properties:
         if value:
             # A line of a DXF ends at a line break, and has no more than 255 characters in R2010.
             drawing.header.custom_vars.append(name[:255], " ".join(value.split())[:255])

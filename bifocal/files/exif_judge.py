@@ -106,8 +106,8 @@ def judged_focal(info: ImageInfo) -> JudgedFocal:
     by_size = [np.hypot(*info.size) / np.hypot(36, 24), wide / 36]
     stated = float(equivalent * by_size[0])
     if plane is not None and pitch:
-        other = [equivalent * by * z for by in by_size for z in (1.0, zoom)]
-        if min(abs(np.log(plane / one)) for one in other) < AGREE:
+        expected = [equivalent * by * z for by in by_size for z in (1.0, zoom)]
+        if min(abs(np.log(plane / one)) for one in expected) < AGREE:
             return JudgedFocal(focal=plane, sigma=NOMINAL, pitch=pitch / zoom, source=source)
     source = remark("orientation.exif_equivalent", focal=equivalent)
     if plane is not None:

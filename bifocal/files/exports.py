@@ -100,7 +100,7 @@ def export_points(
         raise InputError("no point has coordinates; run `bifocal solve` first.")
     remarks = []
     if not keep.all():
-        missing = [name for name, wanted in zip(points.ids, keep, strict=True) if not wanted]
+        missing = [name for name, use in zip(points.ids, keep, strict=True) if not use]
         shown = ", ".join(missing[:10]) + (" ..." if len(missing) > 10 else "")
         remarks.append(remark("export.left_out", count=len(missing), names=shown))
     points, coordinates = points.take(keep), coordinates[keep]

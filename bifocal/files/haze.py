@@ -108,9 +108,9 @@ def _weights(photo: NDArray[np.generic]) -> Float32Array:
     shares = []
     for channel in np.moveaxis(photo, -1, 0):
         grey = np.asarray(channel, np.float32) / np.float32(level)
-        own = noise(grey)
-        variance = float(np.median(local_contrast(grey))) ** 2 - BLURRED * own**2
-        shares.append(np.sqrt(max(variance, LEAST**2)) / own**2)
+        sigma = noise(grey)
+        variance = float(np.median(local_contrast(grey))) ** 2 - BLURRED * sigma**2
+        shares.append(np.sqrt(max(variance, LEAST**2)) / sigma**2)
     return np.asarray(shares, np.float32) / np.float32(sum(shares))
 
 

@@ -81,13 +81,13 @@ def _mixed(book: SheetFile, table: Table) -> tuple[FloatArray, FloatArray]:
         return blank, blank
     keys = (*dict.fromkeys(order), "EN")
     columns = [Column("id", kind="text"), *(Column(f"cov_{key}") for key in keys)]
-    found = read_table(book, columns, name="Points", errors=[])
-    place = {name: row for row, name in enumerate(found.texts("id")) if name}
-    rows = np.array([place.get(name, len(found)) for name in table.texts("id")], dtype=np.int64)
-    flat = np.stack([np.append(found.numbers(f"cov_{key}"), np.nan) for key in order], axis=-1)
+    points = read_table(book, columns, name="Points", errors=[])
+    place = {name: row for row, name in enumerate(points.texts("id")) if name}
+    rows = np.array([place.get(name, len(points)) for name in table.texts("id")], dtype=np.int64)
+    flat = np.stack([np.append(points.numbers(f"cov_{key}"), np.nan) for key in order], axis=-1)
     covariance = flat[rows].reshape(-1, 3, 3)
-    if "cov_EN" in found.present:
-        return covariance[:, 0, 1], np.append(found.numbers("cov_EN"), np.nan)[rows]
+    if "cov_EN" in points.present:
+        return covariance[:, 0, 1], np.append(points.numbers("cov_EN"), np.nan)[rows]
     # A workbook made by an older version, whose sigmas leave out the transformation.
     names = ["g_k", *(f"g_{i}{j}" for i in "12" for j in "123")]
     geo = read_named_values(book, [Column(n) for n in names], sheet="Georeference", errors=[])

@@ -104,10 +104,10 @@ def _edges(
     side = np.degrees(np.arctan2(away[..., 1], away[..., 0]))[strong]
     first = _strongest(side, strength[strong] ** 2)
     turned = np.abs((side - first + 180) % 360 - 180)
-    other = (turned > CORNERS.least_angle) & (turned < 180 - CORNERS.least_angle)
-    if not other.any():
+    second_side = (turned > CORNERS.least_angle) & (turned < 180 - CORNERS.least_angle)
+    if not second_side.any():
         return None
-    second = _strongest(side[other], strength[strong][other] ** 2)
+    second = _strongest(side[second_side], strength[strong][second_side] ** 2)
     between = np.radians(abs((second - first + 180) % 360 - 180))
     # From there on the other edge is far enough from the strip along this one.
     nearest = max(
@@ -116,11 +116,11 @@ def _edges(
     )
     if nearest > CORNERS.farthest - CORNERS.shortest:
         return None
-    found = [_line(coefficients, place, np.radians(side), nearest) for side in (first, second)]
-    if found[0] is None or found[1] is None:
+    lines = [_line(coefficients, place, np.radians(side), nearest) for side in (first, second)]
+    if lines[0] is None or lines[1] is None:
         return None
-    cosine = abs(float(found[0].normal @ found[1].normal))
-    return (found[0], found[1]) if cosine < np.cos(np.radians(CORNERS.least_angle)) else None
+    cosine = abs(float(lines[0].normal @ lines[1].normal))
+    return (lines[0], lines[1]) if cosine < np.cos(np.radians(CORNERS.least_angle)) else None
 
 
 def _strongest(side: FloatArray, weight: FloatArray) -> float:
@@ -182,5 +182,5 @@ def at_places(coefficients: FloatArray, places: FloatArray) -> FloatArray:
     """
     from scipy.ndimage import map_coordinates
 
-    found = map_coordinates(coefficients, places.T[::-1], order=3, mode="nearest", prefilter=False)
-    return np.asarray(found)
+    values = map_coordinates(coefficients, places.T[::-1], order=3, mode="nearest", prefilter=False)
+    return np.asarray(values)

@@ -86,17 +86,19 @@ def find_features(
     for top, bottom in pairwise(edges.tolist()):
         start = max(top - FEATURES.margin, 0)
         strip = np.ascontiguousarray(small[start : min(bottom + FEATURES.margin, height)])
-        found = [
+        keypoints = [
             key
             for key in detector.detect(strip, None)
             if top - 0.5 <= key.pt[1] + start < bottom - 0.5
             or height == bottom <= key.pt[1] + start
         ]
         # Descriptors cost as much as the search: only those of the strongest are made.
-        found.sort(key=lambda key: -key.response)
-        found, part = detector.compute(strip, found[: int(1.3 * limit / (len(edges) - 1)) + 1])
-        if len(found):
-            numbers = [(k.pt[0], k.pt[1] + start, k.size, k.angle, k.response) for k in found]
+        keypoints.sort(key=lambda key: -key.response)
+        keypoints, part = detector.compute(
+            strip, keypoints[: int(1.3 * limit / (len(edges) - 1)) + 1]
+        )
+        if len(keypoints):
+            numbers = [(k.pt[0], k.pt[1] + start, k.size, k.angle, k.response) for k in keypoints]
             keys.append(np.array(numbers))
             parts.append(part)
     table = np.concatenate(keys) if keys else np.zeros((0, 5))
@@ -125,13 +127,13 @@ def match_features(first: Features, second: Features) -> tuple[NDArray[np.intp],
     highest = np.full(len(second.pixels), -np.inf, np.float32)
     for start in range(0, count, 2000):
         part = first.descriptors[start : start + 2000] @ second.descriptors.T
-        own = slice(start, start + len(part))
-        best = nearest[own] = part.argmax(axis=1)
-        value[own] = part[np.arange(len(part)), best]
+        rows = slice(start, start + len(part))
+        best = nearest[rows] = part.argmax(axis=1)
+        value[rows] = part[np.arange(len(part)), best]
         np.maximum(highest, part.max(axis=0), out=highest)
         runner = _runner_up(part, best, second.pixels, FEATURES.same_place * second.reduction)
         # |a - b|² = 2 - 2 a·b for unit vectors.
-        distinct[own] = (2 - 2 * value[own]) < FEATURES.distinct**2 * (2 - 2 * runner)
+        distinct[rows] = (2 - 2 * value[rows]) < FEATURES.distinct**2 * (2 - 2 * runner)
     # Of several that are as near to one feature the first.
     mutual = np.flatnonzero(value == highest[nearest])
     mutual = np.sort(mutual[np.unique(nearest[mutual], return_index=True)[1]])

@@ -113,12 +113,12 @@ def _feature_matches(
     # itself was found, and its neighbours tell whether it is true.
     rest = np.nan_to_num(relief_at(pair, pixels1, pixels2), nan=np.inf)
     inside = (rest > reliefs[0]) & (rest < reliefs[1])
-    seen = seen_at(pair, pixels1, np.where(inside, rest, 0.0))
+    predicted = seen_at(pair, pixels1, np.where(inside, rest, 0.0))
     along = directions_at(pair, pixels1, np.where(inside, rest, 0.0))
-    off = (pixels2 - seen)[:, 0] * -along[:, 1] + (pixels2 - seen)[:, 1] * along[:, 0]
+    off = (pixels2 - predicted)[:, 0] * -along[:, 1] + (pixels2 - predicted)[:, 1] * along[:, 0]
     inside &= good.sum() >= MATCH.fewest_matched  # else pair and photos do not belong together
     kept = ~good & inside & (np.abs(off) < MATCH.feature_across * first.reduction)
-    on_line = np.where(kept[:, None], seen, on_line)
+    on_line = np.where(kept[:, None], predicted, on_line)
     relief, misfit = np.where(kept, rest, relief), np.where(kept, off, misfit)
     sigma = np.where(kept, MATCH.sigma_feature * first.reduction, sigma)
     good |= kept
@@ -205,13 +205,17 @@ def _target_matches(pair: Pair, images: Images, reliefs: tuple[float, float]) ->
     kinds = tuple(first.kinds[row] for row in rows1)
     patches, misfit = refine_along_lines(pair, images, pixels1, pixels2)
     # A disc's or code's own centre beats the patch around it; a chequer's crossing does not.
-    own = np.array([kind != "chequer" for kind in kinds], dtype=bool)
-    pixels2 = np.where(own[:, None], pixels2, patches.pixels2)
+    round_ones = np.array([kind != "chequer" for kind in kinds], dtype=bool)
+    pixels2 = np.where(round_ones[:, None], pixels2, patches.pixels2)
     relief = relief_at(pair, pixels1, pixels2)
     on_line = seen_at(pair, pixels1, relief)
     off = np.linalg.norm(pixels2 - on_line, axis=1)
-    sigma = np.where(own, 0.02, np.hypot(MATCH.optimism * patches.sigma, 0.03))
-    good = (patches.zncc > MATCH.least_agreement) & (own | patches.converged) & np.isfinite(relief)
+    sigma = np.where(round_ones, 0.02, np.hypot(MATCH.optimism * patches.sigma, 0.03))
+    good = (
+        (patches.zncc > MATCH.least_agreement)
+        & (round_ones | patches.converged)
+        & np.isfinite(relief)
+    )
     good &= (relief > reliefs[0]) & (relief < reliefs[1]) & (sigma < 0.3)
     order = np.flatnonzero(good)
     order = order[np.lexsort((pixels1[order, 0], pixels1[order, 1] // 100))]
@@ -224,7 +228,7 @@ def _target_matches(pair: Pair, images: Images, reliefs: tuple[float, float]) ->
         pixels1=pixels1[order],
         pixels2=pixels2[order],
         sigma=sigma[order],
-        misfit=np.where(own, off, np.nan_to_num(misfit))[order],
+        misfit=np.where(round_ones, off, np.nan_to_num(misfit))[order],
         agreement=patches.zncc[order],
         ids=tuple(names),
         kinds=tuple(kinds[row] for row in order),

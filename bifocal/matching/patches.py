@@ -110,8 +110,8 @@ def _refine_part(
     iterations: int,
 ) -> PatchResult:
     """Refine at most 4000 matches (the coordinate maps stay small)."""
-    known: BoolArray = np.isfinite(local.sum(axis=(1, 2)) + pixels2.sum(axis=1))
-    local = np.where(known[:, None, None], local, np.eye(2))
+    finite: BoolArray = np.isfinite(local.sum(axis=(1, 2)) + pixels2.sum(axis=1))
+    local = np.where(finite[:, None, None], local, np.eye(2))
     scale = np.sqrt(np.abs(np.linalg.det(local)))
     step = np.maximum(1.0, 1.0 / np.clip(scale, 0.1, 10.0))
     axis = np.arange(-PATCHES.half - 1, PATCHES.half + 2, dtype=np.float64)
@@ -131,7 +131,7 @@ def _refine_part(
     weight /= weight.sum()
     design = np.concatenate([np.ones((count, len(grid), 1)), template[:, :, None], columns], axis=2)
     normal = np.einsum("nij,i,nik->njk", design, weight, design)
-    ok = known & np.isfinite(normal).all(axis=(1, 2))
+    ok = finite & np.isfinite(normal).all(axis=(1, 2))
     normal[~ok] = np.eye(normal.shape[1])
     normal += 1e-9 * np.eye(normal.shape[1]) * np.trace(normal, axis1=1, axis2=2)[:, None, None]
     solver = np.linalg.inv(normal) @ (design.transpose(0, 2, 1) * weight)

@@ -96,11 +96,11 @@ def held_against_photos(
     out[whole] = typed = _likeness(images, picks, transfer)
     best, gained = None, EVIDENCE.gain
     for slip, meant in picks_meant(picks, (sizes[0], sizes[1])):
-        there = _likeness(images, meant, transfer)
-        gain = np.where(np.isfinite(typed) & np.isfinite(there), there - typed, 0.0)
+        likeness = _likeness(images, meant, transfer)
+        gain = np.where(np.isfinite(typed) & np.isfinite(likeness), likeness - typed, 0.0)
         decides = np.abs(gain) > 0.1
         clear = gain.sum() > EVIDENCE.sigmas * np.sqrt((gain**2).sum())
-        if clear and gain.sum() > gained and np.median(there[decides]) > EVIDENCE.fits:
+        if clear and gain.sum() > gained and np.median(likeness[decides]) > EVIDENCE.fits:
             best, gained = slip, float(gain.sum())
     verdict = PickVerdict(likeness=out, slip=best)
     if best is None and verdict.are_alien:

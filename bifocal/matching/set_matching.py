@@ -48,7 +48,7 @@ class SetMatches:
         """Write the points as a text table that ``bifocal solve --pair`` takes."""
         numbers = range(1, len(self.pixels) + 1)
         heads = [f"{axis}{number} [px]" for number in numbers for axis in ("col", "row")]
-        picks = np.concatenate([own.T for own in self.pixels])
+        picks = np.concatenate([pixels.T for pixels in self.pixels])
         columns = {"id": list(self.ids), **dict(zip(heads, picks, strict=True))}
         formats = dict.fromkeys(heads, ".4f")
         write_csv(path, {**columns, "code": list(self.kinds)}, formats=formats, overwrite=overwrite)
@@ -80,14 +80,14 @@ def match_set(photos: PhotoSet, greys: Greys, settings: MatchSettings | None = N
         raise GeometryError(remark("photo_set.no_pair"))
     far, near = ranked[0].far, ranked[0].near
     pair = photos.pair(far, near)
-    found = match_pair(pair, greys(far, near), settings)
-    sigma = precision(found)
-    xyz = np.array(pair.intersect(found.pixels1, found.pixels2, sigma_px=sigma).xyz)
+    matches = match_pair(pair, greys(far, near), settings)
+    sigma = precision(matches)
+    xyz = np.array(pair.intersect(matches.pixels1, matches.pixels2, sigma_px=sigma).xyz)
     pixels = np.full((len(photos), len(xyz), 2), np.nan)
-    pixels[far], pixels[near] = found.pixels1, found.pixels2
+    pixels[far], pixels[near] = matches.pixels1, matches.pixels2
     others = [number for number in range(len(photos)) if number not in (far, near)]
     for number in others:
-        pixels[number] = _carried(photos, greys(far, number), (far, number), found.pixels1, xyz)
+        pixels[number] = _carried(photos, greys(far, number), (far, number), matches.pixels1, xyz)
     for _ in range(len(photos)):
         points = photos.intersect(list(pixels), sigma_px=sigma)
         wrong = points.suspects.T.copy()
@@ -98,7 +98,7 @@ def match_set(photos: PhotoSet, greys: Greys, settings: MatchSettings | None = N
         wrong[others] |= flagged & ~wrong.any(axis=0)
         pixels[wrong] = np.nan
     return SetMatches(
-        pixels=pixels, sigma_px=sigma, ids=found.ids, kinds=found.kinds, points=points
+        pixels=pixels, sigma_px=sigma, ids=matches.ids, kinds=matches.kinds, points=points
     )
 
 
@@ -112,14 +112,14 @@ def _carried(
     """Return where the second photo shows points of the first, fitted; NaN where they are not."""
     first, second = (photos.photos[number] for number in numbers)
     start = second.project(xyz)
-    known = np.asarray(np.isfinite(start).all(axis=1))
-    place, relief = np.where(known[:, None], start, 0.0), np.nan_to_num(xyz[:, 2])
+    finite = np.asarray(np.isfinite(start).all(axis=1))
+    place, relief = np.where(finite[:, None], start, 0.0), np.nan_to_num(xyz[:, 2])
     away, here = raw_metres(first, pixels, relief), raw_metres(second, place, relief)
-    known &= np.isfinite(here).all(axis=(1, 2)) & (np.abs(np.linalg.det(here)) > 0)
-    local = np.linalg.inv(np.where(known[:, None, None], here, np.eye(2))) @ away
+    finite &= np.isfinite(here).all(axis=(1, 2)) & (np.abs(np.linalg.det(here)) > 0)
+    local = np.linalg.inv(np.where(finite[:, None, None], here, np.eye(2))) @ away
     both = np.broadcast_to(np.eye(2), local.shape)
-    fitted = refine(*same_scale(*images, local[known]), pixels, start, local, both)
+    fitted = refine(*same_scale(*images, local[finite]), pixels, start, local, both)
     sigma = np.hypot(MATCH.optimism * fitted.sigma, 0.02)
     good = np.asarray(fitted.converged & photos.sees(xyz)[numbers[1]])
-    good &= known & (sigma < 0.5) & (fitted.zncc > MATCH.least_agreement)
+    good &= finite & (sigma < 0.5) & (fitted.zncc > MATCH.least_agreement)
     return np.where(good[:, None], fitted.pixels2, np.nan)

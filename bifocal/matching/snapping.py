@@ -62,11 +62,11 @@ def snap(image: ByteArray, pixel: tuple[float, float], radius: float) -> Snapped
         part = np.asarray(cv2.transform(part, np.full((1, 3), 1 / 3)), dtype=np.uint8)
     grey = np.ascontiguousarray(part)
     for kind, find in (("target", _known_target), ("target", _target), ("corner", _corner)):
-        found = find(grey, pick - low, radius)
-        if found is not None:
-            column, row = (found[0] + low).tolist()
+        spot = find(grey, pick - low, radius)
+        if spot is not None:
+            column, row = (spot[0] + low).tolist()
             return Snapped(
-                column, row, kind, float(np.clip(found[1], SNAPPING.best, SNAPPING.worst))
+                column, row, kind, float(np.clip(spot[1], SNAPPING.best, SNAPPING.worst))
             )
     return nothing
 
@@ -160,19 +160,19 @@ def _symmetry(
 
     def both(image: FloatArray | Float32Array) -> tuple[FloatArray, FloatArray]:
         one = image[row + offsets[:, 1], column + offsets[:, 0]]
-        other = image[row - offsets[:, 1], column - offsets[:, 0]]
-        return np.asarray(one, np.float64), np.asarray(other, np.float64)
+        mirrored = image[row - offsets[:, 1], column - offsets[:, 0]]
+        return np.asarray(one, np.float64), np.asarray(mirrored, np.float64)
 
-    one, other = both(values)
-    mean = (one.mean(axis=1) + other.mean(axis=1))[:, None] / 2
-    power = ((one - mean) ** 2 + (other - mean) ** 2).mean(axis=1) / 2
-    left = ((one - other) ** 2).mean(axis=1)
-    correlation = 1.0 - left / np.maximum(2 * power, 1e-9)
-    gx, gy = (one - other for one, other in (both(image) for image in gradient))
+    one, mirrored = both(values)
+    mean = (one.mean(axis=1) + mirrored.mean(axis=1))[:, None] / 2
+    power = ((one - mean) ** 2 + (mirrored - mean) ** 2).mean(axis=1) / 2
+    difference = ((one - mirrored) ** 2).mean(axis=1)
+    correlation = 1.0 - difference / np.maximum(2 * power, 1e-9)
+    gx, gy = (one - mirrored for one, mirrored in (both(image) for image in gradient))
     xx, yy, xy = (gx * gx).sum(1), (gy * gy).sum(1), (gx * gy).sum(1)
     least = (xx + yy) / 2 - np.sqrt(((xx - yy) / 2) ** 2 + xy**2)
     with np.errstate(divide="ignore", invalid="ignore"):
-        sigma = np.sqrt(np.maximum(left, SNAPPING.noise**2) / least)
+        sigma = np.sqrt(np.maximum(difference, SNAPPING.noise**2) / least)
     good = (
         (correlation > SNAPPING.least_symmetry - 0.15)
         & (np.sqrt(power) > SNAPPING.least_contrast)
@@ -193,7 +193,7 @@ def _refined(values: FloatArray, start: FloatArray, size: float) -> tuple[FloatA
     place = start.copy()
     sigma, symmetry = np.inf, 0.0
     for turn in range(16):
-        one, other = (at_places(values, place + sign * offsets) for sign in (1, -1))
+        one, opposite = (at_places(values, place + sign * offsets) for sign in (1, -1))
         slopes = []
         for axis in np.eye(2) * 0.5:
             ahead, behind = (
@@ -202,7 +202,7 @@ def _refined(values: FloatArray, start: FloatArray, size: float) -> tuple[FloatA
             )
             slopes.append((ahead[0] - ahead[1]) - (behind[0] - behind[1]))
         design = np.column_stack([*slopes, offsets / size])
-        difference = one - other
+        difference = one - opposite
         weight = np.ones(len(difference))
         # A shadow across the target must not pull its centre; far from it edges are no shadows.
         for _ in range(3 if turn > 3 else 1):
@@ -216,10 +216,10 @@ def _refined(values: FloatArray, start: FloatArray, size: float) -> tuple[FloatA
             return None
         if turn > 4 and np.abs(step[:2]).max() < 1e-3:
             break
-    left = max(float(np.sqrt((weight * rest**2).sum() / weight.sum())), SNAPPING.noise)
-    sigma = left * float(np.sqrt(np.linalg.inv(normal)[[0, 1], [0, 1]].max()))
-    mean = float(np.mean([one, other]))
-    power = float(np.mean([(one - mean) ** 2, (other - mean) ** 2]))
+    noise = max(float(np.sqrt((weight * rest**2).sum() / weight.sum())), SNAPPING.noise)
+    sigma = noise * float(np.sqrt(np.linalg.inv(normal)[[0, 1], [0, 1]].max()))
+    mean = float(np.mean([one, opposite]))
+    power = float(np.mean([(one - mean) ** 2, (opposite - mean) ** 2]))
     symmetry = 1.0 - float((weight * rest**2).sum() / weight.sum()) / max(2 * power, 1e-9)
     if symmetry < SNAPPING.least_symmetry or np.sqrt(power) < SNAPPING.least_contrast:
         return None
@@ -248,13 +248,13 @@ def _corner(grey: ByteArray, pick: FloatArray, radius: float) -> tuple[FloatArra
         (-1, -1),
         (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 60, 1e-4),
     )
-    found = crossing(smooth, np.asarray(fine, dtype=np.float64).reshape(2))
+    cross = crossing(smooth, np.asarray(fine, dtype=np.float64).reshape(2))
     if (
-        found is None
-        or found[1] > SNAPPING.worst
-        or np.linalg.norm(found[0] - start) > SNAPPING.half
+        cross is None
+        or cross[1] > SNAPPING.worst
+        or np.linalg.norm(cross[0] - start) > SNAPPING.half
     ):
         return None
-    if np.linalg.norm(found[0] - pick) > radius + 1.0:
+    if np.linalg.norm(cross[0] - pick) > radius + 1.0:
         return None
-    return found[0], max(found[1], SNAPPING.best_corner)
+    return cross[0], max(cross[1], SNAPPING.best_corner)

@@ -133,23 +133,23 @@ def suggest(
     Normalised correlation of 21 x 21 samples along the line, each seen under the zoom k(r) that its
     relief implies; then least-squares matching along the line (`bifocal.matching.patches`).
     """
-    own, other = images[image - 1], images[2 - image]
+    picture, partner = images[image - 1], images[2 - image]
     low, high = relief_range or (SUGGESTIONS.farthest * pair.d2, SUGGESTIONS.nearest * pair.d2)
-    reliefs = _reliefs(pair, image, pixel, (low, high), other.shape)
-    there = seen_in_other(pair, image, pixel, reliefs)
-    search = _Search.along(pair, (own, other), image, pixel, reliefs, there)
+    reliefs = _reliefs(pair, image, pixel, (low, high), partner.shape)
+    predicted = seen_in_other(pair, image, pixel, reliefs)
+    search = _Search.along(pair, (picture, partner), image, pixel, reliefs, predicted)
     correlation, *halves = search.correlation()
     if not np.isfinite(correlation).any():
         raise InputError("too near to the rim of a photo for a suggestion; pick it by hand.")
     judged = correlation - SUGGESTIONS.off_wall * np.abs(reliefs) / pair.d2
     best = int(np.nanargmax(judged))
-    apart = np.linalg.norm(there - there[best], axis=1) > search.radius / 2
+    apart = np.linalg.norm(predicted - predicted[best], axis=1) > search.radius / 2
     second_best = float(np.nanmax(np.where(apart, judged, -1.0))) if apart.any() else -1.0
     match = search.match(best)
     clear = float(np.clip((judged[best] - second_best) / SUGGESTIONS.clear, 0.0, 1.0))
     agreement = float(np.clip((match.score - 0.5) / 0.5, 0.0, 1.0))
     quality = agreement * (0.3 + 0.7 * clear) * (1.0 if match.fits else 0.3)
-    away = np.linalg.norm(there - match.pixel, axis=1)
+    away = np.linalg.norm(predicted - match.pixel, axis=1)
     kept = match.fits and match.score > MATCH.least_agreement and quality >= SUGGESTIONS.kept
     kept = kept and _one_surface(halves, away)
     return Suggestion(
@@ -225,7 +225,7 @@ class _Search:
 
 def _others(search: _Search, curves: list[FloatArray], pixel: FloatArray) -> tuple[FloatArray, ...]:
     """Return other places that whole or half windows take for as good as the match, best first."""
-    offers, taken = list[tuple[float, FloatArray]](), [pixel]
+    offers, places = list[tuple[float, FloatArray]](), [pixel]
     for curve in curves:
         away = np.linalg.norm(search.there - pixel, axis=1)
         near = np.max(curve, where=(away < SUGGESTIONS.peak) & np.isfinite(curve), initial=-1.0)
@@ -238,8 +238,8 @@ def _others(search: _Search, curves: list[FloatArray], pixel: FloatArray) -> tup
         match = search.match(index)
         # The whole window does not always settle where half of it fits.
         place = match.pixel if match.fits else search.there[index]
-        if min(np.linalg.norm(place - one) for one in taken) > SUGGESTIONS.apart:
-            taken.append(place)
+        if min(np.linalg.norm(place - one) for one in places) > SUGGESTIONS.apart:
+            places.append(place)
             offers.append((float(curve[index]), place))
     return tuple(place for _, place in sorted(offers, key=lambda offer: -offer[0]))
 

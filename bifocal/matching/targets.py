@@ -244,9 +244,9 @@ def _codes(image: ByteArray) -> tuple[FloatArray, tuple[str, ...], FloatArray]:
 
 def _diagonals(points: FloatArray) -> FloatArray:
     """Return where the diagonals of a quadrilateral meet: the centre, in any perspective."""
-    along, other = points[2] - points[0], points[3] - points[1]
+    along, across = points[2] - points[0], points[3] - points[1]
     start = points[1] - points[0]
-    share = (start[0] * other[1] - start[1] * other[0]) / (
-        along[0] * other[1] - along[1] * other[0]
+    share = (start[0] * across[1] - start[1] * across[0]) / (
+        along[0] * across[1] - along[1] * across[0]
     )
     return points[0] + share * along

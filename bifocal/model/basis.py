@@ -31,9 +31,9 @@ of relief and in no sigma.'
     d1, d2 = pair.straight_distances
     slip = float(false_relief_of_scale(0.01, d1=d1, d2=d2))
     share = f"of which 1 % of scale is {slip:.2f} m of relief and in no sigma"
-    if (known := pair.whole_orientation) is not None:
+    if (whole := pair.whole_orientation) is not None:
         lens = [NAMES.index(f"focal length {number}") for number in (1, 2)]
         share = "with the covariance of its orientation"
-        if not known[lens].any():  # another program's cameras, placed in a frame by what is known
+        if not whole[lens].any():  # another program's cameras, placed in a frame by what is known
             share = "with the covariance of its frame and scale alone"
     return f"Sigmas rest on: {picks}; {setup}, {share}{'; ' + more if more else ''}."

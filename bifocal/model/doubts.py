@@ -41,10 +41,10 @@ def shape_is_certain(px: float, sigma: float) -> bool:
 
 def doubts_in_words(setup: Any) -> tuple[str, ...]:
     """Return what is known to be wrong with a pair, from the ``setup`` of its file."""
-    told = setup.get("doubts") if isinstance(setup, dict) else ()
-    if told is None and (bend := _bend(setup)):
-        told = [remark("pair.bent", bend=bend, most=MOST_BENT)]
-    return tuple(map(str, told)) if isinstance(told, list | tuple) else ()
+    doubts = setup.get("doubts") if isinstance(setup, dict) else ()
+    if doubts is None and (bend := _bend(setup)):
+        doubts = [remark("pair.bent", bend=bend, most=MOST_BENT)]
+    return tuple(map(str, doubts)) if isinstance(doubts, list | tuple) else ()
 
 
 def doubts_of(keys: Set[str], texts: Iterable[str]) -> list[str]:
@@ -107,10 +107,10 @@ def untold(told: Iterable[str], remarks: Iterable[str]) -> list[str]:
     >>> untold(["It is bent."], ["w.pair.json: It is bent.", "It leans.", "It leans."])
     ['It leans.']
     """
-    known = tuple(told)
+    earlier = tuple(told)
     new: list[str] = []
     for text in remarks:
-        if not text.endswith((*known, *new)):
+        if not text.endswith((*earlier, *new)):
             new.append(text)
     return new
 

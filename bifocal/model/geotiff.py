@@ -67,8 +67,8 @@ class RasterReader(RasterFile):
 
         window, columns, rows = grid.resampling(self.grid, 1)
         patch = np.asarray(self.read(*window, bands=list(bands)), np.float32)
-        found = cv2.remap(patch, columns, rows, cv2.INTER_NEAREST)
-        return np.asarray(found.reshape(*grid.shape, len(bands)), np.float32)
+        values = cv2.remap(patch, columns, rows, cv2.INTER_NEAREST)
+        return np.asarray(values.reshape(*grid.shape, len(bands)), np.float32)
 
 
 @contextmanager
@@ -113,14 +113,14 @@ def create_raster(
     check_all_writable(path, world if world_file else None, overwrite=overwrite)
     if not is_virtual(path):
         _check_space(path, grid, bands * np.dtype(dtype).itemsize)
-    known = dict(tags or {})
+    entries = dict(tags or {})
     if dpi is not None:
-        known |= {f"TIFFTAG_{axis}RESOLUTION": f"{dpi:.10g}" for axis in "XY"}
-        known["TIFFTAG_RESOLUTIONUNIT"] = "2"
+        entries |= {f"TIFFTAG_{axis}RESOLUTION": f"{dpi:.10g}" for axis in "XY"}
+        entries["TIFFTAG_RESOLUTIONUNIT"] = "2"
     with all_or_none():
         with create_geotiff(
             path, width=grid.width, height=grid.height, bands=bands, dtype=dtype, names=names,
-            colour=colour, nodata=nodata, overviews=overviews, overwrite=overwrite, tags=known,
+            colour=colour, nodata=nodata, overviews=overviews, overwrite=overwrite, tags=entries,
             crs=CRS.from_wkt(LOCAL_CRS.format(name=_printable(crs_name))),
             transform=corner_transform(grid.plane_from_pixel),
         ) as writer:  # fmt: skip

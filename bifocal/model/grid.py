@@ -231,6 +231,12 @@ class Gridded(ABC):
         """Outer edges (X min, Y min, X max, Y max). [m]"""
         return self.grid.bounds
 
+    def _drawn(self, values: FloatArray, axes: Any) -> Any:
+        """Draw values where they are on the wall; return what matplotlib made of them."""
+        xmin, ymin, xmax, ymax = self.bounds
+        axes.set(xlabel="X [m]", ylabel="Y [m]")
+        return axes.imshow(values, extent=(xmin, xmax, ymin, ymax))
+
     @property
     def transform(self) -> Any:
         """Affine map from (column, row) of pixel corners to (X, Y), as rasterio counts. [m]"""

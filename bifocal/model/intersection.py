@@ -273,8 +273,8 @@ def _misfit(
 
 def displacement(q: FloatArray, xyz: FloatArray, camera: rays.Foot) -> FloatArray:
     """Return how far relief moves points outwards, from where they stand on the plane. [m]"""
-    seen = rays.object_rays(q, camera).position
-    return _outward(seen - xyz[:, :2], xyz[:, :2] - camera.nadir)
+    position = rays.object_rays(q, camera).position
+    return _outward(position - xyz[:, :2], xyz[:, :2] - camera.nadir)
 
 
 def _outward(shift: FloatArray, direction: FloatArray) -> FloatArray:

@@ -110,10 +110,10 @@ class Lens:
         if str(data.get("format", "")).startswith("bifocal-pair"):
             raise InputError(f"{path}: is a pair file, not a lens file; name the lens.json.")
         data.pop("format", None)
-        known = ("camera_matrix", "coefficients", "image_size", "model", "sigma0", "source")
-        stated = {name: data.pop(name) for name in known if name in data}
+        keys = ("camera_matrix", "coefficients", "image_size", "model", "sigma0", "source")
+        stated = {name: data.pop(name) for name in keys if name in data}
         with located(path):
-            for name in known[:3]:
+            for name in keys[:3]:
                 if name not in stated:
                     raise InputError(f"the key {name!r} is missing.")
             sigma0 = stated.get("sigma0")
@@ -197,12 +197,12 @@ class Lens:
             flat = points[part]
             rays = (np.column_stack([flat, np.ones(len(flat))]) @ by_pixel.T)[:, None]
             if self.model == "fisheye":
-                seen, by = cv2.fisheye.projectPoints(rays, zero, zero, matrix, coefficients)
+                pixels, by = cv2.fisheye.projectPoints(rays, zero, zero, matrix, coefficients)
                 by_shift = by[:, 11:13]  # f, c (2 each), k (4), rotation (3), shift
             else:
-                seen, by = cv2.projectPoints(rays, zero, zero, matrix, coefficients)
+                pixels, by = cv2.projectPoints(rays, zero, zero, matrix, coefficients)
                 by_shift = by[:, 3:5]  # rotation (3), shift
-            yield part, seen.reshape(-1, 2), by_shift.reshape(-1, 2, 2)
+            yield part, pixels.reshape(-1, 2), by_shift.reshape(-1, 2, 2)
 
     @property
     def principal_point(self) -> FloatArray:

@@ -161,9 +161,9 @@ def _by_orientation(photos: Sequence[PlanePhoto], xyz: FloatArray) -> FloatArray
     ``A = dp/dP``, so ``J = -(AᵀA)⁻¹Aᵀ dp/dc``.
     """
     design, by_camera = pixel_rates(photos, xyz)
-    known = np.isfinite(design).all(axis=(1, 2))
+    finite = np.isfinite(design).all(axis=(1, 2))
     out = np.full((len(xyz), 3, by_camera.shape[2]), np.nan)
-    out[known] = -np.linalg.pinv(design[known]) @ by_camera[known]
+    out[finite] = -np.linalg.pinv(design[finite]) @ by_camera[finite]
     return out
 
 
@@ -179,13 +179,13 @@ def pixel_rates(photos: Sequence[PlanePhoto], xyz: FloatArray) -> tuple[FloatArr
     by_point, by_orientation = [], []
     for number, photo in enumerate(photos):
         camera = pinhole(photo)
-        seen = view(camera, photo.media, xyz)
+        points = view(camera, photo.media, xyz)
         # Straightened by 1 / (1 + k1 rho² + k2 rho⁴), ideal pixels move inwards.
-        away = seen.pixels - camera.matrix[:2, 2]
+        away = points.pixels - camera.matrix[:2, 2]
         square = (away**2).sum(axis=1, keepdims=True) / camera.matrix[0, 0] ** 2
         radial = np.stack([away * square, away * square**2], axis=2)
-        by_point.append(seen.by_point)
-        by_orientation.append(rates_of(seen, radial, number, len(photos)))
+        by_point.append(points.by_point)
+        by_orientation.append(rates_of(points, radial, number, len(photos)))
     return np.concatenate(by_point, axis=1), np.concatenate(by_orientation, axis=1)
 
 
@@ -201,15 +201,15 @@ def rates_of(seen: PointViews, radial: FloatArray, number: int, photos: int = 2)
     number, photos : int
         Of the camera, from 0, and how many there are.
     """
-    own, cameras = len(PLACING), photos * len(CAMERA)
-    common = max(seen.by_media.shape[2] - own, 0)
-    count = cameras + common + (photos * own if common else 0)
+    placing, cameras = len(PLACING), photos * len(CAMERA)
+    common = max(seen.by_media.shape[2] - placing, 0)
+    count = cameras + common + (photos * placing if common else 0)
     rates = np.zeros((*seen.pixels.shape, count))
-    first, last = number * len(CAMERA), cameras + common + number * own
+    first, last = number * len(CAMERA), cameras + common + number * placing
     rates[..., first : first + len(PARAMETERS)] = seen.by_camera
     rates[..., first + len(PARAMETERS) : first + len(CAMERA)] = radial
     rates[..., cameras : cameras + common] = seen.by_media[..., :common]
-    rates[..., last : last + own] = seen.by_media[..., common:]
+    rates[..., last : last + placing] = seen.by_media[..., common:]
     return rates
 
 
@@ -249,8 +249,8 @@ def exchanged(covariance: FloatArray) -> FloatArray:
 
 def of_photos(covariance: FloatArray, numbers: Sequence[int], count: int) -> FloatArray:
     """Return the covariance of some of ``count`` photos, counted from 0, in their order."""
-    own, rest = len(CAMERA), np.arange(count * len(CAMERA), len(covariance))
-    order = [np.arange(own) + number * own for number in numbers]
+    size, rest = len(CAMERA), np.arange(count * len(CAMERA), len(covariance))
+    order = [np.arange(size) + number * size for number in numbers]
     if len(rest):  # what the media have in common stays, what places them goes with its camera
         common, placing = np.split(rest, [-count * len(PLACING)])
         order += [common, *(placing.reshape(count, -1)[number] for number in numbers)]

@@ -91,8 +91,8 @@ class Pair:
             object.__setattr__(self, "remarks", (*self.remarks, note))
         first, last = doubts_in_words(self.extra.get("setup")), self._doubts_about_media()
         if first or last:
-            told = tuple(dict.fromkeys((*first, *self.remarks, *last)))
-            object.__setattr__(self, "remarks", told)
+            remarks = tuple(dict.fromkeys((*first, *self.remarks, *last)))
+            object.__setattr__(self, "remarks", remarks)
 
     def _doubts_about_media(self) -> tuple[str, ...]:
         """Return what looks like a slip in what lies between cameras and object."""
@@ -105,10 +105,10 @@ class Pair:
         beyond = [
             photo.distance - z - self.layers.thickness for photo, z in zip(photos, z0, strict=True)
         ]
-        found = tuple(f"layers: {doubt}" for doubt in self.layers.remarks_about(z0=z0, zp=beyond))
+        doubts = tuple(f"layers: {doubt}" for doubt in self.layers.remarks_about(z0=z0, zp=beyond))
         if self.orientation is not None and not self._knows_its_precision:
-            found += (remark("pair.no_covariance"),)
-        return found
+            doubts += (remark("pair.no_covariance"),)
+        return doubts
 
     @classmethod
     def ideal(

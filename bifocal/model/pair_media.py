@@ -100,7 +100,7 @@ class PairMedia:
             if any(normal is not None for normal in self.normals):
                 raise InputError(remark("media.normal_without_port"))
         allowed = self._allowed
-        possible = {own for name in allowed for own in _unknowns(name)}
+        possible = {unknown for name in allowed for unknown in _unknowns(name)}
         for name, sigma in self.sigmas.items():
             if name not in possible:
                 raise InputError(remark("media.no_unknown", name=name, allowed=", ".join(allowed)))
@@ -142,12 +142,12 @@ class PairMedia:
             if any(lean):
                 raise InputError(remark("media.leaning_together"))
             return cls(layers=pair.layers, depth=heights[0] - pair.layers.thickness)
-        own = [
+        normals = [
             pinhole(photo).rotation @ normal if leans else None
             for photo, normal, leans in zip(photos, towards, lean, strict=True)
         ]
         return cls(
-            layers=pair.layers, port=(first, second), normals=(own[0], own[1]),
+            layers=pair.layers, port=(first, second), normals=(normals[0], normals[1]),
             turning=(lean[0], lean[1]),
         )  # fmt: skip
 
@@ -216,12 +216,12 @@ class PairMedia:
         port = None if first is None else (first, first if second is None else second)
         layers = Layers(indices=tuple(indices), thicknesses=tuple(thicknesses))
         media = cls(layers=layers, port=port, depth=depth, normals=normals)
-        sigmas, known = {}, dict(priors or {})
-        for name in (*estimate, *known):
+        sigmas, usual_sigmas = {}, dict(priors or {})
+        for name in (*estimate, *usual_sigmas):
             start = media.value(name) if name in media._allowed and name not in LEANS else 0.0
             usual = SIGMA_LEAN if name in LEANS else max(typical_sigma(name, start), 1e-6)
-            for own in _unknowns(name):
-                sigmas[own] = known.get(name, usual)
+            for unknown in _unknowns(name):
+                sigmas[unknown] = usual_sigmas.get(name, usual)
         return replace(media, sigmas=sigmas)
 
     @property
@@ -345,13 +345,13 @@ class PairMedia:
 
         Media that stay come nearer to a camera that goes up, a port moves and may turn with it.
         """
-        seen = view(camera, self.path(number, camera), xyz)
+        points = view(camera, self.path(number, camera), xyz)
         if not self:
-            return ProjectedPoints(seen.pixels, seen.by_point, seen.by_camera)
-        rates = rates_of(seen, np.zeros((len(xyz), 2, 2)), number) @ self.by_unknowns()
+            return ProjectedPoints(points.pixels, points.by_point, points.by_camera)
+        rates = rates_of(points, np.zeros((len(xyz), 2, 2)), number) @ self.by_unknowns()
         first = number * len(CAMERA)
         by_camera = rates[..., first : first + len(PARAMETERS)]
-        return ProjectedPoints(seen.pixels, seen.by_point, by_camera)
+        return ProjectedPoints(points.pixels, points.by_point, by_camera)
 
     def on_plane(self, number: int, camera: Pinhole, pixels: FloatArray) -> FloatArray:
         """Return where rays of camera 0's or 1's ideal pixels meet the plane, (n, 3). [m]"""
@@ -415,8 +415,8 @@ class PairMedia:
                 lean, turn = f"lean {axis} {number}", f"turn {axis} {number}"
                 out[rows.index(lean), NAMES.index(turn)] = 1.0
         for number, turned in enumerate(self.leans, start=1):  # a lean turns with where it leans
-            own = [rows.index(f"lean {axis} {number}") for axis in "XYZ"]
-            out[own, : len(NAMES)] = turned.T @ out[own, : len(NAMES)]
+            leans = [rows.index(f"lean {axis} {number}") for axis in "XYZ"]
+            out[leans, : len(NAMES)] = turned.T @ out[leans, : len(NAMES)]
         for column, name in enumerate(names[len(NAMES) :], start=len(NAMES)):
             if name in rows:
                 out[rows.index(name), column] = 1.0

@@ -257,8 +257,8 @@ class Photo:
 
     def precision(self, sigma_px: float | None = None) -> float:
         """Return the measuring precision: as given, else the photo's own, else 0.5. [px]"""
-        given = self.sigma_pixel if sigma_px is None else sigma_px
-        return positive(SIGMA_PIXEL if given is None else given, "sigma_px", unit="px")
+        sigma = self.sigma_pixel if sigma_px is None else sigma_px
+        return positive(SIGMA_PIXEL if sigma is None else sigma, "sigma_px", unit="px")
 
     def picks(self, pixels: FloatArray, sigma_px: float | None = None) -> PlanePicks:
         """Return picks carried to the plane, of the given precision or else the photo's own."""
@@ -315,17 +315,17 @@ class Photo:
         InputError
             With both sizes, and what became of the photo.
         """
-        made = self.image_size
-        if made is None or size == made:
+        size0 = self.image_size
+        if size0 is None or size == size0:
             return
-        ratio = size[0] / made[0], size[1] / made[1]
+        ratio = size[0] / size0[0], size[1] / size0[1]
         what = "a part of it, or another photo"
-        if abs(ratio[0] - ratio[1]) <= max(1 / made[0], 1 / made[1]):  # within a rounded pixel
+        if abs(ratio[0] - ratio[1]) <= max(1 / size0[0], 1 / size0[1]):  # within a rounded pixel
             what = f"a copy {'reduced' if ratio[0] < 1 else 'enlarged'} to {ratio[0]:.3g} of it"
-        elif size == made[::-1]:
+        elif size == size0[::-1]:
             what = "it turned by 90 degrees"
         raise InputError(
-            f"{name}: {size[0]} x {size[1]} px, the pair was made from {made[0]} x {made[1]} px: "
+            f"{name}: {size[0]} x {size[1]} px, the pair was made from {size0[0]} x {size0[1]} px: "
             f"this is {what}. Use the photo as it was, or align this one anew."
         )
 

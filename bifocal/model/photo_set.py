@@ -194,7 +194,7 @@ class PhotoSet:
 
     def picked_in(self, pixels: Sequence[FloatArray]) -> list[int]:
         """Return the numbers of the photos with a pick, the first two where fewer have any."""
-        numbers = [k for k, own in enumerate(pixels) if not np.isnan(own).all()]
+        numbers = [k for k, picks in enumerate(pixels) if not np.isnan(picks).all()]
         return numbers if len(numbers) > 1 else [0, 1]
 
     def pair(self, first: int | str = 0, second: int | str = 1) -> Pair:
@@ -241,25 +241,25 @@ class PhotoSet:
         """
         xyz = self._places()
         picked = [
-            photo.picks(np.where(seen[:, None], pixels, np.nan))
-            for photo, pixels, seen in zip(
+            photo.picks(np.where(rows[:, None], pixels, np.nan))
+            for photo, pixels, rows in zip(
                 self.photos, self.project(xyz), self.sees(xyz), strict=True
             )
         ]
         ranked = []
-        for one, other in combinations(range(len(self)), 2):
-            far, near = sorted((one, other), key=lambda number: -self.photos[number].distance)
+        for one, second in combinations(range(len(self)), 2):
+            far, near = sorted((one, second), key=lambda number: -self.photos[number].distance)
             if self.photos[far].distance == self.photos[near].distance:
                 continue
             sigma = intersect(picked[far], picked[near], limits=FlagLimits()).sigma[:, 2]
             both = np.isfinite(sigma)
-            told = float(np.sum(1.0 / sigma[both] ** 2))
+            information = float(np.sum(1.0 / sigma[both] ** 2))
             if both.any() and (middle := float(np.median(sigma[both]))) <= (
                 UNCERTAIN_SHARE * self.photos[near].distance
             ):
                 apart = ray_angles(self.photos[far], self.photos[near], xyz[both])
                 pair = RankedPair(far, near, float(both.mean()), middle)
-                ranked.append((bool(np.median(apart) > WIDEST), -told, pair))
+                ranked.append((bool(np.median(apart) > WIDEST), -information, pair))
         return tuple(pair for *_, pair in sorted(ranked))
 
     def project(self, xyz: ArrayLike) -> tuple[FloatArray, ...]:
@@ -333,50 +333,50 @@ class PhotoSet:
         check_index("intersect", *pixels)
         if len(pixels) != len(self):
             raise InputError(remark("photo_set.picks", count=len(self), found=len(pixels)))
-        given = [
-            as_points(own, f"pixels of {photo.name}", dimension=2)
-            for photo, own in zip(self.photos, pixels, strict=True)
+        arrays = [
+            as_points(picks, f"pixels of {photo.name}", dimension=2)
+            for photo, picks in zip(self.photos, pixels, strict=True)
         ]
-        shape = given[0].shape[:-1]
-        if any(own.shape[:-1] != shape for own in given):
-            shapes = ", ".join(str(own.shape) for own in given)
+        shape = arrays[0].shape[:-1]
+        if any(picks.shape[:-1] != shape for picks in arrays):
+            shapes = ", ".join(str(picks.shape) for picks in arrays)
             raise InputError(remark("photo_set.shapes", shapes=shapes))
         if sigma_r_max is not None:
             positive(sigma_r_max, "sigma_r_max", unit="m")
-        rows = [own.reshape(-1, 2) for own in given]
+        rows = [picks.reshape(-1, 2) for picks in arrays]
         if len(numbers := self.picked_in(rows)) < len(self):  # the others tell nothing
             part = self.only(numbers).intersect(
-                [given[number] for number in numbers], sigma_px=sigma_px, sigma_r_max=sigma_r_max
+                [arrays[number] for number in numbers], sigma_px=sigma_px, sigma_r_max=sigma_r_max
             )
             return part.among(numbers, len(self))
         whole = intersect_rays(
             self.photos, rows, sigma_px=sigma_px, limits=FlagLimits(sigma_r_max=sigma_r_max),
             orientation=self._whole_orientation,
         )  # fmt: skip
-        picked = np.stack([~np.isnan(own).any(axis=1) for own in rows], axis=1)
+        picked = np.stack([~np.isnan(picks).any(axis=1) for picks in rows], axis=1)
         for places, (far, near) in self._seen_by_two(picked):
-            own = self.pair(far, near).intersect(
+            picks = self.pair(far, near).intersect(
                 rows[far][places], rows[near][places], sigma_px=sigma_px, sigma_r_max=sigma_r_max
             )
-            whole = whole.with_pair(places, (far, near), own)
+            whole = whole.with_pair(places, (far, near), picks)
         return whole.reshaped(shape)
 
     @property
     def _whole_orientation(self) -> FloatArray | None:
         """``orientation`` where it counts all that places and bends the rays, else None."""
         size = len(orientation_precision.names_of(self.layers, len(self)))
-        known = self.orientation is not None and len(self.orientation) == size
-        return self.orientation if known else None
+        whole = self.orientation is not None and len(self.orientation) == size
+        return self.orientation if whole else None
 
     def _seen_by_two(self, picked: BoolArray) -> Iterator[tuple[IntArray, tuple[int, int]]]:
         """Yield points measured in two photos alone that are a pair, with its far and near one."""
         alone = picked.sum(axis=1) == 2
-        for one, other in combinations(range(len(self)), 2):
-            d1, d2 = self.photos[one].distance, self.photos[other].distance
-            both = alone & picked[:, one] & picked[:, other]
+        for one, second in combinations(range(len(self)), 2):
+            d1, d2 = self.photos[one].distance, self.photos[second].distance
+            both = alone & picked[:, one] & picked[:, second]
             places = np.flatnonzero(both | (len(self) == 2))
             if len(places) and abs(d1 - d2) > _ALIKE * d1:
-                yield places, (one, other) if d1 > d2 else (other, one)
+                yield places, (one, second) if d1 > d2 else (second, one)
 
     def _places(self) -> FloatArray:
         """Return places of the wall all over the photos, shape (n, 3). [m]"""
@@ -387,9 +387,9 @@ class PhotoSet:
             if photo.image_size is None:  # as wide as a usual lens sees
                 places.append(photo.nadir + (grid - 0.5) * photo.distance)
             else:
-                seen = photo.plane_from_pixels(grid * photo.image_size - 0.5)
-                ahead = photo.sees_ahead(seen, photo.image_size[::-1])
-                places.append(seen[ahead & np.isfinite(seen).all(axis=1)])
+                on_plane = photo.plane_from_pixels(grid * photo.image_size - 0.5)
+                ahead = photo.sees_ahead(on_plane, photo.image_size[::-1])
+                places.append(on_plane[ahead & np.isfinite(on_plane).all(axis=1)])
         plane = np.concatenate(places)
         return np.column_stack([plane, np.zeros(len(plane))])
 

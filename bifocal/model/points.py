@@ -10,7 +10,7 @@ import numpy as np
 
 from photocore.arrays import BoolArray, FloatArray, as_floats
 from photocore.errors import InputError
-from photocore.plots import new_axes
+from photocore.plots import Drawable
 
 #: Columns of each array of a set of points; 0 for one number per point.
 _WIDTHS = {
@@ -31,7 +31,7 @@ class PointLine(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Points:
+class Points(Drawable):
     """Points of a wall with their precision: what `solve`, `intersect` and tables give.
 
     Attributes
@@ -180,25 +180,10 @@ class Points:
         crs = {"type": "name", "properties": {"name": "local engineering frame, metres"}}
         return {"type": "FeatureCollection", "crs": crs, "features": features}
 
-    def plot(self, axes: Any = None) -> Any:
-        """Draw the points on the wall, coloured by their relief, and return the axes.
-
-        Parameters
-        ----------
-        axes : matplotlib.axes.Axes, optional
-            Where to draw; by default a new figure.
-
-        Raises
-        ------
-        InputError
-            If matplotlib is not installed.
-        """
-        if axes is None:
-            axes = new_axes()
+    def _draw(self, axes: Any) -> None:
         drawn = axes.scatter(*self.xyz[:, :2].T, c=self.xyz[:, 2], s=12)
         axes.set(xlabel="X [m]", ylabel="Y [m]", aspect="equal")
         axes.figure.colorbar(drawn, ax=axes, label="r [m]")
-        return axes
 
     def take(self, keep: BoolArray) -> Points:
         """Return the points where ``keep`` is true."""

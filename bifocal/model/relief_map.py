@@ -17,7 +17,7 @@ from bifocal.model.grid import Grid, Gridded
 from bifocal.model.surface import Fetch, MapSurface
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray, as_points, read_only
 from photocore.errors import InputError
-from photocore.plots import new_axes
+from photocore.plots import Drawable
 from photocore.raster import BLOCK
 
 
@@ -37,7 +37,7 @@ TOLD = (Quality.MEASURED, Quality.DRAWN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ReliefMap(Gridded):
+class ReliefMap(Gridded, Drawable):
     """Relief of a wall as seen square on: pixel (column, row) is a point (X, Y) of the plane.
 
     Attributes
@@ -94,11 +94,11 @@ class ReliefMap(Gridded):
     def from_relief(cls, r: ArrayLike, *, plane_from_pixel: ArrayLike) -> ReliefMap:
         """Return a map of given relief with zero sigma: finite pixels count as measured."""
         relief = np.asarray(r, dtype=np.float32)
-        known = np.isfinite(relief)
+        finite = np.isfinite(relief)
         return cls(
             r=relief,
-            sigma=np.where(known, np.float32(0), np.float32(np.nan)),
-            quality=np.where(known, Quality.MEASURED, Quality.UNKNOWN).astype(np.uint8),
+            sigma=np.where(finite, np.float32(0), np.float32(np.nan)),
+            quality=np.where(finite, Quality.MEASURED, Quality.UNKNOWN).astype(np.uint8),
             plane_from_pixel=np.asarray(plane_from_pixel, dtype=np.float64),
         )
 
@@ -129,26 +129,8 @@ class ReliefMap(Gridded):
                     quality = np.clip(np.nan_to_num(band), 0, 255).astype(np.uint8)
             return replace(exact, sigma=sigma, quality=quality)
 
-    def plot(self, axes: Any = None) -> Any:
-        """Draw the relief over the wall, and return the axes.
-
-        Parameters
-        ----------
-        axes : matplotlib.axes.Axes, optional
-            Where to draw; by default a new figure.
-
-        Raises
-        ------
-        InputError
-            If matplotlib is not installed.
-        """
-        if axes is None:
-            axes = new_axes()
-        xmin, ymin, xmax, ymax = self.grid.bounds
-        drawn = axes.imshow(self.r, extent=(xmin, xmax, ymin, ymax))
-        axes.set(xlabel="X [m]", ylabel="Y [m]")
-        axes.figure.colorbar(drawn, ax=axes, label="r [m]")
-        return axes
+    def _draw(self, axes: Any) -> None:
+        axes.figure.colorbar(self._drawn(self.r, axes), ax=axes, label="r [m]")
 
     def write(
         self, path: Path | str, *, overwrite: bool = False, tags: Mapping[str, str] | None = None
@@ -198,8 +180,8 @@ class ReliefMap(Gridded):
         """
         bilinear, _ = self._interpolated(self.r, positions, order=1)
         nearest, inside = self._interpolated(self.r, positions, order=0)
-        known = np.where(np.isfinite(bilinear), bilinear, nearest)
-        return np.where(inside, known, np.nan)
+        values = np.where(np.isfinite(bilinear), bilinear, nearest)
+        return np.where(inside, values, np.nan)
 
     def sample_quality(self, positions: ArrayLike) -> ByteArray:
         """Return the `Quality` of the nearest pixel, shape (...); UNKNOWN outside the map."""
@@ -231,12 +213,12 @@ def told_pixels(reader: RasterReader) -> Fetch | None:
 
 def measured_part(reader: RasterReader) -> MapSurface | None:
     """Return what of an open relief map was measured or drawn; None where it does not say."""
-    told = told_pixels(reader)
-    if told is None:
+    measured = told_pixels(reader)
+    if measured is None:
         return None
 
     def fetch(*window: int) -> Float32Array:
-        return np.where(told(*window) > 0, reader.read_floats(*window), np.float32("nan"))
+        return np.where(measured(*window) > 0, reader.read_floats(*window), np.float32("nan"))
 
     with suppress(InputError):  # nothing was
         return MapSurface(reader.grid, fetch)

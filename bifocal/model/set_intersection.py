@@ -122,35 +122,35 @@ def intersect_rays(
     .. [1] Baarda, "A testing procedure for use in geodetic networks", 1968, for two coordinates.
     """
     picks = [photo.picks(own, sigma_px) for photo, own in zip(photos, pixels, strict=True)]
-    seen = np.stack([np.isfinite(pick.positions).all(axis=1) for pick in picks], axis=1)
-    weights = [_weights(pick, own) for pick, own in zip(picks, seen.T, strict=True)]
-    xyz, cofactor = _closest(picks, weights, seen)
+    picked = np.stack([np.isfinite(pick.positions).all(axis=1) for pick in picks], axis=1)
+    weights = [_weights(pick, own) for pick, own in zip(picks, picked.T, strict=True)]
+    xyz, cofactor = _closest(picks, weights, picked)
     for _ in range(_ITERATIONS):
         rows = [
             _blank(rays.design_rows(xyz, pick.foot), own)
-            for pick, own in zip(picks, seen.T, strict=True)
+            for pick, own in zip(picks, picked.T, strict=True)
         ]
-        miss = [_blank(_miss(pick, xyz), own) for pick, own in zip(picks, seen.T, strict=True)]
+        miss = [_blank(_miss(pick, xyz), own) for pick, own in zip(picks, picked.T, strict=True)]
         step, cofactor = _solved(rows, miss, weights)
         xyz = xyz + step
-    count = seen.sum(axis=1)
+    count = picked.sum(axis=1)
     undetermined = (count >= 2) & np.isnan(cofactor[:, 0, 0])
     xyz[undetermined | (count < 2)] = np.nan
-    for pick, own in zip(picks, seen.T, strict=True):
+    for pick, own in zip(picks, picked.T, strict=True):
         xyz[own & ~rays.is_before(xyz, pick.foot)] = np.nan
     per_metre = [inverse_2x2(pick.metres_per_pixel) for pick in picks]
     shifts = [by @ _miss(pick, xyz)[..., None] for by, pick in zip(per_metre, picks, strict=True)]
     residuals = np.stack([shift[..., 0] for shift in shifts], axis=1)
-    known = np.asarray(np.isfinite(xyz).all(axis=1))
+    finite = np.asarray(np.isfinite(xyz).all(axis=1))
     sigmas = np.array([pick.sigma_px for pick in picks])
     own, total = np.full((len(xyz), 3, 3), np.nan), np.full(len(xyz), np.nan)
     root = None if orientation is None else independent(orientation)
     effect = None if root is None else np.full((len(xyz), 3, len(root)), np.nan)
-    slips, saved = np.full((2, *seen.shape), np.nan)
+    slips, saved = np.full((2, *picked.shape), np.nan)
     for start in range(0, len(xyz), _AT_ONCE):
-        part = start + np.flatnonzero(known[start : start + _AT_ONCE])
+        part = start + np.flatnonzero(finite[start : start + _AT_ONCE])
         own[part], moved, total[part], slips[part], saved[part] = _precision_and_tests(
-            photos, xyz[part], residuals[part], seen[part], sigmas, root
+            photos, xyz[part], residuals[part], picked[part], sigmas, root
         )
         if effect is not None:
             effect[part] = moved
@@ -160,10 +160,10 @@ def intersect_rays(
     flags = point_flags(
         at_nadir=undetermined,
         standardised=standardised,
-        incomplete=_incomplete(pixels, seen),
+        incomplete=_incomplete(pixels, picked),
         relief=xyz[:, 2],
         sigma_r=np.sqrt(covariance[:, 2, 2]),
-        near_distance=np.where(seen, distances, np.inf).min(axis=1),
+        near_distance=np.where(picked, distances, np.inf).min(axis=1),
         limits=limits,
         redundant=redundant,
     )
@@ -185,7 +185,7 @@ def intersect_rays(
 
 def _incomplete(pixels: Sequence[FloatArray], seen: BoolArray) -> BoolArray:
     """Tell which points have fewer than two rays, or a pick beyond the horizon of its photo."""
-    picked = np.stack([np.isfinite(own).all(axis=1) for own in pixels], axis=1)
+    picked = np.stack([np.isfinite(part).all(axis=1) for part in pixels], axis=1)
     return np.asarray((seen.sum(axis=1) < 2) | (picked & ~seen).any(axis=1))
 
 
@@ -209,13 +209,13 @@ def _closest(
 ) -> tuple[FloatArray, FloatArray]:
     """Return where the rays, lines over relief, pass each other closest, (n, 3), and cofactors."""
     rows, places = [], []
-    for pick, own in zip(picks, seen.T, strict=True):
+    for pick, rows_seen in zip(picks, seen.T, strict=True):
         ray = rays.object_rays(pick.positions, pick.foot)
-        design = np.zeros((len(own), 2, 3))
+        design = np.zeros((len(rows_seen), 2, 3))
         design[:, 0, 0] = design[:, 1, 1] = 1.0
         design[:, :, 2] = -ray.slope
-        rows.append(_blank(design, own))
-        places.append(_blank(ray.position, own))
+        rows.append(_blank(design, rows_seen))
+        places.append(_blank(ray.position, rows_seen))
     return _solved(rows, places, weights)
 
 

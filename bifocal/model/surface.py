@@ -161,9 +161,11 @@ class MapSurface:
         smooth = _between(patch[top], patch[top + 1], rows[:, :1] - top[:, None])
         smooth = _between(smooth[:, left], smooth[:, left + 1], columns[:1] - left)
         # Steps and holes of the map, as seen by the four neighbours of a position.
-        known = np.where(np.isnan(patch), np.float32(1e6), patch)
+        filled = np.where(np.isnan(patch), np.float32(1e6), patch)
         corner = np.ones((2, 2), np.uint8)
-        spread = cv2.dilate(known, corner, anchor=(0, 0)) - cv2.erode(known, corner, anchor=(0, 0))
+        spread = cv2.dilate(filled, corner, anchor=(0, 0)) - cv2.erode(
+            filled, corner, anchor=(0, 0)
+        )
         steps = spread > _STEP * self.grid.gsd
         rough = steps[np.ix_(top, left)]
         return np.asarray(np.where(rough | np.isnan(smooth), near, smooth), np.float32)

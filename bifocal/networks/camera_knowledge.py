@@ -75,11 +75,18 @@ class CameraKnowledge:
         self, camera: int, pinhole: Pinhole, radial: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return how far a lens is from what was known of it, as `INTERIOR`, and its sigmas."""
-        known, matrix = self.interiors[camera], pinhole.matrix
-        ratios = np.log([matrix[0, 0] / known.focal, matrix[1, 1] / matrix[0, 0] / known.aspect])
-        off = np.concatenate([ratios, matrix[:2, 2] - known.centre, radial])
-        sigmas = known.sigma_focal, known.sigma_aspect, known.sigma_centre, known.sigma_centre
-        return off, np.array([*sigmas, known.sigma_radial, known.sigma_radial])
+        interior, matrix = self.interiors[camera], pinhole.matrix
+        ratios = np.log(
+            [matrix[0, 0] / interior.focal, matrix[1, 1] / matrix[0, 0] / interior.aspect]
+        )
+        off = np.concatenate([ratios, matrix[:2, 2] - interior.centre, radial])
+        sigmas = (
+            interior.sigma_focal,
+            interior.sigma_aspect,
+            interior.sigma_centre,
+            interior.sigma_centre,
+        )
+        return off, np.array([*sigmas, interior.sigma_radial, interior.sigma_radial])
 
     def observe(
         self, state: NetworkState, rows: Rows, column: IntArray, lengths: tuple[Taped, ...]
@@ -91,16 +98,16 @@ class CameraKnowledge:
         cameras = state.blocks["camera"]
         for k, camera in cameras.items():
             off, sigmas = self.off(k, camera, state.blocks["radial"][k])
-            told = column[k, INTERIOR] >= 0
+            free = column[k, INTERIOR] >= 0
             if self.lens[k] != k:  # what it shares is told once
-                told &= ~np.isin(INTERIOR, SHARED)
-            rows.known(column[k, INTERIOR][told], off[told], sigmas[told])
-        for one, other in pairwise(cameras):
+                free &= ~np.isin(INTERIOR, SHARED)
+            rows.known(column[k, INTERIOR][free], off[free], sigmas[free])
+        for one, following in pairwise(cameras):
             if self.sigma_body is None:
                 break
-            apart = cameras[one].matrix[:2, 2] - cameras[other].matrix[:2, 2]
+            apart = cameras[one].matrix[:2, 2] - cameras[following].matrix[:2, 2]
             line = rows.add(apart / self.sigma_body)
-            for k, sign in ((one, 1.0), (other, -1.0)):
+            for k, sign in ((one, 1.0), (following, -1.0)):
                 rows.by_label(line, column[k, _CENTRE], sign / self.sigma_body)
         for shares, metres, sigma in self.distances:
             total = sum(share * cameras[k].centre[2] for k, share in shares.items())

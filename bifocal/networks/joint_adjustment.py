@@ -120,13 +120,13 @@ class JointAdjustment(JointUnknowns):
         """
         whole = np.zeros((2 * len(CAMERA), 2 * len(CAMERA)))
         places = [[k * len(CAMERA) + e for e in ESTIMATED] for k in (0, 1)]
-        seen = self.observations
-        own = seen.pairs[pair]
-        for place, camera in zip(places, own, strict=True):
+        observations = self.observations
+        pair_cameras = observations.pairs[pair]
+        for place, camera in zip(places, pair_cameras, strict=True):
             whole[np.ix_(place, place)] = self.by_camera[camera]
         whole[np.ix_(*places)] = self.between[pair]
         whole[np.ix_(*places[::-1])] = self.between[pair].T
-        media = PairMedia.of_cameras(*(seen.media_of(camera) for camera in own))
+        media = PairMedia.of_cameras(*(observations.media_of(camera) for camera in pair_cameras))
         by = media.by_unknowns()
         return by @ whole @ by.T if media else whole
 
@@ -146,29 +146,29 @@ def adjust_jointly(observations: JointObservations, start: JointUnknowns) -> Joi
         If the measurements leave an orientation open; the message names it.
     """
     blunders: list[Blunder] = []
-    seen = with_enough_rays(observations)
+    rays = with_enough_rays(observations)
     # What was known before of the focal lengths, however often a round begins anew.
     focal = np.array([camera.matrix[0, 0] for camera in start.cameras])
-    start, tests, control = _coarse(seen, start, focal)
-    blunders += [_of_ray(seen, k, tests[k]) for k in np.flatnonzero(tests >= FAR_OFF).tolist()]
+    start, tests, control = _coarse(rays, start, focal)
+    blunders += [_of_ray(rays, k, tests[k]) for k in np.flatnonzero(tests >= FAR_OFF).tolist()]
     # A wrong ray moves its own point: what is known of that is judged when the ray is gone.
-    control[seen.point[tests >= FAR_OFF]] = 0.0
+    control[rays.point[tests >= FAR_OFF]] = 0.0
     blunders += [
-        _of_control(seen, k, control[k]) for k in np.flatnonzero(control >= FAR_OFF).tolist()
+        _of_control(rays, k, control[k]) for k in np.flatnonzero(control >= FAR_OFF).tolist()
     ]
-    known = np.where((control < FAR_OFF)[:, None], seen.known, np.nan)
-    seen = _without(seen, tests < FAR_OFF, known, blunders)
-    for left in range(ROUNDS, -1, -1):
-        system = _System(seen, start, focal)
+    coordinates = np.where((control < FAR_OFF)[:, None], rays.known, np.nan)
+    rays = _without(rays, tests < FAR_OFF, coordinates, blunders)
+    for remaining in range(ROUNDS, -1, -1):
+        system = _System(rays, start, focal)
         fit = system.network.solve(system.start)
         start = _unknowns(fit.state)
         sigma0 = _sigma0(fit, system)
-        keep, known, found = _gross(seen, system, fit, sigma0)
-        if not found or not left:
+        keep, coordinates, gross = _gross(rays, system, fit, sigma0)
+        if not gross or not remaining:
             break
-        blunders += found
-        seen = _without(seen, keep, known, found)
-    return _adjusted(observations, seen, system, fit, sigma0, (tuple(blunders), tuple(found)))
+        blunders += gross
+        rays = _without(rays, keep, coordinates, gross)
+    return _adjusted(observations, rays, system, fit, sigma0, (tuple(blunders), tuple(gross)))
 
 
 def settled_jointly(
@@ -179,14 +179,14 @@ def settled_jointly(
     Control holds the frame loosely; nothing is said of precision. Weights are renewed in some
     ``rounds``: where it begins near the end one will do.
     """
-    seen = with_enough_rays(observations)
+    rays = with_enough_rays(observations)
     focal = np.array([camera.matrix[0, 0] for camera in start.cameras])
-    start, tests, _ = _coarse(seen, start, focal, rounds)
+    start, tests, _ = _coarse(rays, start, focal, rounds)
     # Picks of control are judged at the end, when it holds the frame closely.
-    picked = np.asarray(np.isfinite(seen.known).any(axis=1))[seen.point]
-    seen = with_rays(seen, picked | (tests < FAR_OFF))
-    system = _System(seen, start, focal)
-    return seen, start, system.rays(system.start)[0]
+    picked = np.asarray(np.isfinite(rays.known).any(axis=1))[rays.point]
+    rays = with_rays(rays, picked | (tests < FAR_OFF))
+    system = _System(rays, start, focal)
+    return rays, start, system.rays(system.start)[0]
 
 
 def _coarse(
@@ -264,15 +264,15 @@ def _without(
     GeometryError
         If too little control is left to hold the frame.
     """
-    left = with_enough_rays(with_rays(replace(seen, known=known), keep))
-    if seen.frame_is_known and not left.frame_is_known:
+    reduced = with_enough_rays(with_rays(replace(seen, known=known), keep))
+    if seen.frame_is_known and not reduced.frame_is_known:
         control = {seen.ids[k] for k in np.flatnonzero(np.isfinite(seen.known).all(axis=1))}
         raise GeometryError(
             "the control points contradict each other or their picks: "
             f"{', '.join(sorted(control & {b.point for b in found}))}. "
             "Check their coordinates and names."
         )
-    return left
+    return reduced
 
 
 class _System:
@@ -283,15 +283,15 @@ class _System:
     """
 
     def __init__(self, seen: JointObservations, start: JointUnknowns, focal: FloatArray) -> None:
-        self.seen, known = seen, seen.cameras
+        self.seen, knowledge = seen, seen.cameras
         count, stay = len(seen.names), len(PARAMETERS)
         free = np.zeros((count, len(CAMERA)), dtype=bool)
         free[:, ESTIMATED] = True
         free[:, 0] = seen.sigma_focal > 0
         owner = np.repeat(np.arange(count)[:, None], len(CAMERA), axis=1)
-        if known is not None:
-            free = known.free
-            owner[:, SHARED] = np.array(known.lens)[:, None]
+        if knowledge is not None:
+            free = knowledge.free
+            owner[:, SHARED] = np.array(knowledge.lens)[:, None]
         elif not seen.frame_is_known:
             # Seven are free: the far camera, and for the scale the near one's distance.
             free[0], free[1, CAMERA.index("Z")] = False, False
@@ -305,12 +305,12 @@ class _System:
         self.used = np.bincount(seen.point, minlength=len(seen.ids)) > 0
         self.loose = np.flatnonzero(self.used & ~np.isfinite(seen.known[:, 2]))
         self.reach = float(min(camera.centre[2] for camera in start.cameras))
-        self.reach *= 1.0 if known is None else SHALLOW
-        self.focal = np.flatnonzero(free[:, 0]) if known is None else np.zeros(0, np.int64)
+        self.reach *= 1.0 if knowledge is None else SHALLOW
+        self.focal = np.flatnonzero(free[:, 0]) if knowledge is None else np.zeros(0, np.int64)
         self.first_focal = np.log(focal)
         labels = [f"{seen.names[i]}: {CAMERA[k]}" for i, k in np.argwhere(self.own_free).tolist()]
         # The ends of a taped length meet in one row and are not eliminated.
-        taped = known.lengths if known else ()
+        taped = knowledge.lengths if knowledge else ()
         self.lengths = tuple(one for one in taped if self.used[[*one[:2]]].all())
         ends = sorted({k for one in self.lengths for k in one[:2]})
         shape = (len(self.used), 3)
@@ -327,14 +327,15 @@ class _System:
         self.network = Network(
             labels=labels,
             columns={kind: {
-                k: {e: at for e, at in enumerate(own) if at >= 0 and (e < stay) == first}
-                for k, own in enumerate(self.column.tolist())
+                k: {e: at for e, at in enumerate(unknowns) if at >= 0 and (e < stay) == first}
+                for k, unknowns in enumerate(self.column.tolist())
             } for kind, first in (("camera", True), ("radial", False))},
             free=np.broadcast_to(eliminated[:, None], shape), kept=self.kept,
             names=[f"{seen.ids[k]}: {axis}" for k in np.flatnonzero(eliminated) for axis in "XYr"],
-            terms=(self._rays, self._known, *([self._cameras] if known else [])),
-            step=_stepped, what="the pairs" if known is None else "the photos", rounding=ROUNDING,
-            kind=SparseEquations if known is None else BlockEquations, largest=0,
+            terms=(self._rays, self._known, *([self._cameras] if knowledge else [])),
+            step=_stepped, rounding=ROUNDING,
+            what="the pairs" if knowledge is None else "the photos",
+            kind=SparseEquations if knowledge is None else BlockEquations, largest=0,
         )  # fmt: skip
 
     def rays(self, state: NetworkState) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -342,40 +343,44 @@ class _System:
 
         A ray's misfit is where its point is seen less where it was measured.
         """
-        seen, count, known = self.seen, len(self.seen.camera), self.seen.cameras
+        observations, count, knowledge = self.seen, len(self.seen.camera), self.seen.cameras
         misfit, by_point = np.empty((count, 2)), np.empty((count, 2, 3))
         by_camera = np.zeros((count, 2, len(CAMERA)))
         for number, camera in state.blocks["camera"].items():
             rows = self.own[number]
-            media, side = seen.media_of(number)
-            view = media.view(side, camera, state.points[seen.point[rows]])
+            media, side = observations.media_of(number)
+            view = media.view(side, camera, state.points[observations.point[rows]])
             by_point[rows], by_camera[rows, :, : len(PARAMETERS)] = view.by_point, view.by_camera
-            straight = seen.pixels[rows]
-            if known is not None and self.column[number, -1] >= 0:
-                bent = known.interiors[number].radial(*state.blocks["radial"][number])
+            straight = observations.pixels[rows]
+            if knowledge is not None and self.column[number, -1] >= 0:
+                bent = knowledge.interiors[number].radial(*state.blocks["radial"][number])
                 by_camera[rows, :, len(PARAMETERS) :] = -bent.undistorted_by_k(straight)
                 straight = bent.undistort(straight)
             misfit[rows] = view.pixels - straight
         return misfit, by_point, by_camera
 
     def _rays(self, state: NetworkState, rows: Rows) -> bool:
-        seen = self.seen
+        observations = self.seen
         misfit, by_point, by_camera = self.rays(state)
         if not np.isfinite(misfit).all():
             return False
-        weight = 1.0 / seen.sigma[:, None, None]
+        weight = 1.0 / observations.sigma[:, None, None]
         lines = rows.add(misfit * weight[:, 0])
-        rows.by_label(lines[..., None], self.column[seen.camera][:, None], by_camera * weight)
-        rows.by_points(lines, seen.point[:, None], by_point * weight)
+        rows.by_label(
+            lines[..., None], self.column[observations.camera][:, None], by_camera * weight
+        )
+        rows.by_points(lines, observations.point[:, None], by_point * weight)
         return True
 
     def _known(self, state: NetworkState, rows: Rows) -> bool:
-        seen, at, focal = self.seen, tuple(self.fixed.T), self.focal
-        rows.known(rows.places[at], (state.points - seen.known)[at], seen.sigma_known[at])
+        observations, at, focal = self.seen, tuple(self.fixed.T), self.focal
+        rows.known(
+            rows.places[at], (state.points - observations.known)[at], observations.sigma_known[at]
+        )
         rows.known(rows.places[self.loose, 2], state.points[self.loose, 2], self.reach)
         lengths = np.array([state.blocks["camera"][k].matrix[0, 0] for k in focal])
         drift = np.log(lengths) - self.first_focal[focal]
-        rows.known(self.column[focal, 0], drift, seen.sigma_focal[focal])
+        rows.known(self.column[focal, 0], drift, observations.sigma_focal[focal])
         return True
 
     def _cameras(self, state: NetworkState, rows: Rows) -> bool:
@@ -406,8 +411,8 @@ def _units(
     _, group = np.unique(sigma, return_inverse=True)
     squares = np.bincount(group, weights=residuals**2)
     free = np.bincount(group, weights=redundancy)
-    own = np.where(free >= ENOUGH, np.sqrt(squares / np.maximum(free, 1.0)), 1.0)
-    return np.maximum(own, sigma0)[group]
+    units = np.where(free >= ENOUGH, np.sqrt(squares / np.maximum(free, 1.0)), 1.0)
+    return np.maximum(units, sigma0)[group]
 
 
 def _gross(
@@ -439,13 +444,13 @@ def _gross(
     # It bends rays of other points too, which are judged again without it.
     if coordinates[wrong].max(initial=0.0) > rays.max(initial=0.0):
         bad[:] = False
-    found = [_of_ray(seen, k, rays[k]) for k in np.flatnonzero(bad).tolist()]
+    blunders = [_of_ray(seen, k, rays[k]) for k in np.flatnonzero(bad).tolist()]
     known = seen.known.copy()
     for k in np.flatnonzero(wrong).tolist():
         point = int(system.fixed[k, 0])
         known[point] = np.nan
-        found.append(_of_control(seen, point, coordinates[k]))
-    return ~bad, known, found
+        blunders.append(_of_control(seen, point, coordinates[k]))
+    return ~bad, known, blunders
 
 
 def _adjusted(

@@ -122,8 +122,8 @@ def with_enough_rays(observations: JointObservations) -> JointObservations:
     That is what is known of points without rays, and of all where they are too few for a frame: in
     that of the first pair they would contradict what is held.
     """
-    seen = np.unique(np.column_stack([observations.point, observations.camera]), axis=0)
-    count = np.bincount(seen[:, 0], minlength=len(observations.ids))
+    rays = np.unique(np.column_stack([observations.point, observations.camera]), axis=0)
+    count = np.bincount(rays[:, 0], minlength=len(observations.ids))
     fixed = np.isfinite(observations.known).all(axis=1) & (count > 0)
     if observations.cameras is not None and observations.cameras.by_wall:
         fixed = np.isfinite(observations.known[:, 2]) & (count > 0)
@@ -131,5 +131,5 @@ def with_enough_rays(observations: JointObservations) -> JointObservations:
         fixed[:] = False
     enough = (count >= 2) | fixed
     held = enough & bool(fixed.any())
-    known = np.where(held[:, None], observations.known, np.nan)
-    return replace(with_rays(observations, enough[observations.point]), known=known)
+    coordinates = np.where(held[:, None], observations.known, np.nan)
+    return replace(with_rays(observations, enough[observations.point]), known=coordinates)

@@ -57,7 +57,10 @@ class SharedPoints:
     def of_photos(self, which: Sequence[int]) -> SharedPoints:
         """Return the rays of some photos, which are counted anew and may be named twice."""
         rays = [np.flatnonzero(self.photo == photo) for photo in which]
-        photo, rows = np.repeat(range(len(rays)), [len(own) for own in rays]), np.concatenate(rays)
+        photo, rows = (
+            np.repeat(range(len(rays)), [len(part) for part in rays]),
+            np.concatenate(rays),
+        )
         return SharedPoints(
             photo=photo, point=self.point[rows], pixels=self.pixels[rows], count=self.count
         )
@@ -132,10 +135,10 @@ def _matches(
     good = inside.ravel() > 0
     if good.sum() < max(FEWEST_MATCHES, 0.3 * len(good)):
         return []
-    found = np.column_stack([rows1[good], rows2[good]]).astype(np.int64)
+    pairs = np.column_stack([rows1[good], rows2[good]]).astype(np.int64)
     # Features come strongest first.
-    keep = spread_evenly(first.pixels[found[:, 0]], np.arange(len(found), dtype=float), shape, most)
-    found_again: list[list[int]] = found[keep].tolist()
+    keep = spread_evenly(first.pixels[pairs[:, 0]], np.arange(len(pairs), dtype=float), shape, most)
+    found_again: list[list[int]] = pairs[keep].tolist()
     return found_again
 
 
@@ -257,12 +260,12 @@ def _places_by_pair(
     """Return the points seen in both photos of each pair, in its frame; NaN for others."""
     places = []
     for k in range(len(cameras) // 2):
-        seen = np.full((2, shared.count, 2), np.nan)
+        pixels = np.full((2, shared.count, 2), np.nan)
         for side in (0, 1):
             rays = shared.photo == 2 * k + side
-            seen[side, shared.point[rays]] = ideal[rays]
+            pixels[side, shared.point[rays]] = ideal[rays]
         both = slice(2 * k, 2 * k + 2)
-        xyz = media[k].meeting(cameras[both], seen[0], seen[1])
+        xyz = media[k].meeting(cameras[both], pixels[0], pixels[1])
         lowest = min(cameras[2 * k].centre[2], cameras[2 * k + 1].centre[2])
         wild = ~(np.abs(xyz[:, 2]) < 0.5 * lowest)  # near the zoom centre relief is not known
         wild |= xyz[:, 2] > BEFORE_MEDIA * highest_relief(cameras[both], media[k])
@@ -287,9 +290,9 @@ def _robust(source: FloatArray, target: FloatArray) -> Similarity:
         )  # fmt: skip
         if inside is not None and inside.sum() >= 3:
             both = both[inside.ravel() > 0]
-    found = fit_plane(source[both], target[both])
-    lifted = np.median(target[both, 2] - found(source[both])[:, 2])
-    return replace(found, target_centre=found.target_centre + np.array([0.0, 0.0, lifted]))
+    plane = fit_plane(source[both], target[both])
+    lifted = np.median(target[both, 2] - plane(source[both])[:, 2])
+    return replace(plane, target_centre=plane.target_centre + np.array([0.0, 0.0, lifted]))
 
 
 def _moved(xyz: FloatArray, frame: Similarity | None) -> FloatArray:

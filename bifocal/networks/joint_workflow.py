@@ -123,8 +123,8 @@ class JointResult:
         for kind in ("control", "check"):
             count, off = self.check_rms(kind)
             if count:
-                said = ", ".join(f"{1000 * v:.1f}" if np.isfinite(v) else "-" for v in off)
-                lines.append(f"{count} {kind} points: RMS in X, Y, r {said} mm")
+                misses = ", ".join(f"{1000 * v:.1f}" if np.isfinite(v) else "-" for v in off)
+                lines.append(f"{count} {kind} points: RMS in X, Y, r {misses} mm")
         named = [b for b in a.blunders if not b.point.startswith("tie ")]
         lines += [f"gross error: {_told(b)}" for b in named[:NAMED]]
         photos = Counter(b.where for b in a.blunders if b.where != "control").most_common(5)
@@ -253,10 +253,10 @@ def joint_adjustment(
     observed = with_rays(observed, good & np.isfinite(ideal).all(axis=1))
     start = replace(start, cameras=tuple(start.cameras[k] for k in once))
     adjusted = adjust_jointly(of_one_camera(observed, camera_of), start)
-    taken = [photos[once[camera]] for camera in camera_of]
+    originals = [photos[once[camera]] for camera in camera_of]
     return JointResult(
         pairs=tuple(
-            _adjusted_pair(pair, adjusted, k, taken[2 * k : 2 * k + 2])
+            _adjusted_pair(pair, adjusted, k, originals[2 * k : 2 * k + 2])
             for k, pair in enumerate(pairs)
         ),
         names=tuple(names), adjustment=adjusted, points=_points(named, adjusted),
@@ -337,8 +337,8 @@ def _observations(
     is_tie = shared.point >= named.shared.count
     sigma = np.where(is_tie, task.sigma_tie * reduction[shared.photo], task.sigma_pick)
     ties = shared.count - named.shared.count
-    known = np.full((shared.count, 3), np.nan)
-    known[: named.shared.count] = np.where(named.is_check[:, None], np.nan, named.xyz)
+    coordinates = np.full((shared.count, 3), np.nan)
+    coordinates[: named.shared.count] = np.where(named.is_check[:, None], np.nan, named.xyz)
     spread = np.ones((shared.count, 3))
     spread[: named.shared.count] = named.sigma
     focal = np.zeros(2 * len(pairs))
@@ -352,7 +352,7 @@ def _observations(
         camera=shared.photo, point=shared.point, pixels=ideal,
         sigma=sigma,
         ids=(*named.ids, *(f"tie {k + 1}" for k in range(ties))),
-        known=known, sigma_known=spread, sigma_focal=focal,
+        known=coordinates, sigma_known=spread, sigma_focal=focal,
     )  # fmt: skip
 
 
@@ -363,23 +363,23 @@ def _adjusted_pair(
     taken: Sequence[Photo],
 ) -> Pair:
     """Return a pair with its adjusted cameras, lenses and media as they were first stated."""
-    seen = adjusted.observations
+    observations = adjusted.observations
     photos = [
         replace(
-            _adjusted_photo(photo, adjusted.cameras[camera], *seen.media_of(camera)),
-            file=own.file, image_size=own.image_size, extra=own.extra,
+            _adjusted_photo(photo, adjusted.cameras[camera], *observations.media_of(camera)),
+            file=original.file, image_size=original.image_size, extra=original.extra,
         )
-        for camera, own, photo in zip(
-            seen.pairs[index], (pair.image1, pair.image2), taken, strict=True
+        for camera, original, photo in zip(
+            observations.pairs[index], (pair.image1, pair.image2), taken, strict=True
         )
     ]  # fmt: skip
     extra = {key: value for key, value in pair.extra.items() if key != "setup"}
-    said = {"way": "joint adjustment", "sigma0": adjusted.sigma0}
+    setup = {"way": "joint adjustment", "sigma0": adjusted.sigma0}
     if isinstance(before := pair.extra.get("setup"), dict):
-        said |= {key: before[key] for key in BENT if key in before}
+        setup |= {key: before[key] for key in BENT if key in before}
     return replace(
         pair, image1=photos[0], image2=photos[1], orientation=adjusted.orientation(index),
-        extra={**extra, "setup": said}, remarks=(),
+        extra={**extra, "setup": setup}, remarks=(),
     )  # fmt: skip
 
 
@@ -400,8 +400,8 @@ def _points(named: NamedPositions, adjusted: JointAdjustment) -> tuple[dict[str,
     out = []
     wrong = {b.point for b in adjusted.blunders if b.where == "control"}
     for k, name in enumerate(named.ids):
-        known = np.isfinite(named.xyz[k]).any()
-        kind = "check" if named.is_check[k] else "control" if known else "tie"
+        is_control = np.isfinite(named.xyz[k]).any()
+        kind = "check" if named.is_check[k] else "control" if is_control else "tie"
         sigma = np.sqrt(np.diagonal(adjusted.covariance[k]))
         away = adjusted.xyz[k] - named.xyz[k]
         row: dict[str, Any] = {"id": name, "kind": kind, "rays": int(rays[k])}

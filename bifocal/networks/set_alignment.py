@@ -135,7 +135,7 @@ def set_alignment(
     # Another face that may be the wall moves all cameras alike.
     offset = 0.0 if first.pair.wall_named else zero_sigma(first.pair.faces)
     covariance[np.ix_(heights, heights)] += offset**2
-    made = tuple(
+    aligned = tuple(
         photo_of(camera, interior, lens_of(interior, k), (PairMedia.none(), 0))
         for camera, interior, k in zip(cameras, first.interiors, radial, strict=True)
     )
@@ -166,45 +166,45 @@ def set_alignment(
         "words": list(words),
     }  # fmt: skip
     return SetAlignment(
-        photos=PhotoSet(photos=made, orientation=covariance), way=oriented.way, setup=setup,
+        photos=PhotoSet(photos=aligned, orientation=covariance), way=oriented.way, setup=setup,
         words=words, remarks=remarks,
     )  # fmt: skip
 
 
 def _words(oriented: OrientedSet, sigma: FloatArray) -> tuple[str, ...]:
     """Return the set-up in sentences; ``sigma`` are those of `CAMERA`, shape (m, 12)."""
-    adjusted, seen = oriented.adjusted, oriented.adjusted.observations
-    told = [
+    adjusted, network = oriented.adjusted, oriented.adjusted.observations
+    words = [
         remark(
-            "photo_set.adjusted", photos=len(seen.names), points=len(np.unique(seen.point)),
-            rays=len(seen.point), sigma=oriented.sigma_tie, sigma0=adjusted.sigma0,
-            far=seen.names[oriented.first.far], near=seen.names[oriented.first.near],
+            "photo_set.adjusted", photos=len(network.names), points=len(np.unique(network.point)),
+            rays=len(network.point), sigma=oriented.sigma_tie, sigma0=adjusted.sigma0,
+            far=network.names[oriented.first.far], near=network.names[oriented.first.near],
         )
     ]  # fmt: skip
-    rays = np.bincount(seen.camera, minlength=len(seen.names))
-    for k, (name, camera) in enumerate(zip(seen.names, adjusted.cameras, strict=True)):
+    rays = np.bincount(network.camera, minlength=len(network.names))
+    for k, (name, camera) in enumerate(zip(network.names, adjusted.cameras, strict=True)):
         tilt = float(np.rad2deg(np.arctan(np.hypot(*camera.tilt))))
         about = {"distance": float(camera.centre[2]), "sigma": 1000 * float(sigma[k, 9])}
-        told.append(remark("photo_set.station", name=name, tilt=tilt, rays=int(rays[k]), **about))
-    return tuple(told)
+        words.append(remark("photo_set.station", name=name, tilt=tilt, rays=int(rays[k]), **about))
+    return tuple(words)
 
 
 def _remarks(oriented: OrientedSet) -> tuple[str, ...]:
     """Return doubts of the first pair, gross errors, and what was taped wrong or is missing."""
-    adjusted, told = oriented.adjusted, list(oriented.first.pair.remarks)
+    adjusted, remarks = oriented.adjusted, list(oriented.first.pair.remarks)
     names = adjusted.observations.names
     for blunder in (*adjusted.blunders, *adjusted.left_in):
         if blunder.point not in oriented.control.ids:
             continue
         if blunder.where == "control":
             about = {"name": blunder.point, "sigmas": blunder.test}
-            told.append(remark("orientation.gross_control", **about))
+            remarks.append(remark("orientation.gross_control", **about))
         else:
             about = {"name": blunder.point, "photo": blunder.where, "sigmas": blunder.test}
-            told.append(remark("photo_set.gross_pick", **about))
-    known = adjusted.observations.cameras
-    assert known is not None
-    for shares, metres, sigma in known.distances:
+            remarks.append(remark("photo_set.gross_pick", **about))
+    knowledge = adjusted.observations.cameras
+    assert knowledge is not None
+    for shares, metres, sigma in knowledge.distances:
         places = {k * len(CAMERA) + CAMERA.index("Z"): share for k, share in shares.items()}
         row = np.array(list(places.values()))
         off = sum(share * adjusted.cameras[k].centre[2] for k, share in shares.items()) - metres
@@ -213,10 +213,10 @@ def _remarks(oriented: OrientedSet) -> tuple[str, ...]:
         if test > OUTLIER_LIMIT and abs(off) > sigma:
             about = {"off": float(off), "given": metres, "sigmas": float(test)}
             name = " - ".join(names[k] for k in shares)
-            told.append(remark("photo_set.distance_contradicts", name=name, **about))
+            remarks.append(remark("photo_set.distance_contradicts", name=name, **about))
     for k, camera in enumerate(adjusted.cameras):
         spread = float(np.sqrt(adjusted.of_cameras[k * len(CAMERA) + 9, k * len(CAMERA) + 9]))
         if spread > REMARKS.worst_scale * camera.centre[2]:
             about = {"distance": float(camera.centre[2]), "sigma": spread}
-            told.append(remark("photo_set.poor_distance", name=names[k], **about))
-    return tuple(dict.fromkeys(told))
+            remarks.append(remark("photo_set.poor_distance", name=names[k], **about))
+    return tuple(dict.fromkeys(remarks))

@@ -107,13 +107,13 @@ def orient_set(
         progress(k, len(photos) + 2, photo.name)
         assert photo.grey is not None
         validation.check_sharp(photo.name, photo.grey)
-        found = find_features(photo.grey, limit=most, budget=PIXELS)
-        features.append(replace(found, pixels=photo.interior.ideal(found.pixels)))
+        features_of = find_features(photo.grey, limit=most, budget=PIXELS)
+        features.append(replace(features_of, pixels=photo.interior.ideal(features_of.pixels)))
     progress(len(photos), len(photos) + 2, "matches")
-    seen = _seen(photos, features, control)
-    first = first_cameras_of(photos, seen, control, site)
+    shared = _seen(photos, features, control)
+    first = first_cameras_of(photos, shared, control, site)
     progress(len(photos) + 1, len(photos) + 2, "adjustment")
-    observed = _observed(photos, seen, control, site, first)
+    observed = _observed(photos, shared, control, site, first)
     is_tie = observed.point >= len(control.ids)
     reduction = np.array([part.reduction for part in features])
     observed = replace(
@@ -124,14 +124,14 @@ def orient_set(
         (first.xyz[observed.point] - camera.centre) @ camera.rotation[2] > 0
         for camera in first.cameras
     ]
-    there = np.array(before)[observed.camera, np.arange(len(is_tie))]
+    started = np.array(before)[observed.camera, np.arange(len(is_tie))]
     # Ends of a length that one photo shows lie on the wall: they wait until that is found.
     alone = ~is_tie & (np.bincount(observed.point)[observed.point] == 1)
     waiting = with_rays(
         observed, alone & ~np.asarray(np.isfinite(observed.known).any(axis=1))[observed.point]
     )
     # A tie whose rays run along each other would wander on them.
-    observed = with_rays(observed, there & (~is_tie | first.met[observed.point]))
+    observed = with_rays(observed, started & (~is_tie | first.met[observed.point]))
     count = len(control.ids)
     for rounds in (3, 1):  # the second pass searches around better places
         observed, state, _ = settled_jointly(observed, state, rounds)
@@ -186,10 +186,10 @@ def _met(
     observed: JointObservations, state: JointUnknowns, control: int
 ) -> tuple[JointObservations, JointUnknowns]:
     """Return the rays without ties that wander along them, and ties where their rays meet."""
-    seen = SharedPoints(
+    shared = SharedPoints(
         photo=observed.camera, point=observed.point, pixels=observed.pixels, count=len(observed.ids)
     )
-    places = meeting(dict(enumerate(state.cameras)), seen, seen.pixels)
+    places = meeting(dict(enumerate(state.cameras)), shared, shared.pixels)
     met = np.asarray(np.isfinite(places).all(axis=1))
     met[:control] = False
     xyz = np.where(met[:, None], places, state.xyz)
@@ -217,7 +217,7 @@ def _seen(
     every = common_features(features, shapes, ~np.eye(len(photos), dtype=bool), most=MATCHES)
     ties = _spread(every, shapes)
     count, picks = len(control.ids), control.picks if control.ids else ()
-    picked = [np.flatnonzero(np.isfinite(own).all(axis=1)) for own in picks]
+    picked = [np.flatnonzero(np.isfinite(pixels).all(axis=1)) for pixels in picks]
     parts = [photos[k].interior.ideal(picks[k][rows]) for k, rows in enumerate(picked)]
     return SharedPoints(
         photo=np.r_[np.repeat(np.arange(len(picked)), [len(r) for r in picked]), ties.photo]
@@ -233,9 +233,9 @@ def _spread(ties: SharedPoints, shapes: Sequence[tuple[int, int]]) -> SharedPoin
     count = np.bincount(ties.point, minlength=ties.count)
     keep = np.zeros(len(ties.photo), dtype=bool)
     for k, shape in enumerate(shapes):
-        own = np.flatnonzero(ties.photo == k)
-        few = 1.0 / count[ties.point[own]]
-        keep[own[spread_evenly(ties.pixels[own], few, shape, RAYS)]] = True
+        rows = np.flatnonzero(ties.photo == k)
+        few = 1.0 / count[ties.point[rows]]
+        keep[rows[spread_evenly(ties.pixels[rows], few, shape, RAYS)]] = True
     keep &= (np.bincount(ties.point[keep], minlength=ties.count) >= 2)[ties.point]
     number = np.cumsum(np.bincount(ties.point[keep], minlength=ties.count) > 0) - 1
     return SharedPoints(
@@ -249,13 +249,13 @@ def _observed(
     first: FirstCameras,
 ) -> JointObservations:  # fmt: skip
     """Return all rays, in the frame of control, or without enough of it of the first pair."""
-    known, sigma = np.full((seen.count, 3), np.nan), np.ones((seen.count, 3))
+    coordinates, sigma = np.full((seen.count, 3), np.nan), np.ones((seen.count, 3))
     held: dict[int, tuple[str, ...]] = {}
     one_body = len({(i.image_size, i.is_calibrated) for i in first.interiors}) == 1
     one_body &= not first.interiors[0].is_calibrated
     centres = 0.002 * float(np.hypot(*first.interiors[0].image_size))
     if _holds_frame(control):
-        known[: len(control.ids)], sigma[: len(control.ids)] = control.xyz, control.sigma
+        coordinates[: len(control.ids)], sigma[: len(control.ids)] = control.xyz, control.sigma
     else:
         pose = ("turn X", "turn Y", "turn Z", "X", "Y", "Z")
         held = {first.far: pose, first.near: ("Z",)}
@@ -263,7 +263,7 @@ def _observed(
         names=tuple(photo.name for photo in photos), camera=seen.photo, point=seen.point,
         pixels=seen.pixels, sigma=np.full(len(seen.photo), site.sigma_pick),
         ids=(*control.ids, *(f"tie {k + 1}" for k in range(seen.count - len(control.ids)))),
-        known=known, sigma_known=sigma, sigma_focal=np.zeros(len(photos)),
+        known=coordinates, sigma_known=sigma, sigma_focal=np.zeros(len(photos)),
         cameras=CameraKnowledge(
             interiors=first.interiors, lens=first.lens, held=held, by_wall=bool(held),
             sigma_body=centres if one_body else None,
@@ -296,18 +296,18 @@ def _refined(
     pixels, good = observed.pixels.copy(), ~is_tie | at_home
     greys = [photo.grey for photo in photos if photo.grey is not None]
     for one, first_grey in enumerate(greys):
-        for other, grey in enumerate(greys):
-            rays = is_tie & (observed.camera == other) & (home[observed.point] == one) & ~at_home
+        for second, grey in enumerate(greys):
+            rays = is_tie & (observed.camera == second) & (home[observed.point] == one) & ~at_home
             if rays.any():
                 pixels[rays], good[rays] = refine_ties(
                     PairObservations(
-                        interiors=(first.interiors[one], first.interiors[other]),
+                        interiors=(first.interiors[one], first.interiors[second]),
                         tie1=place[observed.point[rays]], tie2=pixels[rays],
                         tie_used=np.ones(int(rays.sum()), dtype=bool),
                     ),
                     PairUnknowns(
-                        cameras=(state.cameras[one], state.cameras[other]),
-                        radial=state.radial[[one, other]],
+                        cameras=(state.cameras[one], state.cameras[second]),
+                        radial=state.radial[[one, second]],
                     ),
                     (first_grey, grey),
                 )  # fmt: skip
@@ -328,38 +328,40 @@ def _adjusted(
     sigma = np.where(
         ties, sigma_tie * np.sqrt(np.maximum(crowd, 1.0))[observed.camera], site.sigma_pick
     )
-    known, spread = observed.known.copy(), observed.sigma_known.copy()
-    knowledge, on_wall = observed.cameras, np.zeros(len(known), dtype=bool)
+    coordinates, spread = observed.known.copy(), observed.sigma_known.copy()
+    knowledge, on_wall = observed.cameras, np.zeros(len(coordinates), dtype=bool)
     assert knowledge is not None
     free_frame = knowledge.by_wall and control.positioned.sum() < 2
     pair = first.pair.observations
     turning: tuple[FacadeDirection, ...] = ()
     if knowledge.by_wall:
         count = len(control.ids)
-        known[:count], spread[:count] = control.xyz, control.sigma
+        coordinates[:count], spread[:count] = control.xyz, control.sigma
         on_wall, rough = _wall(observed, state, count, sigma_tie)
-        known[on_wall, 2], spread[on_wall, 2] = 0.0, rough[on_wall]
+        coordinates[on_wall, 2], spread[on_wall, 2] = 0.0, rough[on_wall]
         held = {first.far: ("turn Z", "X", "Y")} if free_frame else {}
         cameras = {1: first.far, 2: first.near}
         tilts = {} if pair.sigma_tilt is None else dict.fromkeys(cameras.values(), pair.sigma_tilt)
         lines = tuple(replace(line, camera=cameras[line.camera] + 1) for line in pair.lines)
         turning, lines = (lines, ()) if pair.lines_bend_nothing else ((), lines)
         knowledge = replace(knowledge, held=held, sigma_tilts=tilts, lines=lines)
-    own = {"distance1": {0: 1.0}, "distance2": {1: 1.0}, "delta_d": {0: 1.0, 1: -1.0}}
+    shares_of = {"distance1": {0: 1.0}, "distance2": {1: 1.0}, "delta_d": {0: 1.0, 1: -1.0}}
     spreads = control.sigma_lengths or (np.nan,) * len(control.lengths)
     usual = float(control.sigma.min(initial=0.003))
     knowledge = replace(
         knowledge,
         distances=tuple(
             (shares, float(getattr(site, name)), site.sigma)
-            for name, shares in own.items() if getattr(site, name) is not None
+            for name, shares in shares_of.items() if getattr(site, name) is not None
         ),
         lengths=tuple(
             (a, b, metres, usual if np.isnan(s) else s)
             for (a, b, metres), s in zip(control.lengths, spreads, strict=True)
         ),
     )  # fmt: skip
-    observed = replace(observed, sigma=sigma, known=known, sigma_known=spread, cameras=knowledge)
+    observed = replace(
+        observed, sigma=sigma, known=coordinates, sigma_known=spread, cameras=knowledge
+    )
     adjusted = adjust_jointly(observed, state)
     adjusted = turned_set(adjusted, turning) if turning else adjusted
     return OrientedSet(
@@ -371,13 +373,13 @@ def _adjusted(
 
 def turned_set(adjusted: JointAdjustment, lines: Sequence[FacadeDirection]) -> JointAdjustment:
     """Return cameras and points in a frame that lines turn, as `turned_by_lines` does a pair's."""
-    known, factor = adjusted.observations.cameras, max(adjusted.sigma0, 1.0) ** 2
-    assert known is not None
+    knowledge, factor = adjusted.observations.cameras, max(adjusted.sigma0, 1.0) ** 2
+    assert knowledge is not None
     scale = np.sqrt(np.diag(adjusted.of_cameras))
     unit = np.where(scale > 0, scale, np.inf)[:, None]  # as correlations: units differ by far
     inverse = np.linalg.pinv(adjusted.of_cameras / (unit * unit.T), rcond=1e-13, hermitian=True)
     frame, cofactor = turned_by_lines(
-        lines, adjusted.cameras, known.free.ravel(), adjusted.of_cameras / factor,
+        lines, adjusted.cameras, knowledge.free.ravel(), adjusted.of_cameras / factor,
         lambda moves: factor * (moves / unit).T @ inverse @ (moves / unit),
     )  # fmt: skip
     xyz = np.where(np.isfinite(adjusted.xyz), frame(np.nan_to_num(adjusted.xyz)), np.nan)
@@ -406,13 +408,13 @@ def _wall(
         points = seen.point[seen.camera == k]
         by = project_with_jacobian(own, xyz[points]).by_point / sigma_tie
         np.add.at(normal, points, by.transpose(0, 2, 1) @ by)
-    there = np.isfinite(xyz).all(axis=1) & (np.linalg.eigvalsh(normal)[:, 0] > 1.0)
-    there[:control] = False
+    usable = np.isfinite(xyz).all(axis=1) & (np.linalg.eigvalsh(normal)[:, 0] > 1.0)
+    usable[:control] = False
     sigma = np.full(len(xyz), np.nan)
-    sigma[there] = np.sqrt(np.linalg.inv(normal[there])[:, 2, 2])
-    face = narrow_face(xyz[there], sigma[there], band=WALLS.rough_band * float(camera.centre[2]))
+    sigma[usable] = np.sqrt(np.linalg.inv(normal[usable])[:, 2, 2])
+    face = narrow_face(xyz[usable], sigma[usable], band=WALLS.rough_band * float(camera.centre[2]))
     chance = np.zeros(len(xyz))
-    chance[there] = face.chance
+    chance[usable] = face.chance
     width = 0.1 * 2 * camera.matrix[0, 2] * camera.centre[2] / camera.matrix[0, 0]
     cells = len(np.unique(np.floor(xyz[chance > LEAST_CHANCE, :2] / width), axis=0))
     if chance.sum() < TIES.fewest_on_wall or cells < TIES.fewest_cells:

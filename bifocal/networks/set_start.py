@@ -95,15 +95,15 @@ def first_cameras_of(
     for k, interior in enumerate(interiors):
         rays = seen.photo == k
         pixels[rays] = interior.radial(*radial[k]).undistort(pixels[rays])
-    known = np.full((seen.count, 3), np.nan)
-    known[: len(control.ids)] = control.xyz
+    coordinates = np.full((seen.count, 3), np.nan)
+    coordinates[: len(control.ids)] = control.xyz
     while len(cameras) < len(photos):
-        xyz = np.where(np.isfinite(known), known, meeting(cameras, seen, pixels))
-        there = np.asarray(np.isfinite(xyz).all(axis=1))[seen.point]
-        count = [-1 if k in cameras else int((there & (seen.photo == k)).sum())
+        xyz = np.where(np.isfinite(coordinates), coordinates, meeting(cameras, seen, pixels))
+        placed = np.asarray(np.isfinite(xyz).all(axis=1))[seen.point]
+        count = [-1 if k in cameras else int((placed & (seen.photo == k)).sum())
                  for k in range(len(photos))]  # fmt: skip
         k = int(np.argmax(count))
-        rays = there & (seen.photo == k)
+        rays = placed & (seen.photo == k)
         try:
             camera, agree = resect(xyz[seen.point[rays]], pixels[rays], interiors[k])
         except GeometryError:
@@ -137,8 +137,8 @@ def _first_pair(
 ) -> tuple[tuple[int, int], OrientedPair]:
     """Return the best pair that today's way orients, and its photos, the far one first."""
     reasons: list[GeometryError | ConvergenceError] = []
-    for one, other in _promising(photos, seen, control, site)[:TRIED]:
-        for far, near in ((one, other), (other, one)):
+    for one, second in _promising(photos, seen, control, site)[:TRIED]:
+        for far, near in ((one, second), (second, one)):
             try:
                 pair = orient_pair(
                     (photos[far], photos[near]), control=control.of(far, near),
@@ -171,20 +171,25 @@ def _promising(
 
     Of each, the photo first that seems to be taken from farther away.
     """
-    found = []
+    ranked = []
     for pair, ties in _common(seen, len(photos), len(control.ids)):
-        one, other = pair
-        picked = control.of(one, other)
+        one, second = pair
+        picked = control.of(one, second)
         enough = all(
             (picked.positioned & np.isfinite(p).all(axis=1)).sum() >= 4
             for p in (picked.pixels1, picked.pixels2)
         )
-        own = _measures(site, one, other)
-        scaled = own.distance1 or own.distance2 or own.delta_d or (control.lengths and one == 0)
+        measures = _measures(site, one, second)
+        scaled = (
+            measures.distance1
+            or measures.distance2
+            or measures.delta_d
+            or (control.lengths and one == 0)
+        )
         if enough or ((scaled or picked.positioned.sum() >= 2) and (site.wall is None or not one)):
-            told = _promise(photos[one].interior, photos[other].interior, *ties)
-            found.append((enough, abs(told), pair if told >= 0 or site.wall else pair[::-1]))
-    return [pair for *_, pair in sorted(found, reverse=True)]
+            promise = _promise(photos[one].interior, photos[second].interior, *ties)
+            ranked.append((enough, abs(promise), pair if promise >= 0 or site.wall else pair[::-1]))
+    return [pair for *_, pair in sorted(ranked, reverse=True)]
 
 
 def _common(
@@ -194,10 +199,10 @@ def _common(
     pixels = np.full((photos, seen.count, 2), np.nan)
     pixels[seen.photo, seen.point] = seen.pixels
     pixels = pixels[:, first:]
-    for one, other in combinations(range(photos), 2):
-        both = np.isfinite(pixels[one] + pixels[other]).all(axis=1)
+    for one, second in combinations(range(photos), 2):
+        both = np.isfinite(pixels[one] + pixels[second]).all(axis=1)
         if both.sum() >= FEWEST_MATCHES:
-            yield (one, other), (pixels[one, both], pixels[other, both])
+            yield (one, second), (pixels[one, both], pixels[second, both])
 
 
 def _promise(first: Interior, second: Interior, x1: FloatArray, x2: FloatArray) -> float:
@@ -218,14 +223,14 @@ def _promise(first: Interior, second: Interior, x1: FloatArray, x2: FloatArray) 
     good = inside.ravel() > 0
     if not good.any():
         return 0.0
-    there = (xyz[:3] / xyz[3]).T[good]
-    depth2 = (there @ turn.T + shift.T)[:, 2]
-    farther = np.median(there[:, 2]) >= np.median(depth2)
+    points = (xyz[:3] / xyz[3]).T[good]
+    depth2 = (points @ turn.T + shift.T)[:, 2]
+    farther = np.median(points[:, 2]) >= np.median(depth2)
     d1, d2 = y1[good], y2[good] @ turn
     sine = np.linalg.norm(np.cross(d1, d2), axis=1)
     sine /= np.linalg.norm(d1, axis=1) * np.linalg.norm(d2, axis=1)
-    told = float((np.minimum(sine, WIDE) ** 2).sum())
-    return told if farther else -told
+    promise = float((np.minimum(sine, WIDE) ** 2).sum())
+    return promise if farther else -promise
 
 
 def _lenses(interiors: Sequence[Interior]) -> tuple[int, ...]:
@@ -239,7 +244,8 @@ def _lenses(interiors: Sequence[Interior]) -> tuple[int, ...]:
         return bool(abs(np.log(one.focal / other.focal)) < SAME_FOCAL)
 
     return tuple(
-        next((j for j in range(k) if same(interiors[j], own)), k) for k, own in enumerate(interiors)
+        next((j for j in range(k) if same(interiors[j], interior)), k)
+        for k, interior in enumerate(interiors)
     )
 
 

@@ -31,8 +31,8 @@ ENDING = ".photos.json"
 def way_of_set(options: AlignOptions) -> tuple[str, AlignOptions]:
     """Return which way into the file of a set the options describe; refuse what is of a pair."""
     if options.media or options.as_set_up:
-        said = "--as-set-up" if options.as_set_up else "--indices"
-        raise InputError(f"{said}: is of two photos; align them in pairs and leave it out here.")
+        option = "--as-set-up" if options.as_set_up else "--indices"
+        raise InputError(f"{option}: is of two photos; align them in pairs and leave it out here.")
     return way_of(options)
 
 
@@ -59,7 +59,7 @@ def align_photo_set(
         )
     way, options = way_of_set(options)
     twice = [path for k, path in enumerate(paths) if path.resolve() in
-             {other.resolve() for other in paths[:k]}]  # fmt: skip
+             {earlier.resolve() for earlier in paths[:k]}]  # fmt: skip
     if twice:
         raise InputError(f"{twice[0]}: was given twice; name each photo once.")
     check_metres(options)
@@ -76,17 +76,19 @@ def align_photo_set(
         *[""] * (len(paths) - 2),
     )  # as the options of their lenses are called
     photos = [
-        PhotoInput(grey=read_grey(path), interior=interior_of_photo(info, known, k), name=name)
-        for k, path, name, info, known in zip(numbers, paths, names, infos, lenses, strict=True)
+        PhotoInput(grey=read_grey(path), interior=interior_of_photo(info, lens, k), name=name)
+        for k, path, name, info, lens in zip(numbers, paths, names, infos, lenses, strict=True)
     ]
     sizes = [photo.interior.image_size for photo in photos]
     control = control_of(options, sizes, [str(path) for path in paths])
     oriented = orient_set(photos, control=control, site=options.site, progress=progress)
-    made = set_alignment(replace(oriented, way=way), photos, options.direction)
-    made = replace(made, remarks=(*control.remarks, *made.remarks))
+    alignment = set_alignment(replace(oriented, way=way), photos, options.direction)
+    alignment = replace(alignment, remarks=(*control.remarks, *alignment.remarks))
     stem = out.name[: -len(ENDING)]
     entries = []
-    for k, (path, name, photo) in enumerate(zip(paths, names, made.photos.photos, strict=True)):
+    for k, (path, name, photo) in enumerate(
+        zip(paths, names, alignment.photos.photos, strict=True)
+    ):
         extra = dict(photo.extra)
         if photo.lens is not None:
             shared = oriented.first.lens[k]
@@ -97,11 +99,11 @@ def align_photo_set(
         entries.append(replace(photo, file=file, name=name if alike else "", extra=extra))
     photo_set = PhotoSet(
         photos=tuple(entries),
-        orientation=made.photos.orientation,
-        extra={"setup": made.setup, **world_entry(control.frame)},
+        orientation=alignment.photos.orientation,
+        extra={"setup": alignment.setup, **world_entry(control.frame)},
     )
     photo_set.write(out, overwrite=overwrite)
-    return replace(made, photos=photo_set)
+    return replace(alignment, photos=photo_set)
 
 
 def set_as_dict(made: SetAlignment) -> dict[str, Any]:

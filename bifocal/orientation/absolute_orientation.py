@@ -228,7 +228,7 @@ def _with_words(pair: OrientedPair, given: Given, remarks: tuple[str, ...]) -> O
     """Return the pair with all that is to be told of it, doubts first; refuse what is none."""
     validation.check_determined(pair.adjusted)
     validation.check_movement(pair.adjusted)
-    told = (
+    sentences = (
         *model_remarks(pair, given.site),
         *filter(None, [given.pick_verdict.words, *(i.doubt for i in given.interiors)]),
         *remarks,
@@ -239,13 +239,13 @@ def _with_words(pair: OrientedPair, given: Given, remarks: tuple[str, ...]) -> O
         *distance_remarks(pair),
     )
     assumed = (*pair.assumed, *assumptions(pair.observations, given.site))
-    return replace(pair, remarks=told, assumed=assumed)
+    return replace(pair, remarks=sentences, assumed=assumed)
 
 
 def _bend(observations: PairObservations, state: PairUnknowns) -> WallShape:
     """Return how far the wall is from a plane between the photos."""
-    seen, size = observations.straight_ties(state.radial), observations.interiors[0].image_size
-    return shape_between(state, *seen, observations.tie_used, size)
+    straight, size = observations.straight_ties(state.radial), observations.interiors[0].image_size
+    return shape_between(state, *straight, observations.tie_used, size)
 
 
 def _reason(
@@ -344,7 +344,7 @@ def _by_control(given: Given, ties: Ties | None) -> TrialOrientation | None:
         z1, z2 = (float(camera.centre[2]) for camera in cameras)
         if d1 and d2 and (d1 < d2) != (z1 < z2):
             d1, d2 = d2, d1
-        if any(known and not 0.5 < known / z < 2 for known, z in ((d1, z1), (d2, z2))):
+        if any(taped and not 0.5 < taped / z < 2 for taped, z in ((d1, z1), (d2, z2))):
             d1 = d2 = None  # another unit: `validation.check_units` says so
         given = replace(given, site=replace(given.site, distance1=d1, distance2=d2))
         observations = observations_of(given, interiors, None, agree)

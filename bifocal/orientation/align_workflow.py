@@ -169,8 +169,8 @@ def align_photos(
     infos = image_info(far), image_info(near)
     greys = read_greys(far, near, in_water=bool(options.media))
     interiors = [
-        interior_of_photo(info, known, number)
-        for number, (info, known) in enumerate(zip(infos, options.lenses, strict=True), start=1)
+        interior_of_photo(info, lens, number)
+        for number, (info, lens) in enumerate(zip(infos, options.lenses, strict=True), start=1)
     ]
     interiors = judged_together(infos, interiors)
     if options.one_lens and all(interior.is_assumed for interior in interiors):
@@ -299,10 +299,10 @@ def _check_focal(photos: tuple[PhotoInput, PhotoInput]) -> None:
 def check_metres(options: AlignOptions) -> None:
     """Refuse distances and lengths in millimetres; control points tell of distances themselves."""
     site = options.site
-    given = {"--delta-d": site.delta_d, "--length": options.length and options.length[1]}
+    lengths = {"--delta-d": site.delta_d, "--length": options.length and options.length[1]}
     if options.control is None:
-        given |= {"--distance1": site.distance1, "--distance2": site.distance2}
-    for name, value in given.items():
+        lengths |= {"--distance1": site.distance1, "--distance2": site.distance2}
+    for name, value in lengths.items():
         if value and value > FARTHEST_WALL:
             about = {"name": name, "value": value, "meant": value / 1000}
             raise InputError(remark("refused.length_in_mm", **about))
@@ -335,11 +335,11 @@ def interior_of_photo(info: ImageInfo, data: KnownLens, number: int | str = "") 
         focal, sigma, pitch, source = judged.focal, judged.sigma, judged.pitch, judged.source
     else:
         return Interior.unknown(info.size)
-    found = Interior.from_focal(
+    interior = Interior.from_focal(
         focal, image_size=info.size, sigma=sigma, source=source, pixel_size=pitch
     )
     typed = data.focal is not None
-    return replace(found, is_typed=typed, doubt="" if typed else judged.doubt)
+    return replace(interior, is_typed=typed, doubt="" if typed else judged.doubt)
 
 
 def judged_together(

@@ -164,7 +164,7 @@ def _radial_units(adjusted: AdjustedPair, observations: PairObservations) -> Flo
     The distortion's radius counts in principal distances: there of the camera as adjusted.
     """
     cameras = zip(adjusted.cameras, observations.interiors, strict=True)
-    ratios = np.array([(camera.matrix[0, 0] / given.focal) ** 2 for camera, given in cameras])
+    ratios = np.array([(camera.matrix[0, 0] / interior.focal) ** 2 for camera, interior in cameras])
     return np.column_stack([ratios, ratios**2])
 
 
@@ -203,11 +203,11 @@ def lens_of(interior: Interior, radial: FloatArray) -> Lens | None:
         return interior.lens
     # r_u = r_d / (1 + k1 r_d² + k2 r_d⁴) turned round: r_d / r_u as an even polynomial of r_u.
     reach = np.hypot(*interior.image_size) / 2 / interior.focal
-    seen = np.linspace(0, reach, 200)[1:]
-    along = np.column_stack([seen, np.zeros_like(seen)])
+    distorted = np.linspace(0, reach, 200)[1:]
+    along = np.column_stack([distorted, np.zeros_like(distorted)])
     ideal = RadialDivision(radial[0], np.zeros(2), 1.0, radial[1]).undistort(along)[:, 0]
     powers = np.stack([ideal**2, ideal**4, ideal**6], axis=1)
-    terms = np.linalg.lstsq(powers * ideal[:, None], seen - ideal, rcond=None)[0]
+    terms = np.linalg.lstsq(powers * ideal[:, None], distorted - ideal, rcond=None)[0]
     return Lens(
         camera_matrix=camera_matrix(interior.focal, 1.0, *interior.centre),
         coefficients=np.array([terms[0], terms[1], 0.0, 0.0, terms[2]]),

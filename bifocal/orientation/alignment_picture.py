@@ -82,13 +82,13 @@ def _grid(alignment: Alignment, images: Images) -> tuple[FloatArray, float]:
     """Return the plane positions of the picture's pixels (h, w, 2), and their size. [m]"""
     far = alignment.pair.image1
     parts = [far.plane_from_pixels(alignment.tie1[alignment.wall]), alignment.control_positions]
-    seen = np.concatenate([part[np.isfinite(part).all(axis=1)] for part in parts])
-    if len(seen) < 4:
+    outline = np.concatenate([part[np.isfinite(part).all(axis=1)] for part in parts])
+    if len(outline) < 4:
         height, width = images[0].shape
         corners = np.array([[0, 0], [width, 0], [width, height], [0, height]], dtype=np.float64)
-        seen = far.plane_from_pixels(corners)
-        seen = seen[np.isfinite(seen).all(axis=1)]
-    low, high = np.percentile(seen, [1, 99], axis=0)
+        outline = far.plane_from_pixels(corners)
+        outline = outline[np.isfinite(outline).all(axis=1)]
+    low, high = np.percentile(outline, [1, 99], axis=0)
     # All that was compared is in it: a wall found in a corner shows as one.
     every = far.plane_from_pixels(alignment.tie1)
     every = every[np.isfinite(every).all(axis=1)]

@@ -94,9 +94,9 @@ class Given:
     @property
     def enough(self) -> bool:
         """Whether control points alone orient both cameras."""
-        known, control = self.control.positioned, self.control
+        positioned, control = self.control.positioned, self.control
         return all(
-            (known & np.isfinite(pixels).all(axis=1)).sum() >= 4
+            (positioned & np.isfinite(pixels).all(axis=1)).sum() >= 4
             for pixels in (control.pixels1, control.pixels2)
         )
 
@@ -186,12 +186,12 @@ def approximate_cameras(
         cameras = []
         picks = zip((control.pixels1, control.pixels2), given.photos, strict=True)
         for number, (pixels, photo) in enumerate(picks):
-            seen = control.positioned & np.isfinite(pixels).all(axis=1)
-            xyz, ideal = np.nan_to_num(control.xyz[seen]), photo.interior.ideal(pixels[seen])
+            picked = control.positioned & np.isfinite(pixels).all(axis=1)
+            xyz, ideal = np.nan_to_num(control.xyz[picked]), photo.interior.ideal(pixels[picked])
             with located(photo.name):
                 camera, fits = resect(xyz, ideal, photo.interior, given.media, number)
             cameras.append(camera)
-            agree[np.flatnonzero(seen)[~fits]] = False
+            agree[np.flatnonzero(picked)[~fits]] = False
         return (cameras[0], cameras[1]), agree, interiors
     if ties is None:
         raise GeometryError("too few control points, and no common points to go with them.")

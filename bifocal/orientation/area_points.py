@@ -55,8 +55,8 @@ def even_points(
 def _grid(observations: PairObservations, adjusted: AdjustedPair) -> tuple[FloatArray, float]:
     """Return plane positions over what both photos show, and their spacing. [m]"""
     ties = observations.straight_ties(adjusted.radial)[0][observations.tie_used]
-    seen = adjusted.media.on_plane(0, adjusted.cameras[0], ties)[:, :2]
-    low, high = np.nanpercentile(seen, [1, 99], axis=0)
+    plane = adjusted.media.on_plane(0, adjusted.cameras[0], ties)[:, :2]
+    low, high = np.nanpercentile(plane, [1, 99], axis=0)
     gsd = float(np.sqrt(np.prod(high - low) / AREA.pixels))
     x = np.arange(low[0], high[0], gsd)
     y = np.arange(high[1], low[1], -gsd)

@@ -115,7 +115,7 @@ def _of_typed(media: PairMedia, cameras: Cameras, sigma: float) -> FloatArray:
         row[at("focal length", number + 1)] = 1.0 / (apparent / rate)
         out += sigma**2 * np.outer(row, row)
     for place, name in enumerate(media.names[len(NAMES) :], start=len(NAMES)):
-        known = media.sigmas[name]
-        out[place, place] = known**2 if np.isfinite(known) else 0.0
+        stated = media.sigmas[name]
+        out[place, place] = stated**2 if np.isfinite(stated) else 0.0
     by = media.by_unknowns()
     return by @ out @ by.T

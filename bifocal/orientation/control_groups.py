@@ -42,11 +42,11 @@ def weighed_by_control(pair: OrientedPair) -> OrientedPair:
     observations, used = pair.observations, pair.observations.pick_used
     tests = pair.adjusted.control_test[used & observations.control.positioned]
     cameras = enumerate(pair.adjusted.cameras, start=1)
-    known = all(
+    calibrated = all(
         pair.adjusted.sigma("Z", number) < GROUPS.carried * float(camera.centre[2])
         for number, camera in cameras
     )
-    if len(tests) < GROUPS.fewest or not known:
+    if len(tests) < GROUPS.fewest or not calibrated:
         return pair
     times = float(np.sqrt(np.mean(tests**2)))
     many = int((~used).sum()) > max(2, len(used) // 4)
@@ -67,8 +67,8 @@ def _groups(pair: OrientedPair) -> tuple[str, float]:
     Nowhere: nothing and zero.
     """
     control = pair.observations.control
-    seen = np.isfinite(np.hstack([control.pixels1, control.pixels2])).all(axis=1)
-    points = np.flatnonzero(control.positioned & seen)
+    picked = np.isfinite(np.hstack([control.pixels1, control.pixels2])).all(axis=1)
+    points = np.flatnonzero(control.positioned & picked)
     best, words, apart = np.inf, "", 0.0
     for axis, at, first in _splits(control.xyz[:, :2], points):
         second = np.isin(np.arange(len(first)), points) & ~first

@@ -104,12 +104,12 @@ def of_rows(
         about = {"photos": ", ".join(titles), "listed": ", ".join(names[:5]), "near": near}
         raise InputError(remark("control.no_such_photo", of=table.file, **about))
     order = list(places)
-    made = [np.full((len(order), 2), np.nan) for _ in photos]
+    pixels = [np.full((len(order), 2), np.nan) for _ in photos]
     for (name, photo_number), k in picks.items():
-        made[photo_number][order.index(name)] = column[k], row[k]
+        pixels[photo_number][order.index(name)] = column[k], row[k]
     shown_names = ", ".join(names[:5])
     notes = (remark("control.other_photos", count=len(names), names=shown_names),) if names else ()
-    return ListedPoints(rows=list(places.values()), picks=made, remarks=notes)
+    return ListedPoints(rows=list(places.values()), picks=pixels, remarks=notes)
 
 
 def without_unseen(
@@ -117,7 +117,7 @@ def without_unseen(
 ) -> tuple[list[FloatArray], list[str]]:
     """Return picks without those that stand for "not seen", and what is said of them."""
     notes: list[str] = []
-    made: list[FloatArray] = []
+    cleaned: list[FloatArray] = []
     for number, pixels in enumerate(picks, start=1):
         clean = pixels.copy()
         for place in _UNSEEN:
@@ -127,8 +127,8 @@ def without_unseen(
                 names = ", ".join(ids[row] for row in rows[:10])
                 place_words = f"{place[0]:g}, {place[1]:g}"
                 notes.append(remark("control.unseen", photo=number, names=names, place=place_words))
-        made.append(clean)
-    return made, notes
+        cleaned.append(clean)
+    return cleaned, notes
 
 
 def in_plane_frame(
@@ -176,9 +176,9 @@ def in_plane_frame(
         if frame is None:
             raise InputError(remark("control.no_front", of=table.file))
         notes.append(_described(frame))
-    made = np.full_like(xyz, np.nan)
-    made[whole] = frame.to_plane(world[whole])
-    return made, frame, notes
+    plane = np.full_like(xyz, np.nan)
+    plane[whole] = frame.to_plane(world[whole])
+    return plane, frame, notes
 
 
 def _described(frame: WorldFrame) -> str:

@@ -233,9 +233,9 @@ def read_control(
     """
     alone = photos == 1
     keys = tuple(f"{axis}{k}" for k in range(1, photos + 1) for axis in ("col", "row"))
-    wanted = ALONE if alone else (*COLUMNS, *(Column(key, unit="px") for key in keys[4:]))
-    wanted = (*wanted, *(A_PHOTO[:1] if alone else A_PHOTO))
-    table = read_table(path, wanted, column_map=_places(columns, wanted))
+    expected = ALONE if alone else (*COLUMNS, *(Column(key, unit="px") for key in keys[4:]))
+    expected = (*expected, *(A_PHOTO[:1] if alone else A_PHOTO))
+    table = read_table(path, expected, column_map=_places(columns, expected))
     listed = is_long(table, keys, names)
     missing = [key for key in keys if key not in table.present and not listed]
     if missing and alone:
@@ -273,8 +273,8 @@ def read_control(
     xyz, frame, placed = in_plane_frame(
         table, xyz[points.rows, :3], xyz[points.rows, 3], picks, frame
     )
-    own = metres_of(table, "sigma", unit)[points.rows]
-    spread = np.tile(np.where(np.isfinite(own), own, sigma)[:, None], (1, 3))
+    sigmas = metres_of(table, "sigma", unit)[points.rows]
+    spread = np.tile(np.where(np.isfinite(sigmas), sigmas, sigma)[:, None], (1, 3))
     spread = np.maximum(spread, 1e-5)
     if sigma_plane is not None:
         on_wall = np.isfinite(xyz[:, :2]).all(axis=1) & np.isnan(xyz[:, 2])
@@ -285,8 +285,8 @@ def read_control(
         ids=tuple(ids), xyz=xyz, sigma=spread,
         pixels1=picks[0], pixels2=picks[1], more=tuple(picks[2:]), frame=frame,
     )  # fmt: skip
-    said = [*table.remarks, *points.remarks, *unseen, *placed]
-    remarks = [f"{Path(path).name}: {text}" for text in said]
+    notes = [*table.remarks, *points.remarks, *unseen, *placed]
+    remarks = [f"{Path(path).name}: {text}" for text in notes]
     off = table.numbers("use")[points.rows] == 0
     if off.any():
         control = control.only(~off)
@@ -311,10 +311,12 @@ def _names(texts: Sequence[str], before: str) -> list[str]:
     >>> _names(["A", "", "", "2"], "")
     ['A', 'row 2', '3', '2']
     """
-    taken = set(texts)
-    own = [f"{before}{number}" for number in range(1, len(texts) + 1)]
-    own = [f"{before}row {k}" if name in taken else name for k, name in enumerate(own, start=1)]
-    return [text or name for text, name in zip(texts, own, strict=True)]
+    typed = set(texts)
+    numbered = [f"{before}{number}" for number in range(1, len(texts) + 1)]
+    numbered = [
+        f"{before}row {k}" if name in typed else name for k, name in enumerate(numbered, start=1)
+    ]
+    return [text or name for text, name in zip(texts, numbered, strict=True)]
 
 
 def known_points(
@@ -366,10 +368,10 @@ def read_lengths(path: Path | str, control: Control) -> Control:
 
 def metres_of(table: Table, key: str, unit: str) -> FloatArray:
     """Return a column of lengths in metres, by its heading's unit."""
-    said = unit or table.units.get(key, "m")
-    if said not in METRES:
-        raise InputError(remark("control.no_length", of=table.file, key=key, said=said))
-    return table.numbers(key) * METRES[said]
+    length_unit = unit or table.units.get(key, "m")
+    if length_unit not in METRES:
+        raise InputError(remark("control.no_length", of=table.file, key=key, said=length_unit))
+    return table.numbers(key) * METRES[length_unit]
 
 
 def _halves(table: Table, keys: tuple[str, ...]) -> list[CellError]:

@@ -85,8 +85,8 @@ def facade_rotation(image: ByteArray, camera: Pinhole, interior: Interior) -> tu
         Share of line length within 1° of it or of its perpendicular; below `least_in_line`
         trust nothing.
     """
-    seen = interior.ideal(line_segments(image).reshape(-1, 2))
-    ends: FloatArray = apply_homography(plane_from_pixel(camera), seen).reshape(-1, 2, 2)
+    ends_ideal = interior.ideal(line_segments(image).reshape(-1, 2))
+    ends: FloatArray = apply_homography(plane_from_pixel(camera), ends_ideal).reshape(-1, 2, 2)
     reach = 6 * camera.centre[2]
     ends = ends[(np.linalg.norm(ends - camera.centre[:2], axis=2) < reach).all(axis=1)]
     along = ends[:, 1] - ends[:, 0]
@@ -215,8 +215,8 @@ def facade_directions(
     size = interior.image_size
     ends = ends[np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > LINES.shortest * size[0]]
     part = np.floor(ends.mean(axis=1) / size * LINES.parts) @ [LINES.parts, 1]
-    seen = radial.undistort(interior.ideal(ends.reshape(-1, 2)))
-    flat = np.column_stack([seen, np.ones(len(seen))])
+    straight = radial.undistort(interior.ideal(ends.reshape(-1, 2)))
+    flat = np.column_stack([straight, np.ones(len(straight))])
     cosine, sine = np.cos(turn), np.sin(turn)
     axes = (
         np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]]) @ camera.rotation.T
@@ -230,12 +230,12 @@ def facade_directions(
     out = []
     for name, axis in (("upright", 1), ("level", 0)):
         near = np.abs(normals[:, axis]) < np.sin(np.deg2rad(LINES.astray))
-        found, scatter, count = _common_direction(normals[near], length[near], part[near], axis)
+        direction, scatter, count = _common_direction(normals[near], length[near], part[near], axis)
         if count >= LINES.fewest:
             sigma = float(np.sqrt(2.0) * np.hypot(BUILT, scatter))
             out.append(
                 FacadeDirection(
-                    camera=number, name=name, direction=axes.T @ found, sigma=sigma, count=count
+                    camera=number, name=name, direction=axes.T @ direction, sigma=sigma, count=count
                 )
             )
     return out
@@ -271,22 +271,22 @@ def _common_direction(
     trials = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     away = fixed[:, None] + free @ trials.T
     votes = length @ np.exp(-0.5 * (away / np.deg2rad(0.4)) ** 2)
-    found = trials[int(votes.argmax())]
+    angles = trials[int(votes.argmax())]
     for width in np.deg2rad(
         [2.4 * LINES.agree, 1.6 * LINES.agree, LINES.agree, LINES.agree, LINES.agree]
     ):
-        left = fixed + free @ found
-        weight = length / (1.0 + (left / width) ** 2) ** 2 * (np.abs(left) < 3 * width)
+        rest = fixed + free @ angles
+        weight = length / (1.0 + (rest / width) ** 2) ** 2 * (np.abs(rest) < 3 * width)
         normal = (free * weight[:, None]).T @ free + 1e-12 * np.eye(2)
-        found = found - np.linalg.solve(normal, (free * weight[:, None]).T @ left)
+        angles = angles - np.linalg.solve(normal, (free * weight[:, None]).T @ rest)
     which = np.unique(part[weight > 0], return_inverse=True)[1]
-    pulls = (free * (weight * left)[:, None])[weight > 0]
+    pulls = (free * (weight * rest)[:, None])[weight > 0]
     parts = np.stack([np.bincount(which, pull) for pull in pulls.T], axis=1)
     count = len(parts)
     inverse = np.linalg.inv(normal)
     spread = inverse @ (parts.T @ parts) @ inverse * count / max(count - 1, 1)
     direction = direction.copy()
-    direction[[1 - axis, 2]] = found
-    agree = np.abs(fixed + free @ found) < np.deg2rad(2 * LINES.agree)
+    direction[[1 - axis, 2]] = angles
+    agree = np.abs(fixed + free @ angles) < np.deg2rad(2 * LINES.agree)
     unit = direction / np.linalg.norm(direction)
     return unit, float(np.sqrt(spread[1, 1])), int(agree.sum())

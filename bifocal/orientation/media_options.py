@@ -47,8 +47,8 @@ def _prior(text: str) -> tuple[str, float]:
 
 def _own(given: Mapping[str, Any], name: str, number: int) -> Any:
     """Return an option of one camera, or else that of both."""
-    own = given.get(f"{name}{number}")
-    return given.get(name) if own is None else own
+    of_photo = given.get(f"{name}{number}")
+    return given.get(name) if of_photo is None else of_photo
 
 
 def _normal(stated: tuple[float, ...] | str | None) -> Normal:

@@ -33,9 +33,9 @@ def media_in_words(adjusted: AdjustedPair, given: PairMedia) -> tuple[str, ...]:
     words = [remark(key, layers=layers, **about)]
     for row, name in _estimated(adjusted, media):
         sigma = float(np.sqrt(adjusted.of_unknowns[row, row]))
-        found = {"value": media.value(name), "sigma": sigma, "start": given.value(name)}
-        found |= {"prior": given.sigmas[name]}
-        shown = {what: _shown(name, number) for what, number in found.items()}
+        numbers = {"value": media.value(name), "sigma": sigma, "start": given.value(name)}
+        numbers |= {"prior": given.sigmas[name]}
+        shown = {what: _shown(name, number) for what, number in numbers.items()}
         words.append(remark("orientation.media_found", name=name, **shown))
     return tuple(words)
 
@@ -43,16 +43,16 @@ def media_in_words(adjusted: AdjustedPair, given: PairMedia) -> tuple[str, ...]:
 def media_remarks(adjusted: AdjustedPair, given: PairMedia) -> tuple[str, ...]:
     """Return which unknowns of the media the data do not carry, or cannot tell from others."""
     media = adjusted.media
-    told = []
+    remarks = []
     factor = max(adjusted.sigma0, 1.0)
     for row, name in _estimated(adjusted, media):
-        prior, own = given.sigmas[name], float(np.sqrt(adjusted.of_unknowns[row, row]))
-        if own > UNCARRIED * prior * factor:
-            told.append(_hardly_carried(name, given.value(name), prior))
+        prior, sigma = given.sigmas[name], float(np.sqrt(adjusted.of_unknowns[row, row]))
+        if sigma > UNCARRIED * prior * factor:
+            remarks.append(_hardly_carried(name, given.value(name), prior))
         if (twin := _twin(adjusted, media, row)) and twin[1] > ALIKE:
             about = {"name": name, "twin": twin[0], "correlation": twin[1]}
-            told.append(remark("orientation.hardly_told_apart", **about))
-    return tuple(told)
+            remarks.append(remark("orientation.hardly_told_apart", **about))
+    return tuple(remarks)
 
 
 def refuse_impossible_media(adjusted: AdjustedPair, given: PairMedia) -> None:
@@ -82,8 +82,8 @@ def refuse_impossible_media(adjusted: AdjustedPair, given: PairMedia) -> None:
         about = {"name": name, "value": value, "own": own, "start": start, "option": option}
         if twin and twin[1] > ALIKE / 2:
             alike = {"twin": twin[0], "correlation": twin[1]}
-            told = remark("refused.media_value_alike", typical=typical, **about, **alike)
-            raise GeometryError(told)
+            words = remark("refused.media_value_alike", typical=typical, **about, **alike)
+            raise GeometryError(words)
         raise GeometryError(remark("refused.media_value", typical=typical, **about))
 
 

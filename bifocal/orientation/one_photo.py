@@ -185,8 +185,8 @@ def by_rectangle(
     words = proportions() if photo.sigma0 > SLIPS.doubted else ""
     if begun == 2:
         start = remark("rectify.begun_below")
-    said = [text for text in (start, words) if text]
-    return replace(photo, remarks=(*said, *photo.remarks)) if said else photo
+    remarks = [text for text in (start, words) if text]
+    return replace(photo, remarks=(*remarks, *photo.remarks)) if remarks else photo
 
 
 def _begun_at(corners: FloatArray) -> int:
@@ -224,8 +224,10 @@ def by_control(control: Control, interior: Interior, *, sigma_pick: float) -> Or
         lost = np.nan_to_num(photo.test, nan=OUTLIER_LIMIT) >= OUTLIER_LIMIT
         return TrialOrientation(misfit=photo.sigma0, cameras=(photo.camera,) * 2, lost=lost)
 
-    known = replace(interior, is_calibrated=True)  # the points' own slips alone are looked for
-    typed = TypedOrientation(interiors=(known, known), control=control, site=SiteMeasures())
+    calibrated = replace(interior, is_calibrated=True)  # the points' own slips alone are looked for
+    typed = TypedOrientation(
+        interiors=(calibrated, calibrated), control=control, site=SiteMeasures()
+    )
     slip = slip_of(typed, fitted, by_control=True)
     if slip is not None and not slip.mended:
         raise GeometryError(slip.words)
@@ -319,8 +321,8 @@ def _by_points(control: Control, interior: Interior, sigma_pick: float) -> Orien
     count, cofactor = len(control.ids), photo.covariance / photo.sigma0**2
     by = _by_camera(misfit, photo.camera).reshape(count, 2, -1)
     spare = np.eye(2) - by @ cofactor @ np.swapaxes(by, 1, 2)
-    told = np.linalg.eigvalsh(spare)[:, 0] > 0.02  # else the point alone determines something
-    loose = np.linalg.inv(np.where(told[:, None, None], spare, np.nan))
+    determined = np.linalg.eigvalsh(spare)[:, 0] > 0.02  # else the point alone determines something
+    loose = np.linalg.inv(np.where(determined[:, None, None], spare, np.nan))
     errors = (loose @ misfit(photo.camera).reshape(count, 2, 1))[..., 0]
     metres = pinhole.project_with_jacobian(photo.camera, control.xyz).by_point[:, :, :2]
     metres = np.linalg.solve(metres, root)
@@ -368,8 +370,8 @@ def by_lines(
     sigma = float(np.hypot(sigma, 1.41 * sigma_pick * distance / interior.focal))
 
     def misfit(camera: Pinhole) -> FloatArray:
-        origin, other = ray_on_plane(camera, picks)[:, :2]
-        out = [origin / 1e-6, [(np.linalg.norm(other - origin) - length) / sigma]]
+        origin, end = ray_on_plane(camera, picks)[:, :2]
+        out = [origin / 1e-6, [(np.linalg.norm(end - origin) - length) / sigma]]
         for line in lines:
             ray = np.linalg.solve(camera.matrix, interior.matrix @ line.direction)
             along, axis = camera.rotation.T @ ray, int(line.name == "upright")

@@ -24,8 +24,8 @@ def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
     unit = max(observations.interiors[0].image_size) / 3000
     sigma = observations.sigma_tie
     if observations.tie_used.sum() >= 20 and sigma > REMARKS.worst_fit * unit:
-        known = "_lens_known" * _with_lens(observations)
-        cause = "tape" if tapes else f"misses{known}"
+        lens_clause = "_lens_known" * _with_lens(observations)
+        cause = "tape" if tapes else f"misses{lens_clause}"
         reason = remark(f"orientation.reason_{cause}")
         remarks.append(remark("orientation.misses_lines", sigma=sigma, reason=reason))
     remarks.extend(tapes)
@@ -41,8 +41,11 @@ def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
     both = len(pulled) == 2 and changes[0] * changes[1] < 0  # one wrong lens pulls both
     for n in pulled:
         change, lens = changes[n], lenses[n]
-        told = {"change": 100 * np.expm1(change), "alone": 100 * np.expm1(change - changes[1 - n])}
-        about = {"number": int(n) + 1, "source": lens.source, **told}
+        shares = {
+            "change": 100 * np.expm1(change),
+            "alone": 100 * np.expm1(change - changes[1 - n]),
+        }
+        about = {"number": int(n) + 1, "source": lens.source, **shares}
         key = f"orientation.focal_contradicts{'_both' if both else ''}"
         remarks.append(remark(key, sigmas=abs(change) / lens.sigma_focal, **about))
     return [text for text in remarks if text]
@@ -51,13 +54,13 @@ def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
 def _contradicted_tapes(pair: OrientedPair, site: SiteMeasures) -> list[str]:
     """Return which distances measured on site the adjusted ones contradict."""
     remarks: list[str] = []
-    for name, camera, given in zip(
+    for name, camera, taped in zip(
         ("far", "near"), pair.adjusted.cameras, (site.distance1, site.distance2), strict=True
     ):
-        off = float(camera.centre[2]) - (given or 0.0)
-        if given and abs(off) > REMARKS.contradicts * site.sigma:
+        off = float(camera.centre[2]) - (taped or 0.0)
+        if taped and abs(off) > REMARKS.contradicts * site.sigma:
             sigmas, key = abs(off) / site.sigma, f"orientation.distance_contradicts_{name}"
-            remarks.append(remark(key, off=off, given=given, sigmas=sigmas))
+            remarks.append(remark(key, off=off, given=taped, sigmas=sigmas))
     return remarks
 
 

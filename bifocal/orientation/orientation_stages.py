@@ -306,12 +306,12 @@ def _facing_the_wall(pair: OrientedPair, site: SiteMeasures) -> OrientedPair:
     centres = adjusted.cameras[0].centre, adjusted.cameras[1].centre
     cell = np.floor(ties.tie1[used] / (0.03 * max(ties.interiors[0].image_size)))
     _, place, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
-    seen = ties.interiors[0].raw(ties.tie1[used])
+    ties_raw = ties.interiors[0].raw(ties.tie1[used])
     planes = planes_of_any_direction(xyz[used], 1.0 / count[place.ravel()], centres)
-    wall = likely_wall(planes, seen, centres, site, sigma_ratio=_sigma_ratio(pair))
+    wall = likely_wall(planes, ties_raw, centres, site, sigma_ratio=_sigma_ratio(pair))
     if wall is None:
         return pair
-    question = steep_rivals_in_words(planes, wall, seen, site)
+    question = steep_rivals_in_words(planes, wall, ties_raw, site)
     pair = pair.told(question) if question else pair
     if wall.slope <= WALLS.face_slope:
         return pair
@@ -319,8 +319,8 @@ def _facing_the_wall(pair: OrientedPair, site: SiteMeasures) -> OrientedPair:
         adjusted.cameras, np.array([wall.offset, *-wall.normal[:2]]) / wall.normal[2]
     )
     far, near = cameras
-    known = ties.measured.get("distance1")
-    scale = 1.0 if known is None else known[0] / float(far.centre[2])
+    taped = ties.measured.get("distance1")
+    scale = 1.0 if taped is None else taped[0] / float(far.centre[2])
     cameras = far._replace(centre=scale * far.centre), near._replace(centre=scale * near.centre)
     start = evaluated(ties, replace(adjusted, cameras=cameras))
     return (
@@ -361,9 +361,9 @@ def _on_the_wall(pair: OrientedPair, images: Images, site: SiteMeasures) -> Orie
         fair = ties.tie_used & (np.abs(xyz[:, 2]) < 0.1 * d1)
     if fair.sum() < 20:
         return replace(pair, observations=ties).readjusted().settled()
-    seen = ties.interiors[0].raw(ties.tie1[fair])
+    ties_raw = ties.interiors[0].raw(ties.tie1[fair])
     plane, faces = choose_wall(
-        xyz[fair], seen, adjusted.cameras, ties.interiors, site, sigma_ratio=_sigma_ratio(pair)
+        xyz[fair], ties_raw, adjusted.cameras, ties.interiors, site, sigma_ratio=_sigma_ratio(pair)
     )
     pair = replace(pair, faces=tuple(faces))
     pair = pair.told(*(text for text in [rivals_in_words(faces, site)] if text))
@@ -437,8 +437,8 @@ def _with_named_wall(pair: OrientedPair) -> OrientedPair:
     if spread[1] < 0.1 * spread[0]:
         return pair
     # Points said to be on the wall, not measured against it, leave its roughness alone.
-    own = float(np.median(sigma[on])) if height[on].any() else 0.0
-    usual = float(np.hypot(own, wall_roughness(observations, pair.adjusted)))
+    noise = float(np.median(sigma[on])) if height[on].any() else 0.0
+    usual = float(np.hypot(noise, wall_roughness(observations, pair.adjusted)))
     tolerance = (usual / float(np.sqrt(on.sum())), usual / float(spread[1]))
     walled = with_wall(observations, pair.adjusted, tolerance)
     if not walled.wall.any():

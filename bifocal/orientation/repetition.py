@@ -58,9 +58,9 @@ def repetition(images: Images, interiors: Interiors, far: Pinhole, ties: Ties) -
         return None
     grid, spacing = covered
     pixels = project(far, np.concatenate([grid, np.zeros((*grid.shape[:2], 1))], axis=-1))
-    there = apply_homography(ties.homography, pixels)
+    moved = apply_homography(ties.homography, pixels)
     sheets: list[Sheet] = []
-    for image, interior, at in zip(images, interiors, (pixels, there), strict=True):
+    for image, interior, at in zip(images, interiors, (pixels, moved), strict=True):
         ideal = interior.radial(ties.radial).distort(at.reshape(-1, 2))
         raw = interior.raw(ideal).reshape(at.shape)
         inside = (raw > 1) & (raw < np.array(interior.image_size) - 2)

@@ -152,11 +152,11 @@ def _setup(pair: Pair, factor: float) -> dict[str, Any]:
         deviations = aside(deviations, factor * before["aside_x"], factor * before["aside_y"])
     if "relief_offset" in setup.get("standard_deviations", {}) and faces:
         deviations["relief_offset"] = zero_sigma(faces)
-    known = rivals_in_words(faces, SiteMeasures()) if faces else ""
+    question = rivals_in_words(faces, SiteMeasures()) if faces else ""
     doubts = [*map(str, setup.get("doubts", ()))]
-    if known:
+    if question:
         stale = doubts_of(RIVALS, doubts)
-        doubts = [known if text in stale else text for text in doubts]
+        doubts = [question if text in stale else text for text in doubts]
     sigma = max(setup.get("common_points", {}).get("sigma_px", 0.0), 0.05)
     words = orientation_in_words(
         cameras, deviations, sigma_px=sigma,

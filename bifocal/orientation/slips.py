@@ -84,21 +84,21 @@ def slip_of(
     lenses, tables = [*_of_lenses(typed, free=by_control and not fits)], list[Slip]()
     if not fits:
         tables += _of_control(typed, now) if by_control else _of_site(typed)
-    found = _explaining([*lenses, *tables], fitted, now)
-    if not found and tables and by_control:
-        found = _explaining(_of_crops(typed), fitted, now)
-    if not found and tables and by_control and len(typed.control.ids) > 5:
+    explaining = _explaining([*lenses, *tables], fitted, now)
+    if not explaining and tables and by_control:
+        explaining = _explaining(_of_crops(typed), fitted, now)
+    if not explaining and tables and by_control and len(typed.control.ids) > 5:
         # Two at once, of a lens and of the table.
         both = (
             replace(two, words=f"{one.words} {two.words}", handicap=one.handicap)
             for one in lenses
             for two in _of_control(one.meant, now or fitted(one.meant))
         )
-        found = _explaining(both, fitted, now)
-    if not found:
+        explaining = _explaining(both, fitted, now)
+    if not explaining:
         return None
-    least, best = min(found, key=lambda one: one[0])
-    alike = [s.words for misfit, s in found if misfit < SLIPS.clearly * least and not s.mended]
+    least, best = min(explaining, key=lambda one: one[0])
+    alike = [s.words for misfit, s in explaining if misfit < SLIPS.clearly * least and not s.mended]
     return best if best.mended else replace(best, words=remark("slips.or").join(alike))
 
 
@@ -108,7 +108,7 @@ def _explaining(
     now: TrialOrientation | None,
 ) -> list[tuple[float, Slip]]:
     """Return the slips that explain a misfit, each with what is left of it."""
-    found: list[tuple[float, Slip]] = []
+    explaining: list[tuple[float, Slip]] = []
     for slip in slips:
         tried = fitted(slip.meant)
         if tried is not None and tried.explains(now):
@@ -119,8 +119,8 @@ def _explaining(
             turned = tried.cameras[0].centre[2] < tried.cameras[1].centre[2]
             misfit = tried.misfit * slip.handicap * (SLIPS.clearly**2 if lying else 1.0)
             misfit *= SLIPS.clearly if turned else 1.0
-            found.append((misfit, replace(slip, words=words)))
-    return found
+            explaining.append((misfit, replace(slip, words=words)))
+    return explaining
 
 
 def _of_lenses(typed: TypedOrientation, *, free: bool) -> Iterator[Slip]:

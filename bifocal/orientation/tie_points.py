@@ -40,8 +40,8 @@ def local_maps(
 ) -> FloatArray:
     """Return the derivative of photo 2 by photo 1 for surfaces parallel to the wall, (n, 2, 2)."""
     first, second = (
-        interior.raw_by_ideal(pixels) @ seen.by_point[:, :, :2]
-        for seen, interior, pixels in zip(views_of(state, xyz), interiors, ideal, strict=True)
+        interior.raw_by_ideal(pixels) @ one.by_point[:, :, :2]
+        for one, interior, pixels in zip(views_of(state, xyz), interiors, ideal, strict=True)
     )
     bad = ~(np.abs(np.linalg.det(np.nan_to_num(first))) > 0)
     first[bad], second[bad] = np.eye(2), np.eye(2)
@@ -162,8 +162,8 @@ def with_wall(
         rough = WALLS.rough_band * float(state.cameras[0].centre[2])
         on_wall = observations.wall & np.isfinite(xyz).all(axis=1) & np.isfinite(metres)
         face = replace(face, roughness=rough, chance=on_wall.astype(float))
-    seen = observations.tie1[face.members]
-    cell = np.floor(seen / (0.1 * max(observations.interiors[0].image_size)))
+    members = observations.tie1[face.members]
+    cell = np.floor(members / (0.1 * max(observations.interiors[0].image_size)))
     cells = len(np.unique(cell, axis=0))
     if face.chance.sum() < TIES.fewest_on_wall or cells < TIES.fewest_cells:
         return replace(
@@ -197,13 +197,13 @@ def _wall_of(
     """Return the ties' places [m], relief per pixel [m/px], sigma of height [m]; the wall."""
     xyz = tie_positions(observations, state)
     metres = relief_per_pixel(observations, state)
-    known = observations.tie_used & np.isfinite(xyz).all(axis=1) & np.isfinite(metres)
+    usable = observations.tie_used & np.isfinite(xyz).all(axis=1) & np.isfinite(metres)
     sigma = np.hypot(np.sqrt(2.0) * observations.sigma_tie * np.abs(metres), 1e-6)
     face = narrow_face(
-        xyz[known], sigma[known], band=WALLS.rough_band * float(state.cameras[0].centre[2])
+        xyz[usable], sigma[usable], band=WALLS.rough_band * float(state.cameras[0].centre[2])
     )
     chance = np.zeros(len(xyz))
-    chance[known] = face.chance
+    chance[usable] = face.chance
     return xyz, metres, sigma, replace(face, chance=chance)
 
 

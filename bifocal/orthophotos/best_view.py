@@ -42,13 +42,13 @@ def chosen(
     cost = np.stack([np.where(see, _cost(view, grid), np.float32(np.inf)) for view, see in
                      zip(views, usable, strict=True)])  # fmt: skip
     best = cost.argmin(axis=0)
-    seen = np.isfinite(cost.min(axis=0))
+    visible = np.isfinite(cost.min(axis=0))
     side = 2 * int(np.ceil(feather / 2)) + 1
     total = np.zeros(grid.shape, np.float32)
     mixed = np.zeros(images[0].shape, np.float32)
     largest = np.zeros(grid.shape, np.float32)
     for number, (image, see) in enumerate(zip(images, usable, strict=True)):
-        share = cv2.blur(((best == number) & seen).astype(np.float32), (side, side))
+        share = cv2.blur(((best == number) & visible).astype(np.float32), (side, side))
         share = np.where(see, share, np.float32(0))
         mixed += image * share.reshape(share.shape + (1,) * (image.ndim - 2))
         total += share
@@ -56,9 +56,9 @@ def chosen(
     mixed /= np.maximum(total, np.float32(1e-6)).reshape(total.shape + (1,) * (mixed.ndim - 2))
     numbers = np.array([view.number for view in views], np.uint8) + np.uint8(OF_SET)
     source = np.where(largest > 0.99 * total, numbers[best], np.uint8(Source.BOTH))
-    source = np.where(seen, source, np.uint8(Source.NONE))
+    source = np.where(visible, source, np.uint8(Source.NONE))
     picture = np.rint(mixed).astype(images[0].dtype)
-    picture[~seen] = 0
+    picture[~visible] = 0
     return picture, source
 
 

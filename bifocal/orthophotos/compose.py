@@ -199,13 +199,13 @@ def choose_grid(
     """Return the grid asked for, by default the relief map's own, else that of the photo."""
     photo = pair.photo(number)
     under = beneath(surface)
-    own = under.grid if isinstance(under, MapSurface) else None
-    if own is not None and bounds is None and (gsd is None or gsd == own.gsd):
-        return own
+    map_grid = under.grid if isinstance(under, MapSurface) else None
+    if map_grid is not None and bounds is None and (gsd is None or gsd == map_grid.gsd):
+        return map_grid
     if gsd is None:
-        gsd = own.gsd if own is not None else photo.gsd(size)
+        gsd = map_grid.gsd if map_grid is not None else photo.gsd(size)
     if bounds is None:
-        bounds = own.bounds if own is not None else footprint(photo, size)
+        bounds = map_grid.bounds if map_grid is not None else footprint(photo, size)
     return Grid.from_bounds(bounds, gsd=gsd)
 
 
@@ -357,22 +357,22 @@ def _closing_gaps(
     for number, bounds in enumerate(boxes, start=1):
         box = grown(bounds, TIDYING.margin, grid.shape)
         gap = label[box] == number
-        wanted = gap & free[box]
+        region = gap & free[box]
         heights = relief[box][gap & np.isfinite(relief[box])]
         level = np.median(heights) + np.float32(GAPS.before) if heights.size else -np.inf
         rim = (cv2.dilate(gap.astype(np.uint8), ring) > 0) & usable[box] & (relief[box] < level)
         backed = rim if measured is None else rim & measured[box]
         anchored = backed.any() and backed.sum() >= GAPS.measured * rim.sum()
-        if not (anchored or wanted.any()):
+        if not (anchored or region.any()):
             continue
-        seen = place.part(box).look(views[1], options, views[0])
-        sees = seen.inside & ~seen.hidden
-        if anchored and _alike(first.image[box], seen.image, backed & sees, views[0], grid.gsd):
-            wanted = gap
-        second.image[box], second.inside[box] = seen.image, second.inside[box] | seen.inside
-        second.hidden[box] |= seen.hidden
+        look = place.part(box).look(views[1], options, views[0])
+        sees = look.inside & ~look.hidden
+        if anchored and _alike(first.image[box], look.image, backed & sees, views[0], grid.gsd):
+            region = gap
+        second.image[box], second.inside[box] = look.image, second.inside[box] | look.inside
+        second.hidden[box] |= look.hidden
         # Of a thing that moved the relief is no wall's, nor is what it would hide.
-        second.taken[box] |= wanted & (sees | (things[box] & seen.inside))
+        second.taken[box] |= region & (sees | (things[box] & look.inside))
     return second
 
 
@@ -398,11 +398,11 @@ def _choose(
     source = np.where(usable[0], np.uint8(views[0].number), np.uint8(0))
     if len(views) == 1 or not looks[1].taken.any():
         return _masked(looks[0].image, usable[0]), source
-    taken = looks[1].taken
-    share = taken.astype(np.float32)
+    from_second = looks[1].taken
+    share = from_second.astype(np.float32)
     if options.feather:
         # The second fades in towards what it alone shows, where both see the wall.
-        depth = cv2.distanceTransform((~taken).astype(np.uint8), cv2.DIST_L2, 3)
+        depth = cv2.distanceTransform((~from_second).astype(np.uint8), cv2.DIST_L2, 3)
         near = np.clip(1 - depth / np.float32(options.feather), 0, 1)
         share = np.where(usable[0] & usable[1], near, share)
     source[share > 0] = Source.BOTH

@@ -95,7 +95,7 @@ def contour_labels(lines: Sequence[Contour], scale: float) -> list[ContourLabel]
     """Return the labels of the thick lines, each where its line is straightest."""
     paper = scale / 1000.0
     labels: list[ContourLabel] = []
-    taken, levels = np.empty((0, 2)), np.empty(0)
+    labelled, levels = np.empty((0, 2)), np.empty(0)
     thick = [line for line in lines if line.index]
     digits = _digits([line.level for line in thick])
     for contour in sorted(thick, key=lambda one: -len(one.line)):
@@ -111,11 +111,11 @@ def contour_labels(lines: Sequence[Contour], scale: float) -> list[ContourLabel]
             middle, angle = _straightest(
                 line, along, (ends[0] + need / 2, ends[1] - need / 2), need
             )
-            gaps = np.hypot(*(taken - middle).T)
+            gaps = np.hypot(*(labelled - middle).T)
             alike = (levels == contour.level) & (gaps < CONTOURS.neighbour)
             if (gaps < need + 1.0).any() or (along[-1] < CONTOURS.short and alike.any()):
                 continue
-            taken, levels = np.vstack([taken, middle]), np.append(levels, contour.level)
+            labelled, levels = np.vstack([labelled, middle]), np.append(levels, contour.level)
             # On the line, not above it: down by half the height of a digit.
             turn = math.radians(angle)
             base = middle + 0.36 * CONTOURS.label_size * np.array([math.sin(turn), -math.cos(turn)])
@@ -170,11 +170,11 @@ def _clear_parts(
     direction = np.gradient(line, axis=0)
     direction /= np.maximum(np.hypot(*direction.T), 1e-9)[:, None]
     normal = factor * np.stack([-direction[:, 1], direction[:, 0]], axis=-1)
-    level, wanted = _looked_up(relief, line), np.nan_to_num(_looked_up(least, line))
+    level, needed = _looked_up(relief, line), np.nan_to_num(_looked_up(least, line))
     clear = np.ones(len(line), bool)
     for aside, stretch in ((CONTOURS.aside, CONTOURS.stretch), (CONTOURS.near, 4 * CONTOURS.near)):
         left, right = (_looked_up(relief, line + way * aside * normal) for way in (1, -1))
-        clear &= _rises(left, right, level, wanted * aside / CONTOURS.aside, stretch)
+        clear &= _rises(left, right, level, needed * aside / CONTOURS.aside, stretch)
     bounds = [0, *(np.flatnonzero(np.diff(clear)) + 1).tolist(), len(clear)]
     return [line[a:b] for a, b in pairwise(bounds) if clear[a] and b - a > shortest]
 

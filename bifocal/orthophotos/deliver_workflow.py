@@ -225,9 +225,9 @@ def deliver(
         if missing.points:
             remarks += (remark("drawing.outside", count=missing.points),)
         if relief:
-            told = _draw_relief(place, f"{name}_relief", relief, drawing, sheet, hatch=wish.hatch)
-            if told["guessed"]:
-                remarks += (remark("drawing.relief_not_measured", **told),)
+            drawn = _draw_relief(place, f"{name}_relief", relief, drawing, sheet, hatch=wish.hatch)
+            if drawn["guessed"]:
+                remarks += (remark("drawing.relief_not_measured", **drawn),)
         for number, cut in enumerate(cuts, start=1):
             for writer, ending in ((write_section_dxf, "dxf"), (write_section_svg, "svg")):
                 writer(place / f"{name}_section{number}.{ending}", cut, drawing=drawing)
@@ -283,8 +283,8 @@ def _with_shares(drawing: Drawing, basis: Mapping[str, float], *, hatch: bool) -
         parts = ((source, basis.get(source.name.lower())) for source in DIRECTIONS)
         return replace(drawing, hatched=tuple((source, share) for source, share in parts if share))
     guess = basis_in_words(basis, drawing.language)
-    told = (drawing.say("guessed", shares=guess),) if guess else ()
-    return replace(drawing, notes=(*told, *drawing.notes))
+    note = (drawing.say("guessed", shares=guess),) if guess else ()
+    return replace(drawing, notes=(*note, *drawing.notes))
 
 
 def _pictures(
@@ -348,13 +348,13 @@ def _draw_relief(
         dpi=dpi_at_scale(grid.gsd, drawing.scale), overviews=True, names=("red", "green", "blue"),
     ) as writer:  # fmt: skip
         for column, row, part in grid.tiles(COMPOSE.tile):
-            picture, known = shaded(
+            picture, alpha = shaded(
                 relief.surface, part, limits=(low, high), scale=drawing.scale,
                 measured=measured if hatch else None,
             )  # fmt: skip
-            guessed += int(np.count_nonzero((known > 0) & np.isnan(measured.window(part))))
-            coloured += int(np.count_nonzero(known))
-            writer.write(picture, column=column, row=row, mask=known > 0)
+            guessed += int(np.count_nonzero((alpha > 0) & np.isnan(measured.window(part))))
+            coloured += int(np.count_nonzero(alpha))
+            writer.write(picture, column=column, row=row, mask=alpha > 0)
     share = guessed / max(coloured, 1)
     unknown = 1.0 - coloured / (grid.width * grid.height)
     shares = {"measured": 1.0 - share, "guessed": share, "unknown": unknown}
@@ -410,10 +410,10 @@ def _band(reader: RasterReader | None, number: int) -> Surface | None:
 def _measured(reader: RasterReader | None, surface: Surface) -> Surface:
     """Return what of a relief was measured or drawn; all of it where no map tells."""
     # A map of which nothing was measured is drawn as it is, hatched by no one.
-    told = None if reader is None else measured_part(reader)
-    if told is None:
+    part = None if reader is None else measured_part(reader)
+    if part is None:
         return surface
-    return FacedSurface(told, surface.faces) if isinstance(surface, FacedSurface) else told
+    return FacedSurface(part, surface.faces) if isinstance(surface, FacedSurface) else part
 
 
 def _points(source: Path | Points | None) -> tuple[Points | None, tuple[str, ...]]:
@@ -432,19 +432,19 @@ def _accuracy(pair: Pair, grid: Grid, task: OrthoTask, reader: RasterReader | No
     A point is off by what its relief is off times the slope of its ray, s / (d - r), and by the
     pick of a photo pixel.
     """
-    own = photo_pixel(pair, task)
+    pixel = photo_pixel(pair, task)
     if reader is None or reader.bands < 3:
-        return [1000 * own]
+        return [1000 * pixel]
     coarse = Grid.from_bounds(grid.bounds, gsd=max(grid.shape) * grid.gsd / SHEET.looked_at)
     r, sigma, quality = np.moveaxis(reader.nearest(coarse, bands=[1, 2, 3]), -1, 0)
-    known = np.isfinite(r) & np.isfinite(sigma) & (quality == Quality.MEASURED)
-    if not known.any():
-        return [1000 * own]
+    measured = np.isfinite(r) & np.isfinite(sigma) & (quality == Quality.MEASURED)
+    if not measured.any():
+        return [1000 * pixel]
     photo = pair.photo(2 if task.image == "2" else 1)
     x, y = np.meshgrid(coarse.columns_x - photo.nadir[0], coarse.rows_y - photo.nadir[1])
-    slope = np.hypot(x, y)[known] / (photo.distance - r[known])
-    place = np.hypot(slope * sigma[known], photo.precision() * own)
-    return [1000 * own, 1000 * float(np.median(place)), 1000 * float(np.median(sigma[known]))]
+    slope = np.hypot(x, y)[measured] / (photo.distance - r[measured])
+    place = np.hypot(slope * sigma[measured], photo.precision() * pixel)
+    return [1000 * pixel, 1000 * float(np.median(place)), 1000 * float(np.median(sigma[measured]))]
 
 
 def _notes(
@@ -452,12 +452,12 @@ def _notes(
 ) -> tuple[str, ...]:
     """Return the lines of the title block."""
     precise = _accuracy(pair, grid, task, reader)
-    known = dict(zip(("own", "place", "relief"), precise, strict=False))
-    words = "accuracy" if len(known) > 1 else "photo_pixel"
+    lengths = dict(zip(("own", "place", "relief"), precise, strict=False))
+    words = "accuracy" if len(lengths) > 1 else "photo_pixel"
     misfit = bool(doubts_of(MISFITS, pair.remarks))
     if wish.checked is not None:
         count, place, deep = wish.checked
-        words, known = "accuracy_checked", known | {
+        words, lengths = "accuracy_checked", lengths | {
             "count": count, "place": 1000 * place, "relief": 1000 * deep
         }  # fmt: skip
     elif misfit:
@@ -471,7 +471,7 @@ def _notes(
         cameras = say(f"photo_{task.photo_words}", d1=d1, d2=d2)
     return (
         say("pixel", size=grid.gsd * 1000, dpi=dpi_at_scale(grid.gsd, wish.scale)),
-        say(words, **known),
+        say(words, **lengths),
         *((say("misfit"),) if misfit else ()),
         wish.camera or cameras,
         *((say("media", media=media_words(pair.layers)),) if pair.layers else ()),

@@ -275,10 +275,10 @@ class PrintSheet:
             for turned, size in ways if high > wide else ways[::-1]:
                 if need[0] <= size[0] and need[1] <= size[1]:
                     return cls(name=f"{name} {turned}", width=size[0], height=size[1])
-        wanted = paper or "A0"
+        paper_size = paper or "A0"
         raise InputError(
             f"at 1:{drawing.scale:g} the picture is {wide:.0f} x {high:.0f} mm and does not fit "
-            f"{wanted}. Choose a smaller scale (1:{drawing.scale * 2:g}), --bounds, or another "
+            f"{paper_size}. Choose a smaller scale (1:{drawing.scale * 2:g}), --bounds, or another "
             "--paper."
         )
 

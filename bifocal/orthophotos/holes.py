@@ -59,8 +59,8 @@ def _close_specks(
     rim_row, rim_column, beside = rim_row[behind], rim_column[behind], beside[behind]
     count = np.bincount(beside, minlength=len(areas))
     closed: BoolArray = small & (count > 0)
-    taken = closed[inside]
-    row, column, inside = row[taken], column[taken], inside[taken]
+    near = closed[inside]
+    row, column, inside = row[near], column[near], inside[near]
     colours = image[rim_row, rim_column].reshape(len(beside), -1)
     total = np.stack([np.bincount(beside, band, len(areas)) for band in colours.T], axis=-1)
     mean = np.rint(total[inside] / count[inside, None]).astype(image.dtype)
@@ -76,11 +76,11 @@ def _copy_texture(
     """Fill one hole, in place; where nothing around fits in, with the colours at its rim."""
     part = grown(box, HOLES.rim, label.shape)
     hole = label[part] == number
-    known = shows(source[part])
+    painted = shows(source[part])
     # A hole that goes on as another part is no rim.
-    rim = known & (relief[part] < np.median(relief[part][hole]) + np.float32(HOLES.before))
+    rim = painted & (relief[part] < np.median(relief[part][hole]) + np.float32(HOLES.before))
     if np.count_nonzero(rim) < HOLES.fewest:
-        rim = known
+        rim = painted
     if not rim.any():
         return
     colours = image[part]
@@ -103,11 +103,11 @@ def _best_copy(
     if around.shape[0] <= colours.shape[0] or around.shape[1] <= colours.shape[1]:
         return None
     grey = [part.mean(axis=2) if part.ndim == 3 else part for part in (around, colours)]
-    wide, patch, weight, unknown, wanted = (
+    wide, patch, weight, unknown, weights = (
         np.asarray(part, np.float32) for part in (*grey, rim, ~known, hole)
     )
     off = cv2.matchTemplate(wide, patch, cv2.TM_SQDIFF, mask=weight)
-    empty = cv2.matchTemplate(unknown, wanted, cv2.TM_CCORR)
+    empty = cv2.matchTemplate(unknown, weights, cv2.TM_CCORR)
     off[(empty > 0.5) | ~np.isfinite(off)] = np.inf
     row, column = np.unravel_index(int(np.argmin(off)), off.shape)
     if not np.isfinite(off[row, column]):

@@ -122,8 +122,8 @@ def _likeness(
     images: Sequence[Float32Array], valid: Sequence[BoolArray]
 ) -> dict[tuple[int, int], float]:
     """Return the correlation of layers that overlap widely and show something; refuse strangers."""
-    found = {}
-    fine = [_detail(image, seen) for image, seen in zip(images, valid, strict=True)]
+    likenesses = {}
+    fine = [_detail(image, mask) for image, mask in zip(images, valid, strict=True)]
     for i, j in combinations(range(len(images)), 2):
         both = valid[i] & valid[j]
         if np.count_nonzero(both) < BLENDING.telling:
@@ -139,8 +139,8 @@ def _likeness(
                 f"{likeness:+.2f}): their X and Y are not of one frame. Orient their pairs by "
                 "control points in one system, then make them again."
             )
-        found[i, j] = likeness
-    return found
+        likenesses[i, j] = likeness
+    return likenesses
 
 
 def _detail(image: Float32Array, seen: BoolArray) -> Float32Array:
@@ -188,7 +188,7 @@ def plan_mosaic(
     coarse = Grid.from_bounds(grid.bounds, gsd=grid.gsd * max(1.0, max(grid.shape) / side))
     images, valid = zip(*(_onto(layer, coarse) for layer in layers), strict=True)
     likeness = _likeness(images, valid)
-    depth = np.stack([_depth(seen) for seen in valid])
+    depth = np.stack([_depth(mask) for mask in valid])
     gains, differences = _gains(images, valid, wanted=gain)
     if priority:
         labels = np.where(np.any(valid, axis=0), np.argmax(valid, axis=0), -1)
@@ -209,7 +209,7 @@ def mosaic_window(
     wide = window.window(-halo, -halo, window.width + 2 * halo, window.height + 2 * halo)
     touching = [k for k, layer in enumerate(layers) if _overlap(layer.grid, wide)]
     parts = {k: window_of(layers[k], wide) for k in touching}
-    owner = _owners(plan, wide, {k: seen for k, (_, seen) in parts.items()})
+    owner = _owners(plan, wide, {k: mask for k, (_, mask) in parts.items()})
     core = np.s_[halo : halo + window.height, halo : halo + window.width]
     used = [k for k in touching if (owner == k).any()]
     if not used:
@@ -240,13 +240,13 @@ def window_of(layer: Layer, grid: Grid) -> Seen:
     if offset is not None:
         return layer.read(*offset, grid.width, grid.height)
     window, columns, rows = grid.resampling(layer.grid, 3)
-    image, seen = layer.read(*window)
+    image, mask = layer.read(*window)
     values = image.dtype.kind == "f"
-    if not values and not seen.all():
-        image = np.where(seen[:, :, None], image, _around(image, seen))
+    if not values and not mask.all():
+        image = np.where(mask[:, :, None], image, _around(image, mask))
     flag = cv2.INTER_NEAREST if values else cv2.INTER_CUBIC
     moved = cv2.remap(image, columns, rows, flag, borderMode=cv2.BORDER_REPLICATE)
-    inside = cv2.remap(seen.astype(np.uint8), columns, rows, cv2.INTER_NEAREST)
+    inside = cv2.remap(mask.astype(np.uint8), columns, rows, cv2.INTER_NEAREST)
     return moved.reshape(*grid.shape, -1), inside > 0
 
 
@@ -259,18 +259,18 @@ def _around(image: NDArray[Any], seen: BoolArray) -> NDArray[Any]:
 
 def _onto(layer: Layer, coarse: Grid) -> tuple[Float32Array, BoolArray]:
     """Return a layer on the coarse grid, colours 0..1 (values stay as they are)."""
-    own = layer.grid
-    width = max(1, round(own.width * own.gsd / coarse.gsd))
-    height = max(1, round(own.height * own.gsd / coarse.gsd))
-    image, seen = layer.reduced(width, height)
+    grid = layer.grid
+    width = max(1, round(grid.width * grid.gsd / coarse.gsd))
+    height = max(1, round(grid.height * grid.gsd / coarse.gsd))
+    image, mask = layer.reduced(width, height)
     scale = 1.0 if image.dtype.kind == "f" else 1.0 / np.iinfo(image.dtype).max
-    xmin, ymin, xmax, ymax = own.bounds
+    xmin, ymin, xmax, ymax = grid.bounds
     column = (coarse.columns_x - xmin) / (xmax - xmin) * width - 0.5
     row = (ymax - coarse.rows_y) / (ymax - ymin) * height - 0.5
     columns, rows = np.meshgrid(column.astype(np.float32), row.astype(np.float32))
     colours = np.nan_to_num(image.astype(np.float32)) * np.float32(scale)
     moved = cv2.remap(colours, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    inside = cv2.remap(seen.astype(np.uint8), columns, rows, cv2.INTER_NEAREST)
+    inside = cv2.remap(mask.astype(np.uint8), columns, rows, cv2.INTER_NEAREST)
     return moved.reshape(*coarse.shape, -1), inside > 0
 
 
@@ -340,9 +340,9 @@ def _seams(
         cost = np.maximum(cost, np.where(valid[i] & valid[j], apart, 0))
     spread = float(np.percentile(cost[any_valid], 90)) if any_valid.any() else 0.0
     cost = cv2.GaussianBlur(cost / max(spread, 1e-3), (0, 0), 1.5)
-    for seen in valid:
-        holes = cv2.morphologyEx(seen.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((31, 31)))
-        near = cv2.distanceTransform((~((holes > 0) & ~seen)).astype(np.uint8), cv2.DIST_L2, 3)
+    for mask in valid:
+        holes = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((31, 31)))
+        near = cv2.distanceTransform((~((holes > 0) & ~mask)).astype(np.uint8), cv2.DIST_L2, 3)
         cost += np.exp(-near / np.float32(BLENDING.shy))
     if relief is not None:
         dy, dx = np.gradient(np.nan_to_num(relief), gsd)

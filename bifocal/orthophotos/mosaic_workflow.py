@@ -210,8 +210,8 @@ def _remarks(
             )
     for (i, j), likeness in seams.likeness.items():
         if likeness < BLENDING.weak:
-            told = remark("mosaic.little_alike", name=names[i], other=names[j], likeness=likeness)
-            remarks.append(told)
+            words = remark("mosaic.little_alike", name=names[i], other=names[j], likeness=likeness)
+            remarks.append(words)
     if not values:
         for name, gains in zip(names, seams.gains, strict=True):
             if np.abs(gains - 1).max() > 0.02:

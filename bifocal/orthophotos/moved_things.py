@@ -84,7 +84,7 @@ def moved_things(
     near = _opened((off > MOVED.rim) & ~(measured & (off < MOVED.core)), disc)
     near = cv2.morphologyEx(near.astype(np.uint8), cv2.MORPH_CLOSE, disc)
     _, label, stats, _ = cv2.connectedComponentsWithStats(near, connectivity=8)
-    found = []
+    things = []
     for number in np.unique(label[core & (near > 0)]):
         left, top, width, height, area = stats[number]
         if area * coarse.gsd**2 < MOVED.area:
@@ -94,9 +94,9 @@ def moved_things(
             np.ascontiguousarray(_padded(of, (left, top, width, height)))
             for of in (first, second, (label == number).astype(np.uint8), measured, both)
         ]
-        one, other, own, known, common = padded
-        rings, _ = cv2.findContours(own, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-        full = cv2.drawContours(np.zeros_like(own), rings, -1, 1, cv2.FILLED)
+        one, other, blob, known, common = padded
+        rings, _ = cv2.findContours(blob, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+        full = cv2.drawContours(np.zeros_like(blob), rings, -1, 1, cv2.FILLED)
         if known[full > 0].mean() > MOVED.measured or _likeness(one, other, full) > MOVED.likeness:
             continue
         share = _share_of_edges(one, other, full, common > 0)
@@ -106,11 +106,11 @@ def moved_things(
         if share < 1 - MOVED.sure:
             continue
         mask = cv2.dilate(full, disc) > 0
-        found.append(MovedThing(
+        things.append(MovedThing(
             mask=mask, grid=part, area=float(full.sum()) * coarse.gsd**2,
             drawn_from_second=share > MOVED.sure,
         ))  # fmt: skip
-    return tuple(found)
+    return tuple(things)
 
 
 def _smooth(

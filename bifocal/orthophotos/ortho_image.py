@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from bifocal.model.grid import Gridded
 from bifocal.model.image import ImageArray
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.errors import InputError
+from photocore.plots import Drawable
 
 Interpolation = Literal["nearest", "linear", "cubic", "lanczos"]
 INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
@@ -83,7 +84,7 @@ class OrthoOptions:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Orthophoto(Gridded):
+class Orthophoto(Gridded, Drawable):
     """An orthophoto in memory.
 
     Attributes
@@ -112,6 +113,11 @@ class Orthophoto(Gridded):
     def valid(self) -> BoolArray:
         """Pixels that show something, shape (height, width)."""
         return shows(self.source)
+
+    def _draw(self, axes: Any) -> None:
+        colours = self.image.reshape(*self.shape, -1) / np.iinfo(self.image.dtype).max
+        colours = np.broadcast_to(colours, (*self.shape, 3))
+        self._drawn(np.dstack([colours, self.valid]), axes)
 
     def write(self, path: Path | str, *, overwrite: bool = False) -> None:
         """Write a GeoTIFF of the plane frame: colours, then the `Source` of each pixel.

@@ -113,12 +113,16 @@ class OrthoTask:
     @classmethod
     def from_given(cls, given: Mapping[str, Any], **more: Any) -> OrthoTask:
         """Return the task of options by the names of the command's; absent ones by default."""
-        own = {key: value for key, value in given.items() if value is not None}
-        own.pop("complete", None)  # of survey files from when whole pictures were asked for
-        if "mask" in own:
-            own["mask_hidden"] = own.pop("mask")
-        how = {item.name: own.pop(item.name) for item in fields(OrthoOptions) if item.name in own}
-        return cls(options=OrthoOptions(**how), **own, **more)
+        settings = {key: value for key, value in given.items() if value is not None}
+        settings.pop("complete", None)  # of survey files from when whole pictures were asked for
+        if "mask" in settings:
+            settings["mask_hidden"] = settings.pop("mask")
+        how = {
+            item.name: settings.pop(item.name)
+            for item in fields(OrthoOptions)
+            if item.name in settings
+        }
+        return cls(options=OrthoOptions(**how), **settings, **more)
 
 
 def make_ortho(
@@ -147,8 +151,8 @@ def make_ortho(
         faces, _ = given_faces(task.faces)
         drawn = (faces or Faces()).digest
         made_from = MadeFrom.of(photos_of(pair), faces=drawn, relief=task.relief)
-        images, said = _images(pair, task)
-        remarks += said
+        images, notes_of_photos = _images(pair, task)
+        remarks += notes_of_photos
         numbers = tuple(images)
         height, width = images[numbers[0]].shape[:2]
         grid = _grid(pair, numbers[0], (width, height), surface, task)
@@ -196,9 +200,9 @@ def make_ortho(
     if task.relief and basis["plane"] > PIXELS.rectified:
         notes.append(remark("ortho.rectified", share=basis["plane"]))
     notes += [] if isinstance(pair, PhotoAlone | PhotosOfSet) else _advice(shares, task)
-    own = photo_pixel(pair, task)
-    if grid.gsd < PIXELS.said * own:
-        notes.append(remark("ortho.finer_than_photo", size=1000 * grid.gsd, own=1000 * own))
+    pixel = photo_pixel(pair, task)
+    if grid.gsd < PIXELS.said * pixel:
+        notes.append(remark("ortho.finer_than_photo", size=1000 * grid.gsd, own=1000 * pixel))
     return RasterResult(
         path=out, grid=grid, shares=shares, remarks=(*pair.remarks, *remarks, *notes), basis=basis
     )
@@ -271,11 +275,11 @@ def open_surface(
     task: OrthoTask, pair: Pair
 ) -> Iterator[tuple[Surface, RasterReader | None, tuple[str, ...]]]:
     """Yield the relief asked for, checked against the cameras' distances, its map, and remarks."""
-    faces, told = given_faces(task.faces)
-    told += check_faces(faces, photos_of(pair))
+    faces, notes = given_faces(task.faces)
+    notes += check_faces(faces, photos_of(pair))
     if task.relief is not None:
         now = MadeFrom.of(photos_of(pair), faces=(faces or Faces()).digest)
-        told += check_maps(now, relief=task.relief)
+        notes += check_maps(now, relief=task.relief)
     with ExitStack() as stack:
         surface: Surface = FlatSurface(task.plane)
         reader: RasterReader | None = None
@@ -298,7 +302,7 @@ def open_surface(
         if high >= nearest or low < -20 * pair.image1.distance:
             about = {"name": named, "low": low, "high": high, "near": nearest}
             raise InputError(remark("ortho.relief_of_another_pair", **about))
-        yield surface, reader, (*remarks, *told)
+        yield surface, reader, (*remarks, *notes)
 
 
 def _triangles(
@@ -307,8 +311,8 @@ def _triangles(
     """Return the surface through the useful points of a table, and remarks."""
     points, notes = survey_points_of(source)
     remarks = list(notes)
-    known = np.isfinite(points.xyz).all(axis=1)
-    keep = known & np.array([flag not in _USELESS for flag in points.flags], dtype=bool)
+    finite = np.isfinite(points.xyz).all(axis=1)
+    keep = finite & np.array([flag not in _USELESS for flag in points.flags], dtype=bool)
     if not keep.all():
         count = int((~keep).sum())
         remarks.append(remark("ortho.points_left_out", count=count, total=len(keep)))
@@ -354,15 +358,17 @@ def _grid(pair: Pair, first: int, size: tuple[int, int], surface: Surface, task:
     if bounds is None and isinstance(under, TriangleSurface):
         bounds = under.bounds
     grid = choose_grid(pair, first, size, surface, gsd=task.gsd, bounds=bounds)
-    own = pair.photo(first).gsd(size)
-    ratio = grid.gsd / own
+    photo_gsd = pair.photo(first).gsd(size)
+    ratio = grid.gsd / photo_gsd
     pixels = grid.width * grid.height
     strange = not PIXELS.finest <= ratio <= PIXELS.coarsest or pixels > PIXELS.most
     strange = strange or (ratio < PIXELS.fine and pixels > PIXELS.many)
     if strange and not task.any_size:
         about = {"size": 1000 * grid.gsd, "width": grid.width, "height": grid.height}
-        told = bytes_in_words(3 * pixels)
-        raise InputError(remark("ortho.strange_size", bytes=told, own=1000 * own, **about))
+        size_words = bytes_in_words(3 * pixels)
+        raise InputError(
+            remark("ortho.strange_size", bytes=size_words, own=1000 * photo_gsd, **about)
+        )
     return grid
 
 
@@ -388,8 +394,8 @@ def _sources(
             raise InputError(remark("ortho.photos_differ"))
         if not task.match:
             continue
-        for other in photos[:place]:  # the first that shares a part of the wall
-            matched, note = match_exposure(other, photos[place], surface, grid)
+        for earlier in photos[:place]:  # the first that shares a part of the wall
+            matched, note = match_exposure(earlier, photos[place], surface, grid)
             if matched is not photos[place]:
                 break
         photos[place] = matched

@@ -141,8 +141,8 @@ class _Pdf:
 
 def _properties(made: Provenance) -> str:
     """Return the entries that viewers show as properties of the file."""
-    known = {"Creator": made.program, "Producer": "bifocal", "Subject": "; ".join(made.lines())}
-    texts = {key: f"\ufeff{text}".encode("utf-16-be").hex() for key, text in known.items()}
+    metadata = {"Creator": made.program, "Producer": "bifocal", "Subject": "; ".join(made.lines())}
+    texts = {key: f"\ufeff{text}".encode("utf-16-be").hex() for key, text in metadata.items()}
     entries = " ".join(f"/{key} <{text}>" for key, text in texts.items())
     return f"<< {entries} /CreationDate (D:{made.date.replace('-', '')}000000Z) >>"
 

@@ -231,11 +231,11 @@ def _project_leaning(
     xyz = np.stack([x, y, relief.astype(np.float64)], axis=-1)
     q = plane_position(xyz, photo.foot)
     matrix = np.linalg.inv(photo.plane_from_pixel)
-    seen = q @ matrix[:, :2].T + matrix[:, 2]
+    homogeneous = q @ matrix[:, :2].T + matrix[:, 2]
     middle = float(photo.plane_from_pixel[2] @ np.array([size[0] / 2, size[1] / 2, 1.0]))
     with np.errstate(divide="ignore", invalid="ignore"):
-        scale = np.where(seen[..., 2] * middle > 0, 1.0 / seen[..., 2], np.nan)
-    return seen[..., 0] * scale, seen[..., 1] * scale
+        scale = np.where(homogeneous[..., 2] * middle > 0, 1.0 / homogeneous[..., 2], np.nan)
+    return homogeneous[..., 0] * scale, homogeneous[..., 1] * scale
 
 
 def _reduced(image: ImageArray, factor: int) -> ImageArray:

@@ -131,7 +131,7 @@ def _title(cut: Section, scale: float, say: Words) -> str:
 
 def _extent(cut: Section, scale: float) -> tuple[float, float, float, float]:
     """Return left, bottom, right and top of the axes: what is known, with the wall's plane. [mm]"""
-    known = np.isfinite(cut.relief)
+    finite = np.isfinite(cut.relief)
     factor = 1000.0 / scale
 
     def rounded(values: FloatArray) -> tuple[float, float]:
@@ -141,8 +141,8 @@ def _extent(cut: Section, scale: float) -> tuple[float, float, float, float]:
         return (math.floor(low / step - 1e-6) * step * factor,
                 math.ceil(high / step + 1e-6) * step * factor)  # fmt: skip
 
-    across = rounded(cut.relief[known])
-    along = cut.place[known].min() * factor, cut.place[known].max() * factor
+    across = rounded(cut.relief[finite])
+    along = cut.place[finite].min() * factor, cut.place[finite].max() * factor
     (left, right), (bottom, top) = (across, along) if cut.axis == "x" else (along, across)
     return float(left), float(bottom), float(right), float(top)
 

@@ -53,10 +53,10 @@ def section(
     relief = sample(surface, points, gsd=grid.gsd)
     if not np.isfinite(relief).any():
         raise InputError(f"section {name}: no relief is known along it; check its coordinates.")
-    known = relief if measured is None else sample(measured, points, gsd=grid.gsd)
+    measured_relief = relief if measured is None else sample(measured, points, gsd=grid.gsd)
     return Section(
         letter=letter, name=name, axis=axis, path=path, place=place, relief=relief,
-        measured=np.isfinite(known),
+        measured=np.isfinite(measured_relief),
     )  # fmt: skip
 
 

@@ -98,7 +98,7 @@ def shaded(
     wide = grid.window(-1, -1, grid.width + 2, grid.height + 2)
     r = surface.window(wide)
     middle = r[1:-1, 1:-1]
-    known = np.isfinite(middle)
+    finite = np.isfinite(middle)
     # Slopes steeper than 1:1 would all be black or white: they are flattened softly.
     dx, dy = (
         np.tanh(np.nan_to_num(step / np.float32(2 * grid.gsd)))
@@ -118,6 +118,6 @@ def shaded(
         lined = ((rows + columns + first) % period < stroke) & broad[rows, columns]
         pale = picture[rows, columns] * (1 - SHADING.pale) + 255 * SHADING.pale
         picture[rows, columns] = np.where(lined[:, None], pale * SHADING.lines, pale)
-    picture[~known] = 255
+    picture[~finite] = 255
     colours = np.clip(np.rint(picture), 0, 255).astype(np.uint8)
-    return colours, np.where(known, np.uint8(255), np.uint8(0))
+    return colours, np.where(finite, np.uint8(255), np.uint8(0))

@@ -26,12 +26,12 @@ def spot_heights(measured: Surface, grid: Grid, scale: float) -> FloatArray:
     """
     coarse = contour_grid(grid, scale)
     relief = measured.window(coarse)
-    known = np.isfinite(relief)
+    finite = np.isfinite(relief)
     side = max(3, round(SPOTS.even / 1000 * scale / coarse.gsd) | 1)
-    filled = np.where(known, relief, np.float32(0))
+    filled = np.where(finite, relief, np.float32(0))
     mean, square = (cv2.blur(band, (side, side)) for band in (filled, filled * filled))
     rough = np.sqrt(np.maximum(square - mean * mean, 0))
-    whole = cv2.erode(known.astype(np.uint8), np.ones((side, side), np.uint8), borderValue=0) > 0
+    whole = cv2.erode(finite.astype(np.uint8), np.ones((side, side), np.uint8), borderValue=0) > 0
     step = max(side, round(SPOTS.field / 1000 * scale / coarse.gsd))
     spots = []
     for top in range(0, coarse.height, step):

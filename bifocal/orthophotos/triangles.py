@@ -127,7 +127,7 @@ def _halved(
 ) -> tuple[FloatArray, list[list[int]], bool]:
     """Insert the middle of every breakline piece that is no edge of a triangle."""
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    known = {(min(a, b), max(a, b)) for a, b in edges.tolist()}
+    sides = {(min(a, b), max(a, b)) for a, b in edges.tolist()}
     added: list[FloatArray] = []
     place: dict[tuple[int, int], int] = {}
     out = []
@@ -135,7 +135,7 @@ def _halved(
         longer = [line[0]] if len(line) else []
         for a, b in pairwise(line):
             key = (min(a, b), max(a, b))
-            if a != b and key not in known:
+            if a != b and key not in sides:
                 if key not in place:
                     place[key] = len(points) + len(added)
                     added.append((points[a] + points[b]) / 2)

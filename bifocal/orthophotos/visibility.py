@@ -239,10 +239,10 @@ def _hidden(
 def _seen_past(doubtful: BoolArray, measured: BoolArray) -> BoolArray:
     """Return what only the space below thin things hides, around which both photos measured."""
     side = (VISIBILITY.seen_past, VISIBILITY.seen_past)
-    there, known = (
+    doubtful_share, measured_share = (
         cv2.blur(mask.astype(np.float32), side) for mask in (doubtful, doubtful & measured)
     )
-    return doubtful & (known > np.float32(VISIBILITY.share_seen) * there)
+    return doubtful & (measured_share > np.float32(VISIBILITY.share_seen) * doubtful_share)
 
 
 def _behind(around: _Surroundings, largest: float) -> BoolArray:
@@ -259,8 +259,8 @@ def _without_thin(around: _Surroundings, gsd: float) -> Float32Array:
     A railing is a surface before another one: rays pass beneath its bars.
     """
     side = max(3, int(VISIBILITY.thin / gsd) | 1)
-    known = np.where(np.isnan(around.relief), np.float32(1e9), around.relief)
-    body = cv2.morphologyEx(known, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
+    filled = np.where(np.isnan(around.relief), np.float32(1e9), around.relief)
+    body = cv2.morphologyEx(filled, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
     with np.errstate(invalid="ignore"):
         displaced = (around.relief - body) * around.rho
         thin = displaced > np.float32(side) * (around.distance - around.relief)
@@ -380,8 +380,8 @@ def _sharpen(around: _Surroundings, buffer: _Buffer) -> BoolArray:
     flags, square = hidden.astype(np.uint8), np.ones((3, 3), np.uint8)
     sure = (cv2.erode(flags, square) > 0) & (ahead > np.float32(VISIBILITY.sure))
     unsure = (cv2.dilate(flags, square) > 0) & ~sure
-    known = np.where(np.isnan(around.relief), np.float32(-1e9), around.relief)
-    rise = cv2.dilate(known, square)[core] - around.relief[core]
+    filled = np.where(np.isnan(around.relief), np.float32(-1e9), around.relief)
+    rise = cv2.dilate(filled, square)[core] - around.relief[core]
     depth = around.distance - around.relief[core]
     unsure |= rise * rho > np.float32(VISIBILITY.least_shadow) * depth
     unsure &= rho > 0  # nothing lies between the nadir and the camera

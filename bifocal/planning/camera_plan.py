@@ -252,5 +252,5 @@ def sigma_at(pair: Pair, radius: FloatArray) -> FloatArray:
     """Return the sigma of relief on the plane at radii from the nadir, NaN at the nadir. [m]"""
     flat = radius.reshape(-1)
     xyz = np.column_stack([flat, np.zeros_like(flat), np.zeros_like(flat)])
-    found = pair.intersect(*pair.project(xyz)).sigma[:, 2]
-    return np.where(flat > 0, found, np.nan).reshape(radius.shape)
+    sigma = pair.intersect(*pair.project(xyz)).sigma[:, 2]
+    return np.where(flat > 0, sigma, np.nan).reshape(radius.shape)

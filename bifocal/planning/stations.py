@@ -101,10 +101,10 @@ def plan_stations(
         raise InputError("give at least two different focal lengths, e.g. --focal 35 --focal 19.")
     sigma_px = positive(sigma_px, "sigma_px", unit="px")
     wishes = {"scale": scale_number, "gsd": gsd, "sigma_r": sigma_r}
-    given = [name for name, value in wishes.items() if value is not None]
-    if len(given) > 1:
-        raise InputError(f"give only one of {' and '.join(given)}: each of them sets the scale.")
-    if not given and object_size is None:
+    stated = [name for name, value in wishes.items() if value is not None]
+    if len(stated) > 1:
+        raise InputError(f"give only one of {' and '.join(stated)}: each of them sets the scale.")
+    if not stated and object_size is None:
         raise InputError("give the size of the wall, a photo scale, a GSD or a wanted sigma of r.")
     media = media or PairMedia.none()
     if media and sigma_r is not None:

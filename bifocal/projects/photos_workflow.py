@@ -20,7 +20,7 @@ from bifocal.projects.scale import by_control, of_cameras
 from bifocal.projects.wall_frame import found_frame, framed, turned_by_lines
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.camera.lensformats import LensData
+from photocore.camera.lensdata import LensData
 from photocore.camera.pinhole import Pinhole, plane_from_pixel, project
 from photocore.camera.similarity import Similarity
 from photocore.errors import InputError
@@ -126,7 +126,7 @@ def photos_from_project(
     ----------
     project : path
         File or folder of COLMAP, Metashape, OpenSfM or OpenDroneMap, AliceVision or Meshroom,
-        OpenMVG, Bundler.
+        OpenMVG, Bundler, RealityCapture or RealityScan, VisualSFM, NeRF.
     out : path
         File of the set, or ``*.pair.json`` for the two photos that promise the best relief; lens
         files are written beside it.
@@ -268,7 +268,7 @@ def _of_the_wall(
 
 
 def _camera(view: ForeignView, frame: Similarity) -> Pinhole:
-    return Pinhole(view.lens.camera_matrix, view.rotation, view.centre).carried(frame)
+    return view.camera.carried(frame)
 
 
 def _photos(
@@ -322,13 +322,13 @@ def _upright(view: ForeignView, path: Path | None) -> ForeignView:
         return view
     if info.orientation in known[1:] and info.size == size[::-1]:
         lens = lens_of_photo(Lens(**view.lens._asdict()), info.size, orientation=info.orientation)
-        rotation = view.rotation.copy()
-        rotation[:2] = np.array(TURNS[info.orientation]) @ rotation[:2]
+        rotation, turn = view.rotation.copy(), np.array(TURNS[info.orientation])
+        rotation[:2], shear = turn @ rotation[:2], turn @ view.shear @ turn.T
         turned = LensData(*(getattr(lens, name) for name in LensData._fields))
-        return view._replace(lens=turned, rotation=rotation)
-    turn = f", turned by its EXIF data ({info.orientation})" if info.orientation != 1 else ""
+        return view._replace(lens=turned, rotation=rotation, shear=shear)
+    hint = f", turned by its EXIF data ({info.orientation})" if info.orientation != 1 else ""
     raise InputError(
-        f"{path}: is {info.size[0]} x {info.size[1]} px{turn}, its project says {size[0]:g} x "
+        f"{path}: is {info.size[0]} x {info.size[1]} px{hint}, its project says {size[0]:g} x "
         f"{size[1]:g} px. Name the folder of the photos that were processed with --images; save "
         "turned ones upright and process them there again."
     )

@@ -89,8 +89,7 @@ def _intersected(table: Table, views: tuple[ForeignView, ...]) -> dict[str, Floa
         else:
             view = shown[0]
             lens = Lens(**view.lens._asdict())
-            camera = Pinhole(lens.camera_matrix, view.rotation, view.centre)
-            rays.setdefault(name, []).append((camera, lens.undistort(pixels[row])[None]))
+            rays.setdefault(name, []).append((view.camera, lens.undistort(pixels[row])[None]))
     if errors:
         raise WorkbookError(errors)
     points = {}

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.model.lens import Lens
 from bifocal.model.orientation_precision import CAMERA
 from bifocal.orientation.control_lists import in_plane_frame
 from bifocal.orientation.control_points import COLUMNS, metres_of
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.camera.pinhole import Pinhole, project
+from photocore.camera.pinhole import project
 from photocore.camera.rotation import skew
 from photocore.camera.similarity import Similarity, fit_similarity
 from photocore.errors import InputError, WorkbookError
@@ -53,8 +52,7 @@ def by_control(
     xyz = np.column_stack([metres_of(table, key, "") for key in ("X", "Y", "r")])
     blank = np.full(3, np.nan)
     places = np.array([points.get(name, blank) for name in table.texts("id")]).reshape(-1, 3)
-    cameras = [Pinhole(Lens(**v.lens._asdict()).camera_matrix, v.rotation, v.centre) for v in views]
-    picks = [project(camera, places) for camera in cameras]
+    picks = [project(view.camera, places) for view in views]
     xyz, _, notes = in_plane_frame(table, xyz, metres_of(table, "H", ""), picks, None)
     for text in notes:
         note_remark(f"{path.name}: {text}")

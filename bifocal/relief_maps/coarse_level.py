@@ -55,7 +55,7 @@ def halved(frame: Frame) -> Frame:
         return cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
 
     seen1, seen2 = (
-        small(255 * seen.astype(np.uint8)) == 255 for seen in (frame.seen1, frame.seen2)
+        small(255 * mask.astype(np.uint8)) == 255 for mask in (frame.seen1, frame.seen2)
     )
     return replace(
         frame, grid=grid, image1=small(frame.image1), image2=small(frame.image2), seen1=seen1,
@@ -86,17 +86,20 @@ def backed(
         At half the resolution.
     """
     half = halved(frame)
-    found = flow.measure(half, first)
+    half_flow = flow.measure(half, first)
     d2 = frame.distances[1]
     sure = evidence.validated(
-        2 * found.across, 2 * found.loop, flow.sigma_of_relief(half, found.r, found.sigma_px), d2
+        2 * half_flow.across,
+        2 * half_flow.loop,
+        flow.sigma_of_relief(half, half_flow.r, half_flow.sigma_px),
+        d2,
     )
-    coarse, coarse_sure = _enlarged(found.r, frame), _enlarged(sure.astype(np.float32), frame)
+    coarse, coarse_sure = _enlarged(half_flow.r, frame), _enlarged(sure.astype(np.float32), frame)
     sigma = flow.sigma_of_relief(frame, fine.r, fine.sigma_px)
     unsure = ~evidence.validated(fine.across, fine.loop, sigma, d2)
-    known = unsure & (coarse_sure > 0.99)
-    better = known | (unsure & (np.abs(coarse - fine.r) > COARSE.gross))
-    return replace(fine, r=np.where(better, coarse, fine.r)), known, half
+    coarse_only = unsure & (coarse_sure > 0.99)
+    better = coarse_only | (unsure & (np.abs(coarse - fine.r) > COARSE.gross))
+    return replace(fine, r=np.where(better, coarse, fine.r)), coarse_only, half
 
 
 def _enlarged(values: Float32Array, frame: Frame) -> Float32Array:

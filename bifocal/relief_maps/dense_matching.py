@@ -122,7 +122,7 @@ def pair_relief(
                 f"relief_range: the last interface lies {pair.highest_relief:.3g} m before the "
                 f"plane, and nothing beyond it is measured; got {low:g}, {high:g}."
             )
-    wanted, target, work = _grids(pair, (grey1, grey2), gsd, bounds, quality, relief_range)
+    map_grid, target, work = _grids(pair, (grey1, grey2), gsd, bounds, quality, relief_range)
     whole = make_frame(pair, grey1, grey2, work, relief_range, sideways=sideways, of_set=of_set)
     fast = quality == "fast"
     frame = coarse_level.halved(whole) if fast else whole
@@ -147,17 +147,17 @@ def pair_relief(
     else:
         bands = relief_map(frame, matched, relief_range, target)
     progress(1.0, 1.0)
-    bands = _resampled(bands, target, wanted)
-    known = np.isfinite(bands.r)
+    bands = _resampled(bands, target, map_grid)
+    finite = np.isfinite(bands.r)
     return DenseRelief(
         r=bands.r,
         sigma=np.where(
-            known,
-            np.hypot(bands.sigma, orientation_sigma(pair, bands.r, wanted)),
+            finite,
+            np.hypot(bands.sigma, orientation_sigma(pair, bands.r, map_grid)),
             np.float32("nan"),
         ),
-        quality=np.where(known, bands.quality, np.uint8(Quality.UNKNOWN)),
-        plane_from_pixel=wanted.plane_from_pixel,
+        quality=np.where(finite, bands.quality, np.uint8(Quality.UNKNOWN)),
+        plane_from_pixel=map_grid.plane_from_pixel,
         registration=registration,
         working_gsd=frame.grid.gsd,
     )
@@ -176,13 +176,13 @@ def _grids(
     common = common_bounds(pair, (images[0].shape, images[1].shape))
     step = native if gsd is None else float(gsd)
     box = common if bounds is None else bounds
-    wanted = Grid.from_bounds(box, gsd=step)
+    map_grid = Grid.from_bounds(box, gsd=step)
     about = {"gsd": step, "wide": box[2] - box[0], "high": box[3] - box[1], "native": native}
-    about |= {"width": wanted.width, "height": wanted.height}
-    if wanted.width * wanted.height > LIMITS.largest_map or max(wanted.shape) > LONGEST_SIDE:
+    about |= {"width": map_grid.width, "height": map_grid.height}
+    if map_grid.width * map_grid.height > LIMITS.largest_map or max(map_grid.shape) > LONGEST_SIDE:
         raise InputError(remark("relief.gsd_too_fine", **about))
-    few = min(wanted.shape) < LIMITS.fewest_pixels and step > 1.01 * native
-    if few or min(wanted.shape) < 2 or step > max(LIMITS.coarsest_gsd, 2 * native):
+    few = min(map_grid.shape) < LIMITS.fewest_pixels and step > 1.01 * native
+    if few or min(map_grid.shape) < 2 or step > max(LIMITS.coarsest_gsd, 2 * native):
         about |= {"coarsest": LIMITS.coarsest_gsd, "fewest": LIMITS.fewest_pixels}
         raise InputError(remark("relief.gsd_too_coarse", **about))
     low, high = relief_range or seed.usual_range(pair.image2.distance)
@@ -190,8 +190,8 @@ def _grids(
     lower, upper = np.maximum(reach[:2], common[:2]), np.minimum(reach[2:], common[2:])
     reach = (*lower.tolist(), *upper.tolist())
     if reach[2] - reach[0] < 16 * native or reach[3] - reach[1] < 16 * native:
-        seen = tuple(round(v, 2) for v in common)
-        raise InputError(remark("relief.bounds_outside", bounds=box, seen=seen))
+        rounded = tuple(round(v, 2) for v in common)
+        raise InputError(remark("relief.bounds_outside", bounds=box, seen=rounded))
     factor, most = QUALITIES[quality]
     area = (reach[2] - reach[0]) * (reach[3] - reach[1])
     fine = max(native * factor, np.sqrt(area / most), step / 2)
@@ -209,9 +209,9 @@ def _grids(
         )
     if bounds is None and gsd is None:
         # The map's pixels are those of photo 1, where that is square to the wall.
-        wanted = working_grid(pair, images[0].shape, common, native)
-    target = wanted if step >= 0.999 * fine else Grid.from_bounds(wanted.bounds, gsd=fine)
-    return wanted, target, work
+        map_grid = working_grid(pair, images[0].shape, common, native)
+    target = map_grid if step >= 0.999 * fine else Grid.from_bounds(map_grid.bounds, gsd=fine)
+    return map_grid, target, work
 
 
 def _check_range(relief_range: tuple[float, float], d2: float) -> None:

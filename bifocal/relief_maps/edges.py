@@ -125,14 +125,16 @@ def sharpen(
         _mismatch(frame, far, near, candidate, grey, gradient)
         for candidate in (relief, upper, lower)
     ]
-    own, high, low = (guide.smooth(misfit) for misfit in misfits)
+    misfit_kept, high, low = (guide.smooth(misfit) for misfit in misfits)
     textured = _textured(frame)
-    own += np.float32(precise) * textured * _ramp(median, per_relief) - np.float32(EDGES.favour)
+    misfit_kept += np.float32(precise) * textured * _ramp(median, per_relief) - np.float32(
+        EDGES.favour
+    )
     margin = (
         textured * _margin(frame, median) * np.clip(parallax / np.float32(EDGES.wide_step), 0, 1)
     )
-    up = band & (high + margin <= low) & (high + margin < own)
-    down = band & (low - margin < own) & (low < high + margin)
+    up = band & (high + margin <= low) & (high + margin < misfit_kept)
+    down = band & (low - margin < misfit_kept) & (low < high + margin)
     np.copyto(result, upper, where=up)
     np.copyto(result, lower, where=down)
     return result, misfits[0]

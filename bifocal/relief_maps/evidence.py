@@ -134,9 +134,9 @@ def held_back(relief: Float32Array, support: BoolArray, distance: float) -> Floa
         )[:height, :width]
         for band in bounds
     )
-    known = ~support & (low <= high)
+    bounded = ~support & (low <= high)
     held = np.minimum(np.maximum(relief, low - slack), high + slack)
-    return np.where(known, held, relief)
+    return np.where(bounded, held, relief)
 
 
 def _surroundings(relief: Float32Array, support: BoolArray, side: int) -> _Range:
@@ -145,11 +145,11 @@ def _surroundings(relief: Float32Array, support: BoolArray, side: int) -> _Range
     rows, columns = -(-height // side), -(-width // side)
     edge = ((0, rows * side - height), (0, columns * side - width))
     blocks = (rows, side, columns, side)
-    known = np.pad(support, edge).reshape(blocks)
+    inside = np.pad(support, edge).reshape(blocks)
     values = np.pad(relief, edge).reshape(blocks)
-    enough = known.sum((1, 3)) >= EVIDENCE.fewest
-    low = np.where(known, values, np.inf).min((1, 3))
-    high = np.where(known, values, -np.inf).max((1, 3))
+    enough = inside.sum((1, 3)) >= EVIDENCE.fewest
+    low = np.where(inside, values, np.inf).min((1, 3))
+    high = np.where(inside, values, -np.inf).max((1, 3))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
     # OpenCV pads by what changes nothing; infinities stay where no block around says anything.
     return _Range(
@@ -213,8 +213,8 @@ def most_falling(frame: Frame, typical: float = 0.0) -> float | Float32Array:
     if frame.sideways:
         x, y = frame.from_centre()
         own_x, own_y = offsets(frame.grid.shape, frame.grid.pixel_of(frame.foot(2).nadir))
-        own = np.maximum(np.sqrt(own_x * own_x + own_y * own_y), np.float32(1))
-        share = np.minimum(np.float32(share) * np.sqrt(x * x + y * y) / own, np.float32(1))
+        steepness = np.maximum(np.sqrt(own_x * own_x + own_y * own_y), np.float32(1))
+        share = np.minimum(np.float32(share) * np.sqrt(x * x + y * y) / steepness, np.float32(1))
     precise = edges.precision(typical)
     limit = EVIDENCE.falls_away * share**EVIDENCE.falls_power
     return precise * limit + (1 - precise) * EVIDENCE.falls_away_imprecise

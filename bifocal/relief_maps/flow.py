@@ -241,10 +241,10 @@ def sigma_of_relief(frame: Frame, relief: Float32Array, sigma_px: Float32Array) 
 def _loop(frame: Frame, flow: Float32Array, alpha: float) -> Float32Array:
     """Return how far a pixel lands from itself after the flow there and back. [px]"""
     x, y = offsets(frame.grid.shape)
-    there = (flow[..., 0] + x, flow[..., 1] + y)
+    ends = (flow[..., 0] + x, flow[..., 1] + y)
     seed = _turned_round(flow)
     back = seeded_flow(frame.image2, frame.image1, seed, finest=1, alpha=alpha)
-    moved = cv2.remap(back, *there, cv2.INTER_LINEAR, borderValue=(1e3, 1e3))
+    moved = cv2.remap(back, *ends, cv2.INTER_LINEAR, borderValue=(1e3, 1e3))
     away: Float32Array = np.hypot(flow[..., 0] + moved[..., 0], flow[..., 1] + moved[..., 1])
     return away
 

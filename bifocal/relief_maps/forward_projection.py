@@ -133,16 +133,16 @@ def to_plane(frame: Frame, source: MapBands, usable: BoolArray, grid: Grid) -> M
     foot = frame.foot(1)
     relief = np.where(usable, source.r, np.float32(np.nan))
     first = _scatter(frame, relief, source.quality == Quality.MEASURED, grid, foot)
-    known = np.isfinite(first)
+    finite = np.isfinite(first)
     around = np.ones((5, 5), dtype=np.uint8)
-    upper = cv2.dilate(np.where(known, first, np.float32(-1e3)), around)
-    lower = cv2.erode(np.where(known, first, np.float32(1e3)), around)
+    upper = cv2.dilate(np.where(finite, first, np.float32(-1e3)), around)
+    lower = cv2.erode(np.where(finite, first, np.float32(1e3)), around)
     result = _look_up(frame, source, relief, foot, _away(frame, foot, grid), first)
     for start in (upper, lower):
         row, column = np.nonzero((np.abs(start) < 999) & np.isnan(result.r))
         away = _away(frame, foot, grid, row, column)
-        found = _look_up(frame, source, relief, foot, away, start[row, column])
-        result.put((row, column), found)
+        relief_met = _look_up(frame, source, relief, foot, away, start[row, column])
+        result.put((row, column), relief_met)
     return result
 
 
@@ -183,8 +183,8 @@ def highest(
     if first is not None:
         best = np.full(result.size, np.nan, dtype=np.float32)
         np.fmax.at(best, index[first], relief[first])
-        known = np.isfinite(best)
-        result.ravel()[known] = best[known]
+        finite = np.isfinite(best)
+        result.ravel()[finite] = best[finite]
     return result
 
 
@@ -410,11 +410,11 @@ def fill_small(bands: MapBands, holes: BoolArray) -> None:
         unknown.astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
     fill = holes & unknown & (distance <= PROJECTION.fringe_hidden)
-    known = np.flatnonzero(~unknown)
-    if not len(known) or not fill.any():
+    sources = np.flatnonzero(~unknown)
+    if not len(sources) or not fill.any():
         return
     source_of_label = np.zeros(int(label.max()) + 1, dtype=np.int64)
-    source_of_label[label.ravel()[known]] = known
+    source_of_label[label.ravel()[sources]] = sources
     _fill(bands, fill, source_of_label[label[fill]], 5, Quality.INTERPOLATED)
 
 

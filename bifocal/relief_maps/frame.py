@@ -186,9 +186,9 @@ def common_bounds(pair: Pair, shapes: tuple[tuple[int, ...], tuple[int, ...]]) -
     """
     places = []
     photos = zip((pair.image1, pair.image2), shapes, strict=True)
-    for (one, shape), (other, across) in permutations(photos):
+    for (one, shape), (second, across) in permutations(photos):
         footprint = _footprint(one, shape)
-        places.append(footprint[_shows(other, across, footprint)])
+        places.append(footprint[_shows(second, across, footprint)])
     both = np.concatenate(places)
     if len(both) < 4:
         raise GeometryError(remark("relief.nothing_in_common"))
@@ -312,7 +312,7 @@ def _on_grid(photo: Photo, image: ByteArray, grid: Grid) -> tuple[ByteArray, Boo
         image = np.asarray(cv2.resize(image, small, interpolation=cv2.INTER_AREA), dtype=np.uint8)
     factors = np.array([image.shape[1] / width, image.shape[0] / height])
     result = np.empty(grid.shape, dtype=np.uint8)
-    seen = np.empty(grid.shape, dtype=bool)
+    inside = np.empty(grid.shape, dtype=bool)
     band = max(1, 2**20 // grid.width)
     for top in range(0, grid.height, band):
         part = grid.window(0, top, grid.width, min(band, grid.height - top))
@@ -320,16 +320,16 @@ def _on_grid(photo: Photo, image: ByteArray, grid: Grid) -> tuple[ByteArray, Boo
         pixels = photo.pixels_from_plane(places)
         rows = slice(top, top + part.height)
         with np.errstate(invalid="ignore"):
-            seen[rows] = ((pixels >= 0) & (pixels <= [width - 1, height - 1])).all(-1)
-        seen[rows] &= photo.sees_ahead(places, (height, width))
+            inside[rows] = ((pixels >= 0) & (pixels <= [width - 1, height - 1])).all(-1)
+        inside[rows] &= photo.sees_ahead(places, (height, width))
         maps = ((pixels + 0.5) * factors - 0.5).astype(np.float32)
         maps[~np.isfinite(maps)] = -1e4
         result[rows] = cv2.remap(
             image, maps, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
         )
     if not photo.refracted:
-        result[~seen] = 0
-    return result, seen
+        result[~inside] = 0
+    return result, inside
 
 
 def _whole_shift(matrix: FloatArray, grid: Grid) -> tuple[int, int] | None:

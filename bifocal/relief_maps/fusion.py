@@ -102,20 +102,20 @@ def fused(found: Sequence[PairRelief], witnesses: Sequence[Witness], grid: Grid)
     near = min(witness.photo.distance for witness in witnesses)
     _decide(result, found, misfits, open_, FUSION.in_front * near)
     rest = np.isfinite(result.r) & (result.quality != Quality.MEASURED)
-    seen = np.isfinite(shown_by(photos, result.r, grid, rest)).sum(axis=0)
-    result.quality[rest] = np.where(seen < 2, Quality.HIDDEN, Quality.INTERPOLATED)
+    count = np.isfinite(shown_by(photos, result.r, grid, rest)).sum(axis=0)
+    result.quality[rest] = np.where(count < 2, Quality.HIDDEN, Quality.INTERPOLATED)
     return result
 
 
 def _apart(found: Sequence[PairRelief]) -> BoolArray:
     """Return where two pairs differ visibly, or measured what differs beyond their sigmas."""
     apart = np.zeros(found[0].bands.r.shape, bool)
-    for one, other in combinations(found, 2):
-        variance = sum(of.bands.sigma**2 for of in (one, other))
+    for one, second in combinations(found, 2):
+        variance = sum(of.bands.sigma**2 for of in (one, second))
         with np.errstate(invalid="ignore"):
             limit = np.minimum(FUSION.beyond * np.sqrt(variance), FUSION.visible)
-            off = np.abs(one.bands.r - other.bands.r)
-            apart |= (off > limit) & one.measured & other.measured
+            off = np.abs(one.bands.r - second.bands.r)
+            apart |= (off > limit) & one.measured & second.measured
         apart |= off > FUSION.visible
     return apart
 
@@ -156,33 +156,33 @@ def _decide(
         return np.stack([band(one)[at] for one in found])
 
     relief, sigma = all_of(lambda one: one.bands.r), all_of(lambda one: one.bands.sigma)
-    measured, known = all_of(lambda one: one.measured), np.isfinite(relief)
+    measured, finite = all_of(lambda one: one.measured), np.isfinite(relief)
     behind = all_of(lambda one: one.bands.quality == Quality.HIDDEN)
     doubt = FUSION.unmeasured * ~measured + FUSION.behind * behind
-    cost = np.where(known, misfits[:, row, column] + doubt, NEVER)
+    cost = np.where(finite, misfits[:, row, column] + doubt, NEVER)
     best = cost.argmin(axis=0)[None]
     with np.errstate(invalid="ignore"):
         front = relief > np.take_along_axis(relief, best, 0) + np.float32(in_front)
     front &= cost < np.take_along_axis(cost, best, 0) + np.float32(FUSION.front)
     first = np.where(front, relief, -NEVER).argmax(axis=0)[None]
     best = np.where(front.any(axis=0), first, best)
-    value, own, least = (np.take_along_axis(a, best, 0) for a in (relief, sigma, cost))
+    value, sigma_best, least = (np.take_along_axis(a, best, 0) for a in (relief, sigma, cost))
     off = np.nan_to_num(np.abs(relief - value))
-    limit = np.minimum(FUSION.beyond * np.hypot(sigma, own), np.float32(FUSION.visible))
+    limit = np.minimum(FUSION.beyond * np.hypot(sigma, sigma_best), np.float32(FUSION.visible))
     same = measured & (off <= limit)
     share = np.where(same, all_of(lambda one: one.weight), np.float32(0))
     some = same.any(axis=0)
     share /= np.where(some, share.sum(axis=0), np.float32(1))
     mean, variance = ((share * np.nan_to_num(a)).sum(axis=0) for a in (relief, sigma**2))
-    rival = np.where(known & (off > limit), cost, NEVER) - least
+    rival = np.where(finite & (off > limit), cost, NEVER) - least
     clear = rival.min(axis=0) > FUSION.margin
     # What differs by less than anyone sees at 1:50 is told by its sigma, not taken out.
     spread = np.where(measured, off, np.float32(0)).max(axis=0)
     small = spread < FUSION.visible
     even = (measured & (np.abs(rival) < FUSION.undecided)).any(axis=0)
     good = np.isfinite(value[0]) & (small | ~(even & some))
-    told = np.where(small & ~clear, spread, np.float32(0))
-    precise = np.hypot(np.where(some, np.sqrt(variance), own[0]), told)
+    between = np.where(small & ~clear, spread, np.float32(0))
+    precise = np.hypot(np.where(some, np.sqrt(variance), sigma_best[0]), between)
     result.r[at] = np.where(good, np.where(some, mean, value[0]), np.float32(np.nan))
     result.sigma[at] = np.where(good, precise, np.float32(np.nan))
     quality = np.where(some & (clear | small), Quality.MEASURED, Quality.INTERPOLATED)

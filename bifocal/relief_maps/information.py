@@ -90,8 +90,8 @@ def _noise(apart: Float32Array, matched: BoolArray) -> Float32Array:
         values = fine[box][matched[box]]
         if len(values) > INFORMATION.fewest:
             tiles[i, j] = 1.4826 * np.median(values)
-    known = np.isfinite(tiles)
-    tiles[~known] = np.median(tiles[known]) if known.any() else np.median(1.4826 * fine)
+    finite = np.isfinite(tiles)
+    tiles[~finite] = np.median(tiles[finite]) if finite.any() else np.median(1.4826 * fine)
     tiles = np.maximum(tiles, np.float32(INFORMATION.least_noise))
     if min(tiles.shape) > 2:
         tiles = cv2.medianBlur(tiles, 3)

@@ -161,22 +161,22 @@ def _spread_inwards(mask: BoolArray, middle: FloatArray, reach: int) -> BoolArra
 
 def tidied(bands: MapBands) -> MapBands:
     """Round the outline of what is known, drop pieces that float, close pinholes (in place)."""
-    known = np.isfinite(bands.r)
-    wanted = cv2.medianBlur(known.astype(np.uint8), MAP.outline)
-    _, label, stats, _ = cv2.connectedComponentsWithStats(wanted, connectivity=8)
+    finite = np.isfinite(bands.r)
+    smooth = cv2.medianBlur(finite.astype(np.uint8), MAP.outline)
+    _, label, stats, _ = cv2.connectedComponentsWithStats(smooth, connectivity=8)
     area = stats[:, cv2.CC_STAT_AREA]
     if len(area) > 1:
         scrap = area < min(MAP.scrap, MAP.scrap_share * area[1:].max())
         scrap[0] = False
         if scrap.any():
-            wanted[scrap[label]] = 0
-    _, label, stats, _ = cv2.connectedComponentsWithStats(1 - wanted, connectivity=4)
+            smooth[scrap[label]] = 0
+    _, label, stats, _ = cv2.connectedComponentsWithStats(1 - smooth, connectivity=4)
     pinhole = stats[:, cv2.CC_STAT_AREA] < MAP.hole
     pinhole[0] = False
     if pinhole.any():
-        wanted[pinhole[label]] = 1
-    forward_projection.fill_small(bands, (wanted > 0) & ~known)
-    lost = wanted == 0
+        smooth[pinhole[label]] = 1
+    forward_projection.fill_small(bands, (smooth > 0) & ~finite)
+    lost = smooth == 0
     bands.r[lost] = bands.sigma[lost] = np.nan
     bands.quality[lost] = Quality.UNKNOWN
     return bands

@@ -111,7 +111,7 @@ def _surface_behind(frame: Frame, relief: Float32Array, support: BoolArray) -> F
     """
     share = _block_means(support.astype(np.float32))
     sums = _block_means(np.where(support, relief, np.float32(0)))
-    known = share * REGIONS.block**2 >= EVIDENCE.fewest
+    supported = share * REGIONS.block**2 >= EVIDENCE.fewest
     values = (sums / np.maximum(share, np.float32(1e-3))).astype(np.float32)
     nothing = np.zeros(values.shape, np.float32)
     bands = MapBands(values, nothing, nothing.astype(np.uint8))
@@ -121,7 +121,7 @@ def _surface_behind(frame: Frame, relief: Float32Array, support: BoolArray) -> F
         x0=frame.grid.x0 + shift, y0=frame.grid.y0 - shift, gsd=gsd * REGIONS.block, width=columns,
         height=rows,
     )  # fmt: skip
-    filled = forward_projection.fill_from_behind(bands, ~known, grid, frame.foot(1).nadir)
-    bands.r[~(known | filled)] = np.inf
+    filled = forward_projection.fill_from_behind(bands, ~supported, grid, frame.foot(1).nadir)
+    bands.r[~(supported | filled)] = np.inf
     # Chance supports blocks in the midst of a lost region.
     return np.asarray(cv2.medianBlur(bands.r, 5))

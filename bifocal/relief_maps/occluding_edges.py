@@ -125,12 +125,12 @@ def _falling(frame: Frame, bands: MapBands, grid: Grid) -> _Rims:
     row, column = row + margin, column + margin
     x, y = (column - nadir[0]).astype(np.float32), (row - nadir[1]).astype(np.float32)
     rho = np.maximum(np.sqrt(x * x + y * y), np.float32(1))
-    own = relief[row, column]
-    rims = _Rims(column, row, x / rho, y / rho, own, own, rho)
+    top = relief[row, column]
+    rims = _Rims(column, row, x / rho, y / rho, top, top, rho)
     behind = np.fmin.reduce([relief[rims.places(-step)] for step in (2.0, 3.0, 4.0)])
-    fall = own - behind
-    falls = fall * rho > np.float32(RIMS.least_shadow) * (distance - own)
-    falls &= own - relief[rims.places(-1.0)] > np.float32(0.5) * fall
+    fall = top - behind
+    falls = fall * rho > np.float32(RIMS.least_shadow) * (distance - top)
+    falls &= top - relief[rims.places(-1.0)] > np.float32(0.5) * fall
     # What camera 2 cannot see, by Eq. (1); 1e-6 keeps a camera that touches the relief finite.
     unseen = fall * rho / np.maximum(np.float32(frame.foot(2).distance) - behind, np.float32(1e-6))
     reach = np.minimum(unseen + np.float32(RIMS.doubt), np.float32(RIMS.reach))
@@ -140,15 +140,15 @@ def _falling(frame: Frame, bands: MapBands, grid: Grid) -> _Rims:
 def _measured_inwards(bands: MapBands, rims: _Rims) -> tuple[_Rims, Float32Array]:
     """Return the rims with measured relief inwards of them that is theirs, and that relief."""
     raised, nearest = rims.own.copy(), np.zeros(len(rims.row), np.float32)
-    left, part, fall = np.arange(len(rims.row)), rims, rims.own - rims.behind
+    open_rows, part, fall = np.arange(len(rims.row)), rims, rims.own - rims.behind
     for step in range(1, RIMS.reach + 1):
         places = part.places(step)
         relief = bands.r[places]
-        found = bands.quality[places] == Quality.MEASURED
-        found &= np.abs(relief - part.own) < RIMS.same * fall
-        raised[left[found]], nearest[left[found]] = relief[found], step
-        search = ~found & (relief > part.behind + RIMS.same * fall)
-        left, part, fall = left[search], part.only(search), fall[search]
+        measured = bands.quality[places] == Quality.MEASURED
+        measured &= np.abs(relief - part.own) < RIMS.same * fall
+        raised[open_rows[measured]], nearest[open_rows[measured]] = relief[measured], step
+        search = ~measured & (relief > part.behind + RIMS.same * fall)
+        open_rows, part, fall = open_rows[search], part.only(search), fall[search]
     rims = rims._replace(reach=np.minimum(rims.reach, nearest))
     return rims.only(nearest > 0), raised[nearest > 0]
 

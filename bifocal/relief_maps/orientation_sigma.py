@@ -51,8 +51,8 @@ def orientation_sigma(pair: Pair, relief: Float32Array, grid: Grid) -> Float32Ar
     rows = np.linspace(0, height - 1, min(SIGMA.nodes, height))
     x, y = grid.columns_x[np.rint(columns).astype(int)], grid.rows_y[np.rint(rows).astype(int)]
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    known = relief[np.isfinite(relief)]
-    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
+    finite = relief[np.isfinite(relief)]
+    low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
     middle, half = (low + high) / 2, max((high - low) / 2, 1e-3 * pair.d2)
     low_, mid_, high_ = (
         _variance(pair, places, level).reshape(len(rows), len(columns))

@@ -175,13 +175,13 @@ def exposed_alike(
     shown = shown_by(witnesses, relief, grid, part)
     done = list(witnesses)
     for number, witness in enumerate(witnesses):
-        for other in shown[:number]:
-            use = np.isfinite(shown[number]) & np.isfinite(other)
+        for reference in shown[:number]:
+            use = np.isfinite(shown[number]) & np.isfinite(reference)
             if use.sum() < WITNESSES.exposure_least:
                 continue
             place = witness.photo.project(xyz) / witness.size * 2 - 1
             terms = np.column_stack([np.ones(len(xyz)), shown[number], place])
-            a, b, c, d = least_absolute(terms[use], other[use], rounds=8, floor=0.5)
+            a, b, c, d = least_absolute(terms[use], reference[use], rounds=8, floor=0.5)
             height, width = witness.grey.shape
             across = np.linspace(c, -c, width, dtype=np.float32)[None, :]
             down = np.linspace(d, -d, height, dtype=np.float32)[:, None]

@@ -110,8 +110,8 @@ def fitted(half: Frame, image: ByteArray, relief: Float32Array) -> Float32Array:
     problem = _Problem.of(half, Segments.of(image))
     height, width = half.grid.shape
     coarse = np.ascontiguousarray(relief[: 2 * height : 2, : 2 * width : 2])
-    found = problem.relief_of(problem.solve(coarse), image.shape)
-    return np.clip(found, relief.min(), relief.max())
+    solved = problem.relief_of(problem.solve(coarse), image.shape)
+    return np.clip(solved, relief.min(), relief.max())
 
 
 def _added(segment: IntArray, values: FloatArray | Float32Array, count: int) -> FloatArray:
@@ -246,15 +246,15 @@ class _Problem:
         """Return the relief of own planes and of the neighbours' at the borders. [m]"""
         borders = self.segments.borders
         sides = ((planes, borders.own, self.from_own), (others, borders.other, self.from_other))
-        own, other = (
+        inner, outer = (
             each[0][at] + each[1][at] * away[0] + each[2][at] * away[1] for each, at, away in sides
         )
-        return own, other
+        return inner, outer
 
     def _jumps(self, planes: FloatArray, others: FloatArray) -> FloatArray:
         """Return what the jumps from own planes to the neighbours' cost every segment."""
-        own, other = self._at_borders(planes, others)
-        cost = self.tie * np.minimum(np.abs(own - other) / PATCHES.jump, 1)
+        inner, outer = self._at_borders(planes, others)
+        cost = self.tie * np.minimum(np.abs(inner - outer) / PATCHES.jump, 1)
         return _added(self.segments.borders.own, cost, self.segments.number)
 
     def _median(self, relief: Float32Array) -> FloatArray:
@@ -292,5 +292,5 @@ class _Problem:
         at = np.minimum(at, len(borders.own) - 1)
         height, slope, lean = planes[:, borders.other[at]]
         away = self.from_other[:, at] - share * self.from_own[:, at]
-        there = height + slope * away[0] + lean * away[1]
-        return np.where(several == 0, planes, np.stack([there, share * slope, share * lean]))
+        at_neighbour = height + slope * away[0] + lean * away[1]
+        return np.where(several == 0, planes, np.stack([at_neighbour, share * slope, share * lean]))

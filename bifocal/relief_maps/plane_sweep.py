@@ -145,9 +145,9 @@ def swept(frame: Frame, box: Box, tried: Hypotheses) -> Swept:
     slots, zooms = tried.slots, np.asarray(1 + tried.step * tried.numbers, np.float64)
     moved = _moved(frame, frame.image2, box, zooms, cv2.INTER_LINEAR)
     cost = _costs(_bordered(frame.image1, box), moved, slots)
-    seen = frame.seen2.view(np.uint8)
-    if not _moved(frame, seen, box, zooms[[0, -1]], cv2.INTER_NEAREST).all():
-        content = _moved(frame, seen, box, zooms, cv2.INTER_NEAREST)[:, HALF:-HALF, HALF:-HALF]
+    mask = frame.seen2.view(np.uint8)
+    if not _moved(frame, mask, box, zooms[[0, -1]], cv2.INTER_NEAREST).all():
+        content = _moved(frame, mask, box, zooms, cv2.INTER_NEAREST)[:, HALF:-HALF, HALF:-HALF]
         for slot, inside in zip(slots, content, strict=True):
             cost[:, slot][inside == 0] = SWEEP.outside
     total = semi_global.aggregated(
@@ -261,8 +261,8 @@ def _costs(first: ByteArray, second: ByteArray, slots: IntArray) -> semi_global.
     for slot, moved in zip(slots, second, strict=True):
         middle = moved[inner]
         differ = np.zeros((height, width), np.uint8)
-        for own, (y, x) in zip(darker, _PLACES, strict=True):
-            differ += (moved[y : y + height, x : x + width] < middle) ^ own
+        for bits, (y, x) in zip(darker, _PLACES, strict=True):
+            differ += (moved[y : y + height, x : x + width] < middle) ^ bits
         off = np.minimum(cv2.absdiff(grey, np.ascontiguousarray(middle)), np.uint8(weights[2]))
         cost[:, slot] = weights[0] * differ.astype(np.int16) + weights[1] * off.astype(np.int16)
     return cost
@@ -279,12 +279,12 @@ def _compare(grey, darker, second, slots, cost, census, share, most):  # type: i
             middle = moved[row + 2, 2 : 2 + width]
             differ[:] = 0
             for place in range(24):
-                there = place if place < 12 else place + 1
-                across = there % 5
-                other = moved[row + there // 5, across : across + width]
-                own = darker[place, row]
+                cell = place if place < 12 else place + 1
+                across = cell % 5
+                beside = moved[row + cell // 5, across : across + width]
+                bits = darker[place, row]
                 for column in range(width):
-                    differ[column] += np.uint8(other[column] < middle[column]) ^ own[column]
+                    differ[column] += np.uint8(beside[column] < middle[column]) ^ bits[column]
             line, out = grey[row], cost[row, slots[number]]
             for column in range(width):
                 a, b = np.int16(line[column]), np.int16(middle[column])

@@ -72,23 +72,23 @@ class Registration:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What the user should be told."""
-        told = []
+        sentences = []
         per_scale = self.false_relief_per_scale
         if self.systematic > REGISTRATION.remark_px:
             (x, y), turn = self.shift, np.degrees(self.rotation)
             about = {"x": x, "y": y, "turn": turn}
-            told.append(remark("relief.no_exact_fit", miss=self.across_median, **about))
+            sentences.append(remark("relief.no_exact_fit", miss=self.across_median, **about))
         if self.matched < 0.5:
-            told.append(remark("relief.few_matched", share=self.matched))
+            sentences.append(remark("relief.few_matched", share=self.matched))
         if self.base:
             shift = 100 * self.false_relief_per_shift  # of 0.1 px, in mm
-            told.append(remark("relief.shift_along_base", base=self.base, relief=shift))
-            return tuple(told)
+            sentences.append(remark("relief.shift_along_base", base=self.base, relief=shift))
+            return tuple(sentences)
         if 0.3 * per_scale < abs(self.wall) < 15 * per_scale:
             share = 100 * self.wall / per_scale * 1e-3
-            told.append(remark("relief.flat_surface", wall=1000 * self.wall, share=share))
-        told.append(remark("relief.scale_error", relief=1000 * per_scale))
-        return tuple(told)
+            sentences.append(remark("relief.flat_surface", wall=1000 * self.wall, share=share))
+        sentences.append(remark("relief.scale_error", relief=1000 * per_scale))
+        return tuple(sentences)
 
 
 def check_registration(frame: Frame, measured: Measurement) -> Registration:

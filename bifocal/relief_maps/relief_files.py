@@ -27,13 +27,13 @@ def write_preview(path: Path | str, relief: ReliefMap, *, overwrite: bool = Fals
     check_ending(path, "the preview is written as .png.", ".png")
     step = max(1, -(-max(relief.shape) // PREVIEW_SIDE))
     r = relief.r[::step, ::step]
-    known = np.isfinite(r)
-    low, high = (float(v) for v in np.percentile(r[known], [0.5, 99.5]))
+    finite = np.isfinite(r)
+    low, high = (float(v) for v in np.percentile(r[finite], [0.5, 99.5]))
     scale = ScalarMappable(Normalize(low, max(high, low + 1e-3)), "viridis")
     picture = shaded(scale.to_rgba(r)[..., :3], r, relief.gsd * step)
-    guessed = known & ~np.isin(relief.quality[::step, ::step], TOLD)
+    guessed = finite & ~np.isin(relief.quality[::step, ::step], TOLD)
     picture = hatched(picture, guessed)
-    picture[~known] = 1.0
+    picture[~finite] = 1.0
     height, width = r.shape
     size = 12.0 if width >= height else 12.0 * width / height + 2.5
     figure = Figure(figsize=(size, size * height / width * 0.82 + 1.0), dpi=150)

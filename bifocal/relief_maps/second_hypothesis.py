@@ -139,45 +139,45 @@ def with_swept(frame: Frame, matched: Measurement) -> tuple[Measurement, BoolArr
     every = np.s_[: 2 * half.grid.height : 2, : 2 * half.grid.width : 2]
     coarse = _Level(half, fine.relief[every], fine.valid[every], fine.support[every])
     guess = _guessed(coarse)
-    found = _refined(fine, guess, _taken(coarse, guess))
-    taken = _large(_taken(fine, found))
+    hypothesis = _refined(fine, guess, _taken(coarse, guess))
+    accepted = _large(_taken(fine, hypothesis))
     swept: dict[str, Any] = {
-        "r": found.relief,
+        "r": hypothesis.relief,
         "loop": 0,
         "across": 0,
         "sigma_px": HYPOTHESIS.sigma,
     }
     bands: dict[str, Any] = {
-        name: np.where(taken, np.float32(new), getattr(matched, name))
+        name: np.where(accepted, np.float32(new), getattr(matched, name))
         for name, new in swept.items()
     }
-    return replace(matched, **bands), taken
+    return replace(matched, **bands), accepted
 
 
 def _guessed(level: _Level) -> _Found:
     """Return what a sweep through all reliefs around each tile finds where flow is not sure."""
-    found, shape = _nothing(level), level.valid.shape
+    hypothesis, shape = _nothing(level), level.valid.shape
     unsure = level.frame.seen1 & ~level.valid
     low, high = _ranges(level)
     for tile, box in _tiles(shape):
         if low[tile] < high[tile] and unsure[box].mean() > HYPOTHESIS.unsure:
             wide = _widened(box, shape)
             tried = Hypotheses.between(level.frame, wide, float(low[tile]), float(high[tile]))
-            _sweep(found, level, box, wide, tried)
-    return found
+            _sweep(hypothesis, level, box, wide, tried)
+    return hypothesis
 
 
 def _refined(level: _Level, guess: _Found, taken: BoolArray) -> _Found:
     """Return what a sweep through the reliefs at hand finds where a guess differs from flow."""
-    found, shape = _nothing(level), level.valid.shape
+    hypothesis, shape = _nothing(level), level.valid.shape
     for _, box in _tiles(shape):
         if taken[_halves(box)].sum() > HYPOTHESIS.wanted:
             wide = _widened(box, shape)
             values = guess.relief[_halves(wide)]
-            own = level.relief[wide][level.support[wide]][::4]
-            values = np.concatenate([values[np.isfinite(values)], own])
-            _sweep(found, level, box, wide, Hypotheses.near(level.frame, wide, values))
-    return found
+            supported = level.relief[wide][level.support[wide]][::4]
+            values = np.concatenate([values[np.isfinite(values)], supported])
+            _sweep(hypothesis, level, box, wide, Hypotheses.near(level.frame, wide, values))
+    return hypothesis
 
 
 def _nothing(level: _Level) -> _Found:
@@ -191,15 +191,16 @@ def _sweep(found: _Found, level: _Level, box: Box, wide: Box, tried: Hypotheses)
     if len(tried.numbers) < HYPOTHESIS.fewest_tried:
         return
     relief, cost = plane_sweep.swept(level.frame, wide, tried)
-    known = np.where(np.isnan(relief), level.relief[wide], relief)
-    own, new = (
-        plane_sweep.misfit(level.frame, wide, values) for values in (level.relief[wide], known)
+    start_relief = np.where(np.isnan(relief), level.relief[wide], relief)
+    cost_kept, new = (
+        plane_sweep.misfit(level.frame, wide, values)
+        for values in (level.relief[wide], start_relief)
     )
     inner = tuple(
         slice(part.start - around.start, part.stop - around.start)
         for part, around in zip(box, wide, strict=True)
     )
-    for band, values in zip(found, (relief, cost, own - new), strict=True):
+    for band, values in zip(found, (relief, cost, cost_kept - new), strict=True):
         band[box] = values[inner]
 
 
@@ -245,10 +246,10 @@ def _ranges(level: _Level) -> tuple[Float32Array, Float32Array]:
 
 def _taken(level: _Level, found: _Found) -> BoolArray:
     """Return where a sweep fits better than flow, and best of all at its place of photo 2."""
-    taken = np.zeros(level.valid.shape, bool)
+    accepted = np.zeros(level.valid.shape, bool)
     at = np.nonzero(np.isfinite(found.relief))
     if not len(at[0]):
-        return taken
+        return accepted
     relief = found.relief[at]
     column, row, parallax = plane_sweep.places(level.frame, (at[0], at[1]), relief)
     height, width = level.valid.shape
@@ -257,16 +258,16 @@ def _taken(level: _Level, found: _Found) -> BoolArray:
     inside &= level.frame.seen2.ravel()[index]
     # Of two pixels at one place of photo 2 the one that fits worse is hidden there.
     fit = np.where(inside, -found.cost[at], -np.inf).astype(np.float32)
-    best = np.full(taken.size, -np.inf, np.float32)
+    best = np.full(accepted.size, -np.inf, np.float32)
     forward_projection.highest(fit, index, best)
-    there = np.full(taken.size, np.nan, np.float32)
+    placed = np.full(accepted.size, np.nan, np.float32)
     first = inside & (best[index] == fit)
-    there[index[first]] = relief[first]
-    alone = np.abs(there[index] - relief) * parallax < HYPOTHESIS.alone
-    other = np.abs(relief - level.relief[at]) * parallax > HYPOTHESIS.differs
+    placed[index[first]] = relief[first]
+    alone = np.abs(placed[index] - relief) * parallax < HYPOTHESIS.alone
+    differs = np.abs(relief - level.relief[at]) * parallax > HYPOTHESIS.differs
     margin = np.where(level.valid[at], HYPOTHESIS.better, HYPOTHESIS.better_invalid)
-    taken[at] = inside & alone & other & (found.better[at] > margin)
-    return taken
+    accepted[at] = inside & alone & differs & (found.better[at] > margin)
+    return accepted
 
 
 def _large(mask: BoolArray) -> BoolArray:

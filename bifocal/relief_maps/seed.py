@@ -149,7 +149,7 @@ def _cost_volume(
         if frame.pair.refracted:
             maps = _coarse_map(frame, (height, width), float(relief[i]))
         moved = cv2.remap(near, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        there = cv2.remap(content, *maps, cv2.INTER_LINEAR, borderValue=0.0)
+        overlap = cv2.remap(content, *maps, cv2.INTER_LINEAR, borderValue=0.0)
         score = np.zeros_like(far)
         for n in windows:
             mean, variance = moments[n]
@@ -158,7 +158,7 @@ def _cost_volume(
             score += (
                 0.5 * shared / np.sqrt((variance + SEED.noise**2) * (variance2 + SEED.noise**2))
             )
-        cost[..., i] = np.where(there > 0.99, np.clip(1 - score, 0, 1), SEED.outside)
+        cost[..., i] = np.where(overlap > 0.99, np.clip(1 - score, 0, 1), SEED.outside)
     return cost
 
 

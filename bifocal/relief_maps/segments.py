@@ -151,14 +151,14 @@ def _borders(label: IntArray, quiet: ByteArray, count: int) -> Borders:
     length = np.bincount(number).astype(float)
     means = [np.bincount(number, x, len(pairs)) / length for x in (step, row, column)]
     low, high = pairs // count, pairs % count
-    own, other = np.concatenate([low, high]), np.concatenate([high, low])
-    order = np.argsort(own, kind="stable")
+    inner, outer = np.concatenate([low, high]), np.concatenate([high, low])
+    order = np.argsort(inner, kind="stable")
     edge = np.tile(np.arange(len(pairs)), 2)[order]
-    own = own[order]
+    inner = inner[order]
     return Borders(
-        own=own, other=other[order], length=length[edge], contrast=np.abs(means[0])[edge],
+        own=inner, other=outer[order], length=length[edge], contrast=np.abs(means[0])[edge],
         row=means[1][edge], column=means[2][edge],
-        first=np.searchsorted(own, np.arange(count + 1)),
+        first=np.searchsorted(inner, np.arange(count + 1)),
     )  # fmt: skip
 
 

@@ -59,15 +59,15 @@ def _paths(
         # Beyond the rims all is 0; beyond the first and the last label, out of reach.
         before = np.zeros((labels + 2, width + 2), np.int16)
         before[[0, -1]] = 32000 - one_step
-        inner, there = np.s_[1:-1, 1:-1], slice(1 - shift, width + 1 - shift)
+        inner, columns = np.s_[1:-1, 1:-1], slice(1 - shift, width + 1 - shift)
         for row in order:
-            least = before[1:-1, there].min(0)
+            least = before[1:-1, columns].min(0)
             start = row == order[0]
             edge = np.zeros(width, np.int16) if start else np.abs(
                 grey[row] - np.roll(grey[row - down], shift)
             )  # fmt: skip
-            best = np.minimum(before[:-2, there], before[2:, there]) + one_step
-            np.minimum(best, before[1:-1, there], out=best)
+            best = np.minimum(before[:-2, columns], before[2:, columns]) + one_step
+            np.minimum(best, before[1:-1, columns], out=best)
             np.minimum(best, least + jumps[edge], out=best)
             before[inner] = cost[row] + best - least
             total[row] += before[inner]
@@ -103,12 +103,12 @@ def _add_path(cost, image, total, jumps, one_step, down, shift):  # type: ignore
             lower = before[label - 1, start : start + width]
             same = before[label, start : start + width]
             upper = before[label + 1, start : start + width]
-            own, sums = cost[row, label - 1], total[row, label - 1]
+            costs, sums = cost[row, label - 1], total[row, label - 1]
             smooth = now[label, 1 : 1 + width]
             for x in range(width):
                 best = np.int16(min(lower[x], upper[x]) + one_step)
                 best = min(min(best, same[x]), most[x])
-                value = np.int16(own[x] + best - least[x])
+                value = np.int16(costs[x] + best - least[x])
                 smooth[x] = value
                 sums[x] += value
         before, now = now, before

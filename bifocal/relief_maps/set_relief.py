@@ -210,11 +210,11 @@ def _of_set(
         np.full(grid.shape, np.nan, np.float32), np.full(grid.shape, np.nan, np.float32),
         np.zeros(grid.shape, np.uint8),
     )  # fmt: skip
-    made: dict[tuple[int, int], DenseRelief] = {}
+    reliefs: dict[tuple[int, int], DenseRelief] = {}
     refused: dict[tuple[int, int], Exception] = {}
     done = 0
     for part in parts:
-        found = []
+        maps = []
         for pair in part.pairs:
             try:
                 relief, one = _measured(
@@ -223,20 +223,20 @@ def _of_set(
             except (GeometryError, InputError) as error:
                 refused[pair] = error
             else:
-                made[pair] = relief
-                found.append(one)
+                reliefs[pair] = relief
+                maps.append(one)
             done += 1
-        if found:
+        if maps:
             column, row = part.grid.whole_offset_in(grid) or (0, 0)
             cut = np.s_[row : row + part.grid.height, column : column + part.grid.width]
-            bands.put(cut, fused(found, witnesses, part.grid))
-    if not made:
+            bands.put(cut, fused(maps, witnesses, part.grid))
+    if not reliefs:
         raise next(iter(refused.values()), GeometryError(remark("relief.nothing_in_common")))
     progress(1.0, 1.0)
     names = photos.names
-    worst = max(made.values(), key=lambda one: one.registration.systematic)
-    judged = [one.registration.false_relief_per_scale for one in made.values()]
-    wide = all(one.registration.base for one in made.values())
+    worst = max(reliefs.values(), key=lambda one: one.registration.systematic)
+    judged = [one.registration.false_relief_per_scale for one in reliefs.values()]
+    wide = all(one.registration.base for one in reliefs.values())
     registration = replace(
         worst.registration,
         false_relief_per_scale=min(judged),
@@ -245,10 +245,10 @@ def _of_set(
     return DenseRelief(
         r=bands.r, sigma=bands.sigma, quality=bands.quality, plane_from_pixel=grid.plane_from_pixel,
         registration=registration, working_gsd=worst.working_gsd,
-        used=tuple((names[far], names[near]) for far, near in made),
+        used=tuple((names[far], names[near]) for far, near in reliefs),
         notes=tuple(
             remark("relief.pair_left_out", far=names[far], near=names[near], why=str(error))
-            for (far, near), error in refused.items() if (far, near) not in made
+            for (far, near), error in refused.items() if (far, near) not in reliefs
         ),
     )  # fmt: skip
 
@@ -265,8 +265,8 @@ def _within(progress: Progress, done: int, jobs: int) -> Progress:
 
 def _pair(photos: PhotoSet, far: int, near: int) -> Pair:
     """Return two photos as a pair, also if both stand equally far from the wall."""
-    one, other = photos.photos[far], photos.photos[near]
-    if one.distance == other.distance:
+    one, second = photos.photos[far], photos.photos[near]
+    if one.distance == second.distance:
         farther = replace(one, distance=one.distance * (1 + PAIRING.farther))
         changed = (farther if number == far else p for number, p in enumerate(photos.photos))
         photos = replace(photos, photos=tuple(changed))
@@ -306,13 +306,13 @@ def _best_pairs(
     xyz0 = np.column_stack([xy, np.zeros(len(xy))])
     pixel = [_pixel(photo, grey, xy) for photo, grey in zip(photos.photos, greys, strict=True)]
     pairs, sigmas = [], []
-    for one, other in combinations(range(len(photos)), 2):
-        away = np.linalg.norm(_parallax(photos, one, other, xy), axis=-1)
+    for one, second in combinations(range(len(photos)), 2):
+        away = np.linalg.norm(_parallax(photos, one, second, xy), axis=-1)
         with np.errstate(divide="ignore", invalid="ignore"):
-            sigma = np.hypot(pixel[one], pixel[other]) / away
-        sigma[ray_angles(photos.photos[one], photos.photos[other], xyz0) > WIDEST] = np.inf
+            sigma = np.hypot(pixel[one], pixel[second]) / away
+        sigma[ray_angles(photos.photos[one], photos.photos[second], xyz0) > WIDEST] = np.inf
         sigma[~np.isfinite(sigma)] = np.inf
-        pairs.append((one, other))
+        pairs.append((one, second))
         sigmas.append(sigma)
     rank = np.argsort(np.argsort(sigmas, axis=0), axis=0)
     chosen = (rank < PAIRING.pairs) & np.isfinite(sigmas)

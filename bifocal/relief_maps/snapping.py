@@ -88,10 +88,10 @@ def snapped(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
 
 def surroundings(relief: Float32Array, side: int = 5) -> tuple[Float32Array, Float32Array]:
     """Return the greatest and the least known relief of a square: the surfaces of a step."""
-    known = np.isfinite(relief)
+    finite = np.isfinite(relief)
     square = np.ones((side, side), np.uint8)
-    high = cv2.dilate(np.where(known, relief, np.float32(-1e3)), square)
-    low = cv2.erode(np.where(known, relief, np.float32(1e3)), square)
+    high = cv2.dilate(np.where(finite, relief, np.float32(-1e3)), square)
+    low = cv2.erode(np.where(finite, relief, np.float32(1e3)), square)
     return high, low
 
 

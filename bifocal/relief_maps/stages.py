@@ -105,17 +105,17 @@ def relief_map(
         At half the resolution, for plain walls: there relief is put on plane patches.
     """
     distance = frame.distances[1]
-    known: dict[str, Any] = {
+    values: dict[str, Any] = {
         "frame": frame, "matched": matched, "grid": grid, "backing": backing, "half": half,
         "distance": distance, "relief_range": relief_range or seed.usual_range(distance),
         "side_face": np.False_, "swept": np.False_, "behind": np.False_,
         "misfit": np.zeros_like(matched.r), "unpatched": np.float32(np.nan),
     }  # fmt: skip
     for stage in STAGES:
-        given = stage.run(**{name: known[name] for name in stage.takes.split()})
+        results = stage.run(**{name: values[name] for name in stage.takes.split()})
         names = stage.gives.split()
-        known.update(zip(names, given if len(names) > 1 else (given,), strict=True))
-    return known["bands"]
+        values.update(zip(names, results if len(names) > 1 else (results,), strict=True))
+    return values["bands"]
 
 
 def _believed(

@@ -41,9 +41,9 @@ TURNING = TurningTuning()
 
 def steepness(photos: tuple[Photo, Photo]) -> float:
     """Return how much a base rises from the plane per length along it; infinite on one axis."""
-    one, other = photos
-    aside = float(np.hypot(*(one.nadir - other.nadir)))
-    return abs(one.distance - other.distance) / aside if aside > 0 else math.inf
+    one, second = photos
+    aside = float(np.hypot(*(one.nadir - second.nadir)))
+    return abs(one.distance - second.distance) / aside if aside > 0 else math.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,8 +74,8 @@ class TurnedPlane:
         rise = steepness(photos)
         if rise >= TURNING.least_steepness:
             return None
-        one, other = sorted(photos, key=lambda photo: -photo.distance)  # the farther stays so
-        away = np.append(one.nadir - other.nadir, 0.0)
+        one, second = sorted(photos, key=lambda photo: -photo.distance)  # the farther stays so
+        away = np.append(one.nadir - second.nadir, 0.0)
         away /= np.linalg.norm(away)
         turn = np.arctan(TURNING.least_steepness) - np.arctan(rise)
         axis = np.array([0.0, 0.0, np.cos(turn)]) + np.sin(turn) * away
@@ -110,15 +110,15 @@ class TurnedPlane:
         x, y = np.meshgrid(grid.columns_x, grid.rows_y)
         relief = np.zeros(grid.shape)
         for _ in range(TURNING.turning_rounds):
-            there = self._turned(np.stack([x, y, relief], axis=-1))
-            places = found.grid.pixel_of(there[..., :2]).astype(np.float32)
+            places_back = self._turned(np.stack([x, y, relief], axis=-1))
+            places = found.grid.pixel_of(places_back[..., :2]).astype(np.float32)
             height = values_at(found.r, places, cv2.INTER_NEAREST)
-            before, relief = relief, np.nan_to_num(self._relief(there, height))
+            before, relief = relief, np.nan_to_num(self._relief(places_back, height))
         smooth = values_at(found.r, places, cv2.INTER_LINEAR)
         with np.errstate(invalid="ignore"):
             near = np.abs(smooth - height) < grid.gsd
             settled = np.abs(relief - before) < TURNING.settled * grid.gsd / TURNING.least_steepness
-        value = self._relief(there, np.where(near, smooth, height))
+        value = self._relief(places_back, np.where(near, smooth, height))
         settled &= np.isfinite(height)
         sigma, quality = (
             values_at(band, places, cv2.INTER_NEAREST) for band in (found.sigma, found.quality)

@@ -94,8 +94,8 @@ def relief_of_pair(
     photos = pair_or_set(source)
     infos = photo_infos(photos)
     _check_outputs(job, *(info.path for info in infos))
-    faces, told = given_faces(job.faces)
-    told += check_faces(faces, photos_of(photos))
+    faces, notes = given_faces(job.faces)
+    notes += check_faces(faces, photos_of(photos))
     images = tuple(read_image(info.path) for info in infos)
     result = dense_relief(
         photos, *images, gsd=job.gsd, bounds=job.bounds, quality=job.quality,
@@ -132,7 +132,7 @@ def relief_of_pair(
         pair, setup="the pair as given", picks="the photos' own misfit across the radius, measured"
     )
     summary = result.summary() | {"rests_on": basis, "written": [str(path) for path in written]}
-    return summary, (*photos.remarks, *told, *result.notes, *result.registration.remarks)
+    return summary, (*photos.remarks, *notes, *result.notes, *result.registration.remarks)
 
 
 def coloured_cloud(
@@ -152,17 +152,17 @@ def coloured_cloud(
     positions, colours = [], []
     for row in range(0, relief.shape[0], _ROWS):
         rows = slice(row, row + _ROWS)
-        known = relief.known[rows]
-        if not known.any():
+        finite = relief.known[rows]
+        if not finite.any():
             continue
-        xyz = np.column_stack([relief.plane_positions(rows)[known], relief.r[rows][known]])
+        xyz = np.column_stack([relief.plane_positions(rows)[finite], relief.r[rows][finite]])
         positions.append(xyz)
         colours.append(_colours(xyz, photos, pictures))
-    known = relief.known
+    finite = relief.known
     attributes = dict(zip(("red", "green", "blue"), np.concatenate(colours).T, strict=True))
     attributes |= {
-        "sigma": relief.sigma[known].astype(np.float32),
-        "quality": relief.quality[known],
+        "sigma": relief.sigma[finite].astype(np.float32),
+        "quality": relief.quality[finite],
     }
     return np.concatenate(positions), attributes
 

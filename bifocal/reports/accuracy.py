@@ -31,8 +31,8 @@ def accuracy_blocks(content: PairContent, say: Words) -> Iterator[Block]:
     """Yield doubts in the model, the verdict, its table per drawing scale, and compared points."""
     doubts = doubts_of(MISFITS, content.pair.remarks)
     if doubts:
-        told = tuple(in_language(text, content.task.language) for text in doubts)
-        yield Banner(text=say("misfit"), details=told, good=False)
+        details = tuple(in_language(text, content.task.language) for text in doubts)
+        yield Banner(text=say("misfit"), details=details, good=False)
     solution = content.solution
     check = None if solution is None else solution.check
     if check is None or not np.isfinite(check.accuracy):
@@ -92,20 +92,20 @@ def millimetres(length: float | None) -> str:
 def _banner(content: PairContent, check: CheckResult, say: Words) -> Banner:
     count = int(np.isfinite(check.errors).any(axis=1).sum())
     key = "verdict_check" if content.has_check else "verdict_control"
-    rule, asked = check.verdicts[0].rule, content.task.scale
+    rule, scale = check.verdicts[0].rule, content.task.scale
     details, good = [], set()
     for part, accuracy in _accuracies(check).items():
         held = [verdict.scale for verdict in judge(accuracy, (rule,)) if verdict.holds]
-        said = [say("good_for", scale=min(held)) if held else say("good_for_none")]
+        clauses = [say("good_for", scale=min(held)) if held else say("good_for_none")]
         holds = bool(held)
-        if asked:
-            limit = rule.tolerance(round(asked))
+        if scale:
+            limit = rule.tolerance(round(scale))
             holds = limit is not None and accuracy <= limit
-            said.append(say("wanted_yes" if holds else "wanted_no", scale=f"{asked:g}"))
-        known = bool(np.isfinite(accuracy))
-        verdict = " ".join(said) if known else say("part_none")
+            clauses.append(say("wanted_yes" if holds else "wanted_no", scale=f"{scale:g}"))
+        finite = bool(np.isfinite(accuracy))
+        verdict = " ".join(clauses) if finite else say("part_none")
         details.append(say(part, accuracy=millimetres(accuracy), verdict=verdict))
-        good |= {holds} if known else set()
+        good |= {holds} if finite else set()
     details += [*_foundation(content, check, say), *_map_in_words(content, say)]
     text = say(key, accuracy=millimetres(check.accuracy), n=count)
     return Banner(text=text, details=tuple(details), good=good.pop() if len(good) == 1 else None)
@@ -132,12 +132,12 @@ def _foundation(content: PairContent, check: CheckResult, say: Words) -> Iterato
     with np.errstate(invalid="ignore", divide="ignore"):
         in_sigmas = np.abs(check.errors) / sigma
     worst = int(np.nanargmax(rmse))
-    known = np.isfinite(in_sigmas[:, worst])
+    finite = np.isfinite(in_sigmas[:, worst])
     # Points the orientation was fitted to come out better than their precision.
-    if not (content.has_check and known.any()):
+    if not (content.has_check and finite.any()):
         return
-    expected = float(np.sqrt(np.mean(sigma[known, worst] ** 2)))
-    ratio = float(np.sqrt(np.mean(in_sigmas[known, worst] ** 2)))
+    expected = float(np.sqrt(np.mean(sigma[finite, worst] ** 2)))
+    ratio = float(np.sqrt(np.mean(in_sigmas[finite, worst] ** 2)))
     key = "expected_exceeded" if ratio > BY_CHANCE else "expected_agrees"
     key = "expected_undercut" if ratio < TOO_SMALL else key
     yield say(key, expected=millimetres(expected), ratio=f"{ratio:.2g}")
@@ -149,7 +149,9 @@ def _foundation(content: PairContent, check: CheckResult, say: Words) -> Iterato
 
 def _verdict_table(check: CheckResult, say: Words) -> TextTable:
     names = {verdict.rule.key: verdict.rule.name for verdict in check.verdicts}
-    found = {(verdict.scale, verdict.rule.key): verdict.tolerance for verdict in check.verdicts}
+    tolerances = {
+        (verdict.scale, verdict.rule.key): verdict.tolerance for verdict in check.verdicts
+    }
     accuracies = _accuracies(check).values()
 
     def cell(limit: float | None) -> str:
@@ -161,7 +163,9 @@ def _verdict_table(check: CheckResult, say: Words) -> TextTable:
         )
         return f"{limit * 1000:.3g} mm: {' / '.join(words)}"
 
-    rows = [[f"1:{scale}", *(cell(found.get((scale, key))) for key in names)] for scale in SCALES]
+    rows = [
+        [f"1:{scale}", *(cell(tolerances.get((scale, key))) for key in names)] for scale in SCALES
+    ]
     headings = [say("scale"), *names.values()]
     return TextTable(headings=headings, rows=rows, caption=say("rule_table"))
 
@@ -175,8 +179,8 @@ def _totals(content: PairContent, check: CheckResult, say: Words) -> TextTable:
         if not len(errors):
             continue
         with np.errstate(invalid="ignore"):
-            known = np.isfinite(errors).sum(axis=0)
-            mean = np.nansum(errors**2, axis=0) / np.where(known > 0, known, np.nan)
+            count = np.isfinite(errors).sum(axis=0)
+            mean = np.nansum(errors**2, axis=0) / np.where(count > 0, count, np.nan)
         x, y, r = mean.tolist()
         values = np.sqrt([x, y, x + y, r, x + y + r]).tolist()
         rows.append([say(kind), str(len(errors)), *(_number(v, 2) for v in values)])

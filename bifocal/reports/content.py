@@ -195,12 +195,14 @@ class PairContent:
     @property
     def deviations(self) -> Sequence[Mapping[str, float]]:
         """Standard deviations of each camera by the keys of a set's file, where known."""
-        found = self.setup.get("standard_deviations", {})
+        sigmas = self.setup.get("standard_deviations", {})
         if self.of_set is not None:
-            return found or [{}] * len(self.of_set)
+            return sigmas or [{}] * len(self.of_set)
         keys = {"distance": "distance{}", "nadir": "nadir{}", "tilt_deg": "tilt{}_deg",
                 "focal_px": "focal{}"}  # fmt: skip
-        return [{key: found.get(own.format(n)) for key, own in keys.items()} for n in (1, 2)]
+        return [
+            {key: sigmas.get(pattern.format(n)) for key, pattern in keys.items()} for n in (1, 2)
+        ]
 
     def names(self, say: Words) -> tuple[str, ...]:
         """Return what the photos are called."""
@@ -238,16 +240,16 @@ class PairContent:
         """
         if self.relief is None or self.solution is None:
             return [], np.zeros(0), np.zeros(0)
-        known = self.solution.survey.known
-        rows = np.flatnonzero(known.used & np.isfinite(known.xyz).all(axis=1))
-        pixels = np.rint(self.relief.grid.pixel_of(known.xyz[rows, :2])).astype(int)
+        reference = self.solution.survey.known
+        rows = np.flatnonzero(reference.used & np.isfinite(reference.xyz).all(axis=1))
+        pixels = np.rint(self.relief.grid.pixel_of(reference.xyz[rows, :2])).astype(int)
         height, width = self.relief.shape
         inside = ((pixels >= 0) & (pixels < [width, height])).all(axis=1)
         rows, (column, row) = rows[inside], pixels[inside].T
-        errors = self.relief.sample(known.xyz[rows, :2]) - known.xyz[rows, 2]
+        errors = self.relief.sample(reference.xyz[rows, :2]) - reference.xyz[rows, 2]
         good = np.isfinite(errors) & (self.relief.quality[row, column] == Quality.MEASURED)
         sigma = np.asarray(self.relief.sigma[row, column], dtype=float)
-        return [known.ids[k] for k in rows[good]], errors[good], sigma[good]
+        return [reference.ids[k] for k in rows[good]], errors[good], sigma[good]
 
 
 def read_content(source: Path, task: ReportTask, *, pictures: bool = True) -> PairContent:
@@ -283,8 +285,8 @@ def read_content(source: Path, task: ReportTask, *, pictures: bool = True) -> Pa
         setup = named.extra.get("setup")
         of_set = named if isinstance(named, PhotoSet) else None
         if of_set is not None and isinstance(setup, dict):
-            told = setup.get("focal_px"), setup.get("standard_deviations")
-            if not all(isinstance(own, list) and len(own) == len(of_set) for own in told):
+            lists = setup.get("focal_px"), setup.get("standard_deviations")
+            if not all(isinstance(values, list) and len(values) == len(of_set) for values in lists):
                 setup = None  # that of other photos, or of the project of another program
         pair = best_pair(named) if isinstance(named, PhotoSet) else named
         if task.control or task.check:
@@ -336,10 +338,10 @@ def _with_photos(pair: Pair, path: Path) -> Pair:
 def _photos(source: Pair | PhotoSet) -> tuple[ReportedPhoto, ...]:
     """Return all photos made small; none where a file is not named or not there."""
     photos = []
-    own = (source.image1, source.image2) if isinstance(source, Pair) else source.photos
-    if not all(photo.file and photo.path.is_file() for photo in own):
+    originals = (source.image1, source.image2) if isinstance(source, Pair) else source.photos
+    if not all(photo.file and photo.path.is_file() for photo in originals):
         return ()
-    for photo, info in zip(own, photo_infos(source), strict=True):
+    for photo, info in zip(originals, photo_infos(source), strict=True):
         image = to_eight_bit(read_image(info.path))
         height, width = image.shape[:2]
         reduction = max(1.0, max(width, height) / SIDE)

@@ -96,25 +96,27 @@ def solve_control(
         np.concatenate([part.picks[k] for part in parts] or [np.zeros((0, 2))])
         for k in range(photos)
     ]
-    seen = np.sum([np.isfinite(own).all(axis=1) for own in picks], axis=0) >= 2
-    if not seen.any():
+    picked = np.sum([np.isfinite(pixels).all(axis=1) for pixels in picks], axis=0) >= 2
+    if not picked.any():
         raise InputError(
             f"{control or check}: no point was picked in two photos; nothing to measure."
         )
     points = PointObservations(
-        ids=tuple(compress(ids, seen)),
-        pixels1=picks[0][seen],
-        pixels2=picks[1][seen],
-        others=np.stack(picks, axis=1)[seen, 2:],
-        code=tuple(codes[seen].tolist()),
+        ids=tuple(compress(ids, picked)),
+        pixels1=picks[0][picked],
+        pixels2=picks[1][picked],
+        others=np.stack(picks, axis=1)[picked, 2:],
+        code=tuple(codes[picked].tolist()),
     )
-    compared = codes[seen] == CHECK
+    compared = codes[picked] == CHECK
     if not compared.any():
         compared[:] = True
-    known = KnownPoints(ids=points.ids, xyz=xyz[seen], use=compared)
+    reference = KnownPoints(ids=points.ids, xyz=xyz[picked], use=compared)
     remarks = tuple(text for part in parts for text in part.remarks)
     survey = SurveyInput.of_points(points)
-    survey = replace(survey, known=known, language=language, remarks=(*survey.remarks, *remarks))
+    survey = replace(
+        survey, known=reference, language=language, remarks=(*survey.remarks, *remarks)
+    )
     return solve(survey, pair=pair_path)
 
 

@@ -163,13 +163,13 @@ def draw_ties(figure: Any, content: PairContent, say: Words) -> None:
     """Draw the ties of both photos by cells: how many, and the RMS of their misfits."""
     cells = content.setup["common_points"]["cells"]
     most = max(max((row[4] for row in one["rows"]), default=1.0) for one in cells)
-    for k, (one, seen) in enumerate(zip(cells, content.photos, strict=True)):
+    for k, (one, photo) in enumerate(zip(cells, content.photos, strict=True)):
         axes = figure.add_axes((0.01 + 0.45 * k, 0.02, 0.435, 0.9))
-        shape = seen.picture.shape
-        axes.imshow(seen.picture, cmap="gray" if seen.picture.ndim == 2 else None, alpha=0.45)
+        shape = photo.picture.shape
+        axes.imshow(photo.picture, cmap="gray" if photo.picture.ndim == 2 else None, alpha=0.45)
         axes.set(xlim=(0, shape[1]), ylim=(shape[0], 0))
         axes.set_axis_off()
-        side = one["side"] / seen.reduction
+        side = one["side"] / photo.reduction
         column, row, count, _, rms = np.array(one["rows"], dtype=float).reshape(-1, 5).T
         places = (column + 0.5) * side, (row + 0.5) * side
         # The area of a dot grows with the number of its ties, up to the usual one of a full cell.
@@ -207,8 +207,8 @@ def draw_sigma(figure: Any, content: PairContent, say: Words, limit: float) -> N
         image = axes.imshow(sigma, extent=extent, norm=norm, **_styles()["sigma"])
         colour_bar(figure, image, say("sigma_axis"), extend="both")
         if (sigma[good] > 1000 * limit).any() and (sigma[good] < 1000 * limit).any():
-            known = np.where(good, sigma, np.nan)
-            axes.contour(known, levels=[1000 * limit], extent=extent, **_styles()["limit"])
+            finite = np.where(good, sigma, np.nan)
+            axes.contour(finite, levels=[1000 * limit], extent=extent, **_styles()["limit"])
     x, y = content.pair.zoom_centre
     if len(_inside(np.array([[x, y]]), bounds)):
         axes.plot([x], [y], "x", color="red", ms=10, mew=2)
@@ -219,8 +219,8 @@ def draw_errors(figure: Any, content: PairContent, say: Words) -> None:
     """Draw errors in X and Y as arrows, those of r as colour."""
     assert content.solution is not None
     check = content.solution.check
-    known = np.isfinite(check.errors).any(axis=1) & np.isfinite(check.solved[:, :2]).all(axis=1)
-    places, errors = check.solved[known], np.nan_to_num(check.errors[known])
+    compared = np.isfinite(check.errors).any(axis=1) & np.isfinite(check.solved[:, :2]).all(axis=1)
+    places, errors = check.solved[compared], np.nan_to_num(check.errors[compared])
     bounds = error_bounds(content)
     axes = plane_axes(figure, bounds, BESIDE)
     if content.ortho is not None:

@@ -179,9 +179,9 @@ def _relief(relief: ReliefMap, factor: float) -> tuple[dict[str, Any], ByteArray
     fine = relief.grid
     height, width = r.shape
     grid = Grid(x0=fine.x0, y0=fine.y0, gsd=fine.gsd * step, width=width, height=height)
-    known = np.isfinite(r)
-    least = float(np.nanmin(r)) if known.any() else 0.0
-    levels = np.where(known, np.rint((np.nan_to_num(r) - least) / UNIT) + 1, 0)
+    finite = np.isfinite(r)
+    least = float(np.nanmin(r)) if finite.any() else 0.0
+    levels = np.where(finite, np.rint((np.nan_to_num(r) - least) / UNIT) + 1, 0)
     levels = np.clip(levels, 0, 65535).astype(np.uint16)
     coded = np.dstack([np.zeros_like(levels), levels & 255, levels >> 8]).astype(np.uint8)
     packed = cv2.imencode(".png", coded)[1].tobytes()
@@ -199,13 +199,13 @@ def _points(shown: _Shown) -> list[dict[str, Any]]:
     points = shown.points
     if points is None:
         return []
-    known = np.isfinite(points.xyz).all(axis=1)
-    seen = shown.pair.project(points.xyz[known])
+    finite = np.isfinite(points.xyz).all(axis=1)
+    projected = shown.pair.project(points.xyz[finite])
     return [
         {"name": name, "X": xyz[0], "Y": xyz[1], "r": xyz[2], "sigma": sigma, "photos": [one, two]}
         for name, xyz, sigma, one, two in zip(
-            np.array(points.ids)[known].tolist(), points.xyz[known].tolist(),
-            np.asarray(points.sigma_r)[known].tolist(), *(pixels.tolist() for pixels in seen),
+            np.array(points.ids)[finite].tolist(), points.xyz[finite].tolist(),
+            np.asarray(points.sigma_r)[finite].tolist(), *(pixels.tolist() for pixels in projected),
             strict=True,
         )
     ]  # fmt: skip

@@ -85,21 +85,21 @@ def _geometry(content: PairContent, say: Words) -> Iterator[Block]:
 
     add("file", *(Path(photo.file).name or "-" for photo in photos))
     rows += camera_rows(content, say)
-    spreads = [_spread(own.get("distance"), 3) for own in deviations]
+    spreads = [_spread(deviation.get("distance"), 3) for deviation in deviations]
     add("distance", *(f"{p.distance:.3f}{s} m" for p, s in zip(photos, spreads, strict=True)))
-    spreads = [_spread(own.get("nadir"), 3) for own in deviations]
+    spreads = [_spread(deviation.get("nadir"), 3) for deviation in deviations]
     places = zip(photos, spreads, strict=True)
     add("nadir", *(f"{photo.nadir[0]:.3f}, {photo.nadir[1]:.3f}{s} m" for photo, s in places))
-    add("angles", *map(_angles, photos, [own.get("tilt_deg") for own in deviations]))
+    add("angles", *map(_angles, photos, [deviation.get("tilt_deg") for deviation in deviations]))
     if focal := content.setup.get("focal_px"):
         pitches = [photo.pixel_size for photo in photos]
-        sigmas = [own.get("focal_px") for own in deviations]
+        sigmas = [deviation.get("focal_px") for deviation in deviations]
         add("focal_found", *map(_focal, map(float, focal), pitches, sigmas))
         sources = content.setup.get("interior", ("-",) * len(photos))
         add("focal_given", *(in_language(str(source), language) for source in sources))
     if content.photos:
-        add("gsd", *(millimetres(seen.photo.gsd(seen.size)) for seen in content.photos))
-        add("tilt", *(f"{_tilt(seen.photo):.2f}°" for seen in content.photos))
+        add("gsd", *(millimetres(shown.photo.gsd(shown.size)) for shown in content.photos))
+        add("tilt", *(f"{_tilt(shown.photo):.2f}°" for shown in content.photos))
     if layers := content.pair.layers:
         add("media", media_words(layers))
         add("z0", *(f"{photo.z0 or 0.0:.3f} m" for photo in photos))
@@ -137,14 +137,14 @@ def _focal(pixels: float, pitch: float | None, sigma: float | None) -> str:
 def _photos(content: PairContent, say: Words) -> Iterator[Block]:
     if content.photos:
         yield Heading(text=say("photos"))
-    for number, seen in enumerate(content.photos, start=1):
+    for number, photo in enumerate(content.photos, start=1):
         yield Picture(
-            draw=partial(figures.draw_photo, content=content, seen=seen, number=number),
-            ratio=min(1.2, seen.picture.shape[0] / seen.picture.shape[1]),
+            draw=partial(figures.draw_photo, content=content, seen=photo, number=number),
+            ratio=min(1.2, photo.picture.shape[0] / photo.picture.shape[1]),
             caption=say(
                 "photo_caption",
                 photo=content.names(say)[number - 1],
-                file=Path(seen.photo.file).name,
+                file=Path(photo.photo.file).name,
             ),
         )
 
@@ -157,13 +157,13 @@ def _ties(content: PairContent, say: Words) -> Iterator[Block]:
         return
     yield Heading(text=say("ties"))
     shares = (
-        len(one["rows"]) / float(np.prod(np.ceil(np.divide(seen.size, one["side"]))))
-        for one, seen in zip(cells, content.photos, strict=True)
+        len(one["rows"]) / float(np.prod(np.ceil(np.divide(photo.size, one["side"]))))
+        for one, photo in zip(cells, content.photos, strict=True)
     )
     far, near = (f"{share:.0%}" for share in shares)
-    said = {key: f"{ties[key]:.2f} px" for key in ("rms_px", "largest_px")}
-    yield Paragraph(text=say("ties_said", n=ties["count"], far=far, near=near, **said))
-    ratio = max(seen.size[1] / seen.size[0] for seen in content.photos)
+    lengths = {key: f"{ties[key]:.2f} px" for key in ("rms_px", "largest_px")}
+    yield Paragraph(text=say("ties_said", n=ties["count"], far=far, near=near, **lengths))
+    ratio = max(photo.size[1] / photo.size[0] for photo in content.photos)
     draw = partial(figures.draw_ties, content=content, say=say)
     yield Picture(draw=draw, ratio=min(0.47 * ratio + 0.06, 0.6), caption=say("ties_caption"))
 
@@ -194,11 +194,11 @@ def _relief(content: PairContent, say: Words) -> Iterator[Block]:
 def _density(relief: ReliefMap, say: Words) -> str:
     """Return in words how large the map is, and how densely it is measured."""
     pixel = float(np.sqrt(abs(np.linalg.det(relief.plane_from_pixel[:2, :2]))))
-    known = int((relief.quality != Quality.UNKNOWN).sum())
+    covered = int((relief.quality != Quality.UNKNOWN).sum())
     measured = float((relief.quality == Quality.MEASURED).sum())
     return say(
-        "density", pixel=millimetres(pixel), area=f"{known * pixel**2:.1f}",
-        all=f"{pixel**-2:.0f}", measured=f"{measured / max(known, 1) * pixel**-2:.0f}",
+        "density", pixel=millimetres(pixel), area=f"{covered * pixel**2:.1f}",
+        all=f"{pixel**-2:.0f}", measured=f"{measured / max(covered, 1) * pixel**-2:.0f}",
     )  # fmt: skip
 
 
@@ -246,10 +246,10 @@ def _lengths(content: PairContent, say: Words) -> Iterator[Block]:
     for one in taped:
         if not {one["from"], one["to"]} <= places.keys():
             continue
-        found = float(np.linalg.norm(places[one["from"]] - places[one["to"]]))
-        off = 1000 * (found - one["length"])
+        solved = float(np.linalg.norm(places[one["from"]] - places[one["to"]]))
+        off = 1000 * (solved - one["length"])
         rows.append(
-            [f"{one['from']} - {one['to']}", f"{one['length']:.4f}", f"{found:.4f}", f"{off:.1f}"]
+            [f"{one['from']} - {one['to']}", f"{one['length']:.4f}", f"{solved:.4f}", f"{off:.1f}"]
         )
     headings = [say("length"), say("taped"), say("found"), say("error_mm")]
     yield TextTable(headings=headings, rows=rows, caption=say("length_table"))
@@ -266,15 +266,15 @@ def _foundations(content: PairContent, say: Words) -> Iterator[Block]:
         shown = "-" if sigma is None else f"{sigma:.2f} px"
         counts = {"control": len(content.control_ids), "ties": ties.get("count", 0)}
         yield Paragraph(text=say("rest_measured", sigma=shown, **counts))
-        found = {} if content.of_set is not None else setup.get("standard_deviations", {})
+        deviations = {} if content.of_set is not None else setup.get("standard_deviations", {})
 
         def share(key: str) -> str:
-            value = found.get(key)
+            value = deviations.get(key)
             return "-" if value is None else f"{100 * value:.2g} %"
 
-        d1, d2 = (millimetres(found.get(key)) for key in ("distance1", "distance2"))
+        d1, d2 = (millimetres(deviations.get(key)) for key in ("distance1", "distance2"))
         scale, relief = share("scale"), share("relief_scale")
-        if found:
+        if deviations:
             yield Paragraph(text=say("rest_sigma", d1=d1, d2=d2, scale=scale, relief=relief))
         assumed = [str(text) for text in setup.get("assumed", ())]
         for text in assumed:
@@ -284,8 +284,8 @@ def _foundations(content: PairContent, say: Words) -> Iterator[Block]:
             yield Paragraph(text=say("rest_nothing"))
     remarks = [*content.pair.remarks, *(content.solution.remarks if content.solution else ())]
     if content.solution is not None:  # told with the geometry, in the language of the report
-        told = refraction_remarks(content.solution.pair, content.solution.points)
-        remarks = [remark for remark in remarks if remark not in told]
+        elsewhere = refraction_remarks(content.solution.pair, content.solution.points)
+        remarks = [remark for remark in remarks if remark not in elsewhere]
     # What does not fit heads the report; a solution tells the doubts of its pair with their file.
     head = tuple(doubts_of(MISFITS, content.pair.remarks))
     remarks = [remark for remark in untold((), remarks) if not remark.endswith(head)]

@@ -13,8 +13,10 @@ from photocore.reports.words import Words
 
 def project_blocks(content: PairContent, say: Words) -> Iterator[Block]:
     """Yield the data of the project; nothing where none were given."""
-    said = [(name, content.task.project[name]) for name in PROJECT if name in content.task.project]
-    rows = [[say(name), str(text)] for name, text in said if name != "times"]
+    entries = [
+        (name, content.task.project[name]) for name in PROJECT if name in content.task.project
+    ]
+    rows = [[say(name), str(text)] for name, text in entries if name != "times"]
     if rows:
         yield TextTable(headings=[say("project"), ""], rows=rows)
 
@@ -42,9 +44,9 @@ def processing_blocks(content: PairContent, say: Words) -> Iterator[Block]:
     timed = any(step.seconds is not None for step in steps)
     rows = []
     for step in steps:
-        said = ", ".join(step.settings) or "-"
+        settings = ", ".join(step.settings) or "-"
         time = [] if not timed else [_seconds(step.seconds)]
-        rows.append([say(f"made_{step.name}"), said, ", ".join(step.defaults), *time])
+        rows.append([say(f"made_{step.name}"), settings, ", ".join(step.defaults), *time])
     if timed:
         total = sum(step.seconds or 0.0 for step in steps)
         rows.append([say("total"), "", "", _seconds(total)])

@@ -67,15 +67,15 @@ def relief_view(
     """
     say = words_of("bifocal.reports", language)
     heights, step = _thinned(relief)
-    known = heights[np.isfinite(heights)]
-    if not known.size:
+    finite = heights[np.isfinite(heights)]
+    if not finite.size:
         raise InputError("relief: no pixel is known; there is nothing to show.")
-    least, most = float(known.min()), float(known.max())
+    least, most = float(finite.min()), float(finite.max())
     unit = max((most - least) / 65534.0, 1e-9)
     levels = np.where(np.isfinite(heights), np.rint((heights - least) / unit) + 1, 0)
     x_min, y_min, x_max, y_max = relief.bounds
     gsd = relief.gsd
-    reach = max(float(np.percentile(np.abs(known), _SPAN)), 1e-3)
+    reach = max(float(np.percentile(np.abs(finite), _SPAN)), 1e-3)
     data = {
         "width": heights.shape[1], "height": heights.shape[0], "step": gsd * step,
         # Centres of the blocks of pixels.

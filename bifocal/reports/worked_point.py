@@ -77,12 +77,14 @@ def recomputed(
     """
     text = html.unescape(page)
     pixels = _PIXELS.search(text)
-    found = _FOUND.search(text, pixels.end()) if pixels else None
-    told = _PROGRAM.search(text, found.end()) if found else None
-    if pixels is None or found is None or told is None:
+    by_hand_text = _FOUND.search(text, pixels.end()) if pixels else None
+    program_text = _PROGRAM.search(text, by_hand_text.end()) if by_hand_text else None
+    if pixels is None or by_hand_text is None or program_text is None:
         return None
     # By hand, both photos alike; by the program, which weights them; each X, Y, r.
-    by_hand, by_program = (np.roll(np.array(one.groups(), float), -1) for one in (found, told))
+    by_hand, by_program = (
+        np.roll(np.array(one.groups(), float), -1) for one in (by_hand_text, program_text)
+    )
     # The digits printed, then each pixel coordinate moved by what was rounded off.
     picks = np.array([float(number) for number in pixels.groups()])
     digits = min(len(number.partition(".")[2]) for number in pixels.groups())
@@ -113,8 +115,8 @@ def _agree(printed: FloatArray, xyz: FloatArray) -> bool:
 def _by_hand(pair: Pair, pixels: Sequence[FloatArray]) -> FloatArray:
     """Return X, Y, r as the method page finds them, both photos of equal weight, (n, 3). [m]"""
     places, slopes = [], []
-    for photo, seen in zip((pair.image1, pair.image2), pixels, strict=True):
-        rays = object_rays(photo.apparent_from_pixels(seen), photo.foot)
+    for photo, pixel in zip((pair.image1, pair.image2), pixels, strict=True):
+        rays = object_rays(photo.apparent_from_pixels(pixel), photo.foot)
         places.append(rays.position)
         slopes.append(-rays.slope)
     shift, slope = places[0] - places[1], slopes[0] - slopes[1]

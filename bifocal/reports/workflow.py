@@ -93,14 +93,14 @@ def find_pairs(folder: Path, task: ReportTask) -> tuple[list[Path], list[ReportT
     sources = _aligned(folder, "") or _aligned(folder, "*/")
     if not sources:
         raise InputError(remark("report.no_pair", of=folder))
-    tasks, found = [], []
+    tasks, origins = [], []
     for source in sources:
         home, name = source.parent.parent, _ENDINGS.sub("", source.name)
         orthos = (home / "drawing" / f"{name}.tif", home / "ortho" / f"{name}_ortho.tif")
         relief = home / "relief" / f"{name}_relief.tif"
         view = home / "view" / f"{name}_view.html"
         workbook = home / "points" / f"{name}_points.xlsx"
-        given: dict[str, Any] = {
+        fields: dict[str, Any] = {
             "title": task.title if len(sources) == 1 and task.title else name,
             "relief": relief if relief.is_file() else None,
             "ortho": next((path for path in orthos if path.is_file()), None),
@@ -109,11 +109,11 @@ def find_pairs(folder: Path, task: ReportTask) -> tuple[list[Path], list[ReportT
         }
         is_set = source.name.endswith(".photos.json")
         if is_set:  # its workbook holds values: the points are solved from their tables
-            given |= _tables(home / "points")
+            fields |= _tables(home / "points")
         has_book = workbook.is_file() and not is_set
-        found.append(workbook if has_book else _pair_file(source, folder))
-        tasks.append(replace(task, **given))
-    return found, tasks
+        origins.append(workbook if has_book else _pair_file(source, folder))
+        tasks.append(replace(task, **fields))
+    return origins, tasks
 
 
 def _tables(folder: Path) -> dict[str, Path]:
@@ -125,8 +125,8 @@ def _tables(folder: Path) -> dict[str, Path]:
 
 def _aligned(folder: Path, within: str) -> list[Path]:
     """Return the files of the pairs and sets that were set up."""
-    found = folder.glob(f"{within}align/*.json")
-    return sorted(path for path in found if _ENDINGS.search(path.name))
+    paths = folder.glob(f"{within}align/*.json")
+    return sorted(path for path in paths if _ENDINGS.search(path.name))
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,24 +138,25 @@ class _Time:
 def _remembered(home: Path, task: ReportTask) -> dict[str, Any]:
     """Return what the records of a pair's steps tell, and the task does not say otherwise."""
     steps: list[StepTold] = []
-    known: dict[str, Any] = {}
+    remembered: dict[str, Any] = {}
     for path in (home / name / ".made.json" for name in OF_STEP):
         if not path.is_file():
             continue
         record = read_object(path, what="record of a step")
         if isinstance(options := record.get("options"), dict):
-            known |= options
+            remembered |= options
             if (name := str(record.get("step"))) != "report":
                 time = _Time(float(record.get("seconds", 0)), str(record.get("machine", "")))
                 files = {role: Path(file) for role, (file, _) in record["inputs"].items()}
                 steps.append(StepTold.of(name, {**options, **files}, time))
-    scale = task.scale or known.get("scale")
+    scale = task.scale or remembered.get("scale")
     return {
         "steps": tuple(steps),
         "scale": float(scale) if isinstance(scale, int | float) else None,
-        "columns": known.get("columns"),
-        "language": task.language or known.get("language", "en"),
-        "project": {name: known[name] for name in PROJECT if name in known} | dict(task.project),
+        "columns": remembered.get("columns"),
+        "language": task.language or remembered.get("language", "en"),
+        "project": {name: remembered[name] for name in PROJECT if name in remembered}
+        | dict(task.project),
     }
 
 

@@ -15,10 +15,10 @@ def basis(solution: SolvedSurvey) -> str:
 
 def _setup(solution: SolvedSurvey) -> str:
     corrected = ", corrected by points of the plane" if solution.adjusted else ""
-    known = "the pair as given" if solution.photos is None else "the photos as given"
+    start = "the pair as given" if solution.photos is None else "the photos as given"
     if solution.setup is not None:
-        known = "d_1, d_2, c_1, c_2 and nadir points as typed"
-    return known + corrected
+        start = "d_1, d_2, c_1, c_2 and nadir points as typed"
+    return start + corrected
 
 
 def _picks(solution: SolvedSurvey) -> str:
@@ -38,7 +38,7 @@ def _world(solution: SolvedSurvey) -> str:
     if solution.georeference is None:
         return ""
     world = solution.georeference
-    own = "with the transformation's own error"
+    clause = "with the transformation's own error"
     if world.precision is None:
-        own = "without the transformation's own error, which is unknown"
-    return f"E, N, H on {int(world.used.sum())} control points taken as exact, {own}"
+        clause = "without the transformation's own error, which is unknown"
+    return f"E, N, H on {int(world.used.sum())} control points taken as exact, {clause}"

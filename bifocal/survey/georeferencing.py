@@ -149,11 +149,11 @@ class _MeasuredControl:
 
     def usable(self, model: TransformationModel) -> BoolArray:
         """Return which points have all that the model needs."""
-        known: BoolArray = self.used & ~np.isnan(self.wall).any(axis=1)
-        known &= ~np.isnan(self.world[:, : model.axes]).any(axis=1)
+        complete: BoolArray = self.used & ~np.isnan(self.wall).any(axis=1)
+        complete &= ~np.isnan(self.world[:, : model.axes]).any(axis=1)
         if self.covariance is not None:
-            known &= np.isfinite(self.covariance[:, : model.axes, : model.axes]).all(axis=(1, 2))
-        return known
+            complete &= np.isfinite(self.covariance[:, : model.axes, : model.axes]).all(axis=(1, 2))
+        return complete
 
 
 def _measured_control(
@@ -211,30 +211,30 @@ def _fit(
     wall, target = measured.wall[used], measured.world[used].copy()
     if model.axes == 2:
         target[:, 2] = 0.0
-    found = model.fit(wall, target)
+    fit = model.fit(wall, target)
     # About a round origin, so that the sum of squares is not one of rounding errors.
     origin = round_origin(target)
     near = target - origin
     offset = near.mean(axis=0)
     weighted: WeightedFit | None = None
     if model.axes == 2:
-        offset[2] = found.target_centre[2]
+        offset[2] = fit.target_centre[2]
     # Rounding noise of large coordinates is no contradiction.
     noise = (1e-9 * float(np.abs(target).max())) ** 2
     redundancy = model.axes * int(used.sum()) - model.parameters
     if measured.covariance is None:
-        left = residuals(found, wall, near, offset)[:, : model.axes]
-        squares = float((left**2).sum())
+        rest = residuals(fit, wall, near, offset)[:, : model.axes]
+        squares = float((rest**2).sum())
     else:
         weights = weights_of(measured.covariance[used], flat=model.axes == 2)
-        about = wall - found.source_centre
-        weighted = weighted_fit(about, weights, near, found, model=model.name)
-        found, offset = weighted.similarity(found.source_centre, origin), weighted.offset
-        left = residuals(found, wall, near, offset) @ found.rotation / found.scale
-        squares = float(np.einsum("ni,nij,nj->", left, weights, left))
+        about = wall - fit.source_centre
+        weighted = weighted_fit(about, weights, near, fit, model=model.name)
+        fit, offset = weighted.similarity(fit.source_centre, origin), weighted.offset
+        rest = residuals(fit, wall, near, offset) @ fit.rotation / fit.scale
+        squares = float(np.einsum("ni,nij,nj->", rest, weights, rest))
         noise *= float(np.trace(weights.mean(axis=0))) / model.axes
     return _FittedTransformation(
-        model=model, used=used, transformation=found, origin=origin, offset=offset,
+        model=model, used=used, transformation=fit, origin=origin, offset=offset,
         squares=squares, noise=noise, redundancy=redundancy, weighted=weighted,
     )  # fmt: skip
 
@@ -259,8 +259,8 @@ def _explained(
         for row in rows:
             without = best.used.copy()
             without[row] = False
-            found = _tried(measured, best.model, without)
-            trials += [(len(rows) / ALPHA_POINT, trial) for trial in found]
+            tried = _tried(measured, best.model, without)
+            trials += [(len(rows) / ALPHA_POINT, trial) for trial in tried]
         # In shares of what is allowed; argmin takes the first of equals, the geometry.
         chances = [share * _chance(best, trial) for share, trial in trials]
         if not chances or min(chances) >= 1.0:
@@ -298,8 +298,8 @@ def _as_georeference(
     """Return the fit with the residuals of all control points."""
     flat = best.model.axes == 2
     near = np.where(flat, measured.world * [1, 1, np.nan], measured.world) - best.origin
-    left = residuals(best.transformation, measured.wall, near, best.offset)
-    squares = float((left[best.used][:, : best.model.axes] ** 2).sum())
+    rest = residuals(best.transformation, measured.wall, near, best.offset)
+    squares = float((rest[best.used][:, : best.model.axes] ** 2).sum())
     sigma0 = float(np.sqrt(squares / best.redundancy)) if best.redundancy > 0 else float("nan")
     flattened = _flattened(measured.world - best.origin, flat=flat)
     precision, expected = _precision(measured, best, flattened, sigma0)
@@ -308,7 +308,7 @@ def _as_georeference(
         ids=measured.ids,
         world_from_wall=best.transformation,
         model=best.model.name,
-        residuals=left,
+        residuals=rest,
         solved=measured.wall,
         used=best.used,
         bad=tuple(

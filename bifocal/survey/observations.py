@@ -124,8 +124,8 @@ class PointObservations:
         pixels = [key for number in numbers for key in pixel_keys(number)]
         unknown = [key for key in columns if key not in (*NUMBERS, *TEXTS, *pixels, "use")]
         if unknown:
-            known = ", ".join((*TEXTS, *NUMBERS, "use"))
-            raise InputError(f"points: there is no column {unknown[0]!r}; known are {known}.")
+            names = ", ".join((*TEXTS, *NUMBERS, "use"))
+            raise InputError(f"points: there is no column {unknown[0]!r}; known are {names}.")
         shapes = {key: np.shape(column) for key, column in columns.items()}
         flawed = [key for key, shape in shapes.items() if len(shape) != 1]
         if flawed:

@@ -159,7 +159,7 @@ def check_orientation(
     weight = _root_weights(pair, first, second, sigma)
     used = measured.copy()
     while True:
-        values, covariance, scaled, left = _fit(q1, q2, weight, used)
+        values, covariance, scaled, rest = _fit(q1, q2, weight, used)
         worst, limit = _worst(scaled, used)
         if worst is None or used.sum() <= 4 or scaled[worst] <= limit:
             break
@@ -174,7 +174,7 @@ def check_orientation(
     return OrientationCheck(
         parameters=_parameters(values, np.sqrt(np.diag(covariance)), pair, radius),
         matrix=plane,
-        residuals=left,
+        residuals=rest,
         outliers=tuple(labels[i] for i in np.flatnonzero(measured & ~used)),
         points=int(used.sum()),
         sigma0=sigma0,
@@ -210,9 +210,9 @@ def zoom_centre_of_points(
     q1, q2 and e lie on one line, ``(q1 - e) x (q2 - e) = 0``, which is linear in e:
     ``e x (q2 - q1) = q1 x q2``. Robust: residuals beyond three sigma count less (Huber).
     """
-    known = np.isfinite(np.hstack([q1, q2])).all(axis=1)
-    q1, q2 = q1[known], q2[known]
-    sigma = np.asarray(np.broadcast_to(sigma, known.shape)[known])
+    finite = np.isfinite(np.hstack([q1, q2])).all(axis=1)
+    q1, q2 = q1[finite], q2[finite]
+    sigma = np.asarray(np.broadcast_to(sigma, finite.shape)[finite])
     move = q2 - q1
     off = np.linalg.norm(move, axis=1) > OFF_PLANE * sigma
     if off.sum() < 3:
@@ -228,9 +228,9 @@ def zoom_centre_of_points(
         if np.linalg.cond(normal) > 1e8:
             return None
         centre = np.linalg.solve(normal, rows.T @ (weight * side))
-        left = np.abs(rows @ centre - side) / np.maximum(spread, 1e-12)
-        unit = max(1.4826 * float(np.median(left)), 1.0)
-        usual = np.minimum(1.0, 3.0 * unit / np.maximum(left, 1e-12))
+        misses = np.abs(rows @ centre - side) / np.maximum(spread, 1e-12)
+        unit = max(1.4826 * float(np.median(misses)), 1.0)
+        usual = np.minimum(1.0, 3.0 * unit / np.maximum(misses, 1e-12))
     return centre, np.linalg.inv(normal) * unit**2
 
 
@@ -246,12 +246,12 @@ def with_zoom_centre(pair: Pair, centre: FloatArray) -> Pair:
 def _root_weights(pair: Pair, first: FloatArray, second: FloatArray, sigma: float) -> FloatArray:
     """Return matrices that make differences of apparent positions unit normal, (n, 2, 2)."""
     covariance = np.zeros((len(first), 2, 2))
-    seen = pair.image1.metres_per_pixel(first)
+    by_pixel = pair.image1.metres_per_pixel(first)
     if pair.refracted:
         places = pair.image1.plane_from_pixels(first)
         on_plane = np.column_stack([places, np.zeros(len(places))])
-        seen = rays.design_rows(on_plane, pair.image2.foot)[:, :, :2] @ seen
-    for metres in (seen, pair.image2.apparent_by_pixel(second)):
+        by_pixel = rays.design_rows(on_plane, pair.image2.foot)[:, :, :2] @ by_pixel
+    for metres in (by_pixel, pair.image2.apparent_by_pixel(second)):
         covariance += metres @ metres.transpose(0, 2, 1) * sigma**2
     safe = np.where(np.isfinite(covariance), covariance, np.eye(2))
     inverse_root: FloatArray = np.linalg.inv(np.linalg.cholesky(safe))
@@ -295,9 +295,9 @@ def _fit(
 
     def equations(values: FloatArray) -> adjustment.DenseEquations:
         _, mapped, by = _mapped(values, q2[used])
-        seen = weight[used] @ (mapped - q1[used])[:, :, None]
+        misfit = weight[used] @ (mapped - q1[used])[:, :, None]
         by = (weight[used] @ by).reshape(-1, len(names))
-        return adjustment.DenseEquations(residuals=seen.ravel(), jacobian=by)
+        return adjustment.DenseEquations(residuals=misfit.ravel(), jacobian=by)
 
     try:
         fit = adjustment.fit(
@@ -310,9 +310,9 @@ def _fit(
         )
     except GeometryError:
         raise GeometryError(remark("survey.plane_in_line")) from None
-    left = q1 - _mapped(fit.state, q2)[1]
-    scaled = np.linalg.norm((weight @ left[:, :, None])[:, :, 0], axis=1)
-    return fit.state, fit.linear.cofactor, scaled, left
+    rest = q1 - _mapped(fit.state, q2)[1]
+    scaled = np.linalg.norm((weight @ rest[:, :, None])[:, :, 0], axis=1)
+    return fit.state, fit.linear.cofactor, scaled, rest
 
 
 def _worst(scaled: FloatArray, used: BoolArray) -> tuple[int | None, float]:

@@ -192,7 +192,7 @@ def _measured_radii(
         q = np.where(s1 > 0, across, np.where(cartesian & ~incomplete, 0.0, np.nan))
         spread = sigma * np.sqrt(1.0 + (s2 / s1) ** 2)
         standardised = q / np.where(s1 > 0, spread, np.nan)
-    found = Radii(
+    measured = Radii(
         scale_number=np.nan if scale_number is None else scale_number,
         s1=s1,
         s2=s2,
@@ -210,8 +210,8 @@ def _measured_radii(
         ),
     )  # fmt: skip
     if not first.refracted:
-        return found
-    return refracted_radii(found, (first, second), (s1, s2 / k12), sigma)
+        return measured
+    return refracted_radii(measured, (first, second), (s1, s2 / k12), sigma)
 
 
 def _adjusted_radii(

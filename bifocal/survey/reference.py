@@ -86,8 +86,8 @@ class KnownPoints:
 
     def missing_in(self, points: NamedPoints) -> tuple[str, ...]:
         """Return the names that are not among other points."""
-        known = set(points.ids)
-        return tuple(name for name in self.ids if name not in known)
+        names = set(points.ids)
+        return tuple(name for name in self.ids if name not in names)
 
     def called_as(self, names: Collection[str]) -> KnownPoints:
         """Return the same points under these names where only leading zeros differ, 007 from 7."""
@@ -153,13 +153,13 @@ class CheckResult:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What the user should know about the names, and points that are not counted."""
-        said: list[str] = []
+        sentences: list[str] = []
         if self.missing:
-            said.append(remark("survey.no_such_check", names=", ".join(self.missing[:10])))
+            sentences.append(remark("survey.no_such_check", names=", ".join(self.missing[:10])))
         if self.flagged:
             named = ", ".join(f"{name} ({flag})" for name, flag in list(self.flagged.items())[:10])
-            said.append(remark("survey.flagged_check", count=len(self.flagged), names=named))
-        return tuple(said)
+            sentences.append(remark("survey.flagged_check", count=len(self.flagged), names=named))
+        return tuple(sentences)
 
     @property
     def accuracy(self) -> float:
@@ -268,10 +268,10 @@ class Georeference:
             return np.asarray(turn @ covariance @ turn.T)
         added = self.precision.of_points(near)
         rests_on = {name for name, used in zip(self.ids, self.used, strict=True) if used}
-        own = np.array([name in rests_on for name in ids], dtype=bool)
-        if own.any():
+        controls = np.array([name in rests_on for name in ids], dtype=bool)
+        if controls.any():
             flat = self.model == "2D"
-            added[own] *= np.where(np.outer([0, 0, flat], [0, 0, flat]), 1.0, -1.0)
+            added[controls] *= np.where(np.outer([0, 0, flat], [0, 0, flat]), 1.0, -1.0)
         out = turn @ covariance @ turn.T + added
         if effect is not None:
             out += self.common(near, effect)

@@ -43,32 +43,32 @@ def georeference_remarks(
     is_auto : bool
         Whether the data chose the model.
     """
-    said: list[str] = [remark("survey.left_out", name=name) for name in world.bad]
+    remarks: list[str] = [remark("survey.left_out", name=name) for name in world.bad]
     unknown = control.missing_in(table)
     if unknown:
-        said.append(remark("survey.no_such_control", names=", ".join(unknown[:10])))
+        remarks.append(remark("survey.no_such_control", names=", ".join(unknown[:10])))
     if is_auto and world.model == "2D":
-        said.append(remark("survey.no_heights"))
+        remarks.append(remark("survey.no_heights"))
     elif is_auto and world.model != "levelled":
         lean = math.degrees(math.acos(min(1.0, float(world.world_from_wall.rotation[2, 1]))))
-        said.append(remark("survey.model_taken", model=world.model, lean=lean))
+        remarks.append(remark("survey.model_taken", model=world.model, lean=lean))
     scale = world.world_from_wall.scale
     if abs(scale - 1.0) > SCALE_SHARE:
-        said.append(remark("survey.wrong_scale", scale=scale))
+        remarks.append(remark("survey.wrong_scale", scale=scale))
         if unit := unit_of(max(scale, 1 / scale)):
-            said.append(remark("survey.scale_of_unit", unit=unit))
+            remarks.append(remark("survey.scale_of_unit", unit=unit))
     sizes = np.where(world.used, np.sqrt(np.nansum(world.residuals**2, axis=1)), 0.0)
     if sizes.size and sizes.max() > LARGEST_RESIDUAL:
         name = world.ids[int(sizes.argmax())]
-        said.append(remark("survey.large_residuals", size=sizes.max(), name=name))
+        remarks.append(remark("survey.large_residuals", size=sizes.max(), name=name))
         turned = replace(control, xyz=control.xyz[:, [1, 0, 2]])
         try:
             fitted = georeference(table, turned, model=world.model).residuals
         except GeometryError:
-            return said
+            return remarks
         if np.sqrt(np.nansum(fitted**2, axis=1)).max() < 0.1 * sizes.max():
-            said.insert(0, remark("survey.east_north_exchanged"))
-    return said
+            remarks.insert(0, remark("survey.east_north_exchanged"))
+    return remarks
 
 
 def angle_remarks(points: PointObservations) -> list[str]:
@@ -100,14 +100,16 @@ def unused_remarks(unused: Collection[str], **listed: KnownPoints) -> list[str]:
     **listed : KnownPoints
         What is typed, by the name of its sheet.
     """
-    said: list[str] = []
-    for sheet, known in listed.items():
-        names = [n for n, use in zip(known.ids, known.used, strict=True) if use and n in unused]
+    remarks: list[str] = []
+    for sheet, points in listed.items():
+        names = [n for n, use in zip(points.ids, points.used, strict=True) if use and n in unused]
         if len(names) == 1:
-            said.append(remark("survey.unused", sheet=sheet, name=names[0]))
+            remarks.append(remark("survey.unused", sheet=sheet, name=names[0]))
         elif names:
-            said.append(remark("survey.unused_several", sheet=sheet, names=", ".join(names[:10])))
-    return said
+            remarks.append(
+                remark("survey.unused_several", sheet=sheet, names=", ".join(names[:10]))
+            )
+    return remarks
 
 
 def opposite_signs_remark(table: ReliefTable, known: KnownPoints) -> list[str]:

@@ -141,8 +141,8 @@ def image_unit(solution: SolvedSurvey) -> str:
 
 def length_unit(solution: SolvedSurvey) -> str:
     """Return the unit of e1, e2, s_c and q: without an image scale they are on the wall."""
-    known = solution.setup is not None or solution.table.image_scale is not None
-    return "mm" if known else "m"
+    on_photo = solution.setup is not None or solution.table.image_scale is not None
+    return "mm" if on_photo else "m"
 
 
 def _georeference(solution: SolvedSurvey) -> dict[str, Any] | None:

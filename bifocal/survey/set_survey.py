@@ -78,15 +78,15 @@ def solve_set(
     )
     notes = _notes(photos, solved)
     off = [i for i in np.argsort(-np.abs(solved.standardised)) if notes[i] and points.use[i]]
-    said = [
+    remarks = [
         remark(
             "survey.off_set", name=points.ids[i], sigmas=abs(solved.standardised[i]), picks=notes[i]
         )
         for i in off[:10]
     ]
     if len(off) > 10:
-        said.append(remark("survey.off_radial_more", count=len(off) - 10))
-    return table, notes, tuple(said)
+        remarks.append(remark("survey.off_radial_more", count=len(off) - 10))
+    return table, notes, tuple(remarks)
 
 
 def _notes(photos: PhotoSet, solved: SetIntersection) -> tuple[str, ...]:

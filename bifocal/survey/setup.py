@@ -68,14 +68,14 @@ class Taking:
     @property
     def c_used(self) -> tuple[float | None, ...]:
         """Principal distances of the images as measured: those of prints are enlarged too. [mm]"""
-        own = zip((self.c1, self.c2), self.enlargements, strict=True)
-        return tuple(c and c * enlargement for c, enlargement in own)
+        both = zip((self.c1, self.c2), self.enlargements, strict=True)
+        return tuple(c and c * enlargement for c, enlargement in both)
 
     def exchanged(self) -> Taking:
         """Return the same with the images exchanged."""
-        other = {"1": "2", "2": "1"}
+        opposite = {"1": "2", "2": "1"}
         swapped: dict[str, Any] = {
-            f"{name}{image}": getattr(self, f"{name}{other[image]}")
+            f"{name}{image}": getattr(self, f"{name}{opposite[image]}")
             for name in ("d", "c", "enlargement", "nadir")
             for image in "12"
         }
@@ -244,29 +244,31 @@ class SurveySetup:
             return self._pair()
 
     def _pair(self) -> Pair:
-        own = self.taking
-        missing = [name for name, value in (("d_1", own.d1), ("d_2", own.d2)) if value is None]
-        if own.d1 is None or own.d2 is None:
+        taking = self.taking
+        missing = [
+            name for name, value in (("d_1", taking.d1), ("d_2", taking.d2)) if value is None
+        ]
+        if taking.d1 is None or taking.d2 is None:
             lacking = remark("setup.no_distances", names=", ".join(missing))
             raise InputError(" ".join((lacking, *self.remarks)))
-        if self.unit == "px" and own.enlargements != (1.0, 1.0):
+        if self.unit == "px" and taking.enlargements != (1.0, 1.0):
             raise InputError(remark("setup.enlargement_in_pixels"))
-        if self.unit == "px" and own.pitch is None:
+        if self.unit == "px" and taking.pitch is None:
             raise InputError(remark("setup.no_pitch"))
-        if self.unit == "px" and (own.nadir1 is None or own.nadir2 is None):
+        if self.unit == "px" and (taking.nadir1 is None or taking.nadir2 is None):
             raise InputError(remark("setup.no_nadirs"))
-        if own.d1 == own.d2:
-            raise GeometryError(remark("setup.one_distance", d=own.d1))
-        if (own.c1 is None) != (own.c2 is None):
+        if taking.d1 == taking.d2:
+            raise GeometryError(remark("setup.one_distance", d=taking.d1))
+        if (taking.c1 is None) != (taking.c2 is None):
             raise InputError("c_1 and c_2: give both principal distances or none.")
-        for name, value in (("pitch", own.pitch), ("sigma_r_max", self.measuring.sigma_r_max)):
+        for name, value in (("pitch", taking.pitch), ("sigma_r_max", self.measuring.sigma_r_max)):
             if value is not None:
                 positive(value, name)
-        c1, c2 = own.c_used
-        pair = Pair.ideal(d1=own.d1, d2=own.d2, c1=c1, c2=c2, sigma=self.precision)
+        c1, c2 = taking.c_used
+        pair = Pair.ideal(d1=taking.d1, d2=taking.d2, c1=c1, c2=c2, sigma=self.precision)
         if not self.media:
             return pair
-        if self.refracted and own.c1 is None:
+        if self.refracted and taking.c1 is None:
             raise InputError(remark("setup.media_without_c"))
         photos = [replace(p, **self.media.through(k)) for k, p in enumerate(pair.as_given, 1)]
         return Pair(image1=photos[0], image2=photos[1])
@@ -350,26 +352,30 @@ class SurveySetup:
         GeometryError
             If they differ by more than the tolerance: not a bifocal pair, or a wrong c or d.
         """
-        own = self.taking
-        if own.c1 is None or own.c2 is None or own.d1 is None or own.d2 is None:
+        taking = self.taking
+        if taking.c1 is None or taking.c2 is None or taking.d1 is None or taking.d2 is None:
             return ""
         # Apart are the prints' scales by it too.
-        enlarged = own.enlargements[1] / own.enlargements[0]
-        share = (1000.0 * own.d2 / own.c2) / (1000.0 * own.d1 / own.c1) / enlarged - 1.0
+        enlarged = taking.enlargements[1] / taking.enlargements[0]
+        share = (1000.0 * taking.d2 / taking.c2) / (1000.0 * taking.d1 / taking.c1) / enlarged - 1.0
         if self.refracted:
             share = scale_ratio(*self.pair().as_given) - 1.0
         apart = abs(share * enlarged + enlarged - 1.0)
         if apart > tolerance:
             place = f"{self.where}: " if self.where else ""
-            about = {"apart": apart, "first": own.c1 / own.d1, "second": own.c2 / own.d2}
+            about = {
+                "apart": apart,
+                "first": taking.c1 / taking.d1,
+                "second": taking.c2 / taking.d2,
+            }
             name = "setup.scales_through_media" if self.refracted else "setup.scales"
-            exchanged = (own.d1 / own.c2) / (own.d2 / own.c1) / enlarged
+            exchanged = (taking.d1 / taking.c2) / (taking.d2 / taking.c1) / enlarged
             if not self.refracted and abs(exchanged * enlarged - 1.0) <= tolerance:
                 name = "setup.scales_exchanged"
             raise GeometryError(f"{place}{remark(name, tolerance=tolerance, **about)}")
         if abs(share) < 1e-4:
             return ""
-        far, near = max(own.d1, own.d2), min(own.d1, own.d2)
+        far, near = max(taking.d1, taking.d2), min(taking.d1, taking.d2)
         if self.refracted:
             far, near = self.pair().straight_distances
         relief = float(false_relief_of_scale(abs(share), d1=far, d2=near))

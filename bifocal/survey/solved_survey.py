@@ -62,11 +62,11 @@ class WorldPoints:
         geo, table = self.georeference, self.table
         if geo is None or table.covariance is None:
             return None
-        own = table.own_covariance
-        if geo.precision is None or own is None:
+        of_picks = table.own_covariance
+        if geo.precision is None or of_picks is None:
             return geo.covariance_of(table.xyz, table.covariance)
         effect = table.effect_of_orientation()
-        return geo.covariance_of(table.xyz, own, ids=table.ids, effect=effect)
+        return geo.covariance_of(table.xyz, of_picks, ids=table.ids, effect=effect)
 
     @property
     def sigma(self) -> FloatArray:

@@ -93,8 +93,8 @@ def solve_survey(
     refuse_contradiction(points, table, survey.where)
     table, other_remarks = _with_others(survey, table, arranged)
     unused = points.unused
-    known, control = survey.known.without(unused), survey.control.without(unused)
-    check = check_points(table, known, rules)
+    reference, control = survey.known.without(unused), survey.control.without(unused)
+    check = check_points(table, reference, rules)
     world, world_remarks = _placed(control, table, survey.model, pair.extra)
     plane = arranged.check
     remarks = (
@@ -105,7 +105,7 @@ def solve_survey(
         *other_remarks,
         *check.remarks,
         *unused_remarks(unused, Check=survey.known, Georeference=survey.control),
-        *opposite_signs_remark(table, known),
+        *opposite_signs_remark(table, reference),
         *(survey.tape.compared(table).remarks if survey.tape else ()),
         *world_remarks,
     )
@@ -124,14 +124,14 @@ def _with_others(
     setup = survey.setup
     if arranged.setup is None or not setup.others or not survey.points.other_xy.size:
         return table, []
-    found = arranged.setup.adjusted
-    setup = replace(setup, adjusted=found[::-1] if arranged.pair.exchanged else found)
+    adjusted = arranged.setup.adjusted
+    setup = replace(setup, adjusted=adjusted[::-1] if arranged.pair.exchanged else adjusted)
     columns = of_all_photos(setup, survey.points)
     doubtful = contradictions(table.ids, np.where(survey.points.use, columns["chance"], np.nan))
-    said: list[str] = []
+    remarks: list[str] = []
     if doubtful:
-        said.append(remark("survey.picks_contradict", names=", ".join(doubtful[:10])))
-    return replace(table, columns={**table.columns, **columns}), said
+        remarks.append(remark("survey.picks_contradict", names=", ".join(doubtful[:10])))
+    return replace(table, columns={**table.columns, **columns}), remarks
 
 
 def solve_survey_of_set(
@@ -158,13 +158,13 @@ def solve_survey_of_set(
     table, notes, off = solve_set(photos, points, sigma_px=sigma, limits=measuring.limits)
     noted = ("; ".join(filter(None, both)) for both in zip(points.note, notes, strict=True))
     unused = points.unused
-    known, control = survey.known.without(unused), survey.control.without(unused)
-    check = check_points(table, known, rules)
+    reference, control = survey.known.without(unused), survey.control.without(unused)
+    check = check_points(table, reference, rules)
     world, world_remarks = _placed(control, table, survey.model, photos.extra)
     remarks = (
         *survey.remarks, *said, *off, *check.remarks,
         *unused_remarks(unused, Check=survey.known, Georeference=survey.control),
-        *opposite_signs_remark(table, known), *world_remarks,
+        *opposite_signs_remark(table, reference), *world_remarks,
     )  # fmt: skip
     return SolvedSurvey(
         survey=survey, setup=None, pair=pair, photos=photos, sigma_px=sigma,
@@ -211,8 +211,8 @@ def _general(pair: Pair, survey: SurveyInput, *, adjust: bool) -> _Arranged:
     pixels = (points.pixels1, points.pixels2)
     check = _check_plane(pair, points, pixels, sigma, survey, adjust)
     if check is not None and adjust:
-        pair, said = _with_centre(check.corrected, points, pixels, sigma)
-        remarks = (*remarks, *said)
+        pair, centred = _with_centre(check.corrected, points, pixels, sigma)
+        remarks = (*remarks, *centred)
     return _Arranged(
         points=points, pair=pair, sigma_px=sigma, check=check,
         remarks=(*remarks, *(check.remarks if check else ())),
@@ -237,15 +237,17 @@ def _with_centre(
         for photo, picked in zip((pair.image1, pair.image2), pixels, strict=True)
     )
     variance = sum(np.trace(p.covariance, axis1=1, axis2=2) / 4 for p in (first, second))
-    found = zoom_centre_of_points(
+    centre = zoom_centre_of_points(
         pair, np.array(first.positions), np.array(second.positions), np.sqrt(variance)
     )
-    if found is None:
+    if centre is None:
         return pair, ()
-    move = found[0] - pair.zoom_centre
-    spread = float(np.sqrt(np.trace(found[1]) / 2))
+    move = centre[0] - pair.zoom_centre
+    spread = float(np.sqrt(np.trace(centre[1]) / 2))
     x, y, sigma = 1000 * np.array([*move, spread])
-    return with_zoom_centre(pair, found[0]), (remark("survey.centre_moved", x=x, y=y, sigma=sigma),)
+    return with_zoom_centre(pair, centre[0]), (
+        remark("survey.centre_moved", x=x, y=y, sigma=sigma),
+    )
 
 
 def _check_plane(
@@ -292,12 +294,12 @@ def _sigma_of_set(
     photos: PhotoSet, points: PointObservations, pixels: Sequence[FloatArray]
 ) -> tuple[float | None, tuple[str, ...]]:
     """Return the picks' precision from the misfits of the pair whose are largest; None if few."""
-    found, count = [], len(pixels)
+    estimates, count = [], len(pixels)
     for far, near, *_ in photos.pairs():
         if max(far, near) < count:
             both = replace(points, pixels1=pixels[far], pixels2=pixels[near])
-            found.append(_sigma_from_misfits(photos.pair(far, near), both))
-    return max(found, key=lambda each: each[0] or 0.0, default=(None, ()))
+            estimates.append(_sigma_from_misfits(photos.pair(far, near), both))
+    return max(estimates, key=lambda each: each[0] or 0.0, default=(None, ()))
 
 
 def _ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -> _Arranged:
@@ -334,8 +336,8 @@ def _ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -> _Arr
     if check is not None and adjust:
         arranged = _corrected(arranged, setup, measured, check)
     if setup.taking.c1 is None:
-        said = remark("survey.no_principal_distances")
-        arranged = replace(arranged, remarks=(*arranged.remarks, said))
+        words = remark("survey.no_principal_distances")
+        arranged = replace(arranged, remarks=(*arranged.remarks, words))
     return arranged
 
 
@@ -349,9 +351,9 @@ def _corrected(
     bent = setup.refracted
     scale = (pair.image2 if bent else pair.image1).plane_from_pixel[0, 0]
     correction = check.matrix @ pair.image2.plane_from_pixel / [[scale], [scale], [1.0]]
-    found, said = _with_centre(check.corrected, points, (xy1, xy2), None)
+    moved, centred = _with_centre(check.corrected, points, (xy1, xy2), None)
     # An ideal pair counts from its nadir; relief spreads from the centre of zoom.
-    centre = found.zoom_centre / scale if said else np.zeros(2)
+    centre = moved.zoom_centre / scale if centred else np.zeros(2)
     measured = replace(
         measured, xy1=xy1 - centre, xy2=apply_homography(correction, xy2) - centre,
         polar=points.polar * np.array([np.nan, np.nan, 1.0]),
@@ -361,8 +363,8 @@ def _corrected(
         c2 = None if setup.taking.c1 is None else setup.taking.c1 * pair.d2 / pair.d1
         setup = setup.but(enlargement2=setup.taking.enlargement1, c2=c2)
     setup = replace(setup.but(unit="mm"), adjusted=(None, None))
-    remarks = [*arranged.remarks, *said]
-    if said:
+    remarks = [*arranged.remarks, *centred]
+    if centred:
         remarks.append(remark("survey.centre_found"))
     remarks.append(remark("survey.image2_corrected", image=2 if bent else 1))
     return replace(

@@ -133,10 +133,10 @@ class SurveyMedia:
     @property
     def used(self) -> tuple[float, ...]:
         """Indices that count, blanks filled in, one a cell."""
-        found: list[float] = []
+        indices: list[float] = []
         for index in self.indices:
-            found.append(index if index is not None else found[-1] if found else 1.0)
-        return tuple(found)
+            indices.append(index if index is not None else indices[-1] if indices else 1.0)
+        return tuple(indices)
 
     @property
     def layers(self) -> Layers | None:

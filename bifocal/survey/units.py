@@ -76,8 +76,8 @@ def refuse_wrong_unit(
 
 def _typical(values: FloatArray) -> float:
     """Return the median size of the numbers given; 0 where there are none."""
-    known = np.abs(values[~np.isnan(values)])
-    return float(np.median(known)) if known.size else 0.0
+    finite = np.abs(values[~np.isnan(values)])
+    return float(np.median(finite)) if finite.size else 0.0
 
 
 def refuse_not_above_zero(**options: Any) -> None:
@@ -218,9 +218,9 @@ def as_pixels(pair: Pair, points: PointObservations, where: str, unit: str) -> P
             continue
         pixels = []
         for number, (photo, xy) in enumerate(zip((pair.image1, pair.image2), both, strict=True), 1):
-            given = np.where(rows[:, None], xy, np.nan)
+            typed = np.where(rows[:, None], xy, np.nan)
             pixels.append(
-                given if own == "px" else _pixels_of_mm(photo, f"image{number}", given, where)
+                typed if own == "px" else _pixels_of_mm(photo, f"image{number}", typed, where)
             )
         points = replace(
             points,

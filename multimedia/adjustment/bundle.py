@@ -95,21 +95,25 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
         bundle, fitted = _balanced(bundle, fitted, weights)
     result = _adjustment(bundle, fitted, weights, remarks)
     refuse_impossible_media(bundle.project, columns, result, unknowns.priors)
-    seen = bundle.observations
-    order = tuple(seen.source[rows] for rows in seen.rows)
+    observations = bundle.observations
+    order = tuple(observations.source[rows] for rows in observations.rows)
     result = with_model_error(result, order, unknowns.plates)
-    told = remarks_on_unknowns(bundle.project, columns, result)
-    whose = {f"{camera}:{name}": at for camera, own in zip(project.camera_names, columns.cameras,
-             strict=True) for name, at in own.items()}  # fmt: skip
-    whose |= {f"{of}:{name}": at for of, own in columns.media.items() for name, at in own.items()}
+    doubts = remarks_on_unknowns(bundle.project, columns, result)
+    whose = {f"{camera}:{name}": at for camera, labels in zip(project.camera_names, columns.cameras,
+             strict=True) for name, at in labels.items()}  # fmt: skip
+    whose |= {
+        f"{of}:{name}": at for of, labels in columns.media.items() for name, at in labels.items()
+    }
     project, lost = with_covariance(result.project, whose, result.covariance)
-    return replace(result, project=project, remarks=(*result.remarks, *told, *lost))
+    return replace(result, project=project, remarks=(*result.remarks, *doubts, *lost))
 
 
 def _weighted(bundle: Bundle, weights: FloatArray) -> Bundle:
     """Return the equations with robust weights of the image coordinates, shape (n, 2)."""
-    seen = bundle.observations
-    return replace(bundle, observations=replace(seen, sigma=seen.sigma / np.sqrt(weights)))
+    observations = bundle.observations
+    return replace(
+        bundle, observations=replace(observations, sigma=observations.sigma / np.sqrt(weights))
+    )
 
 
 def _balanced(
@@ -122,13 +126,17 @@ def _balanced(
     robust weights they are worth what remains without the gross errors.
     """
     for _ in range(BALANCE_ROUNDS if bundle.columns.priors else 0):
-        seen = bundle.observations
-        own = slice(0, seen.image.size)
-        free = float(fitted.linear.redundancy_numbers[own].sum())
-        worth = float(np.sqrt((fitted.residuals[own] ** 2).sum() / free)) if free > 1e-6 else 1.0
-        if abs(worth - 1) < BALANCED or worth * seen.sigma.min() < EXACT:
+        observations = bundle.observations
+        of_images = slice(0, observations.image.size)
+        free = float(fitted.linear.redundancy_numbers[of_images].sum())
+        worth = (
+            float(np.sqrt((fitted.residuals[of_images] ** 2).sum() / free)) if free > 1e-6 else 1.0
+        )
+        if abs(worth - 1) < BALANCED or worth * observations.sigma.min() < EXACT:
             break
-        bundle = replace(bundle, observations=replace(seen, sigma=seen.sigma * worth))
+        bundle = replace(
+            bundle, observations=replace(observations, sigma=observations.sigma * worth)
+        )
         fitted = _weighted(bundle, weights).network.solve(fitted.state)
     return bundle, fitted
 
@@ -145,8 +153,8 @@ def prepare(project: Project, unknowns: Unknowns) -> tuple[Bundle, tuple[str, ..
     sigma = np.zeros((len(ids), 3))
     plate_of = np.full(len(ids), -1, dtype=np.int64)
     keep = [k for k, name in enumerate(control.ids) if name in place]
-    given = [place[control.ids[k]] for k in keep]
-    points[given], sigma[given] = control.xyz[keep], control.sigma[keep]
+    with_control = [place[control.ids[k]] for k in keep]
+    points[with_control], sigma[with_control] = control.xyz[keep], control.sigma[keep]
     for plate, name in enumerate(unknowns.plates):
         on = [place[control.ids[k]] for k in keep if control.groups[k] == name]
         if len(on) < 3:
@@ -185,26 +193,26 @@ def _used_points(
     if not images.ids:
         raise InputError("adjust: the project has no image points.")
     rays = Counter(images.ids)
-    known = set(control.ids)
-    alone = [name for name, count in rays.items() if name not in known and count < 2]
+    controls = set(control.ids)
+    alone = [name for name, count in rays.items() if name not in controls and count < 2]
     if unknowns.control == "free":
         plates = {
             i for i, g in zip(control.ids, control.groups, strict=True) if g in unknowns.plates
         }
-        alone += [name for name in known - plates if 0 < rays[name] < 2]
+        alone += [name for name in controls - plates if 0 < rays[name] < 2]
     unseen = [name for name in control.ids if rays[name] == 0]
     remarks = []
     for names, cameras in ((alone, "one camera only"), (unseen, "no camera")):
         if names:
             shown = ", ".join(names[:8]) + (" ..." if len(names) > 8 else "")
-            told = {"points": "point" if len(names) == 1 else "points", "cameras": cameras}
-            remarks.append(remark("bundle.left_out", count=len(names), names=shown, **told))
+            words = {"points": "point" if len(names) == 1 else "points", "cameras": cameras}
+            remarks.append(remark("bundle.left_out", count=len(names), names=shown, **words))
     dropped = set(alone)
     rows = [row for row, name in enumerate(images.ids) if name not in dropped]
     on_bars = {end for bar in unknowns.scale_bars for end in (bar.first, bar.second)}
-    used = {images.ids[row] for row in rows} | (on_bars & known)
+    used = {images.ids[row] for row in rows} | (on_bars & controls)
     ids = [name for name in control.ids if name in used]
-    ids += [name for name in images.names if name in used and name not in known]
+    ids += [name for name in images.names if name in used and name not in controls]
     if not rows:
         raise InputError("adjust: no point is measured in two cameras or is a control point.")
     return tuple(ids), rows, tuple(remarks)
@@ -244,10 +252,10 @@ def _start_points(project: Project, ids: Sequence[str], points: FloatArray) -> F
     GeometryError
         If the rays of a point do not meet beyond the interface from these starts.
     """
-    wanted = np.flatnonzero(np.isnan(points).any(axis=1))
+    missing = np.flatnonzero(np.isnan(points).any(axis=1))
     filled = points.copy()
-    filled[wanted] = _intersected(project, ids, wanted)
-    lost = [ids[j] for j in wanted.tolist() if np.isnan(filled[j]).any()]
+    filled[missing] = _intersected(project, ids, missing)
+    lost = [ids[j] for j in missing.tolist() if np.isnan(filled[j]).any()]
     if lost:
         raise GeometryError(remark("adjust.rays_lost", names=", ".join(lost[:8])))
     return filled
@@ -288,13 +296,13 @@ def _pose_from_one(project: Project, names: Sequence[str], local: FloatArray, la
         If no camera sees enough of its points, or these give no pose.
     """
     image, _ = project.image_points.grid(project.camera_names, names)
-    seen: BoolArray = np.asarray(np.isfinite(image).all(axis=2))
-    k = int(seen.sum(axis=1).argmax())
-    if seen[k].sum() < FEWEST:
+    finite: BoolArray = np.asarray(np.isfinite(image).all(axis=2))
+    k = int(finite.sum(axis=1).argmax())
+    if finite[k].sum() < FEWEST:
         raise GeometryError(remark("adjust.plate_unseen", label=label, fewest=FEWEST))
     try:
         rotation, shift = plate_pose(
-            project.cameras[k], local[seen[k]], image[k, seen[k]], project.interface_of(k)
+            project.cameras[k], local[finite[k]], image[k, finite[k]], project.interface_of(k)
         )
         return Camera(centre=shift, rotation=rotation, principal_distance=1.0)
     except (GeometryError, ConvergenceError, InputError) as error:
@@ -316,22 +324,22 @@ def _adjustment(
     bundle: Bundle, result: Fit[NetworkState], weights: FloatArray, remarks: tuple[str, ...]
 ) -> Adjustment:
     """Return everything in the project's own terms."""
-    project, seen, state = bundle.project, bundle.observations, result.state
-    unit = float(np.sqrt(np.mean(seen.sigma**2)))
-    own = slice(0, weights.size)
-    misses = result.residuals[own].reshape(-1, 2)
-    shares = result.linear.redundancy_numbers[own].reshape(-1, 2)
+    project, observations, state = bundle.project, bundle.observations, result.state
+    unit = float(np.sqrt(np.mean(observations.sigma**2)))
+    of_images = slice(0, weights.size)
+    misses = result.residuals[of_images].reshape(-1, 2)
+    shares = result.linear.redundancy_numbers[of_images].reshape(-1, 2)
     # The image rows, back in the order of the project's own table.
-    rows, count = seen.source, len(project.image_points.ids)
+    rows, count = observations.source, len(project.image_points.ids)
     residuals, normed, numbers, weight, sigma = (np.full((count, 2), np.nan) for _ in range(5))
-    residuals[rows] = -misses * seen.sigma / np.sqrt(weights)
-    normed[rows] = -result.standardised[own].reshape(-1, 2)
+    residuals[rows] = -misses * observations.sigma / np.sqrt(weights)
+    normed[rows] = -result.standardised[of_images].reshape(-1, 2)
     numbers[rows], weight[rows] = shares, weights
-    sigma[rows] = seen.sigma * result.sigma0 / np.sqrt(weights)
+    sigma[rows] = observations.sigma * result.sigma0 / np.sqrt(weights)
     points, covariance = _points(bundle, result)
     values, change = _values(bundle, state)
     sigma0_of = {}
-    for name, mine in zip(project.camera_names, seen.rows, strict=True):
+    for name, mine in zip(project.camera_names, observations.rows, strict=True):
         share = float(shares[mine].sum())
         square = float((misses[mine] ** 2).sum())
         sigma0_of[name] = unit * float(np.sqrt(square / share)) if share > 1e-9 else float("nan")
@@ -365,8 +373,8 @@ def _points(bundle: Bundle, result: Fit[NetworkState]) -> tuple[ObjectPoints, Fl
             covariance[j] = rows @ pose @ rows.T
     control = bundle.project.object_points
     group = dict(zip(control.ids, control.groups, strict=True))
-    seen = set(bundle.ids)
-    unseen = [row for row, name in enumerate(control.ids) if name not in seen]
+    names = set(bundle.ids)
+    unseen = [row for row, name in enumerate(control.ids) if name not in names]
     ids = (*bundle.ids, *(control.ids[row] for row in unseen))
     full = np.concatenate([covariance * result.sigma0**2, np.full((len(unseen), 3, 3), np.nan)])
     return ObjectPoints(

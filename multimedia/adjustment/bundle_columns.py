@@ -107,7 +107,7 @@ def _interior_names(project: Project, unknowns: Unknowns) -> list[tuple[str, ...
         tuple(name for name in unknowns.interior if name in camera.interior_names)
         for camera in project.cameras
     ]
-    lacking = sorted(set(unknowns.interior) - {name for own in names for name in own})
+    lacking = sorted(set(unknowns.interior) - {name for interior in names for name in interior})
     if lacking:
         raise InputError(
             f"interior: no camera's lens model has {', '.join(lacking)}; camera "
@@ -130,9 +130,9 @@ def _prior_columns(
     # What is said of one unknown counts more than what is said of all alike.
     for label, sigma in sorted(unknowns.priors.items(), key=lambda prior: prior[0] in labels):
         every = [name for name in labels if name.rpartition(":")[2] == label in ANY_INTERIOR]
-        own = [label] if label in labels else every
-        missing += [] if own else [label]
-        priors |= {labels[name]: sigma for name in own}
+        members = [label] if label in labels else every
+        missing += [] if members else [label]
+        priors |= {labels[name]: sigma for name in members}
     if missing:
         shown = ", ".join(list(labels)[:40])
         raise InputError(f"priors: {', '.join(missing)} is not estimated; unknowns are {shown}.")
@@ -169,12 +169,12 @@ def _media_columns(
                     f"media: {owner} has no {parameter!r}; its parameters are {', '.join(allowed)}."
                     + hint * (parameter == "gradient")
                 )
-            own = columns.setdefault(owner, {})
-            if parameter in own:
+            of_medium = columns.setdefault(owner, {})
+            if parameter in of_medium:
                 raise InputError(f"media: {', '.join(wanted)} names the same unknown twice.")
             common = not who and parameter.startswith(OF_MATERIAL)
             label = parameter if common else f"{owner}:{parameter}"
-            own[parameter] = labels.setdefault(label, len(labels))
+            of_medium[parameter] = labels.setdefault(label, len(labels))
     return dict(columns)
 
 
@@ -192,8 +192,8 @@ def with_common_values(project: Project, unknowns: Unknowns) -> Project:
     for k, camera in cameras.items():
         groups.setdefault(interior_group(camera.name, unknowns.shared_interior), []).append(k)
     for group in groups.values():
-        own = [cameras[k].interior_names for k in group]
-        for item in set(unknowns.interior).intersection(*own):
+        interiors = [cameras[k].interior_names for k in group]
+        for item in set(unknowns.interior).intersection(*interiors):
             cameras |= _alike({k: cameras[k] for k in group}, item)
     return replace(project, media=media, cameras=tuple(cameras.values()))
 

@@ -115,11 +115,13 @@ class Bundle:
 
     def _worst(self, fitted: Fit[NetworkState]) -> str:
         """Return the camera, and the plate if any, whose image points fit worst."""
-        seen = self.observations
-        misses = fitted.residuals[: seen.image.size].reshape(-1, 2) * seen.sigma
-        camera = np.repeat(np.arange(len(seen.rows)), [len(own) for own in seen.rows])
-        camera = camera[np.argsort(np.concatenate(seen.rows), kind="stable")]
-        plate = self.plate_of[seen.point]
+        observations = self.observations
+        misses = fitted.residuals[: observations.image.size].reshape(-1, 2) * observations.sigma
+        camera = np.repeat(
+            np.arange(len(observations.rows)), [len(rows) for rows in observations.rows]
+        )
+        camera = camera[np.argsort(np.concatenate(observations.rows), kind="stable")]
+        plate = self.plate_of[observations.point]
         groups = np.unique(np.column_stack([camera, plate]), axis=0).tolist()
         sizes = [np.sqrt(np.mean(misses[(camera == k) & (plate == p)] ** 2)) for k, p in groups]
         k, p = groups[int(np.argmax(sizes))]
@@ -134,11 +136,11 @@ class Bundle:
         return state
 
     def _images(self, state: NetworkState, rows: Rows) -> bool:
-        seen, place, media = self.observations, self.columns, state.blocks["media"]
-        image = np.empty(seen.image.shape)
+        observations, place, media = self.observations, self.columns, state.blocks["media"]
+        image = np.empty(observations.image.shape)
         lines = rows.count + np.arange(image.size).reshape(image.shape)
-        for k, own in enumerate(seen.rows):
-            which, medium = seen.point[own], self.project.media_of[k]
+        for k, own in enumerate(observations.rows):
+            which, medium = observations.point[own], self.project.media_of[k]
             of_camera, through = place.cameras[k], place.media.get(medium, {})
             points = state.points[which]
             try:
@@ -149,7 +151,7 @@ class Bundle:
             except GeometryError:
                 return False
             image[own] = view.image
-            weight = 1.0 / seen.sigma[own][:, :, None]
+            weight = 1.0 / observations.sigma[own][:, :, None]
             by_point, at = view.by_point * weight, lines[own][..., None]
             rows.by_label(at, list(of_camera.values()), view.by_camera * weight)
             rows.by_label(at, list(through.values()), view.by_interface * weight)
@@ -159,7 +161,7 @@ class Bundle:
                 by_pose = np.concatenate([by_point[on], turned], axis=2)
                 rows.by_label(at[on], list(place.plates[plate].values()), by_pose)
             rows.by_points(lines[own], which[:, None], by_point)
-        rows.add((image - seen.image) / seen.sigma)
+        rows.add((image - observations.image) / observations.sigma)
         return bool(np.isfinite(image).all())
 
     def _known(self, state: NetworkState, rows: Rows) -> bool:

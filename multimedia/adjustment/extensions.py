@@ -86,7 +86,7 @@ def diagnose(project: Project, unknowns: Unknowns | None = None) -> tuple[float,
     fitted = bundle.network.solve(bundle.start)
     cost = float(fitted.residuals @ fitted.residuals)
     unit = float(np.sqrt(np.mean(bundle.observations.sigma**2)))
-    found = []
+    trials = []
     for what, option, wider in _candidates(project, unknowns):
         try:
             tried, _ = prepare(project, wider)
@@ -103,16 +103,16 @@ def diagnose(project: Project, unknowns: Unknowns | None = None) -> tuple[float,
         ):
             continue
         rest = linear.residuals + linear.change(linear.step(0.0))
-        left = min(float(rest @ rest), cost)
-        ratio = (cost - left) / more / max(left / redundancy, 1e-300)
-        found.append(
+        cost_left = min(float(rest @ rest), cost)
+        ratio = (cost - cost_left) / more / max(cost_left / redundancy, 1e-300)
+        trials.append(
             Extension(
                 what=what, option=option, unknowns=more,
-                sigma0=unit * float(np.sqrt(left / redundancy)),
+                sigma0=unit * float(np.sqrt(cost_left / redundancy)),
                 chance=float(fisher.sf(ratio, more, redundancy)),
             )
         )  # fmt: skip
-    return fitted.sigma0 * unit, sorted(found, key=lambda extension: extension.sigma0)
+    return fitted.sigma0 * unit, sorted(trials, key=lambda extension: extension.sigma0)
 
 
 def _candidates(project: Project, unknowns: Unknowns) -> Iterator[tuple[str, str, Unknowns]]:
@@ -126,19 +126,21 @@ def _candidates(project: Project, unknowns: Unknowns) -> Iterator[tuple[str, str
     for terms in _LENS:
         if set(terms) <= lens - set(unknowns.interior):
             interior = (*unknowns.interior, *terms)
-            said = ",".join(terms)
-            yield said, f"--interior {said}", replace(unknowns, interior=interior)
-    taken = {label.rpartition(":")[2] for label in unknowns.media}
-    own = dict.fromkeys(name for m in project.media.values() if m for name in m.parameter_names)
-    pairs: list[tuple[str, ...]] = [names for names in _TOGETHER if set(names) <= set(own)]
+            words = ",".join(terms)
+            yield words, f"--interior {words}", replace(unknowns, interior=interior)
+    estimated = {label.rpartition(":")[2] for label in unknowns.media}
+    parameters = dict.fromkeys(
+        name for m in project.media.values() if m for name in m.parameter_names
+    )
+    pairs: list[tuple[str, ...]] = [names for names in _TOGETHER if set(names) <= set(parameters)]
     alone: list[tuple[str, ...]] = [
-        (name,) for name in own if not any(name in names for names in pairs)
+        (name,) for name in parameters if not any(name in names for names in pairs)
     ]
     for names in pairs + alone:
         # The first medium is the air, or the camera's own.
-        if not taken & set(names) and names != ("index1",):
-            said = ",".join(names)
-            yield said, f"--media {said}", replace(unknowns, media=(*unknowns.media, *names))
+        if not estimated & set(names) and names != ("index1",):
+            words = ",".join(names)
+            yield words, f"--media {words}", replace(unknowns, media=(*unknowns.media, *names))
 
 
 def _at_solution(bundle: Bundle, state: NetworkState, tried: Bundle) -> NetworkState:

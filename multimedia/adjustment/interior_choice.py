@@ -48,22 +48,22 @@ def choose_interior(
     adjust : callable
         Adjusts a project.
     """
-    taken: tuple[str, ...] = ()
+    accepted: tuple[str, ...] = ()
     for group in GROUPS:
         if not any(set(group) <= set(camera.interior_names) for camera in project.cameras):
             continue
-        trial = (*taken, *group)
+        trial = (*accepted, *group)
         try:
             result = adjust(project, with_interior(unknowns, trial))
         except (GeometryError, ConvergenceError):
             continue
         if _needed(project, unknowns, result, group):
-            taken, last = trial, result
+            accepted, last = trial, result
     for group in reversed(GROUPS):
-        if set(group) <= set(taken) and not _needed(project, unknowns, last, group):
-            taken = tuple(name for name in taken if name not in group)
-            last = adjust(project, with_interior(unknowns, taken))
-    return taken
+        if set(group) <= set(accepted) and not _needed(project, unknowns, last, group):
+            accepted = tuple(name for name in accepted if name not in group)
+            last = adjust(project, with_interior(unknowns, accepted))
+    return accepted
 
 
 def with_interior(unknowns: Unknowns, interior: tuple[str, ...]) -> Unknowns:

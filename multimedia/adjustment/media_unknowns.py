@@ -60,11 +60,11 @@ def media_unknowns(
     media : mapping of str to mapping of str to int
         Columns of the parameters of each media.
     """
-    told = set()
+    named = set()
     for owner, places in media.items():
         for name, column in places.items():
-            if name.startswith(_KNOWN) and column not in told:
-                told.add(column)
+            if name.startswith(_KNOWN) and column not in named:
+                named.add(column)
                 yield _unknown(project, owner, name, labels[column], column)
 
 

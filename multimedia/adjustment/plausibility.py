@@ -68,11 +68,11 @@ def refuse_impossible_media(
     """
     for item in media_unknowns(project, columns.labels, columns.media):
         label, start = item.label, item.start
-        value, own = result.value(label), result.sigma(label)
+        value, sigma = result.value(label), result.sigma(label)
         if is_possible(
             value, start=start, sigma=given.get(label, item.typical), least=item.least,
             most=item.most,
-        ) and not own > UNDETERMINED * item.typical:  # fmt: skip
+        ) and not sigma > UNDETERMINED * item.typical:  # fmt: skip
             continue
         row = result.names.index(label)
         others = np.abs(result.correlations[row])
@@ -85,7 +85,7 @@ def refuse_impossible_media(
         )
         unit = f" {result.unit(label)}".rstrip()
         raise GeometryError(
-            f"adjust: {label} comes out as {value:.4g} ± {own:.2g}{unit}, {start:g}{unit} was "
+            f"adjust: {label} comes out as {value:.4g} ± {sigma:.2g}{unit}, {start:g}{unit} was "
             f"given: the data cannot carry it{alike}. Give what is known as a standard deviation "
             f"(--prior {label}={item.typical:.3g}), measure points at more depths, or take "
             f"{item.name} out of --media. If it really is so, change its start value in the "
@@ -163,8 +163,12 @@ def _groups(
     label = np.array(points.groups)[at]
     plates, depths = list[tuple[str, str, IntArray]](), list[tuple[str, str, IntArray]]()
     for camera, rows in zip(result.project.cameras, order, strict=True):
-        own = [g for g in np.unique(label[rows]) if g not in ("", "new")]
-        plates += [(str(g), camera.name, rows[label[rows] == g]) for g in own if len(own) > 1]
+        plates_of_camera = [g for g in np.unique(label[rows]) if g not in ("", "new")]
+        plates += [
+            (str(g), camera.name, rows[label[rows] == g])
+            for g in plates_of_camera
+            if len(plates_of_camera) > 1
+        ]
         depth = -camera.vectors_to(points.xyz[at[rows]])[:, 2]
         parts = np.array_split(np.argsort(depth, kind="stable"), _DEPTHS)
         depths += [
@@ -219,15 +223,15 @@ def _carried(project: Project, columns: BundleColumns, result: Adjustment) -> It
     ranked = []
     for column, prior in columns.priors.items():
         label = columns.labels[column]
-        own, degrees = result.sigma(label), float(np.degrees(1.0)) if is_angle(label) else 1.0
+        sigma, degrees = result.sigma(label), float(np.degrees(1.0)) if is_angle(label) else 1.0
         unit = f" {result.unit(label)}".rstrip()
-        if own > UNCARRIED * prior * result.model_error:
+        if sigma > UNCARRIED * prior * result.model_error:
             start = f"{starts[label]:g} ± " if label in starts else "± "
-            given = f"{start}{prior * degrees:.2g}{unit}"
-            yield remark("bundle.hardly_carried", label=label, given=given)
+            prior_words = f"{start}{prior * degrees:.2g}{unit}"
+            yield remark("bundle.hardly_carried", label=label, given=prior_words)
         else:
-            given = f"given {prior * degrees:.2g}{unit}"
-            ranked.append((own / prior, f"{label} ({own * degrees:.2g}{unit}, {given})"))
+            prior_words = f"given {prior * degrees:.2g}{unit}"
+            ranked.append((sigma / prior, f"{label} ({sigma * degrees:.2g}{unit}, {prior_words})"))
     if ranked:
         yield remark("bundle.carried", names=", ".join(text for _, text in sorted(ranked)[:_SHOWN]))
 
@@ -237,10 +241,10 @@ def alike_remarks(result: Adjustment) -> Iterator[str]:
     say = words_of("multimedia.adjustment", "en")
     ranked = alike_pairs(result, ALIKE)
     for kind, pairs in ranked[:_SHOWN]:
-        correlation, one, other = pairs[0]
+        correlation, one, second = pairs[0]
         more = f" (and {len(pairs) - 1} more such pairs)" if len(pairs) > 1 else ""
         yield (
-            f"{one} and {other} can hardly be told apart: correlation {abs(correlation):.3f}"
+            f"{one} and {second} can hardly be told apart: correlation {abs(correlation):.3f}"
             f"{more}; {say(remedy_of(kind))}."
         )
     if len(ranked) > _SHOWN:

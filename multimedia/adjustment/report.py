@@ -80,9 +80,9 @@ def adjustment_document(
         if part is _precision:
             # What is alike has a section of its own.
             alike = set(alike_remarks(result))
-            said = [text for text in (*notes, *result.remarks) if text not in alike]
-            told = [in_language(text, language) for text in said]
-            blocks += _remarks((*told, *([say("see_correlations")] if alike else [])), say)
+            remarks = [text for text in (*notes, *result.remarks) if text not in alike]
+            lines = [in_language(text, language) for text in remarks]
+            blocks += _remarks((*lines, *([say("see_correlations")] if alike else [])), say)
     return dated_document(title, language, say, [*blocks, *provenance_blocks(say)])
 
 
@@ -118,10 +118,10 @@ def _model(result: Adjustment, say: Words, points: int) -> str:
     poses = [name.removesuffix(":X0") for name in result.names if name.endswith(":X0")]
     plates = sum(name.startswith("plate ") for name in poses)
     terms = (name.rpartition(":")[2] for name in result.names if not name.startswith("point "))
-    own = dict.fromkeys(term for term in terms if term not in EXTERIOR)
+    interior = dict.fromkeys(term for term in terms if term not in EXTERIOR)
     counted = (("orientations", len(poses) - plates), ("plate_poses", plates),
                ("free_points", points))  # fmt: skip
-    estimated = [*(say(key, count=count) for key, count in counted if count), *own]
+    estimated = [*(say(key, count=count) for key, count in counted if count), *interior]
     project = result.project
     held = (("orientations", len(project.cameras) - len(poses) + plates),
             ("free_points", len(project.object_points.ids) - points))  # fmt: skip
@@ -136,7 +136,7 @@ def _model(result: Adjustment, say: Words, points: int) -> str:
         names = media.parameter_names if media is not None else ()
         kept = [n for n in names if n.startswith(("index", "thickness", "radius", "gradient"))]
         assumed |= dict.fromkeys(name for name in kept if name != "index1")
-    left = [name for name in assumed if name not in own]
+    left = [name for name in assumed if name not in interior]
     nothing = say("nothing")
     return say(
         "estimated", estimated=", ".join(estimated) or nothing, assumed=", ".join(left) or nothing
@@ -160,7 +160,7 @@ def _media(result: Adjustment, say: Words) -> Iterator[Block]:
     for name, media in project.media.items():
         cameras = [
             camera.name
-            for camera, own in zip(project.cameras, project.media_of, strict=True) if own == name
+            for camera, of in zip(project.cameras, project.media_of, strict=True) if of == name
         ]  # fmt: skip
         many = f" ... ({len(cameras)})" if len(cameras) > 6 else ""
         thick = media.layers.thicknesses if isinstance(media, FlatInterface) else ()
@@ -197,10 +197,10 @@ def _place(media: FlatInterface | Interfaces, say: Words, unit: str) -> str:
 
     if isinstance(media, Interfaces):
         kinds = "; ".join(_surface(surface, say, vector) for surface in media.surfaces)
-        told = say("media_surfaces", count=len(media.surfaces), kinds=kinds)
+        place_words = say("media_surfaces", count=len(media.surfaces), kinds=kinds)
         if not media.is_graded:
-            return told
-        return told + say(
+            return place_words
+        return place_words + say(
             "media_gradient", gradient=f"{media.gradient:.3g}", level=f"{media.level:g}", unit=unit
         )
     key = "media_camera" if media.moves_with_camera else "media_world"
@@ -222,12 +222,12 @@ def _unknowns(result: Adjustment, say: Words) -> Iterator[Block]:
 
 
 def _residuals(result: Adjustment, say: Words) -> Iterator[Block]:
-    seen = [c for c in result.project.cameras if len(figures.measured_rows(result, c))]
-    if not seen:
+    measured_cameras = [c for c in result.project.cameras if len(figures.measured_rows(result, c))]
+    if not measured_cameras:
         return
     yield Heading(text=say("residuals"))
     rows = []
-    for camera in seen:
+    for camera in measured_cameras:
         mine = figures.measured_rows(result, camera)
         rms = float(np.sqrt(np.mean(result.residuals[mine] ** 2)))
         hidden = result.smallest_detectable[mine]
@@ -237,10 +237,12 @@ def _residuals(result: Adjustment, say: Words) -> Iterator[Block]:
     heads = [say("camera"), say("points"), "RMS [µm]", "sigma0 [µm]", say("found_from")]
     yield TextTable(headings=heads, rows=rows)
     yield Paragraph(text=say("detectable"), small=True)
-    drawn = sorted(seen, key=lambda camera: -result.sigma0_of[camera.name])[:_CAMERAS]
-    if len(drawn) < len(seen):
-        yield Paragraph(text=say("more_cameras", shown=len(drawn), all=len(seen)), small=True)
-    drawn = [camera for camera in seen if camera in drawn]
+    drawn = sorted(measured_cameras, key=lambda camera: -result.sigma0_of[camera.name])[:_CAMERAS]
+    if len(drawn) < len(measured_cameras):
+        yield Paragraph(
+            text=say("more_cameras", shown=len(drawn), all=len(measured_cameras)), small=True
+        )
+    drawn = [camera for camera in measured_cameras if camera in drawn]
     page = 2 * figures.COLUMNS
     for first in range(0, len(drawn), page):
         some = drawn[first : first + page]
@@ -282,8 +284,8 @@ def _correlations(result: Adjustment, say: Words) -> Iterator[Block]:
     ranked = alike_pairs(result, STRONG)
     if ranked:
         rows = [
-            [one, other, f"{value:+.3f}", str(len(pairs)), say(remedy_of(kind))]
-            for kind, pairs in ranked for value, one, other in pairs[:1]
+            [one, second, f"{value:+.3f}", str(len(pairs)), say(remedy_of(kind))]
+            for kind, pairs in ranked for value, one, second in pairs[:1]
         ]  # fmt: skip
         heads = [say("unknown"), say("and_other"), say("correlation_axis"), say("how_many"),
                  say("told_apart")]  # fmt: skip

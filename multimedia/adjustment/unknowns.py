@@ -142,13 +142,13 @@ def bars_of(bars: Sequence[ScaleBar], names: Sequence[str]) -> tuple[ScaleBar, .
         heads = (bar.first.split("@"), bar.second.split("@"))
         if not all(len(head) == 2 for head in heads):
             raise InputError(remark("adjust.scale_bar_names", first=bar.first, second=bar.second))
-        (start, end), (other, last) = heads
+        (start, end), (further, last) = heads
         shortest = len(start + end)
         places = [
             name[len(start) : len(name) - len(end)] for name in measured
             if name.startswith(start) and name.endswith(end) and len(name) > shortest
         ]  # fmt: skip
-        pairs = [(start + place + end, other + place + last) for place in places]
+        pairs = [(start + place + end, further + place + last) for place in places]
         both = [pair for pair in pairs if pair[1] in measured]
         if not both:
             raise InputError(f"scale bar {bar.first}, {bar.second}: no two points have such names.")

@@ -67,23 +67,23 @@ def with_boards(
             cameras += [each.camera] * len(names)
             groups += [pose] * len(names)
             image.append(sensor.image_from_pixel(each.view.pixels))
-    own, seen = project.object_points, project.image_points
-    taken = {name.rpartition(" ")[0] for name in set(own.ids) & objects.keys()}
-    if taken:
-        raise InputError(remark("boards.points_already", names=", ".join(sorted(taken)[:8])))
-    sigma = np.concatenate([own.sigma, np.full((len(objects), 3), np.nan)])
+    points, picks = project.object_points, project.image_points
+    repeated = {name.rpartition(" ")[0] for name in set(points.ids) & objects.keys()}
+    if repeated:
+        raise InputError(remark("boards.points_already", names=", ".join(sorted(repeated)[:8])))
+    sigma = np.concatenate([points.sigma, np.full((len(objects), 3), np.nan)])
     places = np.array([point for _, point in objects.values()]).reshape(-1, 3)
     return replace(
         project,
         object_points=ObjectPoints(
-            ids=(*own.ids, *objects), xyz=np.concatenate([own.xyz, places]), sigma=sigma,
-            groups=(*own.groups, *(pose for pose, _ in objects.values())),
+            ids=(*points.ids, *objects), xyz=np.concatenate([points.xyz, places]), sigma=sigma,
+            groups=(*points.groups, *(pose for pose, _ in objects.values())),
         ),
         image_points=ImagePoints(
-            cameras=(*seen.cameras, *cameras), ids=(*seen.ids, *ids),
-            image=np.concatenate([seen.image, *image]),
-            sigma=np.concatenate([seen.sigma, np.full((len(ids), 2), np.nan)]),
-            groups=(*seen.groups, *groups),
+            cameras=(*picks.cameras, *cameras), ids=(*picks.ids, *ids),
+            image=np.concatenate([picks.image, *image]),
+            sigma=np.concatenate([picks.sigma, np.full((len(ids), 2), np.nan)]),
+            groups=(*picks.groups, *groups),
         ),
     )  # fmt: skip
 

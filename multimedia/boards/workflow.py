@@ -108,11 +108,11 @@ def find_boards(
     for k, (photo, (camera, pose)) in enumerate(zip(photos, places, strict=True)):
         progress(k, len(photos), photo.name)
         sensor = project.cameras[project.camera_index(camera)].described_sensor()
-        found = _view(photo, sensor, camera, pattern=pattern, board=board)
-        if isinstance(found, str):
-            without.append(f"{photo.name}: {found}")
+        view = _view(photo, sensor, camera, pattern=pattern, board=board)
+        if isinstance(view, str):
+            without.append(f"{photo.name}: {view}")
         else:
-            views.append(PosedView(camera, pose, found))
+            views.append(PosedView(camera, pose, view))
     progress(len(photos), len(photos))
     for camera in dict.fromkeys(camera for camera, _ in places):
         count = sum(each.camera == camera for each in views)
@@ -202,5 +202,5 @@ def _why_not(grey: ByteArray, pattern: str, board: tuple[int, int]) -> str:
 
 def _moves(media: object) -> bool:
     """Whether media move with the camera."""
-    given = getattr(media, "moves_with_camera", None)
-    return bool(given if given is not None else all(getattr(media, "with_camera", ())))
+    stated = getattr(media, "moves_with_camera", None)
+    return bool(stated if stated is not None else all(getattr(media, "with_camera", ())))

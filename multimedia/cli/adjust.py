@@ -92,12 +92,12 @@ def command(
 
     if (wavelength is None) != (temperature is None):
         raise click.UsageError("the salinity needs both --wavelength and --temperature.")
-    told = {name: choices.pop(name) for name in ("language", "overwrite")}
+    writing = {name: choices.pop(name) for name in ("language", "overwrite")}
     choices["scale_bars"] = tuple(map(adjust.parse_scale_bar, choices["scale_bars"]))
-    given = dict(map(parse_prior, choices["priors"]))
-    choices["priors"] = {k: math.radians(v) if is_angle(k) else v for k, v in given.items()}
+    priors = dict(map(parse_prior, choices["priors"]))
+    choices["priors"] = {k: math.radians(v) if is_angle(k) else v for k, v in priors.items()}
     unknowns = Unknowns(**choices, typical_priors=True)
-    result, notes = adjust.adjust_project(project, unknowns, out=out, report=report, **told)
+    result, notes = adjust.adjust_project(project, unknowns, out=out, report=report, **writing)
     salinity = None
     if wavelength is not None and temperature is not None:
         salinity = adjust.salinity_of(

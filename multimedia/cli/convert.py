@@ -44,7 +44,8 @@ def command(options: ConvertCommand) -> None:
 
     Known are project files (.toml), COLMAP text models with their refractive cameras (a folder),
     Metashape's cameras (.xml), calibrations of OpenCV (.yml, .json, .xml, or a folder of them) and
-    of AquaCal (.json). Poses, lenses and, where both hold them, ports, water surfaces and points go
+    of AquaCal (.json), and, read only, folders with the cameras and control points of MyPTV, proPTV
+    and OpenLPT. Poses, lenses and, where both hold them, ports, water surfaces and points go
     over exactly; what the other program cannot hold is said, or refused.
     """
     from multimedia.exchange.workflow import convert

@@ -43,9 +43,10 @@ class OpenptvCommand:
 def command(options: OpenptvCommand) -> None:
     """Read an OpenPTV experiment folder DIR into a project file.
 
-    Reads ptv.par, .ori, .addpar, _targets, the calibration body and the first rt_is frame; finds
-    the control points among the targets of the calibration images, starting from the stored
-    orientation; and says what looks wrong, such as interchanged indices of glass and water.
+    Reads ptv.par or pyptv's parameters_Run1.yaml (DIR may be that file), .ori, .addpar, _targets,
+    the calibration body and the first rt_is frame; finds the control points among the targets of
+    the calibration images, starting from the stored orientation; and says what looks wrong, such as
+    interchanged indices of glass and water.
 
     Where multi_planes.par lists positions of the body, the .crd and .fix files of each position and
     camera are found by name and content, whatever folder they lie in; what was taken is said, and

@@ -50,7 +50,7 @@ def command(options: ParticlesCommand) -> None:
     """
     from multimedia.openptv.particles_workflow import find_particles
 
-    found = find_particles(
+    particles = find_particles(
         options.project,
         options.targets,
         tolerance=options.tolerance,
@@ -58,25 +58,30 @@ def command(options: ParticlesCommand) -> None:
         out=options.out,
         overwrite=options.overwrite,
     )
-    names = found.project.camera_names
-    median = float(sorted(found.misfit)[len(found.misfit) // 2]) if len(found.misfit) else None
+    names = particles.project.camera_names
+    median = (
+        float(sorted(particles.misfit)[len(particles.misfit) // 2])
+        if len(particles.misfit)
+        else None
+    )
     data = {
         "particles": [
             {"X": x, "Y": y, "Z": z, "targets": row, "misfit_px": miss}
             for (x, y, z), row, miss in zip(
-                found.xyz.tolist(), found.numbers.tolist(), found.misfit.tolist(), strict=True
+                particles.xyz.tolist(), particles.numbers.tolist(), particles.misfit.tolist(),
+                strict=True
             )
         ],
-        "unit": found.project.unit, "median_misfit_px": median, "out": options.out,
-        "by_chance_at_most": float(found.chance.sum()),
+        "unit": particles.project.unit, "median_misfit_px": median, "out": options.out,
+        "by_chance_at_most": float(particles.chance.sum()),
     }  # fmt: skip
     rows = [
-        (f"seen by {k}", int(found.seen_by[k]), f"{found.chance[k]:.3g}")
-        for k in range(len(names), 1, -1) if found.seen_by[k]
+        (f"seen by {k}", int(particles.seen_by[k]), f"{particles.chance[k]:.3g}")
+        for k in range(len(names), 1, -1) if particles.seen_by[k]
     ]  # fmt: skip
     lines = [text_table(("particles", "number", "by chance at most"), rows)]
-    for k, (name, count) in enumerate(zip(names, found.targets, strict=True)):
-        lines.append(f"{name}: {int((found.numbers[:, k] >= 0).sum())} of {count} targets used")
+    for k, (name, count) in enumerate(zip(names, particles.targets, strict=True)):
+        lines.append(f"{name}: {int((particles.numbers[:, k] >= 0).sum())} of {count} targets used")
     if median is not None:
         lines.append(f"median misfit {median:.2f} px")
-    print_result(data, lines, as_json=options.as_json, remarks=found.remarks)
+    print_result(data, lines, as_json=options.as_json, remarks=particles.remarks)

@@ -58,14 +58,18 @@ def command(project: Path, as_json: bool, **options: Any) -> None:
 def _lines(cameras: list[dict[str, Any]]) -> Iterator[str]:
     """Yield parameters with their standard deviations."""
     for camera in cameras:
-        known = bool(camera["redundancy"])
-        sigma0 = f"{camera['sigma0_um']:.3f} um" if known else "unknown"
+        is_determined = bool(camera["redundancy"])
+        sigma0 = f"{camera['sigma0_um']:.3f} um" if is_determined else "unknown"
         yield (
             f"{camera['name']}: sigma0 {sigma0}, {camera['points']} points, "
             f"redundancy {camera['redundancy']}, {camera['iterations']} iterations"
         )
         rows = [
-            (name, f"{camera[name]:.8g}", f"{camera['sigma'][name]:.2g}" if known else "unknown")
+            (
+                name,
+                f"{camera[name]:.8g}",
+                f"{camera['sigma'][name]:.2g}" if is_determined else "unknown",
+            )
             for name in camera["estimated"]
         ]
         yield text_table(("parameter", "value", "sigma"), rows)

@@ -54,7 +54,7 @@ def command(options: SoundingsCommand) -> None:
         target=options.target,
         overwrite=options.overwrite,
     )
-    found = check.offsets
+    offsets = check.offsets
     columns = {
         "mean": "mean [m]", "mean_sigma": "its sigma", "median": "median", "spread": "spread",
         "robust": "robust", "rmse": "RMSE", "expected": "expected",
@@ -62,11 +62,11 @@ def command(options: SoundingsCommand) -> None:
     rows = [
         (f"{of.shallow:g} to {of.deep:g}", of.count, of.gross,
          *(f"{getattr(of, key):+.4f}".replace("+nan", "-") for key in columns))
-        for of in (*found.classes, found.total)
+        for of in (*offsets.classes, offsets.total)
     ]  # fmt: skip
     headings = ("depth [m]", "n", "gross", *columns.values())
     lines = [text_table(headings, rows), f"{check.count} soundings, {check.outside} beside it"]
-    trend = found.trend
+    trend = offsets.trend
     if trend is not None:
         lines.append(
             f"over depth: {trend.at_surface:+.4f} m ± {trend.at_surface_sigma:.4f} at the surface, "
@@ -74,7 +74,7 @@ def command(options: SoundingsCommand) -> None:
             "depth (an index too small by 0.001 makes -0.75, a level 1 cm too low -3 mm throughout)"
         )
     data = {
-        "classes": [asdict(of) for of in found.classes], "all": asdict(found.total),
+        "classes": [asdict(of) for of in offsets.classes], "all": asdict(offsets.total),
         "trend": None if trend is None else asdict(trend),
         "soundings": check.count, "outside": check.outside,
     }  # fmt: skip

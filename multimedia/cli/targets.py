@@ -19,7 +19,7 @@ class TargetsCommand:
     """The options of ``multimedia targets``, and examples.
 
     multimedia targets img/cam1.10001.tif img/cam2.10001.tif --out targets
-    multimedia targets img/*.tif --project tank.toml --out targets
+    multimedia targets img/*.tif --project tank.toml --out targets --overwrite
     multimedia targets img/*.tif --threshold 25 --out targets.csv
     """
 
@@ -55,7 +55,7 @@ def command(options: TargetsCommand) -> None:
     from multimedia.targets.workflow import targets_of_images
 
     with progress_bar("Targets", quiet=options.as_json) as progress:
-        made, remarks = targets_of_images(
+        images, remarks = targets_of_images(
             options.images,
             out=options.out,
             threshold=options.threshold,
@@ -74,7 +74,7 @@ def command(options: TargetsCommand) -> None:
             "median_diameter_px": _median(one.targets.diameter),
             "merged": int(one.targets.merged.sum()),
         }
-        for one in made
+        for one in images
     ]  # fmt: skip
     headings = ("image", "targets", "sigma [px]", "diameter [px]", "perhaps several")
     rows = [
@@ -82,7 +82,7 @@ def command(options: TargetsCommand) -> None:
             one.image.name, len(one.targets), _shown(line["median_sigma_px"], 3),
             _shown(line["median_diameter_px"], 1), line["merged"],
         )
-        for one, line in zip(made, listed, strict=True)
+        for one, line in zip(images, listed, strict=True)
     ]  # fmt: skip
     lines = [text_table(headings, rows)]
     if options.out is not None:

@@ -30,8 +30,8 @@ class TrackCommand:
 
     project: ProjectOption
     targets: tuple[Path, ...]
-    """What the _targets files of a camera begin with, up to the number of the frame; once per
-    camera, in the order of PROJECT."""
+    """What the _targets files of a camera begin with, up to the number of the frame, or MyPTV's
+    file of its blobs; once per camera, in the order of PROJECT."""
     first: Annotated[int | None, Typed(click.IntRange(min=0))] = None
     """First frame.  [default: the first of all cameras]"""
     last: Annotated[int | None, Typed(click.IntRange(min=0))] = None
@@ -77,7 +77,7 @@ def command(options: TrackCommand) -> None:
     """
     from multimedia.tracking.workflow import find_tracks
 
-    found = find_tracks(
+    result = find_tracks(
         options.project,
         options.targets,
         first=options.first,
@@ -93,36 +93,41 @@ def command(options: TrackCommand) -> None:
         folder=options.folder,
         overwrite=options.overwrite,
     )
-    tracks, (length, speed_unit) = found.tracks, found.units
+    tracks, (length, speed_unit) = result.tracks, result.units
     speed = np.linalg.norm(tracks.velocity, axis=1)
     sizes = np.bincount(tracks.track)
-    sigma, own = np.median(tracks.sigma, axis=0), np.nanmedian(tracks.velocity_sigma, axis=0)
+    sigma, velocity_sigma = (
+        np.median(tracks.sigma, axis=0),
+        np.nanmedian(tracks.velocity_sigma, axis=0),
+    )
     lost = tracks.particles - len(tracks.track)
     data = {
-        "frames": [found.frames[0], found.frames[-1]], "particles": tracks.particles,
+        "frames": [result.frames[0], result.frames[-1]], "particles": tracks.particles,
         "tracks": tracks.count, "points": len(tracks.track),
-        "median_length": float(np.median(sizes)), "sigma_px": found.sigma_px,
+        "median_length": float(np.median(sizes)), "sigma_px": result.sigma_px,
         "step": tracks.step, "change": tracks.change, "unit": length,
         "median_speed": float(np.nanmedian(speed)), "speed_unit": speed_unit,
-        "median_sigma": sigma.tolist(), "median_velocity_sigma": own.tolist(),
-        "differ": int(tracks.outlier.sum()), "particles_tested": found.found,
-        "by_chance_at_most": found.chance, "in_no_track": lost,
+        "median_sigma": sigma.tolist(), "median_velocity_sigma": velocity_sigma.tolist(),
+        "differ": int(tracks.outlier.sum()), "particles_tested": result.found,
+        "by_chance_at_most": result.chance, "in_no_track": lost,
         "in_tracks_by_chance": tracks.by_chance, "out": options.out, "folder": options.folder,
     }  # fmt: skip
     rows = [
-        ("frames", f"{found.frames[0]} to {found.frames[-1]}"),
-        ("particles", f"{tracks.particles}; in some frames {found.found:.0f}, by chance at most "
-                      f"{found.chance:.0f}"),
+        ("frames", f"{result.frames[0]} to {result.frames[-1]}"),
+        ("particles", f"{tracks.particles}; in some frames {result.found:.0f}, by chance at most "
+                      f"{result.chance:.0f}"),
         ("tracks", f"{tracks.count} of {len(tracks.track)} points, {np.median(sizes):.0f} the "
                    f"median, {sizes.max()} the longest"),
         ("in no track", f"{lost} particles, {lost / tracks.particles:.0%}; by chance in tracks "
                         f"{tracks.by_chance}"),
         (f"sought within [{length}]", f"{tracks.change:.3g} of the prediction, {tracks.step:.3g} "
                                       "where there is none"),
-        ("image coordinates [px]", f"sigma {found.sigma_px:.2g}"),
+        ("image coordinates [px]", f"sigma {result.sigma_px:.2g}"),
         (f"positions [{length}]", "sigma " + ", ".join(f"{v:.2g}" for v in sigma)),
         (f"speed [{speed_unit}]", f"median {np.nanmedian(speed):.4g}, sigma "
-                                  + ", ".join(f"{v:.2g}" for v in own)),
+                                  + ", ".join(f"{v:.2g}" for v in velocity_sigma)),
         ("differ from those around", f"{int(tracks.outlier.sum())} vectors"),
     ]  # fmt: skip
-    print_result(data, [text_table(("", ""), rows)], as_json=options.as_json, remarks=found.remarks)
+    print_result(
+        data, [text_table(("", ""), rows)], as_json=options.as_json, remarks=result.remarks
+    )

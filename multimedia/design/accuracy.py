@@ -110,24 +110,26 @@ def study_setup(
     seen_by = np.zeros(len(points))
     for camera, interface, name in zip(cameras, media, names, strict=True):
         image = project(camera, points, interface)
-        seen: BoolArray = np.all(np.isfinite(image), axis=1) & _on_sensor(camera, image)
-        seen_by += seen
-        if seen.any():
-            own = interface.parameter_names if interface is not None else ()
-            slopes = project_with_jacobian(camera, points[seen], interface, interface_names=own)
+        on_sensor: BoolArray = np.all(np.isfinite(image), axis=1) & _on_sensor(camera, image)
+        seen_by += on_sensor
+        if on_sensor.any():
+            parameters = interface.parameter_names if interface is not None else ()
+            slopes = project_with_jacobian(
+                camera, points[on_sensor], interface, interface_names=parameters
+            )
             by_point = slopes.by_point.transpose(0, 2, 1)
-            normal[seen] += by_point @ slopes.by_point
+            normal[on_sensor] += by_point @ slopes.by_point
             right = by_point @ slopes.by_interface
-            for k, parameter in enumerate(own):
+            for k, parameter in enumerate(parameters):
                 key = f"{name}:{parameter}"
                 moment = moments.setdefault(key, np.zeros((len(points), 3)))
-                moment[seen] += right[:, :, k]
+                moment[on_sensor] += right[:, :, k]
         direction = np.full((len(points), 3), np.nan)
-        direction[seen] = image_rays(camera, image[seen], interface)[1]
+        direction[on_sensor] = image_rays(camera, image[on_sensor], interface)[1]
         rays.append(direction)
         line = points - camera.centre
         line = line / np.linalg.norm(line, axis=1, keepdims=True)
-        straight.append(np.where(seen[:, None], line, np.nan))
+        straight.append(np.where(on_sensor[:, None], line, np.nan))
     enough = seen_by >= 2
     if not enough.any():
         raise GeometryError(remark("design.unseen"))
@@ -241,10 +243,10 @@ def ring_of_cameras(
             camera = Camera.looking_at(
                 centre, aim, principal_distance=principal_distance, name=f"cam{k + 1}"
             )
-            seen = project(camera, target, interface)
-            if not np.isfinite(seen).all():
+            pixel = project(camera, target, interface)
+            if not np.isfinite(pixel).all():
                 raise GeometryError(f"design: camera {k + 1} cannot see the target.")
-            aim = centre + camera.rotation @ np.array([*seen, -principal_distance])
+            aim = centre + camera.rotation @ np.array([*pixel, -principal_distance])
         cameras.append(camera)
     return tuple(cameras)
 

@@ -233,14 +233,14 @@ def colour_positions(
     places = as_points(offsets, "offsets", dimension=2)
     tangent = np.hypot(places[..., 0], places[..., 1]) / constant
     beta = np.arctan(tangent)
-    own = colours[reference]
+    layers = colours[reference]
     radius = np.zeros(())
-    for height, index in zip(own.heights(z0=z0, zp=zp), own.indices, strict=True):
-        inner = refracted_angle(beta, n_from=own.indices[0], n_to=index)
+    for height, index in zip(layers.heights(z0=z0, zp=zp), layers.indices, strict=True):
+        inner = refracted_angle(beta, n_from=layers.indices[0], n_to=index)
         radius = radius + height * np.tan(inner)
     bars = shift_per_colour(radius, z0=z0, zp=zp, colours=colours)
-    seen = np.where(tangent > 0, tangent * (z0 + own.thickness + zp), 1.0)
-    scale = np.where(tangent[..., None] > 0, bars / seen[..., None], 1.0)
+    depth = np.where(tangent > 0, tangent * (z0 + layers.thickness + zp), 1.0)
+    scale = np.where(tangent[..., None] > 0, bars / depth[..., None], 1.0)
     return np.asarray(places[..., None] * scale[..., None, :])
 
 

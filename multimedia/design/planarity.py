@@ -136,7 +136,10 @@ def planarity_study(
         raise InputError(
             "planarity: two cameras or more are needed, all before plane-parallel media."
         )
-    views = [_Local.of(camera, own, points) for camera, own in zip(cameras, flat, strict=True)]
+    views = [
+        _Local.of(camera, deviations, points)
+        for camera, deviations in zip(cameras, flat, strict=True)
+    ]
     crossed = np.concatenate([view.crossings() for view in views])
     crossed = crossed[np.isfinite(crossed).all(axis=1)]
     if not len(crossed):
@@ -145,9 +148,9 @@ def planarity_study(
     width = 2.0 * float(np.linalg.norm(crossed - middle, axis=1).max())
     if len({len(view.faces.surfaces) for view in views}) > 1:
         raise InputError("planarity: the cameras look through different numbers of faces.")
-    found = []
-    own = [_deviations(view.faces, middle, width, millimetre) for view in views]
-    for alike in zip(*own, strict=True):
+    results = []
+    deviations = [_deviations(view.faces, middle, width, millimetre) for view in views]
+    for alike in zip(*deviations, strict=True):
         kind, size, wavelength, _ = alike[0]
         variants = zip(*(faces for *_, faces in alike), strict=True)
         moved = [_moved(cameras, flat, views, faces, points) for faces in variants]
@@ -157,14 +160,14 @@ def planarity_study(
         largest = float(np.nanmax(np.linalg.norm(moved, axis=-1)))
         cost = float(np.linalg.norm(shift))
         allowed = size * expected / cost if cost > ROUNDING * width else np.inf
-        found.append(
+        results.append(
             Deviation(
                 kind=kind, size=size, wavelength=wavelength, shift=tuple(shift.tolist()),
                 largest=largest, allowed=allowed,
                 left_out=int(np.isnan(moved).any(axis=-1).sum()),
             )
         )  # fmt: skip
-    return tuple(found)
+    return tuple(results)
 
 
 def _moved(
@@ -177,8 +180,8 @@ def _moved(
     """Return by how much points seem to lie elsewhere behind other faces, shape (n, 3)."""
     images = []
     for view, deviating in zip(views, faces, strict=True):
-        other = Interfaces(surfaces=deviating, indices=view.faces.indices)
-        images.append(project(view.camera, view.points, other))
+        bent = Interfaces(surfaces=deviating, indices=view.faces.indices)
+        images.append(project(view.camera, view.points, bent))
     return intersect(cameras, np.stack(images), list(media)).xyz - points
 
 

@@ -197,21 +197,21 @@ def telem(
     """
     if not 0 <= terms <= 5:
         raise InputError(f"terms: 0 to 5 radial coefficients, found {terms}.")
-    seen = _seen(radius, z0, zp, layers, principal_distance)
-    aside = seen.tangent > 0
+    view = _seen(radius, z0, zp, layers, principal_distance)
+    aside = view.tangent > 0
     if np.count_nonzero(aside) <= terms:
         raise InputError(remark("design.few_off_axis", count=np.count_nonzero(aside), terms=terms))
     # r' = c_w T (1 + k1 (c_w T)² + ...) is linear in c_w, c_w³ k1, ...; T scaled against rounding.
-    largest = float(seen.tangent.max())
-    scaled = (seen.tangent[aside] / largest).ravel()
+    largest = float(view.tangent.max())
+    scaled = (view.tangent[aside] / largest).ravel()
     design = np.stack([scaled ** (2 * i + 1) for i in range(terms + 1)], axis=-1)
-    solution = np.linalg.lstsq(design, seen.image[aside].ravel(), rcond=None)[0]
+    solution = np.linalg.lstsq(design, view.image[aside].ravel(), rcond=None)[0]
     absorbed = float(solution[0]) / largest
     distortion = tuple(
         float(value) / largest ** (2 * i + 1) / absorbed ** (2 * i + 1)
         for i, value in enumerate(solution[1:], start=1)
     )
-    return _judged(seen, absorbed, distortion)
+    return _judged(view, absorbed, distortion)
 
 
 class _Seen(NamedTuple):

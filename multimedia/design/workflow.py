@@ -174,8 +174,8 @@ def _simplified(
         models.append((name, float(np.sqrt(np.mean(wrong**2))), float(wrong.max())))
     # Quan and Fry's water at 20 degrees for blue and red, in place of the last medium.
     colours = [
-        replace(layers, indices=(*layers.indices[:-1], own.indices[-1]))
-        for own in layers_per_colour(wavelengths_nm=(650.0, 450.0))
+        replace(layers, indices=(*layers.indices[:-1], of_colour.indices[-1]))
+        for of_colour in layers_per_colour(wavelengths_nm=(650.0, 450.0))
     ]
     seam = seam_width(
         radius, z0=z0, zp=depth, colours=colours, principal_distance=c, pixel_size=1.0
@@ -194,11 +194,13 @@ def _by_depth(study: Study) -> FloatArray:
         group = np.searchsorted(levels, depth)
     rows = []
     for k in np.unique(group):
-        own = (group == k) & np.isfinite(study.sigma[:, 0])
-        if own.any():
-            sigma = np.sqrt(np.mean(study.sigma[own] ** 2, axis=0))
-            angles = [float(np.degrees(np.mean(a[own]))) for a in (study.angle, study.angle_in_air)]
-            rows.append([float(depth[own].mean()), *sigma.tolist(), *angles])
+        members = (group == k) & np.isfinite(study.sigma[:, 0])
+        if members.any():
+            sigma = np.sqrt(np.mean(study.sigma[members] ** 2, axis=0))
+            angles = [
+                float(np.degrees(np.mean(a[members]))) for a in (study.angle, study.angle_in_air)
+            ]
+            rows.append([float(depth[members].mean()), *sigma.tolist(), *angles])
     return np.array(rows)
 
 

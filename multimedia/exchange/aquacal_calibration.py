@@ -19,7 +19,7 @@ from multimedia.projects.model import Project
 from multimedia.projects.point_tables import METRES
 from multimedia.refraction.layers import Layers
 from multimedia.remarks import remark
-from photocore.camera.lensformats import LensData
+from photocore.camera.lensdata import LensData
 from photocore.camera.rotation import checked_rotation
 from photocore.errors import InputError
 from photocore.jsonfile import read_object, write_object

@@ -58,7 +58,7 @@ def read_colmap(folder: Path, *, pitch: float, unit: str) -> Project:
     model = read_colmap_model(folder)
     media = {f"port{k}": _port(words, folder / "cameras.txt")
              for k, words in model.ports.items() if words and words[0] != "NONE"}  # fmt: skip
-    views, seen = model.images, [view for view in model.images if view.ids]
+    views, with_points = model.images, [view for view in model.images if view.ids]
     names = _names([view.name for view in views])
     cameras = tuple(
         camera_of(model.lenses[v.camera], v.rotation, v.translation, pitch=pitch, name=name)
@@ -71,11 +71,11 @@ def read_colmap(folder: Path, *, pitch: float, unit: str) -> Project:
         object_points=ObjectPoints(ids=tuple(model.ids), xyz=model.points),
         image_points=ImagePoints(
             cameras=tuple(n for n, v in zip(names, views, strict=True) for _ in v.ids),
-            ids=tuple(name for view in seen for name in view.ids),
+            ids=tuple(name for view in with_points for name in view.ids),
             image=np.concatenate([
                 c.sensor.image_from_pixel(v.pixels)  # type: ignore[union-attr]
                 for c, v in zip(cameras, views, strict=True) if v.ids
-            ]) if seen else np.empty((0, 2)),
+            ]) if with_points else np.empty((0, 2)),
         ),
         sigma_image=0.5 * pitch,
         unit=unit,
@@ -162,10 +162,10 @@ def _port_words(camera: Camera, media: FlatInterface | Interfaces | None) -> str
         return ""
     if isinstance(media, FlatInterface) and len(media.indices) in (2, 3):
         glass = float(sum(media.layers.thicknesses))
-        there = media.medium(camera)
+        medium = media.medium(camera)
         indices = media.indices if len(media.indices) == 3 else (*media.indices, media.indices[1])
-        distance = float(there.height - glass)
-        normal = -(FLIP @ there.normal)
+        distance = float(medium.height - glass)
+        normal = -(FLIP @ medium.normal)
         return f" FLATPORT {digits([*normal, distance, glass, *indices])}"
     if isinstance(media, Interfaces) and len(media.surfaces) == 2:
         inner, outer = media.surfaces

@@ -31,15 +31,18 @@ def read_metashape(path: Path, *, pitch: float, unit: str) -> Project:
     """
     read = read_metashape_project(path)
     cameras = tuple(
-        camera_of(v.lens, v.rotation, -v.rotation @ v.centre, pitch=pitch, name=v.name)
+        camera_of(
+            v.lens._replace(camera_matrix=v.camera.matrix), v.rotation, -v.rotation @ v.centre,
+            pitch=pitch, name=v.name,
+        )
         for v in read.views
-    )
-    said = (
+    )  # fmt: skip
+    notes = (
         () if read.metres else ("the chunk has no transform: its frame and scale are arbitrary.",)
     )
     return Project(
         cameras=cameras, sigma_image=0.5 * pitch, unit=unit, name=path.stem,
-        extra={"source": "Metashape"}, remarks=(*read.remarks, *said),
+        extra={"source": "Metashape"}, remarks=(*read.remarks, *notes),
     )  # fmt: skip
 
 

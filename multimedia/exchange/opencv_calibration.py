@@ -20,7 +20,8 @@ from multimedia.media.camera import Camera
 from multimedia.projects.model import Project
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.camera.lensformats import FISHEYE_KEY, LensData, opencv_values
+from photocore.camera.lensdata import LensData
+from photocore.camera.lensformats import FISHEYE_KEY, opencv_values
 from photocore.camera.rotation import checked_rotation, rotation_from_vector
 from photocore.errors import InputError
 from photocore.output import atomic_folder, atomic_path
@@ -55,9 +56,9 @@ def read_opencv(path: Path, *, pitch: float, unit: str) -> Project:
     cameras: list[Camera] = []
     remarks: list[str] = []
     for file in files:
-        found, said = _cameras(file, opencv_values(file).get, pitch)
-        cameras += found
-        remarks += said
+        of_file, notes = _cameras(file, opencv_values(file).get, pitch)
+        cameras += of_file
+        remarks += notes
     if not cameras:
         raise InputError(f"{path}: holds no calibration ({', '.join(ENDINGS)}).")
     return Project(
@@ -112,8 +113,8 @@ def _cameras(path: Path, get: _Get, pitch: float) -> tuple[list[Camera], list[st
         size = np.array([width.item(), height.item()])
     if size is None or size.size != 2:
         raise InputError(f"{path}: lacks image_width and image_height; add both.")
-    said = get(FISHEYE_KEY)
-    fisheye = said is not None and bool(np.any(said))
+    flag = get(FISHEYE_KEY)
+    fisheye = flag is not None and bool(np.any(flag))
     turn, shift = _first(get, *_TURN), _first(get, *_SHIFT)
     numbers = ("1", "2") if _first(get, "K1", "M1", "camera_matrix1") is not None else ("",)
     cameras = []

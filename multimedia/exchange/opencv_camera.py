@@ -20,7 +20,7 @@ from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.camera.distortion import Brown, Convention
 from photocore.camera.fisheye import TERMS, Fisheye
-from photocore.camera.lensformats import LensData
+from photocore.camera.lensdata import LensData
 from photocore.camera.rotation import nearest_rotation
 from photocore.errors import InputError
 
@@ -31,7 +31,8 @@ FARTHEST = 1.0
 #: Distortion terms of OpenCV's largest model.
 MOST_TERMS = 14
 _FISHEYE = "fisheye"
-_FREE = ("c", "xh", "yh", "k1", "k2", "k3", "p1", "p2", "scale")
+#: What another lens model may change, the camera staying where it is.
+FREE = ("c", "xh", "yh", "k1", "k2", "k3", "p1", "p2", "scale")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -151,7 +152,7 @@ def opencv_of(camera: Camera) -> OpencvCamera:
         sign = -1.0 if lens.convention is Convention.PHOTOGRAMMETRIC else 1.0
         start_terms = {name: sign * getattr(lens, name) for name in ("k1", "k2", "k3", "p1", "p2")}
         start = replace(camera, distortion=Brown(**start_terms))
-        camera = nearest_camera(start, points, image, _FREE)
+        camera = nearest_camera(start, points, image, FREE)
         misfit = farthest_miss(camera, points, image)
         if misfit > FARTHEST:
             raise InputError(remark("exchange.lens_misfit", name=camera.name, misfit=misfit))

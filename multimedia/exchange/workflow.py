@@ -11,6 +11,7 @@ from multimedia.exchange.colmap_model import read_colmap, write_colmap
 from multimedia.exchange.metashape_project import read_metashape, write_metashape
 from multimedia.exchange.opencv_calibration import read_opencv, write_opencv
 from multimedia.exchange.opencv_camera import PITCH
+from multimedia.exchange.ptv_calibrations import is_ptv_calibration, read_ptv_calibration
 from multimedia.projects.model import Project
 from multimedia.projects.project_file import read_project, write_project
 from multimedia.remarks import remark
@@ -65,7 +66,8 @@ def convert(
     ----------
     source : path
         Project file (.toml); folder of a COLMAP text model; Metashape's cameras (.xml); OpenCV's
-        calibration (.yml, .json, .xml) or a folder of them; AquaCal's calibration (.json).
+        calibration (.yml, .json, .xml) or a folder of them; AquaCal's calibration (.json); folder
+        with the cameras and control points of MyPTV, proPTV or OpenLPT.
     target : path
         .toml for a project file; otherwise ``form`` or the ending tells the format.
     form : str, optional
@@ -98,11 +100,11 @@ def convert(
     kind, project = read_any(source, pitch=pixel_size, unit=unit)
     if wanted == "project":
         write_project(target, project, overwrite=overwrite)
-        said: tuple[str, ...] = ()
+        notes: tuple[str, ...] = ()
     else:
-        said = _WRITERS[wanted](target, project, overwrite=overwrite)
+        notes = _WRITERS[wanted](target, project, overwrite=overwrite)
     return Conversion(
-        project=project, source=kind, target=wanted, remarks=(*project.remarks, *said)
+        project=project, source=kind, target=wanted, remarks=(*project.remarks, *notes)
     )
 
 
@@ -121,6 +123,8 @@ def read_any(path: Path, *, pitch: float = PITCH, unit: str = "m") -> tuple[str,
             return "colmap", read_colmap(path, pitch=pitch, unit=unit)
         if (path / "cameras.bin").is_file():
             raise InputError(remark("exchange.binary_colmap", of=path))
+        if is_ptv_calibration(path):
+            return "particle tracker", read_ptv_calibration(path, pitch=pitch, unit=unit)
         return "opencv", read_opencv(path, pitch=pitch, unit=unit)
     if ending == ".toml":
         return "project", read_project(path)

@@ -289,8 +289,8 @@ class Camera:
             If some but not all angles are named, a name is unknown, or the lens has no such term.
         """
         change = dict(zip(names, as_floats(step, "step").tolist(), strict=True))
-        known = EXTERIOR + self.interior_names
-        unknown = [name for name in change if name not in known]
+        parameters = EXTERIOR + self.interior_names
+        unknown = [name for name in change if name not in parameters]
         angles = [change[name] for name in EXTERIOR[3:] if name in change]
         if unknown or len(angles) not in (0, 3):
             raise InputError(

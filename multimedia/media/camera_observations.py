@@ -48,20 +48,24 @@ class CameraObservations:
 
         def images(state: NetworkState, rows: Rows) -> bool:
             try:
-                seen = project_with_jacobian(
+                points = project_with_jacobian(
                     camera_of(state), self.points, self.media, camera_names=names
                 )
             except GeometryError:
                 return False
-            lines = rows.add((seen.image - self.image) / self.sigma)
+            lines = rows.add((points.image - self.image) / self.sigma)
             rows.by_label(
-                lines[..., None], np.arange(len(names)), seen.by_camera / self.sigma[..., None]
+                lines[..., None], np.arange(len(names)), points.by_camera / self.sigma[..., None]
             )
-            return bool(np.isfinite(seen.image).all())
+            return bool(np.isfinite(points.image).all())
 
-        own = {"camera": {0: columns}}
+        columns_of = {"camera": {0: columns}}
         return Network(
-            labels=names, columns=own, terms=(images,), what=self.what, rounding=self.rounding
+            labels=names,
+            columns=columns_of,
+            terms=(images,),
+            what=self.what,
+            rounding=self.rounding,
         )
 
 

@@ -185,7 +185,7 @@ class FlatInterface(OpticalMedia):
         medium = self.medium(camera)
         vectors = camera.vectors_to(points)
         shift = shifts(vectors, medium, media=bool(names))
-        seen = vectors + shift.g[:, None] * medium.normal
+        apparent = vectors + shift.g[:, None] * medium.normal
 
         def derivatives(by_seen: FloatArray) -> SightDerivatives:
             # u = a + g(rho^2, w) m: the change of g adds a product of two vectors to the identity.
@@ -194,7 +194,7 @@ class FlatInterface(OpticalMedia):
             by_vector += by_seen
             # Before faces that stand still rho and depth do not change with the rotation: the
             # whole seen vector turns; and the height changes with the centre.
-            turning = (by_vector, vectors) if self.moves_with_camera else (by_seen, seen)
+            turning = (by_vector, vectors) if self.moves_with_camera else (by_seen, apparent)
             by_point, by_exterior = by_pose(camera, by_vector, turning if exterior else None)
             if exterior and not self.moves_with_camera:
                 by_height = along * shift.by_height[:, None]
@@ -204,7 +204,7 @@ class FlatInterface(OpticalMedia):
                 by_media[:, :, k] = self._by_parameter(name, camera, vectors, by_seen, along, shift)
             return SightDerivatives(by_point, by_exterior, by_media)
 
-        return Sight(seen, derivatives)
+        return Sight(apparent, derivatives)
 
     def _by_parameter(
         self,

@@ -88,11 +88,11 @@ class HeightField(RefractingSurface):
         enter = np.maximum(np.fmin(to_top, to_bottom), beyond)
         leave = np.fmax(to_top, to_bottom)
         flow = np.hypot(directions[:, 0], directions[:, 1])
-        wanted = np.isfinite(enter) & np.isfinite(leave) & (leave >= enter)
+        usable = np.isfinite(enter) & np.isfinite(leave) & (leave >= enter)
         result = np.full(len(origins), np.nan)
         # A ray steeper than the steepest wave meets the surface once; a flatter one is searched.
         steep = np.abs(directions[:, 2]) > self.steepest * flow
-        once, often = np.flatnonzero(wanted & steep), np.flatnonzero(wanted & ~steep)
+        once, often = np.flatnonzero(usable & steep), np.flatnonzero(usable & ~steep)
         if once.size:
             result[once] = self._root(origins[once], directions[once], enter[once], leave[once])
         if often.size:
@@ -160,9 +160,9 @@ class HeightField(RefractingSurface):
             if not rows.size:
                 break
         # A bracket that closes without a meeting (a hole, a border) leaves a gap: no meeting.
-        known = np.flatnonzero(np.isfinite(distance))
+        finite = np.flatnonzero(np.isfinite(distance))
         gap = np.full(len(origins), np.nan)
-        gap[known] = self._gap(origins[known], directions[known], distance[known])[0]
+        gap[finite] = self._gap(origins[finite], directions[finite], distance[finite])[0]
         tolerance = 1e-9 * (self.highest - self.lowest + self.feature) + smallest
         return np.where(np.abs(gap) <= tolerance, distance, np.nan)
 
@@ -335,8 +335,8 @@ class RasterSurface(HeightField):
         last = np.array(self.raster.shape[::-1]) - 1.0
         with np.errstate(invalid="ignore"):
             clamped = np.clip(cells, 0.0, last)
-        known = np.asarray(np.isfinite(clamped).all(-1))
-        clamped = np.where(known[:, None], clamped, 0.0)
+        finite = np.asarray(np.isfinite(clamped).all(-1))
+        clamped = np.where(finite[:, None], clamped, 0.0)
         base = np.minimum(np.floor(clamped), last - 1).astype(np.int64)
         share = clamped - base
         patch = [
@@ -350,7 +350,7 @@ class RasterSurface(HeightField):
             total = np.zeros(len(cells))
             for weight, line in zip(down, patch, strict=True):
                 total += weight * sum(w * p for w, p in zip(across, line, strict=True))
-            results.append(np.where(known, total, np.nan))
+            results.append(np.where(finite, total, np.nan))
         return results
 
     def heights(self, xy: FloatArray) -> tuple[FloatArray, FloatArray]:

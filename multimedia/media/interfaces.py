@@ -234,12 +234,12 @@ class Interfaces(SurfaceSequence, OpticalMedia):
         starts[: min(pose, 3)] = np.eye(3)[: min(pose, 3)]
         for k in range(pose):
             axis = np.eye(3)[k % 3]
-            own = (
+            motion = (
                 SurfaceMotion(shift=axis)
                 if k < 3
                 else SurfaceMotion(rotation=axis, pivot=camera.centre)
             )
-            motions.append(tuple(own if moves else None for moves in self.with_camera))
+            motions.append(tuple(motion if moves else None for moves in self.with_camera))
         for k, name in enumerate(names, start=pose):
             if name == "gradient":
                 gradients[k] = 1.0
@@ -265,7 +265,7 @@ class Interfaces(SurfaceSequence, OpticalMedia):
 
     def _refuse_unknown(self, names: Sequence[str]) -> None:
         """Refuse names that are no parameter."""
-        known = self.parameter_names
+        parameters = self.parameter_names
         for name in names:
-            if name not in known:
-                raise InputError(f"interface parameter {name}: not one of {', '.join(known)}.")
+            if name not in parameters:
+                raise InputError(f"interface parameter {name}: not one of {', '.join(parameters)}.")

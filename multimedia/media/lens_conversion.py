@@ -49,11 +49,11 @@ def sensor_rays(camera: Camera) -> tuple[FloatArray, FloatArray]:
     along = [np.linspace(0, side - 1, count) for side, count in zip(sides, _GRID, strict=True)]
     pixels = np.stack(np.meshgrid(*along), axis=-1).reshape(-1, 2)
     ideal = camera.ideal(sensor.image_from_pixel(pixels))
-    seen = np.isfinite(ideal).all(axis=1)
-    if not seen.any():
+    finite = np.isfinite(ideal).all(axis=1)
+    if not finite.any():
         raise InputError(f"camera {camera.name}: its distortion cannot be undone on the sensor.")
-    vectors = np.column_stack([ideal, np.full(len(ideal), -camera.principal_distance)])[seen]
-    return camera.centre + vectors @ camera.rotation.T, pixels[seen]
+    vectors = np.column_stack([ideal, np.full(len(ideal), -camera.principal_distance)])[finite]
+    return camera.centre + vectors @ camera.rotation.T, pixels[finite]
 
 
 def nearest_camera(
@@ -80,10 +80,10 @@ def nearest_camera(
         As for `project`.
     """
     what = f"camera {start.name} in the terms of another lens model"
-    seen = CameraObservations(
+    observations = CameraObservations(
         points=points, image=image, media=media, sigma=np.ones_like(image), what=what
     )
-    return camera_of(seen.network(names).minimise(start_at(start), most=60).state)
+    return camera_of(observations.network(names).minimise(start_at(start), most=60).state)
 
 
 def farthest_miss(

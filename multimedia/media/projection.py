@@ -212,14 +212,14 @@ def _through_lens(
         By each of ``names`` that belongs to the interior orientation.
     """
     ideal, by_seen = central_with_jacobian(seen, -camera.principal_distance)
-    own = [name for name in names if name in ANY_INTERIOR]
+    interior = [name for name in names if name in ANY_INTERIOR]
     by_c = ideal / camera.principal_distance
-    if camera.distortion.is_identity and set(own) <= {"c"}:
+    if camera.distortion.is_identity and set(interior) <= {"c"}:
         return ideal + camera.principal_point, by_seen, {"c": by_c}
     image, by_ideal, by_own = camera.distortion.measured_with_jacobian(
-        ideal, camera.principal_point, own, camera.principal_distance
+        ideal, camera.principal_point, interior, camera.principal_distance
     )
-    by_interior = {name: by_own[:, :, k] for k, name in enumerate(own)}
+    by_interior = {name: by_own[:, :, k] for k, name in enumerate(interior)}
     if "c" in by_interior:
         by_interior["c"] = by_interior["c"] + (by_ideal @ by_c[..., None])[..., 0]
     return image, by_ideal @ by_seen, by_interior

@@ -83,7 +83,7 @@ class SurfaceSequence:
         """
         good = np.ones(len(starts), dtype=bool)
         for surface in dict.fromkeys(self.surfaces):
-            crossings = sum(other is surface for other in self.surfaces)
+            crossings = sum(one is surface for one in self.surfaces)
             product = surface.side(starts) * surface.side(ends)
             good &= (product <= 0) if crossings % 2 else (product >= 0)
         return good

@@ -286,8 +286,8 @@ def _hop_round(
 
 def unit_vector(vector: ArrayLike, name: str) -> FloatArray:
     """Return a read-only unit vector."""
-    given = read_only(vector, name, shape=(3,))
-    length = float(np.linalg.norm(given))
+    array = read_only(vector, name, shape=(3,))
+    length = float(np.linalg.norm(array))
     if length == 0:
         raise GeometryError(f"{name}: the vector (0, 0, 0) has no direction.")
-    return read_only(given / length, name)
+    return read_only(array / length, name)

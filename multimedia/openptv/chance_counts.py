@@ -65,18 +65,18 @@ def chance_counts(
 ) -> ChanceCounts:
     """Return what is found in frames: targets of each camera [px]."""
     count = len(content.cameras) + 1
-    found, chance = np.zeros(count), np.zeros(count)
+    counted, chance = np.zeros(count), np.zeros(count)
     misfits: list[FloatArray] = [np.empty(0)]
     rays: list[FloatArray] = [np.empty(0)]
     for targets in frames:
-        seen = (content.cameras, targets, content.interfaces)
-        _, numbers, misfit = correspondences(*seen, tolerance=tolerance, fewest=fewest)
+        scene = (content.cameras, targets, content.interfaces)
+        _, numbers, misfit = correspondences(*scene, tolerance=tolerance, fewest=fewest)
         rays.append((numbers >= 0).sum(axis=1).astype(float))
         misfits.append(misfit)
-        found += np.bincount(rays[-1].astype(int), minlength=count)
-        chance += expected_by_chance(*seen, tolerance=tolerance, fewest=fewest)
+        counted += np.bincount(rays[-1].astype(int), minlength=count)
+        chance += expected_by_chance(*scene, tolerance=tolerance, fewest=fewest)
     return ChanceCounts(
-        tolerance=tolerance, found=found, chance=chance, misfit=np.concatenate(misfits),
+        tolerance=tolerance, found=counted, chance=chance, misfit=np.concatenate(misfits),
         rays=np.concatenate(rays),
     )  # fmt: skip
 

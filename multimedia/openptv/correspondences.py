@@ -68,15 +68,17 @@ def correspondences(
     rays = [image_rays(c, i, m) for c, i, m in zip(cameras, image, media, strict=True)]
     frame = _Exposure(cameras, targets, media, sensors, rays, tolerance, fewest)
     few = proposing_pairs(len(cameras), fewest)
-    found = [np.empty((0, len(cameras)), dtype=np.int64)]
-    found += [frame.proposals(a, b, np.arange(len(targets[a])), np.arange(len(targets[b])))
+    proposals = [np.empty((0, len(cameras)), dtype=np.int64)]
+    proposals += [frame.proposals(a, b, np.arange(len(targets[a])), np.arange(len(targets[b])))
               for a, b in few]  # fmt: skip
     # What they leave is sought from all pairs: rays of a poor calibration miss each other.
-    taken = np.concatenate(found)
-    left = [np.setdiff1d(np.arange(len(t)), taken[:, k]) for k, t in enumerate(targets)]
+    matched = np.concatenate(proposals)
+    unmatched = [np.setdiff1d(np.arange(len(t)), matched[:, k]) for k, t in enumerate(targets)]
     others = combinations(range(len(cameras)), 2)
-    found += [frame.proposals(a, b, left[a], left[b]) for a, b in others if (a, b) not in few]
-    numbers = np.unique(np.concatenate(found), axis=0)
+    proposals += [
+        frame.proposals(a, b, unmatched[a], unmatched[b]) for a, b in others if (a, b) not in few
+    ]
+    numbers = np.unique(np.concatenate(proposals), axis=0)
     # The row behind the last, -1, is that of no target.
     padded = [np.vstack([i, [np.nan, np.nan]]) for i in image]
     grid = np.stack([i[n] for i, n in zip(padded, numbers.T, strict=True)])
@@ -180,8 +182,8 @@ class _Exposure:
             numbers[:, k] = self.seen(k, points)
         enough = (numbers >= 0).sum(axis=1) >= self.fewest - 2
         one, two, points, numbers = one[enough], two[enough], points[enough], numbers[enough]
-        for k, own in ((a, one), (b, two)):
-            numbers[:, k] = np.where(self.seen(k, points) == own, own, -1)
+        for k, numbered in ((a, one), (b, two)):
+            numbers[:, k] = np.where(self.seen(k, points) == numbered, numbered, -1)
         return numbers[(numbers[:, [a, b]] >= 0).all(axis=1)]
 
     def seen(self, camera: int, points: FloatArray) -> IntArray:
@@ -210,9 +212,9 @@ def _misfits(
     """Return the root mean square distance of targets from where their particles are seen. [px]"""
     if not len(xyz):
         return np.empty(0)
-    seen = np.stack([project(c, xyz, m) for c, m in zip(cameras, media, strict=True)])
+    projected = np.stack([project(c, xyz, m) for c, m in zip(cameras, media, strict=True)])
     pitch = np.array([sensor.pixel_size for sensor in sensors])[:, None]
-    squares = (((seen - image) / pitch) ** 2).sum(axis=-1)
+    squares = (((projected - image) / pitch) ** 2).sum(axis=-1)
     with np.errstate(invalid="ignore"):  # a proposal that no camera sees has no misfit
         return np.sqrt(np.nansum(squares, axis=0) / np.isfinite(squares).sum(axis=0))
 

@@ -33,6 +33,7 @@ from multimedia.openptv.openptv_files import (
 )
 from multimedia.openptv.plane_files import find_sets, read_stems
 from multimedia.openptv.plane_sets import PlaneCandidates
+from multimedia.openptv.yaml_parameters import ENDINGS, PATTERN, read_yaml_parameters
 from multimedia.orientation.intersection import intersect
 from multimedia.orientation.workflow import known_misses
 from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints, Project
@@ -88,7 +89,8 @@ def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experi
     Parameters
     ----------
     folder : path
-        Holding ptv.par, or a folder ``parameters`` that does; ``cal`` and ``img`` beside it.
+        Holding ptv.par, or a folder ``parameters`` that does; ``cal`` and ``img`` beside it. Or
+        pyptv's parameters*.yaml there, or that file itself.
     swap_indices : bool
         Exchange the indices of glass and water.
 
@@ -104,18 +106,24 @@ def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experi
     """
     folder = Path(folder)
     check_name(folder)
-    if not folder.is_dir():
+    is_run = folder.is_file() and folder.suffix.lower() in ENDINGS
+    if not folder.is_dir() and not is_run:
         raise InputError(f"{folder}: is no folder; give the folder of an OpenPTV experiment.")
-    control_path = _control_path(folder)
-    control = read_control(control_path)
+    control_path = folder if is_run else _control_path(folder)
+    folder = folder.parent if is_run else folder
+    is_yaml = control_path.suffix.lower() in ENDINGS
+    control = (read_yaml_parameters if is_yaml else read_control)(control_path)
     home = folder.parent if control_path.parent == folder and _is_of_parameters(folder) else folder
     roots = list(dict.fromkeys([control_path.parent, folder, home]))
     remarks: list[str] = []
+    runs = [] if is_yaml else sorted(home.glob(PATTERN))
+    if runs:
+        remarks.append(remark("openptv.both_kinds", of=control_path, file=runs[0].name))
     if control_path.parent.name not in _PARAMETERS and control_path.parent != folder:
         remarks.append(f"{folder}: has no ptv.par of its own; read {control_path}.")
     indices, odd = _checked_indices(control, control_path.name, swap_indices)
     cameras, media, media_of, odd_cameras = _cameras(control, roots, indices)
-    body, source = _body(roots)
+    body, source = _body(roots, control.body)
     remarks += [*odd, *odd_cameras]
     if not source:
         remarks.append("no calibration body (cal_ori.par names it) was found: no object points.")
@@ -124,9 +132,9 @@ def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experi
     unseen = [c.name for c, detected in zip(cameras, targets, strict=True) if detected is None]
     remarks += map(NO_TARGETS.format, unseen)
     particles, numbers, frame, odd_frame = _particles(roots, control)
-    manual, odd_manual = _manual(roots, len(cameras))
+    manual, odd_manual = (control.manual, ()) if is_yaml else _manual(roots, len(cameras))
     listed = _find(roots, "multi_planes.par")
-    stems = read_stems(listed) if listed is not None else []
+    stems = read_stems(listed) if listed is not None and not is_yaml else list(control.stems)
     planes, odd_planes = find_sets(home, stems, control.calibration_images, control.sensor)
     remarks += [*odd_frame, *odd_manual, *odd_planes]
     project = Project(
@@ -242,14 +250,16 @@ def _cost(
         for camera, seen in zip(project.cameras, image, strict=True)
     ]
     scales = np.array([ours.scale for ours, _ in views])
-    there = sensor.image_from_pixel(pixels) / scales[:, None, None]
-    own = intersect(project.cameras, image, project.interfaces).xyz
+    moved_image = sensor.image_from_pixel(pixels) / scales[:, None, None]
+    original = intersect(project.cameras, image, project.interfaces).xyz
     media = [None if len(set(wall.indices)) == 1 else wall for _, wall in views]
-    moved = intersect([ours.camera for ours, _ in views], there, media).xyz
-    miss = np.linalg.norm(moved - own, axis=1)
+    moved = intersect([ours.camera for ours, _ in views], moved_image, media).xyz
+    miss = np.linalg.norm(moved - original, axis=1)
     if not np.isfinite(miss).any():
         return []
-    checks = zip(known_misses(project, ids, own), known_misses(project, ids, moved), strict=False)
+    checks = zip(
+        known_misses(project, ids, original), known_misses(project, ids, moved), strict=False
+    )
     return [
         f"Points in space move by {np.sqrt(np.nanmean(miss**2)):.3g} {project.unit} (RMS), "
         f"{np.nanmax(miss):.3g} at most."
@@ -270,7 +280,7 @@ def _targets_text(project: Project, camera: Camera, rows: Sequence[int]) -> str:
 
 
 def _control_path(folder: Path) -> Path:
-    """Return where ptv.par is."""
+    """Return where ptv.par is, or pyptv's file of all parameters."""
     for name in _PARAMETERS:
         path = folder / name / "ptv.par"
         if path.is_file():
@@ -281,8 +291,12 @@ def _control_path(folder: Path) -> Path:
     if others:
         shown = ", ".join(str(path.parent) for path in others[:SHOWN])
         raise InputError(f"{folder}: holds several experiments; name one of {shown}.")
-    if any(folder.glob("parameters*.y*ml")):
-        raise InputError(remark("openptv.yaml_only", of=folder))
+    runs = sorted([*folder.glob(PATTERN), *(folder / "parameters").glob(PATTERN)])
+    if len(runs) == 1:
+        return runs[0]
+    if runs:
+        shown = ", ".join(map(str, runs[:SHOWN]))
+        raise InputError(remark("openptv.many_runs", of=folder, names=shown))
     raise InputError(remark("openptv.no_parameters", of=folder))
 
 
@@ -335,22 +349,25 @@ def _cameras(
     cameras: list[Camera] = []
     media: dict[str, FlatInterface] = {}
     media_of: list[str] = []
+    named = control.orientations or tuple(f"{image}.ori" for image in control.calibration_images)
     for number, image in enumerate(control.calibration_images, start=1):
-        path = _find(roots, f"{image}.ori")
+        path = _find(roots, named[number - 1])
         if path is None:
             raise InputError(remark("openptv.no_ori", of=roots[0], image=image, number=number))
         name = Path(image.replace("\\", "/")).name.split(".")[0] or f"cam{number}"
         if name in {camera.name for camera in cameras}:
             name = f"{name}_{number}"
-        camera, glass, said = read_camera(path, sensor=control.sensor, name=name)
-        remarks += said
+        camera, glass, notes = read_camera(path, sensor=control.sensor, name=name)
+        remarks += notes
         cameras.append(camera)
         if not np.any(glass) or len(set(indices)) == 1:  # of one index all is one medium
             media_of.append("")
             continue
         wall = glass_interface(glass, indices, control.thickness)
         place = [wall.point, wall.normal]
-        same = [k for k, other in media.items() if np.allclose(place, [other.point, other.normal])]
+        same = [
+            k for k, medium in media.items() if np.allclose(place, [medium.point, medium.normal])
+        ]
         if not same:
             same = [f"wall{len(media) + 1}"]
             media[same[0]] = wall
@@ -361,10 +378,10 @@ def _cameras(
     return cameras, media, tuple(media_of), remarks
 
 
-def _body(roots: Sequence[Path]) -> tuple[ObjectPoints, str]:
+def _body(roots: Sequence[Path], file: str) -> tuple[ObjectPoints, str]:
     """Return the calibration body that cal_ori.par names or of a usual name, and its file."""
-    names = list(_BODIES)
-    listed = _find(roots, "cal_ori.par")
+    names = [file, *_BODIES]
+    listed = None if file else _find(roots, "cal_ori.par")
     if listed is not None:
         first = listed.read_text(encoding="utf-8", errors="replace").splitlines()[:1]
         names = [*first, *names]
@@ -425,8 +442,10 @@ def _particles(
             f"{path}: {numbers.shape[1]} target columns for {len(control.images)} cameras."
         )
     numbers = numbers[:, : len(control.images)]
+    # pyptv writes rt_is.1 and cam1.0001_targets.
+    words = (frame, f".{frame}", f".{frame:0>4}")
     frames = tuple(
-        _targets(roots, [f"{image}{frame}_targets", f"{image}.{frame}_targets"], control.field)
+        _targets(roots, [f"{image}{word}_targets" for word in words], control.field)
         for image in control.images
     )
     if any(targets is None for targets in frames):
@@ -454,9 +473,9 @@ def particle_points(experiment: Experiment) -> tuple[ObjectPoints, ImagePoints]:
                 f"rt_is: target {int(number.max())} of {camera.name} does not exist; its _targets "
                 f"file holds {len(targets.pixels)}. Positions and targets are of other frames."
             )
-        seen = np.flatnonzero(number >= 0)
-        cameras += [camera.name] * len(seen)
-        names += [ids[row] for row in seen]
-        image.append(camera.sensor.image_from_pixel(targets.pixels[number[seen]]))
+        rows = np.flatnonzero(number >= 0)
+        cameras += [camera.name] * len(rows)
+        names += [ids[row] for row in rows]
+        image.append(camera.sensor.image_from_pixel(targets.pixels[number[rows]]))
     images = ImagePoints(cameras=tuple(cameras), ids=tuple(names), image=np.concatenate(image))
     return ObjectPoints(ids=ids, xyz=experiment.particles), images

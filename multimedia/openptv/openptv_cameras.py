@@ -115,9 +115,9 @@ def in_openptvs_terms(
     it goes with the position of the camera, so then the camera is fitted to what it sees of the
     object points.
     """
-    own = camera.described_sensor(_NEEDED)
+    described = camera.described_sensor(_NEEDED)
     rays, pixels = sensor_rays(camera)
-    start, scale = _start(camera, own, sensor)
+    start, scale = _start(camera, described, sensor)
     target = sensor.image_from_pixel(pixels) / scale
     misfit = farthest_miss(start, rays, target * scale, scale=scale)
     if misfit > NO_MISFIT:
@@ -126,13 +126,13 @@ def in_openptvs_terms(
     at_points = misfit > CLOSE and len(points) >= len(_FREE)
     if at_points:
         image = project(camera, points, media)
-        places = own.pixel_from_image(image)
-        inside = ((places > -0.5) & (places < (own.width, own.height))).all(axis=1)
+        places = described.pixel_from_image(image)
+        inside = ((places > -0.5) & (places < (described.width, described.height))).all(axis=1)
         target = sensor.image_from_pixel(places[inside]) / scale
         nearer = nearest_camera(start, points[inside], target, EXTERIOR[:3] + _FREE, media=media)
-        there = farthest_miss(nearer, points[inside], target * scale, scale=scale, media=media)
-        at_points = there < misfit
-        start, misfit = (nearer, there) if at_points else (start, misfit)
+        miss = farthest_miss(nearer, points[inside], target * scale, scale=scale, media=media)
+        at_points = miss < misfit
+        start, misfit = (nearer, miss) if at_points else (start, misfit)
     if not misfit <= FARTHEST:
         raise InputError(remark("openptv.lens_misfit", name=camera.name, misfit=misfit))
     return OpenptvCamera(camera=start, scale=scale, misfit=misfit, at_points=at_points)

@@ -39,6 +39,14 @@ class ControlParameters:
         Air, glass, water as the file says.
     thickness : float
         Of the glass. [mm]
+    orientations : tuple of str
+        The .ori file of each camera; none: named after the calibration images.
+    body : str
+        File of the calibration body; "": beside it, or of a usual name.
+    stems : tuple of str
+        Of the file names of the positions of a body moved from plane to plane.
+    manual : tuple of (list of str, ndarray)
+        Points clicked by hand in each calibration image: ids and pixels.
     """
 
     images: tuple[str, ...]
@@ -47,6 +55,10 @@ class ControlParameters:
     field: int
     indices: tuple[float, ...]
     thickness: float
+    orientations: tuple[str, ...] = ()
+    body: str = ""
+    stems: tuple[str, ...] = ()
+    manual: tuple[tuple[list[str], FloatArray], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -125,8 +137,8 @@ def read_camera(path: Path, *, sensor: Sensor, name: str) -> tuple[Camera, Float
         If numbers are missing or angles and matrix contradict each other.
     """
     values = _numbers(path, 3 + 3 + 9 + 2 + 1, "X0 Y0 Z0, angles, matrix, xh yh, c")
-    rotation, said = _rotation(path, values[3:6], values[6:15].reshape(3, 3))
-    remarks = [*said]
+    rotation, notes = _rotation(path, values[3:6], values[6:15].reshape(3, 3))
+    remarks = [*notes]
     glass = values[18:21] if len(values) >= 21 else np.zeros(3)
     if not np.any(glass):
         remarks.append(f"{path.name}: no glass vector; the camera looks through no interface.")
@@ -183,6 +195,27 @@ def read_targets(path: Path, *, field: int = 0) -> DetectedTargets:
     return DetectedTargets(
         pixels=pixels, counts=table[:, 3].astype(np.int64), numbers=table[:, 7].astype(np.int64)
     )
+
+
+def read_blobs(path: Path) -> dict[int, FloatArray]:
+    """Read MyPTV's blobs: lines of row, column, two sides, area, frame; pixels by frame.
+
+    Raises
+    ------
+    InputError
+        If a line has other than six numbers, or a frame is no whole one.
+    """
+    lines = [line for line in read_text(path, "file of MyPTV").splitlines() if line.strip()]
+    for number, line in enumerate(lines, start=1):
+        if len(line.split()) != 6:
+            raise InputError(remark("tracks.blobs", of=path, line=number, size=len(line.split())))
+    values = floats_of_words(" ".join(lines).split(), path, "value {}")
+    table = values.reshape(-1, 6)
+    frames = table[:, 5].astype(np.int64)
+    if (frames != table[:, 5]).any():
+        number = int(np.argmax(frames != table[:, 5])) + 1
+        raise InputError(f"{path}, line {number}: the frame must be a whole number.")
+    return {int(frame): table[frames == frame, 1::-1] for frame in np.unique(frames)}
 
 
 def targets_text(pixels: FloatArray, counts: IntArray, extents: IntArray, sums: FloatArray) -> str:

@@ -108,12 +108,12 @@ def find_particles(
             "(`multimedia adjust`)? Fewer come by chance with a smaller --tolerance"
             + (f" or --fewest {len(names)}." if fewest < len(names) else ".")
         )
-    said = tolerance_remarks(content, [places], counted, fewest)
+    notes = tolerance_remarks(content, [places], counted, fewest)
     counts = tuple(map(len, places))
-    found = Particles(content, xyz, numbers, misfit, counts, counted.found, chance, said)
+    particles = Particles(content, xyz, numbers, misfit, counts, counted.found, chance, notes)
     if out is not None:
-        _write(out, found, overwrite=overwrite)
-    return found
+        _write(out, particles, overwrite=overwrite)
+    return particles
 
 
 def _write(out: Path, found: Particles, *, overwrite: bool) -> None:

@@ -79,11 +79,11 @@ def read_set(crd: Path, fix: Path, *, sensor: Sensor, label: str, source: str) -
         order = np.arange(len(body), dtype=np.int64)
     else:
         order = _by_number(crd, fix, numbers, body)
-    seen = numbers != _NOT_FOUND
-    places, xyz = places[seen], xyz[order[seen]]
+    listed = numbers != _NOT_FOUND
+    places, xyz = places[listed], xyz[order[listed]]
     _, row, count = np.unique(xyz, axis=0, return_index=True, return_counts=True)
     if (count > 1).any():
-        number = numbers[seen][row[int(count.argmax())]]
+        number = numbers[listed][row[int(count.argmax())]]
         raise InputError(
             f"{crd} and {fix.name}: {int((count > 1).sum())} points stand there more than once, "
             f"such as that of number {number:g}."
@@ -118,9 +118,9 @@ def find_sets(
     sensor : Sensor
         For the units of the image coordinates.
     """
-    found = [path for path in sorted(folder.rglob("*")) if not path.name.startswith(".")]
+    paths = [path for path in sorted(folder.rglob("*")) if not path.name.startswith(".")]
     files, bodies, texts = (
-        [path for path in found if path.suffix.lower() == ending]
+        [path for path in paths if path.suffix.lower() == ending]
         for ending in (".crd", ".fix", ".txt")
     )
     labels, odd = labels_of(stems), dict[str, None]()
@@ -134,9 +134,9 @@ def find_sets(
             theirs = _named(bodies, folder, label, number, first=f"{stem}{number}.tif")
             theirs += [path for path in texts if _position(label).search(path.name)]
             positions.append(_pairs(folder, ours, theirs, sensor, label, odd))
-        own = Path(image.replace("\\", "/")).name
-        taken = [path for path in files if path.name.lower() == f"{own}.crd".lower()]
-        whole = _pairs(folder, taken, [], sensor, "", odd)
+        name = Path(image.replace("\\", "/")).name
+        named = [path for path in files if path.name.lower() == f"{name}.crd".lower()]
+        whole = _pairs(folder, named, [], sensor, "", odd)
         cameras.append(PlaneCandidates(positions=tuple(positions), together=whole))
     return tuple(cameras), tuple(odd)
 
@@ -178,13 +178,13 @@ def _named(
     """Return the files whose names tell this position and camera, the likeliest first."""
     position = _position(label)
     camera = re.compile(rf"cam(era)?[_\- ]?0*{number}(?!\d)", re.IGNORECASE)
-    found = []
+    ranked = []
     for path in files:
         name = path.relative_to(folder).as_posix()
         exact = name.rpartition(".")[0] == first
         if exact or (position.search(name) and camera.search(path.name)):
-            found.append((not exact, _COPY.search(name) is not None, name.count("/"), name, path))
-    return [entry[-1] for entry in sorted(found)]
+            ranked.append((not exact, _COPY.search(name) is not None, name.count("/"), name, path))
+    return [entry[-1] for entry in sorted(ranked)]
 
 
 def _position(label: str) -> re.Pattern[str]:
@@ -212,8 +212,8 @@ def _rows(path: Path, width: int) -> tuple[FloatArray, FloatArray]:
 def _by_number(crd: Path, fix: Path, numbers: FloatArray, body: FloatArray) -> IntArray:
     """Return the row of the body of each number; refuse files that do not belong together."""
     place = {number: row for row, number in enumerate(body.tolist())}
-    known = [number in place or number == _NOT_FOUND for number in numbers.tolist()]
-    if len(place) < len(body) or not all(known):
+    in_body = [number in place or number == _NOT_FOUND for number in numbers.tolist()]
+    if len(place) < len(body) or not all(in_body):
         raise InputError(
             f"{crd} and {fix.name} hold {len(numbers)} and {len(body)} points whose numbers "
             "differ: they are of different calibrations."

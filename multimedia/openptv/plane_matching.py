@@ -97,12 +97,14 @@ def _matched(
     good = _good_points(camera, xyz, image, media)
     if not good.all():
         remarks.append(f"{int((~good).sum())} points were refused: they lie far from their place.")
-    taken = ", ".join(f"{one.label or 'all planes'} ({one.source})" for one in chosen)
-    found = _resected(camera, xyz[good], image[good], media)
-    misfit = "" if found is None else f", {_pixels(camera, found):.2f} px from their place (RMS)"
-    remarks.insert(0, f"took {int(good.sum())} points of {taken}{misfit}.")
+    words = ", ".join(f"{one.label or 'all planes'} ({one.source})" for one in chosen)
+    resected = _resected(camera, xyz[good], image[good], media)
+    misfit = (
+        "" if resected is None else f", {_pixels(camera, resected):.2f} px from their place (RMS)"
+    )
+    remarks.insert(0, f"took {int(good.sum())} points of {words}{misfit}.")
     kept = _resected(camera, xyz[good], image[good], media, estimate=())
-    if found is not None and kept is not None and _rms(kept) > 2.0 * _rms(found):
+    if resected is not None and kept is not None and _rms(kept) > 2.0 * _rms(resected):
         remarks.append(remark("openptv.interior_misfit", rest=_pixels(camera, kept)))
     if _is_flat(xyz[good]):
         remarks.append(remark("openptv.one_plane"))
@@ -116,7 +118,9 @@ def _agreeing(
     sets: list[PlaneSet] = []
     for one in chosen:
         places = set(map(tuple, one.xyz.tolist()))
-        again = [other for other in sets if places & set(map(tuple, other.xyz.tolist()))]
+        again = [
+            candidate for candidate in sets if places & set(map(tuple, candidate.xyz.tolist()))
+        ]
         if again:
             remarks.append(f"{one.source} was left out: it has points of {again[0].source}.")
         else:
@@ -137,23 +141,23 @@ def _agreeing(
 def _fits_alone(camera: Camera, one: PlaneSet, media: Media) -> bool:
     """Whether some pose of the camera shows these points where they were measured."""
     few = _sample(one)
-    found = _resected(camera, one.xyz[few], one.image[few], media, estimate=())
-    return found is not None and _is_match(camera, one, found.residuals)
+    resected = _resected(camera, one.xyz[few], one.image[few], media, estimate=())
+    return resected is not None and _is_match(camera, one, resected.residuals)
 
 
 def _fit_together(camera: Camera, sets: Sequence[PlaneSet], media: Media) -> bool:
     """Whether some camera shows the points of every set where they were measured."""
-    found = _joint(camera, sets, media)
-    if found is None:
+    joint = _joint(camera, sets, media)
+    if joint is None:
         return False
     ends = np.cumsum([len(_sample(one)) for one in sets])[:-1]
-    parts = np.split(found.residuals, ends)
+    parts = np.split(joint.residuals, ends)
     return all(_is_match(camera, one, part) for one, part in zip(sets, parts, strict=True))
 
 
 def _cost(camera: Camera, sets: Sequence[PlaneSet], media: Media) -> float:
-    found = _joint(camera, sets, media)
-    return np.inf if found is None else _rms(found)
+    joint = _joint(camera, sets, media)
+    return np.inf if joint is None else _rms(joint)
 
 
 def _joint(camera: Camera, sets: Sequence[PlaneSet], media: Media) -> Resection | None:
@@ -183,10 +187,10 @@ def _good_points(camera: Camera, xyz: FloatArray, image: FloatArray, media: Medi
     """Return which points are no gross errors, refitting as they are left out."""
     good = np.ones(len(xyz), dtype=bool)
     for _ in range(_ROUNDS):
-        found = _resected(camera, xyz[good], image[good], media)
-        if found is None:
+        resected = _resected(camera, xyz[good], image[good], media)
+        if resected is None:
             break
-        miss = np.linalg.norm(found.residuals / _pitch(camera), axis=1)
+        miss = np.linalg.norm(resected.residuals / _pitch(camera), axis=1)
         bad = miss > max(LEAST, WORST * float(np.median(miss)))
         if not bad.any():
             break

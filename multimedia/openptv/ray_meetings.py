@@ -46,7 +46,7 @@ def _within(
     """Return the numbers of pairs of rays that meet: rows of origin, direction and width."""
     o2, d2 = second[:, :3], second[:, 3:6]
     moments = np.hstack([np.cross(o2, d2), d2]).T
-    along2, found = np.einsum("ni,ni->n", o2, d2), []
+    along2, pairs = np.einsum("ni,ni->n", o2, d2), []
     step = max(1, _BLOCK // len(second))
     for start in range(0, len(first), step):
         o, d, wide = np.split(first[start : start + step], (3, 6), axis=1)
@@ -60,6 +60,6 @@ def _within(
             allowed = wide + per1 * far1 + second[:, 6] + per2 * far2
             meet = (far1 > 0) & (far2 > 0) & (side * side <= square * allowed * allowed)
         rows, columns = np.nonzero(meet)
-        found.append((rows + start, columns))
-    rows, columns = (np.concatenate(part) for part in zip(*found, strict=True))
+        pairs.append((rows + start, columns))
+    rows, columns = (np.concatenate(part) for part in zip(*pairs, strict=True))
     return rows, columns

@@ -50,16 +50,16 @@ def match_targets(
     state = camera
     partner = _nearest(state, control, targets, interface, radius)
     for _ in range(_ROUNDS):
-        seen = partner >= 0
-        if seen.sum() < 4:
+        paired = partner >= 0
+        if paired.sum() < 4:
             return partner
         image = np.full((len(control), 2), np.nan)
-        image[seen] = sensor.image_from_pixel(targets[partner[seen]])
+        image[paired] = sensor.image_from_pixel(targets[partner[paired]])
         try:
             result = resect(state, control, image, interface)
         except (GeometryError, ConvergenceError, InputError):
             return partner
-        miss = np.linalg.norm(result.residuals[seen] / sensor.pixel_size, axis=1)
+        miss = np.linalg.norm(result.residuals[paired] / sensor.pixel_size, axis=1)
         state = result.camera
         limit = min(radius, max(LEAST_RADIUS, WIDEST_MISFIT * float(np.median(miss))))
         again = _nearest(state, control, targets, interface, limit)
@@ -93,22 +93,22 @@ def is_chance(
     """
     from scipy.spatial import cKDTree
 
-    seen = partner >= 0
-    if camera.sensor is None or seen.sum() < 4 or len(targets) < 2:
+    paired = partner >= 0
+    if camera.sensor is None or paired.sum() < 4 or len(targets) < 2:
         return True
-    image = camera.sensor.image_from_pixel(targets[partner[seen]])
+    image = camera.sensor.image_from_pixel(targets[partner[paired]])
     try:
-        found = resect(camera, control[seen], image, interface)
-        visible = project(found.camera, control, interface)
+        resected = resect(camera, control[paired], image, interface)
+        visible = project(resected.camera, control, interface)
     except (GeometryError, ConvergenceError, InputError):
         return True
-    miss = float(np.median(np.linalg.norm(found.residuals / camera.sensor.pixel_size, axis=1)))
+    miss = float(np.median(np.linalg.norm(resected.residuals / camera.sensor.pixel_size, axis=1)))
     radius = max(LEAST_RADIUS, WIDEST_MISFIT * miss)
     apart = float(np.median(cKDTree(targets).query(targets, k=2)[0][:, 1]))
     share = min(1.0, np.pi * radius**2 / apart**2) if apart > 0 else 1.0
     half = np.array([camera.sensor.width, camera.sensor.height]) * camera.sensor.pixel_size / 2
     inside = (np.abs(visible) <= half).all(axis=1)
-    return bool(seen.sum() <= _BEYOND_CHANCE * share * inside.sum())
+    return bool(paired.sum() <= _BEYOND_CHANCE * share * inside.sum())
 
 
 def _nearest(
@@ -119,12 +119,12 @@ def _nearest(
 
     partner = np.full(len(control), -1, dtype=np.int64)
     image = project(camera, control, interface)
-    seen = np.flatnonzero(np.isfinite(image).all(axis=1))
-    if camera.sensor is None or not len(seen) or not len(targets):
+    rows = np.flatnonzero(np.isfinite(image).all(axis=1))
+    if camera.sensor is None or not len(rows) or not len(targets):
         return partner
-    expected = camera.sensor.pixel_from_image(image[seen])
+    expected = camera.sensor.pixel_from_image(image[rows])
     distance, nearest = cKDTree(targets).query(expected)
     _, back = cKDTree(expected).query(targets)
-    mutual = (back[nearest] == np.arange(len(seen))) & (distance < radius)
-    partner[seen[mutual]] = nearest[mutual]
+    mutual = (back[nearest] == np.arange(len(rows))) & (distance < radius)
+    partner[rows[mutual]] = nearest[mutual]
     return partner

@@ -20,7 +20,7 @@ from multimedia.openptv.openptv_files import DetectedTargets
 from multimedia.openptv.plane_matching import PlaneMatch, choose_sets
 from multimedia.openptv.target_matching import FIRST_RADIUS, is_chance, match_targets
 from multimedia.orientation.resection import resect
-from multimedia.projects.model import ImagePoints, ObjectPoints, Project
+from multimedia.projects.model import ImagePoints, ObjectPoints, Project, place_name
 from multimedia.projects.project_file import read_project, write_project
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import PhotogrammetryError
@@ -96,8 +96,10 @@ def import_openptv(
         groups=("control",) * sum(matched) + ("particles",) * len(particles.ids),
     )
     of_planes = [c.name for c, one in zip(project.cameras, control, strict=True) if one.planes]
-    known = [text for text in project.remarks if text not in map(NO_TARGETS.format, of_planes)]
-    remarks = (*known, *(text for one in control for text in one.remarks))
+    remarks_kept = [
+        text for text in project.remarks if text not in map(NO_TARGETS.format, of_planes)
+    ]
+    remarks = (*remarks_kept, *(text for one in control for text in one.remarks))
     project = replace(project, image_points=images, remarks=remarks)
     files = () if out is None else tuple(write_project(out, project, overwrite=overwrite))
     return Import(
@@ -132,24 +134,12 @@ def _control(experiment: Experiment, k: int, least_pixels: int, radius: float) -
     project = experiment.project
     camera = project.cameras[k]
     planes = choose_sets(camera, experiment.planes[k], project.interface_of(k))
-    said = [*targets.remarks, *(f"{camera.name}: {text}" for text in planes.remarks)]
+    notes = [*targets.remarks, *(f"{camera.name}: {text}" for text in planes.remarks)]
     if not planes.labels and listed:
         targets = _from_targets(experiment, k, least_pixels, radius)
-        return replace(targets, remarks=(*said, *targets.remarks))
-    ids = [name_of(place) for place in planes.xyz]
-    return _CameraControl(ids=ids, image=planes.image, remarks=said, planes=planes)
-
-
-def name_of(place: FloatArray) -> str:
-    """Return the name of a point of a plane: the same for all cameras, whatever their numbers.
-
-    The numbers in .fix count what a camera saw, from 0: they mean another point in each of them.
-
-    >>> name_of(np.array([5.0, -7.5, -0.0]))
-    'X5Y-7.5Z0'
-    """
-    rounded = np.round(place, 6) + 0.0
-    return "".join(f"{axis}{v:.10g}" for axis, v in zip("XYZ", rounded.tolist(), strict=True))
+        return replace(targets, remarks=(*notes, *targets.remarks))
+    ids = [place_name(place) for place in planes.xyz]
+    return _CameraControl(ids=ids, image=planes.image, remarks=notes, planes=planes)
 
 
 def _with_planes(experiment: Experiment, control: Sequence[_CameraControl]) -> ObjectPoints:
@@ -198,22 +188,22 @@ def _from_targets(
         if (again >= 0).sum() > 1.1 * (best >= 0).sum():
             best = again
             remarks.append(f"{camera.name}: {said}")
-    seen = np.flatnonzero(best >= 0)
-    if len(seen) < _FEWEST or _by_chance(project, k, targets, best):
+    rows = np.flatnonzero(best >= 0)
+    if len(rows) < _FEWEST or _by_chance(project, k, targets, best):
         remarks.append(
-            f"{camera.name}: its control points were not found: only {len(seen)} of "
+            f"{camera.name}: its control points were not found: only {len(rows)} of "
             f"{len(body.ids)} lie near one of the {len(targets.pixels)} targets, no more than by "
             "chance; none was taken. The stored orientation may be far off (--radius), or belong "
             "to another image."
         )
         return _CameraControl(remarks=remarks)
-    if len(seen) < len(body.ids):
+    if len(rows) < len(body.ids):
         missing = [body.ids[row] for row in np.flatnonzero(best < 0)]
         more = f" and {len(missing) - 10} more" if len(missing) > 10 else ""
         shown = ", ".join(missing[:10])
         remarks.append(f"{camera.name}: no target for control points {shown}{more}.")
-    image = camera.sensor.image_from_pixel(targets.pixels[best[seen]])
-    return _CameraControl(ids=[body.ids[row] for row in seen], image=image, remarks=remarks)
+    image = camera.sensor.image_from_pixel(targets.pixels[best[rows]])
+    return _CameraControl(ids=[body.ids[row] for row in rows], image=image, remarks=remarks)
 
 
 def _by_chance(project: Project, k: int, targets: DetectedTargets, best: IntArray) -> bool:

@@ -184,12 +184,12 @@ def epipolar_candidates(
     ([0], [[0.0, 0.0, -1.5]])
     """
     positive(tolerance, "tolerance", unit="mm")
-    seen = as_points(targets, "targets", dimension=2).reshape(-1, 2)
+    pixels = as_points(targets, "targets", dimension=2).reshape(-1, 2)
     polygons = curves.image.reshape(-1, *curves.image.shape[-2:])
     points = curves.points.reshape(-1, *curves.points.shape[-2:])
-    size = max(1, _CHUNK // max(1, len(seen) * (polygons.shape[1] - 1)))
+    size = max(1, _CHUNK // max(1, len(pixels) * (polygons.shape[1] - 1)))
     parts = [
-        _near(polygons[k : k + size], points[k : k + size], seen, tolerance, k)
+        _near(polygons[k : k + size], points[k : k + size], pixels, tolerance, k)
         for k in range(0, len(polygons), size)
     ]
     names = Candidates.__slots__
@@ -232,8 +232,8 @@ def _intervals(coarse: FloatArray, chord_error: float) -> IntArray:
     bend = np.maximum(across.max(axis=1, initial=0.0), np.maximum(*ends))
     # Chord error = (second difference) / 8 at this step, and it falls with the step squared; a
     # seventh in reserve for what the coarse polygon does not show.
-    wanted = _COARSE * np.sqrt(1.15 * bend / (8.0 * chord_error))
-    return np.clip(np.ceil(wanted), 2, _MOST - 1).astype(np.int64)
+    count = _COARSE * np.sqrt(1.15 * bend / (8.0 * chord_error))
+    return np.clip(np.ceil(count), 2, _MOST - 1).astype(np.int64)
 
 
 def _near(

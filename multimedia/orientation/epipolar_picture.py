@@ -72,11 +72,11 @@ def draw_epipolar(
     if photo is not None:
         axes.imshow(read_photo(photo), cmap="gray", interpolation="nearest")
     for curve, label in zip(curves, labels, strict=True):
-        seen = curve[np.isfinite(curve).all(axis=1)]
-        (line,) = axes.plot(seen[:, 0], seen[:, 1], "-", linewidth=1.2)
-        if len(seen):
+        finite = curve[np.isfinite(curve).all(axis=1)]
+        (line,) = axes.plot(finite[:, 0], finite[:, 1], "-", linewidth=1.2)
+        if len(finite):
             axes.annotate(
-                label, seen[len(seen) // 2], color=line.get_color(), fontsize=9,
+                label, finite[len(finite) // 2], color=line.get_color(), fontsize=9,
                 xytext=(4, 4), textcoords="offset points",
                 path_effects=[withStroke(linewidth=2.0, foreground="white")],
             )  # fmt: skip
@@ -102,7 +102,7 @@ def _mark_depths(axes: Any, curves: Sequence[FloatArray], depths: Sequence[Float
     low = min(float(np.min(z)) for z in depths)
     high = max(float(np.max(z)) for z in depths)
     values = [v for v in MaxNLocator(5).tick_values(low, high) if low <= v <= high]
-    named, taken = 0, list[Any]()
+    named, boxes = 0, list[Any]()
     for curve, z in zip(curves, depths, strict=True):
         good = np.isfinite(curve).all(axis=1) & np.isfinite(z)
         if good.sum() < 2:
@@ -118,7 +118,7 @@ def _mark_depths(axes: Any, curves: Sequence[FloatArray], depths: Sequence[Float
         )  # fmt: skip
         if named < MOST_NAMED:
             level = float(np.ptp(places[:, 0])) > float(np.ptp(places[:, 1]))
-            named += _name_depths(axes, inside, marks, taken, level=level)
+            named += _name_depths(axes, inside, marks, boxes, level=level)
 
 
 def _name_depths(
@@ -142,7 +142,7 @@ def _name_depths(
             bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "linewidth": 0.3}, **place,
         )  # fmt: skip
         box = name.get_window_extent().padded(_ROOM)
-        if any(box.overlaps(other) for other in taken):
+        if any(box.overlaps(earlier) for earlier in taken):
             name.remove()
         else:
             taken.append(box)

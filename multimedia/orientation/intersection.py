@@ -153,16 +153,18 @@ def intersect(
         views = views_of(cameras, placed)
     if views is None:
         return _by_rows(cameras, image, sigmas, placed)
-    found = _nothing_found(*image.shape[:2])
-    arrays: Any = tuple(getattr(found, name) for name in found.__slots__)
+    result = _nothing_found(*image.shape[:2])
+    arrays: Any = tuple(getattr(result, name) for name in result.__slots__)
     whole = np.ascontiguousarray(image), np.ascontiguousarray(sigmas)
     settled = settled_points(views, *whole, _limits(len(image)), arrays)
-    left = np.flatnonzero(~settled)
-    if left.size:
-        rest = _by_rows(cameras, image[:, left], sigmas[:, left], placed)
-        for name, values in zip(found.__slots__, arrays, strict=True):
-            values[(slice(None), left) if name in _BY_CAMERA else left] = getattr(rest, name)
-    return found
+    unsettled = np.flatnonzero(~settled)
+    if unsettled.size:
+        rest = _by_rows(cameras, image[:, unsettled], sigmas[:, unsettled], placed)
+        for name, values in zip(result.__slots__, arrays, strict=True):
+            values[(slice(None), unsettled) if name in _BY_CAMERA else unsettled] = getattr(
+                rest, name
+            )
+    return result
 
 
 #: Values of shape (cameras, n, 2).
@@ -285,14 +287,14 @@ def _block(
 ) -> IntersectedPoints:
     """Intersect one block of points."""
     m, n, _ = image.shape
-    seen: BoolArray = np.asarray(np.isfinite(image).all(axis=-1))
+    finite: BoolArray = np.asarray(np.isfinite(image).all(axis=-1))
     rays = [image_rays(c, p, i) for c, p, i in zip(cameras, image, placed, strict=True)]
     xyz = nearest_points([o for o, _ in rays], [d for _, d in rays])
     angle = largest_angle([d for _, d in rays])
     status = np.where(np.isfinite(xyz).all(axis=1), PointStatus.NOT_CONVERGED, PointStatus.WEAK)
     equations = _Equations(
         rows=np.ascontiguousarray(np.moveaxis(image, -1, 1)),
-        weights=np.ascontiguousarray(np.moveaxis(1.0 / sigmas, -1, 1)), seen=seen,
+        weights=np.ascontiguousarray(np.moveaxis(1.0 / sigmas, -1, 1)), seen=finite,
         normal=np.full((6, n), np.nan), slopes=np.zeros((m, 2, 3, n)), misses=np.zeros((m, 2, n)),
     )  # fmt: skip
     active = np.flatnonzero(status == PointStatus.NOT_CONVERGED)
@@ -350,8 +352,8 @@ class _Equations:
         m, n = len(cameras), len(xyz)
         slopes, misses = np.zeros((m, 2, 3, n)), np.zeros((m, 2, n))
         for k, (camera, media) in enumerate(zip(cameras, placed, strict=True)):
-            seen = self.seen[k, some]
-            use: slice | BoolArray = slice(None) if seen.all() else seen
+            finite = self.seen[k, some]
+            use: slice | BoolArray = slice(None) if finite.all() else finite
             image, by_point = _images(camera, xyz[use], media)
             weight = self.weights[k][:, some][:, use]
             slopes[k][..., use] = by_point * weight[:, None]
@@ -399,16 +401,16 @@ def _assembled(
     equations: _Equations, *, xyz: FloatArray, angle: FloatArray, status: IntArray
 ) -> IntersectedPoints:
     """Return precision, residuals and tests of the points found."""
-    seen, rays = equations.seen, equations.seen.sum(axis=0)
+    finite, rays = equations.seen, equations.seen.sum(axis=0)
     xyz[status != PointStatus.OK] = np.nan
     status[rays == 1] = PointStatus.ONE_RAY
     status[rays == 0] = PointStatus.NO_RAY
     unknown = np.isnan(xyz[:, 0])
     inverse = inverse_3x3(equations.normal)
     inverse[:, unknown] = np.nan
-    m, n = seen.shape
+    m, n = finite.shape
     slopes = equations.slopes.reshape(2 * m, 3, n)
-    weighted = np.where((seen & ~unknown)[:, None], equations.misses, np.nan)
+    weighted = np.where((finite & ~unknown)[:, None], equations.misses, np.nan)
     square = np.einsum("mkn,mkn->n", equations.misses, equations.misses)
     redundancy = 2 * rays - 3
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -457,11 +459,11 @@ def _sigmas(
 ) -> FloatArray:
     """Return standard deviations of all image coordinates. [mm]"""
     if sigma is None:
-        given = [
+        per_axis = [
             SIGMA_IMAGE if c.sensor is None else SIGMA_PIXEL * float(c.sensor.pixel_size.mean())
             for c in cameras
         ]
-        return np.broadcast_to(np.array(given)[:, None, None], shape)
+        return np.broadcast_to(np.array(per_axis)[:, None, None], shape)
     try:
         values = np.broadcast_to(np.asarray(sigma, dtype=np.float64), shape)
     except ValueError:

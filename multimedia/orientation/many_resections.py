@@ -190,11 +190,11 @@ class _Fitted:
         self, cameras: Sequence[Camera], control: FloatArray, image: FloatArray, sigmas: FloatArray
     ) -> None:
         count = len(cameras)
-        seen: BoolArray = np.asarray(np.isfinite(image).all(-1) & np.isfinite(control).all(-1))
-        self.cameras, self.control, self.seen = cameras, control, seen
-        self.image = np.where(seen[..., None], image, np.nan)
-        total = np.where(seen[..., None], sigmas**2, 0.0).sum((1, 2))
-        mean = np.where(seen.any(1), total, 1.0) / np.maximum(2 * seen.sum(1), 1)
+        finite: BoolArray = np.asarray(np.isfinite(image).all(-1) & np.isfinite(control).all(-1))
+        self.cameras, self.control, self.seen = cameras, control, finite
+        self.image = np.where(finite[..., None], image, np.nan)
+        total = np.where(finite[..., None], sigmas**2, 0.0).sum((1, 2))
+        mean = np.where(finite.any(1), total, 1.0) / np.maximum(2 * finite.sum(1), 1)
         self.sigmas = sigmas / np.sqrt(mean)[:, None, None]
         self.centre = np.array([camera.centre for camera in cameras])
         self.rotation = np.array([camera.rotation for camera in cameras])
@@ -203,8 +203,12 @@ class _Fitted:
         self.sigma0, self.iterations = np.full(count, np.nan), np.zeros(count, dtype=np.int64)
         groups: dict[tuple[object, ...], list[int]] = {}
         for k, camera in enumerate(cameras):
-            own = (camera.distortion, camera.principal_distance, *camera.principal_point.tolist())
-            groups.setdefault((*own, id(camera.sensor)), []).append(k)
+            interior = (
+                camera.distortion,
+                camera.principal_distance,
+                *camera.principal_point.tolist(),
+            )
+            groups.setdefault((*interior, id(camera.sensor)), []).append(k)
         self.lenses = list(groups.values())
         self.sure = self._deep()
 
@@ -280,5 +284,5 @@ class _Fitted:
         cofactor = np.linalg.inv(scaled) * scale[:, :, None] * scale[:, None]
         self.covariance = change @ cofactor @ np.swapaxes(change, 1, 2)
         self.covariance *= self.sigma0[:, None, None] ** 2
-        own = -np.moveaxis(rows[:, :, 0], 1, 2) * self.sigmas
-        self.residuals = np.where(self.seen[..., None], own, np.nan)
+        misses = -np.moveaxis(rows[:, :, 0], 1, 2) * self.sigmas
+        self.residuals = np.where(self.seen[..., None], misses, np.nan)

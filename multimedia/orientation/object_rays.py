@@ -87,8 +87,8 @@ def nearest_points(origins: Sequence[FloatArray], directions: Sequence[FloatArra
     n = len(origins[0])
     normal, right = np.zeros((6, n)), np.zeros((3, n))
     for origin, direction in zip(origins, directions, strict=True):
-        seen = np.isfinite(direction[:, 0])
-        use: slice | BoolArray = slice(None) if seen.all() else seen
+        finite = np.isfinite(direction[:, 0])
+        use: slice | BoolArray = slice(None) if finite.all() else finite
         o, d = origin[use], direction[use]
         x, y, z = d.T
         part = np.stack([1 - x * x, -x * y, -x * z, 1 - y * y, -y * z, 1 - z * z])

@@ -50,9 +50,9 @@ def plate_pose(
     Camera and media are carried round the plate together: a resection in the plate's frame, whose
     starts are straight-ray poses, gives where the camera would stand, hence where the plate is.
     """
-    found = resect(camera, local, image, carried_by(camera, media)).camera
-    rotation = camera.rotation @ found.rotation.T
-    return rotation, camera.centre - rotation @ found.centre
+    pose = resect(camera, local, image, carried_by(camera, media)).camera
+    rotation = camera.rotation @ pose.rotation.T
+    return rotation, camera.centre - rotation @ pose.centre
 
 
 def carried_by(

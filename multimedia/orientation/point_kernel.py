@@ -110,8 +110,8 @@ def _straighten(terms: FloatArray, rows: FloatArray) -> None:
         x, y = rows[0, i], rows[1, i]
         seen_x, seen_y = bent(terms, at[0, i], at[1, i])
         off = max(abs(seen_x - x), abs(seen_y - y))
-        there = off <= 1e-11 * (1.0 + max(abs(x), abs(y)))
-        rows[0, i] = at[0, i] if there else np.nan
+        settled = off <= 1e-11 * (1.0 + max(abs(x), abs(y)))
+        rows[0, i] = at[0, i] if settled else np.nan
         rows[1, i] = at[1, i]
 
 
@@ -145,7 +145,7 @@ def _trace(views: Views, k: int, image: FloatArray, rays: FloatArray) -> None:
 def _begin(rays: FloatArray, seen: BoolArray, xyz: FloatArray, angle: FloatArray) -> BoolArray:
     """Write the points nearest to rays (m, 6, n), and the widest angles; return which have one."""
     m, n = seen.shape
-    there = np.zeros(n, dtype=np.bool_)
+    usable = np.zeros(n, dtype=np.bool_)
     for i in range(n):
         xx, xy, xz, yy, yz, zz, right_x, right_y, right_z = (0.0,) * 9
         count, chord, whole = 0, 0.0, True
@@ -166,11 +166,11 @@ def _begin(rays: FloatArray, seen: BoolArray, xyz: FloatArray, angle: FloatArray
                     chord = max(chord, gap_x * gap_x + gap_y * gap_y + gap_z * gap_z)
         adjugate, determinant, regular = cofactors(xx, xy, xz, yy, yz, zz)
         at = times(adjugate, (right_x, right_y, right_z))
-        there[i] = whole and count > 1 and regular
+        usable[i] = whole and count > 1 and regular
         angle[i] = 2.0 * np.arcsin(min(0.5 * np.sqrt(chord), 1.0))
         for j in range(3):
-            xyz[j, i] = at[j] / determinant if there[i] else 0.0
-    return there
+            xyz[j, i] = at[j] / determinant if usable[i] else 0.0
+    return usable
 
 
 @compiled
@@ -283,12 +283,12 @@ def settled_points(
         stop = min(start + BATCH, n)
         count = stop - start
         rays, rows, xyz = np.empty((m, 6, count)), np.empty((m, 8, count)), np.empty((3, count))
-        before, seen = np.empty(count), np.empty((m, count), dtype=np.bool_)
+        before, finite = np.empty(count), np.empty((m, count), dtype=np.bool_)
         for k in range(m):
             for i in range(count):
-                seen[k, i] = np.isfinite(image[k, start + i, 0] + image[k, start + i, 1])
+                finite[k, i] = np.isfinite(image[k, start + i, 0] + image[k, start + i, 1])
             _trace(views, k, image[k, start:stop], rays[k])
-        active, reach = _begin(rays, seen, xyz, angle[start:stop]), np.zeros(count)
+        active, reach = _begin(rays, finite, xyz, angle[start:stop]), np.zeros(count)
         for j in range(3):
             for i in range(count):
                 reach[i] = max(reach[i], abs(xyz[j, i] - first[j]))
@@ -296,7 +296,7 @@ def settled_points(
             sums, going = np.zeros((9, count)), False
             for k in range(m):
                 one, sigmas = image[k, start:stop], sigma[k, start:stop]
-                _equations(views, k, one, sigmas, seen[k], xyz, rows[k], sums)
+                _equations(views, k, one, sigmas, finite[k], xyz, rows[k], sums)
             for i in range(count):
                 if not active[i]:
                     continue
@@ -319,7 +319,7 @@ def settled_points(
                     inverse = a / whole, b / whole, c / whole, d / whole, e / whole, f / whole
                     for j in range(3):
                         points[p, j] = xyz[j, i]
-                    _judge(found, p, inverse, (x, y, z), sigma, rows[:, :, i], seen[:, i], limits)
+                    _judge(found, p, inverse, (x, y, z), sigma, rows[:, :, i], finite[:, i], limits)
                     settled[p] = True
             if not going:
                 break
@@ -340,8 +340,8 @@ def views_of(cameras: Sequence[Camera], media: Sequence[OpticalMedia]) -> Views 
         if isinstance(item, FlatInterface):
             item.medium(camera)
     lenses = [c.distortion for c in cameras if isinstance(c.distortion, Brown)]
-    known = (one for one in map(layering_of, media) if one is not None)
-    layerings = [_with_inner_layer(one) for one in known if len(one.thicknesses) <= 1]
+    layered = (one for one in map(layering_of, media) if one is not None)
+    layerings = [_with_inner_layer(one) for one in layered if len(one.thicknesses) <= 1]
     if not len(lenses) == len(layerings) == len(cameras):
         return None
     points = np.array([camera.principal_point for camera in cameras])

@@ -93,9 +93,9 @@ def pose_arrays(
         depth, first = -w - height, height - float(layering.thicknesses.sum())
         value, slope, t, settled = apparent_depths(np.sqrt(rho2), first, depth, layering)
         u = along - m * value
-        seen = u if moving else rotation.T @ u
-        scale = -c / seen[2]
-        image = seen[:2] * scale
+        in_camera = u if moving else rotation.T @ u
+        scale = -c / in_camera[2]
+        image = in_camera[:2] * scale
         # The derivatives of `_sight`, then those of `_row`: axes, rows, points.
         by_height = value / slope
         by_w = -layering.k[last] * by_height / np.sqrt(1.0 + layering.q[last] * t * t)
@@ -119,7 +119,7 @@ def pose_arrays(
         table[4] = turned[1] * arm[2] - turned[2] * arm[1]
         table[5] = turned[2] * arm[0] - turned[0] * arm[2]
         table[6] = turned[0] * arm[1] - turned[1] * arm[0]
-    is_seen = first > 0.0 and bool((settled & (depth >= 0.0) & (seen[2] < 0.0)).all())
+    is_seen = first > 0.0 and bool((settled & (depth >= 0.0) & (in_camera[2] < 0.0)).all())
     return is_seen, image, np.swapaxes(table, 0, 1)
 
 
@@ -127,12 +127,12 @@ def pose_steps(rows: FloatArray, damping: float) -> tuple[FloatArray, float]:
     """Return the damped step, and the square of how far it would move the residuals."""
     table = np.swapaxes(rows, 0, 1).reshape(7, -1)
     normal = table @ table.T
-    own, right = normal[1:, 1:], normal[1:, 0]
-    scale = 1.0 / np.sqrt(own.diagonal() + 1e-300)
-    scaled = own * scale[:, None] * scale
+    of_pose, right = normal[1:, 1:], normal[1:, 0]
+    scale = 1.0 / np.sqrt(of_pose.diagonal() + 1e-300)
+    scaled = of_pose * scale[:, None] * scale
     scaled.flat[::7] += damping + 1e-15
     step = -scale * np.linalg.solve(scaled, scale * right)
-    return step, float(step @ own @ step)
+    return step, float(step @ of_pose @ step)
 
 
 def turned_rotation(rotation: FloatArray, v: FloatArray) -> FloatArray:

@@ -185,15 +185,15 @@ def _sight(
     rho2 = dot(along, along)
     value, slope, t, settled = _apparent_depth(np.sqrt(rho2), first, depth, layering)
     u = less(along, value, m)
-    seen = u if moving else into(rotation, u)
-    scale = -c / seen[2]
-    x, y = seen[0] * scale, seen[1] * scale
+    in_camera = u if moving else into(rotation, u)
+    scale = -c / in_camera[2]
+    x, y = in_camera[0] * scale, in_camera[1] * scale
     by_w = -layering.k[last] * value / (slope * np.sqrt(1.0 + layering.q[last] * t * t))
     # On the axis V' t^2 = (F' - V) / 2 and rho^2 vanish together; what V' is does not matter there.
     by_rho2 = (value - slope) * value / (np.maximum(rho2, 1e-300) * slope)
     change = less(_times(m, 1.0 + by_w), by_rho2, along)
     by_height = value / slope + by_w
-    possible = settled & (first > 0.0) & (depth >= 0.0) & (seen[2] < 0.0)
+    possible = settled & (first > 0.0) & (depth >= 0.0) & (in_camera[2] < 0.0)
     return possible, x, y, scale, change, by_height, away, u
 
 
@@ -249,8 +249,8 @@ def seen_points(
     Rows of numpy: one by one, machine code has no more to gain than the rows' memory.
     """
     with np.errstate(all="ignore"):
-        seen, x, y, by_x, by_y = seen_point.plain(points, centre, rotation, c, layering)
-    return seen, np.stack((x, y)), np.array((by_x, by_y))
+        is_visible, x, y, by_x, by_y = seen_point.plain(points, centre, rotation, c, layering)
+    return is_visible, np.stack((x, y)), np.array((by_x, by_y))
 
 
 def _rows_one_by_one(
@@ -261,10 +261,10 @@ def _rows_one_by_one(
     n = points.shape[1]
     ideal, rows, all_seen = np.empty((2, n)), np.empty((2, 7, n)), True
     for i in range(n):
-        seen, x, y, first, second = point_equations(
+        is_visible, x, y, first, second = point_equations(
             points[:, i], lens[:, :, i], centre, rotation, c, layering
         )
-        all_seen = all_seen and seen
+        all_seen = all_seen and is_visible
         ideal[0, i], ideal[1, i] = x, y
         for j in range(7):
             rows[0, j, i], rows[1, j, i] = first[j], second[j]
@@ -357,16 +357,16 @@ def fitted_pose(
     rows : ndarray, shape (2, 7, n)
         Residuals and derivatives there.
     """
-    seen, ideal, rows = pose_rows(points, lens, centre, rotation, c, layering)
+    is_visible, ideal, rows = pose_rows(points, lens, centre, rotation, c, layering)
     count, cost, damping = 2 * points.shape[1], (rows[:, 0] ** 2).sum(), 0.0
     before = 0.0
-    if not seen:
+    if not is_visible:
         return 0, centre, rotation, ideal, rows
     for number in range(1, MOST_STEPS + 1):
         step, moved = pose_step(rows, damping)
         further, turned = centre + step[:3], turned_pose(rotation, step[3:])
-        seen, new_ideal, new = pose_rows(points, lens, further, turned, c, layering)
-        new_cost = (new[:, 0] ** 2).sum() if seen else np.inf
+        is_visible, new_ideal, new = pose_rows(points, lens, further, turned, c, layering)
+        new_cost = (new[:, 0] ** 2).sum() if is_visible else np.inf
         slack = 1e-13 * cost + 10.0 * rounding * np.sqrt(count * cost) + 100.0 * count * rounding**2
         if not new_cost <= (cost + slack if moved <= slack else cost):
             damping = 10.0 * max(damping, 1e-4)
@@ -413,23 +413,26 @@ def fitted_poses(
     placed, turned = np.empty((m, 3)), np.empty((m, 3, 3))
     for i in range(m):
         used = np.flatnonzero(np.isfinite(lens[i, 0, 2]))
-        some, own = np.empty((3, len(used))), np.empty((2, 3, len(used)))
+        some, lenses = np.empty((3, len(used))), np.empty((2, 3, len(used)))
         block = points[i if len(points) > 1 else 0]
         # Number by number: numba takes seconds to compile that slices are assigned.
         for place, point in enumerate(used):
             for j in range(3):
                 some[j, place] = block[j, point]
-                own[0, j, place], own[1, j, place] = lens[i, 0, j, point], lens[i, 1, j, point]
-        steps[i], found, turn, seen, rows_seen = fitted_pose(
-            some, own, centres[i], rotations[i], c[i], layering, rounding[i]
+                lenses[0, j, place], lenses[1, j, place] = (
+                    lens[i, 0, j, point],
+                    lens[i, 1, j, point],
+                )
+        steps[i], place_found, turn, image, rows_seen = fitted_pose(
+            some, lenses, centres[i], rotations[i], c[i], layering, rounding[i]
         )
         for j in range(3):
-            placed[i, j] = found[j]
+            placed[i, j] = place_found[j]
             for k in range(3):
                 turned[i, j, k] = turn[j, k]
         for place, point in enumerate(used):
             for axis in range(2):
-                ideal[i, axis, point] = seen[axis, place]
+                ideal[i, axis, point] = image[axis, place]
                 for j in range(7):
                     rows[i, axis, j, point] = rows_seen[axis, j, place]
     return steps, placed, turned, ideal, rows

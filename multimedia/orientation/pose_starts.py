@@ -79,10 +79,10 @@ def _refined(
     pose = start
     for _ in range(_ROUNDS):
         try:
-            seen = media.apparent_vectors(pose, control)
+            vectors = media.apparent_vectors(pose, control)
         except GeometryError:
             break
-        apparent = pose.centre + seen @ pose.rotation.T
+        apparent = pose.centre + vectors @ pose.rotation.T
         if not np.isfinite(apparent).all():
             break
         poses = _straight(pose, apparent, ideal)
@@ -107,7 +107,7 @@ def _straight(camera: Camera, control: FloatArray, ideal: FloatArray) -> list[Ca
         methods.append(cv2.SOLVEPNP_EPNP)
     rays = ideal * (1.0, -1.0) / camera.principal_distance
     return [
-        replace(camera, centre=found.centre, rotation=found.rotation.T @ _FLIP)
-        for found in cameras_seeing(control, rays, np.eye(3), methods=methods)
-        if (np.abs(found.centre) <= LARGEST).all()
+        replace(camera, centre=pose.centre, rotation=pose.rotation.T @ _FLIP)
+        for pose in cameras_seeing(control, rays, np.eye(3), methods=methods)
+        if (np.abs(pose.centre) <= LARGEST).all()
     ]

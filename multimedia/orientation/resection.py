@@ -150,12 +150,12 @@ def resect(
         camera, object_points, image_points, sigma, len(names)
     )
     what = f"resection of camera {camera.name}" if camera.name else "resection"
-    seen = CameraObservations(
+    observations = CameraObservations(
         points=control, image=image, media=as_media(media), sigma=sigmas, what=what
     )
-    result = _fitted(camera, seen, names)
+    result = _fitted(camera, observations, names)
     adjusted = camera_of(result.state)
-    _refuse_mirrored(adjusted, result.sigma0, seen)
+    _refuse_mirrored(adjusted, result.sigma0, observations)
     shape = (len(used), 2)
     residuals, normed = np.full(shape, np.nan), np.full(shape, np.nan)
     residuals[used] = -result.residuals.reshape(-1, 2) * sigmas
@@ -227,13 +227,13 @@ def _cost(pose: Fit[NetworkState]) -> float:
 
 def _checked_names(camera: Camera, estimate: Sequence[str]) -> tuple[str, ...]:
     """Return the parameters in canonical order; the exterior orientation always belongs."""
-    own = camera.interior_names
-    unknown = [name for name in estimate if name not in EXTERIOR + own]
+    interior = camera.interior_names
+    unknown = [name for name in estimate if name not in EXTERIOR + interior]
     if unknown:
         who = f"camera {camera.name}: " if camera.name else ""
         raise InputError(
             f"{who}estimate: {', '.join(unknown)} is no camera parameter of its lens model; "
-            f"choose of {', '.join(own)} (the exterior orientation is always estimated)."
+            f"choose of {', '.join(interior)} (the exterior orientation is always estimated)."
         )
     return EXTERIOR + tuple(name for name in ANY_INTERIOR if name in estimate)
 
@@ -264,10 +264,10 @@ def _checked_points(
     control, image = control[used], image[used]
     sigmas = np.ones_like(image)
     if sigma is not None:
-        given = np.broadcast_to(np.asarray(sigma, dtype=np.float64), (len(used), 2))[used]
-        if not (given > 0).all():
+        sigma_xy = np.broadcast_to(np.asarray(sigma, dtype=np.float64), (len(used), 2))[used]
+        if not (sigma_xy > 0).all():
             raise InputError(f"{who}sigma: every standard deviation must be above zero.")
-        sigmas = given / np.sqrt(np.mean(given**2))
+        sigmas = sigma_xy / np.sqrt(np.mean(sigma_xy**2))
     refuse_pixels(camera, image)
     spread = _spread(control)
     if spread[1] < 1e-6 * spread[0] or spread[0] == 0:
@@ -287,20 +287,20 @@ def _refuse_mirrored(camera: Camera, sigma0: float, seen: CameraObservations) ->
     offset = (seen.points - seen.points.mean(axis=0)) @ normal
     mirrored = replace(seen, points=seen.points - 2.0 * offset[:, None] * normal)
     try:
-        other = _best_start(camera, mirrored)
+        mirror = _best_start(camera, mirrored)
     except ConvergenceError:
         return
-    if other.sigma0 < 0.2 * sigma0:
+    if mirror.sigma0 < 0.2 * sigma0:
         raise GeometryError(remark("resect.mirrored", of=seen.what))
 
 
 def _refuse_flat(camera: Camera, names: tuple[str, ...], covariance: FloatArray, what: str) -> None:
     """Refuse a principal distance that is known no better than by half of itself."""
-    own = float(np.sqrt(covariance[names.index("c"), names.index("c")])) if "c" in names else 0.0
-    if own > camera.principal_distance / 2:
+    error = float(np.sqrt(covariance[names.index("c"), names.index("c")])) if "c" in names else 0.0
+    if error > camera.principal_distance / 2:
         raise GeometryError(
             f"{what}: the data cannot determine c and Z0: c comes out as "
-            f"{camera.principal_distance:.3g} ± {own:.2g} mm. The points lie about on one plane "
+            f"{camera.principal_distance:.3g} ± {error:.2g} mm. The points lie about on one plane "
             "square to the axis: add points at other depths, turn the camera, or keep c."
         )
 

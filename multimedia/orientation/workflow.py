@@ -231,10 +231,10 @@ def _resected(
             f"{', '.join(strange[:SHOWN])}{more}"
         )
     rows, place = rows[place >= 0], place[place >= 0]
-    wanted = project.cameras[k].interior_names if tuple(estimate) == ("all",) else estimate
+    parameters = project.cameras[k].interior_names if tuple(estimate) == ("all",) else estimate
     result = resect(
         project.cameras[k], objects.xyz[place], images.image[rows], project.interface_of(k),
-        estimate=wanted, sigma=_image_sigma(project, rows),
+        estimate=parameters, sigma=_image_sigma(project, rows),
     )  # fmt: skip
     remarks.extend(result.remarks)
     names = tuple(objects.ids[at] for at in place)
@@ -294,10 +294,10 @@ def _shown(name: str, value: float) -> float:
 
 def _image_sigma(project: Project, rows: IntArray) -> FloatArray | None:
     """Return standard deviations of image points, None if all are alike."""
-    given = project.image_points.sigma[rows]
-    if np.isnan(given).all():
+    stated = project.image_points.sigma[rows]
+    if np.isnan(stated).all():
         return None
-    return np.where(np.isnan(given), project.sigma_image, given)
+    return np.where(np.isnan(stated), project.sigma_image, stated)
 
 
 def _objects(project: Project, points: Path | None) -> tuple[ObjectPoints, list[str]]:
@@ -338,13 +338,13 @@ def _suspicious(project: Project, status: Sequence[str]) -> list[str]:
 def known_misses(project: Project, ids: Sequence[str], xyz: FloatArray) -> list[str]:
     """Return how well intersected points agree with the object points of the same name."""
     place = project.object_points.rows(ids)
-    known = [k for k, at in enumerate(place) if at >= 0 and np.isfinite(xyz[k, 0])]
-    if not known:
+    rows = [k for k, at in enumerate(place) if at >= 0 and np.isfinite(xyz[k, 0])]
+    if not rows:
         return []
-    miss = xyz[known] - project.object_points.xyz[[place[k] for k in known]]
+    miss = xyz[rows] - project.object_points.xyz[[place[k] for k in rows]]
     rms = np.sqrt((miss**2).mean(axis=0))
     return [
-        f"against {len(known)} known points: RMS X {rms[0]:.4g}, Y {rms[1]:.4g}, Z {rms[2]:.4g}, "
+        f"against {len(rows)} known points: RMS X {rms[0]:.4g}, Y {rms[1]:.4g}, Z {rms[2]:.4g}, "
         f"3D {np.sqrt((miss**2).sum(axis=1).mean()):.4g} {project.unit}"
     ]
 

@@ -47,7 +47,7 @@ class Dem(RasterFile):
         self._unmarked = self.nodata is None and not self.masked
         name = self.path.name
         lost = not self.has_position
-        told = {
+        doubts = {
             f"{name} has no position (no geotransform); X and Y are unknown.": lost,
             f"{name} has no coordinate reference system; its coordinates are taken as metres, "
             "like those of the cameras.": self.crs is None,
@@ -56,7 +56,7 @@ class Dem(RasterFile):
             f"{name} has {self.bands} bands; band 1 is taken as the heights.": self.bands > 1
             and self.names[1:] != ("sigma",),
         }
-        self.remarks = [remark for remark, holds in told.items() if holds]
+        self.remarks = [remark for remark, holds in doubts.items() if holds]
 
     @property
     def is_geographic(self) -> bool:
@@ -79,12 +79,12 @@ class Dem(RasterFile):
 
     def _refuse_hidden_nodata(self, values: FloatArray) -> None:
         """Raise InputError if the heights hold what is most likely a mark for empty cells."""
-        known = values[np.isfinite(values)]
-        if not known.size:
+        finite = values[np.isfinite(values)]
+        if not finite.size:
             return
-        for mark in (known.min(), known.max()):
-            rest = known[known != mark]
-            repeats = known.size - rest.size
+        for mark in (finite.min(), finite.max()):
+            rest = finite[finite != mark]
+            repeats = finite.size - rest.size
             sentinel = bool((np.abs(np.array(SENTINELS) - mark) < 1e-6 * abs(mark)).any())
             sentinel |= abs(mark) > 1e30
             apart = False

@@ -155,9 +155,9 @@ class Project:
         object.__setattr__(self, "media_of", tuple(self.media_of) or ("",) * len(self.cameras))
         for camera, name in zip(self.cameras, self.media_of, strict=True):
             if name and name not in self.media:
-                known = ", ".join(self.media) or "none"
+                names = ", ".join(self.media) or "none"
                 raise InputError(
-                    f"camera {camera.name}: its media {name!r} are not described; known: {known}."
+                    f"camera {camera.name}: its media {name!r} are not described; known: {names}."
                 )
         strange = sorted(set(self.image_points.cameras) - set(self.camera_names))
         if strange:
@@ -220,3 +220,15 @@ def refuse_repeated(names: Sequence[str], what: str) -> None:
     if twice:
         shown = ", ".join(twice[:SHOWN])
         raise InputError(f"{what}: {shown} occurs more than once; give each its own name.")
+
+
+def place_name(place: FloatArray) -> str:
+    """Return the name of a point after its place: the same for all cameras, whatever their numbers.
+
+    What numbers a list counts from 0 what one camera saw: it means another point in each of them.
+
+    >>> place_name(np.array([5.0, -7.5, -0.0]))
+    'X5Y-7.5Z0'
+    """
+    rounded = np.round(place, 6) + 0.0
+    return "".join(f"{axis}{v:.10g}" for axis, v in zip("XYZ", rounded.tolist(), strict=True))

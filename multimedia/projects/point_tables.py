@@ -118,9 +118,9 @@ def read_image_points(path: Path, cameras: Sequence[Camera]) -> tuple[ImagePoint
         return wide
     by_name = {camera.name: camera for camera in cameras}
     names = table.texts("camera")
-    known = ", ".join(list(by_name)[:SHOWN])
+    cameras_listed = ", ".join(list(by_name)[:SHOWN])
     errors = [
-        table.error(row, "camera", f"no camera is called {name!r}; known: {known}.")
+        table.error(row, "camera", f"no camera is called {name!r}; known: {cameras_listed}.")
         for row, name in enumerate(names)
         if name not in by_name
     ]
@@ -233,8 +233,8 @@ def _ids(table: Table) -> tuple[str, ...]:
 
 def _factor(table: Table, key: str, unit: str) -> float:
     """Return what converts a column to ``unit``; 1 where the heading says no length."""
-    given = table.units.get(key, "")
-    return METRES[given] / METRES[unit] if given in METRES and unit in METRES else 1.0
+    unit_typed = table.units.get(key, "")
+    return METRES[unit_typed] / METRES[unit] if unit_typed in METRES and unit in METRES else 1.0
 
 
 def _gathered(table: Table, keys: Sequence[str], unit: str, errors: list[CellError]) -> FloatArray:
@@ -253,8 +253,8 @@ def _sigmas(table: Table, coordinates: Sequence[str], cameras: Sequence[Camera])
     sigma = np.empty((len(table), 2))
     for axis, coordinate in enumerate(coordinates):
         key = f"sigma_{'xy'[axis]}" if "sigma_y" in table.present else "sigma_x"
-        own = "px" if coordinate in ("col", "row") else table.units.get(coordinate, "")
-        unit = table.units.get(key, "") or own
+        default_unit = "px" if coordinate in ("col", "row") else table.units.get(coordinate, "")
+        unit = table.units.get(key, "") or default_unit
         factor = METRES.get(unit, METRES["mm"]) / METRES["mm"]
         sigma[:, axis] = table.numbers(key) * factor
         if unit == "px" and key in table.present:
@@ -288,12 +288,12 @@ def _read_wide(book: object, cameras: Sequence[Camera]) -> tuple[ImagePoints, li
             if not set(keys) <= table.present:
                 continue
             values = np.column_stack([table.numbers(key) for key in keys])
-            seen = np.flatnonzero(np.isfinite(values).all(axis=1))
-            image = values[seen]
+            finite = np.flatnonzero(np.isfinite(values).all(axis=1))
+            image = values[finite]
             if first == "col":
                 image = camera.described_sensor(_IN_PIXELS).image_from_pixel(image)
-            names += [camera.name] * len(seen)
-            rows += seen.tolist()
+            names += [camera.name] * len(finite)
+            rows += finite.tolist()
             images.append(image)
             break
     if not images:

@@ -412,17 +412,17 @@ def _distortion(value: Any, where: str, c: float) -> Distortion:
             return Fisheye(**terms)
     convention = str(section.get("convention", Convention.BROWN.value))
     if convention == "opencv":
-        given = [terms.get(name, 0.0) for name in ("k1", "k2", "p1", "p2", "k3")]
+        values = [terms.get(name, 0.0) for name in ("k1", "k2", "p1", "p2", "k3")]
         if "scale" in terms or "shear" in terms:
             raise InputError(f"{where}: OpenCV's model has no scale and shear.")
-        return Brown.from_opencv(given, principal_distance=c)
-    known = {item.value: item for item in Convention}
-    if convention not in known:
+        return Brown.from_opencv(values, principal_distance=c)
+    rules = {item.value: item for item in Convention}
+    if convention not in rules:
         raise InputError(
-            f"{where}: convention {convention!r} is not known; choose {', '.join(known)}, opencv "
+            f"{where}: convention {convention!r} is not known; choose {', '.join(rules)}, opencv "
             f"or {_FISHEYE}."
         )
-    return Brown(**terms, convention=known[convention])
+    return Brown(**terms, convention=rules[convention])
 
 
 def _file_name(value: Any, key: str) -> str:

@@ -141,8 +141,8 @@ class Layers:
                 doubts.append(remark("layers.swapped", place=place, index=index, liquid=outer))
         for place, index in enumerate(self.indices, start=1):
             if index > DIAMOND:
-                told = {"place": place, "index": index, "most": DIAMOND}
-                doubts.append(remark("layers.beyond_diamond", **told))
+                about = {"place": place, "index": index, "most": DIAMOND}
+                doubts.append(remark("layers.beyond_diamond", **about))
         if len(set(self.indices)) == 1:
             doubts.append(remark("layers.all_alike"))
         return tuple(doubts)
@@ -162,8 +162,8 @@ class Layers:
         if thick > 10 * distance > 0:
             doubts.append(remark("layers.thick_in_mm", thick=thick, distance=distance))
         if 0 < thick < 2e-6 * distance:
-            told = {"thick": thick, "distance": distance, "share": distance / thick}
-            doubts.append(remark("layers.thick_in_m", **told))
+            about = {"thick": thick, "distance": distance, "share": distance / thick}
+            doubts.append(remark("layers.thick_in_m", **about))
         return tuple(doubts)
 
 

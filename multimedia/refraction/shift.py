@@ -192,17 +192,17 @@ def shift_derivatives(
     """
     radius, layers = _checked(radius, heights, indices)
     count = len(layers)
-    found = solve(
+    solution = solve(
         radius, layers, indices, row_solver=slopes_row, results=2 + 2 * count, block=BLOCK
     )
-    unknown = np.isnan(found[0])
+    unknown = np.isnan(solution[0])
     if unknown.any():
-        found[:, unknown] = np.nan
+        solution[:, unknown] = np.nan
     return ShiftDerivatives(
-        np.asarray(found[0]),
-        np.asarray(found[1]),
-        np.moveaxis(found[2 : 2 + count], 0, -1),
-        np.moveaxis(found[2 + count :], 0, -1),
+        np.asarray(solution[0]),
+        np.asarray(solution[1]),
+        np.moveaxis(solution[2 : 2 + count], 0, -1),
+        np.moveaxis(solution[2 + count :], 0, -1),
     )
 
 

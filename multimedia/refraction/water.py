@@ -91,12 +91,12 @@ class WaterFormula:
         depth: ArrayLike,
     ) -> tuple[str, ...]:
         """Return what lies outside the range of the formula's data; empty when nothing does."""
-        given = _checked(wavelength_nm, temperature_c, salinity_percent, depth)
+        state = _checked(wavelength_nm, temperature_c, salinity_percent, depth)
         allowed = (self.wavelength_nm, self.temperature_c, self.salinity_percent, self.depth)
         names = ("wavelength", "temperature", "salinity", "depth")
         outside = []
         for name, unit, values, (low, high) in zip(
-            names, ("nm", "°C", "%", "m"), given, allowed, strict=True
+            names, ("nm", "°C", "%", "m"), state, allowed, strict=True
         ):
             if name == "depth" and not any(term.depth for term in self.terms):
                 if (values > 10).any():
@@ -222,8 +222,8 @@ def water_refractive_index(
     >>> round(float(water_refractive_index(**tank, formula=QUAN_FRY)), 5)
     1.33533
     """
-    given = _checked(wavelength_nm, temperature_c, salinity_percent, depth)
-    return _sum_of_terms(formula.terms, given)
+    values = _checked(wavelength_nm, temperature_c, salinity_percent, depth)
+    return _sum_of_terms(formula.terms, values)
 
 
 def water_index_derivatives(
@@ -260,9 +260,9 @@ def water_index_derivatives(
     >>> round(float(d.d_salinity), 6), round(float(d.d_temperature), 6)
     (0.002, -4e-05)
     """
-    given = _checked(wavelength_nm, temperature_c, salinity_percent, depth)
-    slopes = _slopes(formula, given)
-    return WaterIndexDerivatives(_sum_of_terms(formula.terms, given), *slopes)
+    values = _checked(wavelength_nm, temperature_c, salinity_percent, depth)
+    slopes = _slopes(formula, values)
+    return WaterIndexDerivatives(_sum_of_terms(formula.terms, values), *slopes)
 
 
 def _slopes(formula: WaterFormula, given: tuple[FloatArray, ...]) -> Iterator[FloatArray]:
@@ -367,8 +367,8 @@ def salinity_from_index(
     >>> round(float(salt - fresh), 3)
     0.075
     """
-    given = _checked(wavelength_nm, temperature_c, 0.0, depth)
-    constant, slope, _ = _powers_of(2, formula, given)
+    values = _checked(wavelength_nm, temperature_c, 0.0, depth)
+    constant, slope, _ = _powers_of(2, formula, values)
     return np.asarray((as_floats(refractive_index, "refractive_index") - constant) / slope)
 
 
@@ -412,8 +412,8 @@ def temperature_from_index(
     >>> round(float(t), 1)
     22.2
     """
-    given = _checked(wavelength_nm, 0.0, salinity_percent, depth)
-    constant, slope, bend = _powers_of(1, formula, given)
+    values = _checked(wavelength_nm, 0.0, salinity_percent, depth)
+    constant, slope, bend = _powers_of(1, formula, values)
     rest = constant - as_floats(refractive_index, "refractive_index")
     with np.errstate(invalid="ignore"):
         # Citardauq's form of the warm root: no cancellation, and no special case where bend = 0.

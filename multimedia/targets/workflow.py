@@ -111,17 +111,17 @@ def targets_of_images(
                 )
             )
     progress(len(images), len(images))
-    made = [
+    results = [
         ImageTargets(image=image, targets=one, file=None if out is None or is_table else out / name)
         for image, one, name in zip(images, listed, names, strict=True)
     ]
     if out is not None and is_table:
-        write_columns(out, _columns(made), overwrite=overwrite)
+        write_columns(out, _columns(results), overwrite=overwrite)
     elif out is not None:
         with atomic_folder(out, overwrite=overwrite) as folder:
             for name, one in zip(names, listed, strict=True):
                 (folder / name).write_text(_text(one, offset), encoding="utf-8")
-    return made, _remarks(made, largest)
+    return results, _remarks(results, largest)
 
 
 def _file_name(image: Path) -> str:

@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 from multimedia.openptv.chance_counts import ChanceCounts, chance_counts, tolerance_remarks
 from multimedia.openptv.correspondences import TOLERANCE, correspondences, is_chance
-from multimedia.openptv.openptv_files import read_targets
+from multimedia.openptv.openptv_files import read_blobs, read_targets
 from multimedia.orientation.intersection import intersect
 from multimedia.projects.model import SIGMA_PIXEL, Project
 from multimedia.projects.point_tables import METRES
@@ -98,7 +98,8 @@ def find_tracks(
         Project file with oriented cameras.
     targets : sequence of path
         Of each camera, in the order of the project: what its target files begin with, as in
-        OpenPTV's sequence: ``img/cam1.`` for ``img/cam1.10001_targets`` and so on.
+        OpenPTV's sequence: ``img/cam1.`` for ``img/cam1.10001_targets`` and so on; or the file of
+        all frames that MyPTV writes (``blobs_cam1``).
     first, last : int, optional
         Frames; by default all that every camera has.
     rate : float, optional
@@ -129,23 +130,21 @@ def find_tracks(
             f"{len(targets)} sequence(s) of targets for {len(names)} cameras: give --targets once "
             f"per camera, in the order {', '.join(names)}."
         )
-    frames = _frames(targets, first, last)
-    files = {frame: [_file(base, frame) for base in targets] for frame in frames}
+    sequences = [_sequence(base) for base in targets]
+    frames = _frames(targets, sequences, first, last)
+    # A file of blobs has no line for a frame without any: that is no loss.
     lost = [
         f"{base.name}{frame}{ENDING}"
-        for frame, paths in files.items()
-        for base, path in zip(targets, paths, strict=True)
-        if path is None
+        for frame in frames
+        for base, sequence in zip(targets, sequences, strict=True)
+        if frame not in sequence and not base.is_file()
     ]
-    check_not_input(out, project, *(path for paths in files.values() for path in paths if path))
+    files = [path for each in sequences for path in each.values() if isinstance(path, Path)]
+    check_not_input(out, project, *targets, *files)
     if folder is not None and folder.is_dir():
         written = [folder / f"{kind}.{frame}" for frame in frames for kind in ("rt_is", "ptv_is")]
         check_all_writable(*written, overwrite=overwrite)
-    none = np.empty((0, 2))
-    places = {
-        frame: [none if path is None else read_targets(path).pixels for path in files[frame]]
-        for frame in frames
-    }
+    places = {frame: [_places(sequence.get(frame)) for sequence in sequences] for frame in frames}
     tried = _tried_frames(places)
     counted = _beyond_chance(project, content, tried, tolerance, fewest)
     with ThreadPoolExecutor(cores()) as pool:
@@ -177,15 +176,32 @@ def find_tracks(
     return result
 
 
-def _frames(targets: Sequence[Path], first: int | None, last: int | None) -> range:
+def _sequence(base: Path) -> dict[int, Path | FloatArray]:
+    """Return the target files of a camera by frame, or the places in its file of all frames."""
+    if base.is_file():
+        return dict(read_blobs(base))
+    names = {path.name[len(base.name) : -len(ENDING)]: path for path in base.parent.glob("*")
+             if path.name.startswith(base.name) and path.name.endswith(ENDING)}  # fmt: skip
+    # Numbers may have zeros before them; of two files that without counts.
+    ordered = sorted((word for word in names if word.isdecimal()), key=len, reverse=True)
+    if not ordered:
+        raise InputError(remark("tracks.no_files", of=base, name=base.name, ending=ENDING))
+    return {int(word): names[word] for word in ordered}
+
+
+def _places(source: Path | FloatArray | None) -> FloatArray:
+    """Return the targets of a camera in a frame; none where nothing tells of any."""
+    if source is None:
+        return np.empty((0, 2))
+    return read_targets(source).pixels if isinstance(source, Path) else source
+
+
+def _frames(
+    targets: Sequence[Path], sequences: Sequence[dict[int, Path | FloatArray]],
+    first: int | None, last: int | None,
+) -> range:  # fmt: skip
     """Return the frames in a row that all cameras have, or all but a few of them."""
-    seen: list[set[int]] = []
-    for base in targets:
-        names = [path.name for path in base.parent.glob(f"{base.name}*{ENDING}")]
-        words = [name[len(base.name) : -len(ENDING)] for name in names]
-        seen.append({int(word) for word in words if word.isdecimal()})
-        if not seen[-1]:
-            raise InputError(remark("tracks.no_files", of=base, name=base.name, ending=ENDING))
+    seen = [set(sequence) for sequence in sequences]
     common = sorted(set.intersection(*seen))
     chosen = [n for n in common if (first is None or n >= first) and (last is None or n <= last)]
     begin = first if first is not None else (chosen or [0])[0]
@@ -206,16 +222,6 @@ def _lost_files(names: Sequence[str]) -> list[str]:
     """Say which files are taken for frames without targets."""
     shown = ", ".join(names[:3]) + (" ..." if len(names) > 3 else "")
     return [remark("tracks.lost", count=len(names), names=shown)] if names else []
-
-
-def _file(base: Path, frame: int) -> Path | None:
-    """Return the target file of a frame, if it is there; numbers may have zeros before them."""
-    plain = base.with_name(f"{base.name}{frame}{ENDING}")
-    if plain.exists():
-        return plain
-    found = base.parent.glob(f"{base.name}0*{frame}{ENDING}")
-    numbered = (p for p in found if p.name[len(base.name) : -len(ENDING)].isdecimal())
-    return next((p for p in numbered if int(p.name[len(base.name) : -len(ENDING)]) == frame), None)
 
 
 def _tried_frames(places: dict[int, list[FloatArray]]) -> list[list[FloatArray]]:

@@ -101,23 +101,23 @@ def shift_file(
     replaced |= {f"t_{i}": t for i, t in enumerate(thicknesses or (), start=1)}
     if z0 is not None:
         replaced["z_0"] = z0
-    given = read_shift_input(path, decimal=decimal, sheet=sheet, given=replaced)
-    setup = _setup(given.setup, camera, z0, indices, thicknesses)
-    points, rows = points_of(given.table, setup.nadir)
+    read = read_shift_input(path, decimal=decimal, sheet=sheet, given=replaced)
+    setup = _setup(read.setup, camera, z0, indices, thicknesses)
+    points, rows = points_of(read.table, setup.nadir)
     result = points.shifted(setup)
-    table, kind = given.table, Path(path).suffix.lower()
+    table, kind = read.table, Path(path).suffix.lower()
     kept: Path | None = None
     if out is not None and out.suffix.lower() == ".csv":
         write_csv(out, result.columns(points), flavour=flavour, overwrite=overwrite)
     elif out is not None and (new or kind not in (".xlsx", ".xlsm")):
         write_shift_workbook(out, setup, points, rows=1, overwrite=overwrite)
-    elif out is not None and given.setup is not None and is_template(path):
+    elif out is not None and read.setup is not None and is_template(path):
         kept = update_template(
-            path, out, table, rows, setup, given.setup, points, overwrite=overwrite
+            path, out, table, rows, setup, read.setup, points, overwrite=overwrite
         )
     elif out is not None:
-        kept = add_columns(path, out, given, rows, setup, points, overwrite=overwrite)
-    remarks = [*given.table.remarks]
+        kept = add_columns(path, out, read, rows, setup, points, overwrite=overwrite)
+    remarks = [*read.table.remarks]
     if kept is not None:
         remarks.append(f"{out}: the workbook as it was is kept as {kept}.")
     remarks += setup.layers.remarks_about(z0=setup.z0, zp=points.depth)

@@ -53,9 +53,9 @@ class BlockEquations:
     def _normal(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Normal matrix of the unknowns (u, u), with the points (u, p, 3), of them (p, 3, 3)."""
         count = len(self.free)
-        own = (self.design.T @ self.design).toarray()
-        mixed = (self.design.T @ self.eliminated).toarray().reshape(own.shape[0], count, 3)
-        return own, mixed, self._blocks
+        square = (self.design.T @ self.design).toarray()
+        mixed = (self.design.T @ self.eliminated).toarray().reshape(square.shape[0], count, 3)
+        return square, mixed, self._blocks
 
     @cached_property
     def _blocks(self) -> FloatArray:
@@ -72,31 +72,31 @@ class BlockEquations:
         scaled = self._blocks / (length[:, :, None] * length[:, None, :])
         values, vectors = np.linalg.eigh(scaled)
         share = np.abs(np.where((values <= _ROUNDING)[:, None, :], vectors, 0.0)).max(axis=2)
-        found = np.flatnonzero((share > 0.05)[self.free])[:20].tolist()
-        own = names[int(self.design.shape[1]) :]
-        places = np.argwhere(self.free)[found]
+        rows = np.flatnonzero((share > 0.05)[self.free])[:20].tolist()
+        point_names = names[int(self.design.shape[1]) :]
+        places = np.argwhere(self.free)[rows]
         return [
-            own[k] if k < len(own) else f"{'XYZ'[axis]} of point {point + 1}"
-            for k, (point, axis) in zip(found, places.tolist(), strict=True)
+            point_names[k] if k < len(point_names) else f"{'XYZ'[axis]} of point {point + 1}"
+            for k, (point, axis) in zip(rows, places.tolist(), strict=True)
         ]
 
     @cached_property
     def scale(self) -> FloatArray:
         """Length of every unknown's column, shape (u + f,)."""
-        own, _, blocks = self._normal
+        square, _, blocks = self._normal
         points = np.diagonal(blocks, axis1=1, axis2=2)[self.free]
-        return np.sqrt(np.concatenate([np.diag(own), points]))
+        return np.sqrt(np.concatenate([np.diag(square), points]))
 
     def _reduced(self, damping: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return inverse blocks, mixed part times these, and the Schur complement."""
-        own, mixed, blocks = self._normal
+        square, mixed, blocks = self._normal
         inverse = inverse_blocks(blocks * (1.0 + damping * np.eye(3)))
         # As einsum("upi,pij->upj") digit for digit, in less than half its time.
         solved = mixed[:, :, :1] * inverse[:, 0]
         for axis in (1, 2):
             solved += mixed[:, :, axis, None] * inverse[:, axis]
-        schur = own + damping * np.diag(np.diag(own))
-        shape = (len(own), self.free.size)
+        schur = square + damping * np.diag(np.diag(square))
+        shape = (len(square), self.free.size)
         schur -= solved.reshape(shape) @ mixed.reshape(shape).T
         return inverse, solved, schur
 

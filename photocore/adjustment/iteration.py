@@ -145,7 +145,7 @@ def minimise(
         # A block of 50 images (bench_bundle) settles in 4 steps from here, in 5 from 1e-4.
         damping, settle = 1e-6, max(settle, SETTLE_BLOCKS)
     count, cost = len(linear.residuals), float(linear.residuals @ linear.residuals)
-    settled, number, seen = cost <= count * rounding**2, 0, cost
+    settled, number, last = cost <= count * rounding**2, 0, cost
     for number in range(1, most + 1):
         while True:
             step = linear.step(damping)
@@ -182,9 +182,9 @@ def minimise(
         if settled:
             break
         if number % _PATIENCE == 0:
-            if cost > count * hopeless**2 and cost > _FALLS * seen:
+            if cost > count * hopeless**2 and cost > _FALLS * last:
                 break
-            seen = cost
+            last = cost
     return Fit(state=state, linear=linear, iterations=number, settled=settled)
 
 
@@ -263,8 +263,8 @@ def refuse_undetermined(result: Fit[State], names: Sequence[str], what: str) -> 
         raise GeometryError(remark("fit.undetermined", of=what, names=", ".join(open_)))
     if not result.settled:
         alike = np.abs(np.triu(np.nan_to_num(correlations(result.linear.cofactor)), 1))
-        one, other = divmod(int(alike.argmax()), len(alike))
-        apart = f"{names[one]} and {names[other]}" if alike.max() > ALIKE else "the unknowns"
+        one, second = divmod(int(alike.argmax()), len(alike))
+        apart = f"{names[one]} and {names[second]}" if alike.max() > ALIKE else "the unknowns"
         raise ConvergenceError(
             remark("fit.unsettled", of=what, apart=apart),
             iterations=result.iterations,

@@ -164,19 +164,19 @@ class Network:
 
     def advance(self, state: NetworkState, step: FloatArray) -> NetworkState | None:
         """Return the state after a step, None where it is impossible."""
-        own, points = step[: len(self.labels)], state.points.copy()
+        step_kept, points = step[: len(self.labels)], state.points.copy()
         blocks = {kind: dict(some) for kind, some in state.blocks.items()}
-        points[self.free] += step[len(own) :]
-        points[self.kept >= 0] += own[self.kept[self.kept >= 0]]
+        points[self.free] += step[len(step_kept) :]
+        points[self.kept >= 0] += step_kept[self.kept[self.kept >= 0]]
         try:
             for kind, places in self.columns.items():
                 for name, at in places.items():
                     if at:
-                        step = own[list(at.values())]
+                        step = step_kept[list(at.values())]
                         blocks[kind][name] = self.step(blocks[kind][name], list(at), step)
         except (InputError, GeometryError):
             return None
-        state = replace(state, blocks=blocks, points=points, drift=state.drift + own)
+        state = replace(state, blocks=blocks, points=points, drift=state.drift + step_kept)
         return state if self.moved is None else self.moved(state)
 
     def minimise(self, start: Any, *, most: int, settle: float = SETTLE) -> Fit[Any]:

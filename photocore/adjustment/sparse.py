@@ -118,7 +118,7 @@ class _Banded:
         upper = row < column
         row[upper], column[upper] = column[upper], row[upper]
         at = np.searchsorted(self.edges, row, side="right") - 1
-        left = np.searchsorted(self.edges, column, side="right") - 1
+        block = np.searchsorted(self.edges, column, side="right") - 1
         values = np.empty(len(row))
         later = None
         for number in range(len(self.parts) - 1, -1, -1):
@@ -128,11 +128,11 @@ class _Banded:
                 weight = cho_solve((pivot, True), self.below[number].T).T
                 beside = -later @ weight
                 own -= beside.T @ weight
-                mine = (left == number) & (at == number + 1)
+                mine = (block == number) & (at == number + 1)
                 values[mine] = beside[
                     row[mine] - self.edges[number + 1], column[mine] - self.edges[number]
                 ]
-            mine = (left == number) & (at == number)
+            mine = (block == number) & (at == number)
             start = self.edges[number]
             values[mine] = own[row[mine] - start, column[mine] - start]
             later = own
@@ -147,22 +147,22 @@ class SparseEquations(BlockEquations):
     @cached_property
     def _sparse(self) -> tuple[csr_matrix, csr_matrix, FloatArray]:
         """Normal matrix of the unknowns (u, u), with the points (u, 3 p), of them (p, 3, 3)."""
-        own = (self.design.T @ self.design).tocsr()
-        return own, (self.design.T @ self.eliminated).tocsr(), self._blocks
+        square = (self.design.T @ self.design).tocsr()
+        return square, (self.design.T @ self.eliminated).tocsr(), self._blocks
 
     @cached_property
     def scale(self) -> FloatArray:
         """Length of every unknown's column, shape (u + f,)."""
-        own, _, blocks = self._sparse
+        square, _, blocks = self._sparse
         points = np.diagonal(blocks, axis1=1, axis2=2)[self.free]
-        return np.sqrt(np.concatenate([own.diagonal(), points]))
+        return np.sqrt(np.concatenate([square.diagonal(), points]))
 
     def _eliminated_by(self, damping: float) -> tuple[FloatArray, csr_matrix, csr_matrix]:
         """Return inverse blocks, mixed part times these, and the Schur complement."""
-        own, mixed, blocks = self._sparse
+        square, mixed, blocks = self._sparse
         inverse = inverse_blocks(blocks * (1.0 + damping * np.eye(3)))
         solved = (mixed @ _block_diagonal(inverse)).tocsr()
-        schur = own + damping * diags(own.diagonal()) - solved @ mixed.T
+        schur = square + damping * diags(square.diagonal()) - solved @ mixed.T
         return inverse, solved, schur.tocsr()
 
     def step(self, damping: float, misfit: FloatArray | None = None) -> FloatArray:

@@ -80,8 +80,8 @@ def _detected(image: ByteArray, name: str, pattern: str, size: tuple[int, int]) 
         return detect_charuco(image, name, size)
     if pattern == "chessboard":
         flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
-        seen, corners = cv2.findChessboardCorners(_reduced(image)[0], size, flags=flags)
-        if not seen:
+        is_found, corners = cv2.findChessboardCorners(_reduced(image)[0], size, flags=flags)
+        if not is_found:
             return None
         corners = (corners.reshape(-1, 2) + 0.5) * _reduced(image)[1] - 0.5
         corners = _refined(image, corners.astype(np.float32), size)
@@ -106,8 +106,10 @@ def _circles(image: ByteArray, size: tuple[int, int], flags: int) -> Any:
     large.maxArea = image.size / (size[0] * size[1])
     for blobs in (cv2.SimpleBlobDetector.create(), cv2.SimpleBlobDetector.create(large)):
         for more in (0, cv2.CALIB_CB_CLUSTERING):
-            seen, corners = cv2.findCirclesGrid(image, size, flags=flags | more, blobDetector=blobs)
-            if seen:
+            is_found, corners = cv2.findCirclesGrid(
+                image, size, flags=flags | more, blobDetector=blobs
+            )
+            if is_found:
                 return corners
     return None
 
@@ -124,8 +126,8 @@ def find_board_size(images: Sequence[ByteArray]) -> tuple[int, int]:
     flags |= cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
     votes: Counter[tuple[int, int]] = Counter()
     for image in images:
-        found, _, meta = cv2.findChessboardCornersSBWithMeta(_reduced(image)[0], (3, 3), flags)
-        if found:
+        is_found, _, meta = cv2.findChessboardCornersSBWithMeta(_reduced(image)[0], (3, 3), flags)
+        if is_found:
             rows, columns = sorted(meta.shape)
             votes[(int(columns), int(rows))] += 1
     if not votes or votes.most_common(1)[0][1] < min(2, len(images)):

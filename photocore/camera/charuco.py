@@ -126,6 +126,6 @@ def _marker_side(markers: Markers, board: Any) -> float | None:
     change, inside = cv2.findHomography(seen.mean(axis=1), places, cv2.RANSAC, _ASTRAY)
     if change is None or int(inside.sum()) < max(LEAST_MARKERS, 0.75 * len(some)):
         return None
-    there = cv2.perspectiveTransform(seen.reshape(1, -1, 2), change).reshape(-1, 4, 2)
-    side = float(np.median(np.linalg.norm(there - np.roll(there, 1, axis=1), axis=2)))
+    mapped = cv2.perspectiveTransform(seen.reshape(1, -1, 2), change).reshape(-1, 4, 2)
+    side = float(np.median(np.linalg.norm(mapped - np.roll(mapped, 1, axis=1), axis=2)))
     return side if _SIDES[0] < side < _SIDES[1] else None

@@ -9,53 +9,19 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
 from photocore.arrays import FloatArray, is_finite_number
+from photocore.camera.lensdata import LensData
+from photocore.camera.lensfit import UNSAID, FittedLens, Function, brown_lens, equidistant
 from photocore.camera.pinhole import camera_matrix
 from photocore.errors import LARGEST, InputError
 from photocore.jsonfile import read_object
 from photocore.remarks import remark
 from photocore.textfile import check_file, read_text
-
-
-class LensData(NamedTuple):
-    """What a calibration file holds, in OpenCV's conventions and our pixels."""
-
-    camera_matrix: FloatArray
-    coefficients: FloatArray
-    model: str
-    image_size: tuple[float, float]
-    source: str
-
-
-def lens_data(
-    focal: Sequence[float],
-    centre: Sequence[float],
-    terms: Sequence[float],
-    size: Sequence[float],
-    source: str,
-    *,
-    fisheye: bool = False,
-) -> LensData:
-    """Return a lens of fx, fy, cx, cy [px] and OpenCV's distortion terms.
-
-    Raises
-    ------
-    InputError
-        If a focal length or a side of the photo is not above zero.
-    """
-    if not (min(focal) > 0 and min(size) > 0):
-        raise InputError(
-            f"{source}: focal lengths and size of the photo must be above zero [px], found "
-            f"{', '.join(f'{v:g}' for v in (*focal, *size))}."
-        )
-    matrix = camera_matrix(focal[0], focal[1] / focal[0], *centre)
-    model = "fisheye" if fisheye else "opencv"
-    return LensData(matrix, np.array(terms, dtype=float), model, (size[0], size[1]), source)
 
 
 def read_foreign_lens(path: Path | str) -> LensData:
@@ -126,15 +92,15 @@ def colmap_lens(words: Sequence[str], path: Path, *, more: bool = False) -> tupl
         Whether anything may follow the parameters.
     """
     _, model, *numbers = words
-    known = _COLMAP.get(model)
-    count = known[0] if known and more else len(numbers) - 2
+    form = _COLMAP.get(model)
+    count = form[0] if form and more else len(numbers) - 2
     try:
         width, height, *p = (float(item) for item in numbers[: 2 + count])
     except ValueError:
         raise InputError(f"{path}: {' '.join(words)!r} is not a COLMAP camera line.") from None
-    if known is None or len(p) != known[0]:
+    if form is None or len(p) != form[0]:
         raise InputError(f"{path}: COLMAP camera {model} with {len(p)} parameters is not read.")
-    _, (fx, fy, cx, cy), terms = known
+    _, (fx, fy, cx, cy), terms = form
     if not (p[fx] > 0 and p[fy] > 0):
         raise InputError(f"{path}: the focal lengths must be above zero [px].")
     lens = LensData(
@@ -152,9 +118,12 @@ def _metashape(path: Path, text: str) -> LensData:
     root = xml_root(path, text)
     node = root if root.tag == "calibration" else root.find(".//calibration")
     kind = None if node is None else node.findtext("projection")
-    if node is None or kind not in {"frame", "perspective", "fisheye"}:
+    if node is None or kind not in PROJECTIONS:
         raise InputError(f"{path}: holds no frame or fisheye calibration of Metashape.")
-    return metashape_lens(node, path, fisheye=kind == "fisheye")
+    fit, shear = metashape_lens(node, path, kind)
+    if fit.residual > UNSAID or shear[0, 1]:
+        raise InputError(remark("lens.metashape_terms", of=path))
+    return fit.lens
 
 
 def xml_root(path: Path, text: str) -> ElementTree.Element:
@@ -173,10 +142,33 @@ def xml_root(path: Path, text: str) -> ElementTree.Element:
         raise InputError(f"{path}: is not valid XML ({error}).") from None
 
 
-def metashape_lens(node: ElementTree.Element, path: Path, *, fisheye: bool = False) -> LensData:
-    """Return the lens of a ``calibration`` node; its size in elements or in ``resolution``.
+#: Angles from the axis by the projected radius, of Metashape's kinds of sensors.
+_ANGLES: dict[str, Function | None] = {
+    "frame": None,
+    "perspective": None,
+    "fisheye": equidistant,
+    "equidistant_fisheye": equidistant,
+    "equisolid_fisheye": lambda radius: 2.0 * np.arcsin(np.where(radius < 2, radius / 2, np.nan)),
+}
+PROJECTIONS = tuple(_ANGLES)
+#: A skew that moves no pixel of a photo this much is none. [px]
+_SKEWED = 0.002
 
-    Metashape's fisheye (equidistant, then k1 to k4) is OpenCV's where p1 and p2 are zero.
+
+def metashape_lens(
+    node: ElementTree.Element, path: Path, kind: str
+) -> tuple[FittedLens, FloatArray]:
+    """Return the lens of a ``calibration`` node, and the shear of its axes, shape (2, 2).
+
+    Its size stands in elements or in ``resolution``.
+
+    Parameters
+    ----------
+    node : Element
+    path : path
+        For messages.
+    kind : str
+        One of `PROJECTIONS`.
     """
     resolution = node.find("resolution")
 
@@ -189,24 +181,23 @@ def metashape_lens(node: ElementTree.Element, path: Path, *, fisheye: bool = Fal
         except ValueError:
             raise InputError(f"{path}: <{name}> is not a number.") from None
 
-    lacking = ("p1", "p2", "b2", "p3", "p4") if fisheye else ("k4", "b2", "p3", "p4")
-    if any(abs(value(name)) > 1e-9 for name in lacking):
-        raise InputError(
-            f"{path}: uses {', '.join(lacking[:-1])} or {lacking[-1]}, which OpenCV's "
-            f"{'fisheye ' if fisheye else ''}model lacks; "
-            "calibrate again in Metashape with these switched off."
-        )
-    width, height, f = value("width"), value("height"), value("f")
-    if not (width > 0 and height > 0 and f > 0 and f + value("b1") > 0):
+    width, height, f, b2 = (value(name) for name in ("width", "height", "f", "b2"))
+    fx = f + value("b1")
+    if not (width > 0 and height > 0 and f > 0 and fx > 0):
         raise InputError(f"{path}: <width>, <height>, <f> and f + b1 must be above zero.")
-    centre = width / 2 + value("cx") - 0.5, height / 2 + value("cy") - 0.5
-    matrix = camera_matrix(f + value("b1"), f / (f + value("b1")), *centre)
+    k1, k2, k3, k4 = (value(f"k{number}") for number in range(1, 5))
+    p1, p2, p3, p4 = (value(f"p{number}") for number in range(1, 5))
+    size, source = (width, height), f"Metashape, {path.name}"
+    focal, centre = (fx, f), (width / 2 + value("cx") - 0.5, height / 2 + value("cy") - 0.5)
+    shear = np.array([[1.0, b2 / fx], [0.0, 1.0]])
+    if abs(b2) * height < _SKEWED * f:
+        shear = np.eye(2)
     # Metashape's p1 goes with r² + 2x², OpenCV's with 2xy in x: they are exchanged.
-    terms = [value("k1"), value("k2"), value("p2"), value("p1"), value("k3")]
-    if fisheye:
-        terms = [value(name) for name in ("k1", "k2", "k3", "k4")]
-    source, model = f"Metashape, {path.name}", "fisheye" if fisheye else "opencv"
-    return LensData(matrix, np.array(terms), model, (width, height), source)
+    radial, tangential = (k1, k2, k3, k4), (p2, p1, p3, p4)
+    fit = brown_lens(
+        focal, centre, radial, tangential, size, source, angle=_ANGLES[kind], shear=shear
+    )  # fmt: skip
+    return fit, shear
 
 
 def _opencv(path: Path) -> LensData:
@@ -265,50 +256,50 @@ def opencv_values(path: Path) -> dict[str, FloatArray]:
 
 
 def _json_values(path: Path) -> dict[str, FloatArray]:
-    found: dict[str, FloatArray] = {}
+    values: dict[str, FloatArray] = {}
     for key, value in read_object(path, what="OpenCV calibration").items():
         if key in _NAMED and value in _FISHEYES:
-            found[FISHEYE_KEY] = np.ones(1)
+            values[FISHEYE_KEY] = np.ones(1)
         elif isinstance(value, Mapping) and {"rows", "cols", "data"} <= value.keys():
-            found[key] = _table(path, key, value["data"], [value["rows"], value["cols"]])
+            values[key] = _table(path, key, value["data"], [value["rows"], value["cols"]])
         elif isinstance(value, list) or is_finite_number(value):
-            found[key] = _table(path, key, value, None)
-    return found
+            values[key] = _table(path, key, value, None)
+    return values
 
 
 def _xml_values(path: Path, text: str) -> dict[str, FloatArray]:
     root = xml_root(path, text)
     if root.tag != "opencv_storage":
         raise InputError(f"{path}: is not an OpenCV calibration file.")
-    found = {}
+    values = {}
     for node in root:
         words = (node.findtext("data") or node.text or "").split()
         if node.find("data") is not None:
             shape = [node.findtext("rows"), node.findtext("cols")]
-            found[node.tag] = _table(path, node.tag, words, shape)
+            values[node.tag] = _table(path, node.tag, words, shape)
         elif words and all(map(_is_number, words)):
-            found[node.tag] = np.array([float(word) for word in words])
-    return found
+            values[node.tag] = np.array([float(word) for word in words])
+    return values
 
 
 def _yaml_values(path: Path, text: str) -> dict[str, FloatArray]:
     if not re.search(r"^\w+:", text, re.MULTILINE):
         raise InputError(f"{path}: is not an OpenCV calibration file.")
-    found: dict[str, FloatArray] = {}
+    values: dict[str, FloatArray] = {}
     named = rf"^(?:{'|'.join(_NAMED)}):\s*[\"']?(?:{'|'.join(_FISHEYES)})\b"
     if re.search(named, text, re.MULTILINE):
-        found[FISHEYE_KEY] = np.ones(1)
+        values[FISHEYE_KEY] = np.ones(1)
     for match in _YAML.finditer(text):
         words = (match["number"] or match["list"] or match["data"] or "").replace(",", " ").split()
         if match["rows"] is not None:
             shape = [match["rows"], match["cols"]]
-            found[match["key"]] = _table(path, match["key"], words, shape)
+            values[match["key"]] = _table(path, match["key"], words, shape)
         elif words and all(map(_is_number, words)):
-            found[match["key"]] = np.array([float(word) for word in words])
+            values[match["key"]] = np.array([float(word) for word in words])
     for key in re.findall(r"^(\w+):[ \t]*!!opencv-matrix", text, re.MULTILINE):
-        if key not in found:
+        if key not in values:
             raise InputError(f"{path}: the matrix {key} is damaged; export the calibration again.")
-    return found
+    return values
 
 
 def _is_number(word: str) -> bool:

@@ -281,11 +281,11 @@ def rays_meeting(cameras: Sequence[Pinhole], pixels_of: Sequence[FloatArray]) ->
         value.append(rows @ camera.centre)
     rows, side = np.concatenate(design, axis=1), np.concatenate(value, axis=1)
     normal = np.swapaxes(rows, 1, 2) @ rows
-    known = np.isfinite(normal).all(axis=(1, 2))
-    known[known] = np.linalg.det(normal[known]) > 0
+    finite = np.isfinite(normal).all(axis=(1, 2))
+    finite[finite] = np.linalg.det(normal[finite]) > 0
     xyz = np.full((len(rows), 3), np.nan)
-    right = np.einsum("nij,ni->nj", rows[known], side[known])
-    xyz[known] = np.linalg.solve(normal[known], right[..., None])[..., 0]
+    right = np.einsum("nij,ni->nj", rows[finite], side[finite])
+    xyz[finite] = np.linalg.solve(normal[finite], right[..., None])[..., 0]
     return xyz
 
 

@@ -106,17 +106,19 @@ class LasCloud(Cloud):
         texts: Sequence[str] = (),  # noqa: ARG002
     ) -> Iterator[CloudPiece]:
         """Yield pieces of the cloud."""
-        seen = 0
+        count = 0
         with self._reading() as reader:
             for points in reader.chunk_iterator(PIECE):
-                seen += len(points)
+                count += len(points)
                 xyz = np.column_stack([np.asarray(points[axis], float) for axis in "xyz"])
-                wanted = {k: np.asarray(points[k], float) for k in numbers if self.has(k)}
-                yield CloudPiece(xyz=checked_positions(self.path, xyz), raw=points, numbers=wanted)
-        if seen != self._header.point_count:
+                attributes = {k: np.asarray(points[k], float) for k in numbers if self.has(k)}
+                yield CloudPiece(
+                    xyz=checked_positions(self.path, xyz), raw=points, numbers=attributes
+                )
+        if count != self._header.point_count:
             raise InputError(
                 f"{self.path}: its header promises {self._header.point_count} points, the file "
-                f"holds {seen}; it is cut off."
+                f"holds {count}; it is cut off."
             )
 
     @contextmanager
@@ -209,14 +211,14 @@ def write_las(
             columns[name] = values.astype(np.uint16) * 257
         else:
             columns["user_data" if name == "quality" else name] = values
-    known = set(header.point_format.dimension_names)
+    names = set(header.point_format.dimension_names)
     header.add_extra_dims(
         [
             laspy.ExtraBytesParams(
                 name=name, type=values.dtype, description=descriptions.get(name, "")
             )
             for name, values in columns.items()
-            if name not in known
+            if name not in names
         ]
     )
     cloud = laspy.LasData(header)

@@ -91,8 +91,10 @@ class PlyCloud(Cloud):
             for first in range(0, self._count, PIECE):
                 rows = self._rows(file, self._dtype, min(PIECE, self._count - first), "point")
                 xyz = np.column_stack([rows[axis].astype(np.float64) for axis in "xyz"])
-                wanted = {k: rows[k].astype(np.float64) for k in numbers if self.has(k)}
-                yield CloudPiece(xyz=checked_positions(self.path, xyz), raw=rows, numbers=wanted)
+                attributes = {k: rows[k].astype(np.float64) for k in numbers if self.has(k)}
+                yield CloudPiece(
+                    xyz=checked_positions(self.path, xyz), raw=rows, numbers=attributes
+                )
 
     def _rows(self, file: BinaryIO, dtype: np.dtype[Any], count: int, what: str) -> NDArray[Any]:
         """Return the next so many points or faces; a text line may go on behind a face's."""

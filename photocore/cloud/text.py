@@ -113,14 +113,14 @@ class TextCloud(Cloud):
         self, *, numbers: Sequence[str] = (), texts: Sequence[str] = ()
     ) -> Iterator[CloudPiece]:
         """Yield pieces of the file."""
-        wanted = [*"XYZ", *(key for key in numbers if key in self._columns)]
+        keys = [*"XYZ", *(key for key in numbers if key in self._columns)]
         with self._open() as file:
             rows = self._rows(file)
             for _ in range(self._notes + self._headed):
                 next(rows)
             while piece := list(islice(rows, PIECE)):
                 errors: list[CellError] = []
-                values = {key: self._floats(piece, self._columns[key], errors) for key in wanted}
+                values = {key: self._floats(piece, self._columns[key], errors) for key in keys}
                 if errors:
                     raise WorkbookError(errors)
                 yield CloudPiece(

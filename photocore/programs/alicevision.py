@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from photocore.arrays import FloatArray
-from photocore.camera.lensformats import LensData, lens_data
+from photocore.camera.lensdata import LensData, lens_data
 from photocore.camera.rotation import checked_rotation, nearest_rotation
 from photocore.errors import InputError
 from photocore.programs.json_values import JsonValue
@@ -75,11 +75,11 @@ def _alicevision_lens(lens: JsonValue, version: tuple[int, ...], path: Path) -> 
     kind = lens["type"].text().lower()
     if kind == "pinhole" and "distortionType" in lens:
         kind = lens["distortionType"].text().lower()
-    given = lens.get("distortionParams", []).numbers(-1)
+    numbers = lens.get("distortionParams", []).numbers(-1)
     undone = lens.get("undistortionParams", []).numbers(-1)
     if undone.any():
         kind = lens.get("undistortionType", "an undistortion").text()
-    return _lens(focal, centre, kind, given, size, path)
+    return _lens(focal, centre, kind, numbers, size, path)
 
 
 def read_openmvg(path: Path, value: JsonValue) -> ForeignProject:
@@ -132,11 +132,11 @@ def _lens(
 ) -> LensData:  # fmt: skip
     """Return a lens of either program."""
     fisheye = kind in _FISHEYES
-    own = tuple(range(4)) if fisheye else _BROWN.get(kind)
-    if own is None or len(own) != len(given):
+    order = tuple(range(4)) if fisheye else _BROWN.get(kind)
+    if order is None or len(order) != len(given):
         raise InputError(remark("programs.lens_model", of=path, kind=kind, count=len(given)))
     terms = np.zeros(4 if fisheye else 5)
-    terms[list(own)] = given
+    terms[list(order)] = given
     return lens_data(
         focal.tolist(), centre.tolist(), terms.tolist(), size, f"{kind}, {path.name}",
         fisheye=fisheye,
@@ -155,5 +155,5 @@ def _project(
 ) -> ForeignProject:
     if not views:
         raise InputError(remark("programs.no_pose", of=path))
-    said = (f"{unposed} photos without a pose of their own left out.",) if unposed else ()
-    return ForeignProject(program, tuple(views), np.array(points).reshape(-1, 3), remarks=said)
+    notes = (f"{unposed} photos without a pose of their own left out.",) if unposed else ()
+    return ForeignProject(program, tuple(views), np.array(points).reshape(-1, 3), remarks=notes)

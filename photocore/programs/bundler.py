@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from photocore.arrays import FloatArray, floats_of_words
-from photocore.camera.lensformats import lens_data
+from photocore.camera.lensdata import lens_data
 from photocore.camera.rotation import checked_rotation, nearest_rotation
 from photocore.errors import InputError
 from photocore.programs.model import ForeignProject, ForeignView
@@ -62,10 +62,10 @@ def read_bundler(path: Path, size_of: Callable[[str], tuple[int, int]]) -> Forei
         views.append(ForeignView(name, lens, _TURN @ turn, -turn.T @ block[12:]))
     if not views:
         raise InputError(f"{path}: holds no registered photo.")
-    left = cameras - len(views)
-    said = (f"{left} photos that are not registered left out.",) if left else ()
+    unregistered = cameras - len(views)
+    notes = (f"{unregistered} photos that are not registered left out.",) if unregistered else ()
     points = _points(words[end:], count, path)
-    return ForeignProject("Bundler", tuple(views), points, remarks=said)
+    return ForeignProject("Bundler", tuple(views), points, remarks=notes)
 
 
 def _names(path: Path, cameras: int) -> list[str]:
@@ -87,11 +87,11 @@ def _names(path: Path, cameras: int) -> list[str]:
 
 def _points(words: list[str], count: int, path: Path) -> FloatArray:
     """Return positions: of each point follow a colour and so many views of four numbers each."""
-    found, place = [], 0
+    points, place = [], 0
     for k in range(count):
         head = words[place : place + 7]
         if len(head) < 7 or not head[6].isdecimal():
             raise InputError(f"{path}: point {k + 1} of {count} is cut short or damaged.")
-        found.append(floats_of_words(head[:3], path, f"point {k + 1}"))
+        points.append(floats_of_words(head[:3], path, f"point {k + 1}"))
         place += 7 + 4 * int(head[6])
-    return np.array(found).reshape(-1, 3)
+    return np.array(points).reshape(-1, 3)

@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from photocore.arrays import FloatArray, floats_of_words
-from photocore.camera.lensformats import COLMAP_NUMBERS, LensData, colmap_lens, colmap_parameters
+from photocore.camera.lensdata import LensData
+from photocore.camera.lensformats import COLMAP_NUMBERS, colmap_lens, colmap_parameters
 from photocore.camera.rotation import quaternion_from_rotation, rotation_from_quaternion
 from photocore.errors import LARGEST, InputError
 from photocore.output import atomic_folder
@@ -209,12 +210,12 @@ def _image(
     """Return an image of a quaternion with a translation, and of x, y, id of each of its points."""
     if camera not in lenses:
         raise InputError(f"{where}: camera {camera} is not in cameras.txt.")
-    known = np.flatnonzero(table[:, 2] != _NONE)
+    rows = np.flatnonzero(table[:, 2] != _NONE)
     # Two keypoints of one image may be said to be of one point; the first is kept.
-    known = known[np.sort(np.unique(table[known, 2], return_index=True)[1])]
+    rows = rows[np.sort(np.unique(table[rows, 2], return_index=True)[1])]
     rotation = rotation_from_quaternion(pose[:4], f"{where}, quaternion")
-    ids = [str(int(v)) for v in table[known, 2]]
-    return ColmapImage(name, camera, rotation, pose[4:], table[known, :2] - CORNER, ids)
+    ids = [str(int(v)) for v in table[rows, 2]]
+    return ColmapImage(name, camera, rotation, pose[4:], table[rows, :2] - CORNER, ids)
 
 
 def _points(path: Path) -> tuple[list[str], FloatArray]:

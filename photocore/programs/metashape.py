@@ -2,18 +2,21 @@
 
 A camera's transform is world from camera, 4 x 4 row by row, y down and z forwards, in the frame of
 the chunk, whose own transform (rotation, translation, scale) leads to the world. Image points count
-from the corner of the image: u = w / 2 + cx + x' f + x' b1, v = h / 2 + cy + y' f.
+from the corner of the image: u = w / 2 + cx + x' f + x' b1 + y' b2,
+v = h / 2 + cy + y' f.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 
 from photocore.arrays import FloatArray, floats_of_words
-from photocore.camera.lensformats import LensData, metashape_lens, xml_root
+from photocore.camera.lensfit import FittedLens
+from photocore.camera.lensformats import PROJECTIONS, metashape_lens, xml_root
 from photocore.camera.rotation import checked_rotation, nearest_rotation
 from photocore.errors import InputError
 from photocore.programs.model import ForeignProject, ForeignView, chosen_part
@@ -60,17 +63,20 @@ def read_metashape_project(path: Path, part: str | None = None) -> ForeignProjec
     lenses = {sensor.get("id", ""): _lens(sensor, path) for sensor in sensors}
     rotation, translation, scale = _world_from_chunk(chunk, component, path)
     views: list[ForeignView] = []
-    for node in _aligned(chunk, component):
-        name = _name(node)
+    fitted: dict[str, None] = {}
+    aligned = _aligned(chunk, component)
+    for node, name in zip(aligned, _names(chunk, aligned, path), strict=True):
         lens = lenses.get(node.get("sensor_id", ""), "has no calibration")
         if isinstance(lens, str):
             raise InputError(f"{path}: the sensor of camera {name} {lens}.")
+        fitted |= dict.fromkeys(lens[0].remarks)
         text = f"transform of camera {name}"
         matrix = _numbers(node.findtext("transform", ""), 16, path, text).reshape(4, 4)
         turn = checked_rotation(matrix[:3, :3], f"{path}: transform of {name}", tolerance=_PRINTED)
         world = rotation @ nearest_rotation(turn)
         centre = scale * (rotation @ matrix[:3, 3]) + translation
-        views.append(ForeignView(name, lens, world.T, centre))
+        views.append(ForeignView(name, lens[0].lens, world.T, centre, lens[1]))
+    remarks += tuple(fitted)
     cameras = chunk.findall("./cameras//camera")
     off = [_name(node) for node in cameras if not _is_enabled(node)]
     if off:
@@ -88,6 +94,21 @@ def read_metashape_project(path: Path, part: str | None = None) -> ForeignProjec
 
 def _name(camera: ElementTree.Element) -> str:
     return camera.get("label") or f"camera {camera.get('id', '')}"
+
+
+def _names(chunk: ElementTree.Element, cameras: list[ElementTree.Element], path: Path) -> list[str]:
+    """Return labels, with the group's before those that several cameras share."""
+    groups = {camera: f"{group.get('label', '')}/" for group in chunk.findall("./cameras//group")
+              for camera in group.findall("camera")}  # fmt: skip
+    labels = Counter(map(_name, cameras))
+    names = [groups.get(camera, "") * (labels[_name(camera)] > 1) + _name(camera)
+             for camera in cameras]  # fmt: skip
+    name, count = Counter(names).most_common(1)[0]
+    if count > 1:
+        ids = [camera.get("id", "") for camera, one in zip(cameras, names, strict=True)
+               if one == name]  # fmt: skip
+        raise InputError(remark("programs.alike", of=path, name=name, ids=", ".join(ids)))
+    return names
 
 
 def _is_enabled(camera: ElementTree.Element) -> bool:
@@ -115,16 +136,16 @@ def _aligned(chunk: ElementTree.Element, component: str | None) -> list[ElementT
     ]
 
 
-def _lens(sensor: ElementTree.Element, path: Path) -> LensData | str:
-    """Return the lens of a sensor, or what is wrong with it."""
+def _lens(sensor: ElementTree.Element, path: Path) -> tuple[FittedLens, FloatArray] | str:
+    """Return the lens of a sensor and the shear of its axes, or what is wrong with it."""
     kind = sensor.get("type", "frame")
-    if kind not in ("frame", "fisheye"):
+    if kind not in PROJECTIONS:
         return f"is of the type {kind}; frame cameras and fisheyes alone are read; leave it out"
     nodes = sensor.findall("calibration")
     best = [node for node in nodes if node.get("class") == "adjusted"] or nodes
     if not best:
         return "has no calibration"
-    return metashape_lens(best[0], path, fisheye=kind == "fisheye")
+    return metashape_lens(best[0], path, kind)
 
 
 def _world_from_chunk(

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from photocore.arrays import FloatArray
-from photocore.camera.lensformats import LensData
+from photocore.camera.lensdata import LensData
+from photocore.camera.pinhole import Pinhole
 from photocore.errors import InputError
 from photocore.remarks import remark
 
@@ -26,12 +27,22 @@ class ForeignView(NamedTuple):
         Camera from the project's frame.
     centre : ndarray, shape (3,)
         Projection centre. [unit of the project]
+    shear : ndarray, shape (2, 2)
+        Of the image axes, which a lens's camera matrix does not hold.
     """
 
     name: str
     lens: LensData
     rotation: FloatArray
     centre: FloatArray
+    shear: FloatArray = np.eye(2)
+
+    @property
+    def camera(self) -> Pinhole:
+        """The camera behind its lens."""
+        matrix = self.lens.camera_matrix.copy()
+        matrix[:2, :2] = matrix[:2, :2] @ self.shear
+        return Pinhole(matrix, self.rotation, self.centre)
 
 
 class ForeignProject(NamedTuple):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from photocore.camera.lensformats import LensData, lens_data
+from photocore.camera.lensdata import LensData, lens_data
 from photocore.camera.rotation import rotation_from_vector
 from photocore.errors import InputError
 from photocore.programs.json_values import JsonValue
@@ -54,10 +54,10 @@ def read_opensfm(path: Path, value: JsonValue, part: str | None = None) -> Forei
         views.append(ForeignView(name, lenses[camera], rotation, centre))
     points = [point["coordinates"].numbers(3) for _, point in best.get("points", {}).items()]
     place = best.get("reference_lla", {})
-    known = any(place.get(key, 0.0).number() for key in ("latitude", "longitude"))
+    is_placed = any(place.get(key, 0.0).number() for key in ("latitude", "longitude"))
     return ForeignProject(
         "OpenSfM", tuple(views), np.array(points).reshape(-1, 3),
-        metres="the positions of the photos or ground control" if known else "",
+        metres="the positions of the photos or ground control" if is_placed else "",
         remarks=remarks,
     )  # fmt: skip
 

@@ -38,16 +38,17 @@ class PhotoFinder:
         return next((path for path in self._candidates(name) if path.is_file()), None)
 
     def _candidates(self, name: str) -> Iterator[Path]:
-        own = PurePath(name)
-        if self.images is None and own.is_absolute():
+        plain = PurePath(name)
+        if self.images is None and plain.is_absolute():
             yield Path(name)
         for folder in self.folders:
-            for part in dict.fromkeys((own.as_posix(), own.name)):
-                if not Path(part).is_absolute():
-                    yield folder / part
-            if own.suffix.lower() not in _ENDINGS:  # Metashape's labels have no ending
-                for ending in (*_ENDINGS, *map(str.upper, _ENDINGS)):
-                    yield folder / f"{own.name}{ending}"
+            for part in dict.fromkeys((plain.as_posix(), plain.name)):
+                if Path(part).is_absolute():
+                    continue
+                yield folder / part
+                if plain.suffix.lower() not in _ENDINGS:  # Metashape's labels have no ending
+                    for ending in (*_ENDINGS, *map(str.upper, _ENDINGS)):
+                        yield folder / f"{part}{ending}"
 
     def size(self, name: str) -> tuple[int, int]:
         """Return width and height of a photo [px]; its project does not tell them.

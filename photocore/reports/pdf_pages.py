@@ -47,9 +47,9 @@ def write_pdf(
 
     from photocore.reports.tagged_pdf import TaggedPdf
 
-    made = datetime.fromisoformat(today()).replace(tzinfo=UTC)
+    date = datetime.fromisoformat(today()).replace(tzinfo=UTC)
     info: dict[str, Any] = {"Title": document.title, "Creator": document.subject}
-    info |= {"Producer": "bifocal", "CreationDate": made, "ModDate": made}
+    info |= {"Producer": "bifocal", "CreationDate": date, "ModDate": date}
     info["Subject"] = "; ".join(provenance().lines())
     size = min(SIZES, key=lambda size: (_emptiest(document, size), -size))
     with atomic_path(path, overwrite=overwrite) as temporary:

@@ -37,8 +37,8 @@ class Element:
 
     def add(self, tag: str, alt: str = "") -> Element:
         """Return a new element within this one."""
-        self.kids.append(made := Element(tag, alt))
-        return made
+        self.kids.append(child := Element(tag, alt))
+        return child
 
 
 class TaggedPdf(PdfFile):  # type: ignore[misc,unused-ignore]
@@ -110,16 +110,16 @@ class TaggedPdf(PdfFile):  # type: ignore[misc,unused-ignore]
         super().finalize()
 
     def _write_element(self, element: Element, parent: Any, objects: dict[Element, Any]) -> None:
-        own = objects[element] = self.reserveObject("structure element")
+        number = objects[element] = self.reserveObject("structure element")
         content = {
             "Type": Name("StructElem"), "S": Name(element.tag), "P": parent,
-            "K": list(self._kids(element, own, objects)),
+            "K": list(self._kids(element, number, objects)),
         }  # fmt: skip
         if element.alt:
             content["Alt"] = element.alt
         if element.tag == "TH":
             content["A"] = {"O": Name("Table"), "Scope": Name("Column")}
-        super().writeObject(own, content)
+        super().writeObject(number, content)
 
     def _kids(self, element: Element, own: Any, objects: dict[Element, Any]) -> Iterator[Any]:
         for kid in element.kids:

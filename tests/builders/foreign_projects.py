@@ -3,6 +3,8 @@
 COLMAP: colmap.github.io/format.html. Metashape: its manual, appendix C (camera models), and its
 exported cameras. OpenSfM: opensfm.org/docs/geometry.html and dataset.html. AliceVision: version
 notes in sfmDataIO. OpenMVG: its documentation of sfm_data. Bundler: its manual, Output format.
+RealityCapture: Epic's "XMP Camera Math" and nerfstudio's reader of its table. NeRF: nerfstudio,
+Data conventions. VisualSFM: ccwu.me/vsfm, NVM, and Multicore Bundle Adjustment's notes.
 """
 
 from __future__ import annotations
@@ -283,4 +285,73 @@ def write_bundler(path: Path, shots: Sequence[Shot], xyz: np.ndarray) -> Path:
     path.write_text("\n".join(lines) + "\n")
     names = "\n".join([*(shot.file for shot in shots), "lost.png 0 400"])
     path.with_name("list.txt").write_text(names + "\n")
+    return path
+
+
+def write_nerf(path: Path, shots: Sequence[Shot], _: np.ndarray) -> Path:
+    """Write transforms.json: OpenGL's axes, pixels from the corner."""
+    frames = []
+    for shot in shots:
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = shot.rotation.T * [1, -1, -1], shot.place
+        k1, k2, p1, p2, k3 = shot.terms
+        frames.append({
+            "file_path": f"./{shot.file}", "transform_matrix": matrix.tolist(),
+            "fl_x": shot.focal[0], "fl_y": shot.focal[1], "cx": shot.centre[0] + 0.5,
+            "cy": shot.centre[1] + 0.5, "k1": k1, "k2": k2, "k3": k3, "p1": p1, "p2": p2,
+        })  # fmt: skip
+    width, height = shots[0].size
+    whole = {"camera_model": "OPENCV", "w": width, "h": height, "aabb_scale": 16}
+    path.write_text(json.dumps(whole | {"frames": frames}))
+    return path
+
+
+def _reality(shot: Shot) -> tuple[float, float, float, list[float]]:
+    """Return f of 35 mm film, principal point in longer sides, k1 k2 k3 k4 t1 t2."""
+    longer, (k1, k2, p1, p2, k3) = max(shot.size), shot.terms
+    u, v = ((c + 0.5 - side / 2) / longer for c, side in zip(shot.centre, shot.size, strict=True))
+    return shot.focal[0] * 36 / longer, u, v, [k1, k2, k3, 0, p1, p2]
+
+
+def write_reality_xmp(folder: Path, shots: Sequence[Shot], _: np.ndarray) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    for shot in shots:
+        focal, u, v, terms = _reality(shot)
+        (folder / shot.file).with_suffix(".xmp").write_text(
+            '<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/'
+            '22-rdf-syntax-ns#"><rdf:Description xcr:Version="3" xcr:PosePrior="exact" '
+            'xcr:Coordinates="relative" xcr:DistortionModel="brown3t2" '
+            f'xcr:FocalLength35mm="{focal!r}" xcr:Skew="0" '
+            f'xcr:AspectRatio="{shot.focal[1] / shot.focal[0]!r}" xcr:PrincipalPointU="{u!r}" '
+            f'xcr:PrincipalPointV="{v!r}" xmlns:xcr="http://www.capturingreality.com/ns/xcr/1.1#">'
+            f"<xcr:Rotation>{_numbers(shot.rotation.ravel())}</xcr:Rotation>"
+            f"<xcr:Position>{_numbers(shot.place)}</xcr:Position>"
+            f"<xcr:DistortionCoeficients>{_numbers(terms)}</xcr:DistortionCoeficients>"
+            "</rdf:Description></rdf:RDF></x:xmpmeta>"
+        )
+    return folder
+
+
+def write_reality_table(path: Path, shots: Sequence[Shot], _: np.ndarray) -> Path:
+    """Write internal and external parameters; heading clockwise, pitch 0 looks down."""
+    lines = ["#cameras 4", "#name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2"]
+    for shot in shots:
+        world = Rotation.from_matrix(shot.rotation.T * [1, -1, -1])
+        turn, pitch, roll = world.as_euler("ZXY", degrees=True)  # intrinsic: Rz Rx Ry
+        focal, u, v, terms = _reality(shot)
+        values = [*shot.place, -turn, pitch, roll, focal, u, v, *terms]
+        lines.append(",".join([shot.file, *(repr(float(value)) for value in values)]))
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def write_visualsfm(path: Path, shots: Sequence[Shot], xyz: np.ndarray) -> Path:
+    lines = ["NVM_V3 ", "", str(len(shots))]
+    for shot in shots:
+        x, y, z, w = Rotation.from_matrix(shot.rotation).as_quat()
+        numbers = _numbers([shot.focal[0], w, x, y, z, *shot.place, 0, 0])
+        lines.append(f"{shot.file}\t{numbers}")
+    lines += ["", str(len(xyz))]
+    lines += [f"{_numbers(row)} 90 90 90 2 0 7 1.5 2.5 1 8 3.5 4.5" for row in xyz]
+    path.write_text("\n".join([*lines, "", "0", "", "#the last part", "0"]) + "\n")
     return path

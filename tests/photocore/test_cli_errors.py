@@ -154,7 +154,10 @@ def test_a_process_that_ends_so_is_noticed_by_every_test(unforeseen) -> None:
 
 
 @pytest.mark.acceptance
-def test_a_test_fails_that_ends_in_the_handler(pytester: pytest.Pytester, request) -> None:
+def test_a_test_fails_that_ends_in_the_handler(
+    pytester: pytest.Pytester, request, monkeypatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(request.config.rootpath))  # what conftest.py imports
     conftest = request.config.rootpath / "tests" / "conftest.py"
     pytester.makeconftest(conftest.read_text(encoding="utf-8"))
     pytester.makepyfile(

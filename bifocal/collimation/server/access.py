@@ -50,10 +50,10 @@ class Access:
 
     def keep(self, port: int, url: str) -> None:
         """Write token and port down; a folder that cannot be written to is none of our worries."""
-        known = json.dumps({"token": self.token, "port": port})
+        content = json.dumps({"token": self.token, "port": port})
         leads = f'<!doctype html><meta http-equiv="refresh" content="0; url={url}">\n'
         with contextlib.suppress(OSError):
-            for path, text in ((self.path, known), (self.page, leads)):
+            for path, text in ((self.path, content), (self.page, leads)):
                 path.unlink(missing_ok=True)
                 flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
                 with os.fdopen(os.open(path, flags, 0o600), "w", encoding="utf-8") as file:

@@ -45,11 +45,11 @@ async def _photos(request: Request) -> Response:
         files = [(each.filename or "", each.file) for each in sent if isinstance(each, UploadFile)]
 
         def take() -> dict[str, Any]:
-            there = session.all_photos
-            further = len(there) > 1 and len(files) == 1
+            present = session.all_photos
+            further = len(present) > 1 and len(files) == 1
             if not further:
                 session.check_new_photos()
-            photos = take_photos(session.files.folder, files, there)
+            photos = take_photos(session.files.folder, files, present)
             if further:
                 session.give_others(photos[2:])
             else:
@@ -76,11 +76,11 @@ async def _sample(request: Request) -> Response:
 async def _recent(request: Request) -> Response:
     """Name the surveys that were open before: their folders and names, no more."""
     names = [Path(name) for name in await in_thread(recent)]
-    own = session_of(request).files.workbook.resolve()
+    workbook = session_of(request).files.workbook.resolve()
     shown = [
         {"number": number, "name": path.stem, "folder": path.parent.name}
         for number, path in enumerate(names)
-        if path != own
+        if path != workbook
     ]
     return answer({"surveys": shown})
 
@@ -177,11 +177,11 @@ async def _value(request: Request) -> Response:
     session = session_of(request)
 
     def value() -> dict[str, Any]:
-        found: dict[str, Any] = dict(session.products.value(x, y))
-        if found["r"] is not None:
-            place = np.array([[x, y, found["r"]]])
-            found["picks"] = [one[0] for one in session.pictures.needed_pair().project(place)]
-        return plain(found)
+        facts: dict[str, Any] = dict(session.products.value(x, y))
+        if facts["r"] is not None:
+            place = np.array([[x, y, facts["r"]]])
+            facts["picks"] = [one[0] for one in session.pictures.needed_pair().project(place)]
+        return plain(facts)
 
     return answer(await in_thread(value))
 

@@ -118,8 +118,8 @@ class Guard:
         return None
 
     def _is_token(self, *given: str) -> bool:
-        known = self.token.encode()
-        return any(hmac.compare_digest(word.encode("utf-8", "replace"), known) for word in given)
+        token = self.token.encode()
+        return any(hmac.compare_digest(word.encode("utf-8", "replace"), token) for word in given)
 
 
 def _cookies_in(headers: Headers) -> list[str]:
@@ -133,8 +133,8 @@ def _answer(scope: Scope, status: int, text: str) -> Response:
     headers = Headers(scope=scope)
     if "text/html" not in headers.get("accept", ""):
         return JSONResponse({"error": text}, status)
-    asked = headers.get("accept-language", "")[:2]
-    language = asked if asked in LANGUAGES else "en"
+    preferred = headers.get("accept-language", "")[:2]
+    language = preferred if preferred in LANGUAGES else "en"
     return HTMLResponse(
         f'<!doctype html><html lang="{language}"><meta charset="utf-8"><title>bifocal</title>'
         f"<h1>bifocal</h1><p>{say('ask', 'token', language)}</p><p><small>{text}</small></p>",
@@ -148,13 +148,13 @@ class TooLarge(Exception):
 
 def _limited(receive: Receive, limit: int) -> Receive:
     """Return the body's source, cut off where it grows beyond the limit."""
-    taken = 0
+    received = 0
 
     async def receive_limited() -> Message:
-        nonlocal taken
+        nonlocal received
         message = await receive()
-        taken += len(message.get("body", b""))
-        if taken > limit:
+        received += len(message.get("body", b""))
+        if received > limit:
             raise TooLarge
         return message
 

@@ -107,11 +107,11 @@ def _stage(session: Session) -> str:
 
 def _length_unit(session: Session) -> str:
     """Return the unit of s1, s2, delta_s and e1: on the wall where no camera constant is known."""
-    known = (
+    is_scaled = (
         session.pictures.pair is not None
         and session.pictures.pair.image1.principal_distance is not None
     )
-    return "mm" if known else "m"
+    return "mm" if is_scaled else "m"
 
 
 def _photos(session: Session) -> list[dict[str, Any]]:
@@ -140,15 +140,15 @@ def _photos(session: Session) -> list[dict[str, Any]]:
 
 def _others(session: Session) -> list[dict[str, Any]]:
     """Return the photos beside far and near, and whether they are oriented with the pair."""
-    joined, known = session.photo_set, {}
+    joined, distances = session.photo_set, {}
     if joined is not None and session.pictures.others:
         photos = PhotoSet.read(joined)
-        known = {photo.path.resolve(): photo.distance for photo in photos.photos}
+        distances = {photo.path.resolve(): photo.distance for photo in photos.photos}
     return [
         {
             "image": number, "name": info.path.name, "width": info.size[0],
             "height": info.size[1], "joined": joined is not None,
-            "distance": known.get(info.path.resolve()),
+            "distance": distances.get(info.path.resolve()),
         }
         for number, info in enumerate(session.pictures.others, start=3)
     ]  # fmt: skip
@@ -169,13 +169,13 @@ def _focal_said(session: Session, number: int, info: ImageInfo) -> str:
         share = 100 * report["standard_deviations"].get(f"focal{number}", 0.0) / focal
         return say("focal", "found", language, focal=focal, share=share)
     try:
-        known = interior_of_photo(info, lenses_of(session.state)[number - 1], number)
+        interior = interior_of_photo(info, lenses_of(session.state)[number - 1], number)
     except PhotogrammetryError:  # asked for by another question
         return ""
-    if known.is_assumed:
+    if interior.is_assumed:
         return ""
-    key = "typed" if known.is_typed else "file"
-    return say("focal", key, language, focal=known.focal, share=100 * known.sigma_focal)
+    key = "typed" if interior.is_typed else "file"
+    return say("focal", key, language, focal=interior.focal, share=100 * interior.sigma_focal)
 
 
 def _shapes(session: Session) -> list[dict[str, Any]]:
@@ -199,12 +199,12 @@ def _unscaled(session: Session) -> bool:
 
 def _how_good(session: Session) -> str:
     """Say in a line how good relief is; nothing where that is not known."""
-    known = None if _unscaled(session) else goodness(session)
-    if known is None or known["middle"] is None or known["rim"] is None:
+    good = None if _unscaled(session) else goodness(session)
+    if good is None or good["middle"] is None or good["rim"] is None:
         return ""
-    language, scale = session.spoken, known["scale"]
+    language, scale = session.spoken, good["scale"]
     verdict = say("good", "holds" if scale else "none", language, scale=scale)
-    middle, rim = (1000 * known[key] for key in ("middle", "rim"))
+    middle, rim = (1000 * good[key] for key in ("middle", "rim"))
     return say("good", "relief", language, middle=middle, rim=rim, verdict=verdict)
 
 
@@ -265,7 +265,7 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
             "current": proposal_is_current(session),
             "scaled": not _unscaled(session),
             "report": session.proposal and session.proposal["report"],
-            "remarks": [without_options(said, session.spoken) for said in _remarks(session)],
+            "remarks": [without_options(text, session.spoken) for text in _remarks(session)],
         }
     )
 
@@ -273,7 +273,7 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
 def _remarks(session: Session) -> list[str]:
     """Return what is said of the pair, the worst first."""
     pair, report = session.pictures.pair, (session.proposal or {}).get("report", {})
-    remarks = dict.fromkeys((*(pair.remarks if pair else ()), *report.get("remarks", ())))
+    remarks = dict.fromkeys((*report.get("remarks", ()), *(pair.remarks if pair else ())))
     return sorted(remarks, key=lambda text: LEVELS.index(level_of(text)))
 
 
@@ -302,13 +302,13 @@ def _control(session: Session, live: LiveOrientation | None) -> list[dict[str, A
 
 def _residuals(session: Session, live: LiveOrientation | None) -> dict[str, Any]:
     """Return the residuals of the proposed orientation, else those of control points alone."""
-    found: dict[str, Any] = {} if live is None else dict(live.residuals)
+    residuals: dict[str, Any] = {} if live is None else dict(live.residuals)
     if session.proposal is not None and proposal_is_current(session):
         report = session.proposal["report"].get("control", [])
-        found |= {entry["id"]: entry["residual_px"] for entry in report}
+        residuals |= {entry["id"]: entry["residual_px"] for entry in report}
     return {
         name: plain({"1": _both(values[:2]), "2": _both(values[2:])})
-        for name, values in found.items()
+        for name, values in residuals.items()
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import tempfile
 import unicodedata
@@ -23,6 +24,8 @@ from photocore.output import atomic_path, free_path
 MOST = 12
 #: Photos of more pixels per byte than any camera writes are no photos. [px/byte, px]
 EMPTIEST, FROM = 400, 20_000_000
+#: Names that Windows keeps for devices.
+_DEVICE = re.compile(r"con|prn|aux|nul|(com|lpt)\d", re.IGNORECASE)
 
 
 def take_photos(
@@ -60,7 +63,13 @@ def take_photos(
                 raise InputError(remark("page.same_photo", name=info.path.name))
         if len(kept) < 2:  # else far and near are known
             infos = far_first(infos)
-        return tuple(i.path if i.path in kept else _kept(folder, i.path) for i in infos)
+        copies: list[Path] = []
+        try:
+            return tuple(i.path if i.path in kept else _kept(folder, i.path, copies) for i in infos)
+        except BaseException:  # all of them, or none
+            for path in copies:
+                path.unlink(missing_ok=True)
+            raise
 
 
 def safe_name(name: str) -> str:
@@ -68,8 +77,8 @@ def safe_name(name: str) -> str:
 
     Examples
     --------
-    >>> safe_name("../../etc/Façade 1.JPG"), safe_name("C:\\\\x\\\\far?.tif")
-    ('Façade 1.jpg', 'far.tif')
+    >>> safe_name("../../etc/Façade 1.JPG"), safe_name("C:\\\\x\\\\far?.tif"), safe_name("CON.jpg")
+    ('Façade 1.jpg', 'far.tif', 'CON_.jpg')
     """
     last = name.replace("\\", "/").rpartition("/")[2]
     stem, dot, ending = last.rpartition(".")
@@ -78,7 +87,8 @@ def safe_name(name: str) -> str:
         raise InputError(remark("page.no_photo", name=last[:60]))
     stem = unicodedata.normalize("NFC", stem)
     letters = "".join(c if c.isalnum() or c in " -_.,()+&'" else "_" for c in stem)
-    return f"{letters.strip(' _.')[:80].strip() or 'photo'}{ending}"
+    tidy = letters.strip(" _.")[:80].strip() or "photo"
+    return f"{tidy}{'_' * (_DEVICE.fullmatch(tidy) is not None)}{ending}"
 
 
 def far_first(infos: Sequence[ImageInfo]) -> list[ImageInfo]:
@@ -130,14 +140,15 @@ def _refuse_bomb(path: Path) -> None:
         )
 
 
-def _kept(folder: Path, path: Path) -> Path:
-    """Copy a photo into the folder; one that lies there already is not copied again."""
+def _kept(folder: Path, path: Path, copies: list[Path]) -> Path:
+    """Copy a photo into the folder and list it; one that lies there already is not copied again."""
     target = folder / path.name
     if target.is_file() and _same(target, path):
         return target
     target = free_path(folder, path.stem, path.suffix)
     with atomic_path(target, overwrite=False) as temporary:
         shutil.copyfile(path, temporary)
+    copies.append(target)
     return target
 
 

@@ -71,8 +71,8 @@ def main() -> int:
 
 def _point(entry: dict[str, Any]) -> PickedPoint:
     first, second = (None if pick is None else tuple(pick) for pick in entry["picks"])
-    known = entry["reference"]
-    fields = {**entry, "picks": (first, second), "reference": known and tuple(known)}
+    reference = entry["reference"]
+    fields = {**entry, "picks": (first, second), "reference": reference and tuple(reference)}
     return PickedPoint(**fields)
 
 

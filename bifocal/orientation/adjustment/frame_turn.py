@@ -36,9 +36,9 @@ def line_equations(lines: Sequence[FacadeDirection], cameras: Sequence[Pinhole])
     """
     values, by = np.zeros(len(lines)), np.zeros((len(lines), len(cameras), len(CAMERA)))
     for row, line in enumerate(lines):
-        seen = line.in_frame(cameras[line.camera - 1])
-        values[row] = seen[2] / line.sigma
-        by[row, line.camera - 1, _TURN : _TURN + 3] = skew(seen)[2] / line.sigma
+        direction = line.in_frame(cameras[line.camera - 1])
+        values[row] = direction[2] / line.sigma
+        by[row, line.camera - 1, _TURN : _TURN + 3] = skew(direction)[2] / line.sigma
     return values, by.reshape(len(lines), -1)
 
 
@@ -59,8 +59,10 @@ def family_test(
     estimated = observations.estimated[: len(NAMES)]
     moves = _similarities(state.cameras) @ _free(state.cameras, estimated)
     values, by = line_equations(lines, state.cameras)
-    own, seen = equations(observations, state)[1][:, : len(NAMES)] @ moves, by @ moves
-    open_ = seen @ np.linalg.pinv(own.T @ own, rcond=_LEAST, hermitian=True) @ seen.T
+    measured, of_lines = equations(observations, state)[1][:, : len(NAMES)] @ moves, by @ moves
+    open_ = (
+        of_lines @ np.linalg.pinv(measured.T @ measured, rcond=_LEAST, hermitian=True) @ of_lines.T
+    )
     return float(abs(values.mean()) / np.sqrt(1.0 / len(values) + open_.mean()))
 
 
@@ -94,9 +96,9 @@ def turned_by_lines(
     free = _free(cameras, estimated)
     moves = _similarities(cameras) @ free
     values, by = line_equations(lines, cameras)
-    seen = by @ moves
-    normal = known_of(moves) + seen.T @ seen
-    gain = -np.linalg.pinv(normal, rcond=_LEAST, hermitian=True) @ seen.T
+    of_lines = by @ moves
+    normal = known_of(moves) + of_lines.T @ of_lines
+    gain = -np.linalg.pinv(normal, rcond=_LEAST, hermitian=True) @ of_lines.T
     kept = np.eye(len(cofactor)) + moves @ gain @ by
     noise = moves @ gain
     turn, shift, growth = np.split(free @ gain @ values, [3, 6])
@@ -110,11 +112,11 @@ def turned_by_lines(
 def _similarities(cameras: Sequence[Pinhole]) -> FloatArray:
     """Return how `CAMERA` of all move by turn, shift and growth of the frame, shape (12 m, 7)."""
     by = np.zeros((len(cameras), len(CAMERA), 7))
-    for own, camera in zip(by, cameras, strict=True):
-        own[_TURN : _TURN + 3, :3] = -np.eye(3)
-        own[_PLACE : _PLACE + 3, :3] = -skew(camera.centre)
-        own[_PLACE : _PLACE + 3, 3:6] = np.eye(3)
-        own[_PLACE : _PLACE + 3, 6] = camera.centre
+    for rates, camera in zip(by, cameras, strict=True):
+        rates[_TURN : _TURN + 3, :3] = -np.eye(3)
+        rates[_PLACE : _PLACE + 3, :3] = -skew(camera.centre)
+        rates[_PLACE : _PLACE + 3, 3:6] = np.eye(3)
+        rates[_PLACE : _PLACE + 3, 6] = camera.centre
     return by.reshape(-1, 7)
 
 

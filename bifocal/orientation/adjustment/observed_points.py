@@ -31,5 +31,5 @@ def known_points(
     guess = np.where(np.isfinite(both), both, single)
     flat = control.sigma[:, 2:] < UNKNOWN  # relief known: the plane fixes X and Y better
     guess = np.where(flat & np.isfinite(single) & (control.xyz[:, 2:] == 0), single, guess)
-    known = np.where(np.isfinite(control.xyz), control.xyz, np.nan_to_num(guess))
-    return known, np.where(np.isfinite(control.xyz), control.sigma, UNKNOWN)
+    coordinates = np.where(np.isfinite(control.xyz), control.xyz, np.nan_to_num(guess))
+    return coordinates, np.where(np.isfinite(control.xyz), control.sigma, UNKNOWN)

@@ -122,8 +122,8 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
         rates = pair_equations(observations, state)[1]
 
         def known_of(moves: FloatArray) -> FloatArray:
-            own = rates @ moves
-            return np.asarray(own.T @ own)
+            moved = rates @ moves
+            return np.asarray(moved.T @ moved)
 
         frame, cofactor = turned_by_lines(
             observations.lines, state.cameras, observations.estimated, cofactor, known_of
@@ -207,9 +207,9 @@ def pair_equations(observations: PairObservations, state: PairUnknowns) -> Equat
 
 def wall_equations(observations: PairObservations, state: PairUnknowns) -> Equations:
     """Return what the wall's ties tell of the reference plane: height and slopes, in sigma."""
-    asked = observations.wall_rows.any(axis=0) & observations.tie_used
-    values, by = _wall_ties(observations, state, asked)
-    rows = observations.wall_rows[:, asked]
+    on_wall = observations.wall_rows.any(axis=0) & observations.tie_used
+    values, by = _wall_ties(observations, state, on_wall)
+    rows = observations.wall_rows[:, on_wall]
     return rows @ values, rows @ by
 
 
@@ -217,12 +217,12 @@ def _priors(observations: PairObservations, state: PairUnknowns) -> Equations:
     """Return what is known of lenses, media, distances and tilts: all but the tilts are linear."""
     names, media = observations.names, observations.media
     zoom, body = observations.sigma_zoom, observations.sigma_body
-    known: list[tuple[dict[str, float], float, float | None]] = []
+    priors: list[tuple[dict[str, float], float, float | None]] = []
     tilts, by_tilts = [], []
     for number, (interior, camera) in enumerate(
         zip(observations.interiors, state.cameras, strict=True), start=1
     ):
-        own = {
+        of_cameras = {
             "focal length": (np.log(interior.focal), interior.sigma_focal),
             "aspect": (np.log(interior.aspect), interior.sigma_aspect),
             "column": (interior.centre[0], interior.sigma_centre),
@@ -230,7 +230,7 @@ def _priors(observations: PairObservations, state: PairUnknowns) -> Equations:
             "k1": (0.0, interior.sigma_radial),
             "k2": (0.0, interior.sigma_radial),
         }
-        known += [({f"{name} {number}": 1.0}, *said) for name, said in own.items()]
+        priors += [({f"{name} {number}": 1.0}, *measure) for name, measure in of_cameras.items()]
         if observations.sigma_tilt is not None:
             axis, turn = camera.rotation[2], at("turn X", number)
             turned = skew(axis)
@@ -242,19 +242,19 @@ def _priors(observations: PairObservations, state: PairUnknowns) -> Equations:
     aspect = None if body is None else SIGMA_ASPECT
     same = {"focal length": zoom, "column": body, "row": body, "aspect": aspect}
     same |= {"k1": lens, "k2": lens}
-    known += [({f"{name} 1": 1.0, f"{name} 2": -1.0}, 0.0, sigma) for name, sigma in same.items()]
+    priors += [({f"{name} 1": 1.0, f"{name} 2": -1.0}, 0.0, sigma) for name, sigma in same.items()]
     far, near = {"Z 1": 1.0}, {"Z 2": 1.0}
     distances = {"distance1": far, "distance2": near, "delta_d": {"Z 1": 1.0, "Z 2": -1.0}}
-    known += [(distances[name], *said) for name, said in observations.measured.items()]
-    known += [({k: 1.0}, media.value(k), s) for k, s in media.sigmas.items() if np.isfinite(s)]
-    rows = [(terms, value, sigma) for terms, value, sigma in known if sigma]
-    wanted, sigmas = np.array([row[1:] for row in rows]).reshape(-1, 2).T
+    priors += [(distances[name], *measure) for name, measure in observations.measured.items()]
+    priors += [({k: 1.0}, media.value(k), s) for k, s in media.sigmas.items() if np.isfinite(s)]
+    rows = [(terms, value, sigma) for terms, value, sigma in priors if sigma]
+    means, sigmas = np.array([row[1:] for row in rows]).reshape(-1, 2).T
     jacobian = np.zeros((len(rows), len(names)))
     for row, (terms, *_) in enumerate(rows):
         jacobian[row, [names.index(name) for name in terms]] = list(terms.values())
     values = np.array([*state.values(), *(state.media.value(name) for name in media.sigmas)])
     return (
-        np.concatenate([(jacobian @ values - wanted) / sigmas, *tilts]),
+        np.concatenate([(jacobian @ values - means) / sigmas, *tilts]),
         np.concatenate([jacobian / sigmas[:, None], *by_tilts]),
     )
 
@@ -364,26 +364,26 @@ def _control(
     models = observations.radial_models(state.radial)
     raw = (control.pixels1, control.pixels2)
     picks = np.concatenate([m.undistort(x) for m, x in zip(models, raw, strict=True)], axis=1)
-    known, sigma = known_points(observations, state, picks)
-    xyz = known
-    seen = np.isfinite(picks) & used[:, None]
+    coordinates, sigma = known_points(observations, state, picks)
+    xyz = coordinates
+    picked = np.isfinite(picks) & used[:, None]
     held = np.eye(3) / sigma[:, :, None]
     for _ in range(3):
         views = views_of(state, xyz)
         rows = np.concatenate([view.by_point for view in views], axis=1) / sigma_pick
         misfit = (picks - np.concatenate([view.pixels for view in views], axis=1)) / sigma_pick
-        rows = np.where(seen[:, :, None], np.nan_to_num(rows), 0.0)
-        misfit = np.where(seen, np.nan_to_num(misfit, nan=1e4), 0.0)
+        rows = np.where(picked[:, :, None], np.nan_to_num(rows), 0.0)
+        misfit = np.where(picked, np.nan_to_num(misfit, nan=1e4), 0.0)
         base, triangle = np.linalg.qr(np.concatenate([rows, held], axis=1), mode="complete")
         turn, triangle = base.transpose(0, 2, 1), triangle[:, :3]
-        split = turn @ np.concatenate([misfit, (known - xyz) / sigma], axis=1)[..., None]
+        split = turn @ np.concatenate([misfit, (coordinates - xyz) / sigma], axis=1)[..., None]
         xyz = xyz + np.linalg.solve(triangle, split[:, :3])[..., 0]
     rates = [
         rates_of(seen_by, -model.undistorted_by_k(x), number)
         for number, (seen_by, model, x) in enumerate(zip(views, models, raw, strict=True))
     ]
     by = state.media.rates_by_unknowns(-np.concatenate(rates, axis=1))
-    split_by = turn[:, :, :4] @ np.where(seen[:, :, None], np.nan_to_num(by / sigma_pick), 0.0)
+    split_by = turn[:, :, :4] @ np.where(picked[:, :, None], np.nan_to_num(by / sigma_pick), 0.0)
     return _AdjustedControl(
         misfit=split[:, 3:, 0],
         by_unknowns=split_by[:, 3:],
@@ -399,8 +399,8 @@ def _control_residuals(observations: PairObservations, state: PairUnknowns) -> F
         return np.zeros((0, 4))
     xyz = np.where(np.isfinite(control.xyz), control.xyz, _control(observations, state).xyz)
     parts = [
-        model.undistort(pixels) - seen.pixels
-        for model, pixels, seen in zip(
+        model.undistort(pixels) - view.pixels
+        for model, pixels, view in zip(
             observations.radial_models(state.radial), (control.pixels1, control.pixels2),
             views_of(state, xyz), strict=True,
         )
@@ -421,13 +421,13 @@ def _lengths(
     ]
     if not lengths:
         return np.zeros(0), np.zeros((0, len(observations.names)))
-    first, second, taped, own = (np.array(column) for column in zip(*lengths, strict=True))
+    first, second, taped, sigmas = (np.array(column) for column in zip(*lengths, strict=True))
     between = control.xyz[first] - control.xyz[second]
     between_by = control.xyz_by_unknowns[first] - control.xyz_by_unknowns[second]
     # Where no ray of an end meets the wall, on the way to a solution, it is nowhere.
     length = np.maximum(np.linalg.norm(between, axis=1), 1e-9)
     pick = 1.41 * far.centre[2] / far.matrix[0, 0] * observations.sigma_pick
-    sigma = np.hypot(np.where(np.isnan(own), points.sigma.min(initial=0.003), own), pick)
+    sigma = np.hypot(np.where(np.isnan(sigmas), points.sigma.min(initial=0.003), sigmas), pick)
     misfit = (length - taped) / sigma
     by = np.einsum("ni,nik->nk", between / length[:, None], between_by) / sigma[:, None]
     # A pixel on the wall is distance over principal distance; so is the picks' share of sigma.

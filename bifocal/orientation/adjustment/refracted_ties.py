@@ -90,17 +90,17 @@ def _met(observations: PairObservations, state: PairUnknowns) -> _Met:
     pixels, xyz = np.concatenate(straight, axis=1), state.media.meeting(state.cameras, *straight)
     for _ in range(STEPS):
         views = views_of(state, xyz)
-        design = np.concatenate([seen.by_point for seen in views], axis=1)
+        design = np.concatenate([one.by_point for one in views], axis=1)
         lost = ~np.isfinite(design).all(axis=(1, 2))
         design[lost] = np.eye(4, 3)
-        off = pixels - np.concatenate([seen.pixels for seen in views], axis=1)
+        off = pixels - np.concatenate([one.pixels for one in views], axis=1)
         base, triangle = np.linalg.qr(design, mode="complete")
         turn = base.transpose(0, 2, 1)
         along = (turn @ off[..., None])[..., 0]
         xyz = xyz + np.linalg.solve(triangle[:, :3], along[:, :3, None])[..., 0]
     rates = [
-        rates_of(seen, -model.undistorted_by_k(x), number)
-        for number, (seen, model, x) in enumerate(zip(views, models, raw, strict=True))
+        rates_of(one, -model.undistorted_by_k(x), number)
+        for number, (one, model, x) in enumerate(zip(views, models, raw, strict=True))
     ]
     by = state.media.rates_by_unknowns(-(turn @ np.concatenate(rates, axis=1)))
     return _Met(xyz, along, by, triangle[:, :3])

@@ -33,12 +33,12 @@ def first_is_far(images: Images, ties: Ties) -> float:
     Where it does so from the far to the near photo the missing part is covered, and what the near
     photo shows in its place is something else; the other way round it is seen foreshortened.
     """
-    pictures, seen, centre = _on_the_plane(images, ties)
-    rows, columns = np.indices(seen.shape, dtype=np.float32)
+    pictures, common, centre = _on_the_plane(images, ties)
+    rows, columns = np.indices(common.shape, dtype=np.float32)
     away = np.stack([columns, rows], axis=-1) - centre
     radius = np.linalg.norm(away, axis=-1)
     away = (away / np.maximum(radius, 1e-6)[..., None]).astype(np.float32)
-    fair = seen & (radius > 0.12 * np.hypot(*seen.shape))
+    fair = common & (radius > 0.12 * np.hypot(*common.shape))
     first, variance1 = _change(pictures, away, fair)
     second, variance2 = _change(pictures[::-1], away, fair)
     return float(np.nan_to_num((first - second) / np.sqrt(variance1 + variance2)))
@@ -85,13 +85,13 @@ def _change(pictures: Images, away: FloatArray, fair: BoolArray) -> tuple[float,
         for reach in (-ORDER.reach, ORDER.reach)
     )
     steps = np.clip(inner - outer - ORDER.step, 0, 10) * fair
-    found = cv2.remap(second, places + moved, None, cv2.INTER_LINEAR)
-    detail, other = (
+    moved_back = cv2.remap(second, places + moved, None, cv2.INTER_LINEAR)
+    detail, smooth = (
         picture - cv2.GaussianBlur(picture, (0, 0), 6)
-        for picture in (first.astype(np.float32), found.astype(np.float32))
+        for picture in (first.astype(np.float32), moved_back.astype(np.float32))
     )
     usual = cv2.GaussianBlur(np.abs(detail), (0, 0), 8) + 4
-    replaced = steps * np.minimum(np.abs(detail - other), 40) / usual
+    replaced = steps * np.minimum(np.abs(detail - smooth), 40) / usual
     part, whole = (
         cv2.resize(v, (ORDER.blocks, ORDER.blocks), interpolation=cv2.INTER_AREA)
         for v in (replaced, steps)

@@ -30,12 +30,12 @@ def refracted_start(given: Given, found: tuple[Features, Features]) -> tuple[Pai
     GeometryError
         If the photos have too little in common, or nothing gives the scale.
     """
-    seen = [i.ideal(f.pixels) for i, f in zip(given.interiors, found, strict=True)]
+    ideal = [i.ideal(f.pixels) for i, f in zip(given.interiors, found, strict=True)]
     first, second = (replace(i, lens=None, sigma_radial=0.0) for i in given.interiors)
     distances = _supposed(given)
     for _ in range(STAGES.freed_rounds):
         square = _square_on(given, distances)
-        free1, free2 = straightened(square, seen[0], seen[1])
+        free1, free2 = straightened(square, ideal[0], ideal[1])
         features = replace(found[0], pixels=free1), replace(found[1], pixels=free2)
         ties = find_ties(*features, (first, second), given.names)
         first_picks, second_picks = (

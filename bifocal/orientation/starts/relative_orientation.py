@@ -170,17 +170,17 @@ def _within(
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return nearest neighbours among the features of a surrounding, square by square."""
     reach = surrounding.reach
-    there = apply_homography(surrounding.homography, interiors[0].ideal(first.pixels))
+    predicted = apply_homography(surrounding.homography, interiors[0].ideal(first.pixels))
     places = interiors[1].ideal(second.pixels)
-    squares, of_square = np.unique(np.floor(there / reach), axis=0, return_inverse=True)
-    found = [np.zeros((2, 0), np.intp)]
+    squares, of_square = np.unique(np.floor(predicted / reach), axis=0, return_inverse=True)
+    pairs = [np.zeros((2, 0), np.intp)]
     for number, corner in enumerate(squares * reach):
         rows1 = np.flatnonzero(of_square.ravel() == number)
         rows2 = np.flatnonzero(((places > corner - reach) & (places < corner + 2 * reach)).all(1))
         one, two = match_features(first.of(rows1), second.of(rows2))
-        found.append(np.stack([rows1[one], rows2[two]]))
-    rows1, rows2 = np.concatenate(found, axis=1)
-    near = np.linalg.norm(places[rows2] - there[rows1], axis=1) < reach
+        pairs.append(np.stack([rows1[one], rows2[two]]))
+    rows1, rows2 = np.concatenate(pairs, axis=1)
+    near = np.linalg.norm(places[rows2] - predicted[rows1], axis=1) < reach
     return rows1[near], rows2[near]
 
 
@@ -254,13 +254,16 @@ def _along_lines(
     length = np.hypot(line[:, 0], line[:, 1])[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         normal = line[:, :2] / length
-        seen = apply_homography(homography, first.pixels)
-        foot = seen - normal * ((seen * normal).sum(axis=1) + line[:, 2] / length[:, 0])[:, None]
+        predicted = apply_homography(homography, first.pixels)
+        foot = (
+            predicted
+            - normal * ((predicted * normal).sum(axis=1) + line[:, 2] / length[:, 0])[:, None]
+        )
     along = reach * np.column_stack([-normal[:, 1], normal[:, 0]])
-    left = np.linalg.svd(matrix)[0][:, 2]
-    scale = left[2] if abs(left[2]) > 1e-9 * np.abs(left[:2]).max() else 1e-9
+    epipole = np.linalg.svd(matrix)[0][:, 2]
+    scale = epipole[2] if abs(epipole[2]) > 1e-9 * np.abs(epipole[:2]).max() else 1e-9
     rows1, rows2 = match_along_lines(
-        first, second, left[:2] / scale, (foot - along, foot + along), across=tolerance
+        first, second, epipole[:2] / scale, (foot - along, foot + along), across=tolerance
     )
     same = alike(first, second, rows1, rows2)
     return rows1[same], rows2[same]
@@ -360,15 +363,15 @@ def sought_focal(ties: Ties, interiors: Interiors) -> Interiors:
     What the homography of the wall says of the cameras' movement, points off the wall confirm at
     the right principal distance alone; the adjustment that follows refines it.
     """
-    found: list[tuple[float, Interiors]] = []
+    costs: list[tuple[float, Interiors]] = []
     for factor in TIES.focals:
         focal = factor * max(interiors[0].image_size)
         tried = replace(interiors[0], focal=focal), replace(interiors[1], focal=focal)
         try:
-            found.append((_cost(ties, first_cameras(ties, tried)), tried))
+            costs.append((_cost(ties, first_cameras(ties, tried)), tried))
         except GeometryError:
             continue
-    return min(found, key=lambda one: one[0])[1] if found else interiors
+    return min(costs, key=lambda one: one[0])[1] if costs else interiors
 
 
 def _in_plane_frame(

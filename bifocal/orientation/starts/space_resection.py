@@ -67,20 +67,20 @@ def resect(
         camera, agree = _in_air(xyz, pixels, longer)
         ratio = camera.matrix[0, 0] * bent / interior.focal
     # A principal distance that was searched is found; it is not searched in every round.
-    known = replace(
+    refracted = replace(
         interior, focal=interior.focal * ratio, sigma_focal=min(interior.sigma_focal, 0.02)
     )
     for _ in range(RESECTION.rounds):
-        there = np.zeros(len(xyz), dtype=bool)
+        usable = np.zeros(len(xyz), dtype=bool)
         if media.z0(number, camera) >= 0:
             seeming = _seeming(camera, media, number, xyz)
-            there = np.asarray(np.isfinite(seeming).all(axis=1))
-        if there.sum() < 4:
+            usable = np.asarray(np.isfinite(seeming).all(axis=1))
+        if usable.sum() < 4:
             raise GeometryError(remark("resection.before_media"))
         before = camera.centre
-        camera, fits = _in_air(seeming[there], pixels[there], known)
-        agree = there.copy()
-        agree[there] = fits
+        camera, fits = _in_air(seeming[usable], pixels[usable], refracted)
+        agree = usable.copy()
+        agree[usable] = fits
         if np.linalg.norm(camera.centre - before) < RESECTION.settled * before[2]:
             break
     return camera, agree
@@ -139,8 +139,8 @@ def _candidates(
 
 def _solve(xyz: FloatArray, pixels: FloatArray, matrix: FloatArray) -> list[Pinhole]:
     """Return the solutions of one set of points in front of the wall."""
-    found = cameras_seeing(xyz, pixels, matrix, methods=[cv2.SOLVEPNP_SQPNP])
-    return [camera for camera in found if camera.centre[2] > 0]
+    solutions = cameras_seeing(xyz, pixels, matrix, methods=[cv2.SOLVEPNP_SQPNP])
+    return [camera for camera in solutions if camera.centre[2] > 0]
 
 
 def refuse_line(xyz: FloatArray) -> None:

@@ -68,7 +68,7 @@ def faces(heights: FloatArray, pixels: FloatArray, *, band: float) -> list[WallF
         offset = float(np.median(heights[members]))
         if members.sum() < 0.05 * count:
             break
-        if all(abs(offset - other.offset) > WALLS.faces_apart * band for other in planes):
+        if all(abs(offset - face.offset) > WALLS.faces_apart * band for face in planes):
             planes.append(
                 WallFace(
                     offset, float(members.sum() / count), _midst(pixels, np.flatnonzero(members))
@@ -83,9 +83,9 @@ def _midst(pixels: FloatArray, members: IntArray) -> tuple[float, float]:
     radius = 0.03 * float(np.linalg.norm(np.ptp(pixels, axis=0)))
     some = members[:: max(1, len(members) // 400)]
     close = np.linalg.norm(pixels[some, None] - pixels[None], axis=2) < radius
-    own = np.zeros(len(pixels))
-    own[members] = 1.0
-    best = pixels[some[int((close @ (2 * own - 1)).argmax())]]
+    inside = np.zeros(len(pixels))
+    inside[members] = 1.0
+    best = pixels[some[int((close @ (2 * inside - 1)).argmax())]]
     return float(round(best[0])), float(round(best[1]))
 
 
@@ -336,8 +336,8 @@ def _extent(places: FloatArray, chance: FloatArray) -> float:
     likelier = np.minimum(chance, 1 - 1e-9) / np.maximum(1 - chance, 1e-9) * (1 - whole) / whole
     share = np.full(len(cells), 0.5)
     for _ in range(30):
-        own = share[which] * likelier / (share[which] * likelier + 1 - share[which])
-        share = np.bincount(which, own, len(cells)) / count
+        belonging = share[which] * likelier / (share[which] * likelier + 1 - share[which])
+        share = np.bincount(which, belonging, len(cells)) / count
     full = share > 0.5 * np.quantile(share, 0.9)
     if full.sum() < 3:
         return 0.0

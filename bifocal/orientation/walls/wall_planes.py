@@ -70,32 +70,34 @@ def planes_of_any_direction(
     distance = float(centres[0][2]) if distance is None else distance
     band = WALLS.rough_band * distance
     generator = np.random.default_rng(7)
-    free, found = np.ones(len(xyz), dtype=bool), []
+    free, planes = np.ones(len(xyz), dtype=bool), []
     for _ in range(WALLS.most_planes):
-        left = np.flatnonzero(free)
-        if len(left) < 20:
+        remaining = np.flatnonzero(free)
+        if len(remaining) < 20:
             break
-        corners = xyz[generator.choice(left, (WALLS.triples, 3))]
+        corners = xyz[generator.choice(remaining, (WALLS.triples, 3))]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         size = np.linalg.norm(normals, axis=1)
         normals = normals[size > 0] / size[size > 0, None]
         normals *= np.where(normals[:, 2:] < 0, -1.0, 1.0)
         offsets = (normals * corners[size > 0, 0]).sum(axis=1)
-        some = generator.choice(left, min(len(left), 1500), replace=False)
+        some = generator.choice(remaining, min(len(remaining), 1500), replace=False)
         away = np.abs(xyz[some] @ normals.T - offsets)
         scores = weight[some] @ np.maximum(1.0 - away / band, 0.0)
         for centre in centres:
             scores[normals @ centre - offsets < 0.05 * distance] = 0.0
         best = int(scores.argmax())
-        normal, offset = _refined(xyz[left], weight[left], normals[best], offsets[best], band)
+        normal, offset = _refined(
+            xyz[remaining], weight[remaining], normals[best], offsets[best], band
+        )
         height = np.abs(xyz @ normal - offset)
         members = free & (height < band)
         share = float(weight[members].sum() / weight.sum())
         if share < 0.02:
             break
-        found.append(WallPlane(normal, offset, share, members))
+        planes.append(WallPlane(normal, offset, share, members))
         free &= height >= 2 * band
-    return found
+    return planes
 
 
 def _refined(

@@ -72,10 +72,10 @@ def wall_shape(
     standard deviation of k takes the ties of a cell as one: a wall's unevenness is common to them.
     """
     unit = max(size) / 3000.0
-    asked = np.flatnonzero(np.ones(len(pixels1), dtype=bool) if face is None else face)
-    if len(asked) < 30:
+    rows = np.flatnonzero(np.ones(len(pixels1), dtype=bool) if face is None else face)
+    if len(rows) < 30:
         return WallShape(), 0.0
-    some = asked[np.linspace(0, len(asked) - 1, min(len(asked), BEND.ties)).astype(int)]
+    some = rows[np.linspace(0, len(rows) - 1, min(len(rows), BEND.ties)).astype(int)]
     middle, half = (np.array(size) - 1) / 2.0, float(np.hypot(*size)) / 2
     everywhere = (pixels1 - middle) / half
     x1, x2 = everywhere[some], pixels2[some]
@@ -93,12 +93,12 @@ def wall_shape(
                 continue
             held = support
             radii = (everywhere**2).sum(axis=1, keepdims=True)
-            seen = apply_homography(fitted, everywhere * (1.0 + BEND.small * radii))
-            flat, _ = cv2.findHomography(everywhere, seen, 0)
-            apart = np.linalg.norm(seen - apply_homography(flat, everywhere), axis=1)
+            mapped = apply_homography(fitted, everywhere * (1.0 + BEND.small * radii))
+            flat, _ = cv2.findHomography(everywhere, mapped, 0)
+            apart = np.linalg.norm(mapped - apply_homography(flat, everywhere), axis=1)
             by_k = float(np.sqrt((apart**2).mean())) / unit / BEND.small
             answer = WallShape(abs(k) * by_k, sigma * by_k)
-    return answer, held * len(asked) / len(some)
+    return answer, held * len(rows) / len(some)
 
 
 def shape_of_wall(
@@ -120,18 +120,18 @@ def shape_of_wall(
         bent surface through all of them: two faces look like one bent wall. Else of all ties.
     """
     whole, held = wall_shape(pixels1, pixels2, size)
-    known = np.flatnonzero(np.isfinite(height))
-    known = known[:: len(known) // BEND.ties + 1]
-    found = faces(height[known], pixels1[known], band=WALLS.face_band)[: BEND.most_faces]
+    finite = np.flatnonzero(np.isfinite(height))
+    finite = finite[:: len(finite) // BEND.ties + 1]
+    further = faces(height[finite], pixels1[finite], band=WALLS.face_band)[: BEND.most_faces]
     near = [
-        np.abs(height - offset) < BEND.band for offset in (0.0, *(face.offset for face in found))
+        np.abs(height - offset) < BEND.band for offset in (0.0, *(face.offset for face in further))
     ]
-    own = [
+    shapes = [
         wall_shape(pixels1, pixels2, size, face)
         for face in near
         if face.sum() >= BEND.fewest_on_face
     ]
-    bend, most = max(own, key=lambda one: one[1], default=(whole, 0.0))
+    bend, most = max(shapes, key=lambda one: one[1], default=(whole, 0.0))
     return bend if most >= BEND.face_holds * held else whole
 
 
@@ -191,8 +191,8 @@ def straightened(
 def _open(adjusted: AdjustedPair, size: tuple[int, int]) -> float:
     """Return how much the uncertainty of cameras and media bends a flat wall, root mean square."""
     columns, rows = np.meshgrid(np.linspace(0, size[0], 12), np.linspace(0, size[1], 8))
-    seen = np.column_stack([columns.ravel(), rows.ravel()])
-    flat = adjusted.media.on_plane(0, adjusted.cameras[0], seen)
+    pixels = np.column_stack([columns.ravel(), rows.ravel()])
+    flat = adjusted.media.on_plane(0, adjusted.cameras[0], pixels)
     seen1, seen2 = (view.pixels for view in views_of(adjusted, flat))
     values, vectors = np.linalg.eigh(adjusted.of_unknowns)
     factor = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -203,11 +203,11 @@ def _open(adjusted: AdjustedPair, size: tuple[int, int]) -> float:
         except GeometryError:
             continue
         flat1, flat2 = straightened(state, seen1, seen2)
-        known = np.isfinite(np.hstack([flat1, flat2])).all(axis=1)
-        if known.sum() < 12:
+        finite = np.isfinite(np.hstack([flat1, flat2])).all(axis=1)
+        if finite.sum() < 12:
             continue
-        matrix, _ = cv2.findHomography(flat1[known], flat2[known], 0)
-        apart = flat2[known] - apply_homography(matrix, flat1[known])
+        matrix, _ = cv2.findHomography(flat1[finite], flat2[finite], 0)
+        apart = flat2[finite] - apply_homography(matrix, flat1[finite])
         squares.append(float((apart**2).sum(axis=1).mean()))
     return float(np.sqrt(np.mean(squares))) / (max(size) / 3000.0) if squares else 0.0
 
@@ -222,18 +222,18 @@ def _fitted(
     for width in np.repeat(BEND.widths, 2) * unit:
         bent = np.column_stack([x1 * (1.0 + k * square[:, None]), np.ones(len(x1))])
         carried = bent @ matrix.T
-        seen = carried[:, :2] / carried[:, 2:]
-        left = x2 - seen
-        distance = (left**2).sum(axis=1) / (3.0 * width) ** 2
+        mapped = carried[:, :2] / carried[:, 2:]
+        rest = x2 - mapped
+        distance = (rest**2).sum(axis=1) / (3.0 * width) ** 2
         weight = np.where(distance < 1.0, (1.0 - distance) ** 2, 0.0)
         by = np.zeros((len(x1), 2, 9))
         by[:, 0, :3] = by[:, 1, 3:6] = bent / carried[:, 2:]
-        by[:, :, 6:8] = -seen[:, :, None] * (bent[:, None, :2] / carried[:, 2:, None])
-        by_bent = (matrix[None, :2, :2] - seen[:, :, None] * matrix[2, :2]) / carried[:, 2:, None]
+        by[:, :, 6:8] = -mapped[:, :, None] * (bent[:, None, :2] / carried[:, 2:, None])
+        by_bent = (matrix[None, :2, :2] - mapped[:, :, None] * matrix[2, :2]) / carried[:, 2:, None]
         by[:, :, 8] = (by_bent @ (x1 * square[:, None])[:, :, None])[:, :, 0]
         rows, root = by.reshape(-1, 9), np.repeat(weight, 2)
         normal = (rows * root[:, None]).T @ rows
-        pulls = (rows * (root * left.ravel())[:, None]).reshape(-1, 2, 9).sum(axis=1)
+        pulls = (rows * (root * rest.ravel())[:, None]).reshape(-1, 2, 9).sum(axis=1)
         right = pulls.sum(axis=0)
         normal[8, 8] += (unit / BEND.sigma) ** 2
         right[8] -= k * (unit / BEND.sigma) ** 2

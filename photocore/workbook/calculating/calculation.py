@@ -305,8 +305,10 @@ class Calculation:
         if kind == "table" and not parts[1]:
             table = self._table(parts[0])
             return number_cells(np.arange(table.head + 1.0, table.last + 1)[None, :])
-        if kind == "area" and ":" not in parts[1]:
-            return number_cells([[split_cell(parts[1])[0]]])
+        if kind == "area":
+            title, (top, _, bottom, _) = parts[0] or where[0], split_area(parts[1])
+            bottom = min(bottom, max(self._sheets[plain_title(title)].end[0], top))
+            return number_cells(np.arange(float(top), bottom + 1)[None, :])
         raise Unknown("ROW")
 
     def _named(self, name: str, where: tuple[str, list[int], int]) -> CellArray:

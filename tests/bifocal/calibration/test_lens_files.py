@@ -33,9 +33,15 @@ def test_metashape_exchanges_the_tangential_terms(tmp_path):
     lens = Lens.read(path)
     np.testing.assert_allclose(lens.camera_matrix, MATRIX)
     np.testing.assert_allclose(lens.distort(GRID), brown_by_hand(GRID, BROWN), atol=1e-9)
-    path.write_text(path.read_text().replace("<k1>", "<k4>0.1</k4><k1>"))
-    with pytest.raises(InputError, match="k4"):
+    text = path.read_text()
+    path.write_text(text.replace("<k1>", "<b2>0.1</b2><k1>"))
+    with pytest.raises(InputError, match="b2"):
         Lens.read(path)
+    path.write_text(text.replace("<k1>", "<k4>0.02</k4><k1>"))
+    away = GRID - MATRIX[:2, 2]  # k4 moves by r⁸
+    eighth = ((away / np.diag(MATRIX)[:2]) ** 2).sum(axis=-1, keepdims=True) ** 4
+    more = brown_by_hand(GRID, BROWN) + 0.02 * eighth * away
+    np.testing.assert_allclose(Lens.read(path).distort(GRID), more, atol=0.02)
 
 
 def test_opencv_yaml_is_read(tmp_path):

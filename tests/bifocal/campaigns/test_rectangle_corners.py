@@ -41,6 +41,10 @@ def run(*words, folder):
         return CliRunner().invoke(bifocal_command, words)
 
 
+LINE = "rectify wall.png --control control.csv --out o.tif --gsd 0.2"
+BY_CONTROL = (*LINE.split(), *LENS_OPTIONS)
+
+
 def written(folder, points, relief, scale=1.0, heading="id,X,Y,r,col,row"):
     cv2.imwrite(str(folder / "wall.png"), np.zeros(SIZE[::-1], np.uint8))
     places = np.column_stack([points, np.full(len(points), relief)]) * scale
@@ -54,21 +58,11 @@ def written(folder, points, relief, scale=1.0, heading="id,X,Y,r,col,row"):
 
 def test_measures_in_millimetres_are_asked_for_their_unit(tmp_path):
     written(tmp_path, DOTS, 0.0, scale=1000.0)
-    wish = (
-        "wall.png",
-        "--control",
-        "control.csv",
-        "--out",
-        "o.tif",
-        "--gsd",
-        "0.2",
-        *LENS_OPTIONS,
-    )
-    refused = run("rectify", *wish, folder=tmp_path)
+    refused = run(*BY_CONTROL, folder=tmp_path)
     assert refused.exit_code == 1
     assert "Are the measures in millimetres" in refused.stderr
     assert not (tmp_path / "o.tif").exists()
-    done = run("rectify", *wish, "--unit", "mm", folder=tmp_path)
+    done = run(*BY_CONTROL, "--unit", "mm", folder=tmp_path)
     assert done.exit_code == 0, done.stderr
 
 
@@ -79,18 +73,7 @@ def test_a_wall_in_a_national_grid_is_rectified_as_near_the_origin(tmp_path):
         folder = tmp_path / name
         folder.mkdir()
         written(folder, DOTS + origin, 0.0)
-        wish = (
-            "wall.png",
-            "--control",
-            "control.csv",
-            "--out",
-            "o.tif",
-            "--gsd",
-            "0.2",
-            *LENS_OPTIONS,
-            "--json",
-        )
-        done = run("rectify", *wish, folder=folder)
+        done = run(*BY_CONTROL, "--json", folder=folder)
         assert done.exit_code == 0, done.stderr
         made.append(np.array([*(told := json.loads(done.stdout))["nadir"], told["distance"]]))
     np.testing.assert_allclose(made[1] - made[0], [*shift, 0.0], atol=1e-5)

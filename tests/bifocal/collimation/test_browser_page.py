@@ -382,6 +382,19 @@ def test_coordinates_typed_one_after_the_other_are_all_kept(page: Driver) -> Non
     page.command("control.delete", name="K")
 
 
+def test_the_page_is_as_light_as_the_system_until_somebody_chooses(
+    browser: Any, server: Served
+) -> None:
+    theme = "() => document.documentElement.dataset.theme"
+    with tab_of(browser, server, color_scheme="light") as page:
+        assert page.tab.evaluate(theme) == "light"
+        page.tab.emulate_media(color_scheme="dark")
+        page.wait(f"{theme} === 'dark'")
+        page.click("theme")
+        page.tab.reload()
+        assert page.tab.evaluate(theme) == "light"
+
+
 def test_a_token_is_needed(browser: Any, server: Served) -> None:
     context = browser.new_context()
     tab = context.new_page()

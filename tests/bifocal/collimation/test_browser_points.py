@@ -15,6 +15,16 @@ from tests.browser import TARGETS, Driver, Served, tab_of, true_pixel
 #: On the rim of a shadow; not among the control points for that.
 SHADED = (2.10, 2.25, 0.0)
 TENTHS = 0.05
+#: How many pixels are drawn above the photos in the red of what does not fit.
+REDS = """() => [...document.querySelectorAll("canvas")].map((canvas) => {
+  if (!canvas.width) return 0;
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  let count = 0;
+  for (let i = 0; i < data.length; i += 4) {
+    count += data[i] === 255 && data[i + 1] === 107 && data[i + 2] === 107 && data[i + 3] === 255;
+  }
+  return count;
+}).reduce((a, b) => a + b, 0)"""
 
 
 @pytest.fixture
@@ -236,6 +246,16 @@ def test_a_pick_off_the_line_is_taken_and_its_misfit_shown(page: Driver) -> None
     assert "OFF-RADIAL" in str(page.tab.get_by_test_id("value-flag").text_content())
     shown = str(page.tab.get_by_test_id("value-misfit_px").text_content())
     assert shown == f"{result['misfit_px']:.2f} px"
+    # Drawn red in the picture, and led to from anywhere.
+    page.command("point.pick", name="good", image=1, **pixel_of(1, SHADED))
+    page.tab.get_by_label("Fly to good").click()
+    assert page.tab.get_by_test_id("next-doubtful").text_content() == "1 doubtful"
+    page.keys("y")
+    assert page.tab.get_by_test_id("point-name").input_value() == "P01"
+    page.wait(f"() => ({REDS})() > 20")
+    page.command("point.delete", name="P01")
+    page.wait(f"() => ({REDS})() === 0")
+    assert not page.tab.get_by_test_id("next-doubtful").is_visible()
 
 
 def test_a_point_is_picked_by_keys_alone(page: Driver) -> None:

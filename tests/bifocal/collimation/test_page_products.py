@@ -90,6 +90,15 @@ def test_control_points_are_pasted_from_a_spreadsheet(tmp_path, text, expected) 
         assert {n: point.known for n, point in session.state.control.items()} == expected
 
 
+def test_cells_pasted_without_headings_are_x_y_r_and_the_pixels_of_both_photos(tmp_path) -> None:
+    with opened(sample_folder(tmp_path)) as session:
+        line = "T01\t-0,83\t-0.43\t0.1\t117.79\t506.89\t91.09\t520.72"
+        session.command({"op": "control.paste", "text": line})
+        point = session.state.control["T01"]
+        assert point.known == (-0.83, -0.43, 0.1)
+        assert point.picks == ((117.79, 506.89), (91.09, 520.72))
+
+
 #: Commands whose fields are well: the survey is not as they suppose.
 NO_FIELD = (
     "no point nobody", "no point Z", "pasted|number|heading|table|X", "no control point",

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
+import os
 import shutil
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -122,6 +125,21 @@ def test_photos_come_one_at_a_time_and_keep_their_names(tmp_path) -> None:
         again[0][1].seek(0)
         with pytest.raises(InputError, match="already"):
             take_photos(tmp_path, again, kept)
+
+
+def test_where_only_one_photo_has_room_none_stays(tmp_path, monkeypatch) -> None:
+    room = [True, False]
+
+    def copied(source, target):
+        if not room.pop(0):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        Path(target).write_bytes(Path(source).read_bytes())
+
+    monkeypatch.setattr("bifocal.collimation.server.uploads.shutil.copyfile", copied)
+    sent = [(name, io.BytesIO((SAMPLE / name).read_bytes())) for name in ("far.jpg", "near.jpg")]
+    with pytest.raises(InputError, match="nothing was left behind"):
+        take_photos(tmp_path, sent)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_is_drawn_lies_beside_the_pair_and_comes_back(tmp_path) -> None:

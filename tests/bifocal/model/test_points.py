@@ -48,7 +48,7 @@ def test_a_point_without_a_place_has_no_geometry_in_geojson():
     assert lost.to_geojson()["features"][0]["geometry"] is None
 
 
-def test_points_and_relief_maps_draw_themselves(points):
+def test_points_relief_maps_and_orthophotos_draw_themselves(points):
     pyplot = pytest.importorskip("matplotlib.pyplot")
     axes = points.plot()
     assert axes.collections[0].get_offsets().tolist() == points.xyz[:, :2].tolist()
@@ -59,6 +59,13 @@ def test_points_and_relief_maps_draw_themselves(points):
     image = relief.plot().images[0]
     assert image.get_extent() == [9.75, 10.75, 19.75, 20.25]
     assert image.get_array().tolist() == [[0.0, 1.0]]
+    picture = bifocal.Orthophoto(
+        image=np.uint8([[[255, 0, 51], [0, 0, 0]]]), source=np.uint8([[1, 0]]),
+        hidden=np.zeros((1, 2), bool), plane_from_pixel=relief.plane_from_pixel,
+    )  # fmt: skip
+    image = picture.plot().images[0]
+    assert image.get_extent() == [9.75, 10.75, 19.75, 20.25]
+    assert image.get_array().tolist() == [[[1.0, 0.0, 0.2, 1.0], [0.0, 0.0, 0.0, 0.0]]]
     pyplot.close("all")
 
 

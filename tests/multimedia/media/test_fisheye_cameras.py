@@ -248,7 +248,10 @@ def test_other_programs_give_the_same_pixels_back(target, tmp_path) -> None:
         text = (tmp_path / target).read_text()
         bad = tmp_path / "bad.xml"
         bad.write_text(text.replace("<k4>", "<p1>0.1</p1><k4>", 1))
-        with pytest.raises(InputError, match="uses p1, p2, b2, p3 or p4, which OpenCV's fisheye"):
+        with pytest.raises(InputError, match="no lens model of OpenCV's comes nearer"):
+            convert(bad, tmp_path / "no.toml")
+        bad.write_text(text.replace("<k4>", "<b2>0.5</b2><k4>", 1))
+        with pytest.raises(InputError, match=r"has a skew of 0\.(5|49999)"):
             convert(bad, tmp_path / "no.toml")
 
 

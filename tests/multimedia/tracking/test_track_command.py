@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from multimedia import Brown, FlatInterface, Layers, Project, write_project
-from multimedia.openptv.openptv_files import read_correspondences
+from multimedia.openptv.openptv_files import read_blobs, read_correspondences, read_targets
 from tests.builders.commands import multimedia_command as main
 from tests.multimedia.tank import SENSOR, cameras
 from tests.multimedia.tracking.flows import seen_through_water
@@ -157,3 +157,32 @@ def test_bad_input_is_one_message(sequence, tmp_path, monkeypatch):
     assert got.exit_code == 1
     assert "[hdf]" in got.stderr
     assert not list(tmp_path.iterdir())
+
+
+def test_blobs_of_myptv_are_followed_as_targets_are(sequence, tmp_path):
+    """All frames in one file, row first; a frame in which a camera sees nothing has no line."""
+    folder, _ = sequence
+    words, places = [], {}
+    for k in range(1, 5):
+        rows = []
+        for t in range(FRAMES):
+            targets = read_targets(folder / f"cam{k}.{FIRST + t}_targets").pixels
+            places[k, t] = targets
+            if (k, t) != (2, 4):
+                rows += [f"{row:.4f}\t{column:.4f}\t3\t3\t9\t{t}" for column, row in targets]
+        path = tmp_path / f"blobs_cam{k}"
+        path.write_text("\n".join(rows) + "\n")
+        words += ["--targets", str(path)]
+    np.testing.assert_allclose(read_blobs(tmp_path / "blobs_cam3")[5], places[3, 5], atol=1e-9)
+    done = CliRunner().invoke(main, ["track", str(folder / "tank.toml"), *words, "--json"])
+    data = json.loads(done.stdout)
+    assert (data["tracks"], data["frames"]) == (COUNT, [0, FRAMES - 1])
+    assert "not there" not in done.output
+
+
+def test_a_file_that_is_none_of_blobs_is_named(sequence):
+    folder, _ = sequence
+    words = [w for k in range(1, 5) for w in ("--targets", str(folder / f"cam{k}.10001_targets"))]
+    done = CliRunner().invoke(main, ["track", str(folder / "tank.toml"), *words])
+    assert done.exit_code == 1
+    assert "cam1.10001_targets: line 1: 1 values, expected row, column" in done.output

@@ -150,6 +150,22 @@ def test_vectors_that_differ_from_those_around_are_marked():
     assert marked.sum() - 12 <= 5
 
 
+@pytest.mark.parametrize("share", [0.5, 0.2])
+def test_vectors_of_streams_that_cross_do_not_differ_and_odd_ones_among_them_do(share):
+    rng = np.random.default_rng(9)
+    xyz, noise = rng.uniform(0, 10, (500, 3)), 0.005
+    is_across = rng.uniform(size=(500, 1)) < share
+    velocity = vortices(0.1)(xyz) + np.where(is_across, [0.0, 0.4, 0.0], [0.4, 0.0, 0.0])
+    velocity += noise * rng.standard_normal(xyz.shape)
+    odd = rng.choice(500, 12, replace=False)
+    velocity[odd] += rng.choice([-0.5, 0.5], (12, 3))
+    covariance = np.tile(noise**2 * np.eye(3), (500, 1, 1))
+    marked = differs_from_neighbours(xyz, velocity, covariance)
+    assert marked[odd].all()
+    # All sixteen around are of the other stream for 2.8 % of the fifth that crosses.
+    assert marked.sum() - 12 <= 500 * share * (1 - share) ** 16 + 3
+
+
 def test_tracks_are_in_time_and_long_enough():
     places, whose = simulated(vortices(0.2), speed=0.2, frames=8, count=200, seed=3)
     tracks = track_particles(places, frames=range(101, 109), rate=10.0)

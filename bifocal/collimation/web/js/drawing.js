@@ -4,6 +4,8 @@ export const INK = { 1: "#63c7ff", 2: "#ffb454" };
 const sprites = new Map();
 const DARK = "rgba(0, 0, 0, 0.75)";
 const LABELS_FROM = 60;
+/** Of what does not fit. */
+export const DOUBT = "#ff6b6b";
 
 /** What is drawn grows with the page's letters, as on a screen of 4K. */
 let unit = 1;
@@ -27,10 +29,10 @@ function stroke(context, style, width, path) {
 }
 
 /** A cross that leaves its centre free: round for photo 1, square for photo 2. */
-export function marker(context, image, [x, y], { selected = false, proposed = false } = {}) {
+export function marker(context, image, [x, y], { selected = false, proposed = false, ink = INK[image] } = {}) {
   const size = (selected ? 11 : 7) * unit;
   if (proposed) context.setLineDash([3, 3]);
-  stroke(context, INK[image], selected ? 2 : 1.5, (path) => {
+  stroke(context, ink, selected ? 2 : 1.5, (path) => {
     if (image === 1) path.arc(x, y, size, 0, 2 * Math.PI);
     else path.rect(x - size, y - size, 2 * size, 2 * size);
     for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
@@ -43,10 +45,10 @@ export function marker(context, image, [x, y], { selected = false, proposed = fa
 
 const SPRITE = 18;
 
-/** A small marker, drawn once for each image and screen. */
-function sprite(image) {
+/** A small marker, drawn once for each image, ink and screen. */
+function sprite(image, ink) {
   const ratio = window.devicePixelRatio;
-  const key = `${image}/${ratio}`;
+  const key = `${image}/${ink}/${ratio}`;
   let canvas = sprites.get(key);
   if (!canvas) {
     canvas = document.createElement("canvas");
@@ -54,7 +56,7 @@ function sprite(image) {
     const context = canvas.getContext("2d");
     context.scale(ratio * unit, ratio * unit);
     const middle = SPRITE / 2;
-    stroke(context, INK[image], 1.3, (path) => {
+    stroke(context, ink, 1.3, (path) => {
       if (image === 1) path.arc(middle, middle, 5, 0, 2 * Math.PI);
       else path.rect(middle - 5, middle - 5, 10, 10);
     });
@@ -64,8 +66,8 @@ function sprite(image) {
 }
 
 /** Many markers at once: a thousand in every frame. */
-export function markers(context, image, places) {
-  const canvas = sprite(image);
+export function markers(context, image, places, ink = INK[image]) {
+  const canvas = sprite(image, ink);
   for (const [x, y] of places) {
     const side = SPRITE * unit;
     context.drawImage(canvas, x - side / 2, y - side / 2, side, side);
@@ -131,9 +133,9 @@ export function centre(context, [x, y], text) {
 
 /**
  * All picks of `items` in the images a pane shows; the chosen one stands out, names appear where
- * there is room. `pick(item, image)` says where one is, or null.
+ * there is room, what `doubtful(item)` in another colour. `pick(item, image)` says where one is, or null.
  */
-export function picks(context, pane, { items, images, pick, selected }) {
+export function picks(context, pane, { items, images, pick, selected, doubtful = () => false }) {
   const seen = [];
   for (const item of items) {
     const places = images.map((image) => {
@@ -143,15 +145,20 @@ export function picks(context, pane, { items, images, pick, selected }) {
     if (places.some((place) => place && inside(pane, place))) seen.push([item, places]);
   }
   shifts(context, seen);
-  images.forEach((image, index) => markers(context, image, seen
-    .filter(([item, places]) => places[index] && item.name !== selected)
-    .map(([, places]) => places[index])));
+  const inkOf = (item, image) => (doubtful(item) ? DOUBT : INK[image]);
+  images.forEach((image, index) => {
+    const shown = seen.filter(([item, places]) => places[index] && item.name !== selected);
+    for (const ink of [INK[image], DOUBT]) {
+      markers(context, image, shown.filter(([item]) => inkOf(item, image) === ink)
+        .map(([, places]) => places[index]), ink);
+    }
+  });
   const crowded = seen.length > LABELS_FROM && pane.zoom < 1;
   for (const [item, places] of seen) {
     const chosen = item.name === selected;
     if (chosen) {
       images.forEach((image, index) => {
-        if (places[index]) marker(context, image, places[index], { selected: true });
+        if (places[index]) marker(context, image, places[index], { selected: true, ink: inkOf(item, image) });
       });
     }
     const [x, y] = places.find(Boolean);

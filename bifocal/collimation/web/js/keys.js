@@ -47,6 +47,8 @@ export const KEYS = [
   ["leave", "Esc", ["Escape"], (app) => hand(app) || app.stage.leave,
     (app) => app.stage.leave?.() || hand(app)?.leave()],
   ["next", "J", ["j", "J"], (app) => app.stage.list, (app, event) => app.stage.list.step(event.shiftKey ? -1 : 1)],
+  ["doubtful", "Y", ["y", "Y"], (app) => app.stage.list,
+    ({ stage }, event) => stage.list.step(event.shiftKey ? -1 : 1, stage.list.doubtful)],
   ["fly", "F", ["f"], hand, (app) => hand(app).selected && app.stage.flyTo(hand(app).selected)],
   ["rename", "F2", ["F2"], (app) => app.stage.rename, (app) => app.stage.rename()],
   ["type", "T", ["t"], (app) => app.stage.cycleType, (app) => app.stage.cycleType()],

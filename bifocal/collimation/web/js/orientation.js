@@ -177,7 +177,7 @@ export class OrientationStage {
       pick: (item, one) => this.picker.pick(item, one), selected: this.picker.selected });
     for (const item of control) {
       const [pixel, off] = [this.picker.pick(item, image), item.residual?.[image]];
-      if (pixel && off) drawing.residual(context, pane.screen(image, pixel), off.map((one) => one * STRETCHED), "#ff6b6b");
+      if (pixel && off) drawing.residual(context, pane.screen(image, pixel), off.map((one) => one * STRETCHED), drawing.DOUBT);
     }
     const { cursor } = this.picker;
     if (cursor?.pane === pane) drawing.cursor(context, pane, cursor.place, image);

@@ -1,5 +1,6 @@
 /** All points: sorted by any column, named, found, deleted. */
 import { h, keyedRows, number, setText } from "./dom.js";
+import { button } from "./fields.js";
 import { isWarning } from "./readout.js";
 import { t } from "./words/words.js";
 
@@ -36,9 +37,11 @@ export class PointList {
     this.table = h("table", { class: "grid points", testid: "point-list" },
       h("caption", { class: "unseen" }, t("list.title")),
       h("thead", {}, h("tr", {}, this.heads)), this.body);
+    this.doubts = button("", () => this.step(1, this.doubtful), { class: "quiet warn", testid: "next-doubtful",
+      title: `${t("key.doubtful")} (Y)` });
     this.element = h("section", { class: "card list" },
       h("div", { class: "row between" }, h("h2", {}, t("list.title"), " ", this.count),
-        h("span", { class: "row" }, tools)), progress, h("div", { class: "scroll" }, this.table));
+        h("span", { class: "row" }, this.doubts, tools)), progress, h("div", { class: "scroll" }, this.table));
     this.table.addEventListener("keydown", (event) => this.#key(event));
   }
 
@@ -58,9 +61,16 @@ export class PointList {
     return [...points].sort((a, b) => compare(column[1](a), column[1](b), this.sort.down));
   }
 
+  /** Those whose flag warns, in the order shown. */
+  get doubtful() {
+    return this.order.filter(({ result }) => isWarning(result?.flag));
+  }
+
   update() {
-    const { order } = this;
+    const { doubtful, order } = this;
     setText(this.count, String(order.length));
+    this.doubts.hidden = !doubtful.length;
+    setText(this.doubts, t("list.doubtful", { count: doubtful.length }));
     keyedRows(this.body, order, { key: ({ name }) => name,
       signature: (item) => COLUMNS.map(([, value]) => value(item)).join("\t"),
       build: (item) => this.#row(item) });
@@ -118,9 +128,8 @@ export class PointList {
     this.marked?.querySelector("button").focus();
   }
 
-  /** The next or previous point, in the order shown. */
-  step(by) {
-    const { order } = this;
+  /** The next or previous point of some, in the order shown. */
+  step(by, order = this.order) {
     if (!order.length) return;
     const index = order.findIndex(({ name }) => name === this.picker.selected);
     const next = index < 0 ? (by > 0 ? 0 : order.length - 1) : (index + by + order.length) % order.length;

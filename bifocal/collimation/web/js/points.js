@@ -8,7 +8,7 @@ import { Lines, Measure } from "./lines.js";
 import { Loupe } from "./loupe.js";
 import { Picker, trust } from "./picker.js";
 import { PointList } from "./pointlist.js";
-import { Readout, TYPES } from "./readout.js";
+import { isWarning, Readout, TYPES } from "./readout.js";
 import { sketched } from "./sketches.js";
 import { photoMark, wallMark } from "./tiles.js";
 import { Pane, pictureLayer, pixelView, spread, tileLayer } from "./viewer.js";
@@ -189,7 +189,8 @@ export class PointsStage {
       drawing.polyline(context, drawing.INK[guide.image], places, { width: 1.2, dash: [8, 5] });
     }
     drawing.picks(context, pane, { items: app.points(), images: pane.images,
-      pick: (item, image) => picker.pick(item, image), selected: picker.selected });
+      pick: (item, image) => picker.pick(item, image), selected: picker.selected,
+      doubtful: ({ result }) => isWarning(result?.flag) });
     if (proposal && pane.images.includes(proposal.image)) {
       for (const { column, row } of proposal.others ?? []) {
         const place = pane.screen(proposal.image, [column, row]);
