@@ -42,12 +42,7 @@ from photocore.workbook.making.look import (
     prepare_page,
 )
 from photocore.workbook.making.newbook import RowBlock, finish_book, finished_parts, new_workbook
-from photocore.workbook.making.repeated_rows import (
-    COLUMN,
-    column_name,
-    named_columns,
-    repeated_rows,
-)
+from photocore.workbook.making.repeated_rows import repeated_rows
 from photocore.workbook.making.sketch import Sketch
 from photocore.workbook.making.words import WordBook
 from photocore.workbook.reading.grid import TableArea, cell_name, plain_title, split_area
@@ -110,29 +105,6 @@ class BookBuilder:
             sheet.sheet_view.tabSelected = sheet.title == title
         self.book.calculation.fullCalcOnLoad = True
 
-    def name_columns(self) -> None:
-        """Call the columns of tables that short formulas lead to by names: the file has each once.
-
-        That takes names, or cells of the same sheet; with tables every row would spell it out.
-        """
-        areas = {
-            table.name: (sheet.title, *split_area(table.ref)[:3], table.column_names)
-            for sheet in self.book.worksheets
-            for table in sheet.tables.values()
-        }
-        names = self.book.defined_names
-        for title, block in self.blocks.items():
-            for column, formula in block.formulas.items():
-                for table, key in COLUMN.findall(formula.text):
-                    sheet, top, left, bottom, keys = areas[f"tbl{table}"]
-                    letter = get_column_letter(left + keys.index(key))
-                    place = f"'{sheet}'!${letter}${top + 1}:${letter}${bottom}"
-                    self.define(column_name(table, key), place)
-                named = RowText(named_columns(formula.text, names))
-                self.blocks[title] = replace(block, formulas={**block.formulas, column: named})
-                block = self.blocks[title]
-                self.book[title].cell(block.row, column + 1).value = f"={named(block.row)}"
-
     def calculate(self) -> None:
         """Fill in what the formulas give; a cell that has a value keeps it.
 
@@ -147,9 +119,9 @@ class BookBuilder:
             self.results[title][cell_name(row, column)] = value
         for title, cell, shown in self._titles:
             shown.v = str(self.results[title][cell])
-        shown = {}  # once: of a large book each copy is 50 MB
+        results = {}  # once: of a large book each copy is 50 MB
         for title, block in self.blocks.items():
-            columns = shown[title, block.row] = calculation.columns(title, block.row)
+            columns = results[title, block.row] = calculation.columns(title, block.row)
             listed = [columns.get(i, values) for i, values in enumerate(block.columns, start=1)]
             self.blocks[title] = replace(block, columns=listed)
         for sheet in self.book.worksheets:
@@ -157,7 +129,7 @@ class BookBuilder:
                 top, left, _, _ = split_area(table.ref)
                 content = self.tables[table.name]
                 at = sheet.title, top + 1
-                columns = shown[at] if at in shown else calculation.columns(*at)
+                columns = results[at] if at in results else calculation.columns(*at)
                 for number, described in enumerate(content.columns, start=left):
                     if number in columns and described.kind == "formula":
                         content.cells[described.key] = columns[number]
