@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
+from contextlib import suppress
 from difflib import get_close_matches
-from pathlib import PurePath
+from pathlib import Path, PurePath
 
 #: The same name, as forgiving as it goes: letter by letter, without folders, without ending.
 _FORMS: tuple[Callable[[PurePath], str], ...] = (
     PurePath.as_posix, lambda path: path.name, lambda path: path.stem,
 )  # fmt: skip
+_LEADING_ZEROS = re.compile(r"(?<![\d.,])0+(?=\d)")
 
 
 def plain_name(text: str) -> str:
@@ -54,3 +57,67 @@ def nearest(name: str, names: Iterable[str]) -> str:
     plain = {plain_name(one): one for one in names}
     near = get_close_matches(plain_name(name), plain, n=1, cutoff=0.7)
     return plain[near[0]] if near else ""
+
+
+def meant(names: Iterable[str], among: Collection[str]) -> list[str]:
+    """Return names of points as they are called among others: capitals and leading zeros may differ.
+
+    What none is called, or several are, stays as it is.
+
+    Examples
+    --------
+    >>> meant(["t1", "7", "P2", "Q"], ["T01", "007", "p2", "P02"])
+    ['T01', '007', 'P2', 'Q']
+    """
+    alike: dict[str, list[str]] = {}
+    among = dict.fromkeys(among)
+    for name in among:
+        alike.setdefault(_of_point(name), []).append(name)
+    fits = ((name, alike.get(_of_point(name), [])) for name in names)
+    return [one[0] if name not in among and len(one) == 1 else name for name, one in fits]
+
+
+def on_disk(path: Path, *, any_case: bool = True) -> Path:
+    """Return the file or folder that a path means: its letters may be composed or not.
+
+    Parameters
+    ----------
+    path : Path
+    any_case : bool
+        Also in upper or lower case, where only one is called so, as on Windows and macOS.
+
+    Returns
+    -------
+    path : Path
+        As it was where nothing is called so.
+    """
+    with suppress(OSError, ValueError):
+        if path.name in ("", "..") or path.exists():
+            return path
+        folder = on_disk(path.parent, any_case=any_case)
+        kept = plain_name if any_case else _composed
+        fits = [one for one in folder.iterdir() if kept(one.name) == kept(path.name)]
+        return fits[0] if len(fits) == 1 else path
+    return path
+
+
+def near_file(path: Path) -> str:
+    """Return the name in a folder that is most like one that is missing, of the same numbers."""
+    with suppress(OSError):
+        numbers = _numbers(path.stem)
+        beside = path.parent.iterdir()
+        stems = {one.stem: one.name for one in beside if _numbers(one.stem) == numbers}
+        return stems.get(nearest(path.stem, stems), "")
+    return ""
+
+
+def _of_point(name: str) -> str:
+    return _LEADING_ZEROS.sub("", plain_name(name))
+
+
+def _composed(text: str) -> str:
+    return unicodedata.normalize("NFC", text)
+
+
+def _numbers(stem: str) -> list[int]:
+    return [int(number) for number in re.findall(r"\d{1,18}", stem)]
