@@ -7,6 +7,7 @@ import unicodedata
 from collections.abc import Callable, Collection, Iterable, Sequence
 from contextlib import suppress
 from difflib import get_close_matches
+from itertools import takewhile
 from pathlib import Path, PurePath
 
 #: The same name, as forgiving as it goes: letter by letter, without folders, without ending.
@@ -24,14 +25,15 @@ def plain_name(text: str) -> str:
 def called(name: str, names: Sequence[str | Sequence[str]]) -> list[int]:
     """Return which of the names are meant: whole, else without folders, else without ending.
 
-    One that has several is listed with all of them.
+    One that has several is listed with all of them. Of files called alike the one in the folder of
+    this name is meant.
 
     Examples
     --------
     >>> called("img_1.jpg", ["a/IMG_1.JPG", "IMG_2.JPG"]), called("IMG_3", ["IMG_1.JPG"])
     ([0], [])
-    >>> called("2", [("far", "1"), ("near", "2")])
-    [1]
+    >>> called("2", [("far", "1"), ("near", "2")]), called("b/1.jpg", ["/x/a/1.jpg", "/x/b/1.JPG"])
+    ([1], [1])
     """
     each = [(one,) if isinstance(one, str) else one for one in names]
     wanted = PurePath(plain_name(name))
@@ -41,9 +43,18 @@ def called(name: str, names: Sequence[str | Sequence[str]]) -> list[int]:
             for k, forms in enumerate(each)
             if any(one and form(PurePath(plain_name(one))) == form(wanted) for one in forms)
         ]
+        if len(fits) > 1:
+            tails = [max(_shared_tail(wanted, one) for one in each[k]) for k in fits]
+            fits = [k for k, tail in zip(fits, tails, strict=True) if tail == max(tails)]
         if fits:
             return fits
     return []
+
+
+def _shared_tail(wanted: PurePath, name: str) -> int:
+    """Return how many of the last folders two names share."""
+    folders = zip(wanted.parts[-2::-1], PurePath(plain_name(name)).parts[-2::-1], strict=False)
+    return sum(1 for _ in takewhile(lambda both: both[0] == both[1], folders))
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
@@ -60,9 +71,9 @@ def nearest(name: str, names: Iterable[str]) -> str:
 
 
 def meant(names: Iterable[str], among: Collection[str]) -> list[str]:
-    """Return names of points as they are called among others: capitals and leading zeros may differ.
+    """Return names of points as they are called among others.
 
-    What none is called, or several are, stays as it is.
+    Capitals and leading zeros may differ. What none is called, or several are, stays as it is.
 
     Examples
     --------

@@ -50,7 +50,7 @@ def test_a_missing_photo_names_the_nearest_of_its_number(tmp_path, name, near):
 
 def test_a_missing_table_names_the_nearest(tmp_path):
     (tmp_path / "Survey.xlsx").write_bytes(b"x")
-    with pytest.raises(InputError, match='Did you mean "Survey.xlsx"'):
+    with pytest.raises(InputError, match=r'Did you mean "Survey\.xlsx"'):
         open_tables(tmp_path / "survey.ods")
 
 
@@ -77,4 +77,5 @@ def test_points_are_called_as_the_others_call_them():
 def test_photos_of_a_project_are_found_in_other_case(tmp_path):
     (tmp_path / "IMG_1.JPG").write_bytes(b"x")
     file = PhotoFinder(tmp_path / "a.xml", tmp_path).find("img_1.jpg")
-    assert isinstance(file, Path) and file.is_file()
+    assert isinstance(file, Path)
+    assert file.is_file()
