@@ -44,8 +44,8 @@ class TrackCommand:
     """Cameras that must have seen a particle; with 2, many are by chance."""
     step: Annotated[float | None, Typed(POSITIVE)] = None
     """Largest displacement between frames where nothing is known of a velocity [unit of the
-    project].  [default: half the mean distance between particles, more where that links by chance
-    only]"""
+    project].  [default: half the mean distance between particles; where that links by chance
+    only, about the drift that most share, or more]"""
     change: Annotated[float | None, Typed(POSITIVE)] = None
     """Largest distance from where its velocity predicts a particle [unit of the
     project].  [default: 3.5 times the median of those found]"""
@@ -72,8 +72,7 @@ def command(options: TrackCommand) -> None:
     some frames. How many points would be in tracks by chance is counted, too.
 
     Velocities are slopes of parabolas through five points of a track, with their standard
-    deviations; vectors that differ from those around (normalised median test) are marked, not
-    dropped.
+    deviations; vectors that go with none of those around are marked, not dropped.
     """
     from multimedia.tracking.workflow import find_tracks
 
@@ -101,11 +100,14 @@ def command(options: TrackCommand) -> None:
         np.nanmedian(tracks.velocity_sigma, axis=0),
     )
     lost = tracks.particles - len(tracks.track)
+    drift = ", ".join(f"{v:.3g}" for v in tracks.drift)
+    about = f"of the drift ({drift})" if tracks.drift.any() else "of its place"
     data = {
         "frames": [result.frames[0], result.frames[-1]], "particles": tracks.particles,
         "tracks": tracks.count, "points": len(tracks.track),
         "median_length": float(np.median(sizes)), "sigma_px": result.sigma_px,
-        "step": tracks.step, "change": tracks.change, "unit": length,
+        "step": tracks.step, "change": tracks.change, "drift": tracks.drift.tolist(),
+        "unit": length,
         "median_speed": float(np.nanmedian(speed)), "speed_unit": speed_unit,
         "median_sigma": sigma.tolist(), "median_velocity_sigma": velocity_sigma.tolist(),
         "differ": int(tracks.outlier.sum()), "particles_tested": result.found,
@@ -121,7 +123,7 @@ def command(options: TrackCommand) -> None:
         ("in no track", f"{lost} particles, {lost / tracks.particles:.0%}; by chance in tracks "
                         f"{tracks.by_chance}"),
         (f"sought within [{length}]", f"{tracks.change:.3g} of the prediction, {tracks.step:.3g} "
-                                      "where there is none"),
+                                      f"{about} where there is none"),
         ("image coordinates [px]", f"sigma {result.sigma_px:.2g}"),
         (f"positions [{length}]", "sigma " + ", ".join(f"{v:.2g}" for v in sigma)),
         (f"speed [{speed_unit}]", f"median {np.nanmedian(speed):.4g}, sigma "

@@ -47,7 +47,7 @@ _PLATE = {
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Points:
+class _ControlList:
     """Control points of one camera."""
 
     path: Path
@@ -87,7 +87,7 @@ def read_ptv_calibration(folder: Path, *, pitch: float, unit: str) -> Project:
             label = next((k for k, m in media.items() if _is_one(m, wall)), f"w{len(media) + 1}")
             media.setdefault(label, wall)
             media_of[camera.name] = label
-    lists: dict[str, _Points] = {}
+    lists: dict[str, _ControlList] = {}
     for path in files["points"]:
         points, number = _points(path), _number(path)
         if number not in lists or len(points.xyz) > len(lists[number].xyz):
@@ -150,7 +150,7 @@ def _is_one(one: FlatInterface, two: FlatInterface) -> bool:
     return same and one.layers == two.layers
 
 
-def _points(path: Path) -> _Points:
+def _points(path: Path) -> _ControlList:
     """Read lines of column, row, X, Y, Z."""
     rows = []
     for number, line in enumerate(read_text(path, _KIND).splitlines(), start=1):
@@ -164,10 +164,10 @@ def _points(path: Path) -> _Points:
     table = np.array(rows)
     if len(np.unique(table[:, 2:], axis=0)) < len(table):
         raise InputError(remark("exchange.points_twice", of=path))
-    return _Points(path, table[:, :2], table[:, 2:])
+    return _ControlList(path, table[:, :2], table[:, 2:])
 
 
-def _of_points(points: _Points, name: str, pitch: float) -> tuple[Camera, str]:
+def _of_points(points: _ControlList, name: str, pitch: float) -> tuple[Camera, str]:
     """Return the camera in air, its principal point in the middle, that sees the points best."""
     size = np.ceil(points.pixels.max(axis=0)).astype(int) + 1
     depth = np.linalg.svd(points.xyz - points.xyz.mean(axis=0), compute_uv=False)

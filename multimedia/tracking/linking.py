@@ -32,11 +32,14 @@ class LinkRules:
         Largest distance from where its velocity predicts a particle. [object unit]
     gap : int
         Frames for which a particle may be missing.
+    drift : tuple of float
+        Displacement about which ``step`` counts: that of all on the whole. [object unit]
     """
 
     step: float
     change: float
     gap: int
+    drift: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(slots=True, eq=False)
@@ -77,10 +80,10 @@ def linked(places: Sequence[FloatArray], rules: LinkRules) -> IntArray:
     Notes
     -----
     A particle whose velocity is known is expected where that leads; one whose velocity is not,
-    within ``step``. Each pair of such an end and a particle there predicts a place two frames on;
-    how far the next particle is from that counts as much as how far it was from its own place
-    (Malik et al. 1993; Ouellette et al. 2006: the best estimate in four frames). The pairs of the
-    least sum of squares are taken first, each particle once.
+    within ``step`` of where the drift leads. Each pair of such an end and a particle there predicts
+    a place two frames on; how far the next particle is from that counts as much as how far it was
+    from its own place (Malik et al. 1993; Ouellette et al. 2006: the best estimate in four frames).
+    The pairs of the least sum of squares are taken first, each particle once.
     """
     firsts = np.cumsum([0, *map(len, places)])
     trees = [cKDTree(xyz) if len(xyz) else None for xyz in places]
@@ -152,7 +155,7 @@ def _pairs_taken(
         return none, none
     known = np.isfinite(heads.velocity[:, 0])
     steps = heads.age + 1
-    expected = heads.place + np.where(known[:, None], heads.velocity, 0.0) * steps[:, None]
+    expected = heads.place + np.where(known[:, None], heads.velocity, rules.drift) * steps[:, None]
     reach = np.where(known, rules.change, rules.step) * steps
     near = trees[0].query_ball_point(expected, reach)
     end = np.repeat(np.arange(len(near)), list(map(len, near)))

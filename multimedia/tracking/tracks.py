@@ -46,6 +46,9 @@ class Tracks:
     step, change : float
         Largest displacement of a particle of unknown velocity, and largest distance from where
         its velocity predicts one of known. [object unit]
+    drift : ndarray, shape (3,)
+        Displacement from frame to frame about which ``step`` counts; 0 where none was needed.
+        [object unit]
     particles : int
         Of all frames, in tracks or not.
     by_chance : int
@@ -63,6 +66,7 @@ class Tracks:
     outlier: BoolArray
     step: float
     change: float
+    drift: FloatArray
     particles: int
     by_chance: int
 
@@ -115,8 +119,8 @@ def track_particles(
         Of the positions.
     step : float, optional
         Largest displacement from frame to frame of a particle of which nothing is known; by
-        default half the mean distance between particles, and more where that shows nothing but
-        chance. [object unit]
+        default half the mean distance between particles, about the drift that most share where
+        without it nothing shows but chance, or more. [object unit]
     change : float, optional
         Largest distance from where its velocity predicts a particle; by default 3.5 times the
         median of those in the data. [object unit]
@@ -178,5 +182,5 @@ def track_particles(
     return Tracks(
         track=track, frame=frame, number=number, xyz=xyz, covariance=covariance,
         velocity=velocity, velocity_covariance=own, outlier=outlier, step=rules.step,
-        change=rules.change, particles=len(previous), by_chance=chance,
+        change=rules.change, drift=np.array(rules.drift), particles=len(previous), by_chance=chance,
     )  # fmt: skip

@@ -17,7 +17,7 @@ _CERTAIN = 2.0
 _SHARED = 2 * WINDOW
 #: Neighbours among which a vector has a companion, and particles in all that tell anything; ratio
 #: to their distances beyond which it is odd. Tried on vortices, shear and streams of 10 to 50 %.
-_COMPANIONS, _FEWEST, _ODD = 16, 8, 3.0
+_COMPANIONS, _FEWEST, _ODD = 16, 8, 4.0
 
 
 def track_velocities(
@@ -122,7 +122,7 @@ def differs_from_neighbours(
     Notes
     -----
     A vector differs that goes with none of the sixteen nearest: the least of its differences from
-    theirs is beyond three times the median of the least among themselves, its floor the vectors'
+    theirs is beyond four times the median of the least among themselves, its floor the vectors'
     precision. The normalised median test (Westerweel and Scarano 2005) asks the same of a median,
     which is nobody's where streams cross.
     """
