@@ -7,6 +7,7 @@ as wrong usage that names the option.
 from __future__ import annotations
 
 import io
+import os
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -33,7 +34,7 @@ class FilePath(click.Path):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the path, that of the one that is called so."""
-        return on_disk(super().convert(value, param, ctx), any_case=False)
+        return on_disk(Path(os.fsdecode(super().convert(value, param, ctx))), any_case=False)
 
 
 class TableFile(FilePath):
