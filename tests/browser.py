@@ -174,6 +174,12 @@ class Driver:
     def click(self, testid: str) -> None:
         self.tab.get_by_test_id(testid).click()
 
+    def unfold(self, testid: str) -> None:
+        """Open a fold of the page where it is closed."""
+        fold = self.tab.get_by_test_id(testid)
+        if fold.get_attribute("open") is None:
+            fold.locator("summary").click()
+
     def keys(self, *keys: str) -> None:
         for key in keys:
             self.tab.keyboard.press(key)
@@ -255,14 +261,15 @@ class Driver:
                 self.settled("true")
 
     def finished(self, kind: str) -> dict[str, Any]:
-        """Wait until a job has ended; return it."""
+        """Wait until a job that a hand began has ended; return it."""
         self.tab.wait_for_function(
-            "(kind) => !['running', undefined].includes("
-            "bifocal.state().jobs.filter((job) => job.kind === kind).at(-1)?.state)",
+            "(kind) => !['running', undefined].includes(bifocal.state().jobs"
+            ".filter((job) => job.kind === kind && !job.quiet).at(-1)?.state)",
             arg=kind,
             timeout=8 * PATIENCE,
         )
-        return next(job for job in reversed(self.state["jobs"]) if job["kind"] == kind)
+        jobs = [job for job in self.state["jobs"] if job["kind"] == kind and not job["quiet"]]
+        return dict(jobs[-1])
 
     def frames(self) -> list[float]:
         """Return how long the frames take while the photos are dragged and zoomed. [ms]"""

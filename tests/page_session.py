@@ -14,6 +14,7 @@ from starlette.testclient import TestClient
 from bifocal import SAMPLE, Session
 from bifocal.collimation.project import find_files
 from bifocal.collimation.server.application import application
+from photocore.jsonfile import read_object, write_object
 
 TOKEN = "a-token-for-tests-that-is-long-enough"
 BASE = "http://127.0.0.1:8765"
@@ -23,6 +24,21 @@ def sample_folder(folder: Path) -> Path:
     """Copy the sample pair into a folder and return it."""
     for name in ("facade.pair.json", "far.jpg", "near.jpg"):
         shutil.copyfile(SAMPLE / name, folder / name)
+    return folder
+
+
+def proposed(session: Session, folder: Path, **report: Any) -> None:
+    """Propose the sample's orientation as if the photos alone had given it."""
+    data = read_object(SAMPLE / "facade.pair.json", what="pair file")
+    path = folder / "survey.proposed.pair.json"
+    write_object(path, data, overwrite=True, as_is=True)
+    session.propose(path, {"free_scale": True, "remarks": [], "planes": [], **report})
+
+
+def two_photos(folder: Path) -> Path:
+    """Copy the sample's photos alone into a folder and return it."""
+    for name in ("far.jpg", "near.jpg"):
+        shutil.copy(SAMPLE / name, folder)
     return folder
 
 

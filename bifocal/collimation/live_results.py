@@ -103,7 +103,11 @@ class LiveResults:
 
         Shape (3 n, 3 n), NaN where it is not known.
         """
-        table = self._solved(observations(points))
-        joint = table.joint_covariance(range(len(points)))
-        size = 3 * len(points)
+        return self.joint_of(observations(points))
+
+    def joint_of(self, points: PointObservations) -> tuple[FloatArray, FloatArray]:
+        """Return X, Y, r of picks [m], shape (n, 3), and their covariance together [m²]."""
+        table = self._solved(points)
+        size = 3 * len(table.xyz)
+        joint = table.joint_covariance(range(len(table.xyz)))
         return table.xyz, np.full((size, size), np.nan) if joint is None else joint

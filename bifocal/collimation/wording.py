@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from functools import cache
+from string import Formatter
 from typing import Any
 
 from bifocal.remarks import in_language
@@ -17,6 +18,7 @@ _ADVICE = tuple(
     (re.compile(pattern), instead)
     for pattern, instead in (
         (rf" \({_OPTION}(?:(?:,| or| and| o| e| oder| und) {_OPTION})*\)", ""),
+        (rf" \(`bifocal \w+`(?:, {_OPTION})?\)", ""),
         (rf"[:;] {_OPTION} [a-z][^;.]*", ""),
         (rf"(?:, give| and give| with|, indicare| con| mit) {_OPTION}", ""),
         (rf", {_OPTION}(?: angeben|(?=\)))", ""),
@@ -27,9 +29,25 @@ _ADVICE = tuple(
 _content = cache(packaged)
 
 
+class _DecimalComma(Formatter):
+    """Fills sentences of languages that write 1,5 for one and a half."""
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        """Return a value as its blank wants it."""
+        text = super().format_field(value, format_spec)
+        return text.replace(".", ",") if isinstance(value, float) else text
+
+
 def say(section: str, key: str, language: str, **fields: Any) -> str:
-    """Return a sentence in a language, its fields filled in."""
-    return _content(__package__, "words")[section][key][language].format(**fields)
+    """Return a sentence in a language, its fields filled in.
+
+    Examples
+    --------
+    >>> say("depth", "out", "en", r=1.5), say("depth", "out", "de", r=1.5)
+    ('that stands out 1.5 m', 'der 1,5 m vorspringt')
+    """
+    filler = Formatter() if language == "en" else _DecimalComma()
+    return filler.format(_content(__package__, "words")[section][key][language], **fields)
 
 
 def without_options(text: str, language: str = "en") -> str:
@@ -41,6 +59,8 @@ def without_options(text: str, language: str = "en") -> str:
     '35% of it is empty.'
     >>> without_options("Distortion (calibrate, give --lens), or refraction. Check it.")
     'Distortion (calibrate), or refraction. Check it.'
+    >>> without_options("A calibrated lens (`bifocal calibrate`, --lens) is more reliable.")
+    'A calibrated lens is more reliable.'
     >>> without_options("+12 mm, 30 % (--wall 120,130): name a spot with --wall COL,ROW.")
     '+12 mm, 30 %: name a spot.'
     >>> from bifocal.remarks import remark

@@ -114,6 +114,9 @@ def page_server(
         finally:
             warm.cancel()
             access.forget()
+            # OpenCV, reading a photo when Python ends, would abort the process.
+            if warm.is_alive():
+                warm.join()
             session.close()
 
 

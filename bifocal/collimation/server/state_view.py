@@ -12,6 +12,7 @@ from bifocal.collimation.asked import goodness, oriented_live
 from bifocal.collimation.commands import lens_ratio
 from bifocal.collimation.fields import SETUP
 from bifocal.collimation.live_orientation import LiveOrientation, lenses_of
+from bifocal.collimation.next_steps import advice_of, is_looking, is_unscaled, next_steps
 from bifocal.collimation.product_graph import out_of_date, proposal_is_current
 from bifocal.collimation.session import Session
 from bifocal.collimation.shapes import measures_of
@@ -19,6 +20,7 @@ from bifocal.collimation.wording import say, without_options
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
 from bifocal.orientation.align_workflow import interior_of_photo
+from bifocal.survey.tolerances import SCALES
 from photocore.errors import PhotogrammetryError
 from photocore.images import ImageInfo
 from photocore.jsonfile import plain
@@ -31,6 +33,8 @@ def state_of(session: Session) -> dict[str, Any]:
         state, live = session.state, None
         if session.files.pair is None or state.control:
             live = oriented_live(session)
+        steps = next_steps(session)
+        sentence, advice = advice_of(session, steps["orientation"], live, _remarks(session))
         return {
             "serving": session.serving,
             "revision": session.revision,
@@ -52,11 +56,14 @@ def state_of(session: Session) -> dict[str, Any]:
             ],
             "live": _live(live),
             "scale": _drawn_length(session),
-            "looking": any(
-                job.quiet and job.state == "running" for job in session.jobs.jobs.values()
-            ),
+            "looking": is_looking(session),
             "good": _how_good(session),
-            "advice": _advice(session, live),
+            "drawing_scale": _drawing_scale(session),
+            "steps": {
+                stage: asdict(step) | ({"text": sentence} if stage == "orientation" else {})
+                for stage, step in steps.items()
+            },
+            "advice": advice,
             "levels": _levels(session),
             "points": _points(session),
             "lines": [
@@ -132,7 +139,10 @@ def _photos(session: Session) -> list[dict[str, Any]]:
                 "missing": _missing(info, typed, language),
             }
         )
-    if session.files.pair is None and len(shown) == 2 and _exchanged(session, shown):
+    if session.pictures.pair is not None or is_looking(session):
+        # An oriented pair knows its cameras; what the program finds out is not asked.
+        return [photo | {"missing": []} for photo in shown]
+    if len(shown) == 2 and _exchanged(session, shown):
         question = say("ask", "exchange", language, name=shown[0]["name"])
         shown[0]["missing"] = [*shown[0]["missing"], question]
     return shown
@@ -191,21 +201,21 @@ def _drawn_length(session: Session) -> dict[str, Any] | None:
     return None if drawn is None else asdict(drawn)
 
 
-def _unscaled(session: Session) -> bool:
-    """Whether the proposed orientation waits for its scale."""
-    report = (session.proposal or {}).get("report", {})
-    return bool(report.get("free_scale")) and not report.get("scale")
-
-
 def _how_good(session: Session) -> str:
     """Say in a line how good relief is; nothing where that is not known."""
-    good = None if _unscaled(session) else goodness(session)
-    if good is None or good["middle"] is None or good["rim"] is None:
+    good = None if is_unscaled(session) else goodness(session)
+    if good is None or None in (good["middle"], good["rim"], good["place"]):
         return ""
     language, scale = session.spoken, good["scale"]
     verdict = say("good", "holds" if scale else "none", language, scale=scale)
-    middle, rim = (1000 * good[key] for key in ("middle", "rim"))
-    return say("good", "relief", language, middle=middle, rim=rim, verdict=verdict)
+    lengths = {key: 1000 * good[key] for key in ("middle", "rim", "place")}
+    return say("good", "relief", language, **lengths, verdict=verdict)
+
+
+def _drawing_scale(session: Session) -> int | None:
+    """Return the finest drawing scale that holds, else the coarsest there is; None: not known."""
+    good = None if is_unscaled(session) else goodness(session)
+    return None if good is None else good["scale"] or SCALES[-1]
 
 
 def _missing(info: ImageInfo, typed: Mapping[str, float | None], language: str) -> list[str]:
@@ -263,7 +273,7 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
             "images": images,
             "accepted": session.proposed_path is None,
             "current": proposal_is_current(session),
-            "scaled": not _unscaled(session),
+            "scaled": not is_unscaled(session),
             "report": session.proposal and session.proposal["report"],
             "remarks": [without_options(text, session.spoken) for text in _remarks(session)],
         }
@@ -321,29 +331,6 @@ def _live(live: LiveOrientation | None) -> dict[str, Any] | None:
     if live is None:
         return None
     return plain({"error": live.error, "deviations": live.deviations, "distances": live.distances})
-
-
-def _advice(session: Session, live: LiveOrientation | None) -> list[str]:
-    """Return what would help most next."""
-    language = session.spoken
-    if len(session.pictures.infos) < 2:
-        return [say("ask", "photos", language)]
-    if session.files.pair is not None:
-        doubt = [without_options(session.pick_doubt, language)] if session.pick_doubt else []
-        return doubt if session.state.points else [say("advice", "points", language)]
-    if session.proposal is None and live is not None and not session.state.control:
-        running = any(job.quiet and job.state == "running" for job in session.jobs.jobs.values())
-        return [say("advice", "looking", language)] if running else list(live.advice)
-    # What was found contradictory or unknown is said first.
-    worst = _remarks(session)[:1] if session.proposal else ()
-    first = "".join(without_options(text, language) for text in worst if level_of(text) != "hint")
-    hints = live.advice if live and session.state.control else ()
-    if session.proposal is not None:
-        next_step = "length" if _unscaled(session) else "accept"
-        if not proposal_is_current(session):
-            return [say("advice", "changed", language), *([first] if first else []), *hints]
-        hints = (say("advice", next_step, language), *hints)
-    return [*([first] if first else []), *hints]
 
 
 def _points(session: Session) -> list[dict[str, Any]]:

@@ -50,6 +50,7 @@ def test_a_facade_from_two_photos_to_the_drawing_by_clicks_alone(
     with served(tmp_path) as server, tab_of(browser, server) as page:
         dropped(page, [SAMPLE / name for name in ("near.jpg", "far.jpg")])
         page.settled("state.photos.length === 2")
+        page.unfold("site")
         page.tab.get_by_label("Far distance d1").fill("17.50")
         page.tab.get_by_label("Sigma of d1").fill("0,01")
         page.tab.get_by_label("Near distance d2").fill("9.5")
@@ -86,11 +87,17 @@ def test_a_facade_from_two_photos_to_the_drawing_by_clicks_alone(
         for x in (-3.0, 3.0):
             page.tab.mouse.click(*page.screen(1, true_pixel(1, (x, 1.6, 0.0))))
         page.tab.locator(".profile .curve").wait_for()
+        with page.tab.expect_download() as got:
+            page.click("profile-csv")
+        head, *rows = Path(got.value.path()).read_text().splitlines()
+        along = [float(row.split(",")[0]) for row in rows]
+        assert head == "distance [m],X [m],Y [m],r [m],sigma_r [m]"
+        assert along[-1] == pytest.approx(6.0, abs=0.05)
+        page.click("profile-keep")
         page.tab.get_by_test_id("ortho-swipe").fill("0")
         page.click("face")
         for x, y in ((-0.6, 0.2), (0.6, 0.2), (0.6, 1.8)):
             page.tab.mouse.click(*page.screen(1, true_pixel(1, (x, y, 0.0))))
-            page.tab.wait_for_timeout(700)
         page.click("face-close")
         shape = page.settled("state.shapes.length === 1")["shapes"][0]
         assert shape["kind"] == "face"
@@ -98,6 +105,7 @@ def test_a_facade_from_two_photos_to_the_drawing_by_clicks_alone(
         page.click("run-ortho")
         assert page.finished("ortho")["state"] == "done"
         page.tab.get_by_test_id("deliver-scale").select_option("1:100")
+        page.tab.get_by_test_id("deliver-title").fill("North front")
         page.click("deliver")
         told = page.finished("deliver")
         assert told["state"] == "done"

@@ -208,7 +208,7 @@ def test_the_stages_are_tabs_that_say_what_is_missing(page: Driver) -> None:
     tab = page.tab.get_by_role("tab", selected=True)
     assert "pick the first point" in str(tab.text_content())
     page.keys("PageDown")
-    assert "run the relief" in str(page.tab.get_by_role("tab", selected=True).text_content())
+    assert "make the package" in str(page.tab.get_by_role("tab", selected=True).text_content())
     page.tab.get_by_role("tab", selected=True).focus()
     page.keys("ArrowLeft")
     assert page.tab.get_by_role("tabpanel").get_attribute("id") == "stage-points"
@@ -344,6 +344,7 @@ def test_what_is_refused_stays_as_it_was_typed(page: Driver) -> None:
     page.keys("Enter")
     page.settled("state.control.some(({ name }) => name === 'K')")
     page.click("mode-photos")
+    page.unfold("site")
     site = page.tab.get_by_label("Far distance d1")
     # The page drawn anew while the answer is on its way takes nothing away either.
     page.tab.evaluate(SLOW_COMMAND)

@@ -62,6 +62,7 @@ def give(page: Driver, scene: str, folder: Path) -> None:
         for label, value in (("Focal length", focal[index]), ("Sensor width", sensor)):
             page.tab.get_by_label(label).nth(index).fill(str(value))
             page.keys("Enter")
+    page.unfold("site")
     for label, value in zip(("Far distance d1", "Near distance d2"), distances, strict=True):
         page.tab.get_by_label(label).fill(str(value))
         page.keys("Enter")

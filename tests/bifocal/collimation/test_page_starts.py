@@ -6,6 +6,8 @@ import os
 import queue
 import shutil
 import socket
+import threading
+import time
 
 import openpyxl
 import pytest
@@ -13,6 +15,7 @@ from click.testing import CliRunner
 
 import bifocal
 from bifocal import InputError, page_server
+from bifocal.collimation import workflow
 from tests.builders.commands import bifocal_command as main
 from tests.page_session import (
     client_of,
@@ -278,3 +281,19 @@ def test_a_port_that_is_taken_is_said_before_anything_is_written(tmp_path) -> No
         ):
             pass
     assert entries(folder) == ["facade.pair.json", "far.jpg", "near.jpg"]
+
+
+def test_the_end_waits_for_the_photos_that_are_being_read(tmp_path, monkeypatch) -> None:
+    """A thread within OpenCV when Python ends aborts the whole process."""
+    began, done = threading.Event(), []
+
+    def read(_session) -> None:
+        began.set()
+        time.sleep(0.2)
+        done.append("read")
+
+    monkeypatch.setattr(workflow, "WARM_UP", 0.0)
+    monkeypatch.setattr(workflow, "_warm_up", read)
+    with page_server(sample_folder(tmp_path)):
+        assert began.wait(10)
+    assert done == ["read"]

@@ -6,7 +6,6 @@ import errno
 import io
 import json
 import os
-import shutil
 import zipfile
 from pathlib import Path
 
@@ -22,26 +21,11 @@ from bifocal.collimation.server.uploads import take_photos
 from bifocal.collimation.shapes import met, places_of
 from bifocal.collimation.starting import RECENT, recent, remember, reopen
 from bifocal.faces.faces import Face, Faces
-from photocore.jsonfile import read_object, write_object
-from tests.page_session import client_of, opened, sample_folder
+from tests.page_session import client_of, opened, proposed, sample_folder, two_photos
 
 ENDS = [[300.0, 250.0], [1200.0, 700.0]]
 #: A face on the sample's wall, in photo 1, half a metre back. [px, m]
 DOOR = [[600.0, 400.0, -0.5], [800.0, 400.0, -0.5], [800.0, 700.0, -0.5], [600.0, 700.0, -0.5]]
-
-
-def proposed(session, folder, **report) -> None:
-    """Propose the sample's orientation as if the photos alone had given it."""
-    data = read_object(SAMPLE / "facade.pair.json", what="pair file")
-    path = folder / "survey.proposed.pair.json"
-    write_object(path, data, overwrite=True, as_is=True)
-    session.propose(path, {"free_scale": True, "remarks": [], "planes": [], **report})
-
-
-def two_photos(folder):
-    for name in ("far.jpg", "near.jpg"):
-        shutil.copy(SAMPLE / name, folder)
-    return folder
 
 
 def test_one_drawn_length_scales_what_the_photos_gave_and_undo_takes_it_back(tmp_path) -> None:

@@ -1,6 +1,7 @@
 /** What is drawn above the photos. Each image has a colour and a shape of its own. */
 
 export const INK = { 1: "#63c7ff", 2: "#ffb454" };
+const HATCH = 9;
 const sprites = new Map();
 const DARK = "rgba(0, 0, 0, 0.75)";
 const LABELS_FROM = 60;
@@ -181,22 +182,36 @@ function shifts(context, seen) {
   context.stroke();
 }
 
-/** Outlines filled as one sheet, holes left open. */
-export function sheet(context, pane, outlines, fill, edge) {
+/** Lines of a grid within a frame, and hatching within outlines (holes left open); all in pixels of the pane's photo. */
+export function sheet(context, pane, { frame, lines, outlines }, ink) {
+  const trace = (pixels) => pixels.forEach((pixel, index) => {
+    context[index ? "lineTo" : "moveTo"](...pane.screen(pane.image, pixel));
+  });
+  context.save();
+  context.strokeStyle = ink;
+  context.lineWidth = 1;
+  context.globalAlpha = 0.75;
+  context.beginPath();
+  trace(frame);
+  context.clip();
+  context.beginPath();
+  lines.forEach(trace);
+  context.stroke();
   context.beginPath();
   for (const outline of outlines) {
-    outline.forEach((pixel, index) => {
-      const place = pane.screen(pane.image, pixel);
-      if (index) context.lineTo(...place);
-      else context.moveTo(...place);
-    });
+    trace(outline);
     context.closePath();
   }
-  context.fillStyle = fill;
-  context.fill("evenodd");
-  context.strokeStyle = edge;
-  context.lineWidth = 1.2;
+  context.clip("evenodd");
+  context.beginPath();
+  const { width, height } = context.canvas;
+  for (let start = -height; start < width; start += HATCH) {
+    context.moveTo(start, 0);
+    context.lineTo(start + height, height);
+  }
+  context.globalAlpha = 0.5;
   context.stroke();
+  context.restore();
 }
 
 /** How far a point is off, drawn many times as long. */

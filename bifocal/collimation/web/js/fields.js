@@ -2,14 +2,14 @@
  * Fields that a person types into: a command is sent when the value has changed. What is refused
  * stays as it was typed, marked, until it is mended.
  */
-import { h, parseNumber } from "./dom.js";
+import { decimal, h, parseNumber } from "./dom.js";
 import { t } from "./words/words.js";
 
 let count = 0;
 
 /** Write a value into a field unless somebody types in it, waits for the answer, or has to mend it. */
 export function fill(input, value) {
-  const text = value === null || value === undefined ? "" : String(value);
+  const text = value === null || value === undefined ? "" : typeof value === "number" ? decimal(String(value)) : String(value);
   const free = document.activeElement !== input && !input.dataset.sent && input.validity.valid;
   if (free && input.value !== text) input.value = text;
   input.dataset.known = text;

@@ -6,6 +6,8 @@ import { Lens } from "./lens.js";
 import { invert, project } from "./matrices.js";
 import { Media } from "./media.js";
 
+const PIECES = 32;
+
 /** The wall's pixel grid, common to both images. */
 export class Wall {
   constructor(pair) {
@@ -66,6 +68,24 @@ export class Wall {
   fromPlane([x, y]) {
     return [(x - this.xmin) / this.gsd - 0.5, (this.ymax - y) / this.gsd - 0.5];
   }
+}
+
+/** Meshes of a grid that a wall of this pair is divided into: some twelve across, of 1, 2 or 5 times a power of ten. [m] */
+export function gridStep({ plane_bounds: [xmin, , xmax] }) {
+  const wanted = (xmax - xmin) / 12;
+  const power = 10 ** Math.floor(Math.log10(wanted));
+  return [1, 2, 5, 10].map((one) => one * power).find((step) => step >= wanted);
+}
+
+/** Lines of a grid on the wall as a photo shows them, cut into pieces that follow its lens. */
+export function gridLines(wall, image, step) {
+  const [xmax, ymin] = wall.toPlane([wall.width - 0.5, wall.height - 0.5]);
+  const places = (low, high) => Array.from({ length: Math.floor(high / step) - Math.ceil(low / step) + 1 },
+    (_, index) => (Math.ceil(low / step) + index) * step);
+  const piece = (low, high) => Array.from({ length: PIECES + 1 }, (_, index) => low + ((high - low) * index) / PIECES);
+  return [...places(wall.xmin, xmax).map((x) => piece(ymin, wall.ymax).map((y) => [x, y])),
+    ...places(ymin, wall.ymax).map((y) => piece(wall.xmin, xmax).map((x) => [x, y]))]
+    .map((line) => line.map((place) => wall.toPhoto(image, wall.fromPlane(place))));
 }
 
 /** The photo's own pixels as a place to draw in: nothing to convert. */

@@ -1,6 +1,7 @@
 /** The page: its four stages, what they share, and what outsiders may ask of it. */
 import { Connection, Refusal } from "./connection.js";
 import { h, setText } from "./dom.js";
+import { draggable } from "./dragging.js";
 import { button, choice } from "./fields.js";
 import { KEYS, listen } from "./keys.js";
 import { OrientationStage } from "./orientation.js";
@@ -117,36 +118,29 @@ class App {
     return this.stages[this.current];
   }
 
-  /** The one step that comes next, and whether it can be taken now. */
+  /** The one step that comes next at the stage that is shown, as the server tells it. */
   get step() {
-    const { pair, photos, products } = this.state;
-    if (this.current === "photos") return { ready: photos.length === 2, go: () => this.open("orientation") };
-    if (this.current === "orientation") {
-      const accept = pair?.accepted === false;
-      if (accept && !pair.current) return { key: "align", ready: !this.running("align"), go: () => this.stage.align.click() };
-      return { key: accept ? "accept" : "orientation", ready: Boolean(pair?.scaled),
-        go: () => (accept ? this.stage.accept() : this.open("points")) };
-    }
-    if (this.current === "points") return { ready: Boolean(pair), go: () => this.open("products") };
-    return products.files.some(({ name }) => name.endsWith(".pdf")) && !Object.keys(products.stale).length
-      ? { key: "download", ready: true, go: () => this.stage.download.click() }
-      : { ready: Boolean(pair) && !this.running("deliver"), go: () => this.stage.deliver.click() };
+    return this.state.steps[this.current];
   }
 
   running(kind) {
     return this.state.jobs.some((job) => job.kind === kind && job.state === "running");
   }
 
+  /** Take the next step: go to another stage, or what the stage that is shown does. */
   next() {
-    const { ready, go } = this.step;
-    if (ready) go();
+    const { action, ready } = this.step;
+    if (!ready) return;
+    if (action in STAGES) this.open(action);
+    else this.stage.actions[action]();
   }
 
   update() {
     const { state } = this;
     document.title = `${state.title || t("title.untitled")} · bifocal`;
-    for (const [key, stage] of Object.entries(this.stages)) {
-      const { done, text } = stage.status(state);
+    for (const key of Object.keys(this.stages)) {
+      const { status, count, done } = state.steps[key];
+      const text = t(`status.${status}`, { count });
       setText(this.tabs[key].status, text);
       this.tabs[key].title = text;
       this.tabs[key].classList.toggle("done", Boolean(done));
@@ -154,9 +148,8 @@ class App {
     this.undoButton.disabled = !state.undo;
     this.exchangeButton.hidden = state.photos.length < 2;
     this.redoButton.disabled = !state.redo;
-    const { key = this.current, ready } = this.step;
-    setText(this.nextButton, t(`next.${key}`));
-    this.nextButton.disabled = !ready;
+    setText(this.nextButton, t(`next.${this.step.action}`));
+    this.nextButton.disabled = !this.step.ready;
     for (const paint of this.boxes) paint(state);
     this.reach();
     this.stage.update(state);
@@ -227,6 +220,8 @@ class App {
   follow(pane, picker, taker = picker) {
     pane.addEventListener("pick", ({ detail }) => taker.click(pane, detail.pixel));
     pane.addEventListener("hover", ({ detail }) => picker.hover(pane, detail.pixel));
+    draggable(pane, { find: (place) => picker.markAt(pane, place),
+      move: (image, place) => picker.drag(pane, image, place), drop: (image, place) => picker.drop(pane, image, place) });
   }
 
   async job(kind, options = {}) {

@@ -28,11 +28,16 @@ export class OrientationStage {
       items: () => app.state.control, panes: () => this.panes });
     app.listen(this.picker, () => this.refresh(), () => this.#look());
     this.wallCard = new WallCard(this);
+    this.actions = { align: () => this.align.click(), accept: () => this.accept(), control: () => this.#fresh(),
+      length: () => this.wallCard.arm("length") };
     this.targets = button(t("control.targets"), () => app.job("targets"), { class: "quiet", testid: "targets" });
     this.photos = h("div", { class: "viewer two" });
     this.body = h("tbody");
     this.tapes = h("tbody");
     this.advice = h("ul", { class: "advice" });
+    this.further = h("ul", { class: "advice" });
+    this.furtherCount = h("summary", {});
+    this.furtherFold = h("details", { testid: "further" }, this.furtherCount, this.further);
     this.remarks = h("ul", { class: "remarks" });
     this.known = h("dl", { class: "values one", testid: "orientation-values" });
     this.align = button(t("align.run"), () => app.job("align"), { class: "primary", testid: "align" });
@@ -48,10 +53,15 @@ export class OrientationStage {
   #controlButtons() {
     const { picker } = this;
     return h("div", { class: "buttons" },
-      button(t("control.new"), () => { this.wallCard.dismiss(); picker.fresh(1); }, { class: "quiet", testid: "control-new" }),
+      button(t("control.new"), () => this.#fresh(), { class: "quiet", testid: "control-new" }),
       button(t("pick.snap"), () => picker.snap(), { class: "quiet", testid: "control-snap" }),
       button(t("control.paste"), () => this.#paste(), { class: "quiet", testid: "control-paste" }),
       this.targets);
+  }
+
+  #fresh() {
+    this.wallCard.dismiss();
+    this.picker.fresh(1);
   }
 
   #controlTable() {
@@ -94,8 +104,8 @@ export class OrientationStage {
 
   /** What is to be done next stays in sight below the panel, however long the table. */
   #result() {
-    return h("section", { class: "card next" }, h("h2", {}, t("align.title")), this.good, this.advice,
-      h("div", { class: "row" }, this.align, this.acceptAlign), this.app.jobBox("align"));
+    return h("section", { class: "card next" }, h("h2", {}, t("align.title")), this.advice, this.good,
+      h("div", { class: "row" }, this.align, this.acceptAlign), this.app.jobBox("align"), this.furtherFold);
   }
 
   /** What is accepted is done: the points come next. */
@@ -183,17 +193,6 @@ export class OrientationStage {
     if (cursor?.pane === pane) drawing.cursor(context, pane, cursor.place, image);
   }
 
-  status(state) {
-    if (state.photos.length < 2) return { text: t("status.orientation.photos") };
-    if (state.pair && !state.pair.scaled) return { text: t("status.orientation.length") };
-    if (state.pair && state.pair.accepted === false) return { text: t("status.orientation.accept") };
-    if (state.pair) return { done: true, text: t("status.done") };
-    if (state.looking && !state.control.length) return { text: t("status.orientation.looking") };
-    const seen = state.control.filter(({ picks }) => picks[1] && picks[2]).length;
-    if (seen < 4) return { text: t("status.orientation.control", { seen }) };
-    return { text: state.advice[0] ?? t("status.orientation.align") };
-  }
-
   update(state) {
     this.prepare(state).catch((error) => this.app.refuse(error));
     this.picker.settle();
@@ -206,7 +205,13 @@ export class OrientationStage {
       build: (item) => this.#controlRow(item) });
     keyedRows(this.tapes, state.tapes, { key: ({ from, to }) => `${from}\t${to}`,
       signature: JSON.stringify, build: (tape) => this.#tapeRow(tape) });
-    for (const [list, lines] of [[this.advice, state.advice], [this.remarks, state.pair?.remarks ?? []]]) {
+    // What is grave and what comes next stand there; the rest is folded.
+    const { text: sentence } = state.steps.orientation;
+    const ahead = state.advice.filter((text, index) => text === sentence || (!index && state.levels[text]));
+    const further = state.advice.filter((text) => !ahead.includes(text));
+    setText(this.furtherCount, t("advice.further", { count: further.length }));
+    this.furtherFold.hidden = !further.length;
+    for (const [list, lines] of [[this.advice, ahead], [this.further, further], [this.remarks, state.pair?.remarks ?? []]]) {
       keyedRows(list, lines, { key: (text) => text, signature: (text) => `${state.levels[text]} ${text}`,
         build: (text) => h("li", { "data-level": state.levels[text] }, text) });
     }

@@ -29,9 +29,9 @@ export class PhotosStage {
     const fields = (names) => h("div", { class: "fields" },
       names.map(([key, unit]) => labelled(t(`setup.${key}`), this.site[key], unit)));
     this.through = h("p", { testid: "pair-media" });
-    this.form = h("section", { class: "card site" }, h("h2", {}, t("photos.site")),
+    // Most walls stand in air, and one length is enough: what is folded is opened where it is needed.
+    this.form = h("details", { class: "card site", testid: "site" }, h("summary", {}, h("h2", {}, t("photos.site"))),
       h("p", { class: "hint" }, t("photos.siteHint")), fields(SITE));
-    // Most walls stand in air: what is folded is opened where it is needed.
     this.media = h("details", { class: "card site", testid: "media" },
       h("summary", {}, h("h2", {}, t("photos.media"))), this.through,
       h("p", { class: "hint" }, t("photos.mediaHint")), fields(MEDIA));
@@ -43,6 +43,7 @@ export class PhotosStage {
         h("ul", {}, [1, 2, 3, 4, 5, 6].map((number) => h("li", {}, t(`start.bring.${number}`)))),
         h("div", { class: "row" }, button(t("start.print"), () => window.print(), { class: "quiet", testid: "print" }))),
       h("div", { class: "card" }, h("h2", {}, t("start.recent")), this.recent));
+    this.actions = { choose: () => this.input.click() };
     this.alone = new Alone(app);
     this.exchangePlace = h("div", { class: "row" });
     this.others = h("div", { class: "cards", testid: "other-photos" });
@@ -124,12 +125,6 @@ export class PhotosStage {
     return undefined;
   }
 
-  status(state) {
-    if (state.photos.length < 2) return { text: t(state.photos.length ? "status.photos.second" : "status.photos.drop") };
-    const open = state.photos.flatMap(({ missing }) => missing).length;
-    return open && !state.pair ? { text: t("status.photos.missing", { open }) } : { done: true, text: t("status.done") };
-  }
-
   update(state) {
     const ready = state.photos.length === 2;
     this.beginning.hidden = state.photos.length > 0;
@@ -146,6 +141,7 @@ export class PhotosStage {
     this.form.hidden = this.media.hidden = !ready;
     for (const card of this.cards) this.#fillCard(card, state);
     for (const [key] of [...SITE, ...MEDIA]) fill(this.site[key], state.setup?.[key]);
+    if (SITE.some(([key]) => (state.setup?.[key] ?? null) !== null) && !this.typed) this.form.open = this.typed = true;
     this.#tellMedia(state);
   }
 

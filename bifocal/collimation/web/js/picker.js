@@ -2,8 +2,12 @@
  * Picking, the same for control points in single photos and for points in superimposed ones: what
  * the next click means, the point in hand, nudge, snap, the proposed partner.
  */
+import { nearest } from "./dragging.js";
+
 const NEAR = 14;
 const REACH = 8;
+/** So near its middle a mark is taken hold of. [CSS px] */
+const GRIP = 9;
 const FARTHEST = 16;
 
 const other = (image) => 3 - image;
@@ -32,6 +36,7 @@ export class Picker extends EventTarget {
     this.guide = null;
     this.cursor = null;
     this.hovered = null;
+    this.dragged = null;
     this.latest = Promise.resolve();
   }
 
@@ -47,6 +52,8 @@ export class Picker extends EventTarget {
   }
 
   pick(item, image) {
+    const { dragged } = this;
+    if (dragged?.name === item.name && dragged.image === image) return dragged.pixel;
     return this.connection.pick(this.kind, item, image);
   }
 
@@ -243,6 +250,28 @@ export class Picker extends EventTarget {
     return true;
   }
 
+  /** The photo whose pick of the point in hand is drawn at a place of a pane, or null. */
+  markAt(pane, place) {
+    const { item } = this;
+    const marks = (item ? pane.images : []).filter((image) => this.pick(item, image))
+      .map((image) => ({ image, place: pane.screen(image, this.pick(item, image)) }));
+    return nearest(marks, place, GRIP)?.image ?? null;
+  }
+
+  /** Show the pick in hand at a place of a pane. */
+  drag(pane, image, place) {
+    this.dragged = { name: this.selected, image, pixel: pane.photo(image, place) };
+    this.changed();
+  }
+
+  /** Leave the pick in hand where it was dragged to: one step, whichever way it went. */
+  drop(pane, image, place) {
+    const { item } = this;
+    this.dragged = null;
+    this.image = image;
+    if (item) this.#shift(item, image, ...pane.photo(image, place));
+  }
+
   #shift(item, image, column, row) {
     const args = { name: item.name, image, column, row };
     this.hovered = null;
@@ -284,19 +313,11 @@ export class Picker extends EventTarget {
     });
   }
 
-  #nearest(pane, [x, y]) {
-    let best = NEAR;
-    let name = null;
-    for (const item of this.items()) {
-      for (const image of pane.images) {
-        const pixel = this.pick(item, image);
-        if (!pixel) continue;
-        const [u, v] = pane.screen(image, pixel);
-        const distance = Math.hypot(u - x, v - y);
-        if (distance < best) [best, name] = [distance, item.name];
-      }
-    }
-    if (name) this.select(name);
+  #nearest(pane, place) {
+    const marks = this.items().flatMap((item) => pane.images.filter((image) => this.pick(item, image))
+      .map((image) => ({ name: item.name, place: pane.screen(image, this.pick(item, image)) })));
+    const mark = nearest(marks, place, NEAR);
+    if (mark) this.select(mark.name);
   }
 
   /** Show the keyboard's cursor in the middle of a pane, or hide it. */

@@ -68,15 +68,6 @@ export class PointsStage {
     };
   }
 
-  status(state) {
-    if (!state.pair || (!state.pair.accepted && !state.points.length)) return { text: t("status.points.pair") };
-    const points = this.app.points();
-    const half = points.filter(({ picks }) => !picks[1] || !picks[2]).length;
-    if (half) return { text: t("status.points.half", { half }) };
-    if (!points.length) return { text: t("status.points.none") };
-    return { done: true, text: t("status.points.some", { count: points.length }) };
-  }
-
   /** Panes at once, so that pixels have their place; tiles as soon as the server tells of them. */
   async prepare(state) {
     const mark = wallMark(state);

@@ -1,5 +1,6 @@
 /** Stage 4: relief and orthophoto run, looked at, delivered. */
 import { h, keyedRows, number, parseNumber, setText } from "./dom.js";
+import { draggable } from "./dragging.js";
 import * as drawing from "./drawing.js";
 import { button, choice, labelled, numberInput } from "./fields.js";
 import { Wall } from "./geometry.js";
@@ -11,29 +12,37 @@ import { photoMark, wallMark } from "./tiles.js";
 import { Pane, pictureLayer, pixelView, tileLayer } from "./viewer.js";
 import { t } from "./words/words.js";
 
-const SCALES = ["1:10", "1:20", "1:25", "1:50", "1:100", "1:200"];
+const SCALES = [10, 20, 25, 50, 100, 200, 500];
 const SHEETS = ["A4", "A3", "A2", "A1", "A0"];
 const GRADES = ["fast", "standard", "best"];
 const ASK_MS = 80;
 
+/** What is looked at, one at a time. */
+const VIEWS = ["ortho", "relief", "photo"];
+const frameOf = ([left, top, right, bottom]) => [[left, top], [right, bottom]];
+
 /** Bytes of a file, in the unit that leaves digits to read. */
-const size = (bytes) => (bytes < 1e5 ? `${(bytes / 1e3).toFixed(1)} kB` : `${(bytes / 1e6).toFixed(1)} MB`);
+const size = (bytes) => (bytes < 1e5 ? `${number(bytes / 1e3, 1)} kB` : `${number(bytes / 1e6, 1)} MB`);
 
 export class ProductsStage {
   constructor(app) {
     this.app = app;
     this.swipe = 1;
+    this.shown = "photo";
+    this.made = new Set();
     this.photos = h("div", { class: "viewer" });
     this.value = h("p", { class: "value", role: "status", testid: "relief-value" });
     this.range = new Range((low, high) => { this.limits = [low, high]; this.#showRelief(); });
     this.shapes = new Shapes(app, this);
+    const make = () => this.deliver.click();
+    this.actions = { make, again: make, download: () => this.download.click() };
     this.loupe = new Loupe();
     this.profile = new Profile(app, () => this.pane?.paint(), () => {
       this.pane?.mounted();
       this.pane?.fit();
     });
     this.element = h("div", { class: "stage work", id: "stage-products" },
-      h("div", { class: "table-top" }, this.#bar(), this.photos, this.profile.element),
+      h("div", { class: "table-top" }, this.#bar(), this.photos, this.range.element, this.profile.element),
       h("aside", { class: "panel" }, this.#deliverBox(), this.#reliefBox(), this.#orthoBox(),
         this.shapes.element, this.loupe.element));
   }
@@ -44,7 +53,9 @@ export class ProductsStage {
         oninput: () => changed(input.value / 100) });
       return h("span", { class: "slider" }, h("label", { for: id }, t(`products.${id}`)), input);
     };
-    this.opacity = 0.6;
+    this.opacity = 1;
+    this.views = Object.fromEntries(VIEWS.map((view) => [view, button(t(`products.${view}`), () => this.look(view),
+      { testid: `view-${view}` })]));
     const toggle = (key, testid, changed) => {
       const made = button(t(key), () => {
         const on = made.getAttribute("aria-pressed") !== "true";
@@ -54,12 +65,19 @@ export class ProductsStage {
       return made;
     };
     return h("div", { class: "layer-bar", role: "toolbar", "aria-label": t("layer.bar") },
-      range("relief-opacity", "60", (value) => { this.opacity = value; this.#apply(); }),
-      range("ortho-swipe", "100", (value) => { this.swipe = value; this.#apply(); }),
-      toggle("relief.hatch", "relief-hatch", (on) => { this.hatched = on; this.#showRelief(); }),
+      h("div", { class: "segments", role: "group", "aria-label": t("products.view") }, Object.values(this.views)),
+      this.veil = range("relief-opacity", "100", (value) => { this.opacity = value; this.#apply(); }),
+      this.curtain = range("ortho-swipe", "100", (value) => { this.swipe = value; this.#apply(); }),
+      this.hatch = toggle("relief.hatch", "relief-hatch", (on) => { this.hatched = on; this.#showRelief(); }),
       toggle("relief.points", "relief-points", (on) => { this.picks = on; }),
       button(t("profile.draw"), () => this.profile.begin(), { class: "quiet", testid: "profile" }),
       this.value);
+  }
+
+  /** Show one product, or the far photo on the wall; the others only as far as it is drawn aside. */
+  look(view) {
+    this.shown = view;
+    this.#apply();
   }
 
   /** A product: its picture, what it is good for, its size, what makes it. */
@@ -98,12 +116,14 @@ export class ProductsStage {
 
   #deliverBox() {
     const same = (names) => Object.fromEntries(names.map((name) => [name, name]));
-    this.scale = choice({ label: t("deliver.scale"), options: same(SCALES), value: "1:50",
-      save: () => {}, testid: "deliver-scale" });
+    this.scale = choice({ label: t("deliver.scale"), options: same(SCALES.map((scale) => `1:${scale}`)), value: "1:50",
+      save: () => { this.chosen = true; }, testid: "deliver-scale" });
     this.sheet = choice({ label: t("deliver.sheet"), options: { auto: t("deliver.auto"), ...same(SHEETS) },
       save: () => {}, testid: "deliver-sheet" });
+    this.title = h("input", { type: "text", maxlength: "120", autocomplete: "off", placeholder: t("deliver.titleHint"), testid: "deliver-title" });
     this.deliver = button(t("deliver.run"), () => this.app.job("deliver", { scale: this.scale.value, quality: this.grade.value,
-      image: this.source.value, sheet: this.sheet.value === "auto" ? null : this.sheet.value }), { testid: "deliver" });
+      image: this.source.value, sheet: this.sheet.value === "auto" ? null : this.sheet.value, title: this.title.value.trim(),
+      sections: this.profile.kept }), { testid: "deliver" });
     this.deliverState = h("p", { class: "hint", testid: "deliver-state" });
     this.files = h("ul", { class: "files" });
     this.count = h("summary", {});
@@ -112,18 +132,9 @@ export class ProductsStage {
     return h("section", { class: "card" }, h("h2", {}, t("deliver.title")),
       h("p", { class: "hint" }, t("deliver.hint")), h("div", { class: "fields" },
         labelled(t("deliver.scale"), this.scale), labelled(t("deliver.sheet"), this.sheet)),
+      labelled(t("deliver.heading"), this.title),
       h("div", { class: "row" }, this.deliver, this.download), this.deliverState, this.app.jobBox("deliver"),
       h("details", { testid: "files" }, this.count, this.files));
-  }
-
-  status(state) {
-    if (!state.pair?.accepted) return { text: t("status.points.pair") };
-    if (!state.products.relief) return { text: t("status.products.relief") };
-    if (!state.products.ortho) return { text: t("status.products.ortho") };
-    if (!state.products.files.some(({ name }) => name.endsWith(".pdf")) || Object.keys(state.products.stale).length) {
-      return { text: t("status.products.deliver") };
-    }
-    return { done: true, text: t("status.done") };
   }
 
   async prepare(state) {
@@ -151,6 +162,14 @@ export class ProductsStage {
     this.ortho = image && this.#orthoLayer(ortho, image, state.photos);
     this.reliefMark = `${done.length}-${state.revision}`;
     this.#showRelief();
+    // What was made last is looked at first.
+    const newest = ["ortho", "relief"].find((kind) => state.products[kind] && !this.made.has(kind));
+    this.made = new Set(["ortho", "relief"].filter((kind) => state.products[kind]));
+    if (newest) {
+      this.look(newest);
+      this.pane.frameTo(frameOf(this.#edges(state.products[newest].bounds)));
+      this.pane.fit();
+    }
   }
 
   /** The relief in the colours that were chosen, above photo and orthophoto. */
@@ -166,7 +185,7 @@ export class ProductsStage {
 
   /** Whether what lies under the pointer is the orthophoto, where X and Y are true. */
   get onOrtho() {
-    return Boolean(this.ortho) && this.swipe > 0.5;
+    return this.shown === "ortho" && Boolean(this.ortho) && this.swipe > 0.5;
   }
 
   #makePane(state) {
@@ -177,8 +196,10 @@ export class ProductsStage {
       painter: (context, pane) => this.#draw(context, pane) });
     this.pane.frameTo(this.wall.frameOf(1, state.photos[0]));
     this.pane.addEventListener("hover", ({ detail }) => this.#ask(detail.pixel));
+    draggable(this.pane, { find: (place) => this.shapes.cornerAt(place),
+      move: (mark, place) => this.shapes.drag(mark, place), drop: (mark, place) => this.shapes.drop(mark, place) });
     this.pane.addEventListener("pick", ({ detail }) => this.#click(this.pane.unplace(detail.pixel)));
-    this.photos.replaceChildren(this.pane.element, this.range.element);
+    this.photos.replaceChildren(this.pane.element);
     this.pane.mounted();
   }
 
@@ -205,6 +226,11 @@ export class ProductsStage {
     }
   }
 
+  /** Take back the last corner; null where none is in hand. */
+  get remove() {
+    return this.shapes.corners?.length ? () => this.shapes.back() : null;
+  }
+
   /** Leave what is half done. */
   leave() {
     return this.shapes.leave();
@@ -224,8 +250,20 @@ export class ProductsStage {
   }
 
   #apply() {
+    const there = { photo: this.wallLayer, ortho: this.ortho, relief: this.relief };
+    // What is no longer there gives way to what is.
+    if (!there[this.shown]) this.shown = "photo";
+    const whole = this.swipe === 1 && (this.shown !== "relief" || this.opacity === 1);
+    for (const [view, layer] of Object.entries(there)) {
+      this.views[view].setAttribute("aria-pressed", String(view === this.shown));
+      this.views[view].disabled = !layer;
+      layer?.setVisible(view === this.shown || (view === "photo" && !whole));
+    }
+    this.curtain.hidden = this.shown === "photo";
+    this.veil.hidden = this.hatch.hidden = this.range.element.hidden = this.shown !== "relief";
     this.relief?.setOpacity(this.opacity);
     this.photos.style.setProperty("--ortho-cut", `${100 * (1 - this.swipe)}%`);
+    this.pane?.mounted();
   }
 
   #draw(context, pane) {
@@ -263,6 +301,7 @@ export class ProductsStage {
     this.prepare(state).catch((error) => this.app.refuse(error));
     const { relief, ortho, files, stale } = state.products;
     setText(this.deliverState, stale.deliver ?? "");
+    this.#tellScale(state.drawing_scale);
     this.picks &&= Boolean(relief);
     const pixels = (product) => (product.cols ? `${product.cols} × ${product.rows} px` : "");
     this.range.show(relief);
@@ -288,6 +327,16 @@ export class ProductsStage {
     keyedRows(this.files, files, { key: ({ name }) => name, signature: JSON.stringify,
       build: ({ name, bytes: own }) => h("li", {}, h("a", { href: `download/${encodeURIComponent(name)}`, download: "" }, name),
         h("span", { class: "hint" }, ` ${size(own)}`)) });
+  }
+
+  /** The finest scale that holds is chosen; finer ones say that they are too fine. */
+  #tellScale(finest) {
+    if (!finest || this.finest === finest) return;
+    this.finest = finest;
+    SCALES.forEach((scale, index) => {
+      setText(this.scale.options[index], scale < finest ? t("deliver.fine", { scale }) : `1:${scale}`);
+    });
+    if (!this.chosen) this.scale.value = `1:${finest}`;
   }
 
   get activePane() {

@@ -1,9 +1,9 @@
 /** The relief along a line drawn on the wall, as a small chart with its sigma. */
-import { h, number, setText } from "./dom.js";
+import { decimal, h, number, setText } from "./dom.js";
 import { button } from "./fields.js";
 import { t } from "./words/words.js";
 
-const [WIDTH, HEIGHT, LEFT, BOTTOM, PAD] = [900, 180, 54, 26, 12];
+const [WIDTH, HEIGHT, LEFT, BOTTOM, PAD] = [900, 180, 66, 26, 12];
 
 const svg = (tag, attributes) => {
   const node = document.createElementNS("http://www.w3.org/2000/svg", tag);
@@ -24,14 +24,50 @@ function ticks(low, high, count) {
 export class Profile {
   /** `paint`: draw the line on the wall; `shown`: the chart has taken its room. */
   constructor(app, paint, shown) {
-    Object.assign(this, { app, paint, shown, ends: [], drawing: false, data: null, at: null });
+    Object.assign(this, { app, paint, shown, ends: [], drawing: false, data: null, at: null, kept: [] });
     this.chart = svg("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", class: "chart" });
     this.caption = h("p", { class: "hint", role: "status" });
+    this.keep = button(t("profile.keep"), () => this.#keep(), { class: "quiet", testid: "profile-keep", "aria-pressed": "false" });
     this.element = h("section", { class: "profile", hidden: true, "aria-label": t("profile.title") },
-      h("div", { class: "row" }, this.caption, button(t("profile.close"), () => this.close(), { class: "quiet" })),
+      h("div", { class: "row" }, this.caption, this.keep,
+        button("CSV", () => this.#save(), { class: "quiet", testid: "profile-csv" }),
+        button(t("profile.close"), () => this.close(), { class: "quiet" })),
       this.chart);
     this.chart.addEventListener("pointermove", (event) => this.#point(event));
     this.chart.addEventListener("pointerleave", () => { this.at = null; this.paint(); });
+  }
+
+  /** The line as the drawing's sections are named: the corners, in metres. */
+  get #corners() {
+    return this.ends.map((end) => end.map((one) => one.toFixed(3)).join(",")).join(" ");
+  }
+
+  /** Draw this profile in the package's drawings too, or no longer. */
+  #keep() {
+    const { kept } = this;
+    const corners = this.#corners;
+    this.kept = kept.includes(corners) ? kept.filter((one) => one !== corners) : [...kept, corners];
+    this.#tellKept();
+    this.app.say(t("profile.kept", { count: this.kept.length }));
+  }
+
+  #tellKept() {
+    this.keep.setAttribute("aria-pressed", String(this.kept.includes(this.#corners)));
+  }
+
+  /** The profile as a table, in metres. */
+  #save() {
+    const { distance, r, sigma } = this.data;
+    const [[x0, y0], [x1, y1]] = this.ends;
+    const rows = distance.map((along, index) => {
+      const share = along / this.length;
+      return [along, x0 + share * (x1 - x0), y0 + share * (y1 - y0), r[index], sigma[index]]
+        .map((value) => (Number.isFinite(value) ? value.toFixed(4) : "")).join(",");
+    });
+    const file = new Blob([["distance [m],X [m],Y [m],r [m],sigma_r [m]", ...rows, ""].join("\r\n")], { type: "text/csv" });
+    const link = h("a", { href: URL.createObjectURL(file), download: `${this.app.state.title}_profile.csv` });
+    link.click();
+    URL.revokeObjectURL(link.href);
   }
 
   begin() {
@@ -50,6 +86,7 @@ export class Profile {
 
   /** The relief or the wall is another: what was drawn shows neither. */
   forget() {
+    this.kept = [];
     if (this.ends.length) this.close();
   }
 
@@ -107,14 +144,17 @@ export class Profile {
     this.chart.setAttribute("aria-label", t("profile.alt", { low: number(low, 3), high: number(high, 3) }));
     this.element.hidden = false;
     this.shown();
-    setText(this.caption, t("profile.caption", { length: number(this.length, 3), low: number(low, 3), high: number(high, 3) }));
+    this.#tellKept();
+    const times = (x(1) - x(0)) && (y(0) - y(1)) / (x(1) - x(0));
+    setText(this.caption, `${t("profile.caption", { length: number(this.length, 3), low: number(low, 3), high: number(high, 3) })} · ${
+      t("profile.times", { times: number(times, times < 10 ? 1 : 0) })}`);
     return undefined;
   }
 
   #axes(x, y, low, high) {
     const text = (value, attributes) => {
       const node = svg("text", attributes);
-      node.textContent = String(+value.toPrecision(4));
+      node.textContent = `${decimal(String(+value.toPrecision(4)))} m`;
       return node;
     };
     return [

@@ -18,9 +18,8 @@ export class Range {
       this.canvas, h("div", { class: "handles" }, this.handles), h("div", { class: "ends", role: "img" }, this.low, h("span", { class: "zero" }, t("relief.zero")), this.high));
   }
 
-  /** The histogram, colours and range of a relief map; null: there is none. */
+  /** Take the histogram, colours and range of a relief map; null: there is none. */
   show(facts) {
-    this.element.hidden = !facts;
     const mark = JSON.stringify(facts);
     if (!facts || this.mark === mark) return;
     this.mark = mark;

@@ -4,27 +4,31 @@
  */
 import { h, keyedRows, number, setText } from "./dom.js";
 import * as drawing from "./drawing.js";
+import { nearest } from "./dragging.js";
 import { button, choice, fill, numberInput } from "./fields.js";
 import { t } from "./words/words.js";
 
 const KINDS = ["face", "break", "occluder", "outline"];
 const INK = { face: "#ffd84d", break: "#ff8f5e", occluder: "#d69bff", outline: "#b9f27c" };
 const CLOSE = 10;
+/** So near its middle a corner is taken hold of. [CSS px] */
+const GRIP = 8;
 
 export class Shapes {
   /** `stage`: the products, whose pane and wall it draws on. */
   constructor(app, stage) {
-    Object.assign(this, { app, stage, corners: null, hot: null });
+    Object.assign(this, { app, stage, corners: null, hot: null, snapping: true, dragged: null, latest: Promise.resolve() });
     this.kind = choice({ label: t("shape.kind"), testid: "face-kind", save: () => {},
       options: Object.fromEntries(KINDS.map((kind) => [kind, t(`shape.${kind}`)])) });
     this.begin = button(t("shape.draw"), () => this.arm(), { class: "quiet", testid: "face", "aria-pressed": "false" });
     this.close = button(t("shape.close"), () => this.finish(), { class: "quiet", testid: "face-close", hidden: true });
     this.suggest = button(t("shape.suggest"), () => app.job("suggest"), { class: "quiet", testid: "face-suggest" });
+    this.snap = button(t("shape.snap"), () => this.toggleSnap(), { class: "quiet", testid: "face-snap", "aria-pressed": "true" });
     this.hint = h("p", { class: "hint", role: "status" });
     this.body = h("tbody");
     this.offers = h("ul", { class: "offers" });
     this.element = h("section", { class: "card" }, h("h2", {}, t("shape.title")),
-      h("div", { class: "row" }, this.kind, this.begin, this.close, this.suggest), app.jobBox("suggest"), this.hint,
+      h("div", { class: "row" }, this.kind, this.begin, this.close, this.snap, this.suggest), app.jobBox("suggest"), this.hint,
       this.offers, h("table", { class: "grid", testid: "shape-table" }, this.body));
   }
 
@@ -35,18 +39,81 @@ export class Shapes {
     this.stage.pane?.paint();
   }
 
+  /** Whether corners go to the corner of the photo that lies there. */
+  toggleSnap() {
+    this.snapping = !this.snapping;
+    this.snap.setAttribute("aria-pressed", String(this.snapping));
+    this.app.say(t(this.snapping ? "shape.snaps" : "shape.snapsNot"));
+  }
+
+  /** Take back the last corner of the shape in hand. */
+  back() {
+    this.corners?.pop();
+    this.update(this.app.state);
+    this.stage.pane?.paint();
+  }
+
+  /** The corner that is drawn at a CSS pixel of the pane, or null: of the shape in hand, or of a kept one. */
+  cornerAt(place) {
+    const { pane } = this.stage;
+    const of = (shape, corners, places) => corners.map((corner, index) => ({ shape, index, corner,
+      place: pane.place(this.#shown(corner, places?.[index])) }));
+    const marks = this.corners ? of(null, this.corners)
+      : this.app.state.shapes.flatMap((shape) => of(shape, shape.corners, shape.places));
+    return nearest(marks, place, GRIP);
+  }
+
+  /** Draw a corner where it is dragged to. */
+  drag(mark, place) {
+    this.dragged = { ...mark, spot: this.stage.pane.unplace(place) };
+    this.stage.pane.paint();
+  }
+
+  /** Leave a corner where it was dragged to: its shape follows. */
+  async drop({ shape, index }, place) {
+    const spot = this.stage.pane.unplace(place);
+    const corner = await this.#corner(spot).catch((error) => this.app.refuse(error));
+    this.dragged = null;
+    this.stage.pane.paint();
+    if (!corner) return;
+    if (!shape) this.corners?.splice(index, 1, corner);
+    else {
+      const { name, kind } = shape;
+      // A face is one plane: its corner keeps the relief of the others.
+      if (kind !== "outline" && kind !== "break") corner[2] = shape.corners[index][2];
+      await this.app.send("shape.set", { name, kind, corners: shape.corners.with(index, corner) });
+    }
+    this.update(this.app.state);
+    this.stage.pane.paint();
+  }
+
   leave() {
     if (!this.corners) return false;
     this.arm();
     return true;
   }
 
-  /** A click at a pixel of the wall's grid, while a shape is in hand. */
-  async click(spot) {
+  /** A click at a pixel of the wall's grid, while a shape is in hand; one after the other. */
+  click(spot) {
+    return this.#next(() => this.#take(spot));
+  }
+
+  /** Close the shape in hand, once all its corners are there. */
+  finish() {
+    return this.#next(() => this.#keep());
+  }
+
+  #next(action) {
+    this.latest = this.latest.then(action).catch((error) => this.app.refuse(error));
+    return this.latest;
+  }
+
+  async #take(spot) {
     const { corners } = this;
+    if (!corners) return undefined;
     const place = this.stage.pane.place(spot);
     const first = corners[0] && this.stage.pane.place(this.#shown(corners[0]));
-    if (corners.length > 2 && Math.hypot(first[0] - place[0], first[1] - place[1]) < CLOSE) return this.finish();
+    if (corners.length > 2 && Math.hypot(first[0] - place[0], first[1] - place[1]) < CLOSE) return this.#keep();
     const corner = await this.#corner(spot).catch((error) => this.app.refuse(error));
     if (!corner || this.corners !== corners) return undefined;
     corners.push(corner);
@@ -65,14 +132,14 @@ export class Shapes {
     }
     const [column, row] = pixel;
     const radius = Math.min(Math.max(4 / this.stage.pane.zoom, 4), 14);
-    const found = await connection.ask("api/snap", { image: 1, column, row, radius }).catch(() => null);
+    const found = !this.snapping ? null : await connection.ask("api/snap", { image: 1, column, row, radius }).catch(() => null);
     if (found && found.kind !== "none") pixel = [found.column, found.row];
     const { places } = await connection.ask("relief/met", { pixels: [pixel] });
     return [...pixel, places[0][2] ?? 0];
   }
 
   /** Corners -> a shape of the survey: a face has one relief, that which lies most within. */
-  async finish() {
+  async #keep() {
     const { corners } = this;
     const kind = this.kind.value;
     if (!corners || corners.length < (kind === "break" ? 2 : 3)) return this.app.say(t("shape.few"), "warning");
@@ -94,15 +161,18 @@ export class Shapes {
 
   draw(context, pane) {
     const { shapes, suggested } = this.app.state;
-    const line = (corners, places, ink, more) => drawing.polyline(context, ink,
-      corners.map((corner, index) => pane.place(this.#shown(corner, places?.[index]))), more);
+    const { dragged } = this;
+    const line = (corners, places, ink, more, name = null) => drawing.polyline(context, ink,
+      corners.map((corner, index) => pane.place(dragged && dragged.index === index && (dragged.shape?.name ?? null) === name
+        ? dragged.spot : this.#shown(corner, places?.[index]))), more);
     for (const { name, kind, corners, places } of shapes) {
-      line(corners, places, INK[kind], { closed: kind !== "break", width: name === this.hot ? 3.5 : 2, dash: kind === "occluder" ? [6, 4] : [] });
+      line(corners, places, INK[kind], { closed: kind !== "break", width: name === this.hot ? 3.5 : 2, dash: kind === "occluder" ? [6, 4] : [] }, name);
     }
-    for (const { corners } of suggested) line(corners, null, "#ffffff", { closed: true, width: 1.5, dash: [5, 5] });
+    for (const { corners } of suggested) line(corners, null, "#ffffff", { closed: true, width: 1.5, dash: [5, 5] }, "suggested");
     if (!this.corners?.length) return;
     line(this.corners, null, INK[this.kind.value], { width: 2.5 });
-    for (const corner of this.corners) drawing.marker(context, 1, pane.place(this.#shown(corner)));
+    this.corners.forEach((corner, index) => drawing.marker(context, 1,
+      pane.place(dragged && !dragged.shape && dragged.index === index ? dragged.spot : this.#shown(corner))));
   }
 
   update(state) {
@@ -125,7 +195,7 @@ export class Shapes {
   #row({ name, kind, corners, relief, width, height, area, length }) {
     const level = numberInput({ label: t("shape.relief", { name }), size: "6", save: (r) =>
       this.app.send("shape.set", { name, kind, corners: corners.map(([c, row]) => [c, row, r ?? 0]) }) });
-    fill(level, relief === undefined ? null : +number(relief, 3));
+    fill(level, relief === undefined ? null : Math.round(1000 * relief) / 1000);
     const size = [width && `${number(width, 3)} × ${number(height, 3)} m`, area && `${number(area, 3)} m²`,
       kind === "break" && length && `${number(length, 3)} m`].filter(Boolean).join(" · ");
     return h("tr", { onpointerenter: () => { this.hot = name; this.stage.pane?.paint(); }, onpointerleave: () => { this.hot = null; this.stage.pane?.paint(); } },

@@ -2,13 +2,13 @@
  * The orientation that the program found by itself: the wall as a sheet in both photos, the one
  * length that gives its scale, and another face where the wall is none.
  */
-import { h, keyedRows, number, parseNumber, setText } from "./dom.js";
+import { decimal, h, keyedRows, number, parseNumber, setText } from "./dom.js";
 import * as drawing from "./drawing.js";
 import { button } from "./fields.js";
+import { gridLines, gridStep, Wall } from "./geometry.js";
 import { t } from "./words/words.js";
 
-const SHEET = "rgba(60, 220, 130, 0.3)";
-const SHEET_EDGE = "rgba(60, 220, 130, 0.9)";
+const SHEET = "rgb(60, 220, 130)";
 const LENGTH_INK = "#ffe14d";
 
 export class WallCard {
@@ -106,7 +106,8 @@ export class WallCard {
     const refused = !pair && failed?.quiet && failed.state === "failed" && !failed.cured ? failed.message : "";
     this.element.hidden = !found && !looking && !refused;
     const ties = pair?.report?.common_points;
-    const words = found ? t("wall.found", { share: Math.round((100 * ties.on_wall) / ties.count), count: ties.count })
+    const grid = found && pair.scaled ? t("wall.grid", { step: decimal(String(gridStep(pair))) }) : "";
+    const words = found ? `${t("wall.found", { share: Math.round((100 * ties.on_wall) / ties.count), count: ties.count })} ${grid}`.trim()
       : looking ? t("wall.looking") : t("wall.refused", { why: refused });
     setText(this.state, words);
     this.state.dataset.level = found ? "good" : looking ? "busy" : "fair";
@@ -124,10 +125,23 @@ export class WallCard {
           onpointerleave: () => { this.spot = null; this.stage.refresh(); } })) });
   }
 
+  /** Lines of a grid on the wall, as each photo shows them; kept until the pair is another one. */
+  #grid(pair) {
+    const mark = JSON.stringify(pair.images);
+    if (this.mark !== mark) {
+      Object.assign(this, { mark, lines: [1, 2].map((image) => gridLines(new Wall(pair), image, gridStep(pair))) });
+    }
+    return this.lines;
+  }
+
   draw(context, pane) {
-    const { pair, scale } = this.app.state;
-    const sheet = pair?.accepted === false ? pair.report?.wall?.[pane.image - 1] : null;
-    if (sheet) drawing.sheet(context, pane, sheet, SHEET, SHEET_EDGE);
+    const { pair, photos, scale } = this.app.state;
+    const outlines = pair?.accepted === false ? pair.report?.wall?.[pane.image - 1] : null;
+    if (outlines) {
+      const [right, bottom] = [photos[pane.image - 1].width - 0.5, photos[pane.image - 1].height - 0.5];
+      const frame = [[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]];
+      drawing.sheet(context, pane, { frame, lines: this.#grid(pair)[pane.image - 1], outlines }, SHEET);
+    }
     const drawn = this.ends.length ? { image: this.image, ends: this.ends } : scale;
     if (drawn?.image === pane.image) {
       const places = drawn.ends.map((end) => pane.screen(pane.image, end));
