@@ -37,7 +37,7 @@ from photocore.workbook.making.live_book import BookBuilder
 from photocore.workbook.making.live_columns import TEXT_KEYS, row_formula
 from photocore.workbook.making.newbook import RowBlock
 from photocore.workbook.making.print_area import move_print_area
-from photocore.workbook.making.repeated_rows import short_formula
+from photocore.workbook.making.repeated_rows import column_places, named_columns, short_formula
 from photocore.workbook.reading.grid import (
     TableArea,
     Value,
@@ -213,6 +213,7 @@ def _results_of(
                 if not _lacks(editor, row_formula(name, column.formula)):
                     short = short_formula(name, column.formula, letters, area.area[0])
                     ours.add(normal(short(area.first)))
+                    ours.add(normal(named_columns(short(area.first), _column_names(editor))))
                 own = (headings[column.key], area.first, area.area[2])
                 places.setdefault(area.sheet, []).append(own)
     if isinstance(editor, PlainEditor):
@@ -366,11 +367,19 @@ def _table(
         if _lacks(editor, text):
             formula = None
         elif length > STRUCTURED_ROWS:
-            formula = short_formula(area.name, escape(column.formula), letters, area.area[0])
+            named = named_columns(escape(column.formula), _column_names(editor))
+            formula = short_formula(area.name, named, letters, area.area[0])
         shown = ["" if value is None else value for value in values]
         filled.append(NewColumn(number, shown, style, formula))
     editor.fill_rows(area.sheet, first, filled)
     editor.fill_rows(area.sheet, first + area.length, prepared)
+
+
+def _column_names(editor: WorkbookEditor) -> set[str]:
+    """Return the names of columns of our tables, where they lead there and nowhere else."""
+    places, bare = column_places(editor.tables), str.maketrans("", "", "'")
+    named = {name: place.translate(bare) for name, place in editor.named.items()}
+    return {name for name, place in places.items() if named.get(name) == place.translate(bare)}
 
 
 def _lacks(editor: WorkbookEditor, formula: str) -> bool:

@@ -35,6 +35,7 @@ from photocore.workbook.making.look import (
     colour_words,
     strike_out,
 )
+from photocore.workbook.making.repeated_rows import name_columns
 from photocore.workbook.reading.grid import column_letters
 
 #: Row of the keys in `Points` and `Results`.
@@ -96,6 +97,8 @@ def build(content: SurveyContent) -> BookBuilder:
     _log(builder, content)
     if content.functions:
         functions_sheet(builder, named=not content.plain)
+    if content.point_rows > STRUCTURED_ROWS and not content.plain:
+        name_columns(builder)
     builder.calculate()
     if content.table is not None:
         refuse_contradictions(builder, content)

@@ -353,6 +353,8 @@ class WorkbookEditor:
 
     def changed_parts(self) -> dict[str, bytes | None]:
         """Return the parts of the package that change or are new, with their new content."""
+        if self.file is not None:
+            self.file.forget()
         with open_package(self.path) as package:
             spliced = self._splice(package)
             tainted = set[str]()
@@ -363,16 +365,19 @@ class WorkbookEditor:
             settled = [title for title, sheet in spliced.items() if not sheet.strips]
             stale = references.dependents(tainted, settled)
             parts: dict[str, bytes | None] = {}
-            stripped = False
+            stripped = any(spliced[title].strips for title in stale & spliced.keys())
+            formula_lost = any(sheet.formula_lost for sheet in spliced.values())
             for sheet in self.book.sheets:
-                changed = spliced.get(sheet.title)
+                changed = spliced.pop(sheet.title, None)  # of a large sheet each copy is 70 MB
                 if changed is None and sheet.title in stale:
                     data = read_part(self.path, package, sheet.part)
                     changed = splice_sheet(self.path, sheet.part, data, SheetChanges())
+                    stripped |= bool(changed.strips)
                 if changed is not None:
-                    strip = sheet.title in stale
-                    stripped |= strip and bool(changed.strips)
-                    parts[sheet.part] = changed.joined(strip=strip)
+                    joined = changed.joined(strip=sheet.title in stale)
+                    if joined != changed.data:
+                        parts[sheet.part] = joined
+            differ = {*parts}
             for area, bottom in self.grown.values():
                 references.grow(area, bottom, parts)
             for name, old, new in self.texts:
@@ -380,13 +385,13 @@ class WorkbookEditor:
                 parts[name] = replaced_outside_cells(data, old, new)
             if stripped:
                 formulas.recalculate_on_load(self.path, package, self.book, parts)
-            if any(sheet.formula_lost for sheet in spliced.values()):
+            if formula_lost:
                 formulas.drop_order(self.path, package, self.book, parts)
             self._graft(package, parts)
-            known = {s.part: spliced[s.title].data for s in self.book.sheets if s.title in spliced}
-            others = {*package.namelist()} & parts.keys() - known.keys()
-            known |= {name: read_part(self.path, package, name) for name in others}
-        return {name: data for name, data in parts.items() if data != known.get(name, b"")}
+            for name in {*package.namelist()} & parts.keys() - differ:
+                if parts[name] == read_part(self.path, package, name):
+                    del parts[name]
+        return parts
 
     def _graft(self, package: zipfile.ZipFile, parts: dict[str, bytes | None]) -> None:
         """Add new sheets, names and formats."""

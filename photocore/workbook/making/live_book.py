@@ -119,15 +119,17 @@ class BookBuilder:
             self.results[title][cell_name(row, column)] = value
         for title, cell, shown in self._titles:
             shown.v = str(self.results[title][cell])
+        results = {}  # once: of a large book each copy is 50 MB
         for title, block in self.blocks.items():
-            columns = calculation.columns(title, block.row)
+            columns = results[title, block.row] = calculation.columns(title, block.row)
             listed = [columns.get(i, values) for i, values in enumerate(block.columns, start=1)]
             self.blocks[title] = replace(block, columns=listed)
         for sheet in self.book.worksheets:
             for table in sheet.tables.values():
                 top, left, _, _ = split_area(table.ref)
                 content = self.tables[table.name]
-                columns = calculation.columns(sheet.title, top + 1)
+                at = sheet.title, top + 1
+                columns = results[at] if at in results else calculation.columns(*at)
                 for number, described in enumerate(content.columns, start=left):
                     if number in columns and described.kind == "formula":
                         content.cells[described.key] = columns[number]

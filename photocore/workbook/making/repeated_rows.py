@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from photocore.workbook.changing.cells import ROW_MARK, CellValue, RowText
 from photocore.workbook.making.live_columns import LiveColumn
 from photocore.workbook.making.newbook import RowBlock
+from photocore.workbook.reading.grid import TableArea, column_letters, quoted_title, split_area
+
+if TYPE_CHECKING:
+    from photocore.workbook.making.live_book import BookBuilder
+
+#: A whole column of a table: its name without ``tbl``, and its heading.
+COLUMN = re.compile(r"tbl(\w+)\[(\w+)\]")
 
 
 def repeated_rows(
@@ -52,3 +61,57 @@ def short_formula(table: str, text: str, letters: Mapping[str, str], head: int) 
     text = re.sub(heads, lambda key: f"${letters[key[1]]}${head}", text)
     text = re.sub(r"\[@(\w+)\]", lambda key: letters[key[1]] + ROW_MARK, text)
     return RowText(text)
+
+
+def name_columns(builder: BookBuilder) -> None:
+    """Call the columns of tables that short formulas lead to by names: the file has each once.
+
+    That takes names, or cells of the same sheet; with tables every row would spell it out.
+    """
+    places = column_places(
+        TableArea(t.name, sheet.title, split_area(t.ref), columns=tuple(t.column_names))
+        for sheet in builder.book.worksheets
+        for t in sheet.tables.values()
+    )
+    for title, block in builder.blocks.items():
+        formulas = dict(block.formulas)
+        for column, formula in formulas.items():
+            for name in (column_name(*key) for key in COLUMN.findall(formula.text)):
+                builder.define(name, places[name])
+            formulas[column] = named = RowText(named_columns(formula.text, places))
+            builder.book[title].cell(block.row, column + 1).value = f"={named(block.row)}"
+        builder.blocks[title] = replace(block, formulas=formulas)
+
+
+def column_places(tables: Iterable[TableArea]) -> dict[str, str]:
+    """Return where the names of all columns of tables must lead."""
+    places = {}
+    for table in (table for table in tables if table.name.startswith("tbl")):
+        for key, column in table.headings().items():
+            letters = column_letters(column)
+            cells = f"${letters}${table.first}:${letters}${table.area[2]}"
+            name = column_name(table.name.removeprefix("tbl"), key)
+            places[name] = f"{quoted_title(table.sheet)}!{cells}"
+    return places
+
+
+def named_columns(text: str, names: Container[str]) -> str:
+    """Return a formula with whole columns of tables called by names, where there are such names.
+
+    A file has a formula once for all rows only where it leads to names and cells of its own sheet.
+
+    >>> named_columns("INDEX(tblPoints[X],2)+SUM(tblGeo[w])", {"points_X"})
+    'INDEX(points_X,2)+SUM(tblGeo[w])'
+    """
+    return COLUMN.sub(
+        lambda at: name if (name := column_name(*at.groups())) in names else at[0], text
+    )
+
+
+def column_name(table: str, key: str) -> str:
+    """Return the name of a whole column of a table.
+
+    >>> column_name("Points", "X")
+    'points_X'
+    """
+    return f"{table.lower()}_{key}"

@@ -163,6 +163,10 @@ class SheetFile:
             self._grids[title] = self.load(title)
         return self._grids[title]
 
+    def forget(self) -> None:
+        """Let the cells go, where memory is wanted; they are read again when asked for."""
+        self._grids.clear()
+
     def formula(self, title: str, row: int, column: int) -> str:
         """Return the formula of a cell as it stands in the file; empty where there is none."""
         cell_at = rf'<(?:\w+:)?c r="{cell_name(row, column)}"[^>]*><(?:\w+:)?f[^>]*>([^<]*)<'

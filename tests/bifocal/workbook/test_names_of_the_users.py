@@ -9,6 +9,7 @@ import openpyxl
 import pytest
 from openpyxl.workbook.defined_name import DefinedName
 
+from bifocal.workbook.making import book as making
 from tests import office
 from tests.bifocal.workbook.test_cli_solve import run
 
@@ -23,10 +24,12 @@ def names_of_ours(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, ...]:
     """Return every name that a template has, of whatever kind."""
     names: set[str] = set()
     folder = tmp_path_factory.mktemp("templates")
-    for number, options in enumerate(((), ("--media", "3"), ("--photos", "3"))):
-        path = folder / f"template{number}.xlsx"
-        assert run("template", path, *options).exit_code == 0
-        names |= set(openpyxl.load_workbook(path).defined_names)
+    with pytest.MonkeyPatch.context() as long:
+        long.setattr(making, "STRUCTURED_ROWS", 10)
+        for number, options in enumerate(((), ("--media", "3"), ("--photos", "3"))):
+            path = folder / f"template{number}.xlsx"
+            assert run("template", path, *options).exit_code == 0
+            names |= set(openpyxl.load_workbook(path).defined_names)
     return tuple(sorted(names))
 
 
@@ -47,7 +50,7 @@ def planted(tmp_path: Path, names_of_ours: tuple[str, ...]) -> Path:
     book = openpyxl.Workbook()
     data = book.active
     data.title = "Data"
-    assert {"m_1", "k_12", "pitch", "sigma_s", "project", "setup_missing"} <= {*names_of_ours}
+    assert {"m_1", "k_12", "pitch", "sigma_s", "points_X", "setup_missing"} <= {*names_of_ours}
     for row, name in enumerate(names_of_ours, start=1):
         data.cell(row, 1, f"thing {row}")
         data.cell(row, 2, row + 0.5 if row % 7 else f"text {row}")
