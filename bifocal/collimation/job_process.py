@@ -286,7 +286,7 @@ def _documents(task: Task, title: str, progress: Progress) -> list[str]:
 
 
 def _lengths(task: Task) -> dict[str, LengthCheck]:
-    return {name: LengthCheck(**check) for name, check in task["lengths"].items()}
+    return {name: LengthCheck(**check) for name, check in task.get("lengths", {}).items()}
 
 
 def _suggest(task: Task, progress: Progress) -> dict[str, Any]:
