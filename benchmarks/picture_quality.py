@@ -13,7 +13,9 @@ from __future__ import annotations
 import csv
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
+from unittest.mock import patch
 
 import cv2
 import numpy as np
@@ -22,8 +24,9 @@ from benchmarks.relief_ablation import SCENES, shots
 from bifocal import Orthophoto, Pair, ReliefMap, dense_relief, orthophoto
 from bifocal.model.grid import Grid
 from bifocal.orthophotos.compose import as_surface, completed
-from bifocal.orthophotos.ortho_image import Source
+from bifocal.orthophotos.ortho_image import OrthoOptions, Source
 from bifocal.orthophotos.rectify import SourcePhoto
+from bifocal.orthophotos.whole_picture import CompletedSurface
 from photocore.images import read_image
 
 #: Pixel of the pictures of real pairs. [m]
@@ -36,25 +39,34 @@ ISLAND, LARGE = 0.1, 0.05
 
 def drawn(pair: Pair, images, relief: ReliefMap, grid: Grid):
     """Return the picture, its photo per pixel (1, 2; 0 empty), places in photos 1 and 2, CPU s."""
+
+    def no_marks(_, window: Grid):
+        return np.zeros(window.shape, np.uint8)
+
     start = time.process_time()
-    picture = orthophoto(pair, images, relief, gsd=grid.gsd, bounds=grid.bounds)
+    # Without marks of what is interpolated the source names the photo of every pixel.
+    with patch.object(CompletedSurface, "source", no_marks):
+        picture = orthophoto(pair, images, relief, gsd=grid.gsd, bounds=grid.bounds)
     took = time.process_time() - start
+    # Where both are blended, the one of the larger share.
+    second = (picture.source == Source.IMAGE_2).astype(np.uint8)
+    away = cv2.distanceTransform(1 - second, cv2.DIST_L2, 3)
+    first = (picture.source == Source.IMAGE_1) | (picture.source == Source.BOTH)
+    photo = np.where(first, np.uint8(1), np.uint8(0))
+    nearer = (picture.source == Source.BOTH) & (away < OrthoOptions().feather / 2)
+    photo[(second > 0) | nearer] = 2
     pixel = pair.image1.gsd(images[0].shape[1::-1])
     surface = completed(as_surface(relief), picture.grid, pair.image1, pixel)
+    if isinstance(surface, CompletedSurface):
+        mark = surface.source(picture.grid)
+        source = np.where((mark > 0) & (photo > 0), mark, picture.source)
+        picture = replace(picture, source=source)
     r = surface.window(picture.grid)
-    places, off = [], []
+    places = []
     for number, image in enumerate(images, start=1):
         view = SourcePhoto.prepare(pair.photo(number), image, number=number, gsd=picture.gsd)
-        column, row = view.pixel_map(picture.grid, r)
-        places.append((column, row, r))
-        away = np.abs(view.sample(column, row, "cubic").astype(np.float32) - picture.image)
-        off.append(np.where(view.inside(column, row), away.max(axis=-1), np.inf))
-    # On relief that is not measured the source does not name the photo; its colours do.
-    second = cv2.medianBlur((off[1] < off[0]).astype(np.uint8), 5)
-    photo = np.where(picture.source == Source.IMAGE_2, 2, 1 + second)
-    photo[picture.source == Source.IMAGE_1] = 1
-    photo[~picture.valid | (picture.source == Source.FILLED)] = 0
-    return picture, photo.astype(np.uint8), places, took
+        places.append((*view.pixel_map(picture.grid, r), r))
+    return picture, photo, places, took
 
 
 def looks(picture: Orthophoto, photo) -> dict[str, float]:

@@ -7,6 +7,7 @@ as wrong usage that names the option.
 from __future__ import annotations
 
 import io
+import os
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -19,12 +20,24 @@ import click
 
 from photocore.errors import LARGEST
 from photocore.log import COMMAND_LINE
+from photocore.names import on_disk
 
 #: Where a command finds the files that stand for stdin and stdout.
 STREAMS = ("photocore.stdin", "photocore.stdout")
 
 
-class TableFile(click.Path):
+class FilePath(click.Path):
+    """A file or folder; accents of its name may be letters of their own or not, as on the disk."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path, that of the one that is called so."""
+        return on_disk(Path(os.fsdecode(super().convert(value, param, ctx))), any_case=False)
+
+
+class TableFile(FilePath):
     """A file that holds a table; ``-`` stands for stdin or stdout.
 
     What comes from stdin (a text table, or a workbook) is kept as a file while the command runs.
@@ -40,7 +53,7 @@ class TableFile(click.Path):
     name = "file"
 
     def __init__(self, *, output: bool = False) -> None:
-        super().__init__(path_type=Path)
+        super().__init__()
         self.output = output
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:

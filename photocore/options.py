@@ -24,7 +24,7 @@ from typing import Annotated, Any
 
 import click
 
-from photocore.option_types import Checked, Names, Number, Scale
+from photocore.option_types import Checked, FilePath, Names, Number, Scale
 
 
 class Typed:
@@ -291,7 +291,7 @@ def _type_of(kind: Any) -> click.ParamType:  # type: ignore[type-arg,unused-igno
     """Return how values of a type are typed where nothing is noted."""
     if typing.get_origin(kind) is typing.Literal:
         return click.Choice(typing.get_args(kind))
-    plain = {Path: click.Path(path_type=Path), float: Number(), int: click.INT}
+    plain = {Path: FilePath(), float: Number(), int: click.INT}
     return plain.get(kind, click.STRING)
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from photocore.errors import InputError
+from photocore.names import near_file
 from photocore.provenance import note
 
 #: First words of what Git LFS leaves in the place of a file.
@@ -87,7 +88,9 @@ def check_file(path: Path, missing: str = "file", *, folder: str = ", expected a
     if path.is_dir():
         raise InputError(f"{path}: is a folder{folder}")
     if not path.exists():
-        raise InputError(f"{path}: no such {missing}.")
+        near = near_file(path)
+        hint = f' Did you mean "{near}"?' if near else ""
+        raise InputError(f"{path}: no such {missing}.{hint}")
     if not path.is_file():
         raise InputError(f"{path}: is a pipe or a device; save what it gives as a file first.")
 

@@ -39,7 +39,7 @@ from photocore.camera.boards import detect_board
 from photocore.cloud import open_cloud
 from photocore.images import image_info
 from photocore.raster import Window
-from tests.attack.site import make_site
+from tests.attack.site import MESHROOM, make_site
 
 #: Numbers and words that readers stumble over.
 TOKENS = (
@@ -115,6 +115,7 @@ READERS: dict[str, Reader] = {
     "colmap": Reader("cameras.txt", Lens.read),
     "opencv": Reader("lens.yml", Lens.read),
     "metashape": Reader("lens.xml", Lens.read),
+    "meshroom": Reader(f"project/{MESHROOM}", lambda p: _project(p.parents[2])),
     **{
         f"project {name}": Reader(f"project/{name}", _project)
         for name in (
@@ -129,6 +130,10 @@ READERS: dict[str, Reader] = {
             "cameras.sfm",
             "sfm_data.json",
             "bundle.out",
+            "transforms.json",
+            "cameras.csv",
+            "DSC_0.xmp",
+            "model.nvm",
         )
     },
 }

@@ -15,6 +15,7 @@ from bifocal.options import FILES, JOINT, OF_PAIR
 from bifocal.options.commands import MosaicCommand
 from bifocal.remarks import remark
 from photocore.errors import InputError
+from photocore.names import on_disk
 from photocore.options import options_of
 from photocore.textfile import file_name, read_toml
 
@@ -183,7 +184,7 @@ def _entries(
     for key, value in data.items():
         if key in FILES:
             if _is_name(value):
-                entries["files"][key] = base / value
+                entries["files"][key] = on_disk(base / value)
             elif value != "":
                 faults.append(f"{where}: {key} = {value!r}: expected the name of a file.")
         elif key == "products":
@@ -218,7 +219,8 @@ def _job(
     if not isinstance(photos, list) or len(photos) < 2 or not all(map(_is_name, photos)):
         faults.append(f"{where}: far and near, or a list photos, must name its photos.")
         return None
-    places = [os.path.realpath(base / photo) for photo in photos]
+    files = [on_disk(base / photo) for photo in photos]
+    places = [os.path.realpath(file) for file in files]
     if len(set(places)) < len(places):
         faults.append(f"{where}: one photo is named twice; name another.")
     if "photos" in entry and {"far", "near"} & entry.keys():
@@ -226,7 +228,7 @@ def _job(
     name = str(entry.get("name") or f"pair {number}")
     if not name.strip() or not name.isprintable():
         faults.append(f"{where}: name = {name!r}: expected a name that can be read.")
-    far, near, *more = (base / str(photo) for photo in photos)
+    far, near, *more = files
     products = entries["products"].get("products") or common["products"].get("products")
     return PairJob(
         name=name, folder=out / file_name(name), far=far, near=near, more=tuple(more),

@@ -23,6 +23,7 @@ from photocore.arrays import BoolArray, FloatArray, as_points, not_negative, pos
 from photocore.camera.distortion import inverse_2x2
 from photocore.errors import GeometryError, InputError, located
 from photocore.jsonfile import plain
+from photocore.names import on_disk
 from photocore.provenance import changes_are_taken, digest_of, known_hash
 
 #: No wall is photographed from further away, nor has coordinates beyond. [m]
@@ -156,7 +157,7 @@ class Photo:
         """
         if not self.file:
             raise InputError('the pair file names no photo here: add its "file".')
-        return self.folder / self.file
+        return on_disk(self.folder / self.file)
 
     @property
     def image(self) -> NDArray[Any]:

@@ -186,7 +186,7 @@ def align_photos(
         if way == "site" and not options.auto and options.length is None:
             _check_focal((first, second))
         control = control_of(
-            options, (first.interior.image_size, second.interior.image_size), (far.name, near.name)
+            options, (first.interior.image_size, second.interior.image_size), (str(far), str(near))
         )
         reading = control.remarks
         oriented = orient_pair(

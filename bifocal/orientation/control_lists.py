@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import PurePath
 
 import numpy as np
 
@@ -68,6 +69,8 @@ def of_rows(
     """
     column, row = (table.numbers(key) for key in keys)
     titles = [one if isinstance(one, str) else one[0] for one in photos]
+    short = [PurePath(title).name for title in titles]
+    titles = short if len(set(short)) == len(short) else titles
     places: dict[str, int] = {}
     picks: dict[tuple[str, int], int] = {}
     errors: list[CellError] = []

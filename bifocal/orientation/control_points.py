@@ -21,6 +21,7 @@ from bifocal.orientation.tuning import CONTROL
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
+from photocore.names import meant, nearest
 from photocore.tables import Column, Table, parse_column_map, read_table
 from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH, PHOTOS
 from photocore.tables.numbers import METRES
@@ -348,10 +349,13 @@ def read_lengths(path: Path | str, control: Control) -> Control:
     taped: list[tuple[int, int, float]] = []
     spread: list[float] = []
     errors: list[CellError] = []
-    for row, ends in enumerate(zip(table.texts("from"), table.texts("to"), strict=True)):
+    both = (meant(table.texts(key), index) for key in ("from", "to"))
+    for row, ends in enumerate(zip(*both, strict=True)):
         for key, name in zip(("from", "to"), ends, strict=True):
             if name not in index:
-                message = f'"{name}" is not a point of the control table.'
+                near = nearest(name, index)
+                hint = f' Did you mean "{near}"?' if near else ""
+                message = f'"{name}" is not a point of the control table.{hint}'
                 errors.append(table.error(row, key, message))
         if not lengths[row] > 0:
             errors.append(table.error(row, "length", "expected a length above zero, in metres."))

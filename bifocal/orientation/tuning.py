@@ -289,6 +289,9 @@ class ValidationTuning:
     #: Below this a photo is blurred.
     #: Evidence: sharp photos: 0.3 to 0.6; blurred by 3 px: below 0.17.
     blurred: float = 0.15
+    #: Soft photos of more pixels are judged at half their size, and again while they are as large:
+    #: features are sought in fewer. Phones and small sensors enlarge theirs to 24 to 108 MP. [px]
+    large: float = 24e6
     #: The distances must differ by this share; relief errors grow with its inverse.
     least_change: float = 0.03
     #: Lenses for façades bend less than this in the corner, as a share of the half diagonal.

@@ -17,6 +17,7 @@ from bifocal.orientation.tuning import VALIDATION
 from bifocal.remarks import remark
 from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import GeometryError, InputError
+from photocore.provenance import note_remark
 
 
 class SamePhotoError(GeometryError):
@@ -24,10 +25,18 @@ class SamePhotoError(GeometryError):
 
 
 def check_sharp(name: str, image: ByteArray) -> None:
-    """Refuse a blurred photo."""
-    value = sharpness(image)
-    if value < VALIDATION.blurred:
+    """Refuse a blurred photo; of a large one that is sharp when reduced, note that it is soft."""
+    value = reduced = sharpness(image)
+    times, small = 1, image
+    while reduced < VALIDATION.blurred and small.size >= VALIDATION.large:
+        small = cv2.resize(
+            image, None, fx=0.5 / times, fy=0.5 / times, interpolation=cv2.INTER_AREA
+        )
+        times, reduced = 2 * times, sharpness(small)
+    if reduced < VALIDATION.blurred:
         raise GeometryError(remark("align.blurred", of=name, value=value))
+    if times > 1:
+        note_remark(remark("align.soft", of=name, value=value, times=times))
 
 
 def check_different(name1: str, name2: str, images: Images) -> None:

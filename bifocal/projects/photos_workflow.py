@@ -151,6 +151,10 @@ def photos_from_project(
     finder = PhotoFinder(project, options.images)
     read = read_foreign_project(project, finder, options.part)
     files = {view.name: finder.find(view.name) for view in read.views}
+    names: dict[Path, str] = {}
+    for name, file in files.items():
+        if file and (first := names.setdefault(file, name)) != name:
+            raise InputError(remark("projects.one_file", first=first, second=name, of=file))
     upright = [_upright(view, files[view.name]) for view in read.views]
     read = read._replace(views=tuple(upright))
     frame, wall, covariance, scale, said = _frame(read, options)

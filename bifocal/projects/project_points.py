@@ -13,7 +13,7 @@ from photocore.arrays import FloatArray
 from photocore.camera.pinhole import Pinhole, rays_meeting
 from photocore.cloud import open_cloud
 from photocore.errors import InputError, WorkbookError
-from photocore.names import called, nearest
+from photocore.names import called, meant, nearest
 from photocore.programs.model import ForeignProject, ForeignView
 from photocore.tables import Column, Table, read_table
 from photocore.tables.axes import NAMES, PHOTOS
@@ -112,7 +112,8 @@ def chosen(points: Mapping[str, FloatArray], names: tuple[str, ...], option: str
     InputError
         If one of them is not known.
     """
-    lacking = [name for name in names if name not in points]
-    if lacking:
-        raise InputError(remark("projects.unknown_point", of=option, name=lacking[0]))
-    return np.array([points[name] for name in names])
+    called_so = meant(names, points)
+    if lacking := [name for name in called_so if name not in points]:
+        near = nearest(lacking[0], points) or "-"
+        raise InputError(remark("projects.unknown_point", of=option, name=lacking[0], near=near))
+    return np.array([points[name] for name in called_so])

@@ -16,6 +16,7 @@ from photocore.camera.pinhole import project
 from photocore.camera.rotation import skew
 from photocore.camera.similarity import Similarity, fit_similarity
 from photocore.errors import InputError, WorkbookError
+from photocore.names import meant
 from photocore.programs.model import ForeignView
 from photocore.provenance import note_remark
 from photocore.tables import read_table
@@ -51,17 +52,18 @@ def by_control(
         raise WorkbookError(errors)
     xyz = np.column_stack([metres_of(table, key, "") for key in ("X", "Y", "r")])
     blank = np.full(3, np.nan)
-    places = np.array([points.get(name, blank) for name in table.texts("id")]).reshape(-1, 3)
+    ids = meant(table.texts("id"), points)
+    places = np.array([points.get(name, blank) for name in ids]).reshape(-1, 3)
     picks = [project(view.camera, places) for view in views]
     xyz, _, notes = in_plane_frame(table, xyz, metres_of(table, "H", ""), picks, None)
     for text in notes:
         note_remark(f"{path.name}: {text}")
     xyz[np.isnan(xyz[:, 2]), 2] = 0.0
-    rows = [row for row, name in enumerate(table.texts("id"))
+    rows = [row for row, name in enumerate(ids)
             if name in points and np.isfinite(xyz[row]).all()]  # fmt: skip
     if len(rows) < 3:
         raise InputError(remark("projects.few_control_points", of=path, count=len(rows)))
-    names = [table.texts("id")[row] for row in rows]
+    names = [ids[row] for row in rows]
     target, stated = xyz[rows], metres_of(table, "sigma", "")[rows]
     frame = fit_similarity([points[name] for name in names], target)
     missed = np.array([frame(points[name]) for name in names]) - target

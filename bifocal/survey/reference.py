@@ -15,6 +15,7 @@ from bifocal.survey.transformation_precision import TransformationPrecision
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_floats
 from photocore.camera.similarity import Similarity
 from photocore.errors import InputError
+from photocore.names import meant
 from photocore.series import check_index
 
 
@@ -90,9 +91,8 @@ class KnownPoints:
         return tuple(name for name in self.ids if name not in names)
 
     def called_as(self, names: Collection[str]) -> KnownPoints:
-        """Return the same points under these names where only leading zeros differ, 007 from 7."""
-        alike = {name.lstrip("0"): name for name in names}
-        ids = [n if n in names else alike.get(n.lstrip("0"), n) for n in self.ids]
+        """Return the same points under these names where leading zeros or capitals differ."""
+        ids = meant(self.ids, names)
         return self if len(set(ids)) < len(ids) else replace(self, ids=tuple(ids))
 
     def without(self, names: Collection[str]) -> KnownPoints:

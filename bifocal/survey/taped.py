@@ -9,6 +9,7 @@ import numpy as np
 from bifocal.remarks import remark
 from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.remarks import SCALE_SHARE
+from photocore.names import meant
 
 #: Names of the cells it is typed in: both points, and how long. [m]
 TAPE = ("tape_from", "tape_to", "tape_typed")
@@ -39,9 +40,10 @@ class TapedDistance:
         """
         rows = {name: row for row, name in enumerate(table.ids)}
         blank = TapedCheck(tape=self, solved=np.nan, sigma=np.nan)
-        if not all(name in rows for name in self.ends):
+        ends = meant(self.ends, table.ids)
+        if not all(name in rows for name in ends):
             return blank
-        first, second = (rows[name] for name in self.ends)
+        first, second = (rows[name] for name in ends)
         way = table.xyz[second] - table.xyz[first]
         solved, sigma = float(np.linalg.norm(way)), np.nan
         if table.covariance is not None and solved > 0:

@@ -21,6 +21,7 @@ from bifocal.workbook.workflow import solve
 from photocore.arrays import FloatArray, not_negative
 from photocore.errors import InputError, located
 from photocore.images import image_info
+from photocore.names import on_disk
 from photocore.output import all_or_none, check_all_writable, check_ending, relative_name
 
 #: Standard deviation of a distance by tape: it ends at the lens, the ray in its entrance pupil. [m]
@@ -150,9 +151,14 @@ NO_PHOTOS = (
 
 def _photo_files(setup: SurveySetup, folder: Path) -> tuple[str, ...]:
     """Return both photos as typed, found whichever way the folders are separated."""
-    return tuple(
+    names = [
         str(Path(name)) if (folder / name).is_file() else name.replace("\\", "/")
         for name in (setup.photo1, setup.photo2)
+    ]
+    files = [on_disk(folder / name) for name in names]
+    return tuple(
+        name if not file.is_file() or (folder / name).is_file() else relative_name(file, folder)
+        for name, file in zip(names, files, strict=True)
     )
 
 

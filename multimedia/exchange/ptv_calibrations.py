@@ -27,7 +27,7 @@ from photocore.arrays import FloatArray, floats_of_words
 from photocore.camera.lensdata import LensData
 from photocore.camera.rotation import rotation_from_vector, world_from_camera
 from photocore.errors import InputError
-from photocore.textfile import read_text
+from photocore.textfile import read_text, readable
 
 _TSAI, _ZOLOF, _OPENLPT = "Tsai model camera", "extendedZolof", "# Camera Model"
 #: How names of lists of control points run in MyPTV and proPTV; where they lie.
@@ -128,7 +128,7 @@ def _files(folder: Path) -> dict[str, list[Path]]:
         for path in sorted(place.iterdir()) if place.is_dir() else ():
             if not path.is_file() or path.suffix.lower() not in ("", ".txt"):
                 continue
-            with path.open("rb") as stream:
+            with readable(path, _KIND), path.open("rb") as stream:
                 head = stream.read(_HEAD).decode("utf-8", errors="replace")
             if head.startswith(_TSAI) or _OPENLPT in head:
                 files["camera"].append(path)

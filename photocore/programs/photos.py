@@ -7,6 +7,7 @@ from pathlib import Path, PurePath
 
 from photocore.errors import InputError
 from photocore.images import image_info
+from photocore.names import on_disk
 from photocore.remarks import remark
 
 _ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff")
@@ -35,7 +36,9 @@ class PhotoFinder:
 
     def find(self, name: str) -> Path | None:
         """Return the file of a photo; None where there is none."""
-        return next((path for path in self._candidates(name) if path.is_file()), None)
+        places = [place for place in self._candidates(name)]
+        exact = (path for path in places if path.is_file())
+        return next(exact, None) or next((p for p in map(on_disk, places) if p.is_file()), None)
 
     def _candidates(self, name: str) -> Iterator[Path]:
         plain = PurePath(name)

@@ -35,7 +35,7 @@ from photocore.tables.lists import drawing_as_table
 from photocore.tables.model import Column, Table
 from photocore.tables.numbers import FEET, Decimal
 from photocore.tables.rows import DataRows, block_above, data_rows
-from photocore.textfile import check_name
+from photocore.textfile import check_file, check_name
 from photocore.workbook.reading.grid import CellGrid, SheetFile, TableArea, Value, cell_name
 from photocore.workbook.reading.package import check_header
 
@@ -73,8 +73,8 @@ def open_tables(path: Path | str, *, max_rows: int = 100_000) -> SheetFile | Csv
         points = named_points(model_space(path), path)
         return CsvFile(path.name, drawing_as_table(points, str(path)))
     check_name(path)
-    if not path.exists():
-        raise InputError(f"{path}: no such file.")
+    if not path.is_dir():
+        check_file(path)
     if ending in (".xls", ".xlsb", ".numbers", ".fods"):
         raise InputError(f"{path}: {ending} files cannot be read; save the workbook as .xlsx.")
     if ending in (".ods", ".ots"):

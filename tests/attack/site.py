@@ -38,8 +38,12 @@ from tests.builders.foreign_projects import (
     write_colmap_binary,
     write_colmap_text,
     write_metashape,
+    write_nerf,
     write_openmvg,
     write_opensfm,
+    write_reality_table,
+    write_reality_xmp,
+    write_visualsfm,
 )
 from tests.multimedia.tank import LAYERS, SENSOR, cameras, control
 
@@ -92,6 +96,10 @@ ODS = """<?xml version="1.0" encoding="UTF-8"?>
 <office:document-content xmlns:office="o" xmlns:table="t" xmlns:text="x">
 <office:body><office:spreadsheet><table:table table:name="Points">{rows}</table:table>
 </office:spreadsheet></office:body></office:document-content>"""
+
+
+#: A scene in Meshroom's cache of a project.
+MESHROOM = "MeshroomCache/StructureFromMotion/a1/cameras.sfm"
 
 
 def make_site(folder: Path) -> None:
@@ -271,7 +279,10 @@ def _projects(folder: Path) -> None:
         (write_colmap_text, "text"), (write_colmap_binary, "binary"),
         (write_opensfm, "reconstruction.json"), (write_alicevision, "cameras.sfm"),
         (partial(write_openmvg, nested=True), "sfm_data.json"), (write_bundler, "bundle.out"),
+        (write_nerf, "transforms.json"), (write_reality_xmp, ""), (write_visualsfm, "model.nvm"),
+        (write_reality_table, "cameras.csv"), (write_alicevision, MESHROOM),
     ):  # fmt: skip
+        (folder / "project" / name).parent.mkdir(parents=True, exist_ok=True)
         write(folder / "project" / name, shots, xyz)
     write_metashape(folder / "project" / "cameras.xml", shots)
     places = {"A": (-1.5, -1, 0), "B": (1.5, -1, 0), "C": (1.4, 1.1, 0)}

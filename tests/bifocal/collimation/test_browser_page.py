@@ -40,12 +40,6 @@ def test_every_word_is_there_in_three_languages() -> None:
     assert {key for _, key in said} <= set(english)
 
 
-def test_what_is_not_ours_is_versioned_and_licensed() -> None:
-    for folder in (WEB / "vendor").iterdir():
-        assert re.fullmatch(r"[a-z]+-\d+\.\d+\.\d+", folder.name)
-        assert any(path.name.startswith("LICENSE") for path in folder.iterdir())
-
-
 @pytest.fixture
 def page(browser: Any, server: Served) -> Iterator[Driver]:
     with tab_of(browser, server) as driver:

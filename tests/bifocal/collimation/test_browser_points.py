@@ -206,13 +206,14 @@ def test_of_two_measures_the_last_asked_for_is_shown(page: Driver) -> None:
     assert "2.0000 m" in str(page.tab.get_by_test_id("measures").text_content())
 
 
-def test_maps_of_an_earlier_orientation_are_given_back(page: Driver) -> None:
+def test_panes_of_an_earlier_orientation_are_given_back(page: Driver) -> None:
     """The same pair, its distance a little other: both panes are made anew."""
     page.tab.evaluate(
-        """() => {
+        """async () => {
           window.given_back = 0;
-          const before = ol.Map.prototype.disposeInternal;
-          ol.Map.prototype.disposeInternal = function () {
+          const { Pane } = await import(new URL("js/viewer.js", document.baseURI));
+          const before = Pane.prototype.dispose;
+          Pane.prototype.dispose = function () {
             window.given_back += 1;
             before.call(this);
           };
@@ -232,7 +233,7 @@ def test_maps_of_an_earlier_orientation_are_given_back(page: Driver) -> None:
     page.command("point.pick", name="B", image=1, **pixel_of(1, SHADED))
     page.settled("state.points.length === 2")
     page.wait("() => window.given_back === 4")
-    assert page.tab.locator(".viewer:visible .ol-viewport").count() == 2
+    assert page.tab.locator(".viewer:visible .ground").count() == 2
 
 
 def test_a_pick_off_the_line_is_taken_and_its_misfit_shown(page: Driver) -> None:

@@ -181,6 +181,19 @@ def test_the_page_names_all_its_modules_and_they_are_known_by_their_content(sess
     assert "js/words/it.js" not in page
 
 
+def test_what_the_page_loads_first_is_light(session) -> None:
+    client = client_of(session)
+    page = client.get("/").text
+    names = [*re.findall(r'(?:href|src)="([^"]+)"', page), "style.css"]
+    bytes_sent = len(page) + sum(
+        int(client.get(f"/{name}").headers["content-length"]) for name in sorted(set(names))
+    )
+    assert len(names) > 30
+    assert bytes_sent < 150_000
+    plain = client.get("/style.css", headers={"accept-encoding": "identity"})
+    assert "content-encoding" not in plain.headers
+
+
 def test_the_photos_themselves_are_not_served(session) -> None:
     for name in ("far.jpg", "facade.pair.json", "facade.journal.jsonl", ".facade.page.json"):
         assert client_of(session).get(f"/download/{name}").status_code == 404

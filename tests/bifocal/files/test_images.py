@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import sys
 import types
+from importlib import resources
 from pathlib import Path
 
 import cv2
@@ -14,7 +16,7 @@ from PIL import Image
 
 from bifocal import InputError, read_image, write_image
 from bifocal.model.image import as_grey
-from photocore.images import image_info, to_eight_bit, turn_upright
+from photocore.images import READ, image_info, to_eight_bit, turn_upright
 
 PICTURE = np.random.default_rng(7).integers(0, 255, (24, 36, 3), dtype=np.uint8)
 
@@ -193,3 +195,9 @@ def test_a_reader_that_pillow_lacks_is_said(
     monkeypatch.setattr(Image, "init", lambda: 0)
     with pytest.raises(InputError, match="Pillow cannot read PNG here"):
         image_info(path)
+
+
+def test_the_page_lets_every_photo_be_chosen_that_is_read():
+    script = resources.files("bifocal.collimation").joinpath("web/js/photos.js").read_text()
+    of_browsers = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp"}  # image/*
+    assert {one for one in READ - of_browsers if not re.search(rf"\{one}\b", script)} == set()

@@ -144,3 +144,15 @@ def test_one_pixel_of_several_points_stands_for_not_seen(tmp_path, place):
     assert np.isfinite(control.pixels1).sum() == 2 * (len(WALL) - 2)
     assert np.isfinite(control.pixels2).all()
     assert any("not seen: P1, P3" in text for text in control.remarks)
+
+
+def test_photos_called_alike_are_told_by_their_folders(tmp_path):
+    path, names = tmp_path / "long.csv", ("/x/a/1.JPG", "/x/b/1.JPG")
+    rows = [f"P{k},{k},{k % 3},0,{c}/1.jpg,{k * n},{k}" for n, c in ((5, "b"), (7, "A"))
+            for k in range(4)]  # fmt: skip
+    path.write_text("\n".join(["id,X,Y,r,photo,col,row", *rows]))
+    control = read_control(path, names=names)
+    assert (control.pixels1[1, 0], control.pixels2[1, 0]) == (7, 5)
+    path.write_text(path.read_text().replace("A/", ""))
+    with pytest.raises(WorkbookError, match=r"may be /x/a/1\.JPG or /x/b/1\.JPG"):
+        read_control(path, names=names)

@@ -353,6 +353,10 @@ def test_photos_called_alike_in_two_folders_stay_apart(tmp_path: Path) -> None:
     words = (tmp_path / "out" / "images.txt").read_text().split()
     assert {"a/DSC.png", "b/DSC.png"} <= set(words)
     assert (tmp_path / "st.anna.lens1.json").is_file()
+    for name in "ab":
+        (tmp_path / name / "DSC.png").replace(tmp_path / "DSC.png")
+    with pytest.raises(InputError, match=r"two photos, a/DSC\.png and b/DSC\.png; .* --images"):
+        photos_from_project(path, tmp_path / "flat.photos.json")
 
 
 def test_a_photo_that_its_exif_data_turn_is_taken_upright(tmp_path: Path) -> None:

@@ -67,7 +67,7 @@ export class Alone {
     this.viewer.replaceChildren(this.pane.element);
     this.pane.mounted();
     const info = await this.app.pyramids.info("photo", 1, mark);
-    if (this.mark === mark) this.pane.setLayers([tileLayer(view, "layer-1", "tiles/photo/1", info)]);
+    if (this.mark === mark) this.pane.setLayers([tileLayer("layer-1", "tiles/photo/1", info)]);
   }
 
   /** Arrows move a cross over the photo, Enter sets a corner there. */

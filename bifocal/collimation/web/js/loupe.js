@@ -4,31 +4,10 @@
  */
 import { h, setText } from "./dom.js";
 import { INK } from "./drawing.js";
+import { TileStore } from "./tiles.js";
 import { t } from "./words/words.js";
 
 const POWERS = [4, 6, 8, 12, 16];
-const KEEP = 64;
-
-/** Full-resolution tiles of one photo, the last few kept. */
-class Tiles {
-  constructor(image, info, changed) {
-    Object.assign(this, { image, info, changed, kept: new Map() });
-  }
-
-  get(column, row) {
-    const name = `${column}_${row}`;
-    let tile = this.kept.get(name);
-    if (tile) this.kept.delete(name);
-    else {
-      tile = new Image();
-      tile.onload = this.changed;
-      tile.src = `tiles/photo/${this.image}/${this.info.max_level}/${name}.jpg?v=${this.info.version}`;
-    }
-    this.kept.set(name, tile);
-    if (this.kept.size > KEEP) this.kept.delete(this.kept.keys().next().value);
-    return tile.complete && tile.naturalWidth ? tile : null;
-  }
-}
 
 export class Loupe {
   constructor() {
@@ -61,7 +40,7 @@ export class Loupe {
 
   /** Tiles of the photos: `info` of both, once known or when they change. */
   source(image, info) {
-    this.tiles[image] = new Tiles(image, info, () => this.paint());
+    this.tiles[image] = new TileStore(`tiles/photo/${image}`, info, () => this.paint());
     this.paint();
   }
 
@@ -107,7 +86,8 @@ export class Loupe {
 
   #photo(context, image, side) {
     const [column, row] = this.places[image];
-    const { tile: size } = this.tiles[image].info;
+    const { tile: size, max_level: level, width, height } = this.tiles[image].info;
+    const wanted = [];
     const half = side / 2 / this.power;
     // A pixel spans half a pixel to each side of its whole number.
     const [left, top] = [column + 0.5 - half, row + 0.5 - half];
@@ -115,12 +95,15 @@ export class Loupe {
     const last = (start) => Math.floor((start + 2 * half) / size);
     for (let i = Math.floor(left / size); i <= last(left); i++) {
       for (let j = Math.floor(top / size); j <= last(top); j++) {
-        const tile = i >= 0 && j >= 0 ? this.tiles[image].get(i, j) : null;
+        if (i < 0 || j < 0 || i * size >= width || j * size >= height) continue;
+        wanted.push([level, i, j]);
+        const tile = this.tiles[image].get(level, i, j);
         if (!tile) continue;
         const [x, y] = [(i * size - left) * this.power, (j * size - top) * this.power];
-        context.drawImage(tile, x, y, tile.naturalWidth * this.power, tile.naturalHeight * this.power);
+        context.drawImage(tile, x, y, tile.width * this.power, tile.height * this.power);
       }
     }
+    this.tiles[image].load(wanted);
   }
 
   #cross(context, image, side) {

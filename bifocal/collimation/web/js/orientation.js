@@ -159,8 +159,8 @@ export class OrientationStage {
     const infos = await this.app.pyramids.both("photo", mark);
     if (this.mark !== mark) return;
     infos.forEach((info, index) => {
-      const { view, image } = this.panes[index];
-      this.panes[index].setLayers([tileLayer(view, `layer-${image}`, `tiles/photo/${image}`, info)]);
+      const { image } = this.panes[index];
+      this.panes[index].setLayers([tileLayer(`layer-${image}`, `tiles/photo/${image}`, info)]);
       this.loupe.source(image, info);
     });
   }

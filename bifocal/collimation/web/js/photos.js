@@ -11,12 +11,15 @@ const SITE = [["d1", "m"], ["sigma_d1", "m"], ["d2", "m"], ["sigma_d2", "m"]];
 const MEDIA = [["water_index", null], ["sigma_water_index", null], ["glass_index", null],
   ["glass_thickness", "m"], ["port", "m"], ["depth", "m"]];
 const THUMB_LEVEL = 9;
+// What photocore.images reads.
+const PHOTOS = "image/*,.heic,.heif,.hif,.avif,.3fr,.arw,.cr2,.cr3,.crw,.dcr,.dng,.erf,.fff,.iiq,.kdc,.mef,.mos,.mrw,.nef,"
+  + ".nrw,.orf,.pef,.raf,.raw,.rw2,.rwl,.sr2,.srf,.srw,.x3f";
 
 export class PhotosStage {
   constructor(app) {
     this.app = app;
     this.cards = [1, 2].map((image) => this.#card(image));
-    this.input = h("input", { type: "file", accept: "image/*,.heic,.heif,.hif,.avif,.dng,.cr2,.cr3,.nef,.arw,.orf,.raf,.rw2,.pef,.srw", multiple: true, class: "unseen",
+    this.input = h("input", { type: "file", accept: PHOTOS, multiple: true, class: "unseen",
       id: "photo-files", testid: "photo-files", onchange: () => this.#drop([...this.input.files]) });
     this.lead = h("p", { class: "lead" }, t("photos.drop"));
     this.zone = h("div", { class: "drop-zone" },

@@ -84,7 +84,7 @@ export class PointsStage {
       this.app.pyramids.both("photo", photoMark(state))]);
     if (this.mark !== mark) return;
     this.tileLayers = Object.fromEntries([1, 2].map((image) => [image,
-      tileLayer(this.view, `layer-${image}`, `tiles/wall/${image}`, walls[image - 1], null,
+      tileLayer(`layer-${image}`, `tiles/wall/${image}`, walls[image - 1], null,
         this.wall.frameOf(image, state.photos[image - 1]))]));
     photos.forEach((info, index) => this.loupe.source(index + 1, info));
     this.layers.use(this.tileLayers);
@@ -131,7 +131,7 @@ export class PointsStage {
   toggleArea() {
     const { width, height } = this.wall ?? {};
     if (!this.view) return;
-    this.area = this.area ? null : pictureLayer(this.view, "layer-area", `uncertainty.png?v=${Date.now()}`,
+    this.area = this.area ? null : pictureLayer("layer-area", `uncertainty.png?v=${Date.now()}`,
       [-0.5, -0.5, width - 0.5, height - 0.5]);
     this.areaButton.setAttribute("aria-pressed", String(Boolean(this.area)));
     this.contours = [];

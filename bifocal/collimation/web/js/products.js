@@ -158,7 +158,7 @@ export class ProductsStage {
       this.loupe.source(index + 1, info);
       if (!this.loupe.places[index + 1]) this.loupe.look(index + 1, this.pane.middle(index + 1));
     });
-    this.wallLayer = tileLayer(this.view, "layer-1", "tiles/wall/1", walls, null, this.wall.frameOf(1, state.photos[0]));
+    this.wallLayer = tileLayer("layer-1", "tiles/wall/1", walls, null, this.wall.frameOf(1, state.photos[0]));
     this.ortho = image && this.#orthoLayer(ortho, image, state.photos);
     this.reliefMark = `${done.length}-${state.revision}`;
     this.#showRelief();
@@ -178,7 +178,7 @@ export class ProductsStage {
     if (!this.wallLayer) return;
     const wanted = [`v=${this.reliefMark}`, ...(this.limits ? [`low=${this.limits[0]}`, `high=${this.limits[1]}`] : []),
       ...(this.hatched ? ["hatched"] : [])].join("&");
-    this.relief = relief && pictureLayer(this.view, "layer-relief", `relief/overlay.png?${wanted}`, this.#edges(relief.bounds));
+    this.relief = relief && pictureLayer("layer-relief", `relief/overlay.png?${wanted}`, this.#edges(relief.bounds));
     this.pane.setLayers([this.wallLayer, this.ortho, this.relief].filter(Boolean));
     this.#apply();
   }
@@ -245,7 +245,7 @@ export class ProductsStage {
   #orthoLayer(ortho, info, photos) {
     const [left, top, right] = this.#edges(ortho.bounds);
     const scale = (right - left) / info.width;
-    return tileLayer(this.view, "layer-ortho", "tiles/ortho/0", info, [left + 0.5, -top - 0.5, scale],
+    return tileLayer("layer-ortho", "tiles/ortho/0", info, [left, top, scale],
       ...[1, 2].map((one) => this.wall.frameOf(one, photos[one - 1])));
   }
 
