@@ -109,7 +109,7 @@ def _checked(sheet: SheetBuilder, content: SurveyContent, head: int) -> None:
     bars.x_axis.delete = bars.y_axis.delete = False
     bars.height, bars.width, bars.gapWidth = 5.5, 16, 20
     bars += line_of
-    sheet.worksheet.add_chart(bars, "A74")
+    sheet.worksheet.add_chart(bars, "A75")
     ends = {"min_row": head + 1, "max_row": head + count}
     x, y = (Reference(sheet.worksheet, min_col=left + i, **ends) for i in (1, 3))
     plan = scatter("", "X [m]", "Y [m]", x, {"Y": y})
@@ -126,7 +126,7 @@ def _checked(sheet: SheetBuilder, content: SurveyContent, head: int) -> None:
         plan.series.append(arrow)
     plan.title = sheet.book.linked_title("Charts", at)
     _equal_scales(plan, content)
-    sheet.worksheet.add_chart(plan, "A87")
+    sheet.worksheet.add_chart(plan, "A88")
 
 
 def _bin_cells() -> Cells:

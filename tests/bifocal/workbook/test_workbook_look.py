@@ -79,10 +79,13 @@ def test_no_chart_is_cut_by_the_end_of_a_page(name, books):
     paper = 841.9 - 72 * (sheet.page_margins.top + sheet.page_margins.bottom)
     for rows in (range(1, end + 1), range(end + 1, 116)):
         assert sum(height[row] for row in rows) * scale_of(sheet) < paper
-    for chart in sheet._charts:
+    above = 0.0
+    for chart in sorted(sheet._charts, key=lambda chart: chart.anchor._from.row):
         first = chart.anchor._from.row
-        bottom = sum(height[row] for row in range(1, first + 1)) + chart.height * 72 / 2.54
+        assert sum(height[row] for row in range(1, first + 1)) - above > 9  # a gap between charts
+        bottom = sum(height[row] for row in range(1, first + 1)) + chart.anchor.ext.height / 12700
         on_first = first < end
+        above = bottom
         assert (bottom < sum(height[row] for row in range(1, end + 1))) == on_first
         assert first > end or on_first  # not on the break itself, where its edge would show
 
