@@ -17,7 +17,9 @@ def test_changelog_and_citation_have_the_version_of_the_package() -> None:
     )
     citation = (ROOT / "CITATION.cff").read_text("utf-8")
     assert sections[0][0] == VERSION
-    assert sections == sorted(sections, reverse=True)
+    numbers = [tuple(map(int, version.split("."))) for version, _ in sections]
+    assert numbers == sorted(numbers, reverse=True)
+    assert [day for _, day in sections] == sorted((day for _, day in sections), reverse=True)
     assert f"\nversion: {VERSION}\ndate-released: {sections[0][1]}\n" in citation
 
 
