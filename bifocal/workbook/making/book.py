@@ -98,7 +98,7 @@ def build(content: SurveyContent) -> BookBuilder:
     if content.functions:
         functions_sheet(builder, named=not content.plain)
     if content.point_rows > STRUCTURED_ROWS and not content.plain:
-        name_columns(builder)
+        name_columns(builder.book, builder.blocks)
     builder.calculate()
     if content.table is not None:
         refuse_contradictions(builder, content)

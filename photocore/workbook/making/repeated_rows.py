@@ -5,15 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+
+from openpyxl import Workbook
+from openpyxl.workbook.defined_name import DefinedName
 
 from photocore.workbook.changing.cells import ROW_MARK, CellValue, RowText
 from photocore.workbook.making.live_columns import LiveColumn
 from photocore.workbook.making.newbook import RowBlock
 from photocore.workbook.reading.grid import TableArea, column_letters, quoted_title, split_area
-
-if TYPE_CHECKING:
-    from photocore.workbook.making.live_book import BookBuilder
 
 #: A whole column of a table: its name without ``tbl``, and its heading.
 COLUMN = re.compile(r"tbl(\w+)\[(\w+)\]")
@@ -63,24 +62,24 @@ def short_formula(table: str, text: str, letters: Mapping[str, str], head: int) 
     return RowText(text)
 
 
-def name_columns(builder: BookBuilder) -> None:
+def name_columns(book: Workbook, blocks: dict[str, RowBlock]) -> None:
     """Call the columns of tables that short formulas lead to by names: the file has each once.
 
     That takes names, or cells of the same sheet; with tables every row would spell it out.
     """
     places = column_places(
         TableArea(t.name, sheet.title, split_area(t.ref), columns=tuple(t.column_names))
-        for sheet in builder.book.worksheets
+        for sheet in book.worksheets
         for t in sheet.tables.values()
     )
-    for title, block in builder.blocks.items():
+    for title, block in blocks.items():
         formulas = dict(block.formulas)
         for column, formula in formulas.items():
             for name in (column_name(*key) for key in COLUMN.findall(formula.text)):
-                builder.define(name, places[name])
+                book.defined_names[name] = DefinedName(name, attr_text=places[name])
             formulas[column] = named = RowText(named_columns(formula.text, places))
-            builder.book[title].cell(block.row, column + 1).value = f"={named(block.row)}"
-        builder.blocks[title] = replace(block, formulas=formulas)
+            book[title].cell(block.row, column + 1).value = f"={named(block.row)}"
+        blocks[title] = replace(block, formulas=formulas)
 
 
 def column_places(tables: Iterable[TableArea]) -> dict[str, str]:
