@@ -73,19 +73,28 @@ def nearest(name: str, names: Iterable[str]) -> str:
 def meant(names: Iterable[str], among: Collection[str]) -> list[str]:
     """Return names of points as they are called among others.
 
-    Capitals and leading zeros may differ. What none is called, or several are, stays as it is.
+    Capitals and leading zeros may differ; of several called so the one that none of the names is
+    already. What none is called, or still several are, stays as it is.
 
     Examples
     --------
     >>> meant(["t1", "7", "P2", "Q"], ["T01", "007", "p2", "P02"])
     ['T01', '007', 'P2', 'Q']
+    >>> meant(["7", "007"], ["7", "07"])
+    ['7', '07']
     """
     alike: dict[str, list[str]] = {}
     among = dict.fromkeys(among)
     for name in among:
         alike.setdefault(_of_point(name), []).append(name)
-    fits = ((name, alike.get(_of_point(name), [])) for name in names)
-    return [one[0] if name not in among and len(one) == 1 else name for name, one in fits]
+    names = list(names)
+    whole = {name for name in names if name in among}
+    found = []
+    for name in names:
+        fits = alike.get(_of_point(name), [])
+        fits = [one for one in fits if one not in whole] or fits
+        found.append(fits[0] if name not in whole and len(fits) == 1 else name)
+    return found
 
 
 def on_disk(path: Path, *, any_case: bool = True) -> Path:
