@@ -38,6 +38,20 @@ from tests.multimedia.targets.rendered_particles import drawn
 LIFT = np.array([0, 0, 300.0])
 
 
+#: A camera as MyPTV saves it: size, centre, angles, focal length, principal point, no polynomial.
+MYPTV = """Tsai model camera
+cam1
+1280 1024
+60.0 30.0 505.0
+0.02 3.19 3.12
+6000.0
+12.0 -20.0
+0 0 0 0 0
+0 0 0 0 0
+0 0 0 0 0
+"""
+
+
 def make_tank(folder: Path) -> None:
     """Write projects, an OpenPTV experiment with a frame of particles, exchange files, tables."""
     sensor = replace(SENSOR, origin=np.array([SENSOR.width, SENSOR.height]) / 2)
@@ -54,6 +68,8 @@ def make_tank(folder: Path) -> None:
     swapped.write_text(swapped.read_text().replace("\n1.5\n1.337\n", "\n1.337\n1.5\n"))
     shutil.copytree(folder / "experiment" / "img", folder / "img")
     (folder / "res").mkdir()
+    (folder / "myptv").mkdir()
+    (folder / "myptv" / "cam1").write_text(MYPTV)
     _variants(folder, views, tank)
     xyz = control(8, seed=9)
     rows = [f"{k},{x:.4f},{y:.4f},{z:.4f}" for k, (x, y, z) in enumerate(xyz + LIFT)]

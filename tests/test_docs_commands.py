@@ -113,7 +113,7 @@ ONLY = {
     "help of bifocal pick": ("far.jpg", "near.jpg", "wall.pair.json", "survey.xlsx"),
 }
 #: Files of the tank that a page about façades takes for granted too.
-ALSO = {"index.md": ("experiment", "bed.tif")}
+ALSO = {"index.md": ("experiment", "myptv", "bed.tif")}
 #: What is taken under another name.
 UNDER = {
     "underwater-adjustment.md": {"test_cavity": "experiment"},
