@@ -24,6 +24,7 @@ from bifocal.collimation.fields import (
 from bifocal.collimation.pasted import pasted_control
 from bifocal.collimation.records import (
     CODES,
+    GIVES_SCALE,
     Change,
     DrawnLine,
     DrawnShape,
@@ -292,7 +293,7 @@ def _control_use(state: SurveyState, command: Fields) -> list[Change]:
 
 
 def _length_set(state: SurveyState, command: Fields) -> list[Change]:
-    return [_drawn_length(state, command, "length")]
+    return [_drawn_length(state, command, GIVES_SCALE)]
 
 
 def _length_check(state: SurveyState, command: Fields) -> list[Change]:
@@ -300,7 +301,10 @@ def _length_check(state: SurveyState, command: Fields) -> list[Change]:
     number = 1
     while (free := f"K{number}") in state.scale:
         number += 1
-    return [_drawn_length(state, command, command.get("name") or free)]
+    name = command.get("name") or free
+    if name == GIVES_SCALE:
+        raise FieldError(remark("page.gives_scale", name=name))
+    return [_drawn_length(state, command, name)]
 
 
 def _drawn_length(state: SurveyState, command: Fields, name: str) -> Change:
@@ -317,7 +321,9 @@ def _drawn_length(state: SurveyState, command: Fields, name: str) -> Change:
 
 
 def _length_delete(state: SurveyState, command: Fields) -> list[Change]:
-    name = command.get("name") or "length"
+    name = command.get("name") or GIVES_SCALE
+    if name not in state.scale:
+        raise InputError(remark("page.no_length"))
     return [Change("scale", name, state.scale.get(name), None)]
 
 

@@ -6,15 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.collimation.records import ScaleLength, SurveyState
+from bifocal.collimation.records import GIVES_SCALE, ScaleLength, SurveyState
 from bifocal.model.length_checks import LengthCheck, length_check
 from bifocal.model.pair import Pair
 from bifocal.orientation.control_points import SiteMeasures
 from photocore.errors import GeometryError
 from photocore.jsonfile import plain
-
-#: The drawn length that gives the scale; all others check it.
-GIVES_SCALE = "length"
 
 
 def check_lengths(state: SurveyState, pair: Pair) -> dict[str, LengthCheck]:

@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from bifocal.collimation.records import SurveyState
+from bifocal.collimation.records import GIVES_SCALE, SurveyState
 from bifocal.model.doubts import RIVALS, doubts_of
 from bifocal.model.pair import Pair
 from bifocal.orientation.control_points import SiteMeasures
@@ -28,7 +28,7 @@ FAINT = 0.004
 
 def measure_of(state: SurveyState) -> list[Any] | None:
     """Return what gives the scale of a pair that has none: a drawn length or one distance."""
-    drawn, setup = state.scale.get("length"), state.setup
+    drawn, setup = state.scale.get(GIVES_SCALE), state.setup
     if drawn is not None:
         sigma = drawn.sigma or SiteMeasures().sigma_control
         return ["length", drawn.image, [list(end) for end in drawn.ends], drawn.length, sigma]

@@ -98,9 +98,13 @@ class TapedLength:
     sigma: float | None = None
 
 
+#: Name of the drawn length that gives the scale; all others check it.
+GIVES_SCALE = "length"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScaleLength:
-    """A length drawn on the wall in one photo: what gives a pair its scale. [px, m]"""
+    """A length drawn on the wall in one photo: gives a pair its scale, or checks it. [px, m]"""
 
     image: int
     ends: tuple[Pixel, Pixel]

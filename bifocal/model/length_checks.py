@@ -28,8 +28,8 @@ class LengthCheck:
     taped, measured : float
         As taped on site, and between the two pixels on the reference plane. [m]
     sigma : float
-        Standard deviation of their difference: of tape, clicks and orientation; NaN where that of
-        the orientation is not known. [m]
+        Standard deviation of their difference: of tape, clicks and orientation; a pair that
+        states none, as typed set-ups do, is taken as exact. [m]
     """
 
     taped: float
@@ -43,7 +43,7 @@ class LengthCheck:
 
     @property
     def agrees(self) -> bool:
-        """Whether chance explains the difference; False where its sigma is not known."""
+        """Whether chance explains the difference."""
         return abs(self.difference) <= AGREES * self.sigma
 
 
@@ -77,7 +77,7 @@ def length_check(
         If the ends coincide.
     """
     measured, by_orientation, of_ends = length_on_wall(pair, number, ends)
-    of_pair = np.nan
+    of_pair = 0.0
     if pair.orientation is not None:
         of_pair = measured * float(np.sqrt(by_orientation @ pair.orientation @ by_orientation))
     return LengthCheck(

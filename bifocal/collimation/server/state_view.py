@@ -15,6 +15,7 @@ from bifocal.collimation.fields import SETUP
 from bifocal.collimation.live_orientation import LiveOrientation, lenses_of
 from bifocal.collimation.next_steps import advice_of, is_looking, is_unscaled, next_steps
 from bifocal.collimation.product_graph import out_of_date, proposal_is_current
+from bifocal.collimation.records import GIVES_SCALE
 from bifocal.collimation.session import Session
 from bifocal.collimation.shapes import measures_of
 from bifocal.collimation.wording import say, without_options
@@ -201,7 +202,7 @@ def _shapes(session: Session) -> list[dict[str, Any]]:
 
 
 def _drawn_length(session: Session) -> dict[str, Any] | None:
-    drawn = session.state.scale.get("length")
+    drawn = session.state.scale.get(GIVES_SCALE)
     return None if drawn is None else asdict(drawn)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bifocal import Pair
+from bifocal import InputError, Pair
 from bifocal.collimation.job_tasks import task_of
 from bifocal.collimation.uncertainty import PRINT, how_good, places_sigma
 from bifocal.model.length_checks import LengthCheck
@@ -64,6 +64,9 @@ def test_every_further_taped_length_checks_the_scale_and_is_told_in_the_package(
             "K1",
             "K2",
         ]
+        for wrong in (drawn | {"name": "length"}, {"op": "length.delete", "name": "K9"}):
+            with pytest.raises(InputError, match="length"):
+                session.command(wrong)
         session.command({"op": "length.delete", "name": "K2"})
         session.command({"op": "undo"})
         assert session.pictures.pair.d1 == pair.d1  # what checks gives no scale

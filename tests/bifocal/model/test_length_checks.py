@@ -52,10 +52,12 @@ def test_the_length_that_gave_the_scale_agrees_and_a_wrong_one_does_not() -> Non
     assert not length_check(pair, 1, ENDS, 7.3, sigma=0.003).agrees
 
 
-def test_without_a_known_orientation_nothing_agrees() -> None:
-    check = length_check(replace(oriented(0), orientation=None), 1, ENDS, 7.0, sigma=0.003)
-    assert np.isnan(check.sigma)
-    assert not check.agrees
+def test_a_pair_without_covariance_is_taken_as_exact() -> None:
+    typed, exact = (
+        length_check(pair, 1, ENDS, 7.0, sigma=0.003)
+        for pair in (replace(oriented(0), orientation=None), oriented(0.0))
+    )
+    assert typed == exact
 
 
 def test_ends_that_fall_together_are_refused() -> None:

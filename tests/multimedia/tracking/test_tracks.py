@@ -189,12 +189,13 @@ def test_a_short_track_has_a_line_and_one_point_has_none():
     assert np.isnan(velocity[3]).all()
 
 
-def test_vectors_that_differ_from_those_around_are_marked():
+@pytest.mark.parametrize(("turning", "off"), [(0.3, 0.5), (0.1, 0.15)])
+def test_vectors_that_differ_from_those_around_are_marked(turning, off):
     rng = np.random.default_rng(8)
     xyz = rng.uniform(0, 10, (500, 3))
-    velocity = vortices(0.3)(xyz) + 0.005 * rng.standard_normal(xyz.shape)
+    velocity = vortices(turning)(xyz) + 0.005 * rng.standard_normal(xyz.shape)
     odd = rng.choice(500, 12, replace=False)
-    velocity[odd] += rng.choice([-0.5, 0.5], (12, 3))
+    velocity[odd] += rng.choice([-off, off], (12, 3))
     covariance = np.tile(0.005**2 * np.eye(3), (500, 1, 1))
     marked = differs_from_neighbours(xyz, velocity, covariance)
     assert marked[odd].all()
