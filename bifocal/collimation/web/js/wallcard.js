@@ -100,10 +100,12 @@ export class WallCard {
   async #send() {
     const length = parseNumber(this.length.value);
     const drawn = this.app.state.scale;
-    const ends = this.ends.length === 2 ? this.ends : drawn?.ends;
+    // The ends of a length that checks give no scale.
+    const anew = this.ends.length === 2 && !this.checking;
+    const ends = anew ? this.ends : drawn?.ends;
     if (!ends) return this.arm("length");
     if (!(length > 0)) return this.app.say(t("wall.number"), "warning");
-    const image = this.ends.length === 2 ? this.image : drawn.image;
+    const image = anew ? this.image : drawn.image;
     if (await this.app.send("length.set", { image, ends, length })) {
       this.ends = [];
       this.length.blur();
