@@ -17,6 +17,7 @@ The pair
     calibrate, Calibration    a lens from photos of a board
     align, align_set          a pair, or a set of photos, from them and what was measured on site
     Control, Interior, SiteMeasures, PairMedia, read_control   what `align` is told
+    length_check              a length taped on the wall beside that of a pair
 Points
     solve, SolvedSurvey, Points   relief, coordinates, precision, check of measured points
     Taking, Measuring, ReadOptions   lenses, distances, precision, columns that `solve` is told
@@ -36,12 +37,12 @@ The page
 Sample pairs                  SAMPLE, WATER_SAMPLE: folders of photos with exact truth
 
 What they take and give: Alignment, Bounds, BreakLine, ChangedRegion, CheckResult, Comparison, Face,
-Faces, FlagLimits, FlatSurface, Foot, Grid, Intersection, KnownPoints, Layers, MapSurface,
-MediaPath, NamedPoints, Occluder, OrientationCheck, Pinhole, PlanePicks, PointObservations,
-Progress, ProjectedPoints, ProjectOptions, ProjectPhotos, RadialDivision, RankedPair, Rectification,
-Registration, ReliefTable, SetAlignment, SetIntersection, Similarity, suggest_faces, Surface,
-SurveyInput, SurveyMedia, SurveySetup, TapedCheck, TapedDistance, ToleranceRule,
-TransformationPrecision, Window, WorldFrame, WorldPoints.
+Faces, FlagLimits, FlatSurface, Foot, Grid, Intersection, KnownPoints, Layers, LengthCheck,
+MapSurface, MediaPath, NamedPoints, Occluder, OrientationCheck, Pinhole, PlanePicks,
+PointObservations, Progress, ProjectedPoints, ProjectOptions, ProjectPhotos, RadialDivision,
+RankedPair, Rectification, Registration, ReliefTable, SetAlignment, SetIntersection, Similarity,
+suggest_faces, Surface, SurveyInput, SurveyMedia, SurveySetup, TapedCheck, TapedDistance,
+ToleranceRule, TransformationPrecision, Window, WorldFrame, WorldPoints.
 
 Errors are one family with one message each that says what is wrong, where, and how to mend it:
 PhotogrammetryError > InputError (a ValueError) > CellError, WorkbookError, MissingExtraError;

@@ -39,6 +39,7 @@ from .model.flags import FlagLimits
 from .model.grid import Bounds, Grid, Window
 from .model.interior_orientation import Interior
 from .model.intersection import Intersection, PlanePicks
+from .model.length_checks import LengthCheck, length_check
 from .model.lens import Lens
 from .model.pair import Pair
 from .model.pair_media import PairMedia
@@ -108,6 +109,7 @@ __all__ = [
     "Intersection",
     "KnownPoints",
     "Layers",
+    "LengthCheck",
     "Lens",
     "MapSurface",
     "MatchSettings",
@@ -170,6 +172,7 @@ __all__ = [
     "compare",
     "dense_relief",
     "georeference",
+    "length_check",
     "match",
     "mosaic",
     "orthophoto",

@@ -24,7 +24,7 @@ from typing import Annotated, Any
 
 import click
 
-from photocore.option_types import Checked, FilePath, Names, Number, Scale
+from photocore.option_types import Checked, FilePath, Names, Number, Numbers, Scale
 
 
 class Typed:
@@ -183,6 +183,9 @@ class Option:
             if not isinstance(value, bool):
                 raise ValueError("true or false")
             return value
+        if self.attributes.get("multiple") and isinstance(kind, Numbers):
+            one = isinstance(value, list) and not any(isinstance(part, list) for part in value)
+            return tuple(map(kind.read, [value] if one or not isinstance(value, list) else value))
         if self.attributes.get("multiple") or isinstance(kind, Names):
             if not isinstance(value, list) or not all(isinstance(word, str) for word in value):
                 raise ValueError("a list of texts")
@@ -258,6 +261,8 @@ def _option(field: Field[Any], hint: Any, notes: Sequence[Typed], text: str) -> 
     kind = next(part for part in parts if part is not types.NoneType)
     type_ = next((note.kind for note in notes if note.kind), None)
     several = typing.get_origin(kind) is tuple and getattr(type_, "is_single", True)
+    if typing.get_origin(kind) is tuple and typing.get_origin(typing.get_args(kind)[0]) is tuple:
+        several = True  # a list of numbers, over and over
     if several:
         kind = typing.get_args(kind)[0]
     required, default = field.default is MISSING, field.default

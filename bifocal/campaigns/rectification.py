@@ -187,7 +187,7 @@ def rectify_photo(
             unit=given["unit"] or "", columns=given["columns"], photos=1,
             names=(str(path),),
         )  # fmt: skip
-        check_inside(control, control.pixels1, info.size, path.name)
+        check_inside(control.ids, control.pixels1, info.size, path.name)
     reading = () if control is None else control.remarks
     rectangle = given["rectangle"]
     if rectangle is not None:

@@ -134,7 +134,7 @@ def in_survey_words(text: str) -> str:
             return f"{key} = true" + (f" {value}" if value else "")
         if value is None:
             return key
-        if option.attributes.get("multiple"):
+        if option.attributes.get("multiple") and "," not in value:
             return f'{key} = ["{value}"]'
         listed = f"[{value.replace(',', ', ')}]" if "," in value else value
         return f'{key} = "{value}"' if key in FILES else f"{key} = {listed}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -113,7 +113,11 @@ def _align_set(
     options = AlignOptions.from_given(given)
     with progress_bar("align", quiet=as_json) as progress:
         alignment = align_photo_set(photos, out, options, overwrite=overwrite, progress=progress)
-    lines = (*alignment.words, *(f"Assumed: {text}." for text in alignment.setup["assumed"]))
+    lines = (
+        *alignment.words,
+        *_taped(alignment.setup),
+        *(f"Assumed: {text}." for text in alignment.setup["assumed"]),
+    )
     print_result(set_as_dict(alignment), lines, as_json=as_json, remarks=alignment.remarks)
     if not as_json:
         remark(f"Set of {len(photos)} photos written to {out}")
@@ -172,6 +176,7 @@ def _lines(alignment: Alignment) -> Iterator[str]:
             f"{ties['sigma_px']:.2f} px."
         )
     yield from _found(alignment)
+    yield from _taped(alignment.setup)
     if alignment.control_ids:
         yield "Control point residuals [px]: far column, row; near column, row; test"
         for index, name in enumerate(alignment.control_ids):
@@ -181,6 +186,26 @@ def _lines(alignment: Alignment) -> Iterator[str]:
     yield basis(alignment)
     for text in alignment.setup["assumed"]:
         yield f"Assumed: {text}."
+
+
+def _taped(setup: Mapping[str, Any]) -> Iterator[str]:
+    """Yield how the lengths that check agree, each in a line."""
+    checks = setup.get("length_checks", ())
+    if not checks:
+        return
+    off = [1000 * (one["measured"] - one["taped"]) for one in checks]
+    within, agreeing = max(map(abs, off)), sum(one["agrees"] for one in checks)
+    yield (
+        f"{agreeing} of {len(checks)} taped lengths agree, the largest difference is "
+        f"{within:.0f} mm."
+    )
+    yield "Length: taped, measured [m]; difference and its sigma [mm]"
+    for one, difference in zip(checks, off, strict=True):
+        mark = "" if one["agrees"] else "   DISAGREES"
+        yield (
+            f"  {one['name']:>6}  {one['taped']:8.3f}  {one['measured']:8.3f}  {difference:+7.1f}  "
+            f"{1000 * one['sigma']:6.1f}{mark}"
+        )
 
 
 def _found(alignment: Alignment) -> Iterator[str]:

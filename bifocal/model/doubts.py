@@ -23,12 +23,13 @@ MOST_BENT, CERTAIN = 0.2, 2.0
 BEND_BY_K, TAKEN_UP, OR_MORE = 144.0, 0.2, 0.1
 #: Unit of lengths to which nothing gives a scale, and of all others.
 NO_UNIT, METRES = "none", "m"
-#: Keys of doubts that leave no word of how good relief is, and of those about which plane is the
-#: wall; how these began in files of versions that kept no keys.
+#: Keys of doubts that leave no word of how good relief is, of those about which plane is the
+#: wall, of lengths that check; how these began in files of versions that kept no keys.
 MISFITS = frozenset(
     {"orientation.misses_lines", "orientation.bent", "pair.bent", "orientation.aside"}
 )
 RIVALS = frozenset({"orientation.rivals"})
+LENGTHS = frozenset({"orientation.lengths_disagree", "orientation.scale_disagrees"})
 _WITHOUT_KEYS = {"THE MODEL DOES NOT FIT": "pair.bent", "CHECK THE WALL": "orientation.rivals"}
 #: What free diagnostics may lack or hold instead of numbers.
 NO_NUMBER = (LookupError, TypeError, ValueError, ZeroDivisionError)

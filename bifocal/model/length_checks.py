@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from bifocal import rays
+from bifocal.model.doubts import NO_NUMBER
 from bifocal.model.orientation_precision import pixel_rates
 from bifocal.model.pair import Pair
-from photocore.arrays import FloatArray
+from bifocal.model.photo_set import PhotoSet
+from bifocal.remarks import remark
+from photocore.arrays import FloatArray, as_points
 from photocore.errors import GeometryError
+from photocore.remarks import Remark
 
 #: Precision of the ends of a length that are clicked on a photo. [px]
 SIGMA_END = 1.0
@@ -56,8 +63,48 @@ def agreement(checks: Sequence[LengthCheck]) -> dict[str, float]:
     }
 
 
+def checks_of(setup: Any) -> dict[str, LengthCheck]:
+    """Return how the lengths agree that checked a pair or set, by name, from its ``setup``."""
+    checks = {}
+    with suppress(*NO_NUMBER, AttributeError):
+        for entry in setup.get("length_checks", ()):
+            values = {key: float(entry[key]) for key in ("taped", "measured", "sigma")}
+            checks[str(entry["name"])] = LengthCheck(**values)
+    return checks
+
+
+def check_in_set(
+    photos: PhotoSet, number: int, ends: FloatArray, length: float, *, sigma: float
+) -> LengthCheck:
+    """Return `length_check` of a photo of a set by its number, from 0."""
+    distances = np.array([photo.distance for photo in photos.photos])
+    pair = photos.pair(number, int(np.argmax(np.abs(distances - distances[number]))))
+    place = 1 if pair.d1 == distances[number] else 2
+    return length_check(pair, place, ends, length, sigma=sigma)
+
+
+def disagreement(checks: Mapping[str, LengthCheck]) -> tuple[Remark, ...]:
+    """Return, for the user, that lengths disagree which check, and what is likely wrong."""
+    wrong = {name: check for name, check in checks.items() if not check.agrees}
+    if not wrong:
+        return ()
+    name = max(wrong, key=lambda name: abs(wrong[name].difference / wrong[name].sigma))
+    worst, key = wrong[name], "orientation.lengths_disagree"
+    factors = np.array([check.taped / check.measured for check in checks.values()])
+    spread = np.array([check.sigma / check.measured for check in checks.values()])
+    factor = float(np.average(factors, weights=spread**-2.0))
+    if len(wrong) == len(checks) > 1 and (np.abs(factors - factor) < AGREES * spread).all():
+        key = "orientation.scale_disagrees"
+    return (
+        remark(
+            key, count=len(wrong), all=len(checks), name=name, taped=worst.taped, factor=factor,
+            measured=worst.measured, sigma=1000 * worst.sigma,
+        ),
+    )  # fmt: skip
+
+
 def length_check(
-    pair: Pair, number: int, ends: FloatArray, length: float, *, sigma: float
+    pair: Pair, number: int, ends: ArrayLike, length: float, *, sigma: float
 ) -> LengthCheck:
     """Return how a taped length agrees with a pair.
 
@@ -66,7 +113,7 @@ def length_check(
     pair : Pair
     number : int
         Photo 1 or 2.
-    ends : ndarray, shape (2, 2)
+    ends : array_like, shape (2, 2)
         Both on the reference plane. [px]
     length, sigma : float
         As taped, and its standard deviation. [m]
@@ -75,11 +122,21 @@ def length_check(
     ------
     GeometryError
         If the ends coincide.
+
+    Examples
+    --------
+    >>> from bifocal import SAMPLE
+    >>> pair = Pair.read(SAMPLE / "facade.pair.json")
+    >>> check = length_check(pair, 1, [(225.5, 782.5), (1309.5, 782.5)], 8.002, sigma=0.003)
+    >>> f"{1000 * check.difference:+.1f} mm, sigma {1000 * check.sigma:.1f} mm, {check.agrees}"
+    '-2.1 mm, sigma 10.9 mm, True'
     """
-    measured, by_orientation, of_ends = length_on_wall(pair, number, ends)
+    picks = as_points(ends, "ends", dimension=2)
+    measured, by_orientation, of_ends = length_on_wall(pair, number, picks)
     of_pair = 0.0
     if pair.orientation is not None:
-        of_pair = measured * float(np.sqrt(by_orientation @ pair.orientation @ by_orientation))
+        variance = float(by_orientation @ pair.orientation @ by_orientation)
+        of_pair = measured * np.sqrt(max(variance, 0.0))  # below 0 by rounding
     return LengthCheck(
         taped=length, measured=measured, sigma=float(np.sqrt(of_pair**2 + of_ends**2 + sigma**2))
     )

@@ -16,6 +16,7 @@ from bifocal.orientation.align_workflow import (
     check_metres,
     control_of,
     interior_of_photo,
+    lengths_checked,
     way_of,
 )
 from bifocal.orientation.orientation_stages import PhotoInput
@@ -83,7 +84,9 @@ def align_photo_set(
     control = control_of(options, sizes, [str(path) for path in paths])
     oriented = orient_set(photos, control=control, site=options.site, progress=progress)
     alignment = set_alignment(replace(oriented, way=way), photos, options.direction)
-    alignment = replace(alignment, remarks=(*control.remarks, *alignment.remarks))
+    setup, wrong = lengths_checked(alignment.setup, alignment.photos, options)
+    remarks = (*wrong, *control.remarks, *alignment.remarks)
+    alignment = replace(alignment, setup=setup, remarks=remarks)
     stem = out.name[: -len(ENDING)]
     entries = []
     for k, (path, name, photo) in enumerate(
@@ -117,6 +120,7 @@ def set_as_dict(made: SetAlignment) -> dict[str, Any]:
             )
         ],
         **{key: made.setup[key] for key in ("common_points", "sigma0", "control", "assumed")},
+        "lengths": made.setup.get("length_checks", []),
         "words": made.words,
         "remarks": made.remarks,
     }

@@ -256,10 +256,9 @@ class SetUpOptions:
     """Lens file of the near photo."""
     lengths: Path | None = None
     """Table of lengths between control points: from, to, length, sigma [m]."""
-    length: Annotated[
-        tuple[float, float, float, float, float] | None, Typed(Numbers(5), "COL,ROW,COL,ROW,M")
-    ] = None
-    """A length on the wall: two points of the far photo [px] and metres."""
+    length: Annotated[tuple[tuple[float, ...], ...], Typed(Numbers(5), "COL,ROW,COL,ROW,M")] = ()
+    """A length on the wall: two points of the far photo [px] and metres. Repeat it: the first gives
+    the scale, the others check it."""
     wall: Annotated[tuple[float, float] | None, Typed(Numbers(2), "COL,ROW")] = None
     """A spot of the wall in the far photo, where several planes compete [px]."""
     horizontal: Annotated[

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +13,11 @@ from bifocal.files.exif_judge import NOMINAL, judged_focal, sensors_apart
 from bifocal.files.haze import read_greys
 from bifocal.model.basis import rests_on
 from bifocal.model.interior_orientation import Interior, lens_of_photo
+from bifocal.model.length_checks import check_in_set, disagreement
 from bifocal.model.lens import Lens
 from bifocal.model.pair_media import PairMedia
 from bifocal.model.photo import FARTHEST_WALL
+from bifocal.model.photo_set import PhotoSet
 from bifocal.model.world_frame import world_entry
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import Alignment, make_alignment, with_files
@@ -26,7 +28,7 @@ from bifocal.orientation.media_options import media_of
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.tuning import CONTROL
 from bifocal.remarks import remark
-from photocore.arrays import FloatArray
+from photocore.arrays import FloatArray, positive
 from photocore.errors import InputError
 from photocore.images import WRITTEN, ImageInfo, image_info
 from photocore.output import (
@@ -78,8 +80,9 @@ class AlignOptions:
         Which column of the control table is which.
     control, lengths : Path or None
         Tables of control points and of taped lengths.
-    length : (pixels (4,), metres) or None
-        One length between two points of the far photo on the wall.
+    length : tuple of (pixels (4,), metres)
+        Lengths between two points of the far photo on the wall: the first helps to give the scale,
+        where anything has to; the others check.
     line : (pixels (4,), is_vertical) or None
         A level or upright line of the wall in the far photo.
     unit : str
@@ -97,7 +100,7 @@ class AlignOptions:
     columns: str | None = None
     control: Path | None = None
     lengths: Path | None = None
-    length: tuple[tuple[float, ...], float] | None = None
+    length: tuple[tuple[tuple[float, ...], float], ...] = ()
     line: tuple[tuple[float, ...], bool] | None = None
     unit: str = ""
     media: PairMedia = field(default_factory=PairMedia.none)
@@ -106,6 +109,15 @@ class AlignOptions:
     def direction(self) -> tuple[FloatArray, bool] | None:
         """The line's ends in the far photo, shape (2, 2), and whether it is upright."""
         return self.line and (np.array(self.line[0], np.float64).reshape(2, 2), self.line[1])
+
+    @property
+    def checking(self) -> dict[str, tuple[FloatArray, float]]:
+        """The lengths that check, by their numbers: ends, shape (2, 2) [px], and metres."""
+        return {
+            str(number): (np.array(pixels, np.float64).reshape(2, 2), metres)
+            for number, (pixels, metres) in enumerate(self.length, start=1)
+            if number > 1 or self.as_set_up
+        }
 
     @classmethod
     def from_given(cls, given: Mapping[str, Any]) -> AlignOptions:
@@ -124,7 +136,7 @@ class AlignOptions:
         if given.get("sigma_distance") is not None:
             measures["sigma"] = given["sigma_distance"]
         horizontal, vertical = given.get("horizontal"), given.get("vertical")
-        line, length = horizontal or vertical, given.get("length")
+        line = horizontal or vertical
         return cls(
             lenses=(lenses[0], lenses[1]),
             other_lenses=lenses[2],
@@ -135,7 +147,7 @@ class AlignOptions:
             columns=given.get("columns"),
             control=given.get("control"),
             lengths=given.get("lengths"),
-            length=(tuple(length[:4]), length[4]) if length else None,
+            length=tuple((tuple(one[:4]), one[4]) for one in given.get("length") or ()),
             line=(tuple(line), horizontal is None) if line else None,
             unit=given.get("unit") or "",
             media=media_of(given),
@@ -183,7 +195,7 @@ def align_photos(
     if way == "as set up":
         oriented = pair_as_set_up((first, second), options.site, options.media)
     else:
-        if way == "site" and not options.auto and options.length is None:
+        if way == "site" and not options.auto and not options.length:
             _check_focal((first, second))
         control = control_of(
             options, (first.interior.image_size, second.interior.image_size), (str(far), str(near))
@@ -207,6 +219,11 @@ def align_photos(
         write_alignment_picture(picture, alignment, (images[0], images[1]), overwrite=overwrite)
     names = (relative_name(paths[0], out.parent), relative_name(paths[1], out.parent))
     lenses = _write_lenses(alignment, out, overwrite=overwrite)
+    setup, wrong = lengths_checked(
+        alignment.setup, PhotoSet.from_pair(alignment.pair), options,
+        photo=2 if oriented.exchanged else 1,
+    )  # fmt: skip
+    alignment = replace(alignment, setup=setup, remarks=(*wrong, *alignment.remarks))
     alignment = with_files(alignment, names, lenses)
     alignment.pair.write(out, overwrite=overwrite)
     return alignment
@@ -227,6 +244,7 @@ def alignment_as_dict(alignment: Alignment) -> dict[str, Any]:
             for key in ("standard_deviations", "focal_px", "common_points", "assumed", "sigma0")
         },
         "control": alignment.setup.get("control", []),
+        "lengths": alignment.setup.get("length_checks", []),
         "rests_on": basis(alignment),
         "words": alignment.words,
         "remarks": alignment.remarks,
@@ -299,10 +317,12 @@ def _check_focal(photos: tuple[PhotoInput, PhotoInput]) -> None:
 def check_metres(options: AlignOptions) -> None:
     """Refuse distances and lengths in millimetres; control points tell of distances themselves."""
     site = options.site
-    lengths = {"--delta-d": site.delta_d, "--length": options.length and options.length[1]}
+    lengths = [("--delta-d", site.delta_d), *(("--length", metres) for _, metres in options.length)]
     if options.control is None:
-        lengths |= {"--distance1": site.distance1, "--distance2": site.distance2}
-    for name, value in lengths.items():
+        lengths += [("--distance1", site.distance1), ("--distance2", site.distance2)]
+    for _, metres in options.length:
+        positive(metres, "--length", unit="m")
+    for name, value in lengths:
         if value and value > FARTHEST_WALL:
             about = {"name": name, "value": value, "meant": value / 1000}
             raise InputError(remark("refused.length_in_mm", **about))
@@ -377,12 +397,40 @@ def control_of(
         if options.control is None:
             raise InputError("--lengths names points of the --control table; give that too.")
         control = read_lengths(options.lengths, control)
-    if options.length is not None:
-        control = _with_length(control, options.length, options.site.sigma_control)
+    if options.length:
+        control = _with_length(control, options.length[0], options.site.sigma_control)
     names = ("far", "near") if len(sizes) == 2 else [f"{k}." for k in range(1, len(sizes) + 1)]
     for pixels, size, photo in zip(control.picks, sizes, names, strict=False):
-        check_inside(control, pixels, size, photo)
+        check_inside(control.ids, pixels, size, photo)
     return control
+
+
+def lengths_checked(
+    setup: Mapping[str, Any], photos: PhotoSet, options: AlignOptions, *, photo: int = 1
+) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+    """Return diagnostics with the lengths that check, of a photo by its number, and what is wrong.
+
+    Their ends are in that photo, numbered from 1.
+    """
+    lengths, sigma = options.checking, options.site.sigma_control
+    if not lengths:
+        return setup, ()
+    for name, (ends, _) in lengths.items():
+        size = photos.photos[photo - 1].image_size
+        if size is not None:
+            check_inside([f"length {name}"] * 2, ends, size, "far")
+    checks = {
+        name: check_in_set(photos, photo - 1, ends, metres, sigma=sigma)
+        for name, (ends, metres) in lengths.items()
+    }
+    entries = [
+        {"name": name, "photo": photo, "ends": lengths[name][0], **asdict(check),
+         "agrees": check.agrees}
+        for name, check in checks.items()
+    ]  # fmt: skip
+    wrong = disagreement(checks)
+    doubts = [*wrong, *setup.get("doubts", ())]
+    return {**setup, "length_checks": entries, "doubts": doubts}, wrong
 
 
 def _with_length(
@@ -405,12 +453,12 @@ def _with_length(
     )
 
 
-def check_inside(control: Control, pixels: FloatArray, size: tuple[int, int], photo: str) -> None:
+def check_inside(ids: Sequence[str], pixels: FloatArray, size: tuple[int, int], photo: str) -> None:
     """Refuse picks outside the photo: they belong to another photo or another size."""
     width, height = size
     outside = (pixels < -0.5).any(axis=1) | (pixels > [width, height]).any(axis=1)
     if outside.any():
-        name, others = control.ids[int(np.flatnonzero(outside)[0])], int(outside.sum()) - 1
+        name, others = ids[int(np.flatnonzero(outside)[0])], int(outside.sum()) - 1
         about = {"name": name, "photo": photo, "width": width, "height": height}
         key = f"refused.{'more_' if others else ''}outside_photo"
         raise InputError(remark(key, more=others, **about))

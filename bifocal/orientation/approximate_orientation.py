@@ -232,6 +232,8 @@ def scaled(cameras: Cameras, given: Given, interiors: Interiors) -> Cameras:
     elif site.delta_d:
         scale = site.delta_d / (1.0 - near)
     elif control.lengths:
+        by_near = ray_on_plane(cameras[1], interiors[1].ideal(control.pixels2))
+        positions = np.where(np.isfinite(positions), positions, by_near)
         ratios = [
             length / np.linalg.norm(positions[a] - positions[b]) for a, b, length in control.lengths
         ]

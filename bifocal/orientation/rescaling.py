@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.model.doubts import MISFITS, RIVALS, doubts_of
+from bifocal.model.doubts import LENGTHS, MISFITS, RIVALS, doubts_of
 from bifocal.model.length_checks import length_on_wall
 from bifocal.model.orientation_precision import CAMERA, NAMES, pinhole
 from bifocal.model.pair import Pair
@@ -138,6 +138,9 @@ def _setup(pair: Pair, factor: float) -> dict[str, Any]:
         deviations["relief_offset"] = zero_sigma(faces)
     question = rivals_in_words(faces, SiteMeasures()) if faces else ""
     doubts = [*map(str, setup.get("doubts", ()))]
+    stale = doubts_of(LENGTHS, doubts)  # of the scale that is given up
+    doubts = [text for text in doubts if text not in stale]
+    setup.pop("length_checks", None)
     if question:
         stale = doubts_of(RIVALS, doubts)
         doubts = [question if text in stale else text for text in doubts]

@@ -25,7 +25,7 @@ from bifocal.model.geotiff import (
     gsd_at_scale,
 )
 from bifocal.model.grid import Grid
-from bifocal.model.length_checks import LengthCheck, agreement
+from bifocal.model.length_checks import LengthCheck, agreement, checks_of
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
 from bifocal.model.photos_of_set import PhotosOfSet
@@ -459,6 +459,7 @@ def _notes(
     lengths = dict(zip(("own", "place", "relief"), precise, strict=False))
     words = "accuracy" if len(lengths) > 1 else "photo_pixel"
     misfit = bool(doubts_of(MISFITS, pair.remarks))
+    checks = [*checks_of(pair.extra.get("setup")).values(), *wish.lengths]
     if wish.checked is not None:
         count, place, deep = wish.checked
         words, lengths = "accuracy_checked", lengths | {
@@ -476,7 +477,7 @@ def _notes(
     return (
         say("pixel", size=grid.gsd * 1000, dpi=dpi_at_scale(grid.gsd, wish.scale)),
         say(words, **lengths),
-        *((say("lengths_checked", **agreement(wish.lengths)),) if wish.lengths else ()),
+        *((say("lengths_checked", **agreement(checks)),) if checks else ()),
         *((say("misfit"),) if misfit else ()),
         wish.camera or cameras,
         *((say("media", media=media_words(pair.layers)),) if pair.layers else ()),

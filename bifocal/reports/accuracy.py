@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from bifocal.model.doubts import MISFITS, doubts_of
-from bifocal.model.length_checks import agreement
+from bifocal.model.length_checks import LengthCheck, agreement, checks_of
 from bifocal.remarks import in_language
 from bifocal.reports.content import PairContent
 from bifocal.survey.reference import CheckResult
@@ -38,7 +38,7 @@ def accuracy_blocks(content: PairContent, say: Words) -> Iterator[Block]:
     solution = content.solution
     check = None if solution is None else solution.check
     if check is None or not np.isfinite(check.accuracy):
-        if not content.task.lengths:
+        if not _lengths_of(content):
             yield Banner(text=say("verdict_none"))
         return
     yield _banner(content, check, say)
@@ -52,7 +52,7 @@ def accuracy_blocks(content: PairContent, say: Words) -> Iterator[Block]:
 
 def _length_blocks(content: PairContent, say: Words) -> Iterator[Block]:
     """Yield how lengths taped on site agree with the pair."""
-    lengths = content.task.lengths
+    lengths = _lengths_of(content)
     if not lengths:
         return
     agreed = agreement(tuple(lengths.values()))
@@ -68,6 +68,10 @@ def _length_blocks(content: PairContent, say: Words) -> Iterator[Block]:
         ],
         caption=say("lengths_drawn"),
     )  # fmt: skip
+
+
+def _lengths_of(content: PairContent) -> dict[str, LengthCheck]:
+    return checks_of(content.setup) | dict(content.task.lengths)
 
 
 def verdict_in_words(content: PairContent) -> list[str]:

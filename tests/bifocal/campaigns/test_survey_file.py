@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -252,6 +253,17 @@ def test_a_plan_opens_photos_and_compares_the_names_of_both_tables(tmp_path):
         planned = CliRunner().invoke(main, ["survey", str(survey), "--dry-run"])
         assert planned.exit_code == 1
         assert said in planned.output
+
+
+def test_a_length_and_several_are_read():
+    for text, lengths in (
+        ("[1, 2, 3, 4, 5.5]", ((1, 2, 3, 4, 5.5),)),
+        ("[[1, 2, 3, 4, 5.5], [5, 6, 7, 8, 9]]", ((1, 2, 3, 4, 5.5), (5, 6, 7, 8, 9))),
+    ):
+        assert OF_PAIR["length"].read(tomllib.loads(f"a = {text}")["a"]) == lengths
+    for wrong in ([1, 2, 3], [[1, 2, 3, 4]], "1,2,3,4,5", []):
+        with pytest.raises(ValueError, match="list of 5 numbers"):
+            OF_PAIR["length"].read(wrong)
 
 
 def test_an_equivalent_and_a_true_focal_length_do_not_tell_which_photo_is_far():

@@ -169,6 +169,7 @@ def test_picks_of_the_other_photo_are_exchanged_and_said(folder) -> None:
         (["--auto", "--lens", "absent.json", "--distance1", "16"], "absent.json"),
         (["--distance1", "16000", "--distance2", "9000"], "is it in mm?"),
         (["--auto", "--length", "10,10,90,10,4215"], "--length 4215 m is too far"),
+        (["--auto", *["--length", "1,1,9,1,4"] * 2, "--length", "1,1,9,1,0"], "--length"),
         (["--distance1", "16", "--distance2", "9", "--focal1", "35"], "Give --sensor-width"),
     ],
 )
@@ -177,6 +178,68 @@ def test_wrong_options_are_explained(folder, options, message) -> None:
     assert result.exit_code == 1
     assert message in result.stderr
     assert "Traceback" not in result.stderr
+
+
+def length(start, end, metres: float) -> list[str]:
+    """A length between two pixels, as an option."""
+    return ["--length", ",".join(f"{value:.4f}" for value in (*start, *end, metres))]
+
+
+#: Taped at 16 m and focal length f: 600 px level, 400 px upright, 500 px aslant.
+def taped(*factors: float) -> list[str]:
+    ends = [((100, 300), (700, 300)), ((100, 100), (100, 500)), ((200, 100), (500, 500))]
+    metres = [np.hypot(*np.subtract(b, a)) * 16 / FAR.matrix[0, 0] for a, b in ends]
+    parts = zip(ends, metres, factors, strict=False)
+    return [word for (a, b), true, factor in parts for word in length(a, b, factor * true)]
+
+
+@pytest.mark.parametrize(
+    ("factors", "agree", "said"),
+    [
+        ((1, 1, 1), 3, "3 of 3 taped lengths agree, the largest difference is 0 mm."),
+        ((1, 1.05, 1), 2, "CHECK THE LENGTHS: 1 of 3 that check disagree; length 2 was taped as"),
+        ((0.98, 0.98, 0.98), 0, "CHECK THE SCALE: all 3 lengths that check disagree, and by one"),
+    ],
+)
+def test_lengths_check_a_pair_that_has_its_scale(folder, factors, agree, said) -> None:
+    site = ["--as-set-up", "--distance1", "16", "--distance2", "9", *lens(), "--overwrite"]
+    result = align(folder, *site, *taped(*factors), "--no-picture", out="taped.pair.json")
+    assert result.exit_code == 0, result.output
+    assert result.stderr.startswith(said) if said[0] == "C" else said in result.stdout
+    checks = Pair.read(folder / "taped.pair.json").extra["setup"]["length_checks"]
+    assert sum(check["agrees"] for check in checks) == agree
+    # Two ends of a pixel and the tape's 3 mm; scales on the wall as typed count as exact.
+    sigma = np.hypot(np.sqrt(2) * 16 / FAR.matrix[0, 0], 0.003)
+    assert checks[0]["sigma"] == pytest.approx(sigma, rel=0.01)
+
+
+@pytest.mark.acceptance
+@pytest.mark.parametrize("exchanged", [False, True])
+def test_the_first_length_gives_the_scale_and_the_others_check(folder, exchanged) -> None:
+    places = np.array([(-4.5, 2.9, 0), (4.6, 3.0, 0), (-0.9, -3.5, 0)])
+    cam, names = (NEAR, ("near.png", "far.png")) if exchanged else (FAR, ("far.png", "near.png"))
+    picks = project(cam, places)
+    options = [
+        word
+        for a, b in ((0, 1), (0, 2), (1, 2))
+        for word in length(picks[a], picks[b], float(np.linalg.norm(places[a] - places[b])))
+    ]
+    for camera_, number in ((FAR, 1), (NEAR, 2)):
+        data = {"format": "bifocal-lens/1", "camera_matrix": camera_.matrix.tolist(),
+                "model": "opencv", "coefficients": [0.0] * 4, "image_size": [960, 640]}  # fmt: skip
+        (folder / f"l{number}.json").write_text(json.dumps(data), encoding="utf-8")
+    lenses = [f"--lens{k}={folder / f'l{3 - k if exchanged else k}.json'}" for k in (1, 2)]
+    result = align(
+        folder, "--auto", *options, *lenses, "--no-picture", "--json",
+        out=f"first{exchanged}.pair.json", photos=names,
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    checks = json.loads(result.stdout)["lengths"]
+    assert [check["name"] for check in checks] == ["2", "3"]
+    for check in checks:
+        assert check["agrees"]
+        assert check["photo"] == (2 if exchanged else 1)
+        assert check["measured"] == pytest.approx(check["taped"], abs=0.02)
 
 
 @pytest.mark.parametrize(("column", "photo"), [(4, "far"), (6, "near")])
