@@ -1,10 +1,12 @@
 """Particles to tracks: 1000 particles, 4 cameras, 100 frames; beside optv's tracker.
 
-Run: python benchmarks/bench_tracking.py [PARTICLES FRAMES]
+Run: python benchmarks/bench_tracking.py [PARTICLES FRAMES [MISSING FALSE [NOISE]]]
 
 A flow of displacements up to half the mean distance between particles, targets to 0.1 px in any
-order; what leaves the volume enters elsewhere. Both trackers get the same particles of every
-frame, ours; optv's searches within the same displacement. CPU time; links are held against truth.
+order; what leaves the volume enters elsewhere. Of the targets of a camera a share MISSING is left
+out and a share FALSE added anywhere; two nearer than 2 px are then one. Both trackers get the same
+particles of every frame, ours; optv's searches within the same displacement. CPU time; links are
+held against truth.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from pathlib import Path
 
 import numpy as np
 from bench_cameras import CAMERAS, SENSOR, WALL, Optv
+from scipy.spatial import cKDTree
 
 from multimedia import project
 from multimedia.projects.model import Project
@@ -66,16 +69,32 @@ def simulated(flow, count: int, frames: int) -> tuple[list[np.ndarray], list[np.
     return places, whose
 
 
-def written(folder: Path, places, whose) -> list[list[np.ndarray]]:
+def spoiled(rng, pixels: np.ndarray, names: np.ndarray, missing: float, false: float):
+    """Return targets and whose they are with some left out, some added, and near ones as one."""
+    low, high, count = pixels.min(axis=0), pixels.max(axis=0), int(false * len(pixels))
+    kept = rng.uniform(size=len(pixels)) >= missing
+    pixels = np.vstack([pixels[kept], rng.uniform(low, high, (count, 2))])
+    names = np.append(names[kept], -1 - rng.permutation(10**6)[:count])
+    gone: set[int] = set()
+    for one, two in cKDTree(pixels).query_pairs(2.0) if missing or false else ():
+        if not {one, two} & gone:
+            pixels[one] = 0.5 * (pixels[one] + pixels[two])
+            gone.add(two)
+    rest = np.setdiff1d(np.arange(len(pixels)), list(gone))
+    return pixels[rest], names[rest]
+
+
+def written(folder: Path, places, whose, missing=0.0, false=0.0, noise=0.1):
     """Write the targets of every camera and frame; return whose each is."""
     rng, owners = np.random.default_rng(8), []
     for t, xyz in enumerate(places):
         owners.append([])
         for k, camera in enumerate(CAMERAS):
             pixels = SENSOR.pixel_from_image(project(camera, xyz, WALL))
-            pixels += 0.1 * rng.standard_normal(pixels.shape)
+            pixels += noise * rng.standard_normal(pixels.shape)
+            pixels, names = spoiled(rng, pixels, whose[t], missing, false)
             order = np.argsort(pixels[:, 1])  # optv wants them by rows
-            owners[-1].append(whose[t][order])
+            owners[-1].append(names[order])
             lines = [f"{n} {x:.4f} {y:.4f} 9 3 3 99 -1\n" for n, (x, y) in enumerate(pixels[order])]
             (folder / f"c{k}.{FIRST + t}_targets").write_text(f"{len(lines)}\n" + "".join(lines))
     return owners
@@ -84,8 +103,8 @@ def written(folder: Path, places, whose) -> list[list[np.ndarray]]:
 def judged(owner: np.ndarray, frame: np.ndarray, link: np.ndarray, whose) -> str:
     """Return shares of wrong links and of true tracks of four frames or more that are whole."""
     has = link >= 0
-    wrong = (owner[has] != owner[link[has]]).mean()
     truth: dict[int, set[tuple[int, int]]] = {}
+    wrong = float(((owner[has] != owner[link[has]]) | (owner[has] < 0)).mean())
     for t in range(len(whose) - 1):
         for name in np.intersect1d(whose[t], whose[t + 1]).tolist():
             truth.setdefault(name, set()).add((t, t + 1))
@@ -115,7 +134,8 @@ def majority(folder: Path, owners, frames: int) -> list[np.ndarray]:
         names = np.stack([np.where(rows[:, k] >= 0, owners[t][k][rows[:, k]], -1 - k)
                           for k in range(4)], axis=1)  # fmt: skip
         votes = (names[:, :, None] == names[:, None]).sum(axis=2)
-        found.append(names[np.arange(len(names)), votes.argmax(axis=1)])
+        best = names[np.arange(len(names)), votes.argmax(axis=1)]
+        found.append(np.where(votes.max(axis=1) > 1, best, -1))
     return found
 
 
@@ -175,13 +195,14 @@ def optv_tracks(folder: Path, frames: int, reach: float) -> float:
 
 def main() -> None:
     """Print what both find."""
-    count, frames = (int(word) for word in (sys.argv[1:] or ("1000", "100")))
+    count, frames = (int(word) for word in (sys.argv[1:3] or ("1000", "100")))
+    spoiling = [float(word) for word in sys.argv[3:]]
     spacing = float(np.cbrt(np.prod(HIGH - LOW) / count))
     for name, flow in flows(spacing).items():
         with tempfile.TemporaryDirectory() as place:
             folder = Path(place)
             places, whose = simulated(flow, count, frames)
-            owners = written(folder, places, whose)
+            owners = written(folder, places, whose, *spoiling)
             tank = Project(
                 cameras=tuple(CAMERAS), media={"w": WALL}, media_of=("w",) * 4, unit="mm"
             )

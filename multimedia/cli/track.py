@@ -48,7 +48,8 @@ class TrackCommand:
     only, about the drift that most share, or more]"""
     change: Annotated[float | None, Typed(POSITIVE)] = None
     """Largest distance from where its velocity predicts a particle [unit of the
-    project].  [default: 3.5 times the median of those found]"""
+    project]; then no particles around predict it.  [default: 3.5 times the median of the links
+    around]"""
     gap: Annotated[int, Typed(click.IntRange(min=0))] = 2
     """Frames for which a particle may be missing."""
     shortest: Annotated[int, Typed(click.IntRange(min=3))] = 4
@@ -67,9 +68,10 @@ def command(options: TrackCommand) -> None:
 
     In every frame targets belong together where their rays through glass and water meet, as for
     `multimedia particles`; how many come by chance is counted. A particle is then sought where its
-    velocity predicts it, by what fits best in four frames; one that is new, within half the mean
-    distance of the particles, and farther where that links by chance only. It may be missing in
-    some frames. How many points would be in tracks by chance is counted, too.
+    velocity and those around predict it, by what fits best in four frames; one that is new, where
+    those around go or within half the mean distance of the particles, and farther where that links
+    by chance only. It may be missing in some frames. How many points would be in tracks by chance
+    is counted, too.
 
     Velocities are slopes of parabolas through five points of a track, with their standard
     deviations; vectors that go with none of those around are marked, not dropped.

@@ -1,6 +1,6 @@
 """Particles over time: which are one, where they go, and how fast.
 
-`linking` joins the particles of consecutive frames, `chance` counts the links that would come about
-by chance, `tracks` makes tracks of many frames, `velocities` says how fast and how surely;
-`track_files` writes them, `workflow` is the command.
+`linking` joins the particles of consecutive frames, `neighbours` says where those around lead,
+`chance` counts the links that would come about by chance, `tracks` makes tracks of many frames,
+`velocities` says how fast and how surely; `track_files` writes them, `workflow` is the command.
 """

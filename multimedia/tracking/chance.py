@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.ndimage import uniform_filter
 
-from multimedia.tracking.linking import LinkRules, adapted, in_tracks, linked
+from multimedia.tracking.linking import LinkRules, adapted, guided, in_tracks, linked
 from photocore.arrays import FloatArray, IntArray
 
 #: Share of the step below which the largest change of velocity is the particles' own: in runs of
@@ -71,26 +71,27 @@ def widened(places: Sequence[FloatArray], rules: LinkRules, shortest: int) -> Li
     their way, or counts from where the drift of all leads. Of these, what has the most points in
     tracks beyond chance counts.
     """
-    best = adapted(places, rules)
-    if best.change < _OFF_CEILING * best.step or not rules.step > 0:
+    alone = adapted(places, rules)
+    best = guided(places, alone, rules.change)
+    if alone.change < _OFF_CEILING * alone.step or not rules.step > 0:
         return best
     middle = max(0, (len(places) - _TRIED) // 2)
     some = places[middle : middle + _TRIED]
-    most, start = _beyond_chance(some, adapted(some, rules), shortest), rules
+    most, start = _beyond_chance(some, fitted(some, rules), shortest), rules
     drift = common_drift(some, rules.step)
     if drift is not None:
         drifting = replace(rules, drift=drift)
-        fit = adapted(some, drifting)
+        fit = fitted(some, drifting)
         share = _beyond_chance(some, fit, shortest)
         if share > most + _GAIN:
             most, start = share, drifting
             if fit.change < _OFF_CEILING * fit.step:
-                return adapted(places, start)
+                return fitted(places, start)
     narrow = start
     for k in range(1, _WIDENINGS + 1):
         # The change of a long step is a short one most often; else it is sought as far, too.
         for wide in (replace(narrow, step=rules.step * _WIDER**k), _as_far(narrow, _WIDER**k)):
-            fit = adapted(some, wide)
+            fit = fitted(some, wide)
             if fit.change < _AT_CEILING * wide.change:
                 break
         gain = _beyond_chance(some, fit, shortest) - most
@@ -98,7 +99,12 @@ def widened(places: Sequence[FloatArray], rules: LinkRules, shortest: int) -> Li
             most, start = most + gain, wide
         elif fit.change < _OFF_CEILING * wide.change:
             break
-    return best if start is rules else adapted(places, start)
+    return best if start is rules else fitted(places, start)
+
+
+def fitted(places: Sequence[FloatArray], rules: LinkRules) -> LinkRules:
+    """Return the rules adapted to the particles and guided by those around; no step is widened."""
+    return guided(places, adapted(places, rules), rules.change)
 
 
 def common_drift(places: Sequence[FloatArray], cell: float) -> tuple[float, float, float] | None:

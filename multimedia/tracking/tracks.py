@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.remarks import remark
-from multimedia.tracking.chance import points_by_chance, widened
-from multimedia.tracking.linking import LinkRules, adapted, in_tracks, linked, usual_step
+from multimedia.tracking.chance import fitted, points_by_chance, widened
+from multimedia.tracking.linking import LinkRules, in_tracks, linked, usual_step
 from multimedia.tracking.velocities import differs_from_neighbours, track_velocities
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points, positive
 from photocore.errors import InputError
@@ -45,7 +45,7 @@ class Tracks:
         Whether the velocity differs from those of the particles around.
     step, change : float
         Largest displacement of a particle of unknown velocity, and largest distance from where
-        its velocity predicts one of known. [object unit]
+        one of known is predicted, in the median. [object unit]
     drift : ndarray, shape (3,)
         Displacement from frame to frame about which ``step`` counts; 0 where none was needed.
         [object unit]
@@ -122,8 +122,8 @@ def track_particles(
         default half the mean distance between particles, about the drift that most share where
         without it nothing shows but chance, or more. [object unit]
     change : float, optional
-        Largest distance from where its velocity predicts a particle; by default 3.5 times the
-        median of those in the data. [object unit]
+        Largest distance from where its velocity predicts a particle; by default those around
+        predict with it, and it is 3.5 times the median of the links around. [object unit]
     gap : int
         Frames for which a particle may be missing.
     shortest : int
@@ -162,7 +162,7 @@ def track_particles(
     if change is not None:
         rules = LinkRules(step=widest, change=positive(change, "change"), gap=gap)
     else:
-        rules = widened(clouds, rules, shortest) if step is None else adapted(clouds, rules)
+        rules = widened(clouds, rules, shortest) if step is None else fitted(clouds, rules)
     previous = linked(clouds, rules)
     sizes = [len(xyz) for xyz in clouds]
     order, track = in_tracks(previous, shortest)
