@@ -332,7 +332,9 @@ def _table(
     length = max([length, area.length, *(row + 1 for row in rows)])
     editor.extend(name, area.area[0] + length)
     letters = {key: column_letters(number) for key, number in headings.items()}
-    styles, stands = editor.styles_of(area.sheet, first), editor.grid(area.sheet).rows
+    styles = editor.styles_of(area.sheet, first)
+    is_typed = any(column.kind == "input" for column in content.columns)
+    stands = editor.grid(area.sheet).rows if is_typed else {}  # of a large sheet some 70 MB
     nothing: dict[int, Value] = {}
     filled, prepared = [], []
     for column in content.columns:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections import deque
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
-from io import BytesIO
 from operator import itemgetter
+from tempfile import SpooledTemporaryFile
+from typing import IO
 
 from photocore.workbook.changing.cells import CellValue, NewCell, NewRows
 from photocore.workbook.reading.grid import cell_name, split_area
+from photocore.workbook.reading.package import SMALL
 
 _ROWS_END = re.compile(rb"</(?:\w+:)?sheetData\s*>")
 
@@ -84,6 +85,13 @@ class SheetChanges:
         return blocks[0] if len(blocks) == 1 and blocks[0].rule == "filled" else None
 
 
+class _Written(SpooledTemporaryFile[bytes]):
+    """A part on its way, on the disk where it is large."""
+
+    def __del__(self) -> None:
+        self.close()  # left to itself it would warn
+
+
 @dataclass(slots=True)
 class Spliced:
     """A sheet with its changes, ready to be joined with or without stale results.
@@ -98,6 +106,10 @@ class Spliced:
         Whether any typed value differs from what was there.
     formula_lost : bool
         Whether a value took the place of a formula.
+    file : file, optional
+        The changed sheet up to a position of the old one; a large one lies on the disk.
+    differs : bool
+        Whether what is written there is not what stood there.
     """
 
     data: bytes
@@ -105,26 +117,37 @@ class Spliced:
     strips: list[tuple[int, int, bytes]] = field(default_factory=list)
     inputs_changed: bool = False
     formula_lost: bool = False
+    file: IO[bytes] | None = None
+    position: int = 0
+    differs: bool = False
+
+    def write(self) -> None:
+        """Write the sheet up to its last change so far; the changes are let go."""
+        if self.file is None:
+            self.file = _Written(SMALL)
+        view = memoryview(self.data)
+        for start, end, replacement in sorted(self.edits, key=itemgetter(0, 1)):
+            self.file.write(view[self.position : start])
+            self.file.write(replacement)
+            self.differs = self.differs or self.data[start:end] != replacement
+            self.position = end
+        self.edits.clear()  # not only let go: what made them holds the same list
+
+    def written(self, *, strip: bool) -> IO[bytes]:
+        """Return the changed sheet, without results of other formulas if ``strip``."""
+        if self.data or self.file is None:
+            self.edits += self.strips if strip else ()
+            self.write()
+            assert self.file is not None
+            self.file.write(memoryview(self.data)[self.position :])
+            self.data = b""  # of a large sheet each copy is 80 MB
+        return self.file
 
     def joined(self, *, strip: bool) -> bytes:
-        """Return the changed sheet, without results of other formulas if ``strip``; only once.
-
-        The changes, which may be as many bytes as the sheet, are let go.
-        """
-        edits = deque(self.edits)
-        self.edits.clear()  # not only let go: what made them holds the same list
-        if strip and self.strips:
-            edits = deque(sorted([*edits, *self.strips], key=itemgetter(0, 1)))
-        if not edits:
-            return self.data
-        whole, view, position = BytesIO(), memoryview(self.data), 0
-        while edits:  # none is held once it is written
-            start, end, replacement = edits.popleft()
-            whole.write(view[position:start])
-            whole.write(replacement)
-            position = end
-        whole.write(view[position:])
-        return whole.getvalue()
+        """Return the bytes of the changed sheet, as `written`."""
+        file = self.written(strip=strip)
+        file.seek(0)
+        return file.read()
 
 
 def column_edits(

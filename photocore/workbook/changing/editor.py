@@ -32,6 +32,7 @@ from photocore.workbook.changing.styles import StyleSheet
 from photocore.workbook.making.newbook import check_new_workbook, new_workbook
 from photocore.workbook.reading.grid import CellGrid, SheetFile, TableArea, Value, cell_name
 from photocore.workbook.reading.package import (
+    Parts,
     check_header,
     open_package,
     read_part,
@@ -308,7 +309,7 @@ class WorkbookEditor:
         target: Path | str | None = None,
         *,
         overwrite: bool = False,
-        settle: Callable[[Path, dict[str, bytes | None]], dict[str, bytes | None]] | None = None,
+        settle: Callable[[Path, Parts], Parts] | None = None,
     ) -> Path | None:
         """Write the changed workbook.
 
@@ -351,7 +352,7 @@ class WorkbookEditor:
             refuse_lost(temporary, self.path)
             return kept_copy(self.path) if in_place else None
 
-    def changed_parts(self) -> dict[str, bytes | None]:
+    def changed_parts(self) -> Parts:
         """Return the parts of the package that change or are new, with their new content."""
         if self.file is not None:
             self.file.forget()
@@ -360,23 +361,23 @@ class WorkbookEditor:
             tainted = set[str]()
             if any(sheet.inputs_changed for sheet in spliced.values()):
                 # New results of other sheets follow from what was typed.
-                tainted = {title for title, sheet in spliced.items() if sheet.edits}
+                tainted = {t for t, sheet in spliced.items() if sheet.edits or sheet.differs}
             references = formulas.References(self.path, package, self.book, self.tables)
             settled = [title for title, sheet in spliced.items() if not sheet.strips]
             stale = references.dependents(tainted, settled)
-            parts: dict[str, bytes | None] = {}
+            parts = Parts()
             stripped = any(spliced[title].strips for title in stale & spliced.keys())
             formula_lost = any(sheet.formula_lost for sheet in spliced.values())
             for sheet in self.book.sheets:
-                changed = spliced.pop(sheet.title, None)  # of a large sheet each copy is 70 MB
+                changed = spliced.get(sheet.title)
                 if changed is None and sheet.title in stale:
                     data = read_part(self.path, package, sheet.part)
                     changed = splice_sheet(self.path, sheet.part, data, SheetChanges())
                     stripped |= bool(changed.strips)
                 if changed is not None:
-                    joined = changed.joined(strip=sheet.title in stale)
-                    if joined != changed.data:
-                        parts[sheet.part] = joined
+                    file = changed.written(strip=sheet.title in stale)
+                    if changed.differs:
+                        parts[sheet.part] = file
             differ = {*parts}
             for area, bottom in self.grown.values():
                 references.grow(area, bottom, parts)
@@ -393,7 +394,7 @@ class WorkbookEditor:
                     del parts[name]
         return parts
 
-    def _graft(self, package: zipfile.ZipFile, parts: dict[str, bytes | None]) -> None:
+    def _graft(self, package: zipfile.ZipFile, parts: Parts) -> None:
         """Add new sheets, names and formats."""
         if self.grafts or self.names:
             graft = Graft(self.path, package, self.book, parts, self._style_sheet())
@@ -420,8 +421,11 @@ class WorkbookEditor:
         for sheet in self.book.sheets:
             changes = self.changes.get(sheet.title)
             if changes:
-                data = read_part(self.path, package, sheet.part)
-                spliced[sheet.title] = splice_sheet(self.path, sheet.part, data, changes, shared)
+                read = partial(read_part, self.path, package, sheet.part)
+                made = splice_sheet(self.path, sheet.part, read(), changes, shared)
+                if not made.strips:
+                    made.written(strip=False)
+                spliced[sheet.title] = made
         return spliced
 
     def _changes(self, title: str) -> SheetChanges:

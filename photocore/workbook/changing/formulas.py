@@ -11,10 +11,13 @@ from pathlib import Path
 
 from photocore.workbook.reading.grid import TableArea, cell_name, plain_title, split_area
 from photocore.workbook.reading.package import (
+    Parts,
     local,
+    opened,
     read_part,
     read_relations,
     understood,
+    windows,
     xml_elements,
 )
 from photocore.workbook.reading.references import FORMULA
@@ -123,7 +126,7 @@ class References:
         shapes = {_ANY_CELL.sub("#", unescaped(text)) for text in texts}
         return "\n".join(sorted(shapes))
 
-    def grow(self, area: TableArea, bottom: int, parts: dict[str, bytes | None]) -> None:
+    def grow(self, area: TableArea, bottom: int, parts: Parts) -> None:
         """Let a table, and all that reaches to its last row, reach down to a new one.
 
         Parameters
@@ -144,15 +147,16 @@ class References:
         self._replace(self.book.part, parts, area, bottom, tag=rb"definedName")
         last = re.compile(rb"![$]?[A-Z]+[$]?\d+:[$]?[A-Z]+[$]?%d\b" % area.area[2])
         for other in self.book.sheets:
-            if last.search(self._now(other.part, parts)):
+            part = parts.held(other.part) or read_part(self.path, self.package, other.part)
+            if any(last.search(text) for _, text in windows(opened(part))):
                 self._replace(other.part, parts, area, bottom, tag=rb"f")
 
-    def _now(self, name: str, parts: dict[str, bytes | None]) -> bytes:
+    def _now(self, name: str, parts: Parts) -> bytes:
         changed = parts.get(name)
         return read_part(self.path, self.package, name) if changed is None else changed
 
     def _replace(
-        self, name: str, parts: dict[str, bytes | None], area: TableArea, bottom: int, *, tag: bytes
+        self, name: str, parts: Parts, area: TableArea, bottom: int, *, tag: bytes
     ) -> None:
         """Let the ranges in the text of certain elements grow."""
         data = self._now(name, parts)
@@ -252,9 +256,7 @@ def charts_of(path: Path, package: zipfile.ZipFile, sheet: SheetPart) -> list[st
     ]
 
 
-def drop_order(
-    path: Path, package: zipfile.ZipFile, book: Workbook, parts: dict[str, bytes | None]
-) -> None:
+def drop_order(path: Path, package: zipfile.ZipFile, book: Workbook, parts: Parts) -> None:
     """Leave out the list of formulas in the order of calculation: it names one that is gone.
 
     Excel makes it anew, and takes a workbook for damaged whose list is wrong.
@@ -270,9 +272,7 @@ def drop_order(
         parts[name] = re.sub(entry % re.escape(posixpath.basename(part).encode()), b"", data)
 
 
-def recalculate_on_load(
-    path: Path, package: zipfile.ZipFile, book: Workbook, parts: dict[str, bytes | None]
-) -> None:
+def recalculate_on_load(path: Path, package: zipfile.ZipFile, book: Workbook, parts: Parts) -> None:
     """Tell spreadsheet programs to calculate all formulas when they open the workbook."""
     data = parts.get(book.part) or read_part(path, package, book.part)
     element = re.search(rb"<(?:\w+:)?calcPr(?:\s[^>]*)?>", data)

@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 from photocore.errors import InputError
 from photocore.workbook.changing.styles import StyleSheet
 from photocore.workbook.reading.grid import plain_title, quoted_title
-from photocore.workbook.reading.package import read_part
+from photocore.workbook.reading.package import Parts, read_part
 from photocore.workbook.reading.xlsx import SheetPart, Workbook, read_directory
 from photocore.workbook.reading.xmltext import escaped, quoted
 
@@ -51,7 +51,7 @@ class Graft:
     path: Path
     package: zipfile.ZipFile
     book: Workbook
-    parts: dict[str, bytes | None]
+    parts: Parts
     styles: StyleSheet
     _names: set[str] = field(init=False)
 

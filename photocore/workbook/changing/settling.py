@@ -19,7 +19,12 @@ from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.changing.editor import WorkbookEditor
 from photocore.workbook.making.newbook import is_untouched
 from photocore.workbook.reading.grid import CellFault, Value, cell_name, column_number
-from photocore.workbook.reading.package import open_package, read_part, rewrite_package
+from photocore.workbook.reading.package import (
+    Parts,
+    open_package,
+    read_part,
+    rewrite_package,
+)
 from photocore.workbook.reading.xmltext import unescaped
 
 #: Stored and calculated numbers that differ by less are alike: 1e-9 of what is above 1.
@@ -115,7 +120,7 @@ class Settling:
     cells: list[str] = field(default_factory=list)
     unknown: dict[str, str] = field(default_factory=dict)
 
-    def __call__(self, path: Path, parts: Mapping[str, bytes | None]) -> dict[str, bytes | None]:
+    def __call__(self, path: Path, parts: Parts) -> Parts:
         """Return the parts of a workbook with the results that its formulas give."""
         with tempfile.TemporaryDirectory() as folder:
             made = Path(folder) / path.name
@@ -125,7 +130,7 @@ class Settling:
                 book = Calculation(load_workbook(made))
             except (ValueError, TypeError, KeyError, AttributeError, IndexError, BadZipFile) as why:
                 self.unknown[type(why).__name__] = made.name
-                return dict(parts)
+                return parts
             formulas = book.formulas()[:MOST]
             for sheet, row, column in formulas:
                 try:
@@ -136,7 +141,7 @@ class Settling:
                     self.cells.append(f"{sheet}!{cell_name(row, column)}")
                     editor.set_result(sheet, row, column, value)
             self.unknown |= book.unknown
-            return {**parts, **editor.changed_parts()}
+            return parts.but(editor.changed_parts())
 
 
 def _alike(stored: Value | None, value: CellValue) -> bool:

@@ -28,8 +28,8 @@ from photocore.workbook.reading.xlsx import unescape
 from photocore.workbook.reading.xmltext import quoted, unescaped
 
 _TAG = re.compile(rb"""<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*(/?)>""")
-#: New rows are kept in pieces of so many bytes, each of which is let go by itself.
-_PIECE = 2**25
+#: Changes are written once there are so many of them, new rows in pieces of so many bytes.
+_HELD, _PIECE = 256, 2**20
 _INLINE = re.compile(r"\s*<(?:\w+:)?t(?:\s[^>]*)?>([^<]*)</(?:\w+:)?t>\s*")
 
 
@@ -95,6 +95,7 @@ class _Splicer:
         self.new: dict[int, NewCell] = {}
         self.cached: Mapping[int, CellValue] = {}
         self.dimension: tuple[int, int, str] | None = None
+        self.grown: list[tuple[int, int, bytes]] = []
         self.arrays = areas_of_arrays(data)
 
     def run(self) -> Spliced:
@@ -112,12 +113,10 @@ class _Splicer:
                 raise InputError(
                     remark("book.invalid_xml", of=self.path, part=self.part, error=error)
                 ) from None
-        if self.changes.columns:
-            head = self.data[: self.data_start]
-            self.edits += column_edits(head, self.prefix, self.changes.columns)
-        if self.dimension and self.edits:
-            self.grow_dimension(*self.dimension)
+        if self.edits == self.grown:
+            self.edits.clear()  # nothing was made
         self.edits.sort(key=itemgetter(0, 1))
+        del self.parser  # which calls this object: together they would keep the sheet
         return self.result
 
     def begin_anew(self) -> None:
@@ -126,7 +125,7 @@ class _Splicer:
         self.edits = self.result.edits
         self.new_rows = deque(self.changes.rows())
         self.parser = new_parser(self.path, self.part, start=self.start, end=self.end)
-        self.dimension = None
+        self.dimension, self.grown = None, []
         self.prefix, self.depth, self.inside, self.row = "", 0, False, 0
 
     def run_plain(self) -> None:
@@ -136,6 +135,8 @@ class _Splicer:
         self.inside, self.prefix = False, ""
         filler = FormFiller(self.changes)
         for found in plain_rows(self.data, start, end):
+            if len(self.edits) > _HELD:
+                self.spill()
             if found.form is not None and self.fill_formed(filler, found):
                 continue
             row = with_cells(self.data, found)
@@ -160,6 +161,11 @@ class _Splicer:
                 self.add_cells(10**6, place)
         self.add_rows(10**9, (end, end, "", ""))
         self.parser.Parse(self.data[end:], True)
+
+    def spill(self) -> None:
+        """Write what is changed so far, unless results in it may still be taken out."""
+        if not self.result.strips:
+            self.result.write()
 
     def fill_formed(self, filler: FormFiller, row: PlainRow) -> bool:
         """Give every formula of a row of a form its result, if no more is to be done.
@@ -213,6 +219,11 @@ class _Splicer:
             self.inside = True
             self.data_start = self.parser.CurrentByteIndex
             self.prefix = name[: len(name) - len(kind)]
+            if self.changes.columns:
+                head = self.data[: self.data_start]
+                self.edits += column_edits(head, self.prefix, self.changes.columns)
+            if self.dimension:
+                self.grow_dimension(*self.dimension)
         elif kind == "dimension":
             start = self.parser.CurrentByteIndex
             self.dimension = (start, self.tag_end(start), attributes.get("ref", ""))
@@ -415,6 +426,7 @@ class _Splicer:
             if xml:
                 if len(made) > _PIECE:
                     self.insert(made, (start, end, opening, ""))
+                    self.spill()
                     made, opening = bytearray(), ""
                 made += f'<{tag} r="{number}">{xml}</{tag}>'.encode()
         self.insert(made, (start, end, opening, closing))
@@ -469,4 +481,5 @@ class _Splicer:
                 self.data[start:end],
                 count=1,
             )
-            self.edits.append((start, end, tag))
+            self.grown = [(start, end, tag)]
+            self.edits += self.grown

@@ -40,7 +40,7 @@ from photocore.workbook.changing.changes import SheetChanges
 from photocore.workbook.changing.formulas import ModelCell, model_cells
 from photocore.workbook.changing.splice import splice_sheet
 from photocore.workbook.reading.grid import split_cell
-from photocore.workbook.reading.package import read_part, rewrite_package
+from photocore.workbook.reading.package import Parts, read_part, rewrite_package
 from photocore.workbook.reading.references import refuse_lost
 from photocore.workbook.reading.xlsx import read_directory
 
@@ -125,7 +125,7 @@ def finish_book(
     drawings : mapping, optional
         Sheet name to the drawing on it, of a sheet that has neither tables nor charts.
     """
-    parts = finished_parts(source, results=results, blocks=blocks)
+    parts = _finished(source, results, blocks or {})
     _add_drawings(source, target, parts, drawings or {})
     rewrite_package(source, target, parts, date=PART_TIME)
     refuse_lost(target)
@@ -138,11 +138,19 @@ def finished_parts(
     blocks: Mapping[str, RowBlock] | None = None,
 ) -> dict[str, bytes]:
     """Return all parts of a finished package, to take sheets from; as `finish_book` otherwise."""
-    named = Path("new sheets")
+    return {name: part or b"" for name, part in _finished(source, results, blocks or {}).items()}
+
+
+def _finished(
+    source: BinaryIO,
+    results: Mapping[str, Mapping[str, CellValue]],
+    blocks: Mapping[str, RowBlock],
+) -> Parts:
+    """Return all parts of a finished package."""
+    named, parts = Path("new sheets"), Parts()
     with zipfile.ZipFile(source) as package:
-        parts = {}
         for sheet in read_directory(named, package).sheets:
-            changes, block = SheetChanges(restates=True), (blocks or {}).get(sheet.title)
+            changes, block = SheetChanges(restates=True), blocks.get(sheet.title)
             if block is not None:
                 prototype = model_cells(named, package, sheet, block.row)
                 if not prototype:
@@ -154,24 +162,29 @@ def finished_parts(
                     # openpyxl writes 16 digits; doubles need up to 17.
                     changes.cached.setdefault(row, {})[column] = _result(value)
             data = read_part(named, package, sheet.part)
-            parts[sheet.part] = splice_sheet(named, sheet.part, data, changes).joined(strip=False)
+            made = splice_sheet(named, sheet.part, data, changes)
+            parts[sheet.part] = made.written(strip=False)
         parts[_CORE] = _stated_properties(read_part(named, package, _CORE))
-        return {name: parts.pop(name, b"") or package.read(name) for name in package.namelist()}
+        for name in package.namelist():
+            if name not in parts:
+                parts[name] = package.read(name)
+    return parts
 
 
 def _add_drawings(
-    source: BinaryIO, target: Path, parts: dict[str, bytes], drawings: Mapping[str, bytes]
+    source: BinaryIO, target: Path, parts: Parts, drawings: Mapping[str, bytes]
 ) -> None:
     """Add drawings to sheets that openpyxl cannot draw on."""
     with zipfile.ZipFile(source) as package:
         sheets = {sheet.title: sheet.part for sheet in read_directory(target, package).sheets}
-    types = parts[_TYPES]
+    types = parts[_TYPES] or b""
     for title, drawing in drawings.items():
         folder, _, file = sheets[title].rpartition("/")
         name = f"xl/drawings/sketch-{file}"
         parts[name] = drawing
         link = f'<drawing xmlns:r="{_RELATIONS}" r:id="rId1"/></worksheet>'
-        parts[sheets[title]] = parts[sheets[title]].replace(b"</worksheet>", link.encode())
+        sheet = parts[sheets[title]] or b""
+        parts[sheets[title]] = sheet.replace(b"</worksheet>", link.encode())
         entry = f'<Relationship Id="rId1" Type="{_RELATIONS}/drawing" Target="/{name}"/>'
         whole = f'<Relationships xmlns="{_PACKAGE}">{entry}</Relationships>'
         parts[f"{folder}/_rels/{file}.rels"] = whole.encode()

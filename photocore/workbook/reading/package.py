@@ -7,14 +7,16 @@ import lzma
 import os
 import posixpath
 import re
+import shutil
 import zipfile
 import zlib
-from collections.abc import Callable, Container, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
 from functools import lru_cache
+from io import BytesIO
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, BinaryIO, Literal
+from typing import IO, Any, BinaryIO, Literal
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 from xml.parsers import expat
@@ -41,10 +43,13 @@ _REFERENCES = re.compile(rb"xmlns:(\w+)=[\"'][^\"']*/officeDocument/(?:2006/)?re
 #: What spreadsheet programs take: characters of a formula, and how deep its brackets are.
 _LONGEST, _DEEPEST = 8192, 64
 _LONG = re.compile(rb"<(?:\w+:)?f(?:\s[^>]*)?>([^<]{8193,}|(?:[^<(]*\(){65}[^<]*)<")
-#: Formulas are looked at so far into a part: rows further down repeat them.
+#: Formulas are looked at so far into a part: rows further down repeat them. It is looked through
+#: in pieces of so many bytes.
 _FORMS = 2**21
 #: Small, since the elements of a chunk are made before the first is looked at.
 _CHUNK = 2**15
+#: A tag is shorter.
+_TAG = 2**12
 #: What unpacking a damaged member may raise.
 UNPACKING = (
     zipfile.BadZipFile,
@@ -143,8 +148,73 @@ def read_part(path: Path, package: zipfile.ZipFile, name: str) -> bytes:
     InputError
         If the part is missing or damaged.
     """
-    with _unpacking(path, name):
-        return package.read(name)
+    whole = BytesIO()  # unpacked at once a large sheet is held twice for a moment
+    with _unpacking(path, name), package.open(name) as member:
+        shutil.copyfileobj(member, whole, _FORMS)
+    return whole.getvalue()
+
+
+class Parts(MutableMapping[str, bytes | None]):
+    """Parts of a package by name, None for one to be left out; large ones lie in files."""
+
+    def __init__(self) -> None:
+        self._parts: dict[str, bytes | IO[bytes] | None] = {}
+
+    def __getitem__(self, name: str) -> bytes | None:
+        """Return a part; its bytes are read anew."""
+        part = self._parts[name]
+        return part if part is None or isinstance(part, bytes) else opened(part).read()
+
+    def __setitem__(self, name: str, part: bytes | IO[bytes] | None) -> None:
+        """Take a part, or a file that holds it."""
+        self._parts[name] = part
+
+    def __delitem__(self, name: str) -> None:
+        """Forget a part."""
+        del self._parts[name]
+
+    def __contains__(self, name: object) -> bool:
+        """Whether there is a part of that name."""
+        return name in self._parts
+
+    def __iter__(self) -> Iterator[str]:
+        """Return the names of the parts."""
+        return iter(self._parts)
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self._parts)
+
+    def but(self, others: Parts) -> Parts:
+        """Return these parts with others in place of those of their names."""
+        both = Parts()
+        both._parts = self._parts | others._parts
+        return both
+
+    def held(self, name: str) -> bytes | IO[bytes] | None:
+        """Return a part as it lies here."""
+        return self._parts.get(name)
+
+
+def _held(parts: Mapping[str, bytes | None], name: str) -> bytes | IO[bytes] | None:
+    return parts.held(name) if isinstance(parts, Parts) else parts.get(name)
+
+
+def opened(part: bytes | IO[bytes]) -> IO[bytes]:
+    """Return a part as a file to be read from its beginning."""
+    if isinstance(part, bytes):
+        return BytesIO(part)
+    part.seek(0)
+    return part
+
+
+def windows(part: IO[bytes]) -> Iterator[tuple[bytes, bytes]]:
+    """Yield a part piece by piece, each also with the end of the one before."""
+    before = b""
+    while piece := part.read(_FORMS):
+        text = before + piece
+        before = text[-_TAG:]
+        yield piece, text
 
 
 def rewrite_package(
@@ -169,7 +239,7 @@ def rewrite_package(
             new.comment = old.comment
             listed = old.infolist()
             for info in listed:
-                data = parts.get(info.filename)
+                data = _held(parts, info.filename)
                 if data is None and info.filename in parts:
                     continue
                 copy = zipfile.ZipInfo(info.filename, date or info.date_time)
@@ -177,22 +247,24 @@ def rewrite_package(
                 copy.compress_type = zipfile.ZIP_STORED if stored else zipfile.ZIP_DEFLATED
                 copy.external_attr, copy.create_system = info.external_attr, info.create_system
                 data = read_part(named, old, info.filename) if data is None else data
-                new.writestr(copy, data, compresslevel=_level(data))
+                _write(new, copy, data)
             known = {info.filename for info in listed}
             for name in [name for name in parts if name not in known]:
                 added = zipfile.ZipInfo(name, date or NEW_PART_TIME)
                 added.compress_type = zipfile.ZIP_DEFLATED
                 added.external_attr = 0o600 << 16
-                data = parts[name] or b""
-                new.writestr(added, data, compresslevel=_level(data))
+                _write(new, added, _held(parts, name) or b"")
         file.flush()
         os.fsync(file.fileno())
         _refuse_damage(named, old, target, parts)
 
 
-def _level(data: bytes) -> int:
-    """Return how hard to compress a part: sheets of many MB take most of the time of a change."""
-    return _FAST if len(data) > SMALL else _THOROUGH
+def _write(package: zipfile.ZipFile, info: zipfile.ZipInfo, part: bytes | IO[bytes]) -> None:
+    """Write a part; to compress sheets of many MB takes most of the time of a change."""
+    size = len(part) if isinstance(part, bytes) else part.seek(0, os.SEEK_END)
+    info._compresslevel = _FAST if size > SMALL else _THOROUGH  # type: ignore[attr-defined]
+    with package.open(info, "w") as member:
+        shutil.copyfileobj(opened(part), member, SMALL)
 
 
 def _refuse_damage(
@@ -213,31 +285,44 @@ def _faults(
     made: Mapping[str, bytes | None] | None = None,
 ) -> Iterator[str]:
     """Yield why a spreadsheet program would not open a package; parts at hand are not unpacked."""
-    names, known = {*package.namelist()}, made or {}
+    names = {*package.namelist()}
     for name in ("", *package.namelist()):
+        keys, start = set[bytes](), b""
         try:
             relations = read_relations(path, package, name)
-            data = b"<x/>"
             if name in changed and name.endswith(".xml"):
-                data = known.get(name) or package.read(name)
-            expat.ParserCreate(namespace_separator=" ").Parse(data, True)
+                part = _held(made or {}, name)
+                keys, start = _looked_through(opened(part) if part else package.open(name))
         except (InputError, expat.ExpatError) as error:
             yield f"{name} is not valid XML: {str(error).partition(': line')[0]}"
             continue
         for _, place in relations.values():
             if place and place not in names:
                 yield f"{name} leads to {place}, which is missing"
-        for prefix in {*_REFERENCES.findall(data)}:
-            # What begins with plain letters is found ten times as quickly.
-            own = rb"%s:(?<=\s%s:)(?:id|embed|link)=[\"']([^\"']+)" % (prefix, prefix)
-            for key in re.findall(own, data):
-                if key.decode() not in relations:
-                    yield f"{name} has no relation {key.decode()}"
-        for text in _LONG.findall(data[:_FORMS]):
+        for key in sorted(keys):
+            if key.decode() not in relations:
+                yield f"{name} has no relation {key.decode()}"
+        for text in _LONG.findall(start):
             steps = ((letter == 40) - (letter == 41) for letter in re.sub(rb'"[^"]*"', b"", text))
             size, depth = len(re.sub(rb"&\w+;", b" ", text)), max(accumulate(steps))
             if size > _LONGEST or depth > _DEEPEST:
                 yield f"{name} has a formula of {size} characters, {depth} brackets deep"
+
+
+def _looked_through(part: IO[bytes]) -> tuple[set[bytes], bytes]:
+    """Return the relations that a part refers to, and its start; raises where it is no XML."""
+    parser = expat.ParserCreate(namespace_separator=" ")
+    prefixes, keys, start = set[bytes](), set[bytes](), b""
+    for piece, text in windows(part):
+        start = start or piece
+        parser.Parse(piece, False)
+        prefixes.update(_REFERENCES.findall(text))
+        for prefix in prefixes:
+            # What begins with plain letters is found ten times as quickly.
+            own = rb"%s:(?<=\s%s:)(?:id|embed|link)=[\"']([^\"']+)[\"']" % (prefix, prefix)
+            keys.update(re.findall(own, text))
+    parser.Parse(b"", True)
+    return keys, start
 
 
 def package_faults(path: Path) -> list[str]:
