@@ -16,8 +16,7 @@ from bifocal.collimation.fields import FieldError, positive_of, tupled
 from bifocal.collimation.jobs import PageJob
 from bifocal.collimation.live_orientation import control_of, lenses_of, site_of
 from bifocal.collimation.product_graph import causes_of, out_of_date
-from bifocal.collimation.products import discard_pair
-from bifocal.collimation.proposals import NOMINAL
+from bifocal.collimation.proposals import NOMINAL, discard_pair
 from bifocal.collimation.session import Session
 from bifocal.collimation.shapes import outlines_of
 from bifocal.collimation.stated_media import lacking, media_as_dict, media_of

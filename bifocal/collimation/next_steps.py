@@ -8,6 +8,7 @@ from typing import Literal
 
 from bifocal.collimation.live_orientation import LiveOrientation
 from bifocal.collimation.product_graph import out_of_date, proposal_is_current
+from bifocal.collimation.scale import is_unscaled
 from bifocal.collimation.session import Session
 from bifocal.collimation.wording import say, without_options
 from photocore.remarks import level_of
@@ -61,12 +62,6 @@ def next_steps(session: Session) -> dict[str, NextStep]:
         "points": _of_points(session),
         "products": _of_products(session),
     }
-
-
-def is_unscaled(session: Session) -> bool:
-    """Whether the proposed orientation waits for its scale."""
-    report = (session.proposal or {}).get("report", {})
-    return bool(report.get("free_scale")) and not report.get("scale")
 
 
 def is_running(session: Session, *kinds: str) -> bool:

@@ -13,7 +13,6 @@ import numpy as np
 from bifocal.collimation.project import SurveyFiles
 from bifocal.model.geotiff import RasterReader
 from bifocal.model.grid import Grid
-from bifocal.model.pair import Pair
 from bifocal.model.relief_map import TOLD, ReliefMap
 from bifocal.model.surface import MapSurface
 from bifocal.orthophotos.shading import shaded, tints
@@ -21,7 +20,6 @@ from bifocal.remarks import remark
 from bifocal.reports.content import ortho_thumbnail
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
-from photocore.jsonfile import read_object, write_object
 from photocore.output import free_path
 
 #: Longer side of the relief's picture. [px]
@@ -274,21 +272,6 @@ def _histogram(relief: ReliefMap) -> dict[str, Any]:
     return {"from": low, "to": high, "counts": counts.tolist()}
 
 
-def accept_pair(proposed: Path, target: Path) -> None:
-    """Move a proposed pair file, and the lens files it names, to its final name."""
-    data = read_object(proposed, what="pair file")
-    stem = target.name.removesuffix(".json").removesuffix(".pair")
-    for number in (1, 2):
-        photo = data.get(f"image{number}")
-        if isinstance(photo, dict) and photo.get("lens"):
-            name = f"{stem}.lens{number}.json"
-            (proposed.parent / photo["lens"]).replace(target.parent / name)
-            photo["lens"] = name
-    write_object(target, data, overwrite=True, as_is=True)
-    Pair.read(target)
-    proposed.unlink()
-
-
 def _nearest(relief: ReliefMap, places: FloatArray) -> FloatArray:
     """Return the standard deviation at the nearest pixel of places, shape (n,). [m]"""
     pixels = np.rint(relief.grid.pixel_of(places))
@@ -300,16 +283,6 @@ def _nearest(relief: ReliefMap, places: FloatArray) -> FloatArray:
 
 def _plain(value: float) -> float | None:
     return value if np.isfinite(value) else None
-
-
-def discard_pair(proposed: Path) -> None:
-    """Take away a proposed pair file that another one follows, with the lens files it names."""
-    data = read_object(proposed, what="pair file")
-    for number in (1, 2):
-        photo = data.get(f"image{number}")
-        if isinstance(photo, dict) and isinstance(photo.get("lens"), str):
-            (proposed.parent / photo["lens"]).unlink(missing_ok=True)
-    proposed.unlink(missing_ok=True)
 
 
 def _small(picture: Any) -> Any:

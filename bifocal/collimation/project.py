@@ -214,7 +214,7 @@ def _of_folder(folder: Path, workbook: Path | None) -> SurveyFiles:
     journals = [path for path in names if path.name.endswith(_JOURNAL) and last_opened(path)]
     pairs = [path for path in names if path.name.endswith(_PAIR)]
     photos = [path for path in names if path.suffix.lower() in PHOTOS]
-    for candidates, what in ((journals, "surveys"), (pairs, "pair files")):
+    for candidates, what in ((journals, "surveys"), ([] if journals else pairs, "pair files")):
         if len(candidates) > 1:
             shown = ", ".join(path.name for path in candidates[:5])
             raise InputError(f"{folder}: holds {len(candidates)} {what} ({shown}); name one.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from bifocal.model.pair import Pair
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.rescaling import scaled_by_distance, scaled_by_length
 from photocore.arrays import BoolArray, Float32Array, FloatArray
+from photocore.jsonfile import read_object, write_object
 
 #: Far distance of a pair whose scale is still to be given. [m]
 NOMINAL = 10.0
@@ -63,6 +65,41 @@ def rescale(path: Path, report: Mapping[str, Any], measure: list[Any] | None) ->
         "planes": setup["planes"],
         "remarks": [next(iter(rivals), text) if text in stale else text for text in remarks],
     }
+
+
+def accept_pair(proposed: Path, target: Path) -> None:
+    """Move a proposed pair file, and the lens files it names, to its final name."""
+    _write_as(target, proposed, move=True)
+    proposed.unlink()
+
+
+def copy_pair(path: Path, copy: Path) -> None:
+    """Copy a pair file, and the lens files it names."""
+    _write_as(copy, path, move=False)
+
+
+def _write_as(target: Path, path: Path, *, move: bool) -> None:
+    data = read_object(path, what="pair file")
+    stem = target.name.removesuffix(".json").removesuffix(".pair")
+    for number in (1, 2):
+        photo = data.get(f"image{number}")
+        if isinstance(photo, dict) and photo.get("lens"):
+            name = f"{stem}.lens{number}.json"
+            bring = shutil.move if move else shutil.copyfile
+            bring(path.parent / photo["lens"], target.parent / name)
+            photo["lens"] = name
+    write_object(target, data, overwrite=True, as_is=True)
+    Pair.read(target)
+
+
+def discard_pair(proposed: Path) -> None:
+    """Take away a proposed pair file that another one follows, with the lens files it names."""
+    data = read_object(proposed, what="pair file")
+    for number in (1, 2):
+        photo = data.get(f"image{number}")
+        if isinstance(photo, dict) and isinstance(photo.get("lens"), str):
+            (proposed.parent / photo["lens"]).unlink(missing_ok=True)
+    proposed.unlink(missing_ok=True)
 
 
 def wall_sheet(pixels: FloatArray, wall: BoolArray, size: tuple[int, int]) -> list[Any]:

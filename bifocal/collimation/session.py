@@ -27,10 +27,11 @@ from bifocal.collimation.live_orientation import LiveOrientation
 from bifocal.collimation.live_results import LiveResults
 from bifocal.collimation.pictures import Pictures
 from bifocal.collimation.product_graph import causes_again, causes_hold
-from bifocal.collimation.products import Products, accept_pair, discard_pair
+from bifocal.collimation.products import Products
 from bifocal.collimation.project import JoinedSet, SurveyFiles
-from bifocal.collimation.proposals import measure_of, rescale
+from bifocal.collimation.proposals import accept_pair, discard_pair
 from bifocal.collimation.records import Change, SurveyState
+from bifocal.collimation.scale import follow_scale, is_unscaled
 from bifocal.collimation.shapes import outlines_of
 from bifocal.collimation.workbook.rows import PointRow, put_rows, row_of
 from bifocal.collimation.workbook.setup import ideal_setup, pair_of, typed_of
@@ -176,25 +177,17 @@ class Session:
                 self.command({"op": "photos.exchange", "found": True})
                 if current:  # the same, the other way round
                     report = {**report, "causes": causes_again(self, report)}
-            self._note_proposed(path, report)
-            self.follow_scale()
+            self.note_proposed(path, report)
+            follow_scale(self)
             self.changed()
 
-    def _note_proposed(self, path: Path, report: Mapping[str, Any]) -> None:
+    def note_proposed(self, path: Path, report: Mapping[str, Any]) -> None:
+        """Let a pair file be the orientation that waits to be accepted."""
         if (before := self.proposed_path) not in (None, path):
             discard_pair(before)
         self.proposal = {"op": "proposed", "pair": path.name, "report": dict(report)}
         self._write(self.proposal)
         self._show_proposal()
-
-    def follow_scale(self) -> None:
-        """Bring what the photos alone gave to the scale that is known now."""
-        path, report = self.proposed_path, (self.proposal or {}).get("report", {})
-        if path is None or not report.get("free_scale"):
-            return
-        measure = measure_of(self.state)
-        if report.get("scale") != measure:
-            self._note_proposed(path, rescale(path, report, measure))
 
     def _show_proposal(self) -> None:
         path = self.proposed_path
@@ -251,8 +244,7 @@ class Session:
         path = self.proposed_path
         if path is None:
             raise InputError(remark("page.no_orientation"))
-        report = (self.proposal or {})["report"]
-        if report.get("free_scale") and not report.get("scale"):
+        if is_unscaled(self):
             raise InputError(remark("page.no_size"))
         target = self.products.place("pair", ".pair.json")
         if path != target:
@@ -344,7 +336,7 @@ class Session:
             if isinstance(command_id, str) and command_id in self.answered:
                 return self.answered[command_id]
             result = self._checked(fields_of(command))
-            self.follow_scale()
+            follow_scale(self)
             self._faces.keep(self.pictures.pair, self.files.pair)
             if isinstance(command_id, str):
                 self._remember_answer(command_id, result)

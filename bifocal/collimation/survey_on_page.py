@@ -35,6 +35,9 @@ class SurveyOnPage(Protocol):
     def take_files(self, pair: Path | None, proposal: dict[str, Any] | None) -> None:
         """Let this be the pair file of the photos shown, or what is proposed instead."""
 
+    def note_proposed(self, path: Path, report: Mapping[str, Any]) -> None:
+        """Let a pair file be the orientation that waits to be accepted."""
+
     def note_made(
         self, kind: str, names: Sequence[str], causes: Mapping[str, str] | None = None
     ) -> None:

@@ -13,9 +13,10 @@ from bifocal.collimation.commands import lens_ratio
 from bifocal.collimation.drawn_lengths import lengths_shown
 from bifocal.collimation.fields import SETUP
 from bifocal.collimation.live_orientation import LiveOrientation, lenses_of
-from bifocal.collimation.next_steps import advice_of, is_looking, is_unscaled, next_steps
+from bifocal.collimation.next_steps import advice_of, is_looking, next_steps
 from bifocal.collimation.product_graph import out_of_date, proposal_is_current
 from bifocal.collimation.records import GIVES_SCALE
+from bifocal.collimation.scale import free_report, is_unscaled
 from bifocal.collimation.session import Session
 from bifocal.collimation.shapes import measures_of
 from bifocal.collimation.wording import say, without_options
@@ -280,6 +281,7 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
             "current": proposal_is_current(session),
             "scaled": not is_unscaled(session),
             "report": session.proposal and session.proposal["report"],
+            "free_scale": free_report(session) is not None,
             "remarks": [without_options(text, session.spoken) for text in _remarks(session)],
         }
     )

@@ -56,6 +56,34 @@ def test_one_drawn_length_scales_what_the_photos_gave_and_undo_takes_it_back(tmp
         assert Pair.read(session.files.pair).d1 == pytest.approx(17.5)
 
 
+def test_the_scale_is_mended_after_the_orientation_was_accepted(tmp_path) -> None:
+    def length_between_the_ends(pair: Pair) -> float:
+        return float(np.hypot(*np.diff(pair.image1.plane_from_pixels(ENDS), axis=0)[0]))
+
+    drawn = {"op": "length.set", "image": 1, "ends": ENDS}
+    with opened(two_photos(tmp_path)) as session:
+        proposed(session, tmp_path)
+        session.command({**drawn, "length": 3.0, "sigma": 0.002})
+        session.command({"op": "align.accept"})
+        accepted = session.files.pair
+        session.command({"op": "length.check", "image": 1, "ends": ENDS[::-1], "length": 3.3})
+        session.command({**drawn, "length": 3.3, "sigma": 0.001})
+        state = client_of(session).get("/api/state").json()
+        assert state["steps"]["orientation"]["action"] == "accept"
+        assert not state["pair"]["accepted"]
+        assert state["pair"]["free_scale"]
+        assert length_between_the_ends(Pair.read(accepted)) == pytest.approx(3.0)
+    with opened(tmp_path) as session:  # taken up again, the mended one still waits
+        assert length_between_the_ends(session.pictures.pair) == pytest.approx(3.3)
+        session.command({"op": "align.accept"})
+        assert session.files.pair == accepted
+        assert length_between_the_ends(Pair.read(accepted)) == pytest.approx(3.3)
+        state = client_of(session).get("/api/state").json()
+        assert state["check_lengths"][0]["difference"] == pytest.approx(0, abs=1e-9)
+        assert state["scale"]["sigma"] == pytest.approx(0.001)
+        assert not list(tmp_path.glob("*.proposed*"))
+
+
 def test_the_orientation_is_begun_once_and_makes_way(tmp_path, monkeypatch) -> None:
     begun = []
     monkeypatch.setattr(first_orientation, "start_job", lambda *a, **k: begun.append((a[1:], k)))

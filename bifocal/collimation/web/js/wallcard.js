@@ -12,30 +12,36 @@ const SHEET = "rgb(60, 220, 130)";
 const LENGTH_INK = "#ffe14d";
 const CHECK_INK = "#b9f27c";
 
+/** A length and what it is good to; nothing typed: what is taken everywhere. */
+const lengthInputs = (id, ...testids) => testids.map((testid, index) => h("input", { type: "text", inputmode: "decimal",
+  autocomplete: "off", testid, size: index ? "4" : "7", ...(index ? { placeholder: "3", "aria-label": t("wall.sigma") } : { id }) }));
+
+const lengthFields = (length, sigma) => [h("label", { for: length.id }, t("wall.length")),
+  h("span", { class: "with-unit short" }, length, h("span", { class: "unit" }, "m")), "±",
+  h("span", { class: "with-unit short", title: t("wall.sigma") }, sigma, h("span", { class: "unit" }, "mm"))];
+
+const sigmaOf = ({ value }) => (parseNumber(value) > 0 ? { sigma: parseNumber(value) / 1000 } : {});
+
 export class WallCard {
   /** `stage`: the orientation, whose panes and picker it shares. */
   constructor(stage) {
     Object.assign(this, { stage, app: stage.app, tool: null, ends: [], image: 1, dismissed: false, checking: false });
     this.state = h("p", { class: "wall-state", role: "status", testid: "wall-state" });
-    this.length = h("input", { type: "text", inputmode: "decimal", autocomplete: "off", id: "wall-length",
-      testid: "length-value", size: "7" });
+    [this.length, this.sigma] = lengthInputs("wall-length", "length-value", "length-sigma");
     this.drawButton = button(t("wall.draw"), () => this.arm("length"), { class: "quiet", testid: "length-draw" });
     this.faceButton = button(t("wall.other"), () => this.arm("wall"), { class: "quiet", testid: "wall-pick" });
     this.faces = h("ul", { class: "faces" });
     this.form = h("form", { class: "row", onsubmit: (event) => { event.preventDefault(); this.#send(); } },
-      this.drawButton, h("label", { for: "wall-length" }, t("wall.length")),
-      h("span", { class: "with-unit short" }, this.length, h("span", { class: "unit" }, "m")),
+      this.drawButton, ...lengthFields(this.length, this.sigma),
       h("button", { type: "submit", class: "quiet", testid: "length-set" }, t("wall.set")));
-    this.checkLength = h("input", { type: "text", inputmode: "decimal", autocomplete: "off", id: "check-length",
-      testid: "check-value", size: "7" });
+    [this.checkLength, this.checkSigma] = lengthInputs("check-length", "check-value", "check-sigma");
     this.agreement = h("p", { class: "hint", role: "status", testid: "check-agreement" });
     this.checks = h("tbody");
     this.checkCard = h("section", { class: "card", hidden: true, testid: "checks" }, h("h2", {}, t("check.title")), this.agreement,
       h("table", { class: "grid" }, this.checks),
       h("form", { class: "row", onsubmit: (event) => { event.preventDefault(); this.#check(); } },
         button(t("check.draw"), () => this.arm("check"), { class: "quiet", testid: "check-draw" }),
-        h("label", { for: "check-length" }, t("wall.length")),
-        h("span", { class: "with-unit short" }, this.checkLength, h("span", { class: "unit" }, "m")),
+        ...lengthFields(this.checkLength, this.checkSigma),
         h("button", { type: "submit", class: "quiet", testid: "check-set" }, t("check.set"))));
     this.element = h("section", { class: "card wall-card", hidden: true }, h("h2", {}, t("wall.title")), this.state,
       this.form, h("div", { class: "row" }, this.faceButton, this.faces));
@@ -106,9 +112,10 @@ export class WallCard {
     if (!ends) return this.arm("length");
     if (!(length > 0)) return this.app.say(t("wall.number"), "warning");
     const image = anew ? this.image : drawn.image;
-    if (await this.app.send("length.set", { image, ends, length })) {
+    if (await this.app.send("length.set", { image, ends, length, ...sigmaOf(this.sigma) })) {
       this.ends = [];
       this.length.blur();
+      this.sigma.blur();
       this.app.say(t("wall.scaled"));
     }
     return undefined;
@@ -119,7 +126,7 @@ export class WallCard {
     const length = parseNumber(this.checkLength.value);
     if (!this.checking || this.ends.length < 2) return this.arm("check");
     if (!(length > 0)) return this.app.say(t("wall.number"), "warning");
-    if (await this.app.send("length.check", { image: this.image, ends: this.ends, length })) {
+    if (await this.app.send("length.check", { image: this.image, ends: this.ends, length, ...sigmaOf(this.checkSigma) })) {
       Object.assign(this, { ends: [], checking: false });
       this.checkLength.value = "";
       this.checkLength.blur();
@@ -147,20 +154,26 @@ export class WallCard {
     this.#tellChecks(state);
     const { pair, scale, looking } = state;
     const found = pair && pair.accepted === false && pair.report?.free_scale;
+    // What gave the scale can be mended as long as the photos alone gave the rest.
+    const mended = pair?.accepted && pair.free_scale;
     const failed = state.jobs.filter(({ kind }) => kind === "align").at(-1);
     const refused = !pair && failed?.quiet && failed.state === "failed" && !failed.cured ? failed.message : "";
-    this.element.hidden = !found && !looking && !refused;
+    this.element.hidden = !found && !mended && !looking && !refused;
     const ties = pair?.report?.common_points;
     const grid = found && pair.scaled ? t("wall.grid", { step: decimal(String(gridStep(pair))) }) : "";
     const words = found ? `${t("wall.found", { share: Math.round((100 * ties.on_wall) / ties.count), count: ties.count })} ${grid}`.trim()
-      : looking ? t("wall.looking") : t("wall.refused", { why: refused });
+      : mended ? t("wall.mend") : looking ? t("wall.looking") : t("wall.refused", { why: refused });
     setText(this.state, words);
-    this.state.dataset.level = found ? "good" : looking ? "busy" : "fair";
-    this.form.hidden = this.faceButton.hidden = this.faces.hidden = !found;
-    if (scale && document.activeElement !== this.length && this.ends.length < 2) this.length.value = number(scale.length, 3);
+    this.state.dataset.level = found || mended ? "good" : looking ? "busy" : "fair";
+    this.form.hidden = !found && !mended;
+    this.faceButton.hidden = this.faces.hidden = !found;
+    if (scale && ![this.length, this.sigma].includes(document.activeElement) && this.ends.length < 2) {
+      this.length.value = number(scale.length, 3);
+      this.sigma.value = scale.sigma ? number(1000 * scale.sigma, 1) : "";
+    }
     // The one thing that is asked is asked at once.
     if (found && !pair.scaled && !state.control.length && !this.tool && !this.ends.length && !this.dismissed) this.tool = "length";
-    if (!found && !this.checking) Object.assign(this, { tool: null, ends: [] });
+    if (!found && !mended && !this.checking) Object.assign(this, { tool: null, ends: [] });
     const others = found ? pair.report.planes.slice(1, 4) : [];
     keyedRows(this.faces, others, { key: ({ pixel }) => String(pixel), signature: JSON.stringify,
       build: ({ offset, share, pixel: [column, row] }) => h("li", {}, button(

@@ -272,6 +272,8 @@ export default {
   "wall.refused": "Nicht automatisch gefunden: {why}",
   "wall.draw": "Länge zeichnen",
   "wall.length": "misst",
+  "wall.sigma": "Genauigkeit des Maßbands",
+  "wall.mend": "Der Maßstab lässt sich noch berichtigen: Länge ändern oder eine andere zeichnen, dann neu annehmen.",
   "wall.set": "Übernehmen",
   "wall.other": "Die Wand ist eine andere Fläche",
   "wall.askFirst": "Nächster Klick: ein Ende einer bekannten Länge",

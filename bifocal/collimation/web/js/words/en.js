@@ -272,6 +272,8 @@ export default {
   "wall.refused": "Not found without help: {why}",
   "wall.draw": "Draw a length",
   "wall.length": "it is",
+  "wall.sigma": "What the tape is good to",
+  "wall.mend": "The scale can still be mended: correct the length, or draw another one; then accept again.",
   "wall.set": "Set",
   "wall.other": "Another face is the wall",
   "wall.askFirst": "Next click: one end of a length you know",

@@ -272,6 +272,8 @@ export default {
   "wall.refused": "Non trovato automaticamente: {why}",
   "wall.draw": "Traccia una lunghezza",
   "wall.length": "misura",
+  "wall.sigma": "Precisione della misura a nastro",
+  "wall.mend": "La scala si può ancora correggere: correggi la lunghezza o tracciane un’altra, poi accetta di nuovo.",
   "wall.set": "Imposta",
   "wall.other": "Il muro è un’altra superficie",
   "wall.askFirst": "Prossimo clic: un estremo di una lunghezza nota",
