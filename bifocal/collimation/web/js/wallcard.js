@@ -16,9 +16,9 @@ const CHECK_INK = "#b9f27c";
 const lengthInputs = (id, ...testids) => testids.map((testid, index) => h("input", { type: "text", inputmode: "decimal",
   autocomplete: "off", testid, size: index ? "4" : "7", ...(index ? { placeholder: "3", "aria-label": t("wall.sigma") } : { id }) }));
 
-const lengthFields = (length, sigma) => [h("label", { for: length.id }, t("wall.length")),
-  h("span", { class: "with-unit short" }, length, h("span", { class: "unit" }, "m")), "±",
-  h("span", { class: "with-unit short", title: t("wall.sigma") }, sigma, h("span", { class: "unit" }, "mm"))];
+const lengthFields = (length, sigma) => h("span", { class: "taped" }, h("label", { for: length.id }, t("wall.length")),
+  h("span", { class: "with-unit" }, length, h("span", { class: "unit" }, "m")), "±",
+  h("span", { class: "with-unit", title: t("wall.sigma") }, sigma, h("span", { class: "unit" }, "mm")));
 
 const sigmaOf = ({ value }) => (parseNumber(value) > 0 ? { sigma: parseNumber(value) / 1000 } : {});
 
@@ -32,7 +32,7 @@ export class WallCard {
     this.faceButton = button(t("wall.other"), () => this.arm("wall"), { class: "quiet", testid: "wall-pick" });
     this.faces = h("ul", { class: "faces" });
     this.form = h("form", { class: "row", onsubmit: (event) => { event.preventDefault(); this.#send(); } },
-      this.drawButton, ...lengthFields(this.length, this.sigma),
+      this.drawButton, lengthFields(this.length, this.sigma),
       h("button", { type: "submit", class: "quiet", testid: "length-set" }, t("wall.set")));
     [this.checkLength, this.checkSigma] = lengthInputs("check-length", "check-value", "check-sigma");
     this.agreement = h("p", { class: "hint", role: "status", testid: "check-agreement" });
@@ -41,7 +41,7 @@ export class WallCard {
       h("table", { class: "grid" }, this.checks),
       h("form", { class: "row", onsubmit: (event) => { event.preventDefault(); this.#check(); } },
         button(t("check.draw"), () => this.arm("check"), { class: "quiet", testid: "check-draw" }),
-        ...lengthFields(this.checkLength, this.checkSigma),
+        lengthFields(this.checkLength, this.checkSigma),
         h("button", { type: "submit", class: "quiet", testid: "check-set" }, t("check.set"))));
     this.element = h("section", { class: "card wall-card", hidden: true }, h("h2", {}, t("wall.title")), this.state,
       this.form, h("div", { class: "row" }, this.faceButton, this.faces));
@@ -49,7 +49,7 @@ export class WallCard {
 
   /** The next clicks are the ends of the length, or a spot on the wall. */
   arm(tool) {
-    Object.assign(this, { tool, ends: [], dismissed: false, checking: tool === "check" });
+    Object.assign(this, { tool, ends: [], dismissed: false, unasked: false, checking: tool === "check" });
     this.stage.refresh();
   }
 
@@ -172,7 +172,10 @@ export class WallCard {
       this.sigma.value = scale.sigma ? number(1000 * scale.sigma, 1) : "";
     }
     // The one thing that is asked is asked at once.
-    if (found && !pair.scaled && !state.control.length && !this.tool && !this.ends.length && !this.dismissed) this.tool = "length";
+    if (found && !pair.scaled && !state.control.length && !this.tool && !this.ends.length && !this.dismissed) {
+      Object.assign(this, { tool: "length", unasked: true });
+    }
+    if (this.unasked && this.tool && !this.ends.length && pair?.scaled) Object.assign(this, { tool: null, unasked: false });
     if (!found && !mended && !this.checking) Object.assign(this, { tool: null, ends: [] });
     const others = found ? pair.report.planes.slice(1, 4) : [];
     keyedRows(this.faces, others, { key: ({ pixel }) => String(pixel), signature: JSON.stringify,
