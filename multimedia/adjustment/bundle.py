@@ -22,6 +22,7 @@ from multimedia.adjustment.unknowns import AUTO, Adjustment, Unknowns, bars_of
 from multimedia.media.camera import EXTERIOR, Camera
 from multimedia.orientation.calibration_covariance import with_covariance
 from multimedia.orientation.intersection import intersect
+from multimedia.orientation.object_rays import image_rays, nearest_points
 from multimedia.orientation.plate_poses import FEWEST, plate_pose
 from multimedia.projects.model import ObjectPoints, Project
 from multimedia.remarks import remark
@@ -34,6 +35,9 @@ from photocore.errors import ConvergenceError, GeometryError, InputError
 
 #: Robust weights settle in a few rounds; more change nothing that matters.
 ROBUST_ROUNDS = 8
+#: Shares of the way from a camera to the surface: how close to it rays have to meet for their point
+#: to start beyond it, and how far beyond.
+_NEAR, _INSIDE = 0.1, 1e-3
 #: Rounds and relative change in which the weight of the image coordinates settles.
 BALANCE_ROUNDS, BALANCED = 5, 0.05
 
@@ -250,11 +254,13 @@ def _start_points(project: Project, ids: Sequence[str], points: FloatArray) -> F
     Raises
     ------
     GeometryError
-        If the rays of a point do not meet beyond the interface from these starts.
+        If the rays of a point meet neither beyond the interface from these starts nor close to it.
     """
     missing = np.flatnonzero(np.isnan(points).any(axis=1))
     filled = points.copy()
     filled[missing] = _intersected(project, ids, missing)
+    missing = missing[np.isnan(filled[missing]).any(axis=1)]
+    filled[missing] = _just_inside(project, ids, missing)
     lost = [ids[j] for j in missing.tolist() if np.isnan(filled[j]).any()]
     if lost:
         raise GeometryError(remark("adjust.rays_lost", names=", ".join(lost[:8])))
@@ -318,6 +324,27 @@ def _intersected(project: Project, ids: Sequence[str], which: IntArray) -> Float
         return np.full((which.size, 3), np.nan)
     image, _ = project.image_points.grid(project.camera_names, [ids[j] for j in which.tolist()])
     return intersect(project.cameras, image, project.interfaces).xyz
+
+
+def _just_inside(project: Project, ids: Sequence[str], which: IntArray) -> FloatArray:
+    """Return starts for points whose rays meet just before they enter the object's medium.
+
+    In the midst of where they enter, and a little on. NaN where they meet elsewhere.
+    """
+    cameras = project.cameras
+    image, _ = project.image_points.grid(project.camera_names, [ids[j] for j in which.tolist()])
+    rays = [image_rays(camera, points, project.interface_of(k))
+            for k, (camera, points) in enumerate(zip(cameras, image, strict=True))]  # fmt: skip
+    origins, directions = np.array(rays).transpose(1, 0, 2, 3)
+    centres = np.array([camera.centre for camera in cameras])
+    away = np.linalg.norm(origins - centres[:, None], axis=2)
+    meeting = nearest_points(list(origins), list(directions))
+    depth = ((meeting - origins) * directions).sum(axis=2)
+    count = np.isfinite(depth).sum(axis=0)
+    is_near = (np.abs(depth) <= _NEAR * away) | np.isnan(depth)
+    entries = np.nansum(origins + _INSIDE * away[..., None] * directions, axis=0)
+    entries[(count < 2) | ~is_near.all(axis=0)] = np.nan
+    return np.asarray(entries / np.maximum(count, 1)[:, None])
 
 
 def _adjustment(

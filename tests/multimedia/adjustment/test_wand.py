@@ -10,6 +10,7 @@ import pytest
 from multimedia import (
     Brown,
     FlatInterface,
+    GeometryError,
     ImagePoints,
     InputError,
     Project,
@@ -25,14 +26,14 @@ WAND = ScaleBar(first="@a", second="@b", length=80.0, sigma=0.02)
 WALL = FlatInterface(layers=LAYERS)
 
 
-def waved(places: int, particles: int) -> tuple[list, Project]:
+def waved(places: int, particles: int, *, highest: float = -30.0) -> tuple[list, Project]:
     """Return the true cameras, and a project that knows them badly and no object point. [mm]"""
     rng = np.random.default_rng(2)
     truth = [replace(c, distortion=Brown()) for c in cameras()]
     middle = rng.uniform((-35, -30, -130), (35, 30, -60), (places, 3))
     way = rng.standard_normal((places, 3))
     way *= 40.0 / np.linalg.norm(way, axis=1)[:, None]
-    cloud = rng.uniform((-60, -50, -160), (60, 50, -30), (particles, 3))
+    cloud = rng.uniform((-60, -50, -160), (60, 50, highest), (particles, 3))
     xyz = np.concatenate([middle - way, middle + way, cloud])
     ids = (*(f"{k}a" for k in range(places)), *(f"{k}b" for k in range(places)),
            *(f"p{k}" for k in range(particles)))  # fmt: skip
@@ -83,6 +84,31 @@ def test_a_wand_and_particles_give_cameras_and_scale():
                       strict=True))  # fmt: skip
     lengths = [np.linalg.norm(points[f"{k}a"] - points[f"{k}b"]) for k in range(20)]
     assert np.abs(np.array(lengths) - 80.0).max() < 0.05
+
+
+def test_points_right_below_the_surface_start_inside_and_are_adjusted():
+    """From cameras 3 mm off their rays meet above it, at first."""
+    truth, shallow = waved(20, 30, highest=-1.0)
+    rng = np.random.default_rng(4)
+    few = rng.uniform((-40, -40, -1.5), (40, 40, -0.5), (5, 3))
+    ids = tuple(f"top{k}" for k in range(5))
+    image = np.concatenate([project(camera, few, WALL) for camera in truth])
+    images = shallow.image_points
+    more = replace(
+        shallow,
+        image_points=ImagePoints(
+            cameras=images.cameras + tuple(c.name for c in truth for _ in ids),
+            ids=images.ids + ids * 4,
+            image=np.concatenate([images.image, image]),
+        ),
+    )
+    result = bundle_adjust(more, Unknowns(control="free", scale_bars=(WAND,)))
+    assert np.abs(apart(result.project.cameras) - apart(truth)).max() < 1.5
+    assert result.sigma0 < 0.0012
+    # Rays that meet nowhere near are refused as before.
+    wrong = replace(more.image_points, image=np.roll(more.image_points.image, 60, axis=0))
+    with pytest.raises(GeometryError, match="do not meet"):
+        bundle_adjust(replace(more, image_points=wrong), Unknowns(control="free"))
 
 
 def test_a_wand_of_which_no_place_is_measured_is_refused():
