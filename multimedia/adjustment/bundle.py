@@ -16,6 +16,7 @@ from multimedia.adjustment.plausibility import (
     EXACT,
     refuse_impossible_media,
     remarks_on_unknowns,
+    wand_remarks,
     with_model_error,
 )
 from multimedia.adjustment.unknowns import AUTO, Adjustment, Unknowns, bars_of
@@ -102,7 +103,8 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
     observations = bundle.observations
     order = tuple(observations.source[rows] for rows in observations.rows)
     result = with_model_error(result, order, unknowns.plates)
-    doubts = remarks_on_unknowns(bundle.project, columns, result)
+    doubts = wand_remarks(result, unknowns)
+    doubts += remarks_on_unknowns(bundle.project, columns, result)
     whose = {f"{camera}:{name}": at for camera, labels in zip(project.camera_names, columns.cameras,
              strict=True) for name, at in labels.items()}  # fmt: skip
     whose |= {

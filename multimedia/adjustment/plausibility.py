@@ -10,7 +10,7 @@ from scipy.special import chdtrc, chdtri, ndtr
 
 from multimedia.adjustment.bundle_columns import BundleColumns
 from multimedia.adjustment.media_unknowns import media_unknowns
-from multimedia.adjustment.unknowns import Adjustment, is_angle
+from multimedia.adjustment.unknowns import Adjustment, Unknowns, is_angle
 from multimedia.media.camera import ANY_INTERIOR, EXTERIOR
 from multimedia.projects.model import Project
 from multimedia.remarks import remark
@@ -31,6 +31,9 @@ _DEPTHS = 3
 #: Image coordinates better than this are exact, as computed ones are: only rounding is left. [mm]
 EXACT = 1e-7
 _SHOWN = 6
+#: Extent of a wand's places across their plane, as a share of that within it, below which they
+#: carry little of the cameras.
+_FLAT = 0.1
 #: Interior parameters without which a camera is a pinhole: tested against zero (scale against 1).
 _TESTED = {name: 1.0 if name == "scale" else 0.0 for name in ANY_INTERIOR[3:]}
 #: Beginnings of the names of unknowns, and the text of `words.toml` on what tells them apart.
@@ -215,6 +218,18 @@ def remarks_on_unknowns(
         *alike_remarks(result),
         *_insignificant(result),
     )
+
+
+def wand_remarks(result: Adjustment, unknowns: Unknowns) -> tuple[str, ...]:
+    """Return that a wand was waved in a plane, where nothing but its points gives the cameras."""
+    xyz = result.project.object_points.xyz
+    if unknowns.control != "free" or not any(b.first[:1] == "@" for b in unknowns.scale_bars):
+        return ()
+    extent = 2.0 * np.linalg.svd(xyz - xyz.mean(axis=0))[1] / np.sqrt(len(xyz))
+    if extent[2] > _FLAT * extent[1]:
+        return ()
+    across, along = (f"{value:.2g} {result.project.unit}" for value in (extent[2], extent[1]))
+    return (remark("bundle.wand_in_plane", across=across, along=along),)
 
 
 def _carried(project: Project, columns: BundleColumns, result: Adjustment) -> Iterator[str]:

@@ -26,7 +26,9 @@ WAND = ScaleBar(first="@a", second="@b", length=80.0, sigma=0.02)
 WALL = FlatInterface(layers=LAYERS)
 
 
-def waved(places: int, particles: int, *, highest: float = -30.0) -> tuple[list, Project]:
+def waved(
+    places: int, particles: int, *, highest: float = -30.0, depth: float = 1.0
+) -> tuple[list, Project]:
     """Return the true cameras, and a project that knows them badly and no object point. [mm]"""
     rng = np.random.default_rng(2)
     truth = [replace(c, distortion=Brown()) for c in cameras()]
@@ -35,6 +37,8 @@ def waved(places: int, particles: int, *, highest: float = -30.0) -> tuple[list,
     way *= 40.0 / np.linalg.norm(way, axis=1)[:, None]
     cloud = rng.uniform((-60, -50, -160), (60, 50, highest), (particles, 3))
     xyz = np.concatenate([middle - way, middle + way, cloud])
+    if depth < 1.0:  # the wand stays level
+        xyz[:, 2] = -80.0 + depth * (xyz[:, 2] + 80.0)
     ids = (*(f"{k}a" for k in range(places)), *(f"{k}b" for k in range(places)),
            *(f"p{k}" for k in range(particles)))  # fmt: skip
     image = np.concatenate([project(camera, xyz, WALL) for camera in truth])
@@ -84,6 +88,14 @@ def test_a_wand_and_particles_give_cameras_and_scale():
                       strict=True))  # fmt: skip
     lengths = [np.linalg.norm(points[f"{k}a"] - points[f"{k}b"]) for k in range(20)]
     assert np.abs(np.array(lengths) - 80.0).max() < 0.05
+
+
+def test_a_wand_that_is_waved_in_one_plane_is_told():
+    for depth in (0.03, 0.5):
+        _, start = waved(30, 0, depth=depth)
+        bar = replace(WAND, length=75.0, sigma=5.0)
+        remarks = bundle_adjust(start, Unknowns(control="free", scale_bars=(bar,))).remarks
+        assert any("in a plane" in text for text in remarks) == (depth < 0.1), depth
 
 
 def test_points_right_below_the_surface_start_inside_and_are_adjusted():
