@@ -368,7 +368,9 @@ def _check_size(path: Path, size: tuple[int, int]) -> None:
     width, height = size
     if width * height > MAX_PIXELS:
         raise InputError(
-            f"{path}: claims {width} x {height} px; more than {MAX_PIXELS // 10**6} MP is refused."
+            f"{path}: claims {width} x {height} px; more than {MAX_PIXELS // 10**6} MP is refused. "
+            f"Halve it first, e.g. gdal_translate -r average -outsize 50% 0 {path.name} half.tif: "
+            "--sensor-width stays as it is, --pixel-size doubles."
         )
 
 

@@ -70,6 +70,18 @@ def nearest(name: str, names: Iterable[str]) -> str:
     return plain[near[0]] if near else ""
 
 
+def did_you_mean(name: str, names: Iterable[str]) -> str:
+    """Return, in brackets, the nearest of names to one that is none of them; empty without one.
+
+    Examples
+    --------
+    >>> did_you_mean("left", ["lefty", "right"]), did_you_mean("a", ["right"])
+    (' (did you mean lefty?)', '')
+    """
+    near = nearest(name, names)
+    return f" (did you mean {near}?)" if near else ""
+
+
 def meant(names: Iterable[str], among: Collection[str]) -> list[str]:
     """Return names of points as they are called among others.
 

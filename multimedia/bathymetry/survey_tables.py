@@ -15,6 +15,7 @@ from multimedia.projects.project_file import read_project
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
+from photocore.names import meant
 from photocore.tables import Column, Table, read_table
 from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH, PHOTOS
 from photocore.tables.numbers import METRES
@@ -89,13 +90,14 @@ def read_camera_positions(path: Path | str) -> CameraPositions:
     return CameraPositions(ids=ids, centres=centres, times=tuple(table.texts("time")))
 
 
-def read_visibility(path: Path | str) -> dict[str, set[str]]:
+def read_visibility(path: Path | str, cameras: CameraPositions) -> dict[str, set[str]]:
     """Read a table ``point, camera``: one row per point and camera that saw it."""
     point = Column("point", ("id", "pointid"), kind="text", required=True)
     camera = Column("camera", ("image", "photo"), kind="text", required=True)
     table = read_table(path, (point, camera))
     seen: dict[str, set[str]] = {}
-    for name, photo in zip(table.texts("point"), table.texts("camera"), strict=True):
+    photos = meant(table.texts("camera"), cameras.ids)
+    for name, photo in zip(table.texts("point"), photos, strict=True):
         seen.setdefault(name, set()).add(photo)
     return seen
 
@@ -116,7 +118,7 @@ def read_levels(path: Path | str, cameras: CameraPositions) -> FloatArray:
     table = read_table(path, (camera, _TIME, level))
     heights = _numbers(table, ("level",))[:, 0]
     if "camera" in table.present:
-        found = dict(zip(table.texts("camera"), heights.tolist(), strict=True))
+        found = dict(zip(meant(table.texts("camera"), cameras.ids), heights.tolist(), strict=True))
         missing = [name for name in cameras.ids if name not in found]
         if missing:
             raise InputError(

@@ -177,7 +177,7 @@ def _corrector(
     if cameras is None:
         return lambda piece: corrected(piece.xyz), []
     remarks: list[str] = []
-    pairs = read_visibility(job.visibility) if job.visibility else None
+    pairs = read_visibility(job.visibility, cameras) if job.visibility else None
     if pairs is not None:
         _check_pairs(pairs, cameras, job)
         if not cloud.has("id"):

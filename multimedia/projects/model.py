@@ -14,6 +14,7 @@ from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.interfaces import Interfaces
 from photocore.arrays import FloatArray, read_only
 from photocore.errors import InputError
+from photocore.names import did_you_mean, meant
 
 #: Measuring precision of an image coordinate where nobody says otherwise. [px] and [mm]
 SIGMA_PIXEL, SIGMA_IMAGE = 0.5, 0.005
@@ -189,9 +190,11 @@ class Project:
         InputError
             If there is none.
         """
+        (name,) = meant([name], self.camera_names)
         if name not in self.camera_names:
             raise InputError(
-                f"no camera is called {name!r}; the project has {', '.join(self.camera_names)}."
+                f"no camera is called {name!r}{did_you_mean(name, self.camera_names)}; "
+                f"the project has {', '.join(self.camera_names)}."
             )
         return self.camera_names.index(name)
 

@@ -12,6 +12,7 @@ from multimedia.media.camera import Camera
 from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
+from photocore.names import did_you_mean, meant
 from photocore.tables import Column, Table, open_tables, read_table, write_csv
 from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH
 
@@ -117,10 +118,14 @@ def read_image_points(path: Path, cameras: Sequence[Camera]) -> tuple[ImagePoint
             ) from None
         return wide
     by_name = {camera.name: camera for camera in cameras}
-    names = table.texts("camera")
+    names = meant(table.texts("camera"), by_name)
     cameras_listed = ", ".join(list(by_name)[:SHOWN])
     errors = [
-        table.error(row, "camera", f"no camera is called {name!r}; known: {cameras_listed}.")
+        table.error(
+            row,
+            "camera",
+            f"no camera is called {name!r}{did_you_mean(name, by_name)}; known: {cameras_listed}.",
+        )
         for row, name in enumerate(names)
         if name not in by_name
     ]

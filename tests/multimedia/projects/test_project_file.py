@@ -254,6 +254,7 @@ def test_every_bad_entry_is_named_with_file_and_place(folder, old, new, message)
         ("body.csv", "2;-50", "two;-50", "two"),
         ("seen.csv", "right,A", "left,A", "A in left occurs more than once"),
         ("seen.csv", "right,A", "middle,A", "no camera is called 'middle'"),
+        ("seen.csv", "right,A", "rihgt,A", "no camera is called 'rihgt' (did you mean right?)"),
         ("seen.csv", "650.5", "", "is blank; leave the row out"),
     ],
 )
@@ -261,6 +262,14 @@ def test_every_bad_cell_is_named(folder, file, old, new, message):
     path = changed(folder, old, new, file)
     with pytest.raises(InputError, match=re.escape(message)):
         read_project(path)
+
+
+def test_a_camera_may_be_written_with_capitals(folder):
+    before = read_project(folder / "tank.toml")
+    changed(folder, "right,A", "RIGHT,A", "seen.csv")
+    after = read_project(folder / "tank.toml")
+    assert after.image_points.cameras == before.image_points.cameras
+    assert after.camera_index("Right") == before.camera_index("right")
 
 
 def test_interchanged_indices_are_remarked(folder):
