@@ -25,6 +25,12 @@ WORST = 0.14
 SAME_SHAPE = 0.01
 
 
+#: Proportions of what cameras and phones write, and how closely bodies keep to them.
+SHAPES, KEPT = (1.0, 1.25, 4 / 3, 1.5, 16 / 9, 2.0, 18.5 / 9, 13 / 6, 20 / 9, 65 / 24), 0.01
+#: A photo of other proportions lost so much of its diagonal on one side, as a standard deviation.
+LOST = 0.05
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JudgedFocal:
     """A principal distance out of EXIF data.
@@ -71,6 +77,38 @@ def sensors_apart(first: ImageInfo, second: ImageInfo) -> float:
     sizes = [max(i.size) * (p or 1.0) for i, p in zip((first, second), pitches, strict=True)]
     apart = abs(float(np.log(sizes[0] / sizes[1])))
     return apart if apart > AGREE else 0.0
+
+
+def middle_aside(info: ImageInfo) -> tuple[float, str]:
+    """Return how far the middle of a photo may be from the camera's own, and what says so.
+
+    A standard deviation, in pixels; 0 and no word where nothing says that it was cropped.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> info = ImageInfo(path=Path("a.jpg"), size=(1500, 1400), recorded_size=(3072, 2048))
+    >>> middle_aside(info)[1][:50]
+    'THE PHOTO WAS CROPPED: a.jpg has 1500 x 1400 px of'
+    """
+    (small, large), focal = sorted(info.size), judged_focal(info).focal or 1.2 * max(info.size)
+    shape, recorded = large / small, sorted(info.recorded_size or ())
+    about = {"name": info.path.name, "width": info.size[0], "height": info.size[1]}
+    if recorded:
+        if abs(recorded[1] / recorded[0] / shape - 1) < SAME_SHAPE:
+            return 0.0, ""
+        fit = max(1.0, small / recorded[0], large / recorded[1])  # enlarged since
+        lost = np.hypot(recorded[0] * fit - small, recorded[1] * fit - large)
+        about |= {"wide": recorded[1], "high": recorded[0]}
+        key, sigma = "cropped", 0.3 * float(lost)
+    elif not (info.model or info.focal_length) or any(
+        abs(shape / one - 1) < KEPT for one in SHAPES
+    ):
+        return 0.0, ""
+    else:
+        key, sigma = "odd_shape", LOST * float(np.hypot(small, large))
+    tilt = float(np.rad2deg(np.arctan(sigma / focal)))
+    return sigma, remark(f"orientation.exif_{key}", tilt=tilt, shape=shape, **about)
 
 
 def judged_focal(info: ImageInfo) -> JudgedFocal:

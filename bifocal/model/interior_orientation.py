@@ -64,6 +64,9 @@ class Interior:
         Whether the focal length was typed for the far or the near photo, and is not the file's own.
     is_sought : bool
         Whether the photos themselves are to tell the principal distance, one for both.
+    is_part : bool
+        Whether the photo may be cut out of a larger one by itself: its principal point is then not
+        that of the other photo, though both are of one body.
     doubt : str
         What contradicts it, for the user; empty: nothing.
     """
@@ -82,6 +85,7 @@ class Interior:
     is_calibrated: bool = False
     is_typed: bool = False
     is_sought: bool = False
+    is_part: bool = False
     doubt: str = ""
 
     def __post_init__(self) -> None:

@@ -38,6 +38,7 @@ from bifocal.orientation.orientation_remarks import (
     model_remarks,
     order_remarks,
     repeated_in_words,
+    tilt_remarks,
     wall_remarks,
 )
 from bifocal.orientation.orientation_stages import (
@@ -233,6 +234,7 @@ def _with_words(pair: OrientedPair, given: Given, remarks: tuple[str, ...]) -> O
         *filter(None, [given.pick_verdict.words, *(i.doubt for i in given.interiors)]),
         *remarks,
         *pair.remarks,
+        *tilt_remarks(pair),
         *wall_remarks(pair),
         *media_remarks(pair.adjusted, given.media),
         *control_remarks(given.control, pair),

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.files.exif_judge import NOMINAL, judged_focal, sensors_apart
+from bifocal.files.exif_judge import NOMINAL, judged_focal, middle_aside, sensors_apart
 from bifocal.files.haze import read_greys
 from bifocal.model.basis import rests_on
 from bifocal.model.interior_orientation import Interior, lens_of_photo
@@ -358,8 +358,12 @@ def interior_of_photo(info: ImageInfo, data: KnownLens, number: int | str = "") 
     interior = Interior.from_focal(
         focal, image_size=info.size, sigma=sigma, source=source, pixel_size=pitch
     )
-    typed = data.focal is not None
-    return replace(interior, is_typed=typed, doubt="" if typed else judged.doubt)
+    typed, (aside, part) = data.focal is not None, middle_aside(info)
+    doubts = [part, *([] if typed else [judged.doubt])]
+    return replace(
+        interior, is_typed=typed, doubt=" ".join(filter(None, doubts)),
+        sigma_centre=max(interior.sigma_centre, aside), is_part=bool(part),
+    )  # fmt: skip
 
 
 def judged_together(

@@ -280,4 +280,6 @@ def _same_body(interiors: Interiors) -> float | None:
     # With one photo upright and one lying the axes differ.
     if first.is_calibrated or second.is_calibrated or first.image_size != second.image_size:
         return None
+    if first.is_part or second.is_part:
+        return None
     return 0.002 * float(np.hypot(*first.image_size))

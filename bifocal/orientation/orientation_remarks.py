@@ -117,6 +117,17 @@ def wall_remarks(pair: OrientedPair) -> list[str]:
     return [remark("orientation.wall_in_part", zones=named, **count)]
 
 
+def tilt_remarks(pair: OrientedPair) -> list[str]:
+    """Return that cameras tilted as no bifocal pair's are may have cropped photos."""
+    lenses, cameras = pair.observations.interiors, pair.adjusted.cameras
+    if not pair.observations.free_datum or any(lens.is_calibrated for lens in lenses):
+        return []
+    tilts = [float(np.rad2deg(np.arctan(np.hypot(*camera.tilt)))) for camera in cameras]
+    if max(tilts) < REMARKS.asked_tilt:
+        return []
+    return [remark("orientation.tilted", far=tilts[0], near=tilts[1])]
+
+
 def control_remarks(control: Control, pair: OrientedPair) -> list[str]:
     """Return what the control points lack."""
     tests = pair.adjusted.control_test

@@ -85,8 +85,8 @@ def slip_of(
     if not fits:
         tables += _of_control(typed, now) if by_control else _of_site(typed)
     explaining = _explaining([*lenses, *tables], fitted, now)
-    if not explaining and tables and by_control:
-        explaining = _explaining(_of_crops(typed), fitted, now)
+    if not explaining and not fits:
+        explaining = _explaining(_of_crops(typed, by_control=by_control), fitted, now)
     if not explaining and tables and by_control and len(typed.control.ids) > 5:
         # Two at once, of a lens and of the table.
         both = (
@@ -166,17 +166,24 @@ def _of_lenses(typed: TypedOrientation, *, free: bool) -> Iterator[Slip]:
         yield Slip(meant=replace(typed, interiors=loose), words=words, handicap=SLIPS.clearly)
 
 
-def _of_crops(typed: TypedOrientation) -> Iterator[Slip]:
+def _of_crops(typed: TypedOrientation, *, by_control: bool) -> Iterator[Slip]:
     """Yield that photos are parts of larger ones, where there are points enough to tell."""
-    if any(i.is_calibrated for i in typed.interiors) or typed.control.positioned.sum() < 8:
+    too_few = by_control and typed.control.positioned.sum() < 8
+    unknown = not by_control and any(i.is_assumed for i in typed.interiors)
+    if any(i.is_calibrated for i in typed.interiors) or too_few or unknown:
         return
-    for which, key in (((0, 1), "both"), ((0,), "first"), ((1,), "second")):
+    # Cut alike, as a whole folder is, each by itself, or one of them.
+    for which, key, alike in (((0, 1), "both", True), ((0, 1), "both", False),
+                              ((0,), "first", False), ((1,), "second", False)):  # fmt: skip
         loose = [
-            replace(i, sigma_centre=0.15 * float(np.hypot(*i.image_size))) if k in which else i
+            replace(i, sigma_centre=0.15 * float(np.hypot(*i.image_size)), is_part=not alike)
+            if k in which
+            else i
             for k, i in enumerate(typed.interiors)
         ]
         meant = replace(typed, interiors=(loose[0], loose[1]))
-        yield Slip(meant=meant, words=remark(f"slips.cropped_{key}"), handicap=SLIPS.clearly)
+        words = remark(f"slips.{'cropped' if by_control else 'part'}_{key}")
+        yield Slip(meant=meant, words=words, handicap=SLIPS.clearly)
 
 
 def _of_site(typed: TypedOrientation) -> Iterator[Slip]:
