@@ -12,9 +12,10 @@ import pytest
 from bifocal import Foot, Grid, MapSurface, dense_relief
 from bifocal.model.image import as_grey
 from bifocal.orthophotos.visibility import hidden_from
+from bifocal.rays import zoom_factor
 from bifocal.relief_maps import plane_sweep, second_hypothesis
 from bifocal.relief_maps.forward_projection import MapBands
-from bifocal.relief_maps.frame import make_frame
+from bifocal.relief_maps.frame import common_bounds, make_frame, working_grid
 from bifocal.relief_maps.second_hypothesis import HYPOTHESIS
 from bifocal.relief_maps.smoothing import straightened
 from tests.scenes import RICH, CameraPair, Rendering, Scene, bifocal_cameras, render
@@ -46,7 +47,8 @@ def railing() -> tuple[Rendering, np.ndarray]:
 
 @pytest.mark.acceptance
 def test_a_railing_is_found_that_flow_cannot_find(monkeypatch):
-    anywhere = replace(HYPOTHESIS, least_valid=0.0)  # there is little else in the picture
+    # There is little else in the picture.
+    anywhere = replace(HYPOTHESIS, least_valid=0.0, least_backed=0.0)
     monkeypatch.setattr(second_hypothesis, "HYPOTHESIS", anywhere)
     shot, rail = railing()
     grid = shot.truth.grid
@@ -55,6 +57,46 @@ def test_a_railing_is_found_that_flow_cannot_find(monkeypatch):
     assert rail.mean() > 0.05
     assert right[rail].mean() > 0.35  # flow alone finds nothing of it
     assert right[(shot.visible1 & shot.visible2 & ~rail)].mean() > 0.9  # flow alone 0.82
+
+
+def test_only_an_even_part_that_both_photos_show_alike_is_backed():
+    cameras, rng = bifocal_cameras(size=(400, 300)), np.random.default_rng(1)
+    grey = cv2.GaussianBlur(rng.integers(0, 256, (300, 400), np.uint8), (0, 0), 1.0)
+    pair = cameras.nominal
+    box = common_bounds(pair, (grey.shape, grey.shape))
+    frame = make_frame(
+        pair, grey, grey, working_grid(pair, grey.shape, box, pair.image1.gsd((400, 300))), None
+    )
+    far = cv2.resize(grey, frame.grid.shape[::-1])
+    zoom = float(zoom_factor(0.8, d1=frame.distances[0], d2=frame.distances[1]))
+    shift = (1 - zoom) * np.asarray(frame.centre)
+    near = cv2.warpAffine(
+        far, np.array([[zoom, 0, shift[0]], [0, zoom, shift[1]]]), far.shape[::-1]
+    )
+    even, moved, rough, behind = (np.s_[20:60, x : x + 40] for x in (20, 90, 250, 320))
+    place = [
+        slice(*(np.array([s.start - 8, s.stop + 8]) * zoom + t).astype(int))
+        for s, t in zip(moved, shift[::-1], strict=True)
+    ]
+    near[tuple(place)] = rng.integers(0, 256, near[tuple(place)].shape)
+    frame = replace(
+        frame,
+        image1=far,
+        image2=near,
+        seen1=np.ones(far.shape, bool),
+        seen2=np.ones(far.shape, bool),
+    )
+    relief, no = np.zeros(far.shape, np.float32), np.zeros(far.shape, bool)
+    taken = no.copy()
+    for part in (even, moved, rough, behind):
+        relief[part], taken[part] = 0.8, True
+    relief[rough] += rng.uniform(-0.3, 0.3, (40, 40))
+    relief[behind] = -0.8
+    level = second_hypothesis._Level(frame, np.zeros(far.shape, np.float32), no, no)
+    found = second_hypothesis._Found(relief, relief, relief)
+    backed = second_hypothesis._backed(level, found, taken)
+    assert backed[even].mean() > 0.9
+    assert not any(backed[part].any() for part in (moved, rough, behind))
 
 
 @pytest.mark.acceptance  # compiles
