@@ -32,9 +32,25 @@ from photocore.workbook.reading import package  # noqa: E402
 from tests import equipment, turns  # noqa: E402
 from tests.workbook_schema import schema_faults  # noqa: E402
 
+#: The folder of the tests.
+TESTS = Path(__file__).parent
+
 # The same examples on every machine and in every run: a red test is then a change of the code.
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.load_profile("same")
+
+
+class Doctests:
+    """What of the packages is collected: the modules that hold examples.
+
+    To import all others and search them for examples takes longer than to collect the tests.
+    """
+
+    def pytest_ignore_collect(self, collection_path: Path) -> bool | None:
+        """Leave a module of the packages out that holds none."""
+        if collection_path.suffix != ".py" or TESTS in collection_path.parents:
+            return None
+        return True if b">>>" not in collection_path.read_bytes() else None
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -42,6 +58,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
     On a fresh machine numba takes a minute for them: the other tests run them as they are written.
     """
+    config.pluginmanager.register(Doctests())
     turns.choose(config)
     if "not acceptance" in config.getoption("markexpr"):
         os.environ["NUMBA_DISABLE_JIT"] = "1"
