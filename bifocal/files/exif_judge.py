@@ -25,6 +25,8 @@ WORST = 0.14
 SAME_SHAPE = 0.01
 
 
+#: Sensors of phones are smaller. [mm]
+PHONE = 14.0
 #: Proportions of what cameras and phones write, and how closely bodies keep to them.
 SHAPES, KEPT = (1.0, 1.25, 4 / 3, 1.5, 16 / 9, 2.0, 18.5 / 9, 13 / 6, 20 / 9, 65 / 24), 0.01
 #: A photo of other proportions lost so much of its diagonal on one side, as a standard deviation.
@@ -70,11 +72,22 @@ def sensors_apart(first: ImageInfo, second: ImageInfo) -> float:
     >>> half = replace(whole, size=(1536, 1024), focal_length=19)
     >>> round(sensors_apart(whole, half), 2), sensors_apart(whole, whole)
     (0.69, 0.0)
+
+    Two lenses of a phone have sensors of their own:
+
+    >>> wide = ImageInfo(path=Path("c.jpg"), size=(4032, 3024), model="P", lens="P 5.7 mm f/1.8",
+    ...                  focal_length=5.7, focal_plane_pitch=0.0019)
+    >>> tele = replace(wide, lens="P 9 mm f/2.8", focal_length=9, focal_plane_pitch=0.001)
+    >>> sensors_apart(wide, tele), round(sensors_apart(wide, replace(tele, lens=wide.lens)), 2)
+    (0.0, 0.64)
     """
     pitches = [judged_focal(info).pitch for info in (first, second)]
     if not first.model or first.model != second.model or None in pitches:
         return 0.0
     sizes = [max(i.size) * (p or 1.0) for i, p in zip((first, second), pitches, strict=True)]
+    lenses = {first.lens, second.lens} - {""}
+    if len(lenses) == 2 and max(sizes) < PHONE:
+        return 0.0  # each lens of a phone has its sensor
     apart = abs(float(np.log(sizes[0] / sizes[1])))
     return apart if apart > AGREE else 0.0
 
