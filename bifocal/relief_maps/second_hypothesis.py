@@ -110,7 +110,8 @@ class HypothesisTuning:
     #: without.
     stands_out: float = 4.0
     #: Pixels that must vouch for a part. [px]
-    #: Evidence: white 5001, tears: 200 px 126, 350 px 124, 600 px 123 m; with 350 castle_B's slab is whole.
+    #: Evidence: white 5001, tears: 200 px 126, 350 px 124, 600 px 123 m; castle_B's slab is whole
+    #: with 350.
     vouching: int = 350
     #: Both photos must be alike there: correlation in windows of `alike_window`.
     #: Evidence: castle_B: balcony 0.82 to 0.98, a tractor that stands in one photo 0.27 to 0.52.
