@@ -164,7 +164,7 @@ def guided(places: Sequence[FloatArray], rules: LinkRules, widest: float) -> Lin
         guide = neighbours_guide(places, previous, track, widest)
         if guide is None:
             break
-        strays = (previous < 0).sum() / len(places)
+        strays = max(1.0, (track < 0).sum() / len(places))
         least = np.cbrt(_STRAYS * np.prod(np.ptp(xyz, axis=0)) / (4.0 / 3.0 * np.pi * strays))
         rules = replace(
             rules, guide=guide, least=min(float(least), widest),
