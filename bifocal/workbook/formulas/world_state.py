@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection
 
+from bifocal.model.photo import FARTHEST_WALL
 from bifocal.survey.remarks import SCALE_SHARE, WIDEST_ANGLE
 from bifocal.survey.taped import TAPED_SIGMAS
 from bifocal.workbook.formulas.columns import FORMULAS
@@ -16,7 +17,7 @@ SPEAKING = (STATE, SITE, "title_world", "check_state", "points_state")
 #: Keys of the sentences.
 _SENTENCES = (
     *("world_few", "world_bad", "world_scale", "world_large", "world_good", "world_unchecked"),
-    *("points_wide", "points_twice", "names_unknown"),
+    *("points_far", "points_wide", "points_twice", "names_unknown"),
     *("tape_good", "tape_bad", "tape_unknown", "site_unchecked"),
 )
 
@@ -47,6 +48,7 @@ def sentence(
     parts = {name: word(name) for name in _SENTENCES}
     parts |= {"note": word(note)}
     parts |= {"share": f"{SCALE_SHARE:g}", "most_sigmas": f"{TAPED_SIGMAS:g}", "sheet": sheet}
+    parts |= {"farthest": f"{FARTHEST_WALL:g}"}
     parts |= {"wide": f"{math.tan(math.radians(WIDEST_ANGLE)):.9g}"}
     lines = FORMULAS.columns("states", facts, parts, rows="lines")
     return next(line.formula for line in lines if line.key == key)

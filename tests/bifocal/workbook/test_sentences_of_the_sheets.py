@@ -91,6 +91,14 @@ def test_millimetres_that_no_lens_sees_are_doubted_above_the_points():
     assert said.startswith("s is 300.7 mm on image 2 with c = 19.01 mm: 86 degrees off the axis")
 
 
+def test_distances_typed_in_mm_are_doubted_above_the_points():
+    content = ideal_content()
+    taking = replace(content.setup.taking, d1=17500.0, d2=9500.0)
+    setup = replace(content.setup, taking=taking)
+    built = build(points_of(replace(content, setup=setup, pair=setup.pair(), georeference=None)))
+    assert built.value_of("points_state").startswith("d_1 or d_2 is 17500 m. Distances are typed")
+
+
 def test_results_say_that_nothing_on_site_checks_them_until_something_does():
     content = replace(ideal_content(), georeference=None, control=KnownPoints())
     said = "Nothing measured on site checks these results"
