@@ -15,9 +15,8 @@ The pair
     read_image, write_image   photos as arrays, upright as seen
     Lens                      principal distance, principal point and distortion of a lens
     calibrate, Calibration    a lens from photos of a board
-    align, align_set          a pair, or a set of photos, from them and what was measured on site
+    align, align_set, length_check   a pair, or a set of photos, from them and lengths taped on site
     Control, Interior, SiteMeasures, PairMedia, read_control   what `align` is told
-    length_check              a length taped on the wall beside that of a pair
 Points
     solve, SolvedSurvey, Points   relief, coordinates, precision, check of measured points
     Taking, Measuring, ReadOptions   lenses, distances, precision, columns that `solve` is told

@@ -118,6 +118,10 @@ def length_check(
     length, sigma : float
         As taped, and its standard deviation. [m]
 
+    Returns
+    -------
+    LengthCheck
+
     Raises
     ------
     GeometryError

@@ -13,15 +13,6 @@ from photocore.workbook.changing.cells import CellValue, NewCell, NewRows
 from photocore.workbook.reading.grid import cell_name, split_area
 from photocore.workbook.reading.package import SMALL
 
-#: Follow the page in a sheet, and what says already how it is printed.
-_BEHIND_PAGE = re.compile(
-    rb"<(?:\w+:)?(?:headerFooter|rowBreaks|customProperties|cellWatches|ignoredErrors|smartTags|"
-    rb"drawing|legacyDrawing|legacyDrawingHF|picture|oleObjects|controls|webPublishItems|tableParts|"
-    rb"extLst|AlternateContent)\b|</(?:\w+:)?worksheet\s*>"
-)
-_PAGED = re.compile(
-    rb"fitToPage|<(?:\w+:)?(?:colBreaks|customSheetViews|pageSetup[^>]*\s(?:scale|fitTo\w+))\b"
-)
 _ROWS_END = re.compile(rb"</(?:\w+:)?sheetData\s*>")
 
 
@@ -43,8 +34,6 @@ class SheetChanges:
         Rows to be added, with formulas, formats and results.
     columns : dict
         Column to its width and whether it is folded away; columns side by side, new to the sheet.
-    fits : bool
-        Whether the sheet is printed as wide as a page, unless it says how it is printed.
     restates : bool
         Whether a number may be given among the results for a cell that holds one, to replace it.
     """
@@ -54,7 +43,6 @@ class SheetChanges:
     added: list[NewRows] = field(default_factory=list)
     placed: dict[int, dict[int, NewCell]] = field(default_factory=dict)
     columns: dict[int, tuple[float, bool]] = field(default_factory=dict)
-    fits: bool = False
     restates: bool = False
 
     def __bool__(self) -> bool:
@@ -195,40 +183,6 @@ def column_edits(
     whole = b"".join(tag for _, tag in sorted(made.items()))
     tags = b"<%scols>%s</%scols>" % (prefix.encode(), whole, prefix.encode())
     yield (*(known.span() if known else (len(head), len(head))), tags)
-
-
-def page_edits(data: bytes, rows: int, prefix: str) -> list[tuple[int, int, bytes]]:
-    """Return the edits that print a sheet as wide as a page; none where it says how it is printed.
-
-    Parameters
-    ----------
-    data : bytes
-        The sheet.
-    rows : int
-        Where its rows begin.
-    prefix : str
-        Of its tags.
-    """
-    head, last, p = data[:rows], max(data.rfind(b"sheetData"), 0), prefix.encode()
-    tail = data[last:]
-    page = re.search(rb"<(?:\w+:)?pageSetup\b", tail)
-    place = page or _BEHIND_PAGE.search(tail)
-    if place is None or _PAGED.search(head) or _PAGED.search(tail):
-        return []
-    high = b' fitToHeight="0"' if page else b'<%spageSetup fitToHeight="0"/>' % p
-    at = last + (page.end() if page else place.start())
-    fit = b'<%spageSetUpPr fitToPage="1"/>' % p
-    if tag := re.search(rb"<(?:\w+:)?pageSetUpPr\b", head):
-        edit = tag.end(), tag.end(), b' fitToPage="1"'
-    elif tag := re.search(rb"</(?:\w+:)?sheetPr\s*>", head):
-        edit = tag.start(), tag.start(), fit
-    elif tag := re.search(rb"<(?:\w+:)?sheetPr\b[^>]*/>", head):
-        edit = tag.end() - 2, tag.end(), b">%s</%ssheetPr>" % (fit, p)
-    elif tag := re.search(rb"<(?:\w+:)?worksheet\b[^>]*>", head):
-        edit = tag.end(), tag.end(), b"<%ssheetPr>%s</%ssheetPr>" % (p, fit, p)
-    else:
-        return []
-    return [edit, (at, at, high)]
 
 
 def _ends(columns: Collection[int]) -> tuple[int, ...]:

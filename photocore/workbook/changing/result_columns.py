@@ -24,8 +24,6 @@ from photocore.workbook.reading.grid import (
 
 #: The least width of a column, in characters.
 _WIDTH = 10.0
-#: More columns would be too small to read on the width of a page.
-_ON_A_PAGE = 14
 _COUNTED = re.compile(r"(COUNT\([^()]*\))")
 _CELL = re.compile(r"\[@(\w+)\]")
 
@@ -133,10 +131,7 @@ def put_result_columns(
     places = _known(editor, table, columns, mark, adopted)
     count = sum(column.key not in places for column in columns)
     last = _free_columns(editor, table, {*table.columns.values(), *places.values()}, count) - 1
-    changes = editor.changes.setdefault(table.sheet, SheetChanges())
-    widths = changes.columns
-    shown = last + sum(not column.folded for column in columns if column.key not in places)
-    changes.fits = count > 0 and shown <= _ON_A_PAGE
+    widths = editor.changes.setdefault(table.sheet, SheetChanges()).columns
     for column in columns:
         if column.key not in places:
             last += 1

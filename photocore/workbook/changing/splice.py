@@ -12,7 +12,7 @@ from xml.parsers import expat
 from photocore.errors import InputError
 from photocore.remarks import remark
 from photocore.workbook.changing.cells import CellValue, NewCell, cell_xml, type_and_content
-from photocore.workbook.changing.changes import SheetChanges, Spliced, column_edits, page_edits
+from photocore.workbook.changing.changes import SheetChanges, Spliced, column_edits
 from photocore.workbook.changing.formfill import FormFiller
 from photocore.workbook.changing.formulas import areas_of_arrays
 from photocore.workbook.reading.grid import cell_name, column_number, split_area
@@ -96,7 +96,6 @@ class _Splicer:
         self.cached: Mapping[int, CellValue] = {}
         self.dimension: tuple[int, int, str] | None = None
         self.grown: list[tuple[int, int, bytes]] = []
-        self.page: list[tuple[int, int, bytes]] = []
         self.arrays = areas_of_arrays(data)
 
     def run(self) -> Spliced:
@@ -114,7 +113,6 @@ class _Splicer:
                 raise InputError(
                     remark("book.invalid_xml", of=self.path, part=self.part, error=error)
                 ) from None
-        self.edits += self.page
         if self.edits == self.grown:
             self.edits.clear()  # nothing was made
         self.edits.sort(key=itemgetter(0, 1))
@@ -224,10 +222,6 @@ class _Splicer:
             if self.changes.columns:
                 head = self.data[: self.data_start]
                 self.edits += column_edits(head, self.prefix, self.changes.columns)
-            if self.changes.fits:
-                edits = page_edits(self.data, self.data_start, self.prefix)
-                self.edits += edits[:1]
-                self.page = edits[1:]
             if self.dimension:
                 self.grow_dimension(*self.dimension)
         elif kind == "dimension":

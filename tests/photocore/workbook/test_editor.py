@@ -477,33 +477,3 @@ def test_a_sheet_added_under_another_title_prints_its_own_headings(tmp_path):
         book = file.read("xl/workbook.xml").decode()
     names = re.findall(r"<definedName [^>]*localSheetId=\"1\"[^>]*>([^<]*)<", book)
     assert sorted(names) == ["'Dose''s 2'!$4:$5", "'Dose''s 2'!$A$1:$C$9"]
-
-
-FIT, HIGH = '<pageSetUpPr fitToPage="1"/>', '<pageSetup fitToHeight="0"'
-PAGES = {
-    "<w><sheetData/></w>": None,
-    "<worksheet><sheetData/></worksheet>": (
-        f"<worksheet><sheetPr>{FIT}</sheetPr><sheetData/>{HIGH}/></worksheet>"
-    ),
-    '<worksheet><sheetPr codeName="a"/><sheetData/><pageSetup paperSize="9"/></worksheet>': (
-        f'<worksheet><sheetPr codeName="a">{FIT}</sheetPr><sheetData/>{HIGH} paperSize="9"/>'
-        "</worksheet>"
-    ),
-    "<worksheet><sheetPr><outlinePr/></sheetPr><sheetData/><drawing/></worksheet>": (
-        f"<worksheet><sheetPr><outlinePr/>{FIT}</sheetPr><sheetData/>{HIGH}/><drawing/></worksheet>"
-    ),
-    "<worksheet><sheetPr><pageSetUpPr/></sheetPr><sheetData/></worksheet>": (
-        f"<worksheet><sheetPr>{FIT}</sheetPr><sheetData/>{HIGH}/></worksheet>"
-    ),
-    '<worksheet><sheetData/><pageSetup scale="80"/></worksheet>': None,
-    '<worksheet><sheetData/><pageSetup fitToWidth="2"/></worksheet>': None,
-    "<worksheet><sheetData/><colBreaks/></worksheet>": None,
-    "<worksheet><sheetData/><customSheetViews><pageSetup/></customSheetViews></worksheet>": None,
-}
-
-
-@pytest.mark.parametrize("before", PAGES)
-def test_a_sheet_is_printed_as_wide_as_a_page_unless_it_says_how(before):
-    changes = SheetChanges(fits=True)
-    after = splice_sheet(None, "s", before.encode(), changes).joined(strip=False).decode()
-    assert after == (PAGES[before] or before)
