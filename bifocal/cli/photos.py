@@ -44,8 +44,8 @@ class PhotosCommand:
     """Point cloud in the project's frame, where its file holds no points (.ply, .las, .xyz)."""
     points: Annotated[Path | None, Typed(TABLE)] = None
     """Named points: id, photo, col, row in two photos or more; or id, x, y, z of the project."""
-    wall: Annotated[tuple[str, ...] | None, Typed(Names(), "A,B,C,...")] = None
-    """Three points of the wall or more.  [default: the largest façade]"""
+    wall: Annotated[tuple[str, ...] | None, Typed(Names(), "N or A,B,C,...")] = None
+    """Three points of the wall or more, or its number in the list.  [default: 1, the largest]"""
     horizontal: Annotated[tuple[str, ...] | None, Typed(Names(), "A,B")] = None
     """Two points on a level line.  [default: up as the project or its photos say]"""
     control: Annotated[Path | None, Typed(TABLE)] = None
@@ -75,7 +75,8 @@ def command(
     OpenDroneMap or OpenSfM (reconstruction.json), AliceVision or Meshroom (.sfm, or its cache),
     OpenMVG (sfm_data.json), Bundler (bundle.out), RealityCapture or RealityScan (XMP, CSV),
     VisualSFM (.nvm) or NeRF (transforms.json). The wall is the largest façade among its points, or
-    goes through points that are named (--wall), or is that of control points (--control). With --to
+    another of those listed (--wall 2), whose X, Y run on about the corner; or goes through points
+    that are named, or is that of control points (--control). With --to
     PROJECT is a set of photos or a pair, and OUT a folder for the other program.
     """
     from bifocal.projects.colmap_workflow import export_photos
@@ -92,6 +93,7 @@ def command(
     data = {
         "program": result.program,
         "scale": result.scale,
+        "walls": result.walls,
         "photos": [
             {
                 "name": photo.name,
@@ -110,5 +112,6 @@ def command(
 def _lines(made: ProjectPhotos) -> Iterator[str]:
     """Yield what was made for people."""
     yield f"{made.program}: {len(made.photos)} photos of the wall; scale: {made.scale}."
+    yield from (f"  {wall}" for wall in made.walls)
     for photo in made.photos.photos:
         yield f"  {photo.name:>16}  {photo.distance:8.3f} m from the wall"

@@ -17,7 +17,14 @@ from bifocal.model.photo import Photo
 from bifocal.model.photo_set import PhotoSet
 from bifocal.projects.project_points import chosen, read_points, sparse_points
 from bifocal.projects.scale import by_control, of_cameras
-from bifocal.projects.wall_frame import found_frame, framed, turned_by_lines
+from bifocal.projects.wall_frame import (
+    ProjectWall,
+    beside,
+    framed,
+    turned_by_lines,
+    walls_of,
+)
+from bifocal.projects.wall_pictures import write_wall_pictures
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.camera.lensdata import LensData
@@ -51,7 +58,8 @@ class ProjectOptions:
     points : path, optional
         Table of named points: id, photo, col, row; or id, x, y, z.
     wall : tuple of str
-        Names of three points of the wall or more; none: the largest façade is found.
+        Names of three points of the wall or more, or the number of one of the project's walls;
+        none: the largest façade.
     horizontal : tuple of str
         Names of two points on a level line.
     control : path, optional
@@ -79,7 +87,7 @@ class ProjectOptions:
     part: str | None = None
 
     def __post_init__(self) -> None:
-        if self.wall and len(self.wall) < 3:
+        if len(self.wall) in (1, 2) and not self.number:
             raise InputError(f"--wall: three points or more, found {len(self.wall)}.")
         if self.horizontal and len(self.horizontal) != 2:
             raise InputError(f"--horizontal: two points, found {len(self.horizontal)}.")
@@ -88,8 +96,14 @@ class ProjectOptions:
         if self.length and self.unit:
             raise InputError("--length and --unit: both give the scale; leave one out.")
         for option in ("wall", "horizontal", "control", "length"):
-            if getattr(self, option) and self.points is None:
+            named = getattr(self, option) if option != "wall" or not self.number else ()
+            if named and self.points is None:
                 raise InputError(f"--{option}: needs --points, the table of the points it names.")
+
+    @property
+    def number(self) -> int:
+        """Which of the project's walls is asked for by its number; 0: none."""
+        return int(self.wall[0]) if len(self.wall) == 1 and self.wall[0].isdecimal() else 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,6 +117,9 @@ class ProjectPhotos:
         Whose project it was.
     scale : str
         What makes its lengths metres.
+    walls : tuple of str
+        The façades among the project's points with size and share, the largest first, where one
+        was looked for; their picture is beside the set where there are several.
     remarks : tuple of str
         What the user should be told.
     """
@@ -110,6 +127,7 @@ class ProjectPhotos:
     photos: PhotoSet
     program: str
     scale: str
+    walls: tuple[str, ...]
     remarks: tuple[str, ...]
 
 
@@ -157,7 +175,7 @@ def photos_from_project(
             raise InputError(remark("projects.one_file", first=first, second=name, of=file))
     upright = [_upright(view, files[view.name]) for view in read.views]
     read = read._replace(views=tuple(upright))
-    frame, wall, covariance, scale, said = _frame(read, options)
+    frame, wall, covariance, scale, said, walls = _frame(read, options)
     views, left = _of_the_wall(read.views, frame, wall)
     if left:
         said.append(remark("projects.left_out", count=len(left), names=", ".join(left[:5])))
@@ -166,11 +184,13 @@ def photos_from_project(
             f"{project}: {len(views)} of {len(read.views)} photos show the wall from its front; "
             "two are needed. Name three points of the wall with --points and --wall."
         )
-    if not (options.horizontal or options.control or read.metres):
-        seen = [(_camera(view, frame), Lens(**view.lens._asdict()), path)
-                for view in views if (path := files[view.name])]  # fmt: skip
-        frame, turned = turned_by_lines(frame, seen)
-        said += turned
+    frame, turned = _upright_frame(frame, views, files, read, options)
+    said += turned
+    if options.number > 1:
+        largest = replace(walls[0].frame, scale=frame.scale)
+        of_largest = _of_the_wall(read.views, largest, walls[0].points)[0]
+        as_held = replace(options, horizontal=())
+        frame = beside(_upright_frame(largest, of_largest, files, read, as_held)[0], frame)
     doubts = [remark("projects.no_precision")]
     unit = {} if scale else {"unit": NO_UNIT}
     if not scale:
@@ -194,26 +214,62 @@ def photos_from_project(
                 raise InputError(f"{out}: no two photos of the wall tell its relief; write a set.")
             written = made.pair(ranked[0].far, ranked[0].near)
         written.write(out, overwrite=overwrite)
+        listed = _listed(walls, frame.scale, "m" if not unit else "")
+        if len(walls) > 1:
+            picture = out.with_name(f"{_stem(out)}.walls.jpg")
+            write_wall_pictures(picture, walls, listed, read.views, files, overwrite=overwrite)
     return ProjectPhotos(
-        photos=made, program=read.program, scale=scale, remarks=(*read.remarks, *said, *doubts)
-    )
+        photos=made, program=read.program, scale=scale, walls=listed,
+        remarks=(*read.remarks, *said, *doubts),
+    )  # fmt: skip
+
+
+def _listed(walls: Sequence[ProjectWall], scale: float, unit: str) -> tuple[str, ...]:
+    """Return each wall's number, size and share in words."""
+    lines = []
+    for number, wall in enumerate(walls, start=1):
+        left, lower, right, upper = wall.bounds
+        width, height = (float(f"{scale * side:.2g}") for side in (right - left, upper - lower))
+        about = {"number": number, "count": len(walls), "share": 100 * wall.share}
+        lines.append(remark("projects.wall", width=width, height=height, unit=unit, **about))
+    return tuple(lines)
+
+
+def _stem(out: Path) -> str:
+    return re.sub(r"(\.photos|\.pair)?\.json$", "", out.name)
+
+
+def _upright_frame(
+    frame: Similarity, views: Sequence[ForeignView], files: Mapping[str, Path | None],
+    project: ForeignProject, options: ProjectOptions,
+) -> tuple[Similarity, list[str]]:  # fmt: skip
+    """Return the frame turned by the façade's lines where nothing else tells what is upright."""
+    if options.horizontal or options.control or project.metres:
+        return frame, []
+    seen = [(_camera(view, frame), Lens(**view.lens._asdict()), path)
+            for view in views if (path := files[view.name])]  # fmt: skip
+    return turned_by_lines(frame, seen)
 
 
 def _frame(
     project: ForeignProject, options: ProjectOptions
-) -> tuple[Similarity, FloatArray, FloatArray, str, list[str]]:
-    """Return the wall's frame, points of it, the frame's covariance, its scale, what to say."""
+) -> tuple[Similarity, FloatArray, FloatArray, str, list[str], list[ProjectWall]]:
+    """Return the wall's frame, points of it, the frame's covariance, its scale, what to say, walls.
+
+    Walls where one of the project's is taken.
+    """
     named = {} if options.points is None else read_points(options.points, project.views)
     if options.control is not None:
         frame, covariance, fits = by_control(
             named, options.control, options.sigma_control, project.views
         )
         places = np.array(list(named.values()))
-        return frame, places, covariance, remark("projects.by_control"), [fits]
+        return frame, places, covariance, remark("projects.by_control"), [fits], []
     points = sparse_points(project, options.cloud)
     said: list[str] = []
+    walls: list[ProjectWall] = []
     level = chosen(named, options.horizontal, "--horizontal") if options.horizontal else None
-    if options.wall:
+    if options.wall and not options.number:
         points = chosen(named, options.wall, "--wall")
         middle = points.mean(axis=0)
         _, spread, axes = np.linalg.svd(points - middle, full_matrices=False)
@@ -221,7 +277,15 @@ def _frame(
             raise InputError("--wall: its points lie nearly on one line; add one well beside it.")
         frame = framed(project, axes[2], points, level)
     else:
-        frame, points, said = found_frame(project, points, level)
+        walls = walls_of(project, points)
+        if options.number > len(walls):
+            raise InputError(f"--wall {options.number}: {len(walls)} walls are found.")
+        wall = walls[max(options.number, 1) - 1]
+        frame, points = wall.frame, wall.points
+        if level is not None:
+            frame = framed(project, frame.rotation[2], points, level)
+        if not options.number:
+            said.append(remark("projects.found", share=100 * wall.share))
     covariance, scale = np.zeros((7, 7)), ""
     if options.length:
         *ends, metres = options.length
@@ -239,7 +303,7 @@ def _frame(
         scale = remark("projects.by_unit", unit=options.unit)
     elif project.metres:
         scale = remark("projects.by_project", by=project.metres)
-    return frame, points, covariance, scale, said
+    return frame, points, covariance, scale, said, walls
 
 
 def _metres(text: str, ends: Sequence[str]) -> float:
@@ -280,7 +344,7 @@ def _photos(
     overwrite: bool,
 ) -> list[Photo]:  # fmt: skip
     """Return the photos in the wall's frame; write their lenses beside the set."""
-    stem = re.sub(r"(\.photos|\.pair)?\.json$", "", out.name)
+    stem = _stem(out)
     written: dict[tuple[object, ...], tuple[Lens, str]] = {}
     photos = []
     for view in views:

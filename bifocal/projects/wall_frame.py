@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -32,16 +32,39 @@ AGREES = 0.7
 CELLS = 60
 #: Photos, the squarest ones, whose lines say what is upright.
 MOST_PHOTOS = 5
-#: Other façades of such a share of the largest are worth a word.
-RIVAL = 0.6
+#: Façades of a smaller share of the largest are none.
+LEAST = 0.1
+#: Walls whose normals part by less face alike: cosine.
+ALIKE = 0.9
 
 
-def found_frame(
-    project: ForeignProject, points: FloatArray, level: FloatArray | None = None
-) -> tuple[Similarity, FloatArray, list[str]]:
-    """Return the frame of the largest façade among points, its points, and what to say of it.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ProjectWall:
+    """A façade of a project.
 
-    ``level`` as for `framed`.
+    Attributes
+    ----------
+    frame : Similarity
+        From the project's frame to that of the wall, at the project's scale.
+    points : ndarray, shape (n, 3)
+        Those of the project that lie on it.
+    share : float
+        Of what the project's points cover.
+    """
+
+    frame: Similarity
+    points: FloatArray
+    share: float
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Left, lower, right and upper edge of nearly all its points. [unit of the project]"""
+        low, high = np.quantile(self.frame(self.points)[:, :2], (0.01, 0.99), axis=0).tolist()
+        return (*low, *high)
+
+
+def walls_of(project: ForeignProject, points: FloatArray) -> list[ProjectWall]:
+    """Return the façades among points, the largest first.
 
     Raises
     ------
@@ -63,19 +86,36 @@ def found_frame(
     faces = [plane for plane in planes if abs(plane.normal @ up) < UPRIGHT]
     if not faces:
         raise InputError(remark("projects.no_facade"))
-    face = max(faces, key=lambda plane: plane.share)
-    said: list[str] = [remark("projects.found", share=100 * face.share)]
-    others = [f"{100 * one.share:.0f} %" for one in faces if one.share >= RIVAL * face.share]
-    if len(others) > 1:
-        said.append(remark("projects.rivals", shares=", ".join(others)))
-    frame = framed(project, face.normal, near[face.members])
-    wall = frame(near)
-    # A narrow face beats a vague heap: the same choice as for pairs.
-    plane = largest_plane(wall[face.members], band=WALLS.face_band * distance)
-    normal = frame.rotation.T @ [-plane[1], -plane[2], 1.0]
-    raised = wall @ [-plane[1], -plane[2], 1.0] - plane[0]
-    members = np.abs(raised) < WALLS.face_band * distance
-    return framed(project, normal, near[members], level), near[members], said
+    faces.sort(key=lambda plane: -plane.share)
+    walls = []
+    for face in faces:
+        if face.share < LEAST * faces[0].share:
+            break
+        frame = framed(project, face.normal, near[face.members])
+        wall = frame(near)
+        # A narrow face beats a vague heap: the same choice as for pairs.
+        plane = largest_plane(wall[face.members], band=WALLS.face_band * distance)
+        normal = frame.rotation.T @ [-plane[1], -plane[2], 1.0]
+        raised = wall @ [-plane[1], -plane[2], 1.0] - plane[0]
+        members = np.abs(raised) < WALLS.face_band * distance
+        frame = framed(project, normal, near[members])
+        walls.append(ProjectWall(frame=frame, points=near[members], share=face.share))
+    return walls
+
+
+def beside(first: Similarity, second: Similarity) -> Similarity:
+    """Return the frame of another wall moved so that its X, Y run on from the first one's.
+
+    About the corner where both meet, at the height of the first one's origin; of walls that face
+    alike X, Y are those of the first one seen square.
+    """
+    place = first.source_centre
+    if abs(first.rotation[2] @ second.rotation[2]) < ALIKE:
+        rows = np.array([first.rotation[2], second.rotation[2], first.rotation[1]])
+        heights = [one.rotation[2] @ one.source_centre for one in (first, second)]
+        place = np.linalg.solve(rows, [*heights, first.rotation[1] @ place])
+    move = (first(place) - second(place)) * [1.0, 1.0, 0.0]
+    return replace(second, target_centre=second.target_centre + move)
 
 
 def framed(
@@ -109,10 +149,12 @@ def framed(
 
 
 def side(views: Sequence[ForeignView], normal: FloatArray, origin: FloatArray) -> float:
-    """Return on which side of a plane the cameras that look at it stand; the nearest decide."""
+    """Return on which side of a plane the cameras that look at it stand; near ones decide."""
     heights = np.array([normal @ (view.centre - origin) for view in views])
-    looks = np.array([normal @ view.rotation[2] for view in views]) * heights < 0
-    return 1.0 if np.sum(looks * np.sign(heights) / np.maximum(heights**2, 1e-300)) >= 0 else -1.0
+    looks = np.array([normal @ view.rotation[2] for view in views]) / np.linalg.norm(normal)
+    weight = np.minimum(looks * np.sign(heights), 0.0) ** 2
+    total = np.sum(weight * np.sign(heights) / np.maximum(heights**2, 1e-300))
+    return 1.0 if total >= 0 else -1.0
 
 
 def upwards(project: ForeignProject) -> FloatArray:

@@ -79,8 +79,32 @@ def texture(xy: np.ndarray) -> np.ndarray:
     return 128 + 38 * rows
 
 
-def render(shots: Sequence[Shot], folder: Path) -> None:
-    """Write the photos of the flat wall; of its back a grey one."""
+#: Of the front, and of the wall that runs back from its right end at X = 3: about the upright edge.
+FRONT, FLANK = np.eye(3), np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]])
+
+
+def make_flank_shots() -> list[Shot]:
+    """Return three photos of the flank, 10, 7 and 7.5 m before it; it is seen from X = 3 on."""
+    shots = []
+    for k, (x, y, z, yaw) in enumerate([(2, -0.3, 10, 3), (2.4, -0.4, 7, -4), (1.2, -0.2, 7.5, 0)]):
+        turn = Rotation.from_euler("yx", [yaw, 3], degrees=True).as_matrix()
+        turn, place = FLANK @ turn, FLANK @ [x, y, z] + [3, 0, 0]
+        down = np.diag([1.0, -1.0, -1.0]) @ turn.T
+        shots.append(Shot(f"SIDE_{k}.png", (300, 200), (300.0, 300.0), (149.5, 99.5), (0,) * 5,
+                          down @ TURN.T, to_world(place)))  # fmt: skip
+    return shots
+
+
+def flank_points(count: int = 380) -> np.ndarray:
+    """Return points on the flank, in the frame of the front."""
+    rng = np.random.default_rng(3)
+    flat = np.column_stack([rng.uniform((0, -2), (4, 2), (count, 2)), np.zeros(count)])
+    flat[:, 2] += rng.normal(0, 0.0005, count)
+    return flat @ FLANK.T + [3, 0, 0]
+
+
+def render(shots: Sequence[Shot], folder: Path, wall: np.ndarray = FRONT) -> None:
+    """Write the photos of a flat wall; of its back a grey one."""
     folder.mkdir(parents=True, exist_ok=True)
     for shot in shots:
         width, height = shot.size
@@ -89,8 +113,8 @@ def render(shots: Sequence[Shot], folder: Path) -> None:
             grid.astype(float), shot.matrix, np.array(shot.terms),
             criteria=(3, 100, 1e-12),
         )[:, 0]  # fmt: skip
-        rays = np.column_stack([ideal, np.ones(len(ideal))]) @ shot.rotation @ TURN
-        place = (shot.place - SHIFT) @ TURN / UNIT
+        rays = np.column_stack([ideal, np.ones(len(ideal))]) @ shot.rotation @ TURN @ wall
+        place = ((shot.place - SHIFT) @ TURN / UNIT - [3.0 * (wall is FLANK), 0, 0]) @ wall
         xy = place[:2] - rays[:, :2] * (place[2] / rays[:, 2])[:, None]
         grey = np.clip(texture(xy).reshape(height, width), 0, 255).round().astype(np.uint8)
         Image.fromarray(np.repeat(grey[..., None], 3, 2)).save(folder / shot.file)

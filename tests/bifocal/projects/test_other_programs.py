@@ -190,6 +190,45 @@ def test_what_gives_the_scale_is_said_and_none_is_invented(tmp_path: Path) -> No
     assert not any("no scale" in text for text in result.remarks)
 
 
+def test_the_walls_of_a_house_are_listed_and_run_on_about_their_corner(tmp_path: Path) -> None:
+    front, flank = made.make_shots()[:3], made.make_flank_shots()
+    made.render(front, tmp_path)
+    made.render(flank, tmp_path, made.FLANK)
+    xyz = made.to_world(np.vstack([made.wall_points(), made.flank_points()]))
+    path = made.write_colmap_text(tmp_path / "model", [*front, *flank], xyz)
+    sets = []
+    for number in ("1", "2"):
+        out = tmp_path / f"w{number}.photos.json"
+        done = CliRunner().invoke(
+            main, ["photos", str(path), "--wall", number, "--unit", "m", "--out", str(out)]
+        )
+        assert done.exit_code == 0, done.output
+        assert "wall 1 of 2: 2.4 x 1.6 m, 36 % of the points" in done.output
+        assert "wall 2 of 2: " in done.output
+        sets.append(PhotoSet.read(out))
+    assert [list(photos.names) for photos in sets] == [
+        [f"{name}_{k}" for k in range(3)] for name in ("DSC", "SIDE")
+    ]
+    np.testing.assert_allclose(
+        [p.distance for p in sets[1].photos], made.UNIT * np.r_[10, 7, 7.5], rtol=1e-4
+    )
+    # Where both meet, X and Y are one: at X = 3 of the front.
+    corner = made.to_world(np.array([[3.0, -1, 0], [3, 0, 0], [3, 1, 0]]))
+    places = [
+        photos.intersect([shot.pixels(corner) for shot in shots]).xyz / made.UNIT
+        for photos, shots in zip(sets, (front, flank), strict=True)
+    ]
+    np.testing.assert_allclose(places[0], places[1], atol=0.05)
+    assert places[0][1, 0] - sets[0].photos[0].nadir[0] / made.UNIT == pytest.approx(2.6, abs=0.05)
+    # Both walls stand in the picture as their photos show them.
+    picture = read_image(tmp_path / "w1.walls.jpg")
+    assert picture.shape[1] == 800
+    halves = picture[60:500, 20:780], picture[700:1300, 20:780]
+    assert all(half.std() > 20 for half in halves)
+    with pytest.raises(InputError, match="2 walls are found"):
+        photos_from_project(path, tmp_path / "w.photos.json", ProjectOptions(wall=("3",)))
+
+
 def test_a_scaled_metashape_chunk_is_metric(tmp_path: Path) -> None:
     _, shots, xyz = project_of(tmp_path, "metashape")
     path = made.write_metashape(tmp_path / "chunk.xml", shots, scale=2.5)
