@@ -1,4 +1,7 @@
-"""Workbooks of 20 000 rows with 8 live formulas: our splice writer and reader beside openpyxl.
+"""Workbooks of 20 000 rows: our splice writer and reader, and `solve`, beside openpyxl.
+
+Rows of 8 live formulas are written and read; then a survey of as many points is solved, into a new
+workbook and into one that is there, beside openpyxl loading and saving that workbook.
 
 Each job runs in a process of its own; CPU seconds, and peak memory above that of an interpreter
 that has only imported what the job needs. The results are checked against each other first.
@@ -72,7 +75,8 @@ def write_ours(path, rows=ROWS):
     start(1, rows).save(first)
     value = columns(rows)
     editor = WorkbookEditor(first)
-    editor.set_results("Points", 2, {6 + i: value[name][:1] for i, name in enumerate(FORMULAS)})
+    for column, name in enumerate(FORMULAS, start=6):
+        editor.set_result("Points", 2, column, float(value[name][0]))
     for column, name in enumerate(INPUTS, start=2):
         # openpyxl writes 16 digits, which is one too few for some numbers.
         editor.set_value("Points", 2, column, float(value[name][0]))
@@ -100,11 +104,46 @@ def read_ours(path):
     return len(table)
 
 
+def solve_new(path):
+    from bifocal import Taking
+
+    x, y, r = np.random.default_rng(1).uniform((-5, -3, -0.5), (5, 3, 0.5), (ROWS, 3)).T
+    measured = [f * axis / (d - r) for f, d in ((35, 17.5), (19, 9.5)) for axis in (x, y)]
+    picks = path.with_suffix(".csv")
+    header, ids = ",".join(("id", *INPUTS)), [f"P{i}" for i in range(ROWS)]
+    table = np.column_stack([ids, *(np.char.mod("%.4f", column) for column in measured)])
+    np.savetxt(picks, table, fmt="%s", delimiter=",", header=header, comments="")
+    solve(picks, path, taking=Taking(d1=17.5, d2=9.5, c1=35, c2=19))
+
+
+def solve_in_place(path):
+    from bifocal import Measuring
+
+    # Another precision changes every sigma of every row.
+    solve(path, path, measuring=Measuring(sigma_px=0.7))
+
+
+def solve(picks, book, **given):
+    from bifocal.workbook import workflow
+    from bifocal.workbook.output import write_result
+
+    write_result(book, workflow.solve(picks, **given), overwrite=True)
+
+
+def save_openpyxl(path):
+    import openpyxl
+
+    openpyxl.load_workbook(path).save(path.with_name("saved.xlsx"))
+
+
 JOBS = {
     "write ours (with results)": write_ours,
     "write openpyxl (without)": write_openpyxl,
     "read ours": read_ours,
     "read openpyxl": read_openpyxl,
+    "solve into a new book": solve_new,
+    "solve in place": solve_in_place,
+    "solve openpyxl (load, save)": save_openpyxl,
 }
 
 
@@ -133,8 +172,11 @@ def main():
             "write openpyxl (without)", Path(folder) / "plain.xlsx"
         )
         size = path.stat().st_size / 1e6
+        survey = Path(folder) / "survey.xlsx"
+        for job in ("solve into a new book", "solve openpyxl (load, save)", "solve in place"):
+            found[job] = run(job, survey)
     print(f"{ROWS} rows, {len(FORMULAS)} formulas each, {size:.1f} MB")
-    for verb in ("write", "read"):
+    for verb in ("write", "read", "solve"):
         base = next(v for k, v in found.items() if k.startswith(f"{verb} openpyxl"))
         for job in (k for k in found if k.startswith(verb)):
             seconds, megabytes = found[job]

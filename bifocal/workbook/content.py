@@ -217,8 +217,9 @@ class SurveyContent:
 
     @property
     def check_rows(self) -> int:
-        """Rows of `Check`."""
-        return max(CHECK_ROWS, len(self.known) + SPARE_ROWS)
+        """Rows of `Check`: those of one page, or the points and a few spare rows."""
+        known = len(self.known)
+        return CHECK_ROWS if known < CHECK_ROWS else known + SPARE_ROWS
 
     @property
     def arrows(self) -> int:

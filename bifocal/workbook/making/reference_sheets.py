@@ -7,7 +7,7 @@ from openpyxl.styles import Alignment
 from bifocal.model.photo import FARTHEST_WALL
 from bifocal.survey.taped import TAPE
 from bifocal.survey.tolerances import judge
-from bifocal.workbook.content import SurveyContent, check_cells
+from bifocal.workbook.content import CHECK_ROWS, SurveyContent, check_cells
 from bifocal.workbook.formulas.columns import (
     FORMULAS,
     FRAME_SHARES,
@@ -70,6 +70,8 @@ def check(builder: BookBuilder, content: SurveyContent) -> None:
     _verdict(sheet, content)
     repeat = f"{CHECK_HEAD - 1}:{CHECK_HEAD}"
     sheet.finish(landscape=True, freeze=f"B{CHECK_HEAD + 1}", repeat=repeat)
+    if rows == CHECK_ROWS:
+        sheet.worksheet.page_setup.fitToHeight = 1
 
 
 def _taped(sheet: SheetBuilder, content: SurveyContent) -> None:

@@ -119,35 +119,32 @@ def write_many(path, count):
     return xyz
 
 
-#: Solves points into a workbook, then says what that took: seconds of processor and kB of
-#: memory. What `resource` says of memory includes that of the process that began this one.
+#: Solves points into a workbook, then says what memory that took. [kB] What `resource` says
+#: includes that of the process that began this one.
 _BOOK = """
-import re, sys, time
+import re, sys
 from bifocal import Measuring, Taking
 from bifocal.workbook import workflow
 from bifocal.workbook.output import write_result
 picks, book = sys.argv[1:]
-begin = time.process_time()
 if picks == book:  # another precision changes every sigma of every row
     survey = workflow.solve(picks, measuring=Measuring(sigma_px=0.7))
 else:
     survey = workflow.solve(picks, taking=Taking(d1=17.5, d2=9.5, c1=35, c2=19))
 write_result(book, survey, overwrite=True)
-took = time.process_time() - begin
-print(took, re.search(r"VmHWM:\\s+(\\d+)", open("/proc/self/status").read())[1])
+print(re.search(r"VmHWM:\\s+(\\d+)", open("/proc/self/status").read())[1])
 """
 
 
-def taken(picks, book):
-    """Return what it took to solve picks into a workbook: seconds, kB."""
+def memory(picks, book):
+    """Return the memory that it took to solve picks into a workbook. [kB]"""
     command = [sys.executable, "-c", _BOOK, str(picks), str(book)]
-    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    return map(float, said.split())
+    return int(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
 
 
 @pytest.mark.acceptance
 @pytest.mark.skipif(sys.platform != "linux", reason="asks Linux for its memory")
-def test_a_new_book_of_twenty_thousand_rows_takes_seconds_and_little_memory(tmp_path):
+def test_a_new_book_of_twenty_thousand_rows_takes_little_memory(tmp_path):
     x, y, r = np.random.default_rng(1).uniform((-5, -3, -0.5), (5, 3, 0.5), (20_000, 3)).T
     seen = [35 * x / (17.5 - r), 35 * y / (17.5 - r), 19 * x / (9.5 - r), 19 * y / (9.5 - r)]
     picks, path = tmp_path / "picks.csv", tmp_path / "new.xlsx"
@@ -155,23 +152,17 @@ def test_a_new_book_of_twenty_thousand_rows_takes_seconds_and_little_memory(tmp_
         f"P{i}," + ",".join(map("{:.4f}".format, row)) for i, row in enumerate(np.array(seen).T)
     ]
     picks.write_text("\n".join(["id,x1,y1,x2,y2", *lines]))
-    took, memory = taken(picks, path)
-    # 6 s on an idle machine; on a busy one a second of processor does half the work.
-    assert took < 12
-    assert memory < 280_000
+    assert memory(picks, path) < 280_000
     assert path.stat().st_size < 16e6
 
 
 @pytest.mark.acceptance
 @pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="asks Linux for its memory")
-def test_twenty_thousand_rows_are_changed_in_place_in_seconds(tmp_path):
+def test_twenty_thousand_rows_are_changed_in_place_in_little_memory(tmp_path):
     path = tmp_path / "s.xlsx"
     xyz = write_many(path, 20_000)
-    took, memory = taken(path, path)
-    assert memory < 400_000
-    # 8 s on an idle machine; on a busy one a second of processor does half the work.
-    assert took < 16
+    assert memory(path, path) < 400_000
     assert np.abs(workflow.solve(path).table.xyz - xyz).max() < 1e-6
     with zipfile.ZipFile(path) as written:
         points = written.read("xl/worksheets/sheet3.xml")
