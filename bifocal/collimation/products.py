@@ -28,6 +28,10 @@ OVERLAY_SIDE = 1536
 PREVIEW = 480
 #: Bars of the relief's histogram.
 BINS = 96
+#: Endings of what a client opens: sheets, drawing with its picture, report, view in 3-D.
+FOR_CLIENTS = frozenset({".pdf", "_relief.pdf", ".dxf", ".png", "_report.html", "_3d.html"})
+#: Folder of all else in what *Download all* gives.
+DATA = "data"
 #: Points of a profile, at most.
 PROFILE_POINTS = 2000
 
@@ -97,6 +101,9 @@ class Products:
     ) -> dict[str, Path]:
         """Return all that *Download all* holds by its name there: products, workbook, photos.
 
+        What a client opens stands first, all else in the folder ``data``, which is a survey that
+        the page opens: with the workbook, which a client wants, too.
+
         Parameters
         ----------
         workbook : Path
@@ -107,7 +114,12 @@ class Products:
         """
         old = {Path(name).name for name, kind in self.made.items() if kind in stale}
         current = self.downloads(workbook).items()
-        return {**more, **{name: path for name, path in current if name not in old}}
+        files = {**more, **{name: path for name, path in current if name not in old}}
+        first = {n for n in files if n.removeprefix(self.stem) in FOR_CLIENTS}
+        book = {workbook.name} & files.keys()
+        return {(n if n in first else f"{DATA}/{n}"): path for n, path in files.items()} | {
+            name: files[name] for name in book
+        }
 
     def preview(self, kind: str) -> bytes:
         """Return a small picture of the relief, the orthophoto or the drawing, PNG.

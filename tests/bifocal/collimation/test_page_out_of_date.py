@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from pathlib import PurePath
 
 import numpy as np
 import pytest
@@ -51,7 +52,7 @@ def make(session, kind):
 def names(session):
     from bifocal.collimation.server.product_routes import bundle_of
 
-    return set(bundle_of(session))
+    return {PurePath(name).name for name in bundle_of(session)}
 
 
 def test_what_was_just_made_is_up_to_date_also_after_a_new_start(survey, tmp_path):
@@ -159,3 +160,19 @@ def test_control_changed_after_align_is_said_and_counts_again_when_taken_back(tm
         session.command({"op": "control.use", "name": "K1", "use": False})
         assert not shown()[0]
         assert Pair.read(session.proposed_path).d1 == pytest.approx(17.5)
+
+
+def test_a_client_finds_what_to_open_on_top_and_all_else_in_data(tmp_path):
+    from bifocal.collimation.server.product_routes import bundle_of
+
+    folder = sample_folder(tmp_path)
+    endings = (".pdf", ".dxf", ".png", ".tif", ".tfw", "_relief.pdf", "_relief.dxf", "_report.html")
+    with opened(folder) as session:
+        for name in (made := [f"facade{ending}" for ending in endings]):
+            (folder / name).write_bytes(b"x")
+        session.note_made("deliver", made)
+        names = set(bundle_of(session))
+    top = {"facade.pdf", "facade.dxf", "facade.png", "facade_relief.pdf", "facade_report.html"}
+    assert {name for name in names if "/" not in name} - {"facade.xlsx"} == top
+    inside = {"data/facade.tif", "data/facade_relief.dxf", "data/facade.pair.json", "data/far.jpg"}
+    assert inside <= names

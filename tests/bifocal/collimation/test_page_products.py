@@ -315,12 +315,18 @@ def test_points_and_lines_become_a_drawing_in_space(tmp_path) -> None:
             np.testing.assert_allclose(place, [row["X"], row["Y"], row["r"]], atol=1e-9)
         session.sync.step()
         archive = zipfile.ZipFile(BytesIO(client.get("/download/all.zip").content))
-        whole = ["facade.pair.json", "facade.xlsx", "far.jpg", "near.jpg", "SHA256SUMS"]
-        assert archive.namelist() == whole  # photos and pair, so that it opens elsewhere
+        survey = [*("facade.pair.json", "facade.xlsx", "far.jpg", "near.jpg")]
+        # Photos, pair and workbook in one folder, so that it opens elsewhere.
+        whole = [*(f"data/{name}" for name in survey), "facade.xlsx", "SHA256SUMS"]
+        assert archive.namelist() == whole
         (tmp_path / "sent.zip").write_bytes(client.get("/download/all.zip").content)
         found = verify(tmp_path / "sent.zip")
         assert [one.file for one in found.files] == sorted(whole)
         assert found.same
+        archive.extractall(tmp_path / "sent")
+        opened_there = find_files([tmp_path / "sent" / "data"])
+        assert opened_there.pair is not None
+        assert opened_there.workbook.name == "facade.xlsx"
 
 
 def test_a_proposed_orientation_is_shown_and_accepted(tmp_path) -> None:

@@ -222,7 +222,8 @@ def test_a_ray_meets_the_relief_where_the_photo_shows_it(tmp_path) -> None:
         answer = client.get("/download/all.zip")
         assert int(answer.headers["x-bytes"]) > 0
         names = zipfile.ZipFile(io.BytesIO(answer.content)).namelist()
-        assert {"far.jpg", "near.jpg", "facade.pair.json", "facade.relief.tif"} <= set(names)
+        inside = {"far.jpg", "near.jpg", "facade.pair.json", "facade.relief.tif"}
+        assert {f"data/{name}" for name in inside} <= set(names)
 
 
 def test_the_sample_opens_oriented_and_surveys_are_remembered(tmp_path) -> None:
