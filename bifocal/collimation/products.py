@@ -115,9 +115,9 @@ class Products:
         old = {Path(name).name for name, kind in self.made.items() if kind in stale}
         current = self.downloads(workbook).items()
         files = {**more, **{name: path for name, path in current if name not in old}}
-        first = {n for n in files if n.removeprefix(self.stem) in FOR_CLIENTS}
+        top = {n for n in files if n.removeprefix(self.stem) in FOR_CLIENTS}
         book = {workbook.name} & files.keys()
-        return {(n if n in first else f"{DATA}/{n}"): path for n, path in files.items()} | {
+        return {(n if n in top else f"{DATA}/{n}"): path for n, path in files.items()} | {
             name: files[name] for name in book
         }
 

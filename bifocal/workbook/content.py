@@ -218,8 +218,8 @@ class SurveyContent:
     @property
     def check_rows(self) -> int:
         """Rows of `Check`: those of one page, or the points and a few spare rows."""
-        known = len(self.known)
-        return CHECK_ROWS if known < CHECK_ROWS else known + SPARE_ROWS
+        points = len(self.known)
+        return CHECK_ROWS if points < CHECK_ROWS else points + SPARE_ROWS
 
     @property
     def arrows(self) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -14,7 +14,7 @@ from bifocal.collimation.drawn_lengths import lengths_shown
 from bifocal.collimation.fields import SETUP
 from bifocal.collimation.live_orientation import LiveOrientation, lenses_of
 from bifocal.collimation.next_steps import advice_of, is_looking, next_steps
-from bifocal.collimation.product_graph import out_of_date, proposal_is_current
+from bifocal.collimation.product_graph import GRAPH, out_of_date, proposal_is_current
 from bifocal.collimation.records import GIVES_SCALE
 from bifocal.collimation.scale import free_report, is_unscaled
 from bifocal.collimation.session import Session
@@ -85,7 +85,7 @@ def state_of(session: Session) -> dict[str, Any]:
                 "ortho": session.products.facts("ortho"),
                 "rectified": session.products.facts("rectified"),
                 "files": session.products.listed(session.files.workbook),
-                "stale": _stale(session),
+                **_made_from(session),
             },
             "jobs": [
                 {**job.as_dict(), "cured": job.state == "failed" and job.ended_at < state.revision}
@@ -96,17 +96,29 @@ def state_of(session: Session) -> dict[str, Any]:
         }
 
 
-def _stale(session: Session) -> dict[str, str]:
-    """Return in words why products are out of date, by kind."""
-    language = session.spoken
+def _made_from(session: Session) -> dict[str, dict[str, str]]:
+    """Return in words what products were made from, and why some are out of date, by kind."""
+
+    def in_words(sentence: str, causes: Collection[str]) -> str:
+        listed = ", ".join(say("stale", cause, session.spoken) for cause in causes)
+        return say("stale", sentence, session.spoken, causes=listed)
+
+    changed, state = out_of_date(session), session.state
+    lacks = {
+        "points": not (state.points or state.lines),
+        "outlines": not any(shape.kind == "outline" for shape in state.shapes.values()),
+    }
+    causes = {
+        kind: [c for c in GRAPH["deliver"] if digests.get(c) and not lacks.get(c)]
+        for kind, digests in session.products.causes.items()
+    }
     return {
-        kind: say(
-            "stale",
-            "since",
-            language,
-            causes=", ".join(say("stale", cause, language) for cause in causes),
-        )
-        for kind, causes in out_of_date(session).items()
+        "stale": {kind: in_words("since", of) for kind, of in changed.items()},
+        "made_from": {
+            kind: in_words("made_from", of)
+            for kind, of in causes.items()
+            if of and kind not in changed and session.products.current(kind)
+        },
     }
 
 

@@ -58,6 +58,10 @@ def names(session):
 def test_what_was_just_made_is_up_to_date_also_after_a_new_start(survey, tmp_path):
     assert out_of_date(survey) == {}
     assert {"facade.relief.tif", "sheet.pdf"} <= names(survey)
+    causes = client_of(survey).get("/api/state").json()["products"]["made_from"]
+    assert causes == {
+        "relief": "Made from: orientation.", "deliver": "Made from: orientation, relief.",
+    }  # fmt: skip
     survey.journal.close()
     with opened(tmp_path) as again:
         assert out_of_date(again) == {}
@@ -68,7 +72,9 @@ def test_what_was_just_made_is_up_to_date_also_after_a_new_start(survey, tmp_pat
 def test_a_face_drawn_since_leaves_relief_and_package_behind_and_out(survey):
     survey.command({"op": "shape.set", "kind": "face", "corners": DOOR})
     assert out_of_date(survey) == {"relief": ["faces"], "deliver": ["faces", "relief"]}
-    stale = client_of(survey).get("/api/state").json()["products"]["stale"]
+    facts = client_of(survey).get("/api/state").json()["products"]
+    assert facts["made_from"] == {}
+    stale = facts["stale"]
     assert stale["relief"].startswith("Out of date, changed since: drawn faces.")
     assert not {"facade.relief.tif", "sheet.pdf"} & names(survey)
     assert {"far.jpg", "facade.pair.json"} <= names(survey)

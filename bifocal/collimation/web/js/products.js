@@ -299,8 +299,8 @@ export class ProductsStage {
 
   update(state) {
     this.prepare(state).catch((error) => this.app.refuse(error));
-    const { relief, ortho, files, stale } = state.products;
-    setText(this.deliverState, stale.deliver ?? "");
+    const { relief, ortho, files, stale, made_from: causes } = state.products;
+    setText(this.deliverState, stale.deliver ?? causes.deliver ?? "");
     this.#tellScale(state.drawing_scale);
     this.picks &&= Boolean(relief);
     const pixels = (product) => (product.cols ? `${product.cols} × ${product.rows} px` : "");
@@ -308,7 +308,7 @@ export class ProductsStage {
     this.loupe.element.hidden = !relief;
     for (const [kind, product] of [["relief", relief], ["ortho", ortho]]) {
       const size = product && t(`${kind}.ready`, { size: `${pixels(product)}, ${number(1000 * product.gsd, 1)} mm` });
-      setText(this[`${kind}State`], stale[kind] ?? size ?? "");
+      setText(this[`${kind}State`], stale[kind] ?? [size, causes[kind]].filter(Boolean).join(" · "));
       const picture = this[`${kind}Picture`];
       const mark = product && JSON.stringify(product).length + state.jobs.filter((job) => job.state === "done").length;
       picture.hidden = !product;
