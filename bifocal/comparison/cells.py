@@ -36,7 +36,7 @@ def difference_of(before: ReliefMap, after: ReliefMap) -> tuple[ReliefMap, BoolA
         if (relief.sigma[measured] < 0).any() or (np.abs(relief.r[measured]) > LARGEST).any():
             raise InputError(remark("compare.no_relief"))
     base, finer = (before, after) if before.gsd >= after.gsd else (after, before)
-    finer = _on_grid(finer, base.grid)
+    finer = on_grid(finer, base.grid)
     sign = 1 if base is before else -1
     r = sign * (finer.r.astype(np.float64) - base.r)
     variance = np.zeros(r.shape)
@@ -73,16 +73,19 @@ def _two_surfaces(
     """
     gsd = base.gsd
     reach = round(CHANGE.beside / gsd)
-    far = known & (np.abs(other.r - base.r) > CHANGE.apart * sigma)
+    # Sigma beside a step is nearly the step's own half: the wall's usual one says what is noise.
+    least = np.fmax(3 * sigma, CHANGE.apart * float(np.median(sigma[known])))
+    far = known & (np.abs(other.r - base.r) > least)
     rows, columns = np.nonzero(far)
     if not reach or not len(rows):
         return np.zeros_like(known)
     step = max(1, reach // 8)
     offsets = np.arange(-reach, reach + 1, step)
     met = np.zeros((2, len(rows)), np.int64)
-    tolerance = 3 * sigma[rows, columns]
-    padded = [np.pad(np.where(known, one.r, np.nan), reach, constant_values=np.nan)
-              for one in (base, other)]  # fmt: skip
+    step_here = np.abs(other.r - base.r)[rows, columns]
+    tolerance = np.fmax(3 * sigma[rows, columns], CHANGE.round * step_here)
+    # What is interpolated beside a step is of one of its two surfaces, too.
+    padded = [np.pad(one.r, reach, constant_values=np.nan) for one in (base, other)]
     for dy in offsets:
         for dx in offsets[np.hypot(offsets, dy) <= reach]:
             for k, here in enumerate((other, base)):
@@ -93,7 +96,7 @@ def _two_surfaces(
     return two
 
 
-def _on_grid(relief: ReliefMap, grid: Grid) -> ReliefMap:
+def on_grid(relief: ReliefMap, grid: Grid) -> ReliefMap:
     """Return a map at the pixels of a grid; relief and sigma between them bilinear."""
     if relief.shape == grid.shape and relief.grid.whole_offset_in(grid) == (0, 0):
         return relief

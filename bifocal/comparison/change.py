@@ -18,6 +18,7 @@ from bifocal.comparison.cells import (
     without_trend,
 )
 from bifocal.comparison.chance import Chance, Patches, chance
+from bifocal.comparison.photo_evidence import PhotosOfDate, contradicted
 from bifocal.comparison.tuning import CHANGE
 from bifocal.model.relief_map import ReliefMap
 from bifocal.remarks import remark
@@ -112,6 +113,7 @@ def compare(
     fit: bool = False,
     level: float = 0.01,
     smallest: float = 0.02,
+    dates: tuple[PhotosOfDate, PhotosOfDate] | None = None,
     seed: int = 1,
 ) -> Comparison:
     """Return what has changed between two relief maps of one wall in one plane frame.
@@ -132,6 +134,8 @@ def compare(
     smallest : float
         Area of the smallest patch whose mean change is tested; it and patches of 4, 16 and 64
         times as much are. [m²]
+    dates : tuple of Pair or PhotoSet, optional
+        The photos that both maps are of: what is found is held against them.
     seed : int
         Of the walls drawn to learn what chance does.
 
@@ -147,7 +151,7 @@ def compare(
     Notes
     -----
     See "Two dates compared" among the pages for the method: the differences over their standard
-    deviations, cut off at 3 so that one blunder proves nothing, are averaged over patches; the
+    deviations, cut off at 4 so that one blunder proves nothing, are averaged over patches; the
     limit is what the largest average of the whole wall exceeds by chance with probability
     ``level``, drawn from walls whose errors are correlated as those of the maps are.
 
@@ -215,6 +219,15 @@ def compare(
     smooth = np.nan_to_num(patches.averages(cells.difference)[0])
     whole = labels.repeat(pixels, axis=0).repeat(pixels, axis=1)
     whole = whole[: difference.shape[0], : difference.shape[1]]
+    if dates is not None and (wrong := contradicted(whole, difference, (before, after), dates)):
+        two_surfaces |= np.isin(whole, wrong)
+        area = float(np.isin(whole, wrong).sum()) * difference.gsd**2
+        remarks.append(remark("compare.photos_contradict", count=len(wrong), area=area))
+        kept = [one for one in regions if one.number not in wrong]
+        ranks = np.zeros(len(regions) + 1, np.int64)
+        ranks[[one.number for one in kept]] = np.arange(1, len(kept) + 1)
+        whole = ranks[whole]
+        regions = tuple(replace(one, number=int(ranks[one.number])) for one in kept)
     return Comparison(
         difference=difference,
         region=np.where(two_surfaces & (whole == 0), -1, whole),
@@ -366,7 +379,7 @@ class _Outlined:
         wide, narrow = (int((near & (change >= edge + sign * sigma)).sum()) for sign in (-1, 1))
         # How far a change reaches that fades out, no outline knows better than this.
         fading = int((inner & cells.known & (change < 2 * edge)).sum())
-        moved = np.maximum(averages[0] * way, 0)[inner]
+        moved = np.maximum(averages[0] * way, 1e-9)[inner]
         y, x = (float(np.average(index, weights=moved)) for index in np.nonzero(inner))
         area = int(inner.sum()) * cell
         return ChangedRegion(

@@ -49,7 +49,9 @@ def _blocks(done: Comparison, say: Words, language: str) -> Iterator[Block]:
     if done.regions:
         yield Heading(text=say("regions"))
         headings = [say("number"), "X [m]", "Y [m]"]
-        headings += [say(key) for key in ("area", "volume", "mean", "largest", "chance")]
+        headings += [
+            say(key) for key in ("area", "measured", "volume", "mean", "largest", "chance")
+        ]
         yield TextTable(headings=headings, rows=_rows(done), caption=say("region_table"))
     yield Picture(draw=partial(_draw_histogram, done=done, say=say), ratio=0.35,
                   caption=say("histogram"))  # fmt: skip
@@ -73,7 +75,7 @@ def _rows(done: Comparison) -> list[list[str]]:
     return [
         [
             str(one.number), f"{one.X:.2f}", f"{one.Y:.2f}",
-            pair(one.area, one.sigma_area, 1, 3, "-"),
+            pair(one.area, one.sigma_area, 1, 3, "-"), f"{100 * one.measured:.0f} %",
             pair(one.volume, one.sigma_volume, 1000, 2),
             pair(one.mean, one.sigma_mean, 1000, 1),
             pair(one.largest, one.sigma_largest, 1000, 1),

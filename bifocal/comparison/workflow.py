@@ -11,8 +11,10 @@ import numpy as np
 
 from bifocal.comparison.change import ChangedRegion, Comparison, compare
 from bifocal.comparison.change_report import change_document
+from bifocal.comparison.photo_evidence import PhotosOfDate
 from bifocal.files.dxf import add_text, new_drawing, save_drawing
 from bifocal.model.geotiff import create_raster
+from bifocal.model.photo_set import PhotoSet
 from bifocal.model.relief_map import ReliefMap
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray, as_floats
@@ -56,7 +58,8 @@ class ComparedFiles:
         sentences += [
             f"  {one.number}  X {one.X:.2f}  Y {one.Y:.2f}  {one.area:.3f} m2  "
             f"{1000 * one.mean:+.1f} +- {1000 * one.sigma_mean:.1f} mm  "
-            f"{1000 * one.volume:+.2f} +- {1000 * one.sigma_volume:.2f} dm3"
+            f"{1000 * one.volume:+.2f} +- {1000 * one.sigma_volume:.2f} dm3  "
+            f"{100 * one.measured:.0f} % measured"
             for one in done.regions[:10]
         ]
         return [*sentences, f"Written   {self.folder}: {', '.join(self.files)}"]
@@ -112,7 +115,8 @@ def compare_files(
         progress(0.1, 1, "reading")
         maps = [ReliefMap.read(path) for path in paths]
         progress(0.2, 1, "testing")
-        done = compare(maps[0], maps[1], stable=polygons, fit=fit, smallest=smallest)
+        dates = _dates(before, after)
+        done = compare(maps[0], maps[1], stable=polygons, fit=fit, smallest=smallest, dates=dates)
         progress(0.7, 1, "writing")
         _write_map(folder / "difference.tif", done)
         _write_tables(folder, done)
@@ -125,6 +129,19 @@ def compare_files(
             write_document(folder / name, document)
         files = tuple(sorted(path.name for path in folder.iterdir()))
     return ComparedFiles(comparison=done, folder=out, files=files)
+
+
+def _dates(*paths: Path) -> tuple[PhotosOfDate, PhotosOfDate] | None:
+    """Return the photos of both dates, where both are named by a pair or set whose photos exist."""
+    dates: list[PhotosOfDate] = []
+    for path in paths:
+        if not path.name.endswith((".pair.json", ".photos.json")):
+            return None
+        date = PhotoSet.read(path)
+        if not all(photo.file and photo.path.is_file() for photo in date.photos):
+            return None
+        dates.append(date)
+    return dates[0], dates[1]
 
 
 def _relief_of(path: Path) -> Path:

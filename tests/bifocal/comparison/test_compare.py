@@ -17,7 +17,11 @@ from openpyxl import load_workbook
 
 from bifocal import Grid, InputError, Quality, ReliefMap, compare
 from bifocal.comparison.workflow import compare_files
+from photocore.images import write_image
 from tests.builders.commands import bifocal_command as bifocal
+from tests.scenes import bifocal_cameras, render
+from tests.scenes.facade import RICH
+from tests.scenes.shapes import Scene, box
 
 GRID = Grid.from_bounds((0.0, 0.0, 4.0, 3.0), gsd=0.04)
 SIGMA = 0.003
@@ -111,6 +115,30 @@ def test_two_surfaces_that_both_stand_there_are_no_change_and_what_was_taken_awa
     )
     (hole,) = compare(before, block).regions
     assert hole.volume == pytest.approx(-0.2 * 6 * 75 * 0.04**2, rel=0.05)
+
+
+def test_a_change_that_the_photos_of_both_dates_do_not_show_is_none(tmp_path: Path):
+    """A block of 0.4 m on a wall: photographed at the second date, or in its relief alone."""
+    rng, dates, maps = np.random.default_rng(8), [], []
+    for name, depth in (("before", 0.0), ("after", 0.4)):
+        wall = Scene(wall=RICH.stone, texel=0.02, seed=3)
+        if depth:
+            wall.add(box((1.2, 2.0), (-0.4, 0.4), (-0.1, depth), RICH.stone))
+        taken = render(wall, bifocal_cameras(size=(240, 160), pixel=0.03), rng=rng)
+        for number, image in enumerate((taken.image1, taken.image2), start=1):
+            write_image(tmp_path / f"{name}{number}.png", image)
+        images = [replace(image, file=f"{name}{k}.png", folder=tmp_path) for k, image in
+                  enumerate((taken.pair.image1, taken.pair.image2), start=1)]  # fmt: skip
+        dates.append(replace(taken.pair, image1=images[0], image2=images[1], folder=tmp_path))
+        r = taken.truth.r + rng.normal(0, 0.01, taken.truth.shape)
+        flat = ReliefMap.from_relief(r, plane_from_pixel=taken.truth.plane_from_pixel)
+        maps.append(replace(flat, sigma=np.full(flat.shape, 0.01)))
+    (block,) = compare(*maps, dates=(dates[0], dates[1])).regions
+    assert block.volume == pytest.approx(0.4 * 0.8**2, rel=0.1)
+    done = compare(*maps, dates=(dates[0], dates[0]))
+    assert done.regions == ()
+    assert (done.region == -1).sum() * 0.03**2 == pytest.approx(0.8**2, rel=0.15)
+    assert "1 regions" in done.remarks[-1]
 
 
 def test_offset_and_tilt_come_off_by_stable_parts_and_are_told_without_them():

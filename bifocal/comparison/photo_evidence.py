@@ -1,0 +1,89 @@
+"""What the photos of both dates say of a change: each date's must contradict the other's relief."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bifocal.comparison.cells import on_grid
+from bifocal.comparison.tuning import EVIDENCE
+from bifocal.model.image import as_grey
+from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
+from bifocal.model.photo_set import PhotoSet
+from bifocal.model.relief_map import ReliefMap
+from bifocal.relief_maps.photo_evidence import Witness, exposed_alike, misfit, shown_by
+from photocore.arrays import Float32Array, FloatArray, IntArray
+
+#: Where the photos of a date come from.
+PhotosOfDate = Pair | PhotoSet
+
+
+def contradicted(
+    region: IntArray,
+    difference: ReliefMap,
+    maps: Sequence[ReliefMap],
+    dates: Sequence[PhotosOfDate],
+) -> list[int]:
+    """Return the numbers of regions that the photos do not show to have changed.
+
+    A change is shown where the photos of each date fit its own relief, and not that of the other
+    date; of what moves nothing in any photo by `EVIDENCE.parallax` pixels the first alone is asked.
+
+    Parameters
+    ----------
+    region : ndarray of int64, shape (h, w)
+        Numbers of the regions, from 1.
+    difference : ReliefMap
+    maps : sequence of ReliefMap
+        Before and after.
+    dates : sequence of Pair or PhotoSet
+        With photos that exist.
+    """
+    grid, where = difference.grid, region > 0
+    reliefs = [np.asarray(on_grid(one, grid).r, np.float32) for one in maps]
+    if not where.any():
+        return []
+    misfits, parallax = [], np.zeros(grid.shape)
+    for k, date in enumerate(dates):
+        photos = date.photos if isinstance(date, PhotoSet) else (date.photo1, date.photo2)
+        witnesses = [Witness.of(one, as_grey(one.image, one.file), grid.gsd) for one in photos]
+        witnesses, usual = exposed_alike(witnesses, reliefs[k], grid)
+        # First a date's own relief, then the other date's.
+        for relief in (reliefs[k], reliefs[1 - k]):
+            values = misfit(witnesses, relief, grid, where, usual)
+            visible = np.zeros(grid.shape, bool)
+            shown = shown_by(witnesses, relief, grid, where)
+            visible[where & np.isfinite(relief)] = np.isfinite(shown).sum(axis=0) >= 2
+            misfits.append(np.where(visible, values, np.nan))
+        parallax = np.fmax(parallax, _parallax(photos, reliefs, difference))
+    numbers = []
+    for number in range(1, int(region.max()) + 1):
+        part = (region == number) & np.isfinite(difference.r)
+        visible = part & np.isfinite(np.sum(misfits, axis=0))
+        apart = float(np.median(parallax[part]))
+        if not visible.any():
+            numbers.append(number)
+            continue
+        fits = np.reshape([one[visible].mean() for one in misfits], (2, 2))
+        better = min(EVIDENCE.better * apart, EVIDENCE.most) if apart > EVIDENCE.parallax else -9
+        if fits[:, 0].max() > EVIDENCE.fits or (fits[:, 1] - fits[:, 0]).min() < better:
+            numbers.append(number)
+    return numbers
+
+
+def _parallax(
+    photos: Sequence[Photo], reliefs: Sequence[Float32Array], difference: ReliefMap
+) -> FloatArray:
+    """Return by how many pixels of the map the change moves any two photos' pictures apart."""
+    places = difference.plane_positions()
+    shifts = []
+    for photo in photos:
+        away = places - photo.nadir
+        before, after = (
+            away * (r / (photo.distance - r))[..., None] for r in reliefs
+        )  # e = r R / (d - r)
+        shifts.append(after - before)
+    apart = [np.linalg.norm(one - shifts[0], axis=-1) for one in shifts[1:]]
+    return np.asarray(np.nan_to_num(np.max(apart, axis=0)) / difference.gsd)
