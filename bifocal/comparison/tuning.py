@@ -56,10 +56,11 @@ class EvidenceTuning:
     #: A change that moves no photo against another by so many pixels of the map shows in none.
     parallax: float = 0.75
     #: A date's photos show its own relief better than the other date's by so much for every pixel
-    #: that the change moves them, and by so much at most. [times what they usually differ by]
+    #: that the change moves them,. [times what they usually differ by]
     #: Evidence: rendered walls taken twice under other suns: true changes that move photos by 0.8
     #: and 1.4 px gain 0.09 and 0.20, false ones that move them by 2 to 30 px less than 0.17.
     better: float = 0.08
+    #: That gain is asked for up to here. [times what they usually differ by]
     most: float = 0.3
     #: A date's photos differ by so much of what they usually do where its relief is right.
     #: Evidence: the same: true changes 0.6 to 0.9, grilles and railings taken for walls 1.3 to 2.2.
