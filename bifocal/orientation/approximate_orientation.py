@@ -146,7 +146,8 @@ def features_of(given: Given) -> tuple[Features, Features]:
     for name, image in zip(given.names, (far, near), strict=True):
         validation.check_sharp(name, image)
     validation.check_different(*given.names, (far, near))
-    return find_features(far), find_features(near)
+    first, second = (photo.features for photo in given.photos)
+    return first or find_features(far), second or find_features(near)
 
 
 def ties_of(given: Given, *, needed: bool) -> tuple[Ties | None, tuple[str, ...]]:

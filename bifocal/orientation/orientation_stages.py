@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.matching.features import Features
 from bifocal.model.interior_orientation import SIGMA_RADIAL, Cameras, Images, Interior
 from bifocal.model.world_frame import WorldFrame
 from bifocal.orientation import facade_lines, validation
@@ -68,11 +69,14 @@ class PhotoInput:
     interior : Interior
     name : str
         For messages.
+    features : Features, optional
+        Of the photo as it is.  [default: looked for]
     """
 
     grey: ByteArray | None
     interior: Interior
     name: str
+    features: Features | None = None
 
 
 Photos = tuple[PhotoInput, PhotoInput]
