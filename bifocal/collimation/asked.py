@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from bifocal.collimation.live_orientation import LiveOrientation, live_orientation
 from bifocal.collimation.measures import measure
 from bifocal.collimation.session import Session
-from bifocal.collimation.uncertainty import how_good
 from bifocal.remarks import remark
+from bifocal.survey.wall_precision import WallPrecision, wall_precision
 from photocore.errors import InputError
 
 
@@ -25,12 +24,14 @@ def oriented_live(session: Session) -> LiveOrientation | None:
     return session.orientation[1]
 
 
-def goodness(session: Session) -> dict[str, Any] | None:
-    """Return how good relief is; None before the photos are oriented."""
+def goodness(session: Session) -> WallPrecision | None:
+    """Return how precisely the wall is known; None before the photos are oriented."""
     if session.results is None:
         return None
     if session.good is None or session.good[0] is not session.results:
-        session.good = session.results, how_good(session.pictures, session.results)
+        first, second = (info.size for info in session.pictures.infos[:2])
+        pair, solve = session.pictures.needed_pair(), session.results.solved
+        session.good = session.results, wall_precision(pair, (first, second), solve)
     return session.good[1]
 
 

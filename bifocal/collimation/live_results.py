@@ -73,7 +73,7 @@ class LiveResults:
                    .values())  # fmt: skip
         if not new:
             return
-        table = self._solved(observations(new))
+        table = self.solved(observations(new))
         for row, point in enumerate(new):
             misfit = table.of_pixels.get("misfit_px")
             self._rows[_key(point)] = plain(
@@ -86,7 +86,8 @@ class LiveResults:
                 }
             )
 
-    def _solved(self, seen: PointObservations) -> ReliefTable:
+    def solved(self, seen: PointObservations) -> ReliefTable:
+        """Return points solved that are given by pixels."""
         if self.setup is None:
             return solve_points(self.pair, seen, sigma_px=self.sigma_px, limits=self.limits)
         typed = replace(seen, xy1=seen.pixels1, xy2=seen.pixels2)
@@ -107,7 +108,7 @@ class LiveResults:
 
     def joint_of(self, points: PointObservations) -> tuple[FloatArray, FloatArray]:
         """Return X, Y, r of picks [m], shape (n, 3), and their covariance together [m²]."""
-        table = self._solved(points)
+        table = self.solved(points)
         size = 3 * len(table.xyz)
         joint = table.joint_covariance(range(len(table.xyz)))
         return table.xyz, np.full((size, size), np.nan) if joint is None else joint

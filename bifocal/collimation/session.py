@@ -40,6 +40,7 @@ from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
 from bifocal.remarks import remark
+from bifocal.survey.wall_precision import WallPrecision
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.jsonfile import plain
 from photocore.output import relative_name
@@ -82,7 +83,7 @@ class Session:
         self.orientation: tuple[object, LiveOrientation] | None = None
         self.proposal: dict[str, Any] | None = None
         self.pick_doubt = ""
-        self.good: tuple[LiveResults, dict[str, Any] | None] | None = None
+        self.good: tuple[LiveResults, WallPrecision | None] | None = None
         self._joined = JoinedSet()
         self._faces = DrawnFaces(lambda: self.state, lambda one: self._carry_out(one, write=True))
         #: Faces that the program would draw.

@@ -12,6 +12,7 @@ from bifocal.remarks import in_language
 from bifocal.reports.content import PairContent
 from bifocal.survey.reference import CheckResult
 from bifocal.survey.tolerances import SCALES, judge
+from bifocal.survey.wall_precision import WallPrecision, wall_precision
 from photocore.reports.document import Banner, Block, Paragraph, TextTable
 from photocore.reports.words import Words, words_of
 
@@ -39,7 +40,7 @@ def accuracy_blocks(content: PairContent, say: Words) -> Iterator[Block]:
     check = None if solution is None else solution.check
     if check is None or not np.isfinite(check.accuracy):
         if not _lengths_of(content):
-            yield Banner(text=say("verdict_none"))
+            yield Banner(text=say("verdict_none"), details=_expected(content, say))
         return
     yield _banner(content, check, say)
     yield _verdict_table(check, say)
@@ -79,11 +80,27 @@ def verdict_in_words(content: PairContent) -> list[str]:
     say = words_of("bifocal.reports", "en")
     solution = content.solution
     if solution is None or not np.isfinite(solution.check.accuracy):
-        return [say("verdict_none")]
+        return [say("verdict_none"), *_expected(content, say)]
     banner = _banner(content, solution.check, say)
     misfit = bool(doubts_of(MISFITS, content.pair.remarks))
     parts, (_, *expected) = banner.details[: len(_PARTS)], banner.details[len(_PARTS) :]
     return [f"{banner.text}.", *parts, *expected[:1], *[say("misfit")] * misfit]
+
+
+def precision_in_words(precision: WallPrecision, say: Words) -> str:
+    """Return in a line how precisely the wall is known, and the finest drawing scale that holds."""
+    lengths = {key: 1000 * getattr(precision, key) for key in ("middle", "rim", "place")}
+    holds = "known_none" if precision.scale is None else "known_holds"
+    return say("known_to", **lengths, verdict=say(holds, scale=precision.scale))
+
+
+def _expected(content: PairContent, say: Words) -> tuple[str, ...]:
+    """Return what the sigmas of the pair alone let expect; nothing of a set of photos."""
+    sizes = (content.pair.image1.image_size, content.pair.image2.image_size)
+    if content.of_set is not None or sizes[0] is None or sizes[1] is None:
+        return ()
+    precision = wall_precision(content.pair, (sizes[0], sizes[1]))
+    return () if precision is None else (precision_in_words(precision, say),)
 
 
 def _map_in_words(content: PairContent, say: Words) -> Iterator[str]:

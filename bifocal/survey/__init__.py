@@ -7,5 +7,5 @@ by points of the plane (`orientation_check`), and calls `point_survey`, where Eq
 its columns are prepared by `radii`, `refracted_radii` and `image_shift`. More than two photos are
 `other_photos` and `set_survey`. Then the world: `georeferencing`, by `weighted_similarity`, its
 worth by `transformation_precision`. Last the judgement: `check_points`, `taped`, `tolerances`,
-`basis`, `remarks`; `results` are its words.
+`wall_precision`, `basis`, `remarks`; `results` are its words.
 """

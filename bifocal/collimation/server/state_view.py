@@ -23,11 +23,13 @@ from bifocal.collimation.wording import say, without_options
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
 from bifocal.orientation.align_workflow import interior_of_photo
+from bifocal.reports.accuracy import precision_in_words
 from bifocal.survey.tolerances import SCALES
 from photocore.errors import PhotogrammetryError
 from photocore.images import ImageInfo
 from photocore.jsonfile import plain
 from photocore.remarks import LEVELS, level_of
+from photocore.reports.words import words_of
 
 
 def state_of(session: Session) -> dict[str, Any]:
@@ -222,18 +224,15 @@ def _drawn_length(session: Session) -> dict[str, Any] | None:
 def _how_good(session: Session) -> str:
     """Say in a line how good relief is; nothing where that is not known."""
     good = None if is_unscaled(session) else goodness(session)
-    if good is None or None in (good["middle"], good["rim"], good["place"]):
+    if good is None:
         return ""
-    language, scale = session.spoken, good["scale"]
-    verdict = say("good", "holds" if scale else "none", language, scale=scale)
-    lengths = {key: 1000 * good[key] for key in ("middle", "rim", "place")}
-    return say("good", "relief", language, **lengths, verdict=verdict)
+    return precision_in_words(good, words_of("bifocal.reports", session.spoken))
 
 
 def _drawing_scale(session: Session) -> int | None:
     """Return the finest drawing scale that holds, else the coarsest there is; None: not known."""
     good = None if is_unscaled(session) else goodness(session)
-    return None if good is None else good["scale"] or SCALES[-1]
+    return None if good is None else good.scale or SCALES[-1]
 
 
 def _missing(info: ImageInfo, typed: Mapping[str, float | None], language: str) -> list[str]:

@@ -6,20 +6,21 @@ import numpy as np
 import pytest
 
 from bifocal import InputError, Pair
+from bifocal.collimation.asked import goodness
 from bifocal.collimation.job_tasks import task_of
-from bifocal.collimation.uncertainty import PRINT, how_good, places_sigma
 from bifocal.model.length_checks import LengthCheck
 from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver
 from bifocal.orthophotos.ortho_workflow import OrthoTask
 from bifocal.reports.content import ReportTask
 from bifocal.reports.workflow import report_of
+from bifocal.survey.wall_precision import PRINT, places_sigma
 from tests.page_session import client_of, opened, proposed, sample_folder, two_photos
 
 
 def test_places_are_known_as_well_as_noise_on_the_picks_moves_them(tmp_path) -> None:
     with opened(sample_folder(tmp_path)) as session:
-        stated = float(np.median(places_sigma(session.pictures, session.results)))
-        pair = session.pictures.pair
+        pair, sizes = session.pictures.pair, [info.size for info in session.pictures.infos]
+        stated = float(np.median(places_sigma(pair, sizes, session.results.solved)))
     rng = np.random.default_rng(5)
     plane = rng.uniform((-4.5, -2.5), (4.5, 2.5), (400, 2))
     picks = [pair.photo(number).pixels_from_plane(plane) for number in (1, 2)]
@@ -31,10 +32,10 @@ def test_places_are_known_as_well_as_noise_on_the_picks_moves_them(tmp_path) -> 
 
 def test_the_finest_scale_whose_tolerance_holds_the_places_is_chosen(tmp_path) -> None:
     with opened(sample_folder(tmp_path)) as session:
-        good = how_good(session.pictures, session.results)
-        assert PRINT.tolerance(20) < good["place"] <= PRINT.tolerance(50)
+        good = goodness(session)
+        assert PRINT.tolerance(20) < good.place <= PRINT.tolerance(50)
         state = client_of(session).get("/api/state").json()
-        assert state["drawing_scale"] == good["scale"] == 50
+        assert state["drawing_scale"] == good.scale == 50
         assert "1:50 holds" in state["good"]
 
 
