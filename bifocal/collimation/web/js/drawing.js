@@ -4,7 +4,8 @@ export const INK = { 1: "#63c7ff", 2: "#ffb454" };
 const HATCH = 9;
 const sprites = new Map();
 const DARK = "rgba(0, 0, 0, 0.75)";
-const LABELS_FROM = 60;
+/** Letters of a name beside its mark, at most. */
+const LONGEST = 18;
 /** Of what does not fit. */
 export const DOUBT = "#ff6b6b";
 
@@ -154,16 +155,34 @@ export function picks(context, pane, { items, images, pick, selected, doubtful =
         .map(([, places]) => places[index]), ink);
     }
   });
-  const crowded = seen.length > LABELS_FROM && pane.zoom < 1;
-  for (const [item, places] of seen) {
-    const chosen = item.name === selected;
-    if (chosen) {
-      images.forEach((image, index) => {
-        if (places[index]) marker(context, image, places[index], { selected: true, ink: inkOf(item, image) });
-      });
-    }
-    const [x, y] = places.find(Boolean);
-    if (!crowded || chosen) label(context, item.name, [x + (chosen ? 15 : 9) * unit, y - 8 * unit]);
+  const last = seen.findLast(([item]) => item.name === selected);
+  if (last) {
+    images.forEach((image, index) => {
+      if (last[1][index]) marker(context, image, last[1][index], { selected: true, ink: inkOf(last[0], image) });
+    });
+  }
+  names(context, pane, (last ? [last, ...seen.filter((one) => one !== last)] : seen)
+    .map(([item, places]) => [item.name, places.find(Boolean), item.name === selected ? 15 : 9]));
+}
+
+/** Names beside their marks, on whichever side is free; none over another, long ones without their middle. */
+function names(context, pane, marks) {
+  const rows = new Map();
+  context.font = `500 ${12 * unit}px system-ui, sans-serif`;
+  const height = 14 * unit;
+  for (const [name, [x, y], gap] of marks) {
+    const text = name.length > LONGEST ? `${name.slice(0, LONGEST / 2)}…${name.slice(1 - LONGEST / 2)}` : name;
+    const { width } = context.measureText(text);
+    const sides = [[gap, -8], [gap, 17], [-gap, -8], [-gap, 17]].map(([dx, dy]) =>
+      [x + dx * unit - (dx < 0 ? width : 0), y + dy * unit]);
+    const free = sides.find(([left, base]) => left >= 0 && left + width <= pane.width && [-1, 0, 1].every((near) =>
+      (rows.get(Math.round(base / height) + near) ?? []).every(([from, to, at]) =>
+        to < left || from > left + width || Math.abs(at - base) >= height)));
+    if (!free) continue;
+    label(context, text, free);
+    const row = Math.round(free[1] / height);
+    if (!rows.has(row)) rows.set(row, []);
+    rows.get(row).push([free[0], free[0] + width, free[1]]);
   }
 }
 
