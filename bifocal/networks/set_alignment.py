@@ -14,6 +14,7 @@ from bifocal.model.interior_orientation import Interior
 from bifocal.model.orientation_precision import CAMERA, moved
 from bifocal.model.pair_media import PairMedia
 from bifocal.model.photo_set import PhotoSet
+from bifocal.networks.photo_influence import dragging_photo
 from bifocal.networks.set_orientation import OrientedSet, orient_set
 from bifocal.orientation.alignment import facade_axes, lens_of, photo_of
 from bifocal.orientation.control_points import Control, SiteMeasures
@@ -219,4 +220,7 @@ def _remarks(oriented: OrientedSet) -> tuple[str, ...]:
         if spread > REMARKS.worst_scale * camera.centre[2]:
             about = {"distance": float(camera.centre[2]), "sigma": spread}
             remarks.append(remark("photo_set.poor_distance", name=names[k], **about))
+    if (dragging := dragging_photo(adjusted)) is not None:
+        about = {"times": dragging.test, "moved": 1000 * dragging.moved}
+        remarks.append(remark("photo_set.drags", name=dragging.name, **about))
     return tuple(dict.fromkeys(remarks))

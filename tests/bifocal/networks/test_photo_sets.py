@@ -28,6 +28,7 @@ from bifocal.model.orientation_precision import CAMERA
 from bifocal.networks.camera_knowledge import CameraKnowledge
 from bifocal.networks.joint_adjustment import JointUnknowns, adjust_jointly
 from bifocal.networks.joint_observations import JointObservations
+from bifocal.networks.photo_influence import dragging_photo
 from bifocal.networks.set_orientation import turned_set
 from bifocal.orientation.adjustment.frame_turn import line_equations
 from bifocal.orientation.facade_lines import FacadeDirection
@@ -115,6 +116,20 @@ def test_cameras_and_points_of_a_set_are_as_precise_as_their_sigmas_say(by_wall)
     for ratio in (np.sqrt(np.mean(np.square(centres))), np.sqrt(np.mean(np.square(focals)))):
         assert 0.75 < ratio < 1.25
     assert 0.85 < np.sqrt(np.mean(points)) < 1.15
+
+
+def test_a_photo_that_drags_the_others_is_named_and_no_honest_one():
+    """The sensor of the far photo is bent by 2 px, as by another photo's lens file."""
+    seen, start, _, _ = simulated(np.random.default_rng(1), by_wall=False)
+    assert dragging_photo(adjust_jointly(seen, start)) is None
+    pixels, rays = seen.pixels.copy(), seen.camera == 0
+    along = (pixels[rays] - [1536, 1024]) / 1536
+    pixels[rays] += 2 * along[:, :1] * along[:, ::-1]
+    photo = dragging_photo(adjust_jointly(replace(seen, pixels=pixels), start))
+    assert photo is not None
+    assert photo.name == "a"
+    assert photo.test > 4
+    assert photo.moved > 0.005
 
 
 def test_lines_turn_the_frame_of_a_set_and_neither_its_lenses_nor_its_relative_orientation():
