@@ -170,11 +170,18 @@ def by_rectangle(
         near = np.exp(np.linspace(-0.5, 0.5, 41))
         close = near[misfits(near).argmin()] * np.exp(np.linspace(-0.025, 0.025, 21))
         rest = misfits(close)
+        focal = ""
+        with suppress(GeometryError, ConvergenceError):
+            control = replace(cornered(width, height), pixels1=interior.ideal(corners))
+            free = _by_points(control, replace(interior, sigma_focal=0.5), sigma_pick)
+            if free.sigma0 < SLIPS.doubted:
+                times = float(free.camera.matrix[0, 0]) / interior.focal
+                focal = remark("rectify.other_focal", times=times)
         if rest.min() > SLIPS.doubted:
-            return ""
+            return focal
         best = float(close[rest == rest.min()].mean())
         about = {"width": width * best, "height": height / best, "at": height, "by": width}
-        return remark("rectify.proportions", **about)
+        return " ".join(text for text in (remark("rectify.proportions", **about), focal) if text)
 
     try:
         photo = fitted(width, height)

@@ -309,6 +309,19 @@ def test_a_side_that_was_measured_wrongly_is_no_crop() -> None:
     assert done.photo.sigma_at(CORNERS).max() > 0.03  # 0.2 m off in the width
 
 
+def test_a_focal_length_that_would_fit_stands_beside_the_sides_that_would() -> None:
+    """The lens is said to be 1.25 times as long as it is; the photo looks up at the wall."""
+    image = np.zeros(SIZE[::-1], np.uint8)
+    lens = Interior.from_focal(1.25 * 1500.0, image_size=SIZE, sigma=0.01, source="test")
+    try:
+        remarks = rectify(image, rectangle=((5.0, 4.0), seen(CORNERS)), interior=lens).remarks
+    except GeometryError as error:
+        remarks = (str(error),)
+    (words,) = [note for note in remarks if "fit a focal length" in note]
+    times = float(words.partition("focal length ")[2].partition(" times")[0])
+    assert times == pytest.approx(0.8, abs=0.02)
+
+
 def test_points_at_one_pixel_were_not_seen() -> None:
     points = np.vstack([DOTS[::4], [[1.0, 1.0], [2.0, -1.0]]])
     picks = seen(points)
