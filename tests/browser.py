@@ -230,11 +230,13 @@ class Driver:
         return json.loads(answer)["result"]
 
     def empty(self) -> None:
-        """Delete all points and control and let go of everything: a test begins afresh."""
-        for kind, listed in (("point", "points"), ("control", "control")):
+        """Delete all points, control and shapes and let go of everything: a test begins afresh."""
+        listings = {"point": "points", "control": "control", "shape": "shapes"}
+        for kind, listed in listings.items():
             for one in self.state[listed]:
                 self.command(f"{kind}.delete", name=one["name"])
-        self.settled("state.points.length === 0 && state.control.length === 0")
+        empty = (f"state.{listed}.length === 0" for listed in listings.values())
+        self.settled(" && ".join(empty))
         self.click("mode-points")
         self.pane.focus()
         self.keys("Escape", "Escape", "n", "v", "0")

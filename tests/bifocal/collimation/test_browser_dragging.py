@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.browser import TARGETS, Driver, sample_survey, tab_of, true_pixel
+from tests.browser import TARGETS, Driver, Served, sample_survey, tab_of, true_pixel
 
 pytestmark = pytest.mark.browser
 
@@ -16,11 +16,15 @@ WINDOW = [(-3.2, -0.6), (-2.2, -0.6), (-2.2, 0.6), (-3.2, 0.6)]
 
 
 @pytest.fixture(scope="module")
-def page(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driver]:
-    with (
-        sample_survey(tmp_path_factory.mktemp("dragging")) as server,
-        tab_of(browser, server) as driver,
-    ):
+def served_sample(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    with sample_survey(tmp_path_factory.mktemp("dragging")) as server:
+        yield server
+
+
+@pytest.fixture
+def page(browser: Any, served_sample: Served) -> Iterator[Driver]:
+    with tab_of(browser, served_sample) as driver:
+        driver.empty()
         yield driver
 
 
@@ -49,6 +53,25 @@ def test_a_mark_in_hand_is_dragged_and_the_photo_stays(page: Driver) -> None:
 
 def outline(page: Driver) -> list[list[float]]:
     return page.settled("state.shapes.length === 1")["shapes"][0]["corners"]
+
+
+def test_corners_are_typed_by_their_coordinates(page: Driver) -> None:
+    page.click("mode-products")
+    page.tab.get_by_test_id("face-kind").select_option("outline")
+    page.click("face")
+    field = page.tab.get_by_test_id("face-typed")
+    field.fill("here")
+    field.press("Enter")
+    page.wait("() => document.body.textContent.includes('Type X; Y of a corner in metres')")
+    for count, text in enumerate(("-2; 1", "1,5; 1", "1.5 -1.25"), start=1):
+        field.fill(text)
+        field.press("Enter")
+        page.wait(f"() => document.body.textContent.includes('Corners: {count}.')")
+    page.click("face-close")
+    (shape,) = page.settled("state.shapes.length === 1")["shapes"]
+    typed = [true_pixel(1, (x, y, 0.0)) for x, y in ((-2, 1), (1.5, 1), (1.5, -1.25))]
+    assert np.abs(np.array(shape["corners"])[:, :2] - typed).max() < 0.01
+    assert shape["width"] == pytest.approx(3.5, abs=1e-4)
 
 
 def test_corners_are_dragged_taken_back_and_kept_from_snapping(page: Driver) -> None:

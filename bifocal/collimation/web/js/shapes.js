@@ -2,10 +2,10 @@
  * What is drawn on the wall in the last stage: faces, break lines and occluders that relief and
  * orthophoto obey, outlines that are measured. Corners snap, and are kept as pixels of photo 1.
  */
-import { h, keyedRows, number, setText } from "./dom.js";
+import { h, keyedRows, number, parseNumber, setText } from "./dom.js";
 import * as drawing from "./drawing.js";
 import { nearest } from "./dragging.js";
-import { button, choice, fill, numberInput } from "./fields.js";
+import { button, choice, fill, numberInput, textInput } from "./fields.js";
 import { t } from "./words/words.js";
 
 const KINDS = ["face", "break", "occluder", "outline"];
@@ -24,11 +24,13 @@ export class Shapes {
     this.close = button(t("shape.close"), () => this.finish(), { class: "quiet", testid: "face-close", hidden: true });
     this.suggest = button(t("shape.suggest"), () => app.job("suggest"), { class: "quiet", testid: "face-suggest" });
     this.snap = button(t("shape.snap"), () => this.toggleSnap(), { class: "quiet", testid: "face-snap", "aria-pressed": "true" });
+    this.typed = textInput({ label: t("shape.typed"), placeholder: "X; Y [m]", size: "12", testid: "face-typed", hidden: true,
+      save: (text) => this.#type(text) });
     this.hint = h("p", { class: "hint", role: "status" });
     this.body = h("tbody");
     this.offers = h("ul", { class: "offers" });
     this.element = h("section", { class: "card" }, h("h2", {}, t("shape.title")),
-      h("div", { class: "row" }, this.kind, this.begin, this.close, this.snap, this.suggest), app.jobBox("suggest"), this.hint,
+      h("div", { class: "row" }, this.kind, this.begin, this.close, this.typed, this.snap, this.suggest), app.jobBox("suggest"), this.hint,
       this.offers, h("table", { class: "grid", testid: "shape-table" }, this.body));
   }
 
@@ -108,31 +110,44 @@ export class Shapes {
     return this.latest;
   }
 
+  /** A corner by its coordinates on the wall: "4.20; 1.35". */
+  async #type(text) {
+    const place = text.split(/[;\s]+/).map(parseNumber);
+    if (place.length !== 2 || !place.every(Number.isFinite)) return this.app.say(t("shape.typedHow"), "warning");
+    this.typed.value = this.typed.dataset.known = "";
+    return this.#next(() => this.#add(this.stage.wall.fromPlane(place), { typed: true }));
+  }
+
   async #take(spot) {
     const { corners } = this;
     if (!corners) return undefined;
     const place = this.stage.pane.place(spot);
     const first = corners[0] && this.stage.pane.place(this.#shown(corners[0]));
     if (corners.length > 2 && Math.hypot(first[0] - place[0], first[1] - place[1]) < CLOSE) return this.#keep();
-    const corner = await this.#corner(spot).catch((error) => this.app.refuse(error));
-    if (!corner || this.corners !== corners) return undefined;
+    return this.#add(spot);
+  }
+
+  async #add(spot, how) {
+    const { corners } = this;
+    const corner = await this.#corner(spot, how).catch((error) => this.app.refuse(error));
+    if (!corner || !corners || this.corners !== corners) return undefined;
     corners.push(corner);
     this.update(this.app.state);
     return this.stage.pane.paint();
   }
 
-  /** The photo's pixel under a place, on the corner there, with its relief. */
-  async #corner(spot) {
+  /** The photo's pixel under a place, on the corner there unless it was typed, with its relief. */
+  async #corner(spot, { typed = false } = {}) {
     const { connection } = this.app;
     let pixel = this.stage.wall.toPhoto(1, spot);
-    if (this.stage.onOrtho) {
+    if (this.stage.onOrtho || typed) {
       const [X, Y] = this.stage.wall.toPlane(spot);
       const { picks } = await connection.get(`relief/value?X=${X}&Y=${Y}`).catch(() => ({}));
       if (picks) [pixel] = picks;
     }
     const [column, row] = pixel;
     const radius = Math.min(Math.max(4 / this.stage.pane.zoom, 4), 14);
-    const found = !this.snapping ? null : await connection.ask("api/snap", { image: 1, column, row, radius }).catch(() => null);
+    const found = typed || !this.snapping ? null : await connection.ask("api/snap", { image: 1, column, row, radius }).catch(() => null);
     if (found && found.kind !== "none") pixel = [found.column, found.row];
     const { places } = await connection.ask("relief/met", { pixels: [pixel] });
     return [...pixel, places[0][2] ?? 0];
@@ -179,6 +194,7 @@ export class Shapes {
     this.begin.setAttribute("aria-pressed", String(Boolean(this.corners)));
     this.begin.disabled = !state.pair;
     this.close.hidden = !this.corners?.length;
+    this.typed.hidden = !this.corners;
     this.suggest.disabled = !state.products.relief;
     setText(this.hint, this.corners ? t("shape.corners", { count: this.corners.length }) : t(state.shapes.length ? "shape.again" : "shape.hint"));
     keyedRows(this.offers, state.suggested.filter(({ corners }) => !state.shapes.some((one) => String(one.corners) === String(corners))),

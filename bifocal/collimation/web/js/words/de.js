@@ -301,6 +301,8 @@ export default {
   "shape.occluder": "Verdeckung",
   "shape.outline": "Umriss zum Messen",
   "shape.draw": "Zeichnen",
+  "shape.typed": "Ecke durch Koordinaten",
+  "shape.typedHow": "X; Y einer Ecke in Metern eintippen, z. B. 4,20; 1,35.",
   "shape.close": "Abschließen",
   "shape.suggest": "Vorschlagen",
   "shape.hint": "Fenster, Türen und Läden als ebene Flächen, Kanten als Bruchkanten, Bäume und Autos als Verdeckungen: Relief und Orthofoto halten sich beim nächsten Lauf daran. Umrisse werden gemessen und kommen ins DXF.",

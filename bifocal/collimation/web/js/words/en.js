@@ -301,6 +301,8 @@ export default {
   "shape.occluder": "occluder",
   "shape.outline": "outline to measure",
   "shape.draw": "Draw",
+  "shape.typed": "Corner by its coordinates",
+  "shape.typedHow": "Type X; Y of a corner in metres, e.g. 4.20; 1.35.",
   "shape.close": "Finish",
   "shape.suggest": "Suggest",
   "shape.hint": "Windows, doors and shutters as plane faces, edges as break lines, trees and cars as occluders: relief and orthophoto obey them at the next run. Outlines are measured and go into the DXF.",

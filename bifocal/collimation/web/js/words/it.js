@@ -301,6 +301,8 @@ export default {
   "shape.occluder": "ostacolo",
   "shape.outline": "contorno da misurare",
   "shape.draw": "Traccia",
+  "shape.typed": "Vertice per coordinate",
+  "shape.typedHow": "Scrivi X; Y di un vertice in metri, ad es. 4,20; 1,35.",
   "shape.close": "Chiudi",
   "shape.suggest": "Proponi",
   "shape.hint": "Finestre, porte e persiane come facce piane, spigoli come linee di discontinuità, alberi e auto come ostacoli: rilievo e ortofoto ne tengono conto al prossimo calcolo. I contorni si misurano e vanno nel DXF.",
