@@ -28,7 +28,9 @@ SAME_SHAPE = 0.01
 #: Sensors of phones are smaller. [mm]
 PHONE = 14.0
 #: Proportions of what cameras and phones write, and how closely bodies keep to them.
-SHAPES, KEPT = (1.0, 1.25, 4 / 3, 1.5, 16 / 9, 2.0, 18.5 / 9, 13 / 6, 20 / 9, 65 / 24), 0.01
+SHAPES, KEPT = (
+    1.0, 7 / 6, 1.25, 4 / 3, 1.5, 1.6, 16 / 9, 2.0, 18.5 / 9, 13 / 6, 20 / 9, 21 / 9, 65 / 24,
+), 0.01  # fmt: skip
 #: A photo of other proportions lost so much of its diagonal on one side, as a standard deviation.
 LOST = 0.05
 
@@ -92,6 +94,18 @@ def sensors_apart(first: ImageInfo, second: ImageInfo) -> float:
     return apart if apart > AGREE else 0.0
 
 
+def is_odd(size: tuple[int, int]) -> bool:
+    """Return whether no camera gives photos of these proportions: they were cut out of one.
+
+    Examples
+    --------
+    >>> is_odd((3072, 2048)), is_odd((2448, 3264)), is_odd((1920, 1200)), is_odd((700, 800))
+    (False, False, False, True)
+    """
+    shape = max(size) / min(size)
+    return all(abs(shape / one - 1) > KEPT for one in SHAPES)
+
+
 def middle_aside(info: ImageInfo) -> tuple[float, str]:
     """Return how far the middle of a photo may be from the camera's own, and what says so.
 
@@ -114,9 +128,7 @@ def middle_aside(info: ImageInfo) -> tuple[float, str]:
         lost = np.hypot(recorded[0] * fit - small, recorded[1] * fit - large)
         about |= {"wide": recorded[1], "high": recorded[0]}
         key, sigma = "cropped", 0.3 * float(lost)
-    elif not (info.model or info.focal_length) or any(
-        abs(shape / one - 1) < KEPT for one in SHAPES
-    ):
+    elif not (info.model or info.focal_length) or not is_odd(info.size):
         return 0.0, ""
     else:
         key, sigma = "odd_shape", LOST * float(np.hypot(small, large))

@@ -402,6 +402,7 @@ def control_of(
             raise InputError("--lengths names points of the --control table; give that too.")
         control = read_lengths(options.lengths, control)
     if options.length:
+        _check_ends(options.length[0][0], sizes[0])
         control = _with_length(control, options.length[0], options.site.sigma_control)
     names = ("far", "near") if len(sizes) == 2 else [f"{k}." for k in range(1, len(sizes) + 1)]
     for pixels, size, photo in zip(control.picks, sizes, names, strict=False):
@@ -419,10 +420,8 @@ def lengths_checked(
     lengths, sigma = options.checking, options.site.sigma_control
     if not lengths:
         return setup, ()
-    for name, (ends, _) in lengths.items():
-        size = photos.photos[photo - 1].image_size
-        if size is not None:
-            check_inside([f"length {name}"] * 2, ends, size, "far")
+    for ends, _ in lengths.values():
+        _check_ends(ends, photos.photos[photo - 1].image_size)
     checks = {
         name: check_in_set(photos, photo - 1, ends, metres, sigma=sigma)
         for name, (ends, metres) in lengths.items()
@@ -455,6 +454,14 @@ def _with_length(
         more=tuple(np.concatenate([picks, unseen]) for picks in control.more),
         lengths=(*control.lengths, (count, count + 1, length[1])),
     )
+
+
+def _check_ends(ends: FloatArray | tuple[float, ...], size: tuple[int, int] | None) -> None:
+    """Refuse a length whose ends are not both in its photo."""
+    for column, row in np.reshape(np.asarray(ends, dtype=np.float64), (2, 2)).tolist():
+        if size is not None and not (-0.5 <= column <= size[0] and -0.5 <= row <= size[1]):
+            about = {"column": column, "row": row, "width": size[0], "height": size[1]}
+            raise InputError(remark("refused.length_outside", **about))
 
 
 def check_inside(ids: Sequence[str], pixels: FloatArray, size: tuple[int, int], photo: str) -> None:

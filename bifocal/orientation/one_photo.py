@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from bifocal.files.exif_judge import is_odd
 from bifocal.model.interior_orientation import Interior
 from bifocal.model.photo import Photo
 from bifocal.model.photo_alone import PhotoAlone
@@ -250,7 +251,7 @@ def by_control(control: Control, interior: Interior, *, sigma_pick: float) -> Or
         # any crop.
         fewer = len(gross) != 1 or cut.sigma0 < photo.sigma0
         if cut.sigma0 < first.sigma0 / SLIPS.better and fewer:
-            if len(control.ids) > 4 and _is_odd(interior.image_size):
+            if len(control.ids) > 4 and is_odd(interior.image_size):
                 photo, gross = _without_gross(control, loose, sigma_pick, cut)
                 gross = [remark("rectify.cut_out"), *gross]
             else:
@@ -258,18 +259,6 @@ def by_control(control: Control, interior: Interior, *, sigma_pick: float) -> Or
     if photo.sigma0 > SLIPS.doubted:
         gross = [remark("rectify.misfit", times=photo.sigma0), *gross]
     return replace(photo, remarks=(*notes, *gross))
-
-
-def _is_odd(size: tuple[int, int]) -> bool:
-    """Return whether no camera gives photos of these proportions: they were cut out of one.
-
-    Examples
-    --------
-    >>> _is_odd((3072, 2048)), _is_odd((2448, 3264)), _is_odd((700, 800))
-    (False, False, True)
-    """
-    ratio = max(size) / min(size)
-    return all(abs(ratio / usual - 1) > 0.005 for usual in (3 / 2, 4 / 3, 16 / 9, 1.0, 5 / 4))
 
 
 def _of_points(control: Control, which: BoolArray) -> Control:

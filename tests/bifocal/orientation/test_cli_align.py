@@ -173,6 +173,10 @@ def test_picks_of_the_other_photo_are_exchanged_and_said(folder) -> None:
         (["--auto", "--lens", "absent.json", "--distance1", "16"], "absent.json"),
         (["--distance1", "16000", "--distance2", "9000"], "is it in mm?"),
         (["--auto", "--length", "10,10,90,10,4215"], "--length 4215 m is too far"),
+        (
+            ["--auto", "--length", "10,10,9000,10,4"],
+            "--length ends at 9000,10, outside the far photo",
+        ),
         (["--auto", *["--length", "1,1,9,1,4"] * 2, "--length", "1,1,9,1,0"], "--length"),
         (["--distance1", "16", "--distance2", "9", "--focal1", "35"], "Give --sensor-width"),
     ],
