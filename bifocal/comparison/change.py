@@ -217,23 +217,17 @@ def compare(
         if abs(common[0]) > 3 * np.sqrt(variance[0, 0]):
             remarks.append(remark("compare.offset", offset=1000 * float(common[0])))
     smooth = np.nan_to_num(patches.averages(cells.difference)[0])
-    whole = labels.repeat(pixels, axis=0).repeat(pixels, axis=1)
-    whole = whole[: difference.shape[0], : difference.shape[1]]
+    height, width = difference.shape
+    whole = labels.repeat(pixels, axis=0).repeat(pixels, axis=1)[:height, :width]
     if dates is not None and (wrong := contradicted(whole, difference, (before, after), dates)):
         two_surfaces |= np.isin(whole, wrong)
         area = float(np.isin(whole, wrong).sum()) * difference.gsd**2
         remarks.append(remark("compare.photos_contradict", count=len(wrong), area=area))
-        kept = [one for one in regions if one.number not in wrong]
-        ranks = np.zeros(len(regions) + 1, np.int64)
-        ranks[[one.number for one in kept]] = np.arange(1, len(kept) + 1)
-        whole = ranks[whole]
-        regions = tuple(replace(one, number=int(ranks[one.number])) for one in kept)
+        regions, whole = _without(regions, whole, wrong)
     return Comparison(
         difference=difference,
         region=np.where(two_surfaces & (whole == 0), -1, whole),
-        smooth=cv2.resize(smooth, None, fx=pixels, fy=pixels, interpolation=cv2.INTER_LINEAR)[
-            : difference.shape[0], : difference.shape[1]
-        ],
+        smooth=cv2.resize(smooth, None, fx=pixels, fy=pixels)[:height, :width],
         regions=regions,
         level=level,
         trend=_three(trend),
@@ -246,6 +240,16 @@ def compare(
         compared=float(cells.known.sum() * cells.grid.gsd**2),
         remarks=tuple(remarks),
     )
+
+
+def _without(
+    regions: Sequence[ChangedRegion], labels: IntArray, wrong: Sequence[int]
+) -> tuple[tuple[ChangedRegion, ...], IntArray]:
+    """Return regions but some, and the pixels of each, numbered anew."""
+    kept = [one for one in regions if one.number not in wrong]
+    ranks = np.zeros(len(regions) + 1, np.int64)
+    ranks[[one.number for one in kept]] = np.arange(1, len(kept) + 1)
+    return tuple(replace(one, number=int(ranks[one.number])) for one in kept), ranks[labels]
 
 
 def _three(values: FloatArray) -> tuple[float, float, float]:

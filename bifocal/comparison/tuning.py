@@ -50,7 +50,7 @@ class ChangeTuning:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EvidenceTuning:
+class PhotoVerdictTuning:
     """What the photos of both dates say of a change."""
 
     #: A change that moves no photo against another by so many pixels of the map shows in none.
@@ -69,4 +69,4 @@ class EvidenceTuning:
 
 CHANCE = ChanceTuning()
 CHANGE = ChangeTuning()
-EVIDENCE = EvidenceTuning()
+EVIDENCE = PhotoVerdictTuning()

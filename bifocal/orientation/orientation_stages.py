@@ -487,11 +487,10 @@ def _care(cameras: Cameras) -> float:
     to 0.3°.
     """
     far, near = cameras
-    matrix = plane_transfer(far, near, np.zeros(3))
     corner = [np.eye(3), np.eye(3)]  # pixels from the principal point to those from the corner
     for shift, camera in zip(corner, cameras, strict=True):
         shift[:2, 2] = camera.matrix[:2, 2]
-    centred = np.linalg.inv(corner[1]) @ matrix @ corner[0]
+    centred = np.linalg.inv(corner[1]) @ plane_transfer(far, near, np.zeros(3)) @ corner[0]
     centred /= centred[2, 2]
     focal = 1.0 / np.hypot(1.0 / far.matrix[0, 0], 1.0 / near.matrix[0, 0])
     keystone = float(np.abs(centred[2, :2]).max() * focal)
