@@ -104,8 +104,11 @@ def main() -> int:
             for name, cost in seconds.items()
             if cost > DEAR
         }
-        text = json.dumps(dict(sorted(table.items())), indent=1, ensure_ascii=False)
-        TABLE.write_text(text + "\n", encoding="utf-8")
+        lines = (
+            f" {json.dumps(k)}: {json.dumps(v, ensure_ascii=False)}"
+            for k, v in sorted(table.items())
+        )
+        TABLE.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
     dear = unexplained(seconds, table)
     for name, cost in dear.items():
         sys.stdout.write(f"{cost:.1f} CPU s: {name}: make it cheaper, or say what only it sees\n")

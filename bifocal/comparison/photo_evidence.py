@@ -67,7 +67,9 @@ def contradicted(
             numbers.append(number)
             continue
         fits = np.reshape([one[visible].mean() for one in misfits], (2, 2))
-        better = min(EVIDENCE.better * apart, EVIDENCE.most) if apart > EVIDENCE.parallax else -9
+        better = -np.inf
+        if apart > EVIDENCE.parallax:
+            better = min(EVIDENCE.better * apart, EVIDENCE.most)
         if fits[:, 0].max() > EVIDENCE.fits or (fits[:, 1] - fits[:, 0]).min() < better:
             numbers.append(number)
     return numbers

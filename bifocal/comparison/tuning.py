@@ -56,7 +56,7 @@ class PhotoVerdictTuning:
     #: A change that moves no photo against another by so many pixels of the map shows in none.
     parallax: float = 0.75
     #: A date's photos show its own relief better than the other date's by so much for every pixel
-    #: that the change moves them,. [times what they usually differ by]
+    #: that the change moves them. [times what they usually differ by]
     #: Evidence: rendered walls taken twice under other suns: true changes that move photos by 0.8
     #: and 1.4 px gain 0.09 and 0.20, false ones that move them by 2 to 30 px less than 0.17.
     better: float = 0.08
