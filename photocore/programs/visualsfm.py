@@ -4,10 +4,14 @@ A line a camera: name, f, quaternion (w x y z) from the world into the camera, c
 z forwards, pixels from the middle of the photo. Its distortion corrects what was measured:
 ideal = m (1 + r m²), m in units of f (its manual, and Multicore Bundle Adjustment's
 ``SetNormalizedMeasurementDistortion``). Blanks in names are written as quotation marks.
+
+A calibration that was kept fixed stands in the first line: ``NVM_V3 FixedK fx cx fy cy r``, the
+principal point from the corner of the first pixel; written by others, from the middle of the photo.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -34,8 +38,9 @@ def read_visualsfm(path: Path, photos: PhotoFinder, part: str | None = None) -> 
     lines = [line for line in read_text(path, "NVM file").splitlines()
              if line.strip() and not line.startswith("#")]  # fmt: skip
     head = lines[0].split() if lines else []
-    if head[:1] != ["NVM_V3"] or head[1:]:
+    if head[:1] != ["NVM_V3"] or head[1:2] not in ([], ["FixedK"]) or len(head) not in (1, 6, 7):
         raise InputError(remark("programs.nvm", of=path, head=" ".join(head)[:40]))
+    fixed = floats_of_words(head[2:], path, "FixedK").tolist()
     models: dict[str, tuple[list[str], list[str]]] = {}
     place = 1
     while place < len(lines) and (count := _count(lines, place, path)):
@@ -55,7 +60,7 @@ def read_visualsfm(path: Path, photos: PhotoFinder, part: str | None = None) -> 
         if len(values) != 10:
             raise InputError(f"{path}: camera {words[0]}: expected 10 numbers.")
         photo = words[0].replace('"', " ").replace("\\", "/")
-        fit = _lens(values[0], values[8], photos.size(photo), path)
+        fit = _lens([values[0], *values[8:9]], fixed, photos.size(photo), path)
         rotation = rotation_from_quaternion(values[1:5], f"{path}: camera {photo}, quaternion")
         views.append(ForeignView(photo, fit.lens, rotation, values[5:8]))
         fits |= dict.fromkeys(fit.remarks)
@@ -70,10 +75,18 @@ def _count(lines: list[str], place: int, path: Path) -> int:
     return int(word)
 
 
-def _lens(focal: float, radial: float, size: tuple[int, int], path: Path) -> FittedLens:
+def _lens(
+    free: Sequence[float], fixed: Sequence[float], size: tuple[int, int], path: Path
+) -> FittedLens:
+    """Return a camera's lens: its focal length and r, and what was fixed for all, if anything."""
     middle, source = (np.array(size) - 1) / 2, f"VisualSFM, {path.name}"
+    focal, radial = [free[0]] * 2, free[1]
+    if fixed:
+        focal, centre = [fixed[0], fixed[2]], np.array([fixed[1], fixed[3]])
+        middle = (middle if (np.abs(centre) < 0.25 * np.array(size)).all() else -0.5) + centre
+        radial = radial or (*fixed, 0.0)[4]
     if not radial:
-        return FittedLens(lens_data([focal] * 2, middle.tolist(), [], size, source))
+        return FittedLens(lens_data(focal, middle.tolist(), [], size, source))
 
     def ideal(pixels: FloatArray) -> FloatArray:
         away = (pixels - middle) / focal

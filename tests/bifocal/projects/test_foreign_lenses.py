@@ -108,6 +108,23 @@ def test_visualsfm_corrects_what_was_measured(tmp_path: Path) -> None:
         np.testing.assert_allclose(found, 280 * m + [149.5, 99.5], atol=1e-4)
 
 
+@pytest.mark.parametrize("centre", ["153 98", "3 -2"])  # from the corner, from the middle
+def test_visualsfm_keeps_a_calibration_fixed(tmp_path: Path, centre: str) -> None:
+    Image.new("L", (300, 200)).save(tmp_path / "a.jpg")
+    path, (cx, cy) = tmp_path / "m.nvm", centre.split()
+    path.write_text(f"NVM_V3 FixedK 280 {cx} 281 {cy} 0\n\n1\na.jpg 280 1 0 0 0 0 0 0 0 0\n\n0\n")
+    (view,) = read_foreign_project(path, PhotoFinder(path)).views
+    found = projected(view, np.array([[0.3, -0.2, 1.0]]))[0]
+    # The middle is at 150, 100 from the corner of the first pixel, whose own middle is at 0.5.
+    np.testing.assert_allclose(found, [0.3 * 280 + 152.5, -0.2 * 281 + 97.5], atol=1e-9)
+    path.write_text(path.read_text().replace("FixedK 280", "FixedK wide"))
+    with pytest.raises(InputError, match="FixedK"):
+        read_foreign_project(path, PhotoFinder(path))
+    path.write_text("NVM_V3_R9T\n0\n")
+    with pytest.raises(InputError, match="expected NVM_V3, or NVM_V3 FixedK"):
+        read_foreign_project(path, PhotoFinder(path))
+
+
 def test_a_radial_fourth_term_of_realitycapture_is_fitted(tmp_path: Path) -> None:
     Image.new("L", SIZE).save(tmp_path / "one.jpg")
     path = tmp_path / "cameras.csv"
