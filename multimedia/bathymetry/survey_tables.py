@@ -15,7 +15,7 @@ from multimedia.projects.project_file import read_project
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
-from photocore.names import meant
+from photocore.names import did_you_mean, meant
 from photocore.tables import Column, Table, read_table
 from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH, PHOTOS
 from photocore.tables.numbers import METRES
@@ -121,8 +121,9 @@ def read_levels(path: Path | str, cameras: CameraPositions) -> FloatArray:
         found = dict(zip(meant(table.texts("camera"), cameras.ids), heights.tolist(), strict=True))
         missing = [name for name in cameras.ids if name not in found]
         if missing:
+            like = did_you_mean(missing[0], found)
             raise InputError(
-                f"{path}: has no level for photo {missing[0]} ({len(missing)} in all)."
+                f"{path}: has no level for photo {missing[0]}{like} ({len(missing)} in all)."
             )
         return np.array([found[name] for name in cameras.ids])
     if "time" not in table.present:

@@ -39,6 +39,7 @@ from photocore.cli import Progress, no_progress
 from photocore.cloud import open_cloud
 from photocore.cloud.model import Cloud, CloudPiece
 from photocore.errors import GeometryError, InputError, located
+from photocore.names import did_you_mean
 from photocore.output import check_ending, check_not_input, check_writable
 from photocore.raster import Window
 from photocore.tables import write_csv
@@ -240,9 +241,10 @@ def _check_pairs(pairs: Mapping[str, set[str]], cameras: CameraPositions, job: J
     """Raise InputError for cameras that only one of the tables knows."""
     unknown = sorted(set().union(*pairs.values()) - set(cameras.ids))
     if unknown:
+        like = did_you_mean(unknown[0], cameras.ids)
+        more = f" (and {len(unknown) - 1} more)" if len(unknown) > 1 else ""
         raise InputError(
-            f"{job.visibility}: camera {unknown[0]!r} is not in {job.cameras}"
-            f"{f' (and {len(unknown) - 1} more)' if len(unknown) > 1 else ''}."
+            f"{job.visibility}: camera {unknown[0]!r} is not in {job.cameras}{like}{more}."
         )
 
 

@@ -152,6 +152,13 @@ def test_tables_that_do_not_fit_each_other_are_named(tmp_path: Path) -> None:
         tmp_path, tmp_path / "in.csv", *cameras, "--visibility", tmp_path / "seen.csv"
     )
     assert "camera 'c9' is not in" in message
+    (tmp_path / "named.csv").write_text(
+        "id,X,Y,Z\nIMG_0001,0,0,150\nc2,9,0,150\n", encoding="utf-8"
+    )
+    (tmp_path / "near.csv").write_text("point,camera\nP1,IMG_O001\n", encoding="utf-8")
+    given = ("--cameras", tmp_path / "named.csv", "--visibility", tmp_path / "near.csv")
+    message = refused(tmp_path, tmp_path / "in.csv", *given)
+    assert "(did you mean IMG_0001?)" in message
     (tmp_path / "by.csv").write_text(
         "id,X,Y,Z,cameras\nP1,1,2,90,c1 c2\nP2,5,6,91,c1 c9\n", encoding="utf-8"
     )

@@ -92,6 +92,11 @@ def test_every_photo_has_the_level_of_its_time(tmp_path: Path) -> None:
         ("time,level\n10:00,1\n10:20,2\n", "id,X,Y,Z,time\na,0,0,9,10:30\nb,1,0,9,10:05\n", "zone"),
         ("time,level\n0,1\n9,2\n", "id,X,Y,Z\na,0,0,9\nb,1,0,9\n", "column time"),
         ("camera,level\na,1\n", "id,X,Y,Z\na,0,0,9\nb,1,0,9\n", "no level for photo b"),
+        (
+            "camera,level\nDJI_01,1\nIMG_O2,1\n",
+            "id,X,Y,Z\nDJI_01,0,0,9\nIMG_02,1,0,9\n",
+            "no level for photo IMG_02 (did you mean IMG_O2?)",
+        ),
         ("time,level\nnoon,1\n9,2\n", "id,X,Y,Z,time\na,0,0,9,1\nb,1,0,9,2\n", "is no time"),
     ],
 )
