@@ -357,6 +357,7 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
     if kind == "rectify":
         drawn = [f"{Path(task['folder']).name}/{name}" for name in result["files"]]
         session.note_made("rectified", [*drawn, Path(task["out"]).name])
+        session.misfits = result["misfits"]
         return " ".join(without_options(text, session.spoken) for text in result["words"][:2])
     if kind == "match":
         session.command({"op": "points.add", "points": result["points"]})

@@ -88,6 +88,8 @@ class Session:
         self._faces = DrawnFaces(lambda: self.state, lambda one: self._carry_out(one, write=True))
         #: Faces that the program would draw.
         self.suggested: list[dict[str, Any]] = []
+        #: From each corner of the rectangle of one photo alone to where it fits. [px]
+        self.misfits: list[list[float]] = []
         self.state = SurveyState()
         self.journal = Journal(files.journal)
         try:

@@ -25,6 +25,7 @@ from photocore.arrays import BoolArray, ByteArray, FloatArray, positive
 from photocore.camera import pinhole
 from photocore.camera.pinhole import PARAMETERS, Pinhole, ray_on_plane
 from photocore.errors import ConvergenceError, GeometryError, InputError
+from photocore.remarks import keys_in
 
 #: Steps for derivatives: of logarithms, pixels, radians, shares of the distance.
 _STEPS = np.array([1e-6, 1e-6, 1e-3, 1e-3, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6])
@@ -186,8 +187,11 @@ def by_rectangle(
 
     try:
         photo = fitted(width, height)
-    except GeometryError:
-        if words := proportions():
+    except GeometryError as error:
+        words = proportions()
+        if not words and "resection.no_camera" in keys_in(str(error)):
+            words = remark("rectify.no_rectangle", width=width, height=height)
+        if words:
             raise GeometryError(words) from None
         raise
     words = proportions() if photo.sigma0 > SLIPS.doubted else ""

@@ -80,6 +80,7 @@ def state_of(session: Session) -> dict[str, Any]:
             ],
             "shapes": _shapes(session),
             "suggested": session.suggested,
+            "misfits": session.misfits,
             "length_unit": _length_unit(session),
             "selection": None,
             "products": {

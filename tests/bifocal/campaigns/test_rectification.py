@@ -164,6 +164,9 @@ def test_sides_of_a_rectangle_the_wrong_way_round_are_named() -> None:
     tall = np.array([[-1, 2.5], [1, 2.5], [1, -1.5], [-1, -1.5]])
     with pytest.raises(GeometryError, match="2 m wide and 4 m high"):
         rectify(image, gsd=0.1, rectangle=((4.0, 2.0), seen(tall)), interior=LENS)
+    crossed = [[200, 150], [900, 160], [1400, 800], [190, 820]]
+    with pytest.raises(GeometryError, match="those of no rectangle of 8 x 4"):
+        rectify(image, gsd=0.1, rectangle=((8.0, 4.75), crossed), interior=LENS)
     with pytest.raises(InputError, match="a rectangle has four"):
         rectify(image, gsd=0.1, rectangle=((2.0, 4.0), seen(tall)[:3]), interior=LENS)
 

@@ -156,6 +156,13 @@ def test_one_photo_alone_comes_to_scale_by_a_rectangle(tmp_path: Path) -> None:
         result = _WORKS["rectify"](task, lambda *_: None)
         said = finish(session, task, result)
         assert "displaced" in said
+        assert np.abs(client.get("/api/state").json()["misfits"]).max() < 0.1
+        skew = np.add(corners, [[0, 0], [4, 0], [0, 0], [0, 0]])
+        off = _WORKS["rectify"](
+            {**task, "corners": skew.tolist(), "overwrite": True}, lambda *_: None
+        )
+        # One corner moved against a fitting rectangle: all four miss it, by no more than that.
+        assert 0.3 < np.linalg.norm(off["misfits"], axis=1).max() < 4
         shown = client.get("/api/state").json()["products"]
         assert shown["rectified"]["name"] == "survey-rectified.tif"
         assert any(file["name"].endswith(".pdf") for file in shown["files"])

@@ -12,6 +12,8 @@ const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], Arrow
 const INK = "#ffe14d";
 /** How far off a click may have fallen. [photo pixels] */
 const REACH = 12;
+/** How long the largest misfit is drawn. [CSS px] */
+const LONGEST = 60;
 
 export class Alone {
   constructor(app) {
@@ -46,7 +48,9 @@ export class Alone {
     const { rectified } = state.products;
     this.picture.hidden = this.download.hidden = !rectified;
     const done = state.jobs.findLast(({ kind, state: how }) => kind === "rectify" && how === "done");
-    setText(this.told, done?.message ?? "");
+    this.misfits = state.misfits;
+    this.worst = Math.max(0, ...state.misfits.map((off) => Math.hypot(...off)));
+    setText(this.told, done ? `${done.message} ${t("alone.misfit", { worst: number(this.worst, 1) })}` : "");
     const mark = rectified && `${done?.id}-${state.revision}`;
     if (rectified && this.seen !== mark) this.picture.src = `preview/rectified?v=${mark}`;
     this.seen = mark;
@@ -110,6 +114,8 @@ export class Alone {
     places.forEach((place, index) => {
       drawing.marker(context, 1, place);
       drawing.label(context, number(index + 1, 0), [place[0] + 10, place[1] - 8], INK);
+      const off = places.length === CORNERS && this.worst > 0.05 && this.misfits[index];
+      if (off) drawing.residual(context, place, off.map((one) => (one * LONGEST) / this.worst), drawing.DOUBT);
     });
     if (this.cursor) drawing.cursor(context, this.pane, this.cursor, 1);
   }

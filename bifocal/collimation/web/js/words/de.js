@@ -360,6 +360,7 @@ export default {
   "alone.width": "Breite",
   "alone.height": "Höhe",
   "alone.size": "Breite und Höhe des Rechtecks in Metern eintippen.",
+  "alone.misfit": "Die Ecken verfehlen ein Rechteck dieser Seiten um bis zu {worst} px: die Pfeile, länger gezeichnet.",
   "alone.run": "Entzerren",
   "alone.again": "Ecken neu setzen",
   "alone.alt": "Die Wand im Maßstab",

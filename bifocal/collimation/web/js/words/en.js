@@ -360,6 +360,7 @@ export default {
   "alone.width": "Width",
   "alone.height": "Height",
   "alone.size": "Type width and height of the rectangle in metres.",
+  "alone.misfit": "The corners miss a rectangle of these sides by up to {worst} px: the arrows, drawn longer.",
   "alone.run": "Bring to scale",
   "alone.again": "Corners anew",
   "alone.alt": "The wall to scale",

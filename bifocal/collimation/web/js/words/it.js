@@ -360,6 +360,7 @@ export default {
   "alone.width": "Larghezza",
   "alone.height": "Altezza",
   "alone.size": "Scrivi larghezza e altezza del rettangolo in metri.",
+  "alone.misfit": "Gli angoli mancano un rettangolo con questi lati di al più {worst} px: le frecce, disegnate più lunghe.",
   "alone.run": "Raddrizza",
   "alone.again": "Vertici da capo",
   "alone.alt": "Il muro in scala",
