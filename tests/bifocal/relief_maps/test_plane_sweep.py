@@ -99,6 +99,27 @@ def test_only_an_even_part_that_both_photos_show_alike_is_backed():
     assert not any(backed[part].any() for part in (moved, rough, behind))
 
 
+def test_pieces_of_a_rail_vouch_for_each_other_and_scatter_goes():
+    cameras, rng = bifocal_cameras(size=(400, 300)), np.random.default_rng(1)
+    grey = np.zeros((300, 400), np.uint8)
+    box = common_bounds(cameras.nominal, (grey.shape, grey.shape))
+    work = working_grid(cameras.nominal, grey.shape, box, cameras.nominal.image1.gsd((400, 300)))
+    frame = make_frame(cameras.nominal, grey, grey, work, None)
+    relief, taken = np.zeros(frame.grid.shape, np.float32), np.zeros(frame.grid.shape, bool)
+    rail, scatter = np.s_[40:43, 20:120], np.s_[20:60, 200:240]
+    taken[rail] = taken[scatter][::3, ::3] = True
+    taken[rail][:, ::7] = False  # in pieces of 12 px
+    relief[rail] = 0.8
+    relief[scatter] = rng.uniform(-3, 3, (40, 40))
+    level = second_hypothesis._Level(frame, 0 * relief, ~taken, ~taken)
+    found = second_hypothesis._Found(relief, relief, relief)
+    kept = second_hypothesis._in_company(level, found, taken)
+    assert kept[rail][taken[rail]].mean() > 0.8
+    assert kept[scatter].sum() < 0.05 * taken[scatter].sum()
+    assert not kept[~taken].any()
+    assert not second_hypothesis._in_company(level, found, kept & False).any()
+
+
 @pytest.mark.acceptance  # compiles
 def test_numpy_and_machine_code_give_the_same_bits(monkeypatch):
     shot, _ = railing()
