@@ -59,6 +59,8 @@ def _close_specks(
     rim_row, rim_column, beside = rim_row[behind], rim_column[behind], beside[behind]
     count = np.bincount(beside, minlength=len(areas))
     closed: BoolArray = small & (count > 0)
+    if not closed.any():
+        return closed
     near = closed[inside]
     row, column, inside = row[near], column[near], inside[near]
     colours = image[rim_row, rim_column].reshape(len(beside), -1)

@@ -154,3 +154,13 @@ def test_specks_take_the_mean_colour_of_the_wall_beside_them(bands):
     assert (source[holes] == Source.FILLED).all()
     assert (image[holes] == 1000).all()
     assert (source[~holes] == Source.IMAGE_1).all()
+
+
+@pytest.mark.parametrize("bands", [(), (3,)])
+def test_a_speck_of_which_nothing_is_behind_takes_what_is_there(bands):
+    image, source = np.full((30, 30, *bands), 90, np.uint8), np.full((30, 30), Source.IMAGE_1)
+    relief, hole = np.ones((30, 30), np.float32), np.s_[12:14, 12:14]
+    image[hole], source[hole], relief[hole] = 0, Source.NONE, 0
+    close_holes(image, source, source == Source.NONE, relief, GSD, largest=0.05)
+    assert (source[hole] == Source.FILLED).all()
+    assert (image == 90).all()
