@@ -318,17 +318,17 @@ def _taken(level: _Level, found: _Found) -> BoolArray:
     return accepted
 
 
-def _in_company(level: _Level, found: _Found, taken: BoolArray) -> BoolArray:
-    """Return what is taken with enough of the same relief around: true rails lie in one plane.
+def _in_company(level: _Level, hypothesis: _Found, finds: BoolArray) -> BoolArray:
+    """Return the finds with enough of the same relief around: true rails lie in one plane.
 
     Neighbours need not touch: a rail of two pixels comes in pieces, what is chance scatters over
     all reliefs. Finds are counted in cells of row, column and relief, 3 x 3 x 3 of them.
     """
-    kept = np.zeros_like(taken)
-    at = np.nonzero(taken)
+    kept = np.zeros_like(finds)
+    at = np.nonzero(finds)
     if not len(at[0]):
         return kept
-    relief = found.relief[at]
+    relief = hypothesis.relief[at]
     scale = float(np.median(parallax_per_metre(level.frame)[at])) / (2 * HYPOTHESIS.same / 3)
     places = (*(n // HYPOTHESIS.cell for n in at), ((relief - relief.min()) * scale).astype(int))
     cells = tuple(n + 1 for n in places)
