@@ -14,8 +14,11 @@ from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.names import called, nearest
 from photocore.tables import Table
+from photocore.tables.axes import HEIGHT
 from photocore.tables.heading_words import bare
 
+#: What heights and relief are called.
+_THIRD = (*HEIGHT, "relief", "rilievo")
 #: Coordinates of one point in several rows may differ by this much. [m]
 _SAME = 1e-6
 #: Pixels that programs write for "not seen", where several points have them.
@@ -159,7 +162,7 @@ def in_plane_frame(
     has_height = bool(np.isfinite(heights).any()) and not np.isfinite(xyz[:, 2]).any()
     is_space = bare(table.headings.get("r", "")).startswith("z") and not has_height
     if not (has_height or is_space):
-        return xyz, frame, []
+        return xyz, frame, _strange_third(table)
     world = np.column_stack([xyz[:, :2], heights if has_height else xyz[:, 2]])
     notes: list[str] = []
     plain = [bare(table.headings.get(key, "")) for key in "XY"] == ["x", "y"]
@@ -182,6 +185,22 @@ def in_plane_frame(
     plane = np.full_like(xyz, np.nan)
     plane[whole] = frame.to_plane(world[whole])
     return plane, frame, notes
+
+
+def _strange_third(table: Table) -> list[str]:
+    """Return a remark on a heading that is nearly one of heights or relief, where both are absent.
+
+    Beside E and N it is refused: without it all points would lie on one line or plane.
+    """
+    if not {"r", "H"}.isdisjoint(table.present):
+        return []
+    for heading in table.strange:
+        if near := nearest(bare(heading), [word for word in _THIRD if len(word) > 2]):
+            words = remark("control.strange_third", heading=heading, near=near)
+            if not bare(table.headings.get("X", "x")).startswith("x"):
+                raise InputError(f"{table.file}: {words}")
+            return [words]
+    return []
 
 
 def _described(frame: WorldFrame) -> str:

@@ -147,12 +147,18 @@ def describe(grid: CellGrid, match: Match | None) -> str:
     return ", ".join(shown[:12]) + (", ..." if len(shown) > 12 else "")
 
 
+def strange_headings(grid: CellGrid, match: Match | None) -> dict[int, str]:
+    """Return the headings above none of the columns that were found, by column."""
+    row = match.header if match else next(iter(sorted(grid.rows)), 0)
+    used = set(match.columns.values()) if match else set()
+    cells = sorted(grid.rows.get(row, {}).items())
+    return {number: t for number, t in cells if number not in used and isinstance(t, str)}
+
+
 def near_headings(grid: CellGrid, match: Match | None, columns: Sequence[Column]) -> str:
     """Return a sentence on each heading that is like one which is missing; empty without any."""
-    cells = grid.rows.get(match.header if match else next(iter(sorted(grid.rows)), 0), {})
-    used = set(match.columns.values()) if match else set()
     words = [word for c in columns if match is None or c.key not in match.columns
              for word in (c.key, *c.aliases) if len(word) > 2]  # fmt: skip
-    texts = [str(v) for n, v in sorted(cells.items()) if n not in used and isinstance(v, str)]
+    texts = strange_headings(grid, match).values()
     near = [(text, nearest(bare(text), words)) for text in texts if len(text) > 2]
     return "".join(f" {remark('table.near_heading', heading=t, near=n)}" for t, n in near[:3] if n)

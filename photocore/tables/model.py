@@ -83,6 +83,8 @@ class Table:
         Cells of a sheet whose number was typed as text: formulas do not see such numbers.
     feet : dict
         Key to the foot (``ft``, ``ftUS``) of each column that was converted to metres.
+    strange : tuple of str
+        Headings of numbers that are none of the columns asked for.
     """
 
     file: str
@@ -98,6 +100,7 @@ class Table:
     typed_units: set[str] = field(default_factory=set)
     text_cells: list[str] = field(default_factory=list)
     feet: dict[str, str] = field(default_factory=dict)
+    strange: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.rows)

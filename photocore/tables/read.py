@@ -27,13 +27,14 @@ from photocore.tables.fill import (
     near_headings,
     refuse_doubles,
     refuse_unknown_units,
+    strange_headings,
     take_unit_row,
 )
 from photocore.tables.heading_words import bare
 from photocore.tables.headings import Match, find_columns
 from photocore.tables.lists import drawing_as_table
 from photocore.tables.model import Column, Table
-from photocore.tables.numbers import FEET, Decimal
+from photocore.tables.numbers import FEET, Decimal, take_apart
 from photocore.tables.rows import DataRows, block_above, data_rows
 from photocore.textfile import check_file, check_name
 from photocore.workbook.reading.grid import CellGrid, SheetFile, TableArea, Value, cell_name
@@ -390,7 +391,17 @@ def _new_table(book: SheetFile | CsvFile, place: _CellPlace, rows: DataRows) -> 
         headings=dict(place.match.headings),
         blocks=rows.blocks,
         remarks=[*book.remarks, *place.match.remarks, *rows.remarks],
+        strange=_strange_numbers(place),
     )
+
+
+def _strange_numbers(place: _CellPlace) -> tuple[str, ...]:
+    """Return the headings of numbers that nobody asked for."""
+    if not place.match.header:
+        return ()
+    first = place.grid.rows.get(place.match.first, {})
+    headings = strange_headings(place.grid, place.match).items()
+    return tuple(text for number, text in headings if take_apart(str(first.get(number, ""))))
 
 
 def _cells(place: _CellPlace, rows: DataRows) -> dict[str, Sequence[Value | None]]:

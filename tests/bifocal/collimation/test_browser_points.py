@@ -26,20 +26,6 @@ REDS = """() => [...document.querySelectorAll("canvas")].map((canvas) => {
   return count;
 }).reduce((a, b) => a + b, 0)"""
 
-#: Note what is written on each canvas since it was cleared: text, left, right, base. [px]
-TEXTS = """() => {
-  window.written = new Map();
-  const { fillText, clearRect } = CanvasRenderingContext2D.prototype;
-  CanvasRenderingContext2D.prototype.clearRect = function (...area) {
-    written.set(this.canvas, []);
-    return clearRect.apply(this, area);
-  };
-  CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
-    written.get(this.canvas)?.push([text, x, x + this.measureText(text).width, y]);
-    return fillText.call(this, text, x, y);
-  };
-}"""
-
 
 @pytest.fixture
 def page(browser: Any, server: Served) -> Iterator[Driver]:
@@ -271,26 +257,6 @@ def test_a_pick_off_the_line_is_taken_and_its_misfit_shown(page: Driver) -> None
     page.command("point.delete", name="P01")
     page.wait(f"() => ({REDS})() === 0")
     assert not page.tab.get_by_test_id("next-doubtful").is_visible()
-
-
-def test_names_of_neighbours_do_not_cover_each_other_and_long_ones_lose_their_middle(
-    page: Driver,
-) -> None:
-    column, row = true_pixel(1, SHADED)
-    for k in range(30):
-        name = f"P{k:02d}" if k else "APRILTAG_36h11 north tower-0012"
-        place = {"column": column + 9 * (k % 6), "row": row + 7 * (k // 6)}
-        page.command("point.pick", name=name, image=1, **place)
-    page.tab.evaluate(TEXTS)
-    page.keys("+", "-")
-    names = "[...written.values()].flat().filter(([text]) => /^P\\d\\d$|^APRIL/.test(text))"
-    page.wait(f"() => {names}.length > 2")
-    drawn = page.tab.evaluate(f"() => {names}")
-    assert "APRILTAG_…wer-0012" in [text for text, *_ in drawn]
-    assert 2 < len(drawn) < 31  # what has no room stands in the list
-    for first, (_, left, right, base) in enumerate(drawn):
-        for _, other, end, line in drawn[first + 1 :]:
-            assert end < left or other > right or abs(line - base) >= 14
 
 
 def test_a_point_is_picked_by_keys_alone(page: Driver) -> None:

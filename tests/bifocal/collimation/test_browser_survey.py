@@ -17,6 +17,21 @@ from tests.browser import Driver, Served, sample_survey, tab_of
 PICKS = [((300.0, 330.0), (293.0, 325.0)), ((1190.0, 700.0), (1196.0, 703.0))]
 
 
+#: Note what is written on each canvas since it was cleared: text, left, right, base. [px]
+TEXTS = """() => {
+  window.written = new Map();
+  const { fillText, clearRect } = CanvasRenderingContext2D.prototype;
+  CanvasRenderingContext2D.prototype.clearRect = function (...area) {
+    written.set(this.canvas, []);
+    return clearRect.apply(this, area);
+  };
+  CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
+    written.get(this.canvas)?.push([text, x, x + this.measureText(text).width, y]);
+    return fillText.call(this, text, x, y);
+  };
+}"""
+
+
 @pytest.fixture
 def page(browser: Any, server: Served) -> Iterator[Driver]:
     """Yield the page with no points."""
@@ -141,3 +156,23 @@ def test_a_killed_server_loses_nothing_and_the_page_goes_on(browser: Any, tmp_pa
         after = state["points"][0]["picks"]["2"]
         assert np.subtract(after, before) == pytest.approx((0.1, 1.0), abs=1e-9)
         pick_both(page, 2, *PICKS[1])
+
+
+def test_names_of_neighbours_do_not_cover_each_other_and_long_ones_lose_their_middle(
+    page: Driver,
+) -> None:
+    column, row = PICKS[1][0]
+    for k in range(30):
+        name = f"P{k:02d}" if k else "APRILTAG_36h11 north tower-0012"
+        place = {"column": column + 9 * (k % 6), "row": row + 7 * (k // 6)}
+        page.command("point.pick", name=name, image=1, **place)
+    page.tab.evaluate(TEXTS)
+    page.keys("+", "-")
+    names = "[...written.values()].flat().filter(([text]) => /^P\\d\\d$|^APRIL/.test(text))"
+    page.wait(f"() => {names}.length > 2")
+    drawn = page.tab.evaluate(f"() => {names}")
+    assert "APRILTAG_…wer-0012" in [text for text, *_ in drawn]
+    assert 2 < len(drawn) < 31  # what has no room stands in the list
+    for first, (_, left, right, base) in enumerate(drawn):
+        for _, other, end, line in drawn[first + 1 :]:
+            assert end < left or other > right or abs(line - base) >= 14

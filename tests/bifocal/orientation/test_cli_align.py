@@ -1,7 +1,6 @@
 """`bifocal align` and `bifocal match` from the command line."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -11,13 +10,10 @@ from click.testing import CliRunner
 
 from bifocal import Interior, Matches, Pair
 from bifocal.cli import match as match_command
-from bifocal.files.exif_judge import middle_aside
-from bifocal.orientation.align_workflow import KnownLens, interior_of_photo
 from bifocal.orientation.validation import check_distortion
 from bifocal.workbook.match_workflow import match_summary
 from bifocal.workbook.template_workflow import write_template
 from multimedia import GeometryError
-from photocore.images import ImageInfo
 from tests.bifocal.orientation.layered_wall import camera, relief_at, take
 from tests.builders.commands import bifocal_command as main
 from tests.builders.pinholes import project
@@ -267,35 +263,6 @@ def test_photos_cropped_off_their_middle_are_named_and_set_up(folder) -> None:
     pair = Pair.read(folder / "part.pair.json")
     assert pair.image2.distance == pytest.approx(9.0, rel=0.01)
     assert pair.remarks[0].startswith("BOTH PHOTOS WERE CROPPED")
-
-
-@pytest.mark.parametrize(
-    ("size", "recorded", "said"),
-    [
-        ((3072, 2048), (3072, 2048), ""),
-        ((1536, 1024), (3072, 2048), ""),
-        ((2048, 3072), (3072, 2048), ""),
-        ((2000, 2048), (3072, 2048), "THE PHOTO WAS CROPPED: a.jpg has 2000 x 2048 px of the 3072"),
-        ((4928, 3264), None, ""),
-        ((4000, 2252), None, ""),
-        ((3072, 1900), None, "THE PHOTO WAS PROBABLY CROPPED: a.jpg is 3072 x 1900 px"),
-    ],
-)
-def test_a_cropped_photo_is_told_by_its_size(size, recorded, said) -> None:
-    info = ImageInfo(
-        path=Path("a.jpg"), size=size, recorded_size=recorded, model="X", focal_length=35,
-        focal_plane_pitch=22.7 / 3072,
-    )  # fmt: skip
-    usual = 0.004 * np.hypot(*size)
-    for data in (KnownLens(), KnownLens(focal=35, pixel_size=22.7 / 3072)):
-        interior = interior_of_photo(info, data)
-        assert interior.doubt.startswith(said)
-        assert bool(interior.doubt) == bool(said)
-        assert interior.is_part == bool(said)
-        assert (interior.sigma_centre > 5 * usual) == bool(said)
-    aside, words = middle_aside(replace(info, model="", focal_length=None))
-    assert bool(words) == bool(said and recorded)
-    assert aside == (interior.sigma_centre if words else 0.0)
 
 
 @pytest.mark.parametrize(("column", "photo"), [(4, "far"), (6, "near")])

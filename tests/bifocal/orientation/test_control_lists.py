@@ -156,3 +156,15 @@ def test_photos_called_alike_are_told_by_their_folders(tmp_path):
     path.write_text(path.read_text().replace("A/", ""))
     with pytest.raises(WorkbookError, match=r"may be /x/a/1\.JPG or /x/b/1\.JPG"):
         read_control(path, names=names)
+
+
+@pytest.mark.parametrize("heading", ["Hxhe", "Hˆhe", "Quta"])  # mistyped, or in another encoding
+def test_a_third_heading_that_is_nearly_a_height_is_asked_about(tmp_path, heading) -> None:
+    path = written(tmp_path, in_world(70.0), headings=f"id,Ost,Nord,{heading}")
+    with pytest.raises(InputError, match=f'"{heading}" is not understood; near it is'):
+        read_control(path)
+    columns = f"H={heading}"
+    np.testing.assert_allclose(np.ptp(read_control(path, columns=columns).xyz[:, 1]), 7, atol=1e-3)
+    # Beside X and Y of the wall the third may be the user's own; a word beside E, N is no height.
+    (words,) = read_control(written(tmp_path, WALL, headings=f"id,X,Y,{heading}")).remarks
+    assert "counts as one on the wall" in words

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from bifocal.files.exif_judge import middle_aside
 from bifocal.orientation.align_workflow import KnownLens, interior_of_photo, judged_together
 from photocore.images import ImageInfo, image_info
 
@@ -93,3 +94,32 @@ def test_what_was_typed_is_not_doubted() -> None:
     made = interior_of_photo(info, KnownLens(focal=35, sensor_width=22.7))
     assert made.focal == pytest.approx(WHOLE)
     assert not made.doubt
+
+
+@pytest.mark.parametrize(
+    ("size", "recorded", "said"),
+    [
+        ((3072, 2048), (3072, 2048), ""),
+        ((1536, 1024), (3072, 2048), ""),
+        ((2048, 3072), (3072, 2048), ""),
+        ((2000, 2048), (3072, 2048), "THE PHOTO WAS CROPPED: a.jpg has 2000 x 2048 px of the 3072"),
+        ((4928, 3264), None, ""),
+        ((4000, 2252), None, ""),
+        ((3072, 1900), None, "THE PHOTO WAS PROBABLY CROPPED: a.jpg is 3072 x 1900 px"),
+    ],
+)
+def test_a_cropped_photo_is_told_by_its_size(size, recorded, said) -> None:
+    info = ImageInfo(
+        path=Path("a.jpg"), size=size, recorded_size=recorded, model="X", focal_length=35,
+        focal_plane_pitch=22.7 / 3072,
+    )  # fmt: skip
+    usual = 0.004 * np.hypot(*size)
+    for data in (KnownLens(), KnownLens(focal=35, pixel_size=22.7 / 3072)):
+        interior = interior_of_photo(info, data)
+        assert interior.doubt.startswith(said)
+        assert bool(interior.doubt) == bool(said)
+        assert interior.is_part == bool(said)
+        assert (interior.sigma_centre > 5 * usual) == bool(said)
+    aside, words = middle_aside(replace(info, model="", focal_length=None))
+    assert bool(words) == bool(said and recorded)
+    assert aside == (interior.sigma_centre if words else 0.0)
