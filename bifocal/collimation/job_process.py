@@ -178,10 +178,8 @@ def _rectify(task: Task, progress: Progress) -> dict[str, Any]:
     assert done.delivery is not None
     width, height = task["rectangle"]
     rectangle = np.array([[0, height], [width, height], [width, 0], [0, 0]], dtype=float)
-    fitted, picks = (
-        done.photo.as_pair().image1.pixels_from_plane(rectangle),
-        np.array(task["corners"]),
-    )
+    fitted = done.photo.as_pair().image1.pixels_from_plane(rectangle)
+    picks = np.array(task["corners"])
     apart = fitted[None] - picks[:, None]  # whichever corner the rectangle was begun at
     nearest = np.linalg.norm(apart, axis=2).argmin(axis=1)
     misfits = apart[range(len(picks)), nearest].tolist()

@@ -114,12 +114,11 @@ class Products:
         """
         old = {Path(name).name for name, kind in self.made.items() if kind in stale}
         current = self.downloads(workbook).items()
-        files = {**more, **{name: path for name, path in current if name not in old}}
-        top = {n for n in files if n.removeprefix(self.stem) in FOR_CLIENTS}
-        book = {workbook.name} & files.keys()
-        return {(n if n in top else f"{DATA}/{n}"): path for n, path in files.items()} | {
-            name: files[name] for name in book
-        }
+        files = {name: path for name, path in current if name not in old}
+        top = {n: p for n, p in files.items() if n.removeprefix(self.stem) in FOR_CLIENTS}
+        rest = {**more, **{name: path for name, path in files.items() if name not in top}}
+        top |= {name: path for name, path in files.items() if name == workbook.name}
+        return {**top, **{f"{DATA}/{name}": path for name, path in rest.items()}}
 
     def preview(self, kind: str) -> bytes:
         """Return a small picture of the relief, the orthophoto or the drawing, PNG.

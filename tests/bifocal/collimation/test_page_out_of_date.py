@@ -178,6 +178,11 @@ def test_a_client_finds_what_to_open_on_top_and_all_else_in_data(tmp_path):
             (folder / name).write_bytes(b"x")
         session.note_made("deliver", made)
         names = set(bundle_of(session))
+        # A photo that is called as a sheet stays among the photos.
+        photo = {"facade.png": folder / "far.jpg"}
+        held = session.products.bundle(session.files.workbook, photo)
+        assert held["data/facade.png"] == folder / "far.jpg"
+        assert held["facade.png"] == folder / "facade.png"
     top = {"facade.pdf", "facade.dxf", "facade.png", "facade_relief.pdf", "facade_report.html"}
     assert {name for name in names if "/" not in name} - {"facade.xlsx"} == top
     inside = {"data/facade.tif", "data/facade_relief.dxf", "data/facade.pair.json", "data/far.jpg"}

@@ -38,6 +38,7 @@ export class Alone {
   #run() {
     const [width, height] = [this.width, this.height].map(({ value }) => parseNumber(value));
     if (!(width > 0) || !(height > 0)) return this.app.say(t("alone.size"), "warning");
+    this.judged = this.corners;
     return this.app.job("rectify", { corners: this.corners, width, height });
   }
 
@@ -114,7 +115,7 @@ export class Alone {
     places.forEach((place, index) => {
       drawing.marker(context, 1, place);
       drawing.label(context, number(index + 1, 0), [place[0] + 10, place[1] - 8], INK);
-      const off = places.length === CORNERS && this.worst > 0.05 && this.misfits[index];
+      const off = this.judged === this.corners && this.worst > 0.05 && this.misfits[index];
       if (off) drawing.residual(context, place, off.map((one) => (one * LONGEST) / this.worst), drawing.DOUBT);
     });
     if (this.cursor) drawing.cursor(context, this.pane, this.cursor, 1);
