@@ -219,7 +219,18 @@ def test_a_heading_that_is_nearly_right_is_named_with_the_right_one(tmp_path):
         ("Fassade Süd, Größe 5°", "mac_roman", "Mac Roman"),
         ("příční řada, okno č. 1", "cp1250", "Windows-1250"),
         ("Żółta ściana", "cp1250", "Windows-1250"),
+        ("Vítězná, ř š ž", "cp1250", "Windows-1250"),
+        ("Šedá, Čáslav, Žižkov, věž", "cp1250", "Windows-1250"),
+        ("źródło, Świętokrzyska, błąd", "cp1250", "Windows-1250"),
+        ("Győr, tűzfal, Üllői út, lépcső", "cp1250", "Windows-1250"),
+        ("Vítězná, Žlutá zeď, Šedá", "iso8859-2", "ISO 8859-2"),
+        ("Główna, Łódź, ściana", "iso8859-2", "ISO 8859-2"),
+        ("Città, perché, lunedì", "mac_roman", "Mac Roman"),
+        ("Élévation, cigüeña", "mac_roman", "Mac Roman"),
+        ("CITTÀ, dell’arco, 20 m²", "cp1252", "Windows-1252"),
+        ("œil-de-bœuf, tête, n° 5", "cp1252", "Windows-1252"),
         ("窓の角1,2", "shift_jis", "Shift-JIS"),
+        ("ﾏﾄﾞ, 測点１", "shift_jis", "Shift-JIS"),
         ("Größe, Öl, perché no", "cp1252", "Windows-1252"),
         ("punto più a destra", "utf-16-le", "UTF-16-LE"),
         ("punto più a destra", "utf-16-be", "UTF-16-BE"),
@@ -229,6 +240,13 @@ def test_letters_are_read_by_what_they_spell_and_the_encoding_is_said(text, enco
     content, remarks = decoded(text.encode(encoding))
     assert content == text
     assert [name in remark for remark in remarks] == [True]
+
+
+def test_letters_of_two_possible_code_pages_are_said_to_be_so():
+    content, remarks = decoded("bod č. 7".encode("cp1250"))
+    assert content == "bod è. 7"
+    assert "read as Windows-1252, but may be Windows-1250" in remarks[0]
+    assert "but may be" not in decoded("Größe außen, Tür".encode("cp1252"))[1][0]
 
 
 def test_degrees_minutes_and_seconds_are_degrees(tmp_path):
