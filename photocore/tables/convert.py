@@ -11,6 +11,7 @@ import numpy as np
 from photocore.arrays import FloatArray
 from photocore.errors import LARGEST
 from photocore.remarks import remark
+from photocore.tables.advice import advice
 from photocore.tables.model import Column
 from photocore.tables.numbers import (
     GRAD,
@@ -160,7 +161,8 @@ def _read_texts(
         if mark is None:
             small, large = sorted((part.value("comma") or 0, part.value("point") or 0), key=abs)
             about = {"found": part.digits, "small": small, "large": large}
-            complain(index, remark("table.two_meanings", **about))
+            how = advice("meaning", "--decimal", small=f"{small:.15g}", large=f"{large:.15g}")
+            complain(index, f"{remark('table.two_meanings', **about)} {how}")
             continue
         value = part.value(mark)
         mixed = decimal is None and len(proven) == 2 and mark != usual and part.evidence != "none"
@@ -236,9 +238,8 @@ def _mixed(part: NumberText, agreed: Decimal) -> str:
     if value is None:
         return f'found "{_short(part.digits)}", expected a number.'
     better = f"{value:.15g}".replace(".", "," if agreed == "comma" else ".")
-    return remark(
-        "table.other_decimal", found=_short(part.digits), agreed=agreed, better=better, other=other
-    )
+    words = remark("table.other_decimal", found=_short(part.digits), agreed=agreed)
+    return f"{words} {advice('mixed', '--decimal', better=better, other=other)}"
 
 
 def _not_a_number(text: str, unit: str) -> str:

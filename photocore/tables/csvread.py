@@ -16,6 +16,7 @@ import numpy as np
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError
 from photocore.remarks import remark
+from photocore.tables.advice import advice
 from photocore.tables.encodings import decoded
 from photocore.tables.fill import describe, near_headings
 from photocore.tables.headings import Match, find_columns, is_summary
@@ -149,12 +150,14 @@ def find_in_text(
     if match is None or missing:
         wanted = missing or [c.key for c in columns if c.required] or [c.key for c in columns]
         shown = describe(grid, match)
-        about = {"missing": ", ".join(wanted), "headings": shown or "absent", "first": wanted[0]}
+        about = {"missing": ", ".join(wanted), "headings": shown or "absent"}
         first = next((record for record in file.records(delimiter, sample=True) if record), [])
         if sum(take_apart(field) is not None for field in first) > 2:
-            raise InputError(remark("table.no_headings", of=file.label, row=" ".join(first[:6])))
+            text = remark("table.no_headings", of=file.label, row=" ".join(first[:6]))
+            keys = ", ".join(column.key for column in columns[:8])
+            raise InputError(f"{text} {advice('order', '--columns', '--control-order', keys=keys)}")
         near = near_headings(grid, match, columns)
-        raise InputError(f"{remark('table.no_column', of=file.label, **about)}{near}")
+        raise InputError(f"{remark('table.no_column', of=file.label, **about)} {near}")
     return grid, match, delimiter
 
 

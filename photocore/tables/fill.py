@@ -10,6 +10,7 @@ from photocore.errors import CellError, InputError, WorkbookError
 from photocore.names import nearest
 from photocore.remarks import remark
 from photocore.tables import convert
+from photocore.tables.advice import advice
 from photocore.tables.heading_words import bare, unknown_unit
 from photocore.tables.headings import Match
 from photocore.tables.model import Column, Table
@@ -97,8 +98,9 @@ def refuse_doubles(label: str, title: str, match: Match) -> None:
     for key, numbers in match.doubles.items():
         cells = " and ".join(cell_name(match.header, number) for number in numbers)
         where = f"{label} › {title}" if title else label
-        about = {"heading": match.headings[key], "key": key, "letter": column_letters(numbers[0])}
-        raise InputError(remark("table.same_heading", of=where, cells=cells, **about))
+        about = {"heading": match.headings[key], "key": key}
+        how = advice("letter", key=key, letter=column_letters(numbers[0]))
+        raise InputError(f"{remark('table.same_heading', of=where, cells=cells, **about)} {how}")
 
 
 def refuse_unknown_units(label: str, title: str, match: Match, columns: Sequence[Column]) -> None:
@@ -156,9 +158,13 @@ def strange_headings(grid: CellGrid, match: Match | None) -> dict[int, str]:
 
 
 def near_headings(grid: CellGrid, match: Match | None, columns: Sequence[Column]) -> str:
-    """Return a sentence on each heading that is like one which is missing; empty without any."""
+    """Return what to do about a heading that is missing, and which are like it."""
     words = [word for c in columns if match is None or c.key not in match.columns
              for word in (c.key, *c.aliases) if len(word) > 2]  # fmt: skip
     texts = strange_headings(grid, match).values()
     near = [(text, nearest(bare(text), words)) for text in texts if len(text) > 2]
-    return "".join(f" {remark('table.near_heading', heading=t, near=n)}" for t, n in near[:3] if n)
+    missing = match.missing(columns) if match else []
+    how = advice("rename", first=next(iter(missing), columns[0].key))
+    return how + "".join(
+        f" {remark('table.near_heading', heading=t, near=n)}" for t, n in near[:3] if n
+    )

@@ -12,6 +12,7 @@ import numpy as np
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.provenance import note_remark
 from photocore.remarks import remark
+from photocore.tables.advice import advice
 from photocore.tables.csvread import (
     CsvFile,
     find_in_text,
@@ -330,18 +331,13 @@ def _nothing_found(
     if near is None or not near.match.header:
         empty = not any(book.grid(title).rows for title in titles)
         what = "has no filled cell" if empty else f"has no table with the headings {headings}"
-        advice = (
-            ""
-            if empty
-            else ' Write them above the columns, or, where it exists, use --columns "id=A,...".'
-        )
-        return InputError(f"{book.label}: {what} (looked in {_quoted(titles)}).{advice}")
+        how = "" if empty else f" {advice('rename', first=columns[0].key)}"
+        return InputError(f"{book.label}: {what} (looked in {_quoted(titles)}).{how}")
     missing = ", ".join(near.match.missing(columns))
-    row, first = near.match.header, near.match.missing(columns)[0]
-    about = {"missing": missing, "headings": describe(near.grid, near.match), "first": first}
+    about = {"missing": missing, "headings": describe(near.grid, near.match)}
     where = f"{book.label} › {near.grid.title}"
-    hint = near_headings(near.grid, near.match, columns)
-    return InputError(f"{remark('table.lacks_column', of=where, row=row, **about)}{hint}")
+    hint, row = near_headings(near.grid, near.match, columns), near.match.header
+    return InputError(f"{remark('table.lacks_column', of=where, row=row, **about)} {hint}")
 
 
 def _read_text(

@@ -34,6 +34,7 @@ from photocore.tables import (
     read_named_values,
     read_table,
 )
+from photocore.tables.advice import advice
 from photocore.tables.heading_words import bare
 from photocore.tables.model import Kind
 from photocore.tables.numbers import Decimal
@@ -347,11 +348,13 @@ def _require_coordinates(table: Table, book: object, path: Path | str) -> None:
     ours = isinstance(book, SheetFile) and bare(table.sheet) != "points"
     if ours and not any(bare(title) == "points" for title in book.titles):  # type: ignore[attr-defined]
         shown = ", ".join(f'"{title}"' for title in book.titles)  # type: ignore[attr-defined]
-        raise InputError(remark("survey.no_points_sheet", of=Path(path).name, sheets=shown))
+        text = remark("survey.no_points_sheet", of=Path(path).name, sheets=shown)
+        raise InputError(f"{text} {advice('rename', first='id')}")
     groups = [keys for keys in kinds if have & set(keys) and not have.issuperset(keys)]
     wanted = groups[0] if groups else XY
     missing = ", ".join(key for key in wanted if key not in have)
-    raise InputError(remark("survey.no_column", of=where, missing=missing))
+    how = advice("rename", first=missing.partition(",")[0])
+    raise InputError(f"{remark('survey.no_column', of=where, missing=missing)} {how}")
 
 
 def _require_photos(table: Table, photos: int) -> None:
@@ -370,9 +373,9 @@ def _require_photos(table: Table, photos: int) -> None:
     ]
     if broken or len(whole) < 2:
         lacking = next(key for key in broken or halves if key not in table.present)
-        raise InputError(
-            remark("survey.no_column_of_set", of=where_of(table), missing=lacking, photos=photos)
-        )
+        about = {"of": where_of(table), "missing": lacking, "photos": photos}
+        how = advice("rename", first=lacking)
+        raise InputError(f"{remark('survey.no_column_of_set', **about)} {how}")
 
 
 def _observations(
