@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
@@ -14,11 +15,15 @@ from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.names import called, nearest
 from photocore.tables import Table
+from photocore.tables.advice import advice
 from photocore.tables.axes import HEIGHT
 from photocore.tables.heading_words import bare
 
-#: What heights and relief are called.
-_THIRD = (*HEIGHT, "relief", "rilievo")
+#: What heights and relief are called, and what has a height or numbers that are none of a point.
+_THIRD = tuple(map(bare, (*HEIGHT, "relief", "rilievo", "z")))
+_OF_TOOLS = re.compile(
+    r"antenn|prism|pole|rod|instr|refle[ck]|target|mira|canna|sigma|std|rms|err|acc|\bh[irt]\b|time"
+)
 #: Coordinates of one point in several rows may differ by this much. [m]
 _SAME = 1e-6
 #: Pixels that programs write for "not seen", where several points have them.
@@ -162,7 +167,7 @@ def in_plane_frame(
     has_height = bool(np.isfinite(heights).any()) and not np.isfinite(xyz[:, 2]).any()
     is_space = bare(table.headings.get("r", "")).startswith("z") and not has_height
     if not (has_height or is_space):
-        return xyz, frame, _strange_third(table)
+        return xyz, frame, strange_third(table)
     world = np.column_stack([xyz[:, :2], heights if has_height else xyz[:, 2]])
     notes: list[str] = []
     plain = [bare(table.headings.get(key, "")) for key in "XY"] == ["x", "y"]
@@ -187,20 +192,32 @@ def in_plane_frame(
     return plane, frame, notes
 
 
-def _strange_third(table: Table) -> list[str]:
+def strange_third(
+    table: Table, east: str = "X", thirds: Sequence[str] = ("r", "H"), option: str = "--columns"
+) -> list[str]:
     """Return a remark on a heading that is nearly one of heights or relief, where both are absent.
 
-    Beside E and N it is refused: without it all points would lie on one line or plane.
+    Beside E and N it is refused: without it all points would lie on one line or plane; whatever
+    numbers stand beside these are named.
     """
-    if not {"r", "H"}.isdisjoint(table.present):
+    if not table.present.isdisjoint(thirds):
         return []
-    for heading in table.strange:
-        if near := nearest(bare(heading), [word for word in _THIRD if len(word) > 2]):
-            words = remark("control.strange_third", heading=heading, near=near)
-            if not bare(table.headings.get("X", "x")).startswith("x"):
+    in_plan = not bare(table.headings.get(east, "x")).startswith("x")
+    strange = [text for text in table.strange if not _OF_TOOLS.search(text.casefold())]
+    for heading in strange:
+        parts = [bare(heading), *re.split(r"[\W\d_]+", heading.casefold())]
+        if near := next((near for part in parts if (near := _near_third(part))), ""):
+            doubt = remark("control.strange_third", heading=heading, near=near)
+            words = f"{doubt} {advice('rename', option, first=thirds[-1])}"
+            if in_plan:
                 raise InputError(f"{table.file}: {words}")
             return [words]
-    return []
+    return [remark("control.beside_plan", names=", ".join(strange))] if in_plan and strange else []
+
+
+def _near_third(word: str) -> str:
+    """Return the word of heights or relief that a word is, or nearly is."""
+    return word if word in _THIRD else nearest(word, [one for one in _THIRD if len(one) > 2])
 
 
 def _described(frame: WorldFrame) -> str:

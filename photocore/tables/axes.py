@@ -10,7 +10,8 @@ EAST = ("E", "east", "easting", "Est", "Ost", "Ostwert", "Rechtswert", "Rechts",
 NORTH = ("N", "north", "northing", "Nord", "Nordwert", "Hochwert", "coordinata N", "coord N",
          "ordonnée")  # fmt: skip
 HEIGHT = ("H", "height", "elevation", "elev", "altitude", "alt", "Höhe", "Hoehe", "Kote", "quota",
-          "altezza", "altitudine", "hauteur", "cote")  # fmt: skip
+          "altezza", "altitudine", "hauteur", "cote", "cota", "altura", "RL", "reduced level",
+          "NHN", "orthometric height", "quota ortometrica")  # fmt: skip
 NAMES = ("point", "name", "punto", "punkt", "nr", "no", "number", "label", "marker", "gcp", "pt",
          "pnt", "point id", "point no", "point number", "Punktnummer", "Punkt-Nr", "Pkt", "nome",
          "nome punto", "numero punto", "matricule", "nom", "no de point", "GCP name",

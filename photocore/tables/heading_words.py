@@ -13,6 +13,13 @@ _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
 _LOOSE_UNIT = re.compile(r"[\s_,]+(mm|cm|m|ft|ftus|px|pixel|deg|°|gon|rad)$", re.IGNORECASE)
 #: Ends a unit: square metres and the like.
 _POWER = re.compile(r"(?:[²³]|\^?[23])$")
+#: Ends a heading that says from where heights are counted, or that it holds values.
+_DATUM = re.compile(
+    r"[\s_.,-]*(?:\b|_|(?<=\b[EHNXYZ]))(?:(?:m[\s.]*)?(?:ü|ue|über)[\s.]*)?"
+    r"(?:NH?N|NAP|TAW|NGF|IGN ?69|DHHN ?\d*|LN ?02|A?M?SL|a\.s\.l\.|s\. ?l\. ?m\."
+    r"|m?s\.?[ln]\.?m\.?|ortho?m?|wert|values?|valore|valeur)$",
+    re.IGNORECASE,
+)
 #: Units people measure in that no command takes.
 _FOREIGN = frozenset(
     (*GRAD, "in", "inch", "inches", "yd", "yard", "yards", "mi", "mile", "miles",
@@ -43,7 +50,7 @@ def unit_of(text: str) -> str:
     ('mm', '', 'px')
     """
     unit = _UNIT.search(text) or _LOOSE_UNIT.search(text)
-    return unit_symbol(unit[1]) if unit else ""
+    return unit_symbol(_DATUM.sub("", unit[1])) if unit else ""
 
 
 def unknown_unit(text: str) -> str:
@@ -60,7 +67,7 @@ def unknown_unit(text: str) -> str:
     said = _UNIT.search(text)
     if said is None:
         return ""
-    word = said[1].strip(" .")
+    word = _DATUM.sub("", said[1]).strip(" .")
     base = _POWER.sub("", word).casefold()
     if said[0].lstrip().startswith("("):
         return word if base in _FOREIGN else ""
@@ -86,6 +93,6 @@ def forms_of(variants: Sequence[str]) -> list[str]:
         if form and form not in forms:
             forms.append(form)
         loose = bare(_LOOSE_UNIT.sub("", _UNIT.sub("", text).strip()))
-        if loose and loose not in forms:
-            forms.append(loose)
+        plain = bare(_DATUM.sub("", _UNIT.sub("", text).strip()))
+        forms += [one for one in (loose, plain) if one and one not in forms]
     return forms or [""]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.model.photo import FARTHEST_WALL
-from bifocal.orientation.control_lists import of_rows, without_unseen
+from bifocal.orientation.control_lists import of_rows, strange_third, without_unseen
 from bifocal.orientation.control_points import A_PHOTO
 from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations, pixel_keys
@@ -65,7 +65,9 @@ def with_list(
     table = read_table(path, columns, decimal=decimal, column_map=names, errors=errors)
     axes_of = {sheet: tuple(axes) for sheet, axes in _AXES.items()}
     errors += table.too_large([*axes_of["Georeference"], *axes_of["Check"]], LARGEST)
-    remarks = list(table.remarks)
+    doubts = strange_third(table, "E", ("Z_ref", "H"), "--control-order")
+    remarks = [*table.remarks, *doubts]
+    count_before = len(remarks)
     for sheet, axes in axes_of.items():
         xyz = np.stack([table.in_unit(key, TO_M, errors) for key in axes], axis=-1)
         places = _first_rows(table, xyz, errors)
@@ -80,7 +82,7 @@ def with_list(
             remarks.append(remark("survey.list_taken", of=Path(path).name, **count))
     if errors:
         raise WorkbookError(errors)
-    if len(remarks) == len(table.remarks):
+    if len(remarks) == count_before:
         raise InputError(remark("survey.list_of_others", of=path))
     return replace(survey, remarks=(*survey.remarks, *remarks))
 

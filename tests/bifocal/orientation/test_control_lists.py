@@ -158,6 +158,27 @@ def test_photos_called_alike_are_told_by_their_folders(tmp_path):
         read_control(path, names=names)
 
 
+@pytest.mark.parametrize("plan", ["Ost,Nord", "X,Y"])
+@pytest.mark.parametrize(
+    "heading",
+    ["Z-Wert", "Quota s.l.m.", "Elev.", "H ortho", "Cota", "Höhe NHN", "Höhe m ü. NN", "RL",
+     "Z [m ü. NN]", "Elevation (m) ASL", "Alt. NGF", "Höhe DHHN2016", "Orthometric height"],
+)  # fmt: skip
+def test_heights_above_some_datum_are_heights(tmp_path, heading, plan) -> None:
+    control = read_control(written(tmp_path, in_world(70.0), headings=f"id,{plan},{heading}"))
+    np.testing.assert_allclose(control.xyz, WALL, atol=2e-4)
+
+
+def test_what_stands_beside_e_and_n_is_asked_about_or_named_unless_it_is_of_a_tool(tmp_path):
+    for heading in ("Ellipsoidal height", "Z UTM", "Kote Sockel"):
+        with pytest.raises(InputError, match=f'"{heading}" is not understood'):
+            read_control(written(tmp_path, in_world(70.0), headings=f"id,E,N,{heading}"))
+    control = read_control(written(tmp_path, in_world(70.0), headings="id,E,N,Niveau"))
+    assert any("left out: Niveau. If one holds heights, call it H" in t for t in control.remarks)
+    control = read_control(written(tmp_path, in_world(70.0), headings="id,E,N,Antenna height"))
+    assert not control.remarks
+
+
 @pytest.mark.parametrize("heading", ["Hxhe", "Hˆhe", "Quta"])  # mistyped, or in another encoding
 def test_a_third_heading_that_is_nearly_a_height_is_asked_about(tmp_path, heading) -> None:
     path = written(tmp_path, in_world(70.0), headings=f"id,Ost,Nord,{heading}")

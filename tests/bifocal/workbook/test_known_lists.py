@@ -168,3 +168,13 @@ def test_pixels_that_programs_write_for_not_seen_are_no_picks_in_a_row_a_photo(t
     found = bifocal.solve(picked(tmp_path / "long.csv", picks), pair=a_pair())
     assert np.isnan(found.table["r"][2:]).all()
     assert any("C, D" in text for text in found.remarks)
+
+
+def test_heights_of_a_list_that_are_not_understood_are_asked_about(tmp_path):
+    path = fill(tmp_path / "s.xlsx", rows(WALL))
+    lines = [(n, 1000 + x, 2000 - r, 50 + y) for n, x, y, r in WALL]
+    field = listed(tmp_path / "field.csv", ("Name", "E", "N", "Quota punto"), lines)
+    refused = run("solve", path, "--control", field)
+    assert refused.exit_code == 1
+    assert '"Quota punto" is not understood' in refused.stderr
+    assert '--control-order "H=HEADING"' in refused.stderr
