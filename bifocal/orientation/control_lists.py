@@ -24,8 +24,6 @@ _THIRD = tuple(map(bare, (*HEIGHT, "relief", "rilievo", "z")))
 _OF_TOOLS = re.compile(
     r"antenn|prism|pole|rod|instr|refle[ck]|target|mira|canna|sigma|std|rms|err|acc|\bh[irt]\b|time"
 )
-#: Coordinates of one point in several rows may differ by this much. [m]
-_SAME = 1e-6
 #: Pixels that programs write for "not seen", where several points have them.
 _UNSEEN = ((0.0, 0.0), (-1.0, -1.0))
 
@@ -79,21 +77,14 @@ def of_rows(
     titles = [one if isinstance(one, str) else one[0] for one in photos]
     short = [PurePath(title).name for title in titles]
     titles = short if len(set(short)) == len(short) else titles
-    places: dict[str, int] = {}
     picks: dict[tuple[str, int], int] = {}
     errors: list[CellError] = []
+    places = table.first_rows("id", coordinates, errors)
     strange: list[str] = []
     for k, (name, photo) in enumerate(zip(table.texts("id"), table.texts("photo"), strict=True)):
         if not name:
             errors.append(table.error(k, "id", "is blank; every row needs the point's name."))
             continue
-        first = places.setdefault(name, k)
-        filled = np.isfinite(coordinates[k])
-        if np.any(np.abs(coordinates[k] - coordinates[first])[filled] > _SAME):
-            message = f'"{name}" has other coordinates in {table.cell(first, "id")}.'
-            errors.append(table.error(k, "id", message))
-        blank = np.isnan(coordinates[first])
-        coordinates[first, blank] = coordinates[k, blank]
         shown = called(photo, photos) if photo else []
         if len(shown) > 1:
             message = f'"{photo}" may be {" or ".join(titles[n] for n in shown)}.'
@@ -114,13 +105,13 @@ def of_rows(
         near = next((n for title in titles if (n := nearest(title, names))), "-")
         about = {"photos": ", ".join(titles), "listed": ", ".join(names[:5]), "near": near}
         raise InputError(remark("control.no_such_photo", of=table.file, **about))
-    order = list(places)
+    order = [table.texts("id")[k] for k in places]
     pixels = [np.full((len(order), 2), np.nan) for _ in photos]
     for (name, photo_number), k in picks.items():
         pixels[photo_number][order.index(name)] = column[k], row[k]
     shown_names = ", ".join(names[:5])
     notes = (remark("control.other_photos", count=len(names), names=shown_names),) if names else ()
-    return ListedPoints(rows=list(places.values()), picks=pixels, remarks=notes)
+    return ListedPoints(rows=places, picks=pixels, remarks=notes)
 
 
 def without_unseen(

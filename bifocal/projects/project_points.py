@@ -12,7 +12,7 @@ from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.camera.pinhole import Pinhole, rays_meeting
 from photocore.cloud import open_cloud
-from photocore.errors import InputError, WorkbookError
+from photocore.errors import CellError, InputError, WorkbookError
 from photocore.names import called, meant, nearest
 from photocore.programs.model import ForeignProject, ForeignView
 from photocore.tables import Column, Table, read_table
@@ -63,10 +63,12 @@ def read_points(path: Path, views: tuple[ForeignView, ...]) -> dict[str, FloatAr
     table = read_table(path, COLUMNS)
     if {"x", "y", "z"} <= table.present:
         xyz = np.column_stack([table.numbers(key) for key in ("x", "y", "z")])
-        if errors := table.repeated("id"):
+        errors: list[CellError] = []
+        rows = table.once("id", xyz, errors)
+        if errors:
             raise WorkbookError(errors)
-        named = zip(table.texts("id"), xyz, strict=True)
-        return {name: place for name, place in named if np.isfinite(place).all()}
+        ids = table.texts("id")
+        return {ids[row]: xyz[row] for row in rows if np.isfinite(xyz[row]).all()}
     if not {"photo", "col", "row"} <= table.present:
         raise InputError(remark("projects.point_columns", of=path))
     return _intersected(table, views)

@@ -15,7 +15,7 @@ from photocore.arrays import FloatArray
 from photocore.camera.pinhole import project
 from photocore.camera.rotation import skew
 from photocore.camera.similarity import Similarity, fit_similarity
-from photocore.errors import InputError, WorkbookError
+from photocore.errors import CellError, InputError, WorkbookError
 from photocore.names import meant
 from photocore.programs.model import ForeignView
 from photocore.provenance import note_remark
@@ -48,14 +48,17 @@ def by_control(
     """
     keys = ("id", "X", "Y", "r", "H", "sigma")
     table = read_table(path, [one for one in COLUMNS if one.key in keys])
-    if errors := table.repeated("id"):
+    errors: list[CellError] = []
+    whole = np.column_stack([metres_of(table, key, "") for key in ("X", "Y", "r", "H", "sigma")])
+    rows = table.once("id", whole, errors)
+    if errors:
         raise WorkbookError(errors)
-    xyz = np.column_stack([metres_of(table, key, "") for key in ("X", "Y", "r")])
+    xyz, heights, stated = whole[rows, :3], whole[rows, 3], whole[rows, 4]
     blank = np.full(3, np.nan)
-    ids = meant(table.texts("id"), points)
+    ids = meant([table.texts("id")[row] for row in rows], points)
     places = np.array([points.get(name, blank) for name in ids]).reshape(-1, 3)
     picks = [project(view.camera, places) for view in views]
-    xyz, _, notes = in_plane_frame(table, xyz, metres_of(table, "H", ""), picks, None)
+    xyz, _, notes = in_plane_frame(table, xyz, heights, picks, None)
     for text in notes:
         note_remark(f"{path.name}: {text}")
     xyz[np.isnan(xyz[:, 2]), 2] = 0.0
@@ -64,7 +67,7 @@ def by_control(
     if len(rows) < 3:
         raise InputError(remark("projects.few_control_points", of=path, count=len(rows)))
     names = [ids[row] for row in rows]
-    target, stated = xyz[rows], metres_of(table, "sigma", "")[rows]
+    target, stated = xyz[rows], stated[rows]
     frame = fit_similarity([points[name] for name in names], target)
     missed = np.array([frame(points[name]) for name in names]) - target
     miss, extent = np.linalg.norm(missed, axis=1), float(np.ptp(target, axis=0).max())

@@ -85,9 +85,14 @@ def read_camera_positions(path: Path | str) -> CameraPositions:
     table = read_table(path, (name, *_XYZ, _TIME))
     if not len(table):
         raise InputError(f"{path}: holds no camera.")
-    centres = _numbers(table, ("X", "Y", "Z"), table.repeated("id"))
-    ids = tuple(text or str(k) for k, text in enumerate(table.texts("id"), start=1))
-    return CameraPositions(ids=ids, centres=centres, times=tuple(table.texts("time")))
+    centres = _numbers(table, ("X", "Y", "Z"))
+    errors: list[CellError] = []
+    rows = table.once("id", centres, errors)
+    if errors:
+        raise WorkbookError(errors)
+    ids = tuple(table.texts("id")[row] or str(row + 1) for row in rows)
+    times = tuple(table.texts("time")[row] for row in rows)
+    return CameraPositions(ids=ids, centres=centres[rows], times=times)
 
 
 def read_visibility(path: Path | str, cameras: CameraPositions) -> dict[str, set[str]]:

@@ -67,7 +67,7 @@ def read_object_points(path: Path, *, unit: str) -> tuple[ObjectPoints, list[str
         Naming every bad cell and every repeated id.
     """
     table = read_table(path, _OBJECT, name="ObjectPoints")
-    errors = table.repeated("id")
+    errors: list[CellError] = []
     xyz = _gathered(table, ("X", "Y", "Z"), unit, errors)
     sigma = np.column_stack(
         [table.numbers(k) * _factor(table, k, unit) for k in ("sigma_X", "sigma_Y", "sigma_Z")]
@@ -75,9 +75,11 @@ def read_object_points(path: Path, *, unit: str) -> tuple[ObjectPoints, list[str
     for row, column in np.argwhere(sigma < 0).tolist():
         key = f"sigma_{'XYZ'[column]}"
         errors.append(table.error(row, key, "a standard deviation cannot be negative."))
+    rows = table.once("id", xyz, errors)
     if errors:
         raise WorkbookError(errors)
-    points = ObjectPoints(ids=_ids(table), xyz=xyz, sigma=sigma, groups=tuple(table.texts("group")))
+    ids, groups = (tuple(np.array(t, object)[rows]) for t in (_ids(table), table.texts("group")))
+    points = ObjectPoints(ids=ids, xyz=xyz[rows], sigma=sigma[rows], groups=groups)
     return points, list(table.remarks)
 
 

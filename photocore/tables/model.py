@@ -11,9 +11,12 @@ import numpy as np
 
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError
+from photocore.provenance import note_remark
 from photocore.remarks import remark
 from photocore.workbook.reading.grid import cell_name, column_letters
 
+#: Coordinates of one point in several rows may differ by this much.
+_SAME = 1e-6
 #: Columns by letter: point, northing, easting, elevation, description.
 _ORDER = re.compile(r"(?=\w{3})P?(?:NE|EN)[ZH]?D?")
 _LETTERS = {"P": "id", "Z": "H", "D": "-"}
@@ -143,6 +146,41 @@ class Table:
                 message = f'"{text}" stands in {other} already; give each point its own name.'
                 errors.append(self.error(row, key, message))
         return errors
+
+    def first_rows(self, key: str, values: FloatArray, errors: list[CellError]) -> list[int]:
+        """Return the first row of each name; rows without a name stand for themselves.
+
+        Parameters
+        ----------
+        key : str
+            The column of names.
+        values : ndarray, shape (n, k)
+            What all rows of a name agree in; blanks of its first row are filled from the others.
+        errors : list
+            Takes a complaint about each row that contradicts the first.
+        """
+        first: dict[str, int] = {}
+        for row, name in enumerate(self.texts(key)):
+            place = first.setdefault(name or f" {row}", row)
+            if place == row:
+                continue
+            if np.any(np.abs(values[row] - values[place]) > _SAME):
+                message = (
+                    f'"{name}" stands in {self.cell(place, key)} already, with other coordinates; '
+                    "give each point its own name, or correct one."
+                )
+                errors.append(self.error(row, key, message))
+            blank = np.isnan(values[place])
+            values[place, blank] = values[row, blank]
+        return [*first.values()]
+
+    def once(self, key: str, values: FloatArray, errors: list[CellError]) -> list[int]:
+        """Return `first_rows`, and say so where a name has several that agree."""
+        rows = self.first_rows(key, values, errors)
+        if len(rows) < len(self) and not errors:
+            self.remarks.append(remark("table.once", rows=len(self), count=len(rows)))
+            note_remark(f"{self.file}: {self.remarks[-1]}")
+        return rows
 
     def too_large(self, keys: Sequence[str], largest: float) -> list[CellError]:
         """Return a complaint about each number beyond a limit: a slip, or a broken formula."""

@@ -17,9 +17,8 @@ from bifocal.survey.reference import KnownPoints
 from bifocal.survey.survey_input import SurveyInput
 from bifocal.workbook.reading.reader import TO_M, understood
 from bifocal.workbook.reading.setup_reader import LARGEST
-from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
-from photocore.tables import Column, Table, parse_column_map, read_table
+from photocore.tables import Column, parse_column_map, read_table
 from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH
 from photocore.tables.numbers import Decimal
 
@@ -70,7 +69,7 @@ def with_list(
     count_before = len(remarks)
     for sheet, axes in axes_of.items():
         xyz = np.stack([table.in_unit(key, TO_M, errors) for key in axes], axis=-1)
-        places = _first_rows(table, xyz, errors)
+        places = [k for k in table.first_rows("id", xyz, errors) if table.texts("id")[k]]
         if np.nanmax(np.abs(xyz), initial=0.0) > FARTHEST_WALL:
             sheet = "Georeference"
         listed = KnownPoints(ids=tuple(table.texts("id")[i] for i in places), xyz=xyz[places])
@@ -85,17 +84,6 @@ def with_list(
     if len(remarks) == count_before:
         raise InputError(remark("survey.list_of_others", of=path))
     return replace(survey, remarks=(*survey.remarks, *remarks))
-
-
-def _first_rows(table: Table, xyz: FloatArray, errors: list[CellError]) -> list[int]:
-    """Return the first row of each name: lists of picks name a point once a photo."""
-    rows: dict[str, int] = {}
-    for row, name in enumerate(table.texts("id")):
-        first = rows.setdefault(name, row)
-        if not np.array_equal(xyz[row], xyz[first], equal_nan=True):
-            message = f'"{name}" has other coordinates in {table.cell(first, "id")}.'
-            errors.append(table.error(row, "id", message))
-    return [row for name, row in rows.items() if name]
 
 
 def _filled(

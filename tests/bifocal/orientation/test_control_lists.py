@@ -127,7 +127,7 @@ def test_rows_of_no_such_photo_and_of_one_photo_twice_are_named(tmp_path):
     with pytest.raises(WorkbookError, match="is picked in this photo in"):
         read_control(listed(tmp_path, names=("far.JPG", "far.JPG")), names=PHOTOS)
     path = listed(tmp_path, change=lambda text: text.replace("652345.0", "652346.0", 1))
-    with pytest.raises(WorkbookError, match="has other coordinates in"):
+    with pytest.raises(WorkbookError, match="already, with other coordinates"):
         read_control(path, names=PHOTOS)
 
 

@@ -108,7 +108,7 @@ def test_x_y_z_that_no_wall_reaches_are_taken_for_the_world(tmp_path):
 def test_a_point_of_two_coordinates_is_named(tmp_path):
     lines = [("P1", 1, 2, 3), ("P1", 1, 2, 4)]
     field = listed(tmp_path / "two.csv", ("id", "E", "N", "H"), lines)
-    with pytest.raises(WorkbookError, match=r'"P1" has other coordinates in'):
+    with pytest.raises(WorkbookError, match=r'"P1" stands in .* already, with other'):
         bifocal.solve(fill(tmp_path / "s.xlsx"), control=field)
 
 
