@@ -236,16 +236,18 @@ def _control_delete(state: SurveyState, command: Fields) -> list[Change]:
 
 
 def _control_paste(state: SurveyState, command: Fields) -> list[Change]:
-    changes = []
-    for name, coordinates, picks in pasted_control(
-        command["text"].encode("utf-8", "replace").decode()
-    ):
+    earlier = state.pasted.get("control")
+    rows, pasted = pasted_control(
+        command["text"].encode("utf-8", "replace").decode(),
+        {name: point.picks for name, point in state.control.items()},
+        earlier.frame if earlier and state.control else None,
+    )
+    changes = [Change("pasted", "control", earlier, pasted)]
+    for name, coordinates, picks in rows:
         before = state.control.get(name)
         start = before or PickedControl(name=name, order=state.next_order())
-        both = (picks[0] or start.picks[0], picks[1] or start.picks[1])
-        changes.append(
-            Change("control", name, before, replace(start, known=coordinates, picks=both))
-        )
+        after = replace(start, known=coordinates, picks=picks)
+        changes.append(Change("control", name, before, after))
     return changes
 
 

@@ -26,6 +26,7 @@ from bifocal.model.orientation_precision import NAMES
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
 from bifocal.model.relief_map import ReliefMap
+from bifocal.model.world_frame import WorldFrame
 from bifocal.networks.set_workflow import align_photo_set
 from bifocal.options.commands import RectifyCommand
 from bifocal.orientation.align_workflow import (
@@ -104,6 +105,7 @@ def _align(task: Task, progress: Progress) -> dict[str, Any]:
         media=media_from_dict(task["media"]),
         control=_path(task["control"]),
         lengths=_path(task["lengths"]),
+        world=task["world"] and WorldFrame.from_json(task["world"]),
     )
     alignment = align_photos(
         Path(task["far"]), Path(task["near"]), Path(task["out"]), options, overwrite=True

@@ -206,6 +206,7 @@ def _align_task(session: Session, options: Options) -> dict[str, Any]:
         "as_set_up": way == "as set up",
         "free_scale": free,
         "media": media_as_dict(media_of(state.setup, session.pictures.pair)),
+        "world": next((p.frame.to_json() for p in state.pasted.values() if p.frame), None),
         **{key: None if path is None else str(path.resolve()) for key, path in tables.items()},
     }
 

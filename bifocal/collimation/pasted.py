@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
-from bifocal.collimation.records import Known, Picks, Pixel
+from bifocal.collimation.records import Known, Pasted, Picks, Pixel
+from bifocal.model.world_frame import WorldFrame
+from bifocal.orientation.control_lists import NoFrontError, in_plane_frame, without_unseen
 from bifocal.orientation.control_points import COLUMNS, metres_of
 from bifocal.remarks import remark
 from photocore.errors import InputError
 from photocore.tables import read_table
+from photocore.tables.advice import without_options
 from photocore.tables.csvread import CsvFile
 from photocore.tables.lists import as_table
 
@@ -18,33 +22,61 @@ from photocore.tables.lists import as_table
 MOST_ROWS = 5000
 
 
-def pasted_control(text: str) -> list[tuple[str, Known, Picks]]:
-    """Return name, X, Y, r [m] and picks [px] of each row; None where blank.
+def pasted_control(
+    text: str, picks: Mapping[str, Picks], frame: WorldFrame | None
+) -> tuple[list[tuple[str, Known, Picks]], Pasted]:
+    """Return name, X, Y, r [m] and picks [px] of each row, None where blank, and how it was read.
+
+    E, N, H become X along an upright wall, Y and r, as `bifocal align` makes them of its control.
+
+    Parameters
+    ----------
+    text : str
+    picks : mapping
+        What is picked on the page already, by name: it tells which side is the wall's front.
+    frame : WorldFrame or None
+        Of E, N, H that were pasted before.
 
     Raises
     ------
     InputError
-        If no table is recognised, a number is none, or a row has no name.
+        If no table is recognised, a number is none, a row has no name, or no picks tell the front.
     """
-    text, _ = as_table(text.strip("\r\n"), "what was pasted")
+    text, notes = as_table(text.strip("\r\n"), "what was pasted")
     if not text.strip():
         raise InputError(remark("page.nothing_pasted"))
-    table = read_table(CsvFile("what was pasted", _with_headings(text)), COLUMNS)
-    if not len(table) or len(table) > MOST_ROWS:
-        raise InputError(remark("page.pasted_many", count=len(table), most=MOST_ROWS))
-    if np.isfinite(table.numbers("H")).any() and not np.isfinite(table.numbers("r")).any():
-        raise InputError(remark("page.pasted_heights"))
-    coordinates = np.column_stack([metres_of(table, key, "") for key in ("X", "Y", "r")])
-    picks = np.column_stack([table.numbers(key) for key in ("col1", "row1", "col2", "row2")])
-    rows = []
-    for name, place, pixels in zip(
-        table.texts("id"), coordinates.tolist(), picks.tolist(), strict=True
-    ):
-        if not name:
-            raise InputError(remark("page.pasted_nameless"))
+    with without_options():
+        table = read_table(CsvFile("what was pasted", _with_headings(text), notes), COLUMNS)
+    count = len(table)
+    if not count or count > MOST_ROWS:
+        raise InputError(remark("page.pasted_many", count=count, most=MOST_ROWS))
+    names = [name[:80] for name in table.texts("id")]
+    if "" in names:
+        raise InputError(remark("page.pasted_nameless"))
+    xyz = np.column_stack([metres_of(table, key, "") for key in ("X", "Y", "r")])
+    pixels = [
+        np.column_stack([table.numbers(f"{axis}{photo}") for axis in ("col", "row")])
+        for photo in "12"
+    ]
+    pixels, unseen = without_unseen(pixels, names)
+    both = [
+        [
+            _pixel(row) or picks.get(name, (None, None))[k]
+            for name, row in zip(names, pixels[k].tolist(), strict=True)
+        ]
+        for k in (0, 1)
+    ]
+    shown = [np.array([pixel or (np.nan, np.nan) for pixel in one]) for one in both]
+    try:
+        with without_options():
+            xyz, frame, placed = in_plane_frame(table, xyz, metres_of(table, "H", ""), shown, frame)
+    except NoFrontError:
+        raise InputError(remark("page.pasted_heights")) from None
+    rows: list[tuple[str, Known, Picks]] = []
+    for name, place, *pair in zip(names, xyz.tolist(), *both, strict=True):
         x, y, r = (None if math.isnan(value) else value for value in place)
-        rows.append((name[:80], (x, y, r), (_pixel(pixels[:2]), _pixel(pixels[2:]))))
-    return rows
+        rows.append((name, (x, y, r), (pair[0], pair[1])))
+    return rows, Pasted(frame=frame, remarks=(*table.remarks, *unseen, *placed))
 
 
 def _with_headings(text: str) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
+from bifocal.model.world_frame import WorldFrame
 from bifocal.survey.observations import DOUBT_CODES, PLANE_CODES
 
 #: A pick: column and row in the photo as taken. [px]
@@ -147,6 +148,23 @@ class DrawnShape:
 
 #: An orientation that was accepted: its pair file, and what was reported of it.
 Accepted = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pasted:
+    """How control points that were pasted were read.
+
+    Attributes
+    ----------
+    frame : WorldFrame or None
+        Where X, Y, r lie, if they were made of E, N, H.
+    remarks : tuple of str
+    """
+
+    frame: WorldFrame | None
+    remarks: tuple[str, ...]
+
+
 Record = (
     PickedPoint
     | PickedControl
@@ -156,6 +174,7 @@ Record = (
     | ScaleLength
     | WallSpot
     | Accepted
+    | Pasted
 )
 
 
@@ -186,6 +205,8 @@ class SurveyState:
         The length that gives the scale, as ``length``; the spot that names the wall, as ``spot``.
     orientation : dict
         The orientation that was accepted on the page, as ``pair``.
+    pasted : dict
+        How the control points that were pasted last were read, as ``control``.
     setup : dict of str to float or None
         Distances and principal distances asked of the user. [m, mm]
     lenses : dict of int to dict
@@ -208,6 +229,7 @@ class SurveyState:
     scale: dict[str, ScaleLength] = field(default_factory=dict)
     wall: dict[str, WallSpot] = field(default_factory=dict)
     orientation: dict[str, Accepted] = field(default_factory=dict)
+    pasted: dict[str, Pasted] = field(default_factory=dict)
     setup: dict[str, float | None] = field(default_factory=dict)
     lenses: dict[int, dict[str, float | None]] = field(default_factory=dict)
     stage: str = ""

@@ -18,7 +18,7 @@ from bifocal.model.lens import Lens
 from bifocal.model.pair_media import PairMedia
 from bifocal.model.photo import FARTHEST_WALL
 from bifocal.model.photo_set import PhotoSet
-from bifocal.model.world_frame import world_entry
+from bifocal.model.world_frame import WorldFrame, world_entry
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import Alignment, make_alignment, with_files
 from bifocal.orientation.alignment_picture import write_alignment_picture
@@ -89,6 +89,8 @@ class AlignOptions:
         Unit of the control coordinates; empty: as the headings say, else metres.
     media : PairMedia
         What lies between cameras and wall.
+    world : WorldFrame or None
+        Where X, Y, r of the control table lie.
     """
 
     lenses: tuple[KnownLens, KnownLens] = field(default_factory=lambda: (KnownLens(), KnownLens()))
@@ -104,6 +106,7 @@ class AlignOptions:
     line: tuple[tuple[float, ...], bool] | None = None
     unit: str = ""
     media: PairMedia = field(default_factory=PairMedia.none)
+    world: WorldFrame | None = None
 
     @property
     def direction(self) -> tuple[FloatArray, bool] | None:
@@ -397,6 +400,7 @@ def control_of(
             photos=len(sizes),
             names=files,
         )
+        control = replace(control, frame=control.frame or options.world)
     if options.lengths is not None:
         if options.control is None:
             raise InputError("--lengths names points of the --control table; give that too.")

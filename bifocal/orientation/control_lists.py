@@ -28,6 +28,10 @@ _OF_TOOLS = re.compile(
 _UNSEEN = ((0.0, 0.0), (-1.0, -1.0))
 
 
+class NoFrontError(InputError):
+    """E, N, H of an upright wall of which no photo tells the front."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ListedPoints:
     """Points of a table, and where each is seen.
@@ -176,7 +180,7 @@ def in_plane_frame(
             raise InputError(remark(f"control.{lies}", of=table.file))
         frame = frame_of(world[whole], [pixels[whole] for pixels in picks])
         if frame is None:
-            raise InputError(remark("control.no_front", of=table.file))
+            raise NoFrontError(remark("control.no_front", of=table.file))
         notes.append(_described(frame))
     plane = np.full_like(xyz, np.nan)
     plane[whole] = frame.to_plane(world[whole])

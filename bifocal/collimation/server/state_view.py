@@ -302,7 +302,9 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
 def _remarks(session: Session) -> list[str]:
     """Return what is said of the pair, the worst first."""
     pair, report = session.pictures.pair, (session.proposal or {}).get("report", {})
-    remarks = dict.fromkeys((*report.get("remarks", ()), *(pair.remarks if pair else ())))
+    pasted = (text for paste in session.state.pasted.values() for text in paste.remarks)
+    held = (*pasted, *report.get("remarks", ()), *(pair.remarks if pair else ()))
+    remarks = dict.fromkeys(held)
     return sorted(remarks, key=lambda text: LEVELS.index(level_of(text)))
 
 
