@@ -20,6 +20,7 @@ from photocore.errors import InputError
 from photocore.remarks import remark
 from photocore.tables.axes import NAMES
 from photocore.tables.heading_words import bare
+from photocore.tables.systems import unit_of_system
 
 #: A word of a Leica instrument: what, about it, sign, data of 8 or 16 signs.
 _GSI_WORD = re.compile(r"(\d\d)([\d.]{4})([+-])(\w{16}|\w{8})(?=\s|$)")
@@ -29,7 +30,9 @@ _GSI_UNITS = {"0": ("m", 1e3), "1": ("ft", 1e3), "6": ("m", 1e4), "7": ("ft", 1e
 _GSI_AXES = ("81", "82", "83")
 #: First line of the ground control points of OpenDroneMap.
 _CRS = re.compile(r"\s*(\+proj|epsg:\d+|wgs84\b|\w*(?:proj|geog|local_)c(?:r)?s\[)", re.IGNORECASE)
-_DEGREES = re.compile(r"longlat|latlong|epsg:+4326|crs84|^\s*GEOG|^\s*WGS84\s*$", re.IGNORECASE)
+#: The comment in which Metashape and others name the system, and headings of its coordinates.
+_SYSTEM = re.compile(r"#\s*(?:CoordinateSystem|CRS)\s*:\s*(.+)", re.IGNORECASE)
+_ITS_AXIS = re.compile(r"(?<![\w/])([XYZ]/\w+)(?=[,;\t\r\n])")
 #: Degrees that span less than this are a place and no wall.
 _PLACE = 0.05
 
@@ -89,7 +92,7 @@ def as_table(text: str, label: str) -> tuple[str, list[str]]:
         if made is not None:
             notes = remark("table.list_of", program=made.program)
             return made.as_text(), [notes, *made.remarks]
-    return _with_commas_as_tabs(text), []
+    return _in_its_unit(_with_commas_as_tabs(text), label), []
 
 
 def _of_gsi(text: str, label: str) -> ListRows | None:
@@ -139,8 +142,8 @@ def _of_opendronemap(text: str, label: str) -> ListRows | None:
             names[place] = name
             height = "" if fields[2].lower() == "nan" else fields[2]
             rows.append((name, *fields[:2], height, fields[5], *fields[3:5]))
-    _refuse_degrees(system, label)
-    return ListRows(("id", "E", "N", "H", "photo", "col", "row"), rows, "OpenDroneMap")
+    axes = _headed("ENH", unit_of_system(system, label))
+    return ListRows(("id", *axes, "photo", "col", "row"), rows, "OpenDroneMap")
 
 
 def _of_qgis(text: str, label: str) -> ListRows | None:
@@ -156,8 +159,8 @@ def _of_qgis(text: str, label: str) -> ListRows | None:
     wanted = ("mapX", "mapY", f"{kind}X", f"{kind}Y")
     if not {*wanted} <= {*table[head]}:
         return None
-    if head and "GEOG" in "".join(table[0]):
-        _refuse_degrees("GEOG", label)
+    system = _SYSTEM.match(text)
+    axes = _headed("XY", unit_of_system(system[1] if head and system else "", label))
     rows: list[Sequence[object]] = [()] * head
     for fields in table[head + 1 :]:
         held = dict(zip(table[head], fields, strict=False))
@@ -172,7 +175,7 @@ def _of_qgis(text: str, label: str) -> ListRows | None:
     made: list[Sequence[object]] = [
         () if not row else (f"{k}", *row) for k, row in enumerate(rows, start=1 - head)
     ]
-    return ListRows(("id", "X", "Y", "col", "row", "use"), made, "QGIS")
+    return ListRows(("id", *axes, "col", "row", "use"), made, "QGIS")
 
 
 def _of_metashape(text: str, label: str) -> ListRows | None:
@@ -207,9 +210,9 @@ def _of_metashape(text: str, label: str) -> ListRows | None:
         shown = places.get(marker.get("id", ""), [("", "", "")])
         rows += [(*first, *one) for one in shown]
     system = chunk.findtext("./reference") or root.findtext("./reference") or ""
-    if any(any(row[1:3]) for row in rows):
-        _refuse_degrees(system, label)
-    headings = ("id", "E", "N", "H", "use", "photo", "col", "row")
+    has_places = any(any(row[1:3]) for row in rows)
+    axes = _headed("ENH", unit_of_system(system if has_places else "", label))
+    headings = ("id", *axes, "use", "photo", "col", "row")
     if not places:
         return ListRows(headings[:5], [row[:5] for row in rows], "Metashape")
     return ListRows(headings, rows, "Metashape")
@@ -244,10 +247,11 @@ def _of_geojson(text: str, label: str) -> ListRows | None:
         kept.append({"id": name, **rest, **axes})
     if not kept:
         raise InputError(remark("table.no_points", of=label))
-    if not is_local:
-        _refuse_degrees(json.dumps(held.get("crs", "")), label, kept)
+    unit = "" if is_local else _unit_of_points(held.get("crs"), label, kept)
     headings = tuple(dict.fromkeys(key for row in kept for key in row))
     rows: list[Sequence[object]] = [[row.get(key, "") for key in headings] for row in kept]
+    axes = dict(zip("XYZ", _headed("XYZ", unit), strict=True))
+    headings = tuple(axes.get(key, key) for key in headings)
     return ListRows(headings, rows, "WebODM" if is_local else "GeoJSON")
 
 
@@ -277,22 +281,34 @@ def _with_commas_as_tabs(text: str) -> str:
     return text.replace(head, re.sub(r"\s*,\s*", "\t", head), 1)
 
 
-def _refuse_degrees(system: str, label: str, rows: Sequence[Mapping[str, Any]] = ()) -> None:
-    """Refuse coordinates that are longitude and latitude.
+def _headed(axes: str, unit: str) -> tuple[str, ...]:
+    """Return headings of coordinates in a unit; an empty one is metres."""
+    return tuple(f"{axis} [{unit}]" if unit else axis for axis in axes)
+
+
+def _in_its_unit(text: str, label: str) -> str:
+    """Return a text whose headings X/Easting and so on say the unit of the system it names."""
+    system = _SYSTEM.match(text)
+    unit = unit_of_system(system[1], label) if system and _ITS_AXIS.search(text[:4000]) else ""
+    return _ITS_AXIS.sub(rf"\1 [{unit}]", text, count=3) if unit else text
+
+
+def _unit_of_points(system: object, label: str, rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the unit of points of GeoJSON; refuse longitude and latitude, named or not.
 
     Raises
     ------
     InputError
         Naming what to export instead.
     """
-    is_place = False
-    bare_places = all(_is_number(str(row.get(axis))) for row in rows for axis in "XY")
-    if rows and system in ('""', "null") and bare_places:
+    if system is None and all(_is_number(str(row.get(axis))) for row in rows for axis in "XY"):
         spans = [[float(row[axis]) for row in rows] for axis in "XY"]
         within = all(max(map(abs, s)) <= most for s, most in zip(spans, (180, 90), strict=True))
-        is_place = within and max(max(s) - min(s) for s in spans) < _PLACE
-    if is_place or _DEGREES.search(system):
-        raise InputError(remark("table.in_degrees", of=label))
+        if within and max(max(s) - min(s) for s in spans) < _PLACE:
+            raise InputError(remark("table.in_degrees", of=label))
+    about = system.get("properties") if isinstance(system, dict) else None
+    name = about.get("name", "") if isinstance(about, dict) else system or ""
+    return unit_of_system(str(name), label)
 
 
 def _are_numbers(place: object) -> bool:

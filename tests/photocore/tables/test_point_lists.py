@@ -249,6 +249,49 @@ def test_letters_of_two_possible_code_pages_are_said_to_be_so():
     assert "but may be" not in decoded("Größe außen, Tür".encode("cp1252"))[1][0]
 
 
+FEET = (
+    'PROJCS["NAD83 / Illinois West (ftUS)",GEOGCS["NAD83",DATUM["North_American_Datum_1983",'
+    'SPHEROID["GRS 1980",6378137,298.257222101]],UNIT["degree",0.0174532925199433]],'
+    'PROJECTION["Transverse_Mercator"],PARAMETER["latitude_of_origin",36.66],'
+    'PARAMETER["central_meridian",-90.16],PARAMETER["scale_factor",0.999941177],'
+    'PARAMETER["false_easting",2296583.333],UNIT["US survey foot",0.3048006096012192]]'
+)
+POINTS = '{"features":[{"geometry":{"type":"Point","coordinates":[3937,7874,39.37]}}],"crs":%s}'
+#: Lists of one point at 1200, 2400, 12 m that say nowhere but in their system that they are feet.
+IN_FEET = {
+    "gcp_list.txt": "+proj=tmerc +lon_0=-90 +units=us-ft\n3937 7874 39.37 1 2 far.jpg P1\n",
+    "gcp_codes.txt": "EPSG:3436\n3937 7874 39.37 1 2 far.jpg P1\n",
+    "far.points": f"#CRS: {FEET}\nmapX,mapY,sourceX,sourceY,enable\n3937,7874,1,-2,1\n",
+    "reference.csv": f"# CoordinateSystem: {FEET}\n#Label,X/Easting,Y/Northing,Z/Altitude\n"
+    "P1,3937,7874,39.37\n",
+    "points.geojson": POINTS % '{"properties":{"name":"urn:ogc:def:crs:EPSG::3436"}}',
+    "markers.xml": f"<chunk><reference>{FEET.replace(chr(34), '&quot;')}</reference>"
+    '<marker id="0" label="P1"><reference x="3937" y="7874" z="39.37"/></marker></chunk>',
+}
+
+
+@pytest.mark.parametrize("name", IN_FEET)
+def test_the_foot_of_the_system_that_a_list_names_is_taken_and_said(tmp_path, name):
+    (tmp_path / name).write_text(IN_FEET[name])
+    axes = [("X", EAST), ("Y", NORTH), ("Z", HEIGHT)]
+    columns = [Column("id", kind="text"), *(Column(k, more, unit="m") for k, more in axes)]
+    table = read_table(tmp_path / name, columns)
+    wanted = [1200, 2400, np.nan if name == "far.points" else 12]
+    np.testing.assert_allclose([table.numbers(k)[0] for k in "XYZ"], wanted, atol=1e-3)
+    assert any("US survey feet" in text for text in table.remarks)
+
+
+def test_degrees_of_any_system_are_refused_and_a_projected_one_is_not(tmp_path):
+    path = tmp_path / "gcp_list.txt"
+    path.write_text("EPSG:4258\n8.1 49.2 39.37 1 2 far.jpg P1\n")
+    with pytest.raises(InputError, match="in degrees of longitude"):
+        read_table(path, [Column("id", kind="text"), Column("X", EAST)])
+    modern = 'PROJCRS["x",BASEGEOGCRS["WGS 84",DATUM["y",ELLIPSOID["z",6378137,298.25]]],'
+    path = tmp_path / "far.points"
+    path.write_text(f"#CRS: {modern}\nmapX,mapY,sourceX,sourceY,enable\n3937,7874,1,-2,1\n")
+    assert read_table(path, [Column("X")]).numbers("X").tolist() == [3937]
+
+
 def test_degrees_minutes_and_seconds_are_degrees(tmp_path):
     columns = [Column("id", kind="text"), Column("theta", unit="deg")]
     path = tmp_path / "angles.csv"
