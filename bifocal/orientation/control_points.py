@@ -23,10 +23,14 @@ from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.names import meant, nearest
 from photocore.tables import Column, Table, parse_column_map, read_table
+from photocore.tables.advice import advice
 from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH, PHOTOS
 from photocore.tables.numbers import METRES
 
-_ALONE = {"col1": ("col", "column", "colonna", "spalte"), "row1": ("row", "riga", "zeile")}
+_ALONE = {
+    "col1": ("col", "column", "colonna", "spalte", "px", "pixel x", "im_x"),
+    "row1": ("row", "riga", "zeile", "py", "pixel y", "im_y"),
+}
 COLUMNS = (
     Column("id", NAMES, kind="text"),
     Column("X", ("X_ref", "X wall", "X control", *EAST), unit="m"),
@@ -250,8 +254,11 @@ def read_control(
             f"Each control point needs its pixel in {each}"
         )
     lone = [axis for axis in "XY" if axis not in table.present]
-    if len(lone) == 1:
-        raise InputError(remark("control.lone_axis", path=path, missing=lone[0]))
+    if len(lone) == 1 or (lone and {"r", "H"} & table.present):
+        text = remark("control.lone_axis", path=path, missing=", ".join(lone))
+        names = ", ".join(f'"{name}"' for name in table.strange) or "-"
+        how = advice("rename", first=lone[0])
+        raise InputError(f"{text} {remark('control.not_understood', names=names)} {how}")
     if not len(table):
         raise InputError(f"{path}: no control points in the table.")
     xyz = np.column_stack([metres_of(table, key, unit) for key in ("X", "Y", "r", "H")])

@@ -17,8 +17,13 @@ _POWER = re.compile(r"(?:[²³]|\^?[23])$")
 _DATUM = re.compile(
     r"[\s_.,-]*(?:\b|_|(?<=\b[EHNXYZ]))(?:(?:m[\s.]*)?(?:ü|ue|über)[\s.]*)?"
     r"(?:NH?N|NAP|TAW|NGF|IGN ?69|DHHN ?\d*|LN ?02|A?M?SL|a\.s\.l\.|s\. ?l\. ?m\."
-    r"|m?s\.?[ln]\.?m\.?|ortho?m?|wert|values?|valore|valeur)$",
+    r"|m?s\.?[ln]\.?m\.?|ortho?m?|wert|values?|valore|valeur|coord(?:inat[ea]|\.)?|koordinate"
+    r"|UTM ?\d*[NS]?|GK ?\d*|L93|CC\d\d|LV ?\d\d)$",
     re.IGNORECASE,
+)
+#: Begins a heading of a coordinate, and says nothing of which.
+_PREFIX = re.compile(
+    r"^\W*(?:coord(?:inat[ea])?|koordinate|grid|point|local)[\s_.]+(?=\w)", re.IGNORECASE
 )
 #: Units people measure in that no command takes.
 _FOREIGN = frozenset(
@@ -74,11 +79,6 @@ def unknown_unit(text: str) -> str:
     return "" if not word or base in UNITS or base in _NO_LENGTHS else word
 
 
-def without_unit(text: str) -> str:
-    """Return a heading without the unit in brackets at its end."""
-    return _UNIT.sub("", text)
-
-
 def numbered(text: str, digit: str) -> str:
     """Return a heading with a digit in front of its unit: ``x [mm]`` of photo 1 is ``x1 [mm]``."""
     unit = _UNIT.search(text)
@@ -93,6 +93,18 @@ def forms_of(variants: Sequence[str]) -> list[str]:
         if form and form not in forms:
             forms.append(form)
         loose = bare(_LOOSE_UNIT.sub("", _UNIT.sub("", text).strip()))
-        plain = bare(_DATUM.sub("", _UNIT.sub("", text).strip()))
-        forms += [one for one in (loose, plain) if one and one not in forms]
+        if loose and loose not in forms:
+            forms.append(loose)
     return forms or [""]
+
+
+def parts_of(text: str) -> set[str]:
+    """Return bare forms of what a heading says besides itself: sides of a slash, less a datum.
+
+    >>> sorted(parts_of("X/Easting")), parts_of("Höhe m ü. NN"), parts_of("Point Elevation [m]")
+    (['easting', 'x'], {'höhe'}, {'elevation'})
+    """
+    whole = _UNIT.sub("", text).strip()
+    sides = whole.split("/") if "/" in whole else []
+    plain = _PREFIX.sub("", _DATUM.sub("", whole))
+    return {bare(part) for part in (*sides, plain)} - {"", bare(text)}

@@ -11,9 +11,9 @@ from photocore.tables.heading_words import (
     bare,
     forms_of,
     numbered,
+    parts_of,
     unit_of,
     unknown_unit,
-    without_unit,
 )
 from photocore.tables.model import Column
 from photocore.workbook.reading.grid import (
@@ -269,11 +269,8 @@ def _assign(
     match = Match(columns=dict(fixed), first=header + 1, header=header)
     taken: dict[int, str] = {number: key for key, number in fixed.items()}
     forms = {number: forms_of(variants) for number, variants in texts.items()}
-    # "X/Easting" is X as well as Easting, where nothing else is.
-    lowest = {number: without_unit(variants[-1]) for number, variants in texts.items()}
-    parts = {
-        n: {bare(p) for p in text.split("/")} if "/" in text else () for n, text in lowest.items()
-    }
+    # "X/Easting" is X as well as Easting, and "Höhe NHN" a height, where nothing else is.
+    parts = {number: parts_of(variants[-1]) for number, variants in texts.items()}
     keys = {column.key: bare(column.key) for column in columns}
     aliases = {column.key: {bare(alias) for alias in column.aliases} for column in columns}
 
@@ -284,6 +281,12 @@ def _assign(
         unit = next((u for u in map(unit_of, texts[number]) if u), "")
         if unit:
             match.units[column.key] = unit
+
+    def alike(key: str, number: int, rival: int) -> bool:
+        """Whether a further heading says as much as that of a column."""
+        is_whole = {keys[key], *aliases[key]} & {*forms[number]}
+        shared = not is_whole and not parts[number].isdisjoint(parts[rival])
+        return shared or forms[rival][0] == forms[number][0]
 
     said = [column for column in columns if column.key in mapped and column.key not in fixed]
     for column in said:
@@ -316,7 +319,7 @@ def _assign(
             same = [
                 other
                 for other in sorted(texts)
-                if (other == number or other not in taken) and forms[other][0] == forms[number][0]
+                if other == number or (other not in taken and alike(column.key, number, other))
             ]
             if len(same) > 1:
                 match.doubles[column.key] = same

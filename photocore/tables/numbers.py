@@ -21,7 +21,8 @@ _SPELLINGS = {"um": "µm μm um", "px": "px pixel pixels pix", "degC": "°c"}
 _SPELLINGS |= {"deg": "° deg degree degrees gradi", "gon": "gon gons"}
 #: The foot of 0.3048 m, and that of the United States' surveys, 2 ppm longer.
 _SPELLINGS |= {"ft": "ft feet foot ift intft internationalfeet internationalfoot"}
-_SPELLINGS |= {"ftUS": "ftus usft sft ussft ussurveyfeet ussurveyfoot surveyfeet surveyfoot"}
+_US = "ftus usft sft ussft footus feetus surveyfeet surveyfoot surveyft"
+_SPELLINGS |= {"ftUS": f"{_US} ussurveyfeet ussurveyfoot"}
 _SPELLINGS |= {unit: unit for unit in ("mm", "cm", "dm", "m", "km", "rad", "%", "nm", "-")}
 UNITS = {word: unit for unit, words in _SPELLINGS.items() for word in words.split()}
 #: Metres in each unit of length.
@@ -34,7 +35,7 @@ _NUMBER = re.compile(
     r"(?P<number>[+-]?(?:\d[\d.,' \u2019]*|[.,]\d+)(?:[eE][+-]?\d+)?)"
     r"\s*(?P<unit>[^\d\s.,'+-][^\d.,]*|)"
 )
-_JOINTS = re.compile(r"[\s_-]+")
+_JOINTS = re.compile(r"[\s_.-]+")
 _PLAIN = re.compile(r"[+-]?[0-9]+([.,][0-9]*)?")
 #: The exponent as Fortran writes it.
 _FORTRAN = re.compile(r"(?<=[\d.,])[dD](?=[+-]?\d+\s*$)")

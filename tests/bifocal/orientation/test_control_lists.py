@@ -170,13 +170,18 @@ def test_heights_above_some_datum_are_heights(tmp_path, heading, plan) -> None:
 
 
 def test_what_stands_beside_e_and_n_is_asked_about_or_named_unless_it_is_of_a_tool(tmp_path):
-    for heading in ("Ellipsoidal height", "Z UTM", "Kote Sockel"):
+    for heading in ("Ellipsoidal height", "Quota ass.", "Kote Sockel"):
         with pytest.raises(InputError, match=f'"{heading}" is not understood'):
             read_control(written(tmp_path, in_world(70.0), headings=f"id,E,N,{heading}"))
     control = read_control(written(tmp_path, in_world(70.0), headings="id,E,N,Niveau"))
     assert any("left out: Niveau. If one holds heights, call it H" in t for t in control.remarks)
     control = read_control(written(tmp_path, in_world(70.0), headings="id,E,N,Antenna height"))
     assert not control.remarks
+
+
+def test_heights_without_x_and_y_name_the_headings_that_are_not_understood(tmp_path):
+    with pytest.raises(InputError, match=r'X, Y is missing.*not understood: "Droite", "Haut"'):
+        read_control(written(tmp_path, in_world(70.0), headings="id,Droite,Haut,H"))
 
 
 @pytest.mark.parametrize("heading", ["Hxhe", "Hˆhe", "Quta"])  # mistyped, or in another encoding

@@ -249,6 +249,31 @@ def test_letters_of_two_possible_code_pages_are_said_to_be_so():
     assert "but may be" not in decoded("Größe außen, Tür".encode("cp1252"))[1][0]
 
 
+@pytest.mark.parametrize(
+    "headings",
+    ["Matricule;X_L93;Y_L93;Z_NGF", "Punkt;E LV95;N LV95;H LN02",
+     "Nome;Coord. Est;Coord. Nord;Quota",
+     "Point Number;Grid Easting;Grid Northing;Point Elevation", "Punto;Este;Norte;Cota",
+     "Point Id;Easting;Northing;Ortho. Hgt.", "Pt;X coord.;Y coord.;El.",
+     "Pt;Easting (U.S. Survey Feet);Northing (us-ft);Elevation (foot_us)",
+     "Pt;geo_x;geo_y;geo_z"],
+)  # fmt: skip
+def test_headings_of_instruments_and_countries_are_understood(tmp_path, headings):
+    scale = 3937 / 1200 if "foot" in headings else 1
+    row = ";".join(["P1", *(repr(scale * v) for v in (1200.0, 2400.0, 12.0))])
+    table = read_table(open_tables_of(tmp_path, f"{headings}\n{row}\n"), COLUMNS)
+    assert table.texts("id") == ["P1"]
+    np.testing.assert_allclose([table.numbers(k)[0] for k in "ENH"], [1200, 2400, 12])
+
+
+def test_the_whole_word_goes_first_and_two_systems_are_asked_about(tmp_path):
+    path = open_tables_of(tmp_path, "id,Local Easting,Easting,N,H\nP1,1,2,3,4\n")
+    assert read_table(path, COLUMNS).numbers("E").tolist() == [2]
+    path = open_tables_of(tmp_path, "id,X_UTM,Y_UTM,X_L93,Y_L93\nP1,1,2,3,4\n")
+    with pytest.raises(InputError, match='"X_UTM" stands in B1 and D1'):
+        read_table(path, COLUMNS)
+
+
 FEET = (
     'PROJCS["NAD83 / Illinois West (ftUS)",GEOGCS["NAD83",DATUM["North_American_Datum_1983",'
     'SPHEROID["GRS 1980",6378137,298.257222101]],UNIT["degree",0.0174532925199433]],'
