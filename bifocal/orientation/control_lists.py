@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import PurePath
+from pathlib import Path, PurePath
 
 import numpy as np
 
@@ -185,6 +185,14 @@ def in_plane_frame(
     plane = np.full_like(xyz, np.nan)
     plane[whole] = frame.to_plane(world[whole])
     return plane, frame, notes
+
+
+def lacks_axis(table: Table, path: Path | str, missing: str, option: str = "--columns") -> str:
+    """Return the complaint about a list without coordinates in plan, and what is not understood."""
+    text = remark("control.lone_axis", path=path, missing=missing)
+    names = ", ".join(f'"{name}"' for name in table.strange) or "-"
+    how = advice("rename", option, first=missing[0])
+    return f"{text} {remark('control.not_understood', names=names)} {how}"
 
 
 def strange_third(

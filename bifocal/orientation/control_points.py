@@ -14,6 +14,7 @@ from bifocal.orientation.control_lists import (
     ListedPoints,
     in_plane_frame,
     is_long,
+    lacks_axis,
     of_rows,
     without_unseen,
 )
@@ -23,7 +24,6 @@ from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.names import meant, nearest
 from photocore.tables import Column, Table, parse_column_map, read_table
-from photocore.tables.advice import advice
 from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH, PHOTOS
 from photocore.tables.numbers import METRES
 
@@ -255,10 +255,7 @@ def read_control(
         )
     lone = [axis for axis in "XY" if axis not in table.present]
     if len(lone) == 1 or (lone and {"r", "H"} & table.present):
-        text = remark("control.lone_axis", path=path, missing=", ".join(lone))
-        names = ", ".join(f'"{name}"' for name in table.strange) or "-"
-        how = advice("rename", first=lone[0])
-        raise InputError(f"{text} {remark('control.not_understood', names=names)} {how}")
+        raise InputError(lacks_axis(table, path, ", ".join(lone)))
     if not len(table):
         raise InputError(f"{path}: no control points in the table.")
     xyz = np.column_stack([metres_of(table, key, unit) for key in ("X", "Y", "r", "H")])

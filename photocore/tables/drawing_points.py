@@ -36,6 +36,14 @@ def model_space(path: Path) -> Any:
         raise InputError(f"{path}: is no DXF drawing that can be read ({error}).") from error
 
 
+def drawing_unit(model: Any) -> str:
+    """Return the unit a drawing says it is in; empty where that is metres, or none."""
+    from ezdxf.units import unit_name
+
+    code = model.doc.units
+    return "" if code in (0, 6) else unit_name(code).lower()
+
+
 def named_points(model: Any, path: Path) -> list[NamedPlace]:
     """Return name and X, Y, Z of each point.
 

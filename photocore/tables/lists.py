@@ -30,9 +30,13 @@ _GSI_UNITS = {"0": ("m", 1e3), "1": ("ft", 1e3), "6": ("m", 1e4), "7": ("ft", 1e
 _GSI_AXES = ("81", "82", "83")
 #: First line of the ground control points of OpenDroneMap.
 _CRS = re.compile(r"\s*(\+proj|epsg:\d+|wgs84\b|\w*(?:proj|geog|local_)c(?:r)?s\[)", re.IGNORECASE)
-#: The comment in which Metashape and others name the system, and headings of its coordinates.
+#: The comment in which Metashape and others name the system, the column in which Emlid does, and
+#: headings of its coordinates.
 _SYSTEM = re.compile(r"#\s*(?:CoordinateSystem|CRS)\s*:\s*(.+)", re.IGNORECASE)
-_ITS_AXIS = re.compile(r"(?<![\w/])([XYZ]/\w+)(?=[,;\t\r\n])")
+_IN_COLUMN = "CS name"
+_ITS_AXIS = re.compile(
+    r"(?<![\w/])([XYZ](?:/\w+)?|Easting|Northing|Elevation)(?=\s*(?:[,;\t]|$))", re.MULTILINE
+)
 #: Degrees that span less than this are a place and no wall.
 _PLACE = 0.05
 
@@ -272,7 +276,11 @@ def _with_commas_as_tabs(text: str) -> str:
     Metashape writes ``# PhotoID, X, Y, Z`` above rows with tabs.
     """
     head = next(
-        (line for line in text[:4000].splitlines() if line.startswith("#") and line.count(",") > 2),
+        (
+            line
+            for line in text[:8000].splitlines()
+            if line.startswith("#") and line.count(",") > 2 and not _SYSTEM.match(line)
+        ),
         "",
     )
     after = text[text.find(head) + len(head) :].lstrip("\r\n").partition("\n")[0] if head else ""
@@ -288,9 +296,16 @@ def _headed(axes: str, unit: str) -> tuple[str, ...]:
 
 def _in_its_unit(text: str, label: str) -> str:
     """Return a text whose headings X/Easting and so on say the unit of the system it names."""
-    system = _SYSTEM.match(text)
-    unit = unit_of_system(system[1], label) if system and _ITS_AXIS.search(text[:4000]) else ""
-    return _ITS_AXIS.sub(rf"\1 [{unit}]", text, count=3) if unit else text
+    system, (first, _, rest) = _SYSTEM.match(text), text.partition("\n")
+    name, start, head = "", "", first
+    if system:
+        name, start, head = system[1], first + "\n", rest.partition("\n")[0]
+    elif _IN_COLUMN in first:
+        names, *rows = csv.reader([first, rest.partition("\n")[0]])
+        name = dict(zip(names, *rows[:1], strict=False)).get(_IN_COLUMN, "") if rows else ""
+    unit = unit_of_system(name, label) if _ITS_AXIS.search(head) else ""
+    rest = text[len(start) + len(head) :]
+    return start + _ITS_AXIS.sub(rf"\1 [{unit}]", head, count=3) + rest if unit else text
 
 
 def _unit_of_points(system: object, label: str, rows: Sequence[Mapping[str, Any]]) -> str:

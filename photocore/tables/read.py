@@ -21,7 +21,7 @@ from photocore.tables.csvread import (
     too_wide,
     unguarded,
 )
-from photocore.tables.drawing_points import model_space, named_points
+from photocore.tables.drawing_points import drawing_unit, model_space, named_points
 from photocore.tables.fill import (
     describe,
     fill,
@@ -72,8 +72,10 @@ def open_tables(path: Path | str, *, max_rows: int = 100_000) -> SheetFile | Csv
     if ending in _TEXTS:
         return open_csv(path)
     if ending == ".dxf":
-        points = named_points(model_space(path), path)
-        return CsvFile(path.name, drawing_as_table(points, str(path)))
+        model = model_space(path)
+        text, unit = drawing_as_table(named_points(model, path), str(path)), drawing_unit(model)
+        notes: list[str] = [remark("table.drawing_unit", unit=unit)] if unit else []
+        return CsvFile(path.name, text, notes)
     check_name(path)
     if not path.is_dir():
         check_file(path)

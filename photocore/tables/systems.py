@@ -7,7 +7,7 @@ from contextlib import suppress
 
 from photocore.errors import InputError
 from photocore.remarks import remark
-from photocore.tables.numbers import METRES
+from photocore.tables.numbers import FEET, METRES
 
 _DEGREES = re.compile(r"longlat|latlong|epsg:+4326|crs84|^\s*GEOG|^\s*WGS84\s*$", re.IGNORECASE)
 #: The usual systems in metres, for which no library is loaded.
@@ -17,6 +17,8 @@ _METRIC = re.compile(
 )
 #: A unit of length in the text of a system.
 _UNIT = re.compile(r'UNIT\["(?!deg)([^"]*)",\s*([\d.eE+-]+)', re.IGNORECASE)
+#: The name of a system that is in feet ends with its foot.
+_IN_NAME = re.compile(r"\((ftUS|ft)\)\s*$")
 _EPSG = re.compile(r"urn:ogc:def:crs:EPSG::\d+|epsg:+\d+", re.IGNORECASE)
 #: Two units of length are one below this; feet and US survey feet are 2e-6 apart.
 _SAME = 2e-7
@@ -67,6 +69,8 @@ def _linear_unit(text: str, label: str) -> tuple[str, float]:
             is_place = _DEGREES.search(text) is not None
     if is_place:
         raise InputError(remark("table.in_degrees", of=label))
+    if in_name := _IN_NAME.search(text):
+        return in_name[1], FEET[in_name[1]]
     for name, metres in _UNIT.findall(text):
         with suppress(ValueError):
             return name, float(metres) or 1.0

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from bifocal.model.photo import FARTHEST_WALL
-from bifocal.orientation.control_lists import of_rows, strange_third, without_unseen
+from bifocal.orientation.control_lists import lacks_axis, of_rows, strange_third, without_unseen
 from bifocal.orientation.control_points import A_PHOTO
 from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations, pixel_keys
@@ -17,8 +17,9 @@ from bifocal.survey.reference import KnownPoints
 from bifocal.survey.survey_input import SurveyInput
 from bifocal.workbook.reading.reader import TO_M, understood
 from bifocal.workbook.reading.setup_reader import LARGEST
+from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
-from photocore.tables import Column, parse_column_map, read_table
+from photocore.tables import Column, Table, parse_column_map, read_table
 from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH
 from photocore.tables.numbers import Decimal
 
@@ -62,16 +63,13 @@ def with_list(
         columns += [understood(key, more=more, unit="m") for key, more in headed.items()]
     names = parse_column_map(order, [column.key for column in columns]) if order else None
     table = read_table(path, columns, decimal=decimal, column_map=names, errors=errors)
-    axes_of = {sheet: tuple(axes) for sheet, axes in _AXES.items()}
-    errors += table.too_large([*axes_of["Georeference"], *axes_of["Check"]], LARGEST)
-    doubts = strange_third(table, "E", ("Z_ref", "H"), "--control-order")
-    remarks = [*table.remarks, *doubts]
+    keys = [key for headed in _AXES.values() for key in headed]
+    errors += table.too_large(keys, LARGEST)
+    world, wall, placed = _placed(table, {k: table.in_unit(k, TO_M, errors) for k in keys}, path)
+    remarks = [*table.remarks, *placed]
     count_before = len(remarks)
-    for sheet, axes in axes_of.items():
-        xyz = np.stack([table.in_unit(key, TO_M, errors) for key in axes], axis=-1)
+    for sheet, xyz in (("Georeference", world), ("Check", wall)):
         places = [k for k in table.first_rows("id", xyz, errors) if table.texts("id")[k]]
-        if np.nanmax(np.abs(xyz), initial=0.0) > FARTHEST_WALL:
-            sheet = "Georeference"
         listed = KnownPoints(ids=tuple(table.texts("id")[i] for i in places), xyz=xyz[places])
         listed = listed.called_as(survey.points.ids)
         measured = np.isin(listed.ids, survey.points.ids) & np.isfinite(listed.xyz).any(axis=1)
@@ -84,6 +82,39 @@ def with_list(
     if len(remarks) == count_before:
         raise InputError(remark("survey.list_of_others", of=path))
     return replace(survey, remarks=(*survey.remarks, *remarks))
+
+
+def _placed(
+    table: Table, columns: Mapping[str, FloatArray], path: Path | str
+) -> tuple[FloatArray, FloatArray, list[str]]:
+    """Return E, N, H and X, Y, Z on the wall of a list, shape (n, 3), and what is said of them.
+
+    Z beside E and N is the height; X and Y beside H, or further off than a wall reaches, are plan.
+
+    Raises
+    ------
+    InputError
+        If a height has no plan beside it.
+    """
+    world, wall = (np.stack([columns[key] for key in axes], axis=-1) for axes in _AXES.values())
+    have, notes = table.present, strange_third(table, "E", ("Z_ref", "H"), "--control-order")
+    plan, flat = have & {"E", "N"}, {"X_ref", "Y_ref"} <= have
+    if (plan or "H" in have) and len(plan) < 2 and not flat:
+        lacking = ", ".join(axis for axis in "EN" if axis not in plan)
+        raise InputError(lacks_axis(table, path, lacking, "--control-order"))
+    if plan:
+        if "H" not in have:
+            world[:, 2], wall[:, 2] = wall[:, 2], np.nan
+    elif "H" in have or np.nanmax(np.abs(wall), initial=0.0) > FARTHEST_WALL:
+        order = [0, 1]
+        if "H" in have:
+            is_geodetic = table.columns["Y_ref"] < table.columns["X_ref"]
+            order = [1, 0] if is_geodetic else order
+            notes.append(remark(f"control.{'geodetic' if is_geodetic else 'x_is_east'}"))
+        world[:, :2] = wall[:, order]
+        world[:, 2] = np.where(np.isnan(world[:, 2]), wall[:, 2], world[:, 2])
+        wall = np.full_like(wall, np.nan)
+    return world, wall, notes
 
 
 def _filled(

@@ -178,3 +178,25 @@ def test_heights_of_a_list_that_are_not_understood_are_asked_about(tmp_path):
     assert refused.exit_code == 1
     assert '"Quota punto" is not understood' in refused.stderr
     assert '--control-order "H=HEADING"' in refused.stderr
+
+
+@pytest.mark.parametrize(
+    "headings",
+    [("Name", "E", "N", "Z"), ("Name", "X", "Y", "elevation"), ("#name", "x", "y", "alt")],
+)
+def test_heights_stay_beside_their_plan_whatever_both_are_called(tmp_path, headings):
+    lines = [(n, 1000 + x, 2000 - r, 50 + y) for n, x, y, r in WALL]
+    path = fill(tmp_path / "s.xlsx", rows(WALL))
+    solved = bifocal.solve(path, control=listed(tmp_path / "mixed.csv", headings, lines))
+    np.testing.assert_allclose(solved.world, [line[1:] for line in lines], atol=1e-6)
+    assert not len(solved.check.ids)
+
+
+def test_y_before_x_beside_a_height_is_geodetic_and_a_height_alone_no_place(tmp_path):
+    lines = [(n, 1000 + x, 2000 - r, 50 + y) for n, x, y, r in WALL]
+    path = fill(tmp_path / "s.xlsx", rows(WALL))
+    solved = bifocal.solve(path, control=listed(tmp_path / "g.csv", ("id", "Y", "X", "H"), lines))
+    np.testing.assert_allclose(solved.world, [line[1:] for line in lines], atol=1e-6)
+    field = listed(tmp_path / "d.csv", ("Name", "Longitude", "Latitude", "Height"), lines)
+    with pytest.raises(InputError, match=r'E, N is missing.*understood: "Longitude", "Latitude"'):
+        bifocal.solve(path, control=field)

@@ -289,6 +289,10 @@ IN_FEET = {
     "far.points": f"#CRS: {FEET}\nmapX,mapY,sourceX,sourceY,enable\n3937,7874,1,-2,1\n",
     "reference.csv": f"# CoordinateSystem: {FEET}\n#Label,X/Easting,Y/Northing,Z/Altitude\n"
     "P1,3937,7874,39.37\n",
+    "angles.txt": f"# CoordinateSystem: {FEET}\n# PhotoID, X, Y, Z, Omega\n"
+    "P1\t3937\t7874\t39.37\t1\n",
+    "reach.csv": "Name,Easting,Northing,Elevation,CS name\n"
+    "P1,3937,7874,39.37,NAD83(2011) / Illinois West (ftUS)\n",
     "points.geojson": POINTS % '{"properties":{"name":"urn:ogc:def:crs:EPSG::3436"}}',
     "markers.xml": f"<chunk><reference>{FEET.replace(chr(34), '&quot;')}</reference>"
     '<marker id="0" label="P1"><reference x="3937" y="7874" z="39.37"/></marker></chunk>',
@@ -304,6 +308,16 @@ def test_the_foot_of_the_system_that_a_list_names_is_taken_and_said(tmp_path, na
     wanted = [1200, 2400, np.nan if name == "far.points" else 12]
     np.testing.assert_allclose([table.numbers(k)[0] for k in "XYZ"], wanted, atol=1e-3)
     assert any("US survey feet" in text for text in table.remarks)
+
+
+def test_the_unit_that_a_drawing_names_is_said(tmp_path):
+    drawing = ezdxf.new()
+    drawing.modelspace().add_text("P1", dxfattribs={"insert": (1, 2, 3)})
+    for unit, remarks in ((4, ["The drawing says its unit is millimeters"]), (6, [])):
+        drawing.units = unit
+        drawing.saveas(tmp_path / "points.dxf")
+        table = read_table(tmp_path / "points.dxf", COLUMNS)
+        assert [text[:40] for text in table.remarks] == remarks
 
 
 def test_degrees_of_any_system_are_refused_and_a_projected_one_is_not(tmp_path):
