@@ -20,7 +20,8 @@ from photocore.arrays import FloatArray
 from photocore.cloud.model import PIECE, Cloud, CloudPiece, NewAttributes, PieceWriter
 from photocore.errors import LARGEST, CellError, InputError, WorkbookError
 from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH
-from photocore.tables.heading_words import bare
+from photocore.tables.heading_words import bare, parts_of, unit_of
+from photocore.tables.lists import unit_of_comment
 from photocore.tables.rows import COMMENTS
 
 #: Headings of each coordinate and of the columns other commands ask for.
@@ -55,6 +56,7 @@ class TextCloud(Cloud):
                 while first.lstrip().startswith(COMMENTS) and (
                     second.lstrip().startswith(COMMENTS) or len(_WORDS.findall(first)) < 3
                 ):
+                    self._refuse_unit(first.strip(), unit_of_comment(first, str(path)))
                     first, second, self._notes = second, next(lines, ""), self._notes + 1
         except UnicodeDecodeError:
             raise InputError(f"{path}: is not a text file.") from None
@@ -70,7 +72,7 @@ class TextCloud(Cloud):
             names if self._headed else ["X", "Y", "Z", *map(str, range(4, 1 + len(names)))]
         )
         numbered = list(enumerate(self._names))[::-1]
-        places = {bare(part): k for k, name in numbered for part in name.split("/")}
+        places = {part: k for k, name in numbered for part in parts_of(name)}
         places |= {bare(name): k for k, name in numbered}
         self._columns = {
             key: next(places[form] for form in forms if form in places)
@@ -83,7 +85,9 @@ class TextCloud(Cloud):
                 f"{path}: no column for {', '.join(missing) or 'X, Y, Z'}; found the headings "
                 f"{', '.join(map(repr, names[:12]))}. Name the columns X, Y and Z [m]."
             )
-        self._refuse_millimetres()
+        for heading in (self._names[self._columns[key]] for key in "XYZ"):
+            unit = re.search(r"[\[(]\s*(\w+)\s*[\])]", heading)
+            self._refuse_unit(heading, unit_of(heading) or (unit[1] if unit else ""))
         if not second and self._headed:
             raise InputError(f"{path}: holds headings but no points.")
 
@@ -95,15 +99,12 @@ class TextCloud(Cloud):
             return (line.split() for line in lines)
         return csv.reader(lines, delimiter=self._delimiter)
 
-    def _refuse_millimetres(self) -> None:
-        for key in "XYZ":
-            heading = self._names[self._columns[key]]
-            unit = re.search(r"[\[(]\s*(\w+)\s*[\])]", heading)
-            if unit and unit[1].lower() not in ("m", "metre", "meter", "metri"):
-                raise InputError(
-                    f"{self.path}: column {heading!r} is in {unit[1]}, but heights and cameras are "
-                    "in metres. Convert the file to metres, and the heading to [m]."
-                )
+    def _refuse_unit(self, heading: str, unit: str) -> None:
+        if unit.lower() not in ("", "m", "metre", "meter", "metri"):
+            raise InputError(
+                f"{self.path}: column {heading[:60]!r} is in {unit}, but heights and cameras are "
+                "in metres. Convert the file to metres, and the heading to [m]."
+            )
 
     def has(self, name: str) -> bool:
         """Return whether a column exists."""

@@ -294,6 +294,12 @@ def _headed(axes: str, unit: str) -> tuple[str, ...]:
     return tuple(f"{axis} [{unit}]" if unit else axis for axis in axes)
 
 
+def unit_of_comment(line: str, label: str) -> str:
+    """Return the unit of the coordinate system that a comment names; empty for metres or none."""
+    system = _SYSTEM.match(line)
+    return unit_of_system(system[1], label) if system else ""
+
+
 def _in_its_unit(text: str, label: str) -> str:
     """Return a text whose headings X/Easting and so on say the unit of the system it names."""
     system, (first, _, rest) = _SYSTEM.match(text), text.partition("\n")
