@@ -24,13 +24,18 @@ from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.names import meant, nearest
 from photocore.tables import Column, Table, parse_column_map, read_table
-from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH, PHOTOS
+from photocore.tables.axes import (
+    COLUMNS_OF_PIXELS,
+    EAST,
+    HEIGHT,
+    NAMES,
+    NORTH,
+    PHOTOS,
+    ROWS_OF_PIXELS,
+)
 from photocore.tables.numbers import METRES
 
-_ALONE = {
-    "col1": ("col", "column", "colonna", "spalte", "px", "pixel x", "im_x"),
-    "row1": ("row", "riga", "zeile", "py", "pixel y", "im_y"),
-}
+_ALONE = {"col1": ("col", *COLUMNS_OF_PIXELS), "row1": ("row", *ROWS_OF_PIXELS)}
 COLUMNS = (
     Column("id", NAMES, kind="text"),
     Column("X", ("X_ref", "X wall", "X control", *EAST), unit="m"),

@@ -16,13 +16,13 @@ from photocore.errors import CellError, InputError, WorkbookError
 from photocore.names import called, meant, nearest
 from photocore.programs.model import ForeignProject, ForeignView
 from photocore.tables import Column, Table, read_table
-from photocore.tables.axes import NAMES, PHOTOS
+from photocore.tables.axes import COLUMNS_OF_PIXELS, NAMES, PHOTOS, ROWS_OF_PIXELS
 
 COLUMNS = (
     Column("id", NAMES, kind="text", required=True),
     Column("photo", PHOTOS, kind="text"),
-    Column("col", ("column", "colonna", "spalte"), unit="px"),
-    Column("row", ("riga", "zeile"), unit="px"),
+    Column("col", COLUMNS_OF_PIXELS, unit="px"),
+    Column("row", ROWS_OF_PIXELS, unit="px"),
     Column("x", ("X model",)),
     Column("y", ("Y model",)),
     Column("z", ("Z model",)),

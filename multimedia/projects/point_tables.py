@@ -14,14 +14,22 @@ from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.names import did_you_mean, meant
 from photocore.tables import Column, Table, open_tables, read_table, write_csv
-from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH
+from photocore.tables.axes import (
+    COLUMNS_OF_PIXELS,
+    EAST,
+    HEIGHT,
+    NAMES,
+    NORTH,
+    PHOTOS,
+    ROWS_OF_PIXELS,
+)
 
 #: Metres per unit of length that a heading may name.
 METRES: Mapping[str, float] = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "km": 1e3}
 
 _ID = Column("id", NAMES, kind="text")
 _GROUP = Column("group", ("set", "plate", "frame", "gruppe", "gruppo", "code"), kind="text")
-_PHOTO = ("cam", "image", "photo", "kamera", "bild", "foto", "fotocamera")
+_PHOTO = ("cam", "photo", "kamera", "fotocamera", *PHOTOS)
 _CAMERA = Column("camera", _PHOTO, kind="text", required=True)
 _OBJECT = (
     _ID,
@@ -38,8 +46,8 @@ _IMAGE = (
     _ID,
     Column("x", ("x mm", "x'"), unit="mm"),
     Column("y", ("y mm", "y'"), unit="mm"),
-    Column("col", ("column", "u", "spalte", "colonna"), unit="px"),
-    Column("row", ("line", "v", "zeile", "riga"), unit="px"),
+    Column("col", COLUMNS_OF_PIXELS, unit="px"),
+    Column("row", ROWS_OF_PIXELS, unit="px"),
     Column("sigma_x", ("sx", "sigma")),
     Column("sigma_y", ("sy",)),
     _GROUP,

@@ -29,3 +29,6 @@ PHOTOS = (
     "picture",
     "image name",
 )
+#: Of the pixel.
+COLUMNS_OF_PIXELS = ("column", "colonna", "spalte", "px", "pixel x", "im_x", "u")
+ROWS_OF_PIXELS = ("line", "riga", "zeile", "py", "pixel y", "im_y", "v")

@@ -5,12 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bifocal.projects.project_points import read_points
+from bifocal.orientation.control_points import read_control
+from bifocal.projects.project_points import COLUMNS, read_points
 from bifocal.projects.scale import by_control
 from multimedia.bathymetry.survey_tables import read_camera_positions
-from multimedia.projects.point_tables import read_object_points
+from multimedia.projects.point_tables import _IMAGE, read_object_points
 from photocore.errors import WorkbookError
 from photocore.provenance import noted_remarks, recording
+from photocore.tables import read_table
 
 PLACES = {"P1": (10.0, 20.0, 5.0), "P2": (14.0, 20.0, 5.5), "P3": (14.0, 23.0, 6.0)}
 XML = (
@@ -80,3 +82,19 @@ def test_rows_that_contradict_each_other_are_both_named(tmp_path, reader):
     (tmp_path / name).write_text(text.replace("P1,10.0,20.0,5.0,2", "P1,10.0,20.1,5.0,2"))
     with pytest.raises(WorkbookError, match=r'A3 .*"P1" stands in A2 already, with other'):
         READERS[reader](tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    "headings",
+    ["name,px,py,image", "label,pixel x,pixel y,filename", "gcp_name,im_x,im_y,image_name",
+     "id,u,v,camera", "Punkt,Spalte,Zeile,Bild"],
+)  # fmt: skip
+def test_pixels_are_called_in_every_room_as_programs_call_them(tmp_path, headings):
+    path = tmp_path / "picks.csv"
+    path.write_text(f"{headings}\nP1,10,20,far.JPG\n")
+    control = read_control(path, photos=1, names=("far.jpg",))
+    assert (control.ids, control.pixels1.tolist()) == (("P1",), [[10, 20]])
+    for columns, photo in ((COLUMNS, "photo"), (_IMAGE, "camera")):
+        table = read_table(path, columns)
+        assert [table.numbers(key)[0] for key in ("col", "row")] == [10, 20]
+        assert table.texts(photo) == ["far.JPG"]
