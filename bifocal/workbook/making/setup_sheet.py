@@ -26,7 +26,6 @@ from bifocal.workbook.words import term, word
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
 from photocore.workbook.making.look import GOOD, HEAD_FILL, HEAD_FONT, WRONG, colour_words
-from photocore.workbook.making.words import Wording
 
 #: What a typed number of the set-up may be, where it need not be above zero.
 _NUMBERS = (-1e7, 1e7)
@@ -83,9 +82,10 @@ def _setup_cell(
     typed: bool,
 ) -> None:
     """Write one named value with its description and unit."""
-    known = _wording(name, content)
+    bent = term("setup", f"{name}_media") if content.media_cells else None
+    known = bent or term("setup", name)
     matrix = f"H{name[1]}({name[3:4]},{name[4:5]})"
-    told = known.in_language(sheet.book.language).format(n=name[-1]) if known else matrix
+    told = known.in_language(sheet.book.language) if known else matrix
     unit = known.unit if known else ""
     sheet.describe(row, (name, told), unit)
     is_default = {
@@ -112,12 +112,6 @@ def _setup_cell(
 def pair_names(others: int) -> list[str]:
     """Return what the pairs of photo 1 with each other one are called, by their photos."""
     return [f"{pair_letter(photo)} (1-{photo})" for photo in range(2, 3 + others)]
-
-
-def _wording(name: str, content: SurveyContent) -> Wording | None:
-    """Return what a cell is called; numbered ones share an entry, some differ with media."""
-    bent = term("setup", f"{name}_media") if content.media_cells else None
-    return bent or term("setup", name) or term("setup", name.rstrip("0123456789"))
 
 
 def _validate(sheet: SheetBuilder, cell: str, name: str, prompt: str) -> None:

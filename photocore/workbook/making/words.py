@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -35,7 +36,8 @@ class WordBook:
     ----------
     package : str
         Where its `words.toml` lies, with the sections ``words``, ``columns``, ``prompts`` and
-        ``readme``, and others of its own.
+        ``readme``, and others of its own. An entry is one key's, or that of all keys which have a
+        number or capitals where it has ``{n}``.
     """
 
     def __init__(self, package: str) -> None:
@@ -47,19 +49,25 @@ class WordBook:
         return packaged(self.package, "words")
 
     def term(self, section: str, key: str) -> Wording | None:
-        """Return an entry of a section; None if absent."""
-        entry = self.content[section].get(key)
-        return None if entry is None else Wording(**entry)
+        """Return an entry of a section, also the one of all keys like it; None if absent."""
+        entries = self.content[section]
+        if key in entries:
+            return Wording(**entries[key])
+        for family, entry in entries.items():
+            form = family.replace("{n}", r"(\d+|[A-Z]+)")
+            if form != family and (match := re.fullmatch(form, key)):
+                return Wording(**{name: text.format(n=match[1]) for name, text in entry.items()})
+        return None
 
     def word(self, key: str, language: str) -> str:
         """Return a word in a language."""
         return Wording(**self.content["words"][key]).in_language(language)
 
     def label(self, key: str, language: str) -> str:
-        """Return a column's label with its unit; numbered columns may share one entry."""
-        columns, stem = self.content["columns"], key.rstrip("0123456789")
-        column = Wording(**columns[key if key in columns else stem])
-        name = column.in_language(language).format(n=key[len(stem) :])
+        """Return a column's label with its unit."""
+        column = self.term("columns", key)
+        assert column is not None, key
+        name = column.in_language(language)
         return f"{name} [{column.unit}]" if column.unit else name
 
     def prompt(self, key: str, language: str) -> str:
