@@ -15,24 +15,8 @@ from pathlib import Path
 import openpyxl
 import pytest
 
-from photocore.workbook.changing.changes import SheetChanges
-from photocore.workbook.changing.splice import splice_sheet
-from photocore.workbook.reading.package import open_package, read_part, rewrite_package
-from photocore.workbook.reading.xlsx import read_directory
+from photocore.workbook.changing.recalculation import strip_results
 from tests.equipment import place
-
-
-def strip_results(source: Path, target: Path) -> Path:
-    """Write a copy of a workbook whose formulas have no stored results."""
-    with open_package(source) as package:
-        parts = {}
-        for sheet in read_directory(source, package).sheets:
-            data = read_part(source, package, sheet.part)
-            parts[sheet.part] = splice_sheet(source, sheet.part, data, SheetChanges()).joined(
-                strip=True
-            )
-    rewrite_package(source, target, parts)
-    return target
 
 
 @functools.cache

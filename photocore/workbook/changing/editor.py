@@ -382,7 +382,7 @@ class WorkbookEditor:
             for area, bottom in self.grown.values():
                 references.grow(area, bottom, parts)
             for name, old, new in self.texts:
-                data = parts.get(name) or read_part(self.path, package, name)
+                data = parts.now(self.path, package, name)
                 parts[name] = replaced_outside_cells(data, old, new)
             if stripped:
                 formulas.recalculate_on_load(self.path, package, self.book, parts)

@@ -7,6 +7,7 @@ import re
 import zipfile
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from photocore.workbook.reading.grid import TableArea, cell_name, plain_title, split_area
@@ -139,8 +140,9 @@ class References:
             Changed parts so far; takes the further ones.
         """
         sheet = next(sheet for sheet in self.book.sheets if sheet.title == area.sheet)
-        parts[area.part] = _grown_table(self._now(area.part, parts), area, bottom)
-        parts[sheet.part] = _grown_sheet(self._now(sheet.part, parts), area, bottom)
+        now = partial(parts.now, self.path, self.package)
+        parts[area.part] = _grown_table(now(area.part), area, bottom)
+        parts[sheet.part] = _grown_sheet(now(sheet.part), area, bottom)
         for name in self.package.namelist():
             if re.match(r"(.*/)?charts/(chart|chartEx)\d*\.xml$", posixpath.normpath(name)):
                 self._replace(name, parts, area, bottom, tag=rb"f")
@@ -151,15 +153,11 @@ class References:
             if any(last.search(text) for _, text in windows(opened(part))):
                 self._replace(other.part, parts, area, bottom, tag=rb"f")
 
-    def _now(self, name: str, parts: Parts) -> bytes:
-        changed = parts.get(name)
-        return read_part(self.path, self.package, name) if changed is None else changed
-
     def _replace(
         self, name: str, parts: Parts, area: TableArea, bottom: int, *, tag: bytes
     ) -> None:
         """Let the ranges in the text of certain elements grow."""
-        data = self._now(name, parts)
+        data = parts.now(self.path, self.package, name)
         pattern = re.compile(rb"(<(?:\w+:)?%s(?:\s[^>]*)?>)([^<]+)(</)" % tag)
 
         def replace(match: re.Match[bytes]) -> bytes:
@@ -267,14 +265,14 @@ def drop_order(path: Path, package: zipfile.ZipFile, book: Workbook, parts: Part
     parts[part] = None
     folder, file = posixpath.split(book.part)
     for name in (f"{folder}/_rels/{file}.rels".lstrip("/"), "[Content_Types].xml"):
-        data = parts.get(name) or read_part(path, package, name)
+        data = parts.now(path, package, name)
         entry = rb"<(?:\w+:)?(?:Relationship|Override)\s[^>]*%s[\"'][^>]*?/>"
         parts[name] = re.sub(entry % re.escape(posixpath.basename(part).encode()), b"", data)
 
 
 def recalculate_on_load(path: Path, package: zipfile.ZipFile, book: Workbook, parts: Parts) -> None:
     """Tell spreadsheet programs to calculate all formulas when they open the workbook."""
-    data = parts.get(book.part) or read_part(path, package, book.part)
+    data = parts.now(path, package, book.part)
     element = re.search(rb"<(?:\w+:)?calcPr(?:\s[^>]*)?>", data)
     if element:
         tag = re.sub(rb"""\sfullCalcOnLoad\s*=\s*("[^"]*"|'[^']*')""", b"", element[0])

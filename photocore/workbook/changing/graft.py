@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 from photocore.errors import InputError
 from photocore.workbook.changing.styles import StyleSheet
 from photocore.workbook.reading.grid import plain_title, quoted_title
-from photocore.workbook.reading.package import Parts, read_part
+from photocore.workbook.reading.package import Parts
 from photocore.workbook.reading.xlsx import SheetPart, Workbook, read_directory
 from photocore.workbook.reading.xmltext import escaped, quoted
 
@@ -232,8 +232,7 @@ class Graft:
         return self._now(self.book.part)
 
     def _now(self, name: str) -> bytes:
-        changed = self.parts.get(name)
-        return read_part(self.path, self.package, name) if changed is None else changed
+        return self.parts.now(self.path, self.package, name)
 
     def _put(self, name: str, data: bytes) -> None:
         self.parts[name] = data

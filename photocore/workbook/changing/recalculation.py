@@ -15,6 +15,7 @@ from photocore.workbook.changing.changes import SheetChanges
 from photocore.workbook.changing.splice import splice_sheet
 from photocore.workbook.reading.grid import CellFault, NotCalculated, Value, split_cell
 from photocore.workbook.reading.package import (
+    Parts,
     open_package,
     package_faults,
     read_part,
@@ -97,17 +98,20 @@ def examination_lines(found: Mapping[str, Any], program: str | None) -> list[str
     return [*lines, f"{len(found['differ'])} cells differ when calculated anew"]
 
 
+def strip_results(source: Path, target: Path) -> Path:
+    """Write a copy of a workbook whose formulas have no stored results."""
+    parts = Parts()
+    with open_package(source) as package:
+        for part in (sheet.part for sheet in read_directory(source, package).sheets):
+            data = read_part(source, package, part)
+            parts[part] = splice_sheet(source, part, data, SheetChanges()).written(strip=True)
+    rewrite_package(source, target, parts)
+    return target
+
+
 def _converted(path: Path, folder: Path, program: str) -> Path:
     """Return a copy that LibreOffice calculated: it trusts stored results, so they are left out."""
-    bare, out = folder / f"bare{path.suffix}", folder / "out"
-    with open_package(path) as package:
-        parts: dict[str, bytes | None] = {
-            sheet.part: splice_sheet(
-                path, sheet.part, read_part(path, package, sheet.part), SheetChanges()
-            ).joined(strip=True)
-            for sheet in read_directory(path, package).sheets
-        }
-    rewrite_package(path, bare, parts)
+    bare, out = strip_results(path, folder / f"bare{path.suffix}"), folder / "out"
     own = f"-env:UserInstallation={(folder / 'profile').as_uri()}"
     words = [program, own, "--headless", "--norestore", "--convert-to", "xlsx", "--outdir"]
     run = subprocess.run([*words, str(out), str(bare)], capture_output=True, text=True, check=False)

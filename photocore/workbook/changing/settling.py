@@ -141,7 +141,7 @@ class Settling:
                     self.cells.append(f"{sheet}!{cell_name(row, column)}")
                     editor.set_result(sheet, row, column, value)
             self.unknown |= book.unknown
-            return parts.but(editor.changed_parts())
+            return parts | editor.changed_parts()
 
 
 def _alike(stored: Value | None, value: CellValue) -> bool:

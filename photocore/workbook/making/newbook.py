@@ -253,7 +253,7 @@ def save_book(book: Workbook, path: Path) -> None:
     book.properties.creator = "bifocal"
     book.save(package)
     with zipfile.ZipFile(package) as written:
-        parts = {_CORE: _stated_properties(written.read(_CORE))}
+        parts = Parts({_CORE: _stated_properties(written.read(_CORE))})
     rewrite_package(package, path, parts, date=PART_TIME)
 
 

@@ -10,7 +10,8 @@ import re
 import shutil
 import zipfile
 import zlib
-from collections.abc import Callable, Container, Iterator, Mapping, MutableMapping
+from collections import UserDict
+from collections.abc import Callable, Container, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from io import BytesIO
@@ -154,50 +155,28 @@ def read_part(path: Path, package: zipfile.ZipFile, name: str) -> bytes:
     return whole.getvalue()
 
 
-class Parts(MutableMapping[str, bytes | None]):
+class Parts(UserDict[str, bytes | None]):
     """Parts of a package by name, None for one to be left out; large ones lie in files."""
 
-    def __init__(self) -> None:
-        self._parts: dict[str, bytes | IO[bytes] | None] = {}
+    data: dict[str, bytes | IO[bytes] | None]  # type: ignore[assignment]
 
     def __getitem__(self, name: str) -> bytes | None:
         """Return a part; its bytes are read anew."""
-        part = self._parts[name]
+        part = self.data[name]
         return part if part is None or isinstance(part, bytes) else opened(part).read()
 
     def __setitem__(self, name: str, part: bytes | IO[bytes] | None) -> None:
         """Take a part, or a file that holds it."""
-        self._parts[name] = part
-
-    def __delitem__(self, name: str) -> None:
-        """Forget a part."""
-        del self._parts[name]
-
-    def __contains__(self, name: object) -> bool:
-        """Whether there is a part of that name."""
-        return name in self._parts
-
-    def __iter__(self) -> Iterator[str]:
-        """Return the names of the parts."""
-        return iter(self._parts)
-
-    def __len__(self) -> int:
-        """Return how many there are."""
-        return len(self._parts)
-
-    def but(self, others: Parts) -> Parts:
-        """Return these parts with others in place of those of their names."""
-        both = Parts()
-        both._parts = self._parts | others._parts
-        return both
+        self.data[name] = part
 
     def held(self, name: str) -> bytes | IO[bytes] | None:
         """Return a part as it lies here."""
-        return self._parts.get(name)
+        return self.data.get(name)
 
-
-def _held(parts: Mapping[str, bytes | None], name: str) -> bytes | IO[bytes] | None:
-    return parts.held(name) if isinstance(parts, Parts) else parts.get(name)
+    def now(self, path: Path, package: zipfile.ZipFile, name: str) -> bytes:
+        """Return a part of a package that these change, as it is by now."""
+        part = self.get(name)
+        return read_part(path, package, name) if part is None else part
 
 
 def opened(part: bytes | IO[bytes]) -> IO[bytes]:
@@ -220,7 +199,7 @@ def windows(part: IO[bytes]) -> Iterator[tuple[bytes, bytes]]:
 def rewrite_package(
     source: Path | BinaryIO,
     target: Path,
-    parts: Mapping[str, bytes | None],
+    parts: Parts,
     *,
     date: tuple[int, int, int, int, int, int] | None = None,
 ) -> None:
@@ -239,7 +218,7 @@ def rewrite_package(
             new.comment = old.comment
             listed = old.infolist()
             for info in listed:
-                data = _held(parts, info.filename)
+                data = parts.held(info.filename)
                 if data is None and info.filename in parts:
                     continue
                 copy = zipfile.ZipInfo(info.filename, date or info.date_time)
@@ -253,7 +232,7 @@ def rewrite_package(
                 added = zipfile.ZipInfo(name, date or NEW_PART_TIME)
                 added.compress_type = zipfile.ZIP_DEFLATED
                 added.external_attr = 0o600 << 16
-                _write(new, added, _held(parts, name) or b"")
+                _write(new, added, parts.held(name) or b"")
         file.flush()
         os.fsync(file.fileno())
         _refuse_damage(named, old, target, parts)
@@ -267,22 +246,17 @@ def _write(package: zipfile.ZipFile, info: zipfile.ZipInfo, part: bytes | IO[byt
         shutil.copyfileobj(opened(part), member, SMALL)
 
 
-def _refuse_damage(
-    path: Path, old: zipfile.ZipFile, target: Path, changed: Mapping[str, bytes | None]
-) -> None:
+def _refuse_damage(path: Path, old: zipfile.ZipFile, target: Path, changed: Parts) -> None:
     """Refuse changed parts that are no XML or refer to what is not there, unless they did so."""
     with zipfile.ZipFile(target) as new:
-        found = _faults(path, new, changed, made=changed)
-        fault = next((f for f in found if f not in {*_faults(path, old, changed)}), "")
+        found = _faults(path, new, changed, changed)
+        fault = next((f for f in found if f not in {*_faults(path, old, changed, Parts())}), "")
     if fault:
         raise InputError(remark("book.would_not_open", of=path, fault=fault))
 
 
 def _faults(
-    path: Path,
-    package: zipfile.ZipFile,
-    changed: Container[str],
-    made: Mapping[str, bytes | None] | None = None,
+    path: Path, package: zipfile.ZipFile, changed: Container[str], made: Parts
 ) -> Iterator[str]:
     """Yield why a spreadsheet program would not open a package; parts at hand are not unpacked."""
     names = {*package.namelist()}
@@ -291,7 +265,7 @@ def _faults(
         try:
             relations = read_relations(path, package, name)
             if name in changed and name.endswith(".xml"):
-                part = _held(made or {}, name)
+                part = made.held(name)
                 keys, start = _looked_through(opened(part) if part else package.open(name))
         except (InputError, expat.ExpatError) as error:
             yield f"{name} is not valid XML: {str(error).partition(': line')[0]}"
@@ -328,7 +302,7 @@ def _looked_through(part: IO[bytes]) -> tuple[set[bytes], bytes]:
 def package_faults(path: Path) -> list[str]:
     """Return why a spreadsheet program would not open a workbook, or ask to repair it."""
     with open_package(path) as package:
-        return list(_faults(path, package, set(package.namelist())))
+        return list(_faults(path, package, set(package.namelist()), Parts()))
 
 
 def read_relations(path: Path, package: zipfile.ZipFile, part: str) -> dict[str, tuple[str, str]]:

@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal import InputError
-from photocore.workbook.reading.package import rewrite_package
+from photocore.workbook.reading.package import Parts, rewrite_package
 from photocore.workbook.reading.references import lost_references, refuse_lost
 from photocore.workbook.reading.xlsx import open_xlsx
 from tests.builders.commands import bifocal_command as bifocal
@@ -89,7 +89,7 @@ FAULTS = {
 def test_a_workbook_that_no_program_would_open_is_not_written(tmp_path, said, parts):
     source = table_book(tmp_path / "m.xlsx", TABLES["solve"])
     with pytest.raises(InputError, match=re.escape(said)):
-        rewrite_package(source, tmp_path / "out.xlsx", parts)
+        rewrite_package(source, tmp_path / "out.xlsx", Parts(parts))
 
 
 @pytest.mark.parametrize("name", [BOOK, RELATIONS, "xl/worksheets/sheet1.xml"])
@@ -99,7 +99,7 @@ def test_what_was_wrong_with_a_workbook_before_is_no_reason_to_refuse_it(tmp_pat
     links = f'<Relationships xmlns="{PACKAGE}">{external}<Relationship Id="g" Target="no.xml"/>'
     data = (f"{links}</Relationships>" if name == RELATIONS else lost).encode()
     source = with_parts(table_book(tmp_path / "m.xlsx", TABLES["solve"]), {name: data})
-    rewrite_package(source, tmp_path / "out.xlsx", {name: data + b"<!-- changed -->"})
+    rewrite_package(source, tmp_path / "out.xlsx", Parts({name: data + b"<!-- changed -->"}))
     with zipfile.ZipFile(tmp_path / "out.xlsx") as package:
         assert package.read(name).endswith(b"<!-- changed -->")
 
