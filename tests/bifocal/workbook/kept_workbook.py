@@ -49,12 +49,6 @@ def solved_in_place(path, *options):
     return result.stderr, {name for name in after if before.get(name) != after[name]}
 
 
-def named(path, name):
-    book = openpyxl.load_workbook(path)
-    sheet, _, cell = book.defined_names[name].attr_text.partition("!")
-    return book[sheet.strip("'")][cell.replace("$", "")].value
-
-
 def slow(*values):
     """A case that runs with the acceptance tests: one like it runs with every test."""
     return pytest.param(*values, marks=pytest.mark.acceptance)

@@ -9,9 +9,7 @@ import numpy as np
 import openpyxl
 import pytest
 
-from bifocal.workbook.template_workflow import write_template
-from tests.bifocal.workbook.test_cli_solve import SETUP, rows, run
-from tests.bifocal.workbook.test_survey_workbook import named
+from tests.bifocal.workbook.test_cli_solve import fill, named, rows, run
 from tests.recalculate import recalculated, rows_of
 
 pytestmark = [pytest.mark.office, pytest.mark.acceptance]
@@ -32,19 +30,9 @@ WALL = [
 
 def typed(path, *, points, control=(), known=(), language="en"):
     """Type into an empty template what is read off with a ruler: hundredths of a millimetre."""
-    write_template(path, language=language, rows=ROWS)
-    book = openpyxl.load_workbook(path)
-    for name, value in SETUP.items():
-        named(book, name).value = value
-    for row, (name, *picks) in enumerate(points, start=5):
-        for column, value in enumerate([name, *(round(pick, 2) for pick in picks)], start=1):
-            book["Points"].cell(row, column).value = value
-    for title, lines in (("Georeference", control), ("Check", known)):
-        for row, line in enumerate(lines, start=13):
-            for column, value in enumerate(line, start=1):
-                book[title].cell(row, column).value = value
-    book.save(path)
-    return path
+    read = [(name, *(round(pick, 2) for pick in picks)) for name, *picks in points]
+    form = ("--rows", ROWS, "--lang", language)
+    return fill(path, read, template=form, Georeference=control, Check=known)
 
 
 def world(points, *, off=()):

@@ -38,34 +38,45 @@ POINTS = [("P1", 2, 0, 1), ("P2", -3, 2, 0.5), ("P3", 4, -2, -0.4), ("P4", -4, -
 
 
 @functools.cache
-def form():
-    """Return the bytes of a template of 20 rows: making it costs more than the tests themselves."""
+def form(*options):
+    """Return the bytes of a template: making it costs more than the tests themselves."""
     with tempfile.TemporaryDirectory() as folder:
-        assert run("template", Path(folder, "form.xlsx"), "--rows", 20).exit_code == 0
+        made = run("template", Path(folder, "form.xlsx"), *(options or ("--rows", 20)))
+        assert made.exit_code == 0, made.stderr
         return Path(folder, "form.xlsx").read_bytes()
 
 
-def fill(path, table=None, setup=SETUP, **sheets):
-    """Fill in a template the way a user does, with openpyxl standing for Excel."""
-    book = openpyxl.load_workbook(io.BytesIO(form()))
+def fill(path, table=None, setup=SETUP, template=(), **sheets):
+    """Fill in a template the way a user does, with openpyxl standing for Excel.
+
+    The rows of a table are values from its first column on, or values by heading; the template is
+    a file, or the options of one.
+    """
+    is_new = isinstance(template, tuple)
+    book = openpyxl.load_workbook(io.BytesIO(form(*template)) if is_new else template)
     for name, value in setup.items():
         put(book, name, value)
-    for row, values in enumerate(table or rows(POINTS), start=5):
-        for column, value in enumerate(values, start=1):
-            book["Points"].cell(row, column, value)
-    for name, lines in sheets.items():
-        start = next(i for i in range(1, 60) if book[name].cell(i, 1).value == "id") + 1
-        for row, values in enumerate(lines, start=start):
-            for column, value in enumerate(values, start=1):
+    points = rows(POINTS) if table is None else table
+    for name, lines in {"Points": points, **sheets}.items():
+        head = next(i for i in range(1, 60) if book[name].cell(i, 1).value == "id")
+        columns = {cell.value: cell.column for cell in book[name][head]}
+        for row, values in enumerate(lines, start=head + 1):
+            keyed = values if isinstance(values, dict) else dict(zip(columns, values, strict=False))
+            for key, value in keyed.items():
                 if value is not None:
-                    book[name].cell(row, column, value)
+                    book[name].cell(row, columns[key], value)
     book.save(path)
     return path
 
 
-def put(book, name, value):
+def named(book, name):
+    """Return the cell of a name."""
     sheet, _, cell = book.defined_names[name].attr_text.replace("$", "").partition("!")
-    book[sheet.strip("'")][cell] = value
+    return book[sheet.strip("'")][cell]
+
+
+def put(book, name, value):
+    named(book, name).value = value
 
 
 def solved(path, *options):

@@ -7,10 +7,10 @@ from pathlib import Path
 import openpyxl
 import pytest
 
-from photocore.workbook.calculating.calculation import Calculation
-from tests import office
 from tests.bifocal.workbook.kept_workbook import DISTANCES, TABLE
+from tests.bifocal.workbook.test_cells_are_calculated import assert_stored_is_calculated
 from tests.bifocal.workbook.test_cli_solve import POINTS, run, write_csv
+from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached
 
 
 @pytest.fixture(scope="module")
@@ -52,21 +52,6 @@ def solved(path: Path) -> str:
     return result.stderr + result.stdout
 
 
-def assert_stored_is_calculated(path: Path) -> int:
-    stored = openpyxl.load_workbook(path, data_only=True)
-    book, count = Calculation(openpyxl.load_workbook(path)), 0
-    for sheet, row, column in book.formulas():
-        shown, value = stored[sheet].cell(row, column), book.value(sheet, row, column)
-        if isinstance(value, float) and value != value:
-            assert shown.value == "#N/A", (sheet, shown.coordinate)
-        elif isinstance(value, float):
-            assert shown.value == pytest.approx(value, rel=1e-9, abs=1e-9), (sheet, shown)
-        else:
-            assert (shown.value or "") == value, (sheet, shown.coordinate)
-        count += 1
-    return count
-
-
 def test_a_formula_that_was_changed_counts_and_all_that_follows_from_it(survey: Path) -> None:
     change(survey, Z="={own}+1")
     told = solved(survey)
@@ -86,11 +71,7 @@ def test_what_follows_from_a_changed_formula_is_what_libreoffice_calculates(
 ) -> None:
     change(survey, Z="={own}+1", sigma_r="=2*({own})")
     solved(survey)
-    stored, anew = office.stored(survey), office.recalculated(survey, tmp_path / "lo")
-    for title, cells in stored.items():
-        for cell, value in cells.items():
-            if isinstance(value, float):
-                assert anew[title][cell] == pytest.approx(value, rel=1e-9, abs=1e-9), cell
+    assert_recalculated_equals_cached(survey, tmp_path, worth=1e-9)
 
 
 def test_a_function_that_is_not_known_is_kept_and_named(survey: Path) -> None:

@@ -7,7 +7,6 @@ import re
 import numpy as np
 import openpyxl
 import pytest
-from click.testing import CliRunner
 
 import bifocal
 import multimedia
@@ -15,8 +14,7 @@ from bifocal.equations import plane_coordinates, relief_displacement
 from bifocal.precision import sigma_relief
 from bifocal.workbook.formulas.columns import FUNCTIONS
 from bifocal.workbook.template_workflow import write_template
-from tests.bifocal.workbook.test_cli_solve import SETUP, put, run
-from tests.builders.commands import bifocal_command as main
+from tests.bifocal.workbook.test_cli_solve import fill, run
 from tests.recalculate import recalculated
 from tests.workbook_lint import lint
 
@@ -150,39 +148,22 @@ def test_sheet_is_sound_and_in_its_language(language, tmp_path):
     assert told in openpyxl.load_workbook(path)["Functions"]["B7"].value
 
 
-def test_a_workbook_with_functions_is_solved_in_place_and_translated(tmp_path):
-    path, out = tmp_path / "book.xlsx", tmp_path / "out.xlsx"
-    assert (
-        CliRunner().invoke(main, ["template", str(path), "--functions", "--rows", "5"]).exit_code
-        == 0
-    )
-    book = openpyxl.load_workbook(path)
-    for name, value in {"c_1": 35, "c_2": 19, "d_2": 9.5, "delta_d": 8}.items():
-        book["Setup"][book.defined_names[name].attr_text.partition("!")[2].replace("$", "")] = value
-    for column, value in enumerate(("P", 4.2424, 0, 4.4706, 0), start=1):
-        book["Points"].cell(5, column).value = value
-    book.save(path)
-    done = CliRunner().invoke(main, ["solve", str(path), "--out", str(out), "--lang", "de"])
-    assert done.exit_code == 0, done.stderr
-    solved = openpyxl.load_workbook(out)
-    assert solved.defined_names["RELIEF"].attr_text == book.defined_names["RELIEF"].attr_text
-    assert "Kamera" in solved["Functions"]["B7"].value
-    assert "kennt kein LAMBDA" in solved["Functions"]["A3"].value
-
-
 @pytest.mark.parametrize("plain", [False, True], ids=["named", "plain"])
 def test_functions_saved_by_another_program_show_what_their_own_inputs_give(plain, tmp_path):
-    path = tmp_path / "s.xlsx"
-    write_template(path, rows=8, functions=True, plain=plain)
+    """In place, and in another language."""
+    options = ("--rows", 8, "--functions", *(["--plain"] if plain else []))
+    path = fill(tmp_path / "s.xlsx", [("A", 4.2424, 0, 4.4706, 0)], template=options)
     book = openpyxl.load_workbook(path)
-    for name, value in SETUP.items():
-        put(book, name, value)
-    for column, value in enumerate(("A", 4.2424, 0, 4.4706, 0), start=1):
-        book["Points"].cell(5, column, value)
     book["Functions"]["C7"], book["Functions"]["C8"] = 35 * 2 / 16.0, 19 * 2 / 8.0
     book.save(path)  # without any result
-    assert run("solve", path, "--out", path, "--overwrite").exit_code == 0
-    formulas = openpyxl.load_workbook(path)["Functions"]
+    done = run("solve", path, "--out", path, "--overwrite", "--lang", "de")
+    assert done.exit_code == 0, done.stderr
+    solved = openpyxl.load_workbook(path)
+    if not plain:
+        assert solved.defined_names["RELIEF"].attr_text == book.defined_names["RELIEF"].attr_text
+    formulas = solved["Functions"]
+    assert "Kamera" in formulas["B7"].value
+    assert "kennt kein LAMBDA" in formulas["A3"].value
     shown = openpyxl.load_workbook(path, data_only=True)["Functions"]
     cells = [c.coordinate for row in formulas.iter_rows() for c in row if c.data_type == "f"]
     assert len(cells) > 20

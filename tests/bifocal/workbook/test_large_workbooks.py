@@ -19,7 +19,7 @@ from bifocal.workbook.content import SPARE_ROWS
 from bifocal.workbook.making import book
 from bifocal.workbook.template_workflow import MOST_ROWS, write_survey, write_template
 from photocore.workbook.reading import package
-from tests.bifocal.workbook.test_cli_solve import POINTS, SETUP, put, rows, run
+from tests.bifocal.workbook.test_cli_solve import POINTS, fill, rows, run
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached
 
 
@@ -56,12 +56,7 @@ def test_formulas_of_long_books_stand_once_in_the_file(tmp_path, monkeypatch):
 def with_rows_below(path, *, own_name=""):
     """Write a form of three rows with more points below its table."""
     write_template(path, rows=3)
-    filled = openpyxl.load_workbook(path)
-    for name, value in SETUP.items():
-        put(filled, name, value)
-    for number, row in enumerate(rows(POINTS), start=5):
-        for column, value in enumerate(row, start=1):
-            filled["Points"].cell(number, column).value = value
+    filled = openpyxl.load_workbook(fill(path, template=path))
     if own_name:
         filled.defined_names[own_name] = DefinedName(own_name, attr_text="'Readme'!$A$1")
     filled.save(path)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
 import cv2
 import numpy as np
 import openpyxl
@@ -14,7 +11,8 @@ from bifocal import InputError, Measuring, SurveySetup, Taking, solve
 from bifocal.survey.survey_lens import SurveyLens
 from bifocal.workbook.output import write_result
 from bifocal.workbook.pair_workflow import read_pair
-from bifocal.workbook.template_workflow import write_template
+from tests.bifocal.workbook.test_cli_solve import SETUP, fill, put
+from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached
 from tests.cases import few_by_default
 from tests.recalculate import recalculated, rows_of
 
@@ -37,21 +35,18 @@ def seen(c, d, nadir, lens):
 
 def filled(path, lenses=LENSES, language="en"):
     """Type everything into a fresh template, as a person would."""
-    write_template(path, rows=20, lens=True, language=language)
-    book = openpyxl.load_workbook(path)
-    typed = {"c_1": 35, "c_2": 19, "d_2": 9.5, "delta_d": 8, "input_unit": "px", "pitch": PITCH}
+    typed = {**SETUP, "input_unit": "px", "pitch": PITCH}
     for image, nadir in ((1, NADIR1), (2, NADIR2)):
         typed |= {f"nadir_{image}_col": nadir[0], f"nadir_{image}_row": nadir[1]}
     for image, lens in enumerate(lenses, start=1):
         typed |= {f"lens_{image}_{key}": getattr(lens, key) for key in ("k1", "k2", "x", "y")}
-    for name, value in typed.items():
-        book["Setup"][book.defined_names[name].attr_text.split("!")[1].replace("$", "")] = value
     picks = np.hstack([seen(35, 17.5, NADIR1, LENSES[0]), seen(19, 9.5, NADIR2, LENSES[1])])
-    for row, values in enumerate(picks.tolist(), start=5):
-        book["Points"][f"A{row}"] = f"P{row}"
-        for column, value in zip("BCDE", values, strict=True):
-            book["Points"][f"{column}{row}"] = value
-    book.save(path)
+    fill(
+        path,
+        [(f"P{i}", *values) for i, values in enumerate(picks.tolist())],
+        typed,
+        ("--lens", "--rows", 12, "--lang", language),
+    )
 
 
 def test_raw_pixels_of_lenses_that_distort_give_the_exact_points(tmp_path):
@@ -81,21 +76,8 @@ def test_the_shift_on_the_photo_leads_to_the_raw_pixel_of_the_foot(tmp_path):
 def test_formulas_free_raw_picks_as_the_library_does(language, tmp_path):
     filled(tmp_path / "s.xlsx", language=language)
     write_result(tmp_path / "r.xlsx", solve(tmp_path / "s.xlsx"))
-    cached = openpyxl.load_workbook(tmp_path / "r.xlsx", data_only=True)
-    formulas = openpyxl.load_workbook(tmp_path / "r.xlsx")
-    fresh, count = recalculated(tmp_path / "r.xlsx", tmp_path), 0
-    for sheet in formulas:
-        for cell in (c for row in sheet.iter_rows() for c in row if c.data_type == "f"):
-            ours = cached[sheet.title][cell.coordinate].value
-            theirs = fresh[sheet.title][cell.coordinate].value
-            where = f"{sheet.title}!{cell.coordinate} {cell.value}"
-            if isinstance(ours, int | float) and isinstance(theirs, int | float):
-                count += 1
-                assert theirs == pytest.approx(ours, rel=1e-9, abs=1e-9), where
-            else:
-                assert (theirs or None) == (ours or None), where
-    assert count > 500
-    points = rows_of(fresh, "Points", 4)[:12]
+    assert assert_recalculated_equals_cached(tmp_path / "r.xlsx", tmp_path, worth=1e-9) > 500
+    points = rows_of(recalculated(tmp_path / "r.xlsx", tmp_path), "Points", 4)[:12]
     found = np.array([[row[key] for key in "XYZ"] for row in points])
     np.testing.assert_allclose(found, XYZ, atol=1e-8)
 
@@ -114,8 +96,7 @@ def test_the_workbook_as_a_pair_sees_through_its_lenses(tmp_path):
     book = openpyxl.load_workbook(tmp_path / "s.xlsx")
     for image in "12":
         cv2.imwrite(str(tmp_path / f"{image}.png"), np.zeros((2048, 3072), dtype=np.uint8))
-        cell = book.defined_names[f"photo_{image}"].attr_text.split("!")[1].replace("$", "")
-        book["Setup"][cell] = f"{image}.png"
+        put(book, f"photo_{image}", f"{image}.png")
     book.save(tmp_path / "s.xlsx")
     first, second = read_pair(tmp_path / "s.xlsx").project(XYZ)
     np.testing.assert_allclose(first, seen(35, 17.5, NADIR1, LENSES[0]), atol=1e-6)
@@ -144,8 +125,7 @@ def test_an_adjusted_set_up_is_refused_beside_it(tmp_path):
 
 
 def test_the_command_writes_the_cells(tmp_path):
-    command = [sys.executable, "-m", "bifocal", "template", "raw.xlsx", "--lens"]
-    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    filled(tmp_path / "raw.xlsx")
     book = openpyxl.load_workbook(tmp_path / "raw.xlsx")
     assert "lens_2_k2" in book.defined_names
     assert [cell.value for cell in book["Points"][4]][:8] == [

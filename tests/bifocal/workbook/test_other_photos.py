@@ -12,7 +12,7 @@ from bifocal import InputError, Measuring, Photo, PhotoSet, PointObservations, T
 from bifocal.survey.other_photos import CHANCE, of_all_photos
 from bifocal.survey.setup import OtherPhoto, SurveySetup
 from bifocal.workbook.template_workflow import write_template
-from tests.bifocal.workbook.test_cli_solve import put, run
+from tests.bifocal.workbook.test_cli_solve import SETUP, fill, named, run
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached
 
 #: Principal distances [mm] and distances [m] of the photos, the last not quite to scale.
@@ -78,21 +78,15 @@ def test_every_pair_with_the_first_photo_is_midullas_formula():
 
 def form(path, seen, xyz, language="en", what_if=False, **cells):
     """Fill a form for four photos in: points, and relief measured on site."""
-    write_template(path, photos=4, rows=20, language=language, what_if=what_if)
-    book = openpyxl.load_workbook(path)
-    values = {"c_1": 35, "c_2": 19, "d_2": 9.5, "delta_d": 8, "c_3": 28, "d_3": 14, "c_4": 24}
-    for name, value in {**values, "d_4": 12.02, **cells}.items():
-        put(book, name, value)
-    points, check = book["Points"], book["Check"]
-    head = {cell.value: cell.column for cell in points[4]}
-    for i, r in enumerate(xyz[:, 2]):
-        points.cell(5 + i, 1).value = check.cell(13 + i, 1).value = f"P{i}"
-        check.cell(13 + i, 4).value = float(round(r, 4))
-        for k, (x, y) in enumerate(seen[:, i].tolist(), start=1):
-            for key, value in ((f"x{k}", x), (f"y{k}", y)):
-                points.cell(5 + i, head[key]).value = None if value != value else value
-    book.save(path)
-    return path
+    options = ("--photos", 4, "--rows", 14, "--lang", language, *(["--what-if"] if what_if else []))
+    values = {**SETUP, "c_3": 28, "d_3": 14, "c_4": 24, "d_4": 12.02}
+    keys = [f"{axis}{k}" for k in "1234" for axis in "xy"]
+    points = [
+        {"id": f"P{i}", **{k: v for k, v in zip(keys, picks, strict=True) if v == v}}
+        for i, picks in enumerate(np.hstack(seen).tolist())
+    ]
+    check = [{"id": f"P{i}", "Z_ref": round(r, 4)} for i, r in enumerate(xyz[:, 2].tolist())]
+    return fill(path, points, values | cells, options, Check=check)
 
 
 @pytest.mark.acceptance
@@ -131,8 +125,7 @@ def test_pairs_stand_beside_each_other_with_their_errors_at_check_points(tmp_pat
     assert "r_1_4 [m],sigma_1_4 [m],r_all [m],sigma_all [m],X_all [m],Y_all [m],chance" in head
 
     def shown(name):
-        sheet, _, cell = book.defined_names[name].attr_text.partition("!")
-        return book[sheet.strip("'")][cell.replace("$", "")].value
+        return named(book, name).value
 
     for key, missing in (("r", [3]), ("r_1_3", [3, 5]), ("r_1_4", [3, 5, 6]), ("r_all", [3, 5])):
         error = np.delete(columns[key] - np.round(xyz[:, 2], 4), missing)

@@ -14,6 +14,8 @@ from bifocal import Pair, Taking, solve
 from bifocal.workbook.pair_workflow import read_pair
 from bifocal.workbook.reading.pick_lists import read_picks
 from multimedia import InputError
+from tests.bifocal.workbook.test_cli_solve import fill as fill_form
+from tests.bifocal.workbook.test_cli_solve import put
 from tests.builders.commands import bifocal_command as main
 from tests.papers.test_midulla_layout import NADIR, SIZE, fill, pixels, truth
 
@@ -137,10 +139,8 @@ def test_a_workbook_is_the_pair_it_states(tmp_path):
     # Without nadir points the middle of each photo is taken, and said so.
     typed = openpyxl.load_workbook(book)
     for name in ("nadir_1_col", "nadir_1_row", "nadir_2_col", "nadir_2_row"):
-        typed["Setup"][typed.defined_names[name].attr_text.split("!")[1].replace("$", "")] = None
-    typed["Setup"][typed.defined_names["input_unit"].attr_text.split("!")[1].replace("$", "")] = (
-        "mm"
-    )
+        put(typed, name, None)
+    put(typed, "input_unit", "mm")
     typed.save(book)
     assumed = read_pair(book)
     assert assumed.project(XYZ) == (pytest.approx(FAR), pytest.approx(NEAR))
@@ -180,12 +180,7 @@ def test_align_takes_the_set_up_of_a_workbook_as_it_is_typed(tmp_path):
 
 @pytest.mark.acceptance
 def test_a_workbook_without_photos_says_which_cells(tmp_path):
-    CliRunner().invoke(main, ["template", str(tmp_path / "t.xlsx")])
-    typed = openpyxl.load_workbook(tmp_path / "t.xlsx")
-    for name, value in {"c_1": 35, "c_2": 19, "d_2": 9.5, "delta_d": 8}.items():
-        cell = typed.defined_names[name].attr_text.split("!")[1].replace("$", "")
-        typed["Setup"][cell] = value
-    typed.save(tmp_path / "t.xlsx")
+    fill_form(tmp_path / "t.xlsx", ())
     run = CliRunner().invoke(main, ["relief", str(tmp_path / "t.xlsx"), "--out", "r.tif"])
     assert run.exit_code == 1
     assert "photo_1 and photo_2 are blank" in run.stderr

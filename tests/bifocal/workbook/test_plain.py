@@ -8,22 +8,15 @@ from dataclasses import replace
 
 import openpyxl
 import pytest
-from click.testing import CliRunner
 
 from bifocal.workbook.making.book import write_book
-from bifocal.workbook.template_workflow import write_template
+from tests.bifocal.workbook.test_cli_solve import fill, rows, run
 from tests.bifocal.workbook.test_survey_workbook import (
     assert_recalculated_equals_cached,
     ideal_content,
-    named,
     pair_content,
 )
-from tests.builders.commands import bifocal_command as main
 from tests.workbook_lint import lint
-
-
-def run(*words):
-    return CliRunner().invoke(main, list(map(str, words)))
 
 
 def names_in_formulas(path):
@@ -49,17 +42,9 @@ def test_plain_formulas_recalculated_equal_the_library(content, tmp_path):
     assert assert_recalculated_equals_cached(path, tmp_path) > 2000
 
 
-def filled(path, rows=2):
-    """Type a set-up and points, r = 1 m, into an empty template."""
-    book = openpyxl.load_workbook(path)
-    for name, value in {"c_1": 35, "c_2": 19, "d_2": 9.5, "delta_d": 8}.items():
-        named(book, name).value = value
-    for i in range(rows):
-        x = 0.5 + i / 10
-        values = (f"P{i}", x / 16.5 * 35, 1, x / 8.5 * 19, 35 / 16.5 * 19 / 35 * 16.5 / 8.5)
-        for column, value in enumerate((values[0], values[1], 0, values[3], 0), start=1):
-            book["Points"].cell(5 + i, column).value = value
-    return book
+def relieved(count):
+    """Return points of r = 1 m as they are typed."""
+    return rows([(f"P{i}", 0.5 + i / 10, 0, 1) for i in range(count)])
 
 
 @pytest.mark.acceptance
@@ -67,9 +52,8 @@ def test_a_plain_template_is_read_back_also_when_its_tables_are_gone(tmp_path):
     path, out = tmp_path / "plain.xlsx", tmp_path / "out.xlsx"
     assert run("template", path, "--plain", "--media", 2, "--rows", 5).exit_code == 0
     assert names_in_formulas(path) == []
-    write_template(path, plain=True, rows=20, overwrite=True)
-    book = filled(path)
-    book.save(tmp_path / "typed.xlsx")
+    typed = fill(tmp_path / "typed.xlsx", relieved(2), template=("--plain", "--rows", 20))
+    book = openpyxl.load_workbook(typed)
     for sheet in book:
         for name in list(sheet.tables):
             del sheet.tables[name]
@@ -89,8 +73,7 @@ def test_a_plain_template_is_read_back_also_when_its_tables_are_gone(tmp_path):
 @pytest.mark.office
 def test_rows_below_the_prepared_ones_get_plain_formulas_and_all_ranges_reach_them(tmp_path):
     path, out = tmp_path / "plain.xlsx", tmp_path / "out.xlsx"
-    write_template(path, plain=True, rows=4)
-    filled(path, rows=9).save(path)
+    fill(path, relieved(9), template=("--plain", "--rows", 4))
     assert run("solve", path, "--out", out).exit_code == 0
     assert names_in_formulas(out) == []
     assert lint(out) == []

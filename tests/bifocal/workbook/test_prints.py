@@ -20,12 +20,14 @@ from bifocal import (
 from bifocal.collimation.workbook.setup import completed, typed_setup
 from bifocal.workbook.reading.reader import read_survey
 from tests.bifocal.workbook.kept_workbook import DISTANCES
-from tests.bifocal.workbook.test_cli_solve import POINTS, fill, put, refused, rows, run, write_csv
+from tests.bifocal.workbook.test_cli_solve import POINTS, fill, refused, rows, run, write_csv
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached
 from tests.cases import few_by_default
 
 CAMERAS = {"d1": 17.5, "d2": 9.5, "c1": 35, "c2": 19}
 SIZES = {"enlargement1": 10, "enlargement2": 12}
+#: What is typed into `Setup`.
+CELLS = {f"{name[:-1]}_{name[-1]}": value for name, value in {**CAMERAS, **SIZES}.items()}
 OPTIONS = (*DISTANCES, "--enlargement1", 10, "--enlargement2", 12)
 TRUTH = np.array([point[1:] for point in POINTS], dtype=float)
 
@@ -114,15 +116,8 @@ def test_the_page_picks_on_the_photos_whatever_was_measured_on_prints():
 
 @pytest.mark.parametrize("language", few_by_default(["en", "it", "de"], "it"))
 def test_the_template_has_cells_for_prints(tmp_path, language):
-    assert run("template", tmp_path / "t.xlsx", "--lang", language, "--rows", 6).exit_code == 0
-    book = openpyxl.load_workbook(tmp_path / "t.xlsx")
-    put(book, "enlargement_1", 10)
-    for name, value in {**CAMERAS, **SIZES}.items():
-        put(book, f"{name[:-1]}_{name[-1]}", value)
-    for row, values in enumerate(on_prints(), start=5):
-        for column, value in enumerate(values, start=1):
-            book["Points"].cell(row, column, value)
-    book.save(tmp_path / "t.xlsx")
+    path = tmp_path / "t.xlsx"
+    fill(path, on_prints(), CELLS, ("--lang", language, "--rows", 6))
     np.testing.assert_allclose(xyz_of(tmp_path / "t.xlsx"), TRUTH, atol=1e-9)
 
 
@@ -160,20 +155,11 @@ def test_formulas_of_prints_equal_the_library(tmp_path, kind):
         assert run("solve", path, *OPTIONS, "--out", out).exit_code == 0
     else:
         media = ("--media", 3) if kind == "water" else ()
-        assert run("template", out, "--rows", 6, *media).exit_code == 0
-        book = openpyxl.load_workbook(out)
-        cells = {f"{name[:-1]}_{name[-1]}": v for name, v in {**CAMERAS, **SIZES}.items()}
+        cells = {**CELLS, "sensor_w": 36, "sensor_h": 24}
         if media:
             cells |= {"index_1": 1, "index_2": 1.5, "index_3": 1.337, "thick_2": 0.01}
             cells |= {"z0_1": 0.3, "z0_2": 0.3, "c_2": 19.6}
-        for name, value in cells.items():
-            put(book, name, value)
-        put(book, "delta_d", None)
-        book["Planning"]["B4"], book["Planning"]["B5"] = 36, 24
-        for row, values in enumerate(on_prints(), start=5):
-            for column, value in enumerate(values, start=1):
-                book["Points"].cell(row, column, value)
-        book.save(out)
+        fill(out, on_prints(), cells, ("--rows", 6, *media))
         line = ("solve", out, "--scale-tolerance", 0.2, "--out", out, "--overwrite")
         result = run(*line)
         assert result.exit_code == 0, result.stderr
@@ -189,11 +175,7 @@ def test_correcting_the_set_up_by_the_plane_keeps_prints_prints(tmp_path):
         *on_prints(),
         *(("Q1", 80, 60, 96, 72), ("Q2", -80, 60, -96, 72), ("Q3", 0, 90, 0, 108)),
     ]
-    path = fill(
-        tmp_path / "s.xlsx",
-        table,
-        setup={f"{k[:-1]}_{k[-1]}": v for k, v in {**CAMERAS, **SIZES}.items()},
-    )
+    path = fill(tmp_path / "s.xlsx", table, CELLS)
     book = openpyxl.load_workbook(path)
     head = [cell.value for cell in book["Points"][4]]
     for row in (9, 10, 11):

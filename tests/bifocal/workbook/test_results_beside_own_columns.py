@@ -12,7 +12,6 @@ import pytest
 from tests.bifocal.workbook.kept_workbook import (
     DISTANCES,
     TABLE,
-    named,
     own_table,
     slow,
     solved_in_place,
@@ -21,6 +20,7 @@ from tests.bifocal.workbook.kept_workbook import (
 from tests.bifocal.workbook.test_cli_solve import (
     POINTS,
     fill,
+    named,
     pixel_rows,
     rows,
     run,
@@ -140,7 +140,7 @@ def test_values_of_the_users_own_setup_stay_where_they_are_and_live(tmp_path):
     )
     solved_in_place(path)
     book = openpyxl.load_workbook(path)
-    assert named(path, "d_1") == "='Note'!$B$1"
+    assert named(book, "d_1").value == "='Note'!$B$1"
     book["Note"]["B1"] = 17.6
     book.save(path)
     place = {cell.value: cell.column for cell in book["S"][1]}["r [m]"]

@@ -133,19 +133,6 @@ def test_macros_stay_in_a_macro_workbook(tmp_path):
     assert parts(out)["xl/vbaProject.bin"] == b"MACROS" * 50
 
 
-@pytest.mark.acceptance
-def test_solving_in_place_keeps_one_backup(tmp_path):
-    path = survey(tmp_path / "s.xlsx")
-    before = path.read_bytes()
-    assert run("solve", path, "--out", path).exit_code == 1
-    assert run("solve", path, "--out", path, "--overwrite").exit_code == 0
-    assert (tmp_path / "s.xlsx.bak").read_bytes() == before
-    log = openpyxl.load_workbook(path)["Log"]
-    assert log["C5"].value == "solved"
-    assert run("solve", path, "--out", path, "--overwrite").exit_code == 0
-    assert openpyxl.load_workbook(path)["Log"]["C6"].value == "solved"
-
-
 def test_solving_again_changes_nothing_but_the_log(tmp_path):
     first, second = tmp_path / "1.xlsx", tmp_path / "2.xlsx"
     assert run("solve", survey(tmp_path / "s.xlsx"), "--out", first).exit_code == 0
@@ -153,19 +140,6 @@ def test_solving_again_changes_nothing_but_the_log(tmp_path):
     a, b = parts(first), parts(second)
     log = {"xl/worksheets/sheet9.xml", "xl/tables/table10.xml"}
     assert {name for name in a if a[name] != b[name]} <= log
-
-
-@pytest.mark.acceptance
-@pytest.mark.office
-def test_points_below_the_prepared_rows_make_the_tables_grow(tmp_path):
-    table = rows([(f"Q{i}", 1 + i / 50, 2, 0.3) for i in range(70)])
-    out = tmp_path / "out.xlsx"
-    result = run("solve", fill(tmp_path / "s.xlsx", table), "--out", out)
-    assert result.exit_code == 0, result.stderr
-    assert_recalculated_equals_cached(out, tmp_path)
-    values = openpyxl.load_workbook(out, data_only=True)["Results"]
-    assert values["A74"].value == "Q69"
-    assert values["D74"].value == pytest.approx(0.3)
 
 
 def test_a_workbook_open_in_a_spreadsheet_program_is_not_touched(tmp_path):
@@ -211,14 +185,7 @@ def test_a_workbook_whose_points_lack_sigmas_of_the_world_keeps_its_own_formulas
         older.setitem(listed, "near", listed["near"][:2])
         older.setattr(making, "results_columns", partial(results_columns, older=True))
         write_template(path, rows=2)
-    book = openpyxl.load_workbook(path)
-    for name, value in SETUP.items():
-        put(book, name, value)
-    for title, lines, first in (("Points", rows(POINTS), 5), ("Georeference", WORLD, 13)):
-        for row, line in enumerate(lines, start=first):
-            for column, value in enumerate(line, start=1):
-                book[title].cell(row, column, value)
-    book.save(path)
+    fill(path, template=path, Georeference=WORLD)
     for one in (path, fresh):
         found = run("solve", one, "--out", one, "--overwrite")
         assert "changed by hand" not in found.stderr

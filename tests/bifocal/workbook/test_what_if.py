@@ -13,7 +13,7 @@ from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.formulas.columns import CHANGED
 from bifocal.workbook.making.book import build, write_book
 from bifocal.workbook.template_workflow import write_template
-from tests.bifocal.workbook.test_cli_solve import put, run
+from tests.bifocal.workbook.test_cli_solve import SETUP, fill, named, run
 from tests.bifocal.workbook.test_survey_workbook import (
     assert_recalculated_equals_cached,
     ideal_content,
@@ -58,33 +58,22 @@ def test_the_size_of_a_pixel_moves_points_and_leaves_their_relief():
     np.testing.assert_allclose(cells["moved"], 0.01 * np.hypot(table["X"], table["Y"]), rtol=1e-9)
 
 
-def named(book, name):
-    sheet, _, cell = book.defined_names[name].attr_text.partition("!")
-    return book[sheet.strip("'")][cell.replace("$", "")].value
-
-
 @pytest.mark.acceptance
 def test_changes_that_were_typed_are_solved_in_place(tmp_path):
-    path = tmp_path / "trial.xlsx"
-    write_template(path, rows=8, what_if=True)
-    book = openpyxl.load_workbook(path)
-    for name, value in {"c_1": 35, "c_2": 19, "d_2": 9.5, "delta_d": 8}.items():
-        put(book, name, value)
-    book["WhatIf"]["C6"] = 0.1
-    for row, point in enumerate(zip(*PICKS.values(), strict=True), start=5):
-        for letter, value in zip("AFGH", point, strict=True):
-            book["Points"][f"{letter}{row}"] = value
-    book.save(path)
+    points = [dict(zip(PICKS, values, strict=True)) for values in zip(*PICKS.values(), strict=True)]
+    setup, path = {**SETUP, "change_d_2": 0.1}, tmp_path / "trial.xlsx"
+    fill(path, points, setup, ("--what-if", "--rows", 8))
     result = run("solve", path, "--out", path, "--overwrite")
     assert result.exit_code == 0, result.stderr
     book = openpyxl.load_workbook(path, data_only=True)
     before = solve(PICKS, taking=TAKING).table["r"]
-    assert named(book, "new_d_2") == pytest.approx(9.6)
+    assert named(book, "new_d_2").value == pytest.approx(9.6)
     by_d_2 = solve(PICKS, taking=replace(TAKING, d2=9.6)).table["r"] - before
-    assert named(book, "effect_max_by_d_2") == pytest.approx(np.abs(by_d_2).max(), rel=1e-9)
+    assert named(book, "effect_max_by_d_2").value == pytest.approx(np.abs(by_d_2).max(), rel=1e-9)
     whole = Taking(d1=17.51, d2=9.6, c1=35.05, c2=19.05)
     change = solve(PICKS, taking=whole).table["r"] - before
-    assert named(book, "effect_rms_change") == pytest.approx(np.sqrt(np.mean(change**2)), rel=1e-9)
+    rms = np.sqrt(np.mean(change**2))
+    assert named(book, "effect_rms_change").value == pytest.approx(rms, rel=1e-9)
 
 
 @pytest.mark.acceptance

@@ -3,36 +3,33 @@
 from __future__ import annotations
 
 import re
-import zipfile
-from pathlib import Path
 
 import openpyxl
 import pytest
-from click.testing import CliRunner
 from openpyxl.utils import range_boundaries
 
 from bifocal import SurveySetup, Taking
 from bifocal.workbook.content import SurveyContent
-from bifocal.workbook.making.book import write_book
+from bifocal.workbook.making.book import build, write_book
 from bifocal.workbook.template_workflow import write_template
 from bifocal.workbook.words import WORDS
-from tests.bifocal.workbook.test_survey_workbook import ideal_content, named, pair_content
-from tests.builders.commands import bifocal_command as main
+from tests.bifocal.workbook.test_cli_solve import DISTANCES, as_file, fill, form, named, rows, run
+from tests.bifocal.workbook.test_survey_workbook import ideal_content, pair_content, parts
 from tests.recalculate import recalculated
 from tests.workbook_page import dimension, printed_columns, scale_of, sizes_of
 
-TEMPLATES = Path(__file__).parents[3] / "templates"
 LANGUAGES = ("en", "it", "de")
 
 
 @pytest.fixture(scope="module")
 def books(tmp_path_factory):
-    """Return workbooks by name: the templates, a survey, a pair."""
+    """Return workbooks by name: forms, a survey, a pair."""
     folder = tmp_path_factory.mktemp("books")
     write_book(folder / "ideal.xlsx", ideal_content(26))
     write_book(folder / "pair.xlsx", pair_content(20))
-    paths = {f"survey-{code}": TEMPLATES / f"survey-{code}.xlsx" for code in LANGUAGES}
-    paths |= {name: folder / f"{name}.xlsx" for name in ("ideal", "pair")}
+    for code in LANGUAGES:
+        (folder / f"survey-{code}.xlsx").write_bytes(form("--rows", 30, "--lang", code))
+    paths = {name: folder / f"{name}.xlsx" for name in NAMES}
     return {name: (path, openpyxl.load_workbook(path)) for name, path in paths.items()}
 
 
@@ -77,8 +74,8 @@ def test_no_chart_is_cut_by_the_end_of_a_page(name, books):
     (end,) = (line.id for line in sheet.row_breaks.brk)
     height = {row: sheet.row_dimensions[row].height or 13.5 for row in range(1, 116)}
     paper = 841.9 - 72 * (sheet.page_margins.top + sheet.page_margins.bottom)
-    for rows in (range(1, end + 1), range(end + 1, 116)):
-        assert sum(height[row] for row in rows) * scale_of(sheet) < paper
+    for printed in (range(1, end + 1), range(end + 1, 116)):
+        assert sum(height[row] for row in printed) * scale_of(sheet) < paper
     above = 0.0
     for chart in sorted(sheet._charts, key=lambda chart: chart.anchor._from.row):
         first = chart.anchor._from.row
@@ -91,19 +88,17 @@ def test_no_chart_is_cut_by_the_end_of_a_page(name, books):
 
 
 def test_forms_print_no_page_after_page_of_headings(tmp_path):
-    write_template(tmp_path / "t.xlsx", photos=3, what_if=True)
+    write_template(tmp_path / "t.xlsx", photos=3, what_if=True, rows=28)
     book = openpyxl.load_workbook(tmp_path / "t.xlsx")
     assert book["Compare"].page_setup.fitToHeight == 1
     assert book["WhatIf"].print_area == "'WhatIf'!$A$1:$V$58"
 
 
-def test_the_title_block_says_what_is_typed_on_setup(tmp_path):
+def test_the_title_block_says_what_is_typed_on_setup():
     block = {"project": "Palazzo Nuovo", "surveyor": "Ada", "survey_date": "3 May 2026"}
-    content = ideal_content(26, title_block=block)
-    write_book(tmp_path / "r.xlsx", content)
-    values = openpyxl.load_workbook(tmp_path / "r.xlsx", data_only=True)["Results"]
-    assert values["A2"].value.startswith("Project: Palazzo Nuovo\nClient: \n")
-    assert values["E2"].value.startswith("Surveyed by: Ada\nDate: 3 May 2026\n")
+    built = build(ideal_content(26, title_block=block))
+    assert built.value_of("title_project").startswith("Project: Palazzo Nuovo\nClient: \n")
+    assert built.value_of("title_survey").startswith("Surveyed by: Ada\nDate: 3 May 2026\n")
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -220,13 +215,12 @@ STATES = [
 
 
 @pytest.mark.parametrize(("given", "told"), STATES)
-def test_setup_says_in_one_line_what_is_missing_or_wrong(given, told, tmp_path):
+def test_setup_says_in_one_line_what_is_missing_or_wrong(given, told):
     setup = SurveySetup(taking=Taking(**given)) if given else None
     content = SurveyContent(setup=setup, pair=setup and setup.pair(), rows=3)
-    write_book(tmp_path / "s.xlsx", content)
-    book = openpyxl.load_workbook(tmp_path / "s.xlsx", data_only=True)
-    assert named(book, "setup_state").coordinate == "A3"
-    assert named(book, "setup_state").value.startswith(told)
+    built = build(content)
+    assert built.book.defined_names["setup_state"].attr_text == "'Setup'!$A$3"
+    assert built.value_of("setup_state").startswith(told)
 
 
 @pytest.mark.acceptance
@@ -276,24 +270,12 @@ def named_area(book, name):
     return range_boundaries(book.defined_names[name].attr_text.partition("!")[2].replace("$", ""))
 
 
-def parts(path):
-    with zipfile.ZipFile(path) as package:
-        return {name: package.read(name) for name in package.namelist()}
-
-
 @pytest.fixture
 def solved(tmp_path):
     """Return a survey workbook of 12 points made from a text table."""
-    lines = ["id,x1,y1,x2,y2"]
-    for i in range(12):
-        x, y, r = 0.7 * (i % 8) - 2.4, 0.9 * (i % 5) - 1.7, 0.2 * (i % 3)
-        far, near = 35 / (17.5 - r), 19 / (9.5 - r)
-        lines.append(f"P{i},{far * x},{far * y},{near * x},{near * y}")
-    (tmp_path / "points.csv").write_text("\n".join(lines), encoding="utf-8")
-    path = tmp_path / "s.xlsx"
-    lenses = ["--d1", "17.5", "--d2", "9.5", "--c1", "35", "--c2", "19"]
-    arguments = ["solve", str(tmp_path / "points.csv"), "--out", str(path), *lenses]
-    result = CliRunner().invoke(main, arguments)
+    points = [(f"P{i}", 0.7 * (i % 8) - 2.4, 0.9 * (i % 5) - 1.7, 0.2 * (i % 3)) for i in range(12)]
+    table, path = [("id", "x1", "y1", "x2", "y2"), *rows(points)], tmp_path / "s.xlsx"
+    result = run("solve", as_file(table, tmp_path / "points.csv"), "--out", path, *DISTANCES)
     assert result.exit_code == 0, result.stderr
     return path
 
@@ -318,24 +300,13 @@ def test_the_sketch_is_small_and_stays_when_the_workbook_is_solved_in_place(solv
 
 @pytest.fixture
 def filled(tmp_path):
-    """Return a template of 30 rows with 40 typed points."""
-    write_template(tmp_path / "form.xlsx", rows=30)
-    book = openpyxl.load_workbook(tmp_path / "form.xlsx")
-    for name, value in (("c_1", 35), ("c_2", 19), ("d_2", 9.5), ("delta_d", 8)):
-        named(book, name).value = value
-    for i in range(40):
-        x, y = 0.7 * (i % 8) - 2.4, 0.9 * (i % 5) - 1.7
-        far, near = 35 / 17.2, 19 / 9.2
-        typed = (f"P{i}", far * x, far * y, near * x, near * y)
-        for letter, value in zip("ABCDE", typed, strict=True):
-            book["Points"][f"{letter}{5 + i}"] = value
-    book.save(tmp_path / "filled.xlsx")
-    return tmp_path / "filled.xlsx"
+    """Return a template of 20 rows with 40 typed points."""
+    points = [(f"P{i}", 0.7 * (i % 8) - 2.4, 0.9 * (i % 5) - 1.7, 0.3) for i in range(40)]
+    return fill(tmp_path / "filled.xlsx", rows(points))
 
 
 def solve(path, *options):
-    arguments = ["solve", str(path), "--out", str(path), "--overwrite", "-q", *options]
-    result = CliRunner().invoke(main, arguments)
+    result = run("solve", path, "--out", path, "--overwrite", "-q", *options)
     assert result.exit_code == 0, result.stderr
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from dataclasses import replace
+from itertools import zip_longest
 
 import numpy as np
 import openpyxl
@@ -28,11 +29,12 @@ from bifocal.workbook.pair_workflow import read_pair
 from bifocal.workbook.template_workflow import write_survey, write_template
 from multimedia import GeometryError, InputError, WorkbookError
 from tests.bifocal.model.test_pair_through_media import AQUARIUM, POINTS, SURFACE, content
+from tests.bifocal.workbook.test_cli_solve import fill as fill_form
+from tests.bifocal.workbook.test_cli_solve import named
 from tests.bifocal.workbook.test_solve_through_media import measured
 from tests.bifocal.workbook.test_survey_workbook import (
     assert_recalculated_equals_cached,
     ideal_content,
-    named,
 )
 from tests.builders.commands import bifocal_command as main
 from tests.recalculate import recalculated, rows_of
@@ -67,20 +69,14 @@ def media_of_tank():
     return SurveyMedia.of_cells(tank_cells(), 3)
 
 
-def fill(path, out, cells, xy, code=None):
+def fill(path, out, cells, xy, code=()):
     """Type a set-up and points into a template."""
-    book = openpyxl.load_workbook(path)
-    for name, value in cells.items():
-        named(book, name).value = value
-    sheet = book["Points"]
-    keys = [cell.value for cell in sheet[4]]
-    for i, row in enumerate(np.hstack(xy)):
-        sheet.cell(5 + i, 1).value = f"P{i}"
-        for key, value in zip(("x1", "y1", "x2", "y2"), row.tolist(), strict=True):
-            sheet.cell(5 + i, keys.index(key) + 1).value = value
-        if code is not None:
-            sheet.cell(5 + i, keys.index("code") + 1).value = code[i]
-    book.save(out)
+    picks = zip_longest(np.hstack(xy).tolist(), code)
+    points = [
+        {"id": f"P{i}", **dict(zip(("x1", "y1", "x2", "y2"), row, strict=True)), "code": word}
+        for i, (row, word) in enumerate(picks)
+    ]
+    fill_form(out, points, cells, path)
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,6 @@ import pytest
 from tests.bifocal.workbook.kept_workbook import (
     DISTANCES,
     TABLE,
-    named,
     own_table,
     slow,
     solved_in_place,
@@ -22,6 +21,7 @@ from tests.bifocal.workbook.kept_workbook import (
 from tests.bifocal.workbook.test_cli_solve import (
     SETUP,
     fill,
+    named,
     rows,
     run,
     write_csv,
@@ -64,8 +64,8 @@ def test_options_are_written_into_the_cells_of_the_users_workbook(tmp_path, opti
     assert len(own) >= 2
     _, changed = solved_in_place(path, *options)
     assert not own & changed
-    for name, value in cells.items():
-        assert named(path, name) == value
+    book = openpyxl.load_workbook(path)
+    assert {name: named(book, name).value for name in cells} == cells
     if options[0] in RECALCULATED:
         assert_recalculated_equals_cached(path, tmp_path)
     # What is solved from the workbook alone is the same: the options are in it now.
@@ -254,7 +254,7 @@ def commands(folder):
     plan = ("plan", "--focal", 35, "--focal", 19, "--sensor", "36x24", "--pixels", "6000x4000")
     plan += ("--object", "10x6", "--scale", 500)
     return {
-        "template": lambda out: ("template", out, "--overwrite"),
+        "template": lambda out: ("template", out, "--rows", 3, "--overwrite"),
         "export": lambda out: ("export", solved, "--out", out, "--overwrite"),
         "solve": lambda out: ("solve", source, "--out", out, "--overwrite", *DISTANCES),
         "plan": lambda out: (*plan, "--out", out, "--overwrite"),
@@ -318,11 +318,13 @@ def test_the_mode_of_a_workbook_changed_in_place_stays_and_a_link_is_followed(tm
 @pytest.mark.acceptance
 def test_the_first_state_stays_in_its_backup(tmp_path):
     path = fill(tmp_path / "s.xlsx")
+    assert run("solve", path, "--out", path).exit_code == 1
     states = []
     for number in range(3):
         states.append(path.read_bytes())
         result = run("solve", path, "--out", path, "--overwrite")
         assert result.exit_code == 0
+        assert openpyxl.load_workbook(path)["Log"][f"C{5 + number}"].value == "solved"
         backup = path.with_name(f"s.xlsx.bak{number + 1 if number else ''}")
         assert f"is kept as {backup}." in result.stderr
     for name, state in zip(("s.xlsx.bak", "s.xlsx.bak2", "s.xlsx.bak3"), states, strict=True):
