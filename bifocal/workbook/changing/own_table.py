@@ -43,7 +43,7 @@ from photocore.workbook.changing.result_columns import (
 )
 from photocore.workbook.making.live_book import BookBuilder
 from photocore.workbook.making.live_columns import LiveColumn
-from photocore.workbook.reading.grid import column_letters, quoted_title, split_cell
+from photocore.workbook.reading.grid import fixed_cell, quoted_title, split_cell
 
 #: Name of the headings of the results in a workbook of the user's own.
 MARK = "bifocal_results"
@@ -141,14 +141,10 @@ def _links(editor: WorkbookEditor, survey: SurveyInput, given: Mapping[str, Any]
     replaced = cells_of(given)
     links = {}
     for key, (sheet, cell) in survey.setup.places.items():
-        row, column = split_cell(cell)
-        named = place_of(editor, key) == (sheet, row, column)
-        if (
-            isinstance(editor.value_at(sheet, row, column), float)
-            and not named
-            and key not in replaced
-        ):
-            links[key] = f"{quoted_title(sheet)}!${column_letters(column)}${row}"
+        place = (sheet, *split_cell(cell))
+        is_number = isinstance(editor.value_at(*place), float)
+        if is_number and key not in replaced and place_of(editor, key) != place:
+            links[key] = f"{quoted_title(sheet)}!{fixed_cell(*place[1:])}"
     return links
 
 

@@ -21,7 +21,7 @@ from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.changing.editor import WorkbookEditor
 from photocore.workbook.changing.named_cells import place_of
 from photocore.workbook.making.live_book import BookBuilder
-from photocore.workbook.reading.grid import NotCalculated, cell_name, quoted_title, with_names
+from photocore.workbook.reading.grid import NotCalculated, fixed_cell, quoted_title, with_names
 
 #: Options that have no cell of their own; those of the distances depend on each other.
 _OTHERS = {"d1", "d2", "pair", "rules", "adjust_setup"}
@@ -156,14 +156,9 @@ def write_corrections(editor: WorkbookEditor, content: SurveyContent) -> None:
             own = place_of(editor, name)
             if own is None:
                 own = (sheet, below, column)
-                editor.define(name, f"{quoted_title(sheet)}!{_absolute(below, column)}")
+                editor.define(name, f"{quoted_title(sheet)}!{fixed_cell(below, column)}")
                 editor.put(sheet, below, 1, name)
                 editor.put(sheet, below, 2, word("correction", content.language).format(n=image))
                 below += 1
             editor.put(*own, value, style=styles.get(column, ""))
         below += 1
-
-
-def _absolute(row: int, column: int) -> str:
-    letters = cell_name(row, column).rstrip("0123456789")
-    return f"${letters}${row}"

@@ -11,7 +11,6 @@ from bifocal.options.commands import SolveCommand
 from bifocal.survey.setup import SIGMA_PRINT, SIGMA_RADIAL
 from bifocal.survey.survey_media import HEIGHTS, index_names, media_names, thickness_names
 from bifocal.workbook.formulas.columns import FORMULAS, other_numbers
-from bifocal.workbook.formulas.media_formulas import calculated_names
 from photocore.option_types import Number
 from photocore.options import options_of
 
@@ -37,6 +36,8 @@ _OPTION_CELLS = {
 }
 #: Cells that are yellow and hold a formula until something is typed over it.
 TYPED_FORMULAS = ("d_1", "sigma_s", "sigma_r_max")
+#: What may be typed as refractive index: vacuum to germanium.
+INDEX_LIMITS = (1.0, 4.1)
 #: What a set-up needs: what to type, the cells that then hold numbers, for which input unit.
 _NEEDED = (
     ("d_2", ("d_2",), ""),
@@ -123,8 +124,22 @@ def groups(*, is_pair: bool, media: int, lens: bool = False, leaning: bool = Fal
         others, last = [typed, *others], (*last, *calculated)
     if not media:
         return (first, *others, last)
-    calculated = calculated_names(media, is_pair=is_pair, leaning=leaning)
+    calculated = _of_media(media, is_pair=is_pair, leaning=leaning)
     return (first, media_names(media, leaning=leaning), *others, (*last, *calculated))
+
+
+def _of_media(media: int, *, is_pair: bool, leaning: bool) -> tuple[str, ...]:
+    """Return the cells that follow from those of the media.
+
+    On the measured side every ray is known, so a spreadsheet follows it layer by layer without
+    iterating: see `bifocal.media`, whose notation this is.
+    """
+    used = (f"n_used_{number}" for number in range(1, media + 1))
+    axes = (f"axis_{axis}_{image}" for image in "12" for axis in "xyr")
+    units = ("n_least", *axes) if leaning else ()
+    rays = () if is_pair else ("c_rays_1", "c_rays_2", "mm_1", "m_seen")
+    both = (f"{name}_{image}" for name in ("behind", "seen", "reach") for image in "12")
+    return (*used, *units, *both, "r_top", *rays)
 
 
 #: Cells of photo 2 beside which those of further photos stand: the typed ones and the others.

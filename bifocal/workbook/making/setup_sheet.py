@@ -9,8 +9,8 @@ from openpyxl.styles import Alignment
 
 from bifocal.workbook.content import SurveyContent, setup_cells
 from bifocal.workbook.formulas.columns import adjustment_names, pair_letter
-from bifocal.workbook.formulas.media_formulas import INDEX_LIMITS
 from bifocal.workbook.formulas.setup_cells import (
+    INDEX_LIMITS,
     STATES,
     beside,
     formulas,

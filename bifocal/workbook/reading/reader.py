@@ -18,7 +18,6 @@ from bifocal.workbook.formulas.columns import other_keys
 from bifocal.workbook.reading.row_checks import PIXELS, POLAR, XY, check_rows
 from bifocal.workbook.reading.setup_reader import (
     LARGEST,
-    OpenSurvey,
     is_general,
     other_count,
     read_setup,
@@ -35,6 +34,7 @@ from photocore.tables import (
     read_table,
 )
 from photocore.tables.advice import advice
+from photocore.tables.csvread import CsvFile
 from photocore.tables.heading_words import bare
 from photocore.tables.model import Kind
 from photocore.tables.numbers import Decimal
@@ -168,20 +168,19 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
         If the file or a sheet cannot be used at all.
     """
     options = options or ReadOptions()
-    survey = OpenSurvey(open_tables(path), options.decimal, options.given)
-    book, errors = survey.book, survey.errors
+    book, errors = open_tables(path), list[CellError]()
     if isinstance(book, SheetFile):
         settle_names(book, options.given)
-    table = _read_points(survey, options)
+    table = _read_points(book, options, errors)
     if options.photos > 2:
         _require_photos(table, options.photos)
     else:
         _require_coordinates(table, book, path)
     points, unit = _observations(table, errors, options.photos)
     sheets = book if isinstance(book, SheetFile) else None
-    setup = read_setup(survey)
-    check = _known(survey, "Check", ("X_ref", "Y_ref", "Z_ref"))
-    control = _known(survey, "Georeference", ("E", "N", "H"))
+    setup = read_setup(book, errors, decimal=options.decimal, given=options.given)
+    check = _known(book, "Check", ("X_ref", "Y_ref", "Z_ref"), options.decimal, errors)
+    control = _known(book, "Georeference", ("E", "N", "H"), options.decimal, errors)
     parts = (table, setup, check, control)
     model, language, is_ours, tape = "auto", "en", False, None
     if sheets is not None:
@@ -232,9 +231,14 @@ def _taped(
     return TapedDistance(ends=(first, second), length=length)
 
 
-def _known(survey: OpenSurvey, sheet: str, keys: tuple[str, str, str]) -> _KnownTable:
+def _known(
+    book: SheetFile | CsvFile,
+    sheet: str,
+    keys: tuple[str, str, str],
+    decimal: Decimal | None,
+    errors: list[CellError],
+) -> _KnownTable:
     """Return check or control points of the sheet made for them; nothing where it is absent."""
-    book, errors = survey.book, survey.errors
     if not isinstance(book, SheetFile):
         return _KnownTable()
     names = {bare(sheet), bare(f"tbl{sheet}"), "tblgeo" if sheet == "Georeference" else ""}
@@ -247,7 +251,7 @@ def _known(survey: OpenSurvey, sheet: str, keys: tuple[str, str, str]) -> _Known
         [understood(key, required=key == "id") for key in ("id", *keys, "use")],
         name="Geo" if sheet == "Georeference" and areas else sheet,
         sheet=areas[0].sheet if areas else titles[0],
-        decimal=survey.decimal,
+        decimal=decimal,
         as_typed=True,
         errors=errors,
     )
@@ -284,9 +288,8 @@ def _typed_as_text(cells: Sequence[str]) -> list[str]:
     ]
 
 
-def _read_points(survey: OpenSurvey, options: ReadOptions) -> Table:
+def _read_points(book: SheetFile | CsvFile, options: ReadOptions, errors: list[CellError]) -> Table:
     """Return the table of points; headings that both photos share are the last resort."""
-    book = survey.book
     # In the workbook of a general pair x1..y2 are formulas that follow from the raw pixels.
     general = isinstance(book, SheetFile) and is_general(book)
     others = other_count(book.names) if isinstance(book, SheetFile) else 0
@@ -306,7 +309,7 @@ def _read_points(survey: OpenSurvey, options: ReadOptions) -> Table:
                 ],
                 name="Points",
                 sheet=options.sheet,
-                decimal=survey.decimal,
+                decimal=options.decimal,
                 column_map=options.columns or None,
                 visible_only=options.visible_only,
                 whole=options.photos == 2 and not ours,
@@ -320,7 +323,7 @@ def _read_points(survey: OpenSurvey, options: ReadOptions) -> Table:
         given = table.present & {*XY, *PIXELS, "s1", "s2"}
         if last or (given and (not shared or table.present.issuperset(shared))):
             break
-    survey.errors.extend(complaints)
+    errors.extend(complaints)
     for key in followed:
         table.values[key] = np.full(len(table), np.nan)
     return table

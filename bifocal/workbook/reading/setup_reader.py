@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -26,8 +26,8 @@ from bifocal.survey.survey_media import (
     thickness_names,
 )
 from bifocal.workbook.formulas.columns import adjustment_names, other_numbers
-from bifocal.workbook.formulas.media_formulas import INDEX_LIMITS
 from bifocal.workbook.formulas.setup_cells import (
+    INDEX_LIMITS,
     MATRICES,
     NADIRS,
     PHOTOS,
@@ -49,7 +49,7 @@ from photocore.tables.numbers import Decimal
 from photocore.workbook.reading.grid import (
     SheetFile,
     cell_name,
-    column_letters,
+    fixed_cell,
     quoted_title,
     split_cell,
     with_names,
@@ -62,28 +62,6 @@ LARGEST = 1e9
 _AGREE = 0.0015
 #: Names that make a set-up: two of them are believed wherever they lead.
 _BELIEVED = {"d_1", "d_2", "delta_d", "c_1", "c_2"}
-
-
-@dataclass(frozen=True, slots=True)
-class OpenSurvey:
-    """A survey's file, open to be read.
-
-    Attributes
-    ----------
-    book : SheetFile or CsvFile
-        The workbook, or a text table, which has no other sheets and no set-up.
-    decimal : {"point", "comma"} or None
-        Decimal separator of numbers typed as text.
-    given : collection of str
-        Cells that options replace, by their names; ``pair`` replaces them all.
-    errors : list of CellError
-        Takes the complaints.
-    """
-
-    book: SheetFile | CsvFile
-    decimal: Decimal | None = None
-    given: Collection[str] = ()
-    errors: list[CellError] = field(default_factory=list)
 
 
 def home_of(book: SheetFile) -> str | None:
@@ -126,9 +104,24 @@ def settle_names(book: SheetFile, given: Collection[str]) -> None:
     book.names.update(names)
 
 
-def read_setup(survey: OpenSurvey) -> SurveySetup:
-    """Return the values of `Setup`, complaining about what cannot be meant."""
-    book, decimal, given = survey.book, survey.decimal, survey.given
+def read_setup(
+    book: SheetFile | CsvFile,
+    errors: list[CellError],
+    *,
+    decimal: Decimal | None,
+    given: Collection[str],
+) -> SurveySetup:
+    """Return the values of `Setup`, complaining about what cannot be meant.
+
+    Parameters
+    ----------
+    book : SheetFile or CsvFile
+        The workbook, or a text table, which has no other sheets and no set-up.
+    errors : list of CellError
+        Takes the complaints.
+    decimal, given
+        As in `bifocal.workbook.reading.reader.ReadOptions`.
+    """
     if not isinstance(book, SheetFile):
         return SurveySetup(where=book.label)
     complaints: list[CellError] = []
@@ -161,7 +154,7 @@ def read_setup(survey: OpenSurvey) -> SurveySetup:
     unit = _unit(values, told)
     # What options replace may hold anything, as all beside another pair that is not our workbook.
     is_idle = "pair" in given and "d_1" not in book.names
-    survey.errors.extend(e for e in told if not is_idle and e.column not in given)
+    errors.extend(e for e in told if not is_idle and e.column not in given)
     matrices, nadirs = _general(values)
     return SurveySetup(
         taking=_stated(
@@ -322,8 +315,8 @@ def _formulas(book: SheetFile, values: NamedValues) -> set[str]:
     """Return which cells hold the template's own formula instead of a typed number."""
     own = set()
     places = {
-        name: f"{quoted_title(sheet)}!${column_letters(column)}${row}"
-        for name, (sheet, row, column) in book.names.items()
+        name: f"{quoted_title(sheet)}!{fixed_cell(*place)}"
+        for name, (sheet, *place) in book.names.items()
     }
     for key in values.places.keys() & set(TYPED_FORMULAS):
         sheet, cell = values.places[key]

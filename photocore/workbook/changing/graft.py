@@ -135,9 +135,8 @@ class Graft:
         prefix = _prefix_of(data)
         text = reference if raw else escaped(reference)
         entry = f"<{prefix}definedName{attributes}>{text}</{prefix}definedName>".encode()
-        listed = re.search(rb"</(?:\w+:)?definedNames\s*>", data)
-        if listed:
-            self._put(self.book.part, data[: listed.start()] + entry + data[listed.start() :])
+        if re.search(rb"</(?:\w+:)?definedNames\s*>", data):
+            self._append(self.book.part, "definedNames", entry.decode())
             return
         names = f"<{prefix}definedNames>".encode() + entry + f"</{prefix}definedNames>".encode()
         empty = re.search(rb"<(?:\w+:)?definedNames\s*/>", data)
@@ -153,18 +152,10 @@ class Graft:
 
     def _add_sheet(self, title: str, part: str) -> None:
         """Name a sheet in the workbook, after all others."""
-        data = self._book()
         key = self._relate(self.book.part, part, "worksheet")
-        numbers = [int(n) for n in re.findall(rb"\ssheetId\s*=\s*[\"'](\d+)", data)]
-        place = re.search(rb"</(?:\w+:)?sheets\s*>", data)
-        if place is None:
-            raise InputError(f"{self.path}: its list of sheets cannot be understood.")
-        entry = (
-            f'<{_prefix_of(data)}sheet xmlns:r="{_RELATIONS}" name={quoted(title)} '
-            f'sheetId="{max(numbers) + 1}" r:id="{key}"/>'
-        )
-        made = self._strict(entry.encode())
-        self._put(self.book.part, data[: place.start()] + made + data[place.start() :])
+        numbers = [int(n) for n in re.findall(rb"\ssheetId\s*=\s*[\"'](\d+)", self._book())]
+        about = f'name={quoted(title)} sheetId="{max(numbers) + 1}" r:id="{key}"'
+        self._append(self.book.part, "sheets", f'<:sheet xmlns:r="{_RELATIONS}" {about}/>')
 
     def _add_part(self, name: str, content: Mapping[str, bytes]) -> str:
         """Add a part and all it refers to; return its new name."""
@@ -177,7 +168,8 @@ class Graft:
         if "/tables/" in new:
             data = re.sub(rb'(<table\b[^>]*?\sid=")\d+', rb"\g<1>%d" % self._table_number(), data)
         self._put(new, self._strict(data))
-        self._add_type(new, _type_of(content[_TYPES], name))
+        about = f'PartName="/{new}" ContentType="{_type_of(content[_TYPES], name)}"'
+        self._append(_TYPES, "Types", f"<:Override {about}/>")
         relations = f"{folder}/_rels/{file}.rels"
         if relations in content:
             for relation in ElementTree.fromstring(content[relations]):
@@ -197,29 +189,30 @@ class Graft:
         """Relate two parts; return the relation's id."""
         folder, file = posixpath.split(part)
         name = f"{folder}/_rels/{file}.rels"
-        empty = f'<Relationships xmlns="{_PACKAGE}"></Relationships>'
-        data = self._now(name) if name in self._names else empty.encode()
+        if name not in self._names:
+            self._put(name, f'<Relationships xmlns="{_PACKAGE}"></Relationships>'.encode())
         if not key:
-            taken = {m.decode() for m in re.findall(rb"\sId\s*=\s*[\"']([^\"']*)", data)}
+            taken = {m.decode() for m in re.findall(rb"\sId\s*=\s*[\"']([^\"']*)", self._now(name))}
             key = next(f"rId{n}" for n in range(1, 10**6) if f"rId{n}" not in taken)
-        place = re.search(rb"</(\w+:)?Relationships\s*>", data)
-        if place is None:
-            raise InputError(f"{self.path}: damaged, the part {name} cannot be understood.")
-        kind = f"{_RELATIONS}/{kind}"
-        prefix = (place[1] or b"").decode()
-        entry = f'<{prefix}Relationship Id="{key}" Type="{kind}" Target="/{target}"/>'
-        made = self._strict(entry.encode())
-        self._put(name, data[: place.start()] + made + data[place.start() :])
+        about = f'Id="{key}" Type="{_RELATIONS}/{kind}" Target="/{target}"'
+        self._append(name, "Relationships", f"<:Relationship {about}/>")
         return key
 
-    def _add_type(self, part: str, kind: str) -> None:
-        data = self._now(_TYPES)
-        place = re.search(rb"</(\w+:)?Types\s*>", data)
+    def _append(self, part: str, parent: str, element: str) -> None:
+        """Put an element at the end of another one; a colon before its name stands for the prefix.
+
+        Raises
+        ------
+        InputError
+            If the part has no such end.
+        """
+        data = self._now(part)
+        place = re.search(rb"</(\w+:)?%s\s*>" % parent.encode(), data)
         if place is None:
-            raise InputError(f"{self.path}: damaged, {_TYPES} cannot be understood.")
-        prefix = (place[1] or b"").decode()
-        entry = f'<{prefix}Override PartName="/{part}" ContentType="{kind}"/>'.encode()
-        self._put(_TYPES, data[: place.start()] + entry + data[place.start() :])
+            raise InputError(f"{self.path}: damaged, the part {part} cannot be understood.")
+        prefixed = element.replace("<:", f"<{(place[1] or b'').decode()}", 1)
+        made = self._strict(prefixed.encode())
+        self._put(part, data[: place.start()] + made + data[place.start() :])
 
     def _strict(self, data: bytes) -> bytes:
         """Return a part in the words of a strict workbook if this is one."""

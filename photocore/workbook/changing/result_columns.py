@@ -15,8 +15,8 @@ from photocore.workbook.changing.editor import WorkbookEditor
 from photocore.workbook.reading.grid import (
     LAST_COLUMN,
     Value,
-    cell_name,
     column_letters,
+    fixed_cell,
     plain_title,
     quoted_title,
     split_area,
@@ -154,7 +154,7 @@ def put_result_columns(
             text = str(row).join(pieces) if column.formula else ""
             editor.put(table.sheet, row, number, value, formula=text, style=style)
     span = [places[column.key] for column in columns]
-    area = ":".join(_absolute(head, number) for number in (min(span), max(span)))
+    area = ":".join(fixed_cell(head, number) for number in (min(span), max(span)))
     editor.define(mark, f"{quoted_title(table.sheet)}!{area}")
 
 
@@ -215,9 +215,3 @@ def _pieces(formula: str, table: OwnTable, places: Mapping[str, int]) -> list[st
     parts = _COUNTED.split(formula)
     counted = [_CELL.sub(partial(cell, scaled=i % 2 == 0), part) for i, part in enumerate(parts)]
     return "".join(counted).split("\0")
-
-
-def _absolute(row: int, column: int) -> str:
-    name = cell_name(row, column)
-    letters = name.rstrip("0123456789")
-    return f"${letters}${row}"

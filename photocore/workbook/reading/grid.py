@@ -223,6 +223,15 @@ def cell_name(row: int, column: int) -> str:
     return f"{column_letters(column)}{row}"
 
 
+def fixed_cell(row: int, column: int) -> str:
+    """Return a cell's name as formulas keep it when they are copied.
+
+    >>> fixed_cell(3, 2)
+    '$B$3'
+    """
+    return f"${column_letters(column)}${row}"
+
+
 def split_cell(reference: str) -> tuple[int, int]:
     """Return row and column of a cell's name, dollar signs allowed.
 
