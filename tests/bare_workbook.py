@@ -9,6 +9,21 @@ from pathlib import Path
 from photocore.workbook.reading.xmltext import escaped
 
 
+def parts(path: Path) -> dict[str, bytes]:
+    """Return the parts of a package."""
+    with zipfile.ZipFile(path) as package:
+        return {name: package.read(name) for name in package.namelist()}
+
+
+def with_parts(path: Path, more: dict[str, bytes], target: Path | None = None) -> Path:
+    """Write a package with parts replaced or added as they are, sound or not."""
+    whole = parts(path) | more
+    with zipfile.ZipFile(target or path, "w") as package:
+        for name, data in whole.items():
+            package.writestr(name, data)
+    return target or path
+
+
 def relations(*items: tuple[str, str]) -> str:
     """Return a relations part of kinds and targets."""
     inside = "".join(

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from openpyxl.chart import BarChart, LineChart, Reference, ScatterChart, Series
+from openpyxl.chart import LineChart, Reference, ScatterChart, Series
 from openpyxl.chart.layout import Layout, ManualLayout
-from openpyxl.chart.shapes import GraphicalProperties
 from openpyxl.drawing.line import LineEndProperties
 from openpyxl.styles import Font
 from openpyxl.worksheet.pagebreak import Break
@@ -16,7 +15,7 @@ from bifocal.workbook.making.reference_sheets import CHECK_HEAD
 from bifocal.workbook.words import word
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
-from photocore.workbook.making.live_charts import COLOURS, scatter, titled
+from photocore.workbook.making.live_charts import COLOURS, bars, scatter, titled
 from photocore.workbook.making.look import FACE, LABEL, LABEL_FONT
 from photocore.workbook.making.newbook import RowBlock
 from photocore.workbook.reading.grid import column_letters
@@ -97,19 +96,19 @@ def _checked(sheet: SheetBuilder, content: SurveyContent, head: int) -> None:
     numbered: Cells = {"check_row": list(range(1, count + 1))}
     sheet.table("tblVectors", vectors, at=(head, left), rows=count, cells=numbered)
     area = {"min_row": head + 1, "max_row": head + rows}
-    bars, line_of = BarChart(), LineChart()
-    for chart, offset in ((bars, 9), (line_of, 10)):
-        numbers = Reference(sheet.worksheet, min_col=LEFT + offset, **area)
-        chart.series.append(Series(numbers, title=bins[offset - 6].key))
-        chart.set_categories(Reference(sheet.worksheet, min_col=LEFT + 6, **area))
-    bars.series[0].graphicalProperties = GraphicalProperties(solidFill=COLOURS[0])
+    names, numbers, normal = (
+        Reference(sheet.worksheet, min_col=LEFT + offset, **area) for offset in (6, 9, 10)
+    )
+    title = sheet.book.word("chart_bins")
+    counted = bars(title, numbers, names, series=bins[3].key, colour=COLOURS[0])
+    counted.height, counted.width, counted.gapWidth = 5.5, 16, 20
+    line_of = LineChart()
+    line_of.series.append(Series(normal, title=bins[4].key))
+    line_of.set_categories(names)
     line_of.series[0].graphicalProperties.line.solidFill = COLOURS[1]
     line_of.series[0].smooth = False
-    bars.title, bars.legend = titled(sheet.book.word("chart_bins")), None
-    bars.x_axis.delete = bars.y_axis.delete = False
-    bars.height, bars.width, bars.gapWidth = 5.5, 16, 20
-    bars += line_of
-    sheet.worksheet.add_chart(bars, "A75")
+    counted += line_of
+    sheet.worksheet.add_chart(counted, "A75")
     ends = {"min_row": head + 1, "max_row": head + count}
     x, y = (Reference(sheet.worksheet, min_col=left + i, **ends) for i in (1, 3))
     plan = scatter("", "X [m]", "Y [m]", x, {"Y": y})
@@ -168,17 +167,10 @@ def _round_step(rough: float) -> float:
 def _errors(builder: BookBuilder, content: SurveyContent) -> None:
     """Draw a bar for the relief error of each check point."""
     sheet, language = builder.book["Check"], builder.language
-    chart = BarChart()
-    chart.type, chart.style, chart.legend = "col", 10, None
-    chart.title = titled(word("chart_error", language))
-    rows = content.check_rows
-    errors = Reference(sheet, min_col=11, min_row=CHECK_HEAD + 1, max_row=CHECK_HEAD + rows)
-    names = Reference(sheet, min_col=1, min_row=CHECK_HEAD + 1, max_row=CHECK_HEAD + rows)
-    series = Series(errors, title="dZ")
-    series.graphicalProperties = GraphicalProperties(solidFill=COLOURS[1])
-    chart.series.append(series)
-    chart.set_categories(names)
-    chart.x_axis.delete = chart.y_axis.delete = False
+    area = {"min_row": CHECK_HEAD + 1, "max_row": CHECK_HEAD + content.check_rows}
+    names, errors = (Reference(sheet, min_col=column, **area) for column in (1, 11))
+    chart = bars(word("chart_error", language), errors, names, series="dZ", colour=COLOURS[1])
+    chart.style = 10
     chart.x_axis.tickLblPos, chart.y_axis.title = "low", titled("dZ [m]", 1000)
     chart.y_axis.number_format = "General"
     chart.height, chart.width = 7, 16

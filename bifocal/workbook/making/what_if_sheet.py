@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from openpyxl.chart import BarChart, Reference, Series
-from openpyxl.chart.shapes import GraphicalProperties
+from openpyxl.chart import Reference
 from openpyxl.styles import Alignment
 
 from bifocal.workbook.content import CHART_ROWS, SurveyContent, printed_rows
 from bifocal.workbook.formulas.columns import CHANGED, FORMULAS
 from bifocal.workbook.formulas.setup_cells import number_format
 from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
-from photocore.workbook.making.live_charts import COLOURS, scatter, titled
+from photocore.workbook.making.live_charts import COLOURS, bars, scatter
 from photocore.workbook.reading.grid import column_letters
 
 #: Rows of the changes, of the charts, and of the keys of the table.
@@ -38,22 +37,19 @@ def what_if_sheet(builder: BookBuilder, content: SurveyContent) -> None:
     rows = min(content.point_rows, CHART_ROWS)
     sheet.table("tblWhatIf", columns, at=(HEAD, 1), rows=rows, cells={}, repeat=True)
     area = {"min_row": FIRST, "max_row": row}
-    bars, names = BarChart(), Reference(sheet.worksheet, min_col=1, **area)
-    bars.series.append(Series(Reference(sheet.worksheet, min_col=6, **area), title="r [m]"))
-    bars.series[0].graphicalProperties = GraphicalProperties(solidFill=COLOURS[0])
-    bars.set_categories(names)
-    bars.type, bars.legend, bars.gapWidth = "bar", None, 40
-    bars.title = titled(builder.word("chart_sensitivity"))
-    bars.x_axis.delete = bars.y_axis.delete = False
-    bars.x_axis.scaling.orientation = "maxMin"
-    bars.y_axis.number_format = "General"
+    names, effects = (Reference(sheet.worksheet, min_col=column, **area) for column in (1, 6))
+    title = builder.word("chart_sensitivity")
+    worst = bars(title, effects, names, series="r [m]", colour=COLOURS[0])
+    worst.type, worst.gapWidth = "bar", 40
+    worst.x_axis.scaling.orientation = "maxMin"
+    worst.y_axis.number_format = "General"
     keys, ends = [column.key for column in columns], {"min_row": HEAD + 1, "max_row": HEAD + rows}
     x, y = (
         Reference(sheet.worksheet, min_col=keys.index(f"plot_{key}") + 1, **ends) for key in _DRAWN
     )
     dots = scatter(builder.word("chart_changes"), "s' [mm]", "r [m]", x, {"change": y})
     dots.y_axis.number_format, dots.visible_cells_only = "General", False
-    for chart, place in ((bars, f"A{CHARTS}"), (dots, f"G{CHARTS}")):
+    for chart, place in ((worst, f"A{CHARTS}"), (dots, f"G{CHARTS}")):
         chart.height, chart.width = 8, 12.5
         sheet.worksheet.add_chart(chart, place)
     sheet.finish(landscape=True, repeat=f"{HEAD - 1}:{HEAD}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from openpyxl.chart import Reference, ScatterChart, Series
+from openpyxl.chart import BarChart, Reference, ScatterChart, Series
 from openpyxl.chart.data_source import StrData, StrRef, StrVal
 from openpyxl.chart.shapes import GraphicalProperties
 from openpyxl.chart.text import RichText, Text
@@ -40,6 +40,17 @@ def linked_title(sheet: str, cell: str, shown: StrVal) -> Title:
     look = RichText(p=[Paragraph(pPr=ParagraphProperties(defRPr=font))])
     place = f"'{sheet}'!{absolute_coordinate(cell)}"
     return Title(tx=Text(strRef=StrRef(f=place, strCache=cache)), txPr=look, overlay=False)
+
+
+def bars(title: str, numbers: Reference, names: Reference, *, series: str, colour: str) -> BarChart:
+    """Return a chart of bars of one series, its axes shown."""
+    chart = BarChart()
+    chart.title, chart.legend = titled(title), None
+    chart.series.append(Series(numbers, title=series))
+    chart.series[0].graphicalProperties = GraphicalProperties(solidFill=colour)
+    chart.set_categories(names)
+    chart.x_axis.delete = chart.y_axis.delete = False
+    return chart
 
 
 def scatter(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import zipfile
 
 import openpyxl
 import pytest
@@ -14,6 +13,7 @@ from bifocal.workbook.making.book import write_book
 from bifocal.workbook.template_workflow import write_template
 from photocore import machine
 from photocore.workbook.reading.package import package_faults
+from tests.bare_workbook import parts, with_parts
 from tests.bifocal.workbook.test_survey_workbook import ideal_content
 from tests.builders.commands import bifocal_command as main
 
@@ -26,11 +26,7 @@ def doctor(path, *words):
 
 def changed(source, target, change):
     """Copy a workbook with the sheet Points changed."""
-    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w") as new:
-        for name in old.namelist():
-            data = old.read(name)
-            new.writestr(name, change(data.decode()).encode() if name == SHEET else data)
-    return target
+    return with_parts(source, {SHEET: change(parts(source)[SHEET].decode()).encode()}, target)
 
 
 @pytest.fixture(scope="module")

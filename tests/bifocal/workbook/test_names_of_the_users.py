@@ -33,6 +33,15 @@ def names_of_ours(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, ...]:
     return tuple(sorted(names))
 
 
+def own_book(path: Path, *above: tuple[str | None, ...], heads=HEADS, picks=(*FAR, *NEAR)):
+    """Write a table of one point, 1 m before the wall, below rows of the user's own."""
+    book = openpyxl.Workbook()
+    for row in (*above, heads, ("P0", *picks)):
+        book.active.append(row)
+    book.save(path)
+    return path
+
+
 def solved(path: Path, *given: str) -> str:
     result = run("solve", path, *given, "--out", path, "--overwrite")
     assert result.exit_code == 0, result.stderr
@@ -114,11 +123,8 @@ def test_a_set_up_in_named_cells_is_read_and_said_and_options_leave_it(tmp_path:
 def test_results_stand_beside_the_table_whatever_stands_further_right(
     tmp_path: Path, cell: str, first: str
 ) -> None:
-    book = openpyxl.Workbook()
-    book.active.append(HEADS)
-    book.active.append(("P0", *FAR, *NEAR))
+    book = openpyxl.load_workbook(path := own_book(tmp_path / "own.xlsx"))
     book.active[cell] = "edge"
-    path = tmp_path / "own.xlsx"
     book.save(path)
     solved(path, *GIVEN)
     sheet = openpyxl.load_workbook(path, data_only=True).active
@@ -127,12 +133,9 @@ def test_results_stand_beside_the_table_whatever_stands_further_right(
 
 
 def test_a_sheet_without_free_columns_is_refused_and_stays(tmp_path: Path) -> None:
-    book = openpyxl.Workbook()
-    book.active.append(HEADS)
-    book.active.append(("P0", *FAR, *NEAR))
+    book = openpyxl.load_workbook(path := own_book(tmp_path / "own.xlsx"))
     for column in range(20, 16385, 20):
         book.active.cell(9, column, "x")
-    path = tmp_path / "own.xlsx"
     book.save(path)
     before = path.read_bytes()
     result = run("solve", path, *GIVEN, "--out", path, "--overwrite")
@@ -158,12 +161,9 @@ def test_a_sheet_without_free_columns_is_refused_and_stays(tmp_path: Path) -> No
 def test_what_stands_above_the_coordinates_tells_the_far_photo(
     tmp_path: Path, above: tuple[str, str], is_far: bool
 ) -> None:
-    book = openpyxl.Workbook()
-    book.active.append((None, above[0], None, above[1], None))
-    book.active.append(("Point", "x [mm]", "y [mm]", "x [mm]", "y [mm]"))
-    book.active.append(("P0", *(FAR + NEAR if is_far else NEAR + FAR)))
-    path = tmp_path / "own.xlsx"
-    book.save(path)
+    heads, picks = ("Point", *("x [mm]", "y [mm]") * 2), FAR + NEAR if is_far else NEAR + FAR
+    words = (None, above[0], None, above[1], None)
+    path = own_book(tmp_path / "own.xlsx", words, heads=heads, picks=picks)
     told = solved(path, *GIVEN)
     sheet = openpyxl.load_workbook(path, data_only=True).active
     assert sheet["F3"].value == pytest.approx(1)
@@ -183,12 +183,8 @@ def test_the_empty_template_of_three_photos_says_what_to_fill_in(tmp_path: Path)
 def test_our_own_workbooks_and_keys_below_labels_are_not_asked_for_the_far_photo(
     tmp_path: Path,
 ) -> None:
-    book = openpyxl.Workbook()
-    book.active.append(("Name", "first photo", "", "second photo", ""))
-    book.active.append(("id", "x1", "y1", "x2", "y2"))
-    book.active.append(("P0", *FAR, *NEAR))
-    path = tmp_path / "own.xlsx"
-    book.save(path)
+    words, heads = ("Name", "first photo", "", "second photo", ""), ("id", "x1", "y1", "x2", "y2")
+    path = own_book(tmp_path / "own.xlsx", words, heads=heads)
     assert "is taken for" not in solved(path, *GIVEN)
     new = tmp_path / "new.xlsx"
     assert run("solve", path, "--out", new).exit_code == 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from functools import partial
 
 import openpyxl
@@ -13,11 +12,11 @@ from PIL import Image as Picture
 from bifocal.workbook.formulas.columns import FORMULAS, results_columns
 from bifocal.workbook.making import book as making
 from bifocal.workbook.template_workflow import write_template
+from tests.bare_workbook import parts, with_parts
 from tests.bifocal.workbook.test_cli_solve import POINTS, SETUP, fill, put, rows, run, write_csv
 from tests.bifocal.workbook.test_survey_workbook import (
     assert_recalculated_equals_cached,
     named,
-    parts,
 )
 
 #: Heights a millimetre off: the residuals of exact points are rounding, which has no equal.
@@ -118,15 +117,12 @@ def test_what_the_user_added_stays_byte_for_byte(tmp_path):
 @pytest.mark.acceptance
 def test_macros_stay_in_a_macro_workbook(tmp_path):
     path, macro = survey(tmp_path / "s.xlsx"), tmp_path / "s.xlsm"
-    with zipfile.ZipFile(path) as old, zipfile.ZipFile(macro, "w") as new:
-        for name in old.namelist():
-            data = old.read(name)
-            if name == "[Content_Types].xml":
-                data = data.replace(b"spreadsheetml.sheet.main+xml", b"x").replace(
-                    b"officedocument.x", b"ms-excel.sheet.macroEnabled.main+xml"
-                )
-            new.writestr(name, data)
-        new.writestr("xl/vbaProject.bin", b"MACROS" * 50)
+    kinds = parts(path)["[Content_Types].xml"].replace(
+        b"openxmlformats-officedocument.spreadsheetml.sheet.main+xml",
+        b"ms-excel.sheet.macroEnabled.main+xml",
+    )
+    own = {"[Content_Types].xml": kinds, "xl/vbaProject.bin": b"MACROS" * 50}
+    with_parts(path, own, macro)
     out = tmp_path / "out.xlsm"
     result = run("solve", macro, "--out", out)
     assert result.exit_code == 0, result.stderr

@@ -6,7 +6,6 @@ import functools
 import io
 import re
 import tempfile
-import zipfile
 from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import canonicalize
@@ -39,6 +38,7 @@ from bifocal.workbook.formulas.space_block import LEFT
 from bifocal.workbook.making.book import write_book
 from bifocal.workbook.template_workflow import write_template
 from multimedia import InputError
+from tests.bare_workbook import parts
 from tests.bifocal.workbook.test_cli_solve import fill, named
 from tests.recalculate import recalculated, rows_of
 from tests.workbook_lint import lint
@@ -52,11 +52,6 @@ NAMED = [
     *("c_1", "c_2", "d_1", "d_2", "delta_d", "pitch", "sigma_s", "input_unit"),
     *("nadir_1_col", "nadir_1_row", "nadir_2_col", "nadir_2_row"),
 ]
-
-
-def parts(path):
-    with zipfile.ZipFile(path) as package:
-        return {name: package.read(name) for name in package.namelist()}
 
 
 def said(part):

@@ -18,6 +18,7 @@ from photocore.workbook.changing.splice import splice_sheet
 from photocore.workbook.making.newbook import finished_parts
 from photocore.workbook.reading.package import open_package
 from tests import office
+from tests.bare_workbook import parts
 from tests.golden import make_rich_workbook
 
 # What openpyxl says it would lose is the point of these tests.
@@ -29,13 +30,8 @@ BOOK = "xl/workbook.xml"
 COLUMNS = (Column("id", kind="text"), Column("s1"), Column("s2"), Column("ds"), Column("twice"))
 
 
-def contents(path):
-    with zipfile.ZipFile(path) as package:
-        return {name: package.read(name) for name in package.namelist()}
-
-
 def differing(first, second):
-    one, two = contents(first), contents(second)
+    one, two = parts(first), parts(second)
     assert list(one) == list(two)
     return {name for name in one if one[name] != two[name]}
 
@@ -71,7 +67,7 @@ def test_a_result_changes_only_its_sheet(rich, tmp_path):
     editor.set_result("Points", 3, 4, 0.5)
     editor.save(tmp_path / "out.xlsm")
     assert differing(rich, tmp_path / "out.xlsm") == {POINTS}
-    before, after = contents(rich)[POINTS], contents(tmp_path / "out.xlsm")[POINTS]
+    before, after = parts(rich)[POINTS], parts(tmp_path / "out.xlsm")[POINTS]
     assert after == before.replace(b"v>0.75<", b"v>0.5<", 1)
 
 
@@ -91,7 +87,7 @@ def test_a_typed_value_takes_the_results_that_depend_on_it_out(rich, tmp_path):
     editor.set_result("Points", 3, 4, 1.0)
     editor.save(out)
     assert differing(rich, out) == {POINTS, NOTES, BOOK}
-    assert b'fullCalcOnLoad="1"' in contents(out)[BOOK]
+    assert b'fullCalcOnLoad="1"' in parts(out)[BOOK]
     book = openpyxl.load_workbook(out, data_only=True)
     assert [c.value for c in book["Points"][3]][:5] == ["P1", 12.25, 13.25, 1.0, None]
     assert book["My notes"]["B1"].value is None  # SUM(all_s1), a name that leads to Points
@@ -161,7 +157,7 @@ def test_rows_are_added_to_a_table_with_formulas_formats_and_all_that_reaches_th
     editor.save(out)
     changed = {POINTS, NOTES, BOOK, "xl/tables/table1.xml", "xl/charts/chart1.xml"}
     assert differing(rich, out) == changed
-    new = contents(out)
+    new = parts(out)
     assert new["xl/tables/table1.xml"].count(b'ref="A2:E6"') == 2
     assert b"Points!$B$3:$B$6" in new["xl/charts/chart1.xml"]
     assert b"Points!$B$3:$B$6" in new[BOOK]
@@ -196,13 +192,13 @@ def test_unknown_tables_columns_and_sheets_are_named(rich):
 
 
 def test_in_place_a_backup_is_kept_and_macros_stay(rich):
-    before = contents(rich)
+    before = parts(rich)
     editor = WorkbookEditor(rich)
     editor.set_result("Points", 3, 4, 0.5)
     editor.save(overwrite=True)
     backup = rich.with_name("rich.xlsm.bak")
-    assert contents(backup) == before
-    assert contents(rich)["xl/vbaProject.bin"] == before["xl/vbaProject.bin"]
+    assert parts(backup) == before
+    assert parts(rich)["xl/vbaProject.bin"] == before["xl/vbaProject.bin"]
 
 
 def test_the_same_changes_give_the_same_bytes(rich, tmp_path):

@@ -11,6 +11,7 @@ from bifocal import InputError
 from photocore.workbook.reading.package import Parts, rewrite_package
 from photocore.workbook.reading.references import lost_references, refuse_lost
 from photocore.workbook.reading.xlsx import open_xlsx
+from tests.bare_workbook import with_parts
 from tests.builders.commands import bifocal_command as bifocal
 from tests.builders.commands import multimedia_command as multimedia
 
@@ -33,16 +34,6 @@ def table_book(path, rows):
     for row in rows:
         book.active.append(row)
     book.save(path)
-    return path
-
-
-def with_parts(path, parts):
-    """Write parts into a package as they are, sound or not."""
-    with zipfile.ZipFile(path) as package:
-        whole = {name: package.read(name) for name in package.namelist()} | parts
-    with zipfile.ZipFile(path, "w") as package:
-        for name, data in whole.items():
-            package.writestr(name, data)
     return path
 
 
