@@ -9,12 +9,11 @@ import openpyxl
 import pytest
 from click.testing import CliRunner
 
-from bifocal.workbook.making.book import write_book
 from bifocal.workbook.template_workflow import write_template
 from photocore import machine
 from photocore.workbook.reading.package import package_faults
 from tests.bare_workbook import parts, with_parts
-from tests.bifocal.workbook.test_survey_workbook import ideal_content
+from tests.bifocal.workbook.test_survey_workbook import ideal_content, written
 from tests.builders.commands import bifocal_command as main
 
 SHEET = "xl/worksheets/sheet3.xml"
@@ -32,7 +31,7 @@ def changed(source, target, change):
 @pytest.fixture(scope="module")
 def book(tmp_path_factory):
     path = tmp_path_factory.mktemp("doctor") / "book.xlsx"
-    write_book(path, ideal_content(26))
+    path.write_bytes(written(ideal_content, 26))
     return path
 
 

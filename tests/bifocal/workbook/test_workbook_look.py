@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import io
 import re
 
 import openpyxl
@@ -10,35 +12,32 @@ from openpyxl.utils import range_boundaries
 
 from bifocal import SurveySetup, Taking
 from bifocal.workbook.content import SurveyContent
-from bifocal.workbook.making.book import build, write_book
+from bifocal.workbook.making.book import build
 from bifocal.workbook.template_workflow import write_template
 from bifocal.workbook.words import WORDS
 from tests.bifocal.workbook.test_cli_solve import DISTANCES, as_file, fill, form, named, rows, run
-from tests.bifocal.workbook.test_survey_workbook import ideal_content, pair_content, parts
+from tests.bifocal.workbook.test_survey_workbook import ideal_content, pair_content, parts, written
+from tests.cases import few_by_default
 from tests.recalculate import recalculated
 from tests.workbook_page import dimension, printed_columns, scale_of, sizes_of
 
 LANGUAGES = ("en", "it", "de")
 
 
-@pytest.fixture(scope="module")
-def books(tmp_path_factory):
-    """Return workbooks by name: forms, a survey, a pair."""
-    folder = tmp_path_factory.mktemp("books")
-    write_book(folder / "ideal.xlsx", ideal_content(26))
-    write_book(folder / "pair.xlsx", pair_content(20))
-    for code in LANGUAGES:
-        (folder / f"survey-{code}.xlsx").write_bytes(form("--rows", 30, "--lang", code))
-    paths = {name: folder / f"{name}.xlsx" for name in NAMES}
-    return {name: (path, openpyxl.load_workbook(path)) for name, path in paths.items()}
+@functools.cache
+def opened(name, **how):
+    """Return a workbook: a form in a language, a survey, a pair."""
+    make = {"ideal": (ideal_content, 26), "pair": (pair_content, 20)}.get(name)
+    data = written(*make) if make else form("--rows", 30, "--lang", name)
+    return openpyxl.load_workbook(io.BytesIO(data), **how)
 
 
-NAMES = [*(f"survey-{code}" for code in LANGUAGES), "ideal", "pair"]
+NAMES = few_by_default([*LANGUAGES, "ideal", "pair"], "en", "ideal", "pair")
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_nothing_is_under_8_pt_on_paper(name, books):
-    for sheet in books[name][1]:
+def test_nothing_is_under_8_pt_on_paper(name):
+    for sheet in opened(name):
         assert min(sizes_of(sheet)) >= 8, (sheet.title, scale_of(sheet))
         assert sheet.page_setup.paperSize == 9
         assert sheet.oddFooter.center.text == "&D"
@@ -46,21 +45,21 @@ def test_nothing_is_under_8_pt_on_paper(name, books):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_all_sheets_have_one_face_and_one_scale_of_sizes(name, books):
-    cells = [cell for sheet in books[name][1] for row in sheet.iter_rows() for cell in row]
+def test_all_sheets_have_one_face_and_one_scale_of_sizes(name):
+    cells = [cell for sheet in opened(name) for row in sheet.iter_rows() for cell in row]
     assert {cell.font.name for cell in cells} == {"Arial"}
     assert {cell.font.sz for cell in cells} == {9, 10, 14}
 
 
-def test_results_are_one_page_for_a_client(books):
-    sheet = books["ideal"][1]["Results"]
+def test_results_are_one_page_for_a_client():
+    sheet = opened("ideal")["Results"]
     assert sheet.print_area == "'Results'!$A$1:$O$30"
     assert sheet.print_title_rows == "$3:$4"
     assert sheet.page_setup.orientation == "landscape"
     rows = [sheet.row_dimensions[r].height or 13.5 for r in range(1, 31)]
     paper = 595.3 - 72 * (sheet.page_margins.top + sheet.page_margins.bottom)
     assert sum(rows) * scale_of(sheet) < paper
-    values = openpyxl.load_workbook(books["ideal"][0], data_only=True)["Results"]
+    values = opened("ideal", data_only=True)["Results"]
     for words in ("Project:", "Client:"):
         assert words in values["A2"].value
     assert "Date:" in values["E2"].value
@@ -68,8 +67,8 @@ def test_results_are_one_page_for_a_client(books):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_no_chart_is_cut_by_the_end_of_a_page(name, books):
-    sheet = books[name][1]["Charts"]
+def test_no_chart_is_cut_by_the_end_of_a_page(name):
+    sheet = opened(name)["Charts"]
     assert not sheet.sheet_properties.pageSetUpPr.fitToPage  # programs then go by no break
     (end,) = (line.id for line in sheet.row_breaks.brk)
     height = {row: sheet.row_dimensions[row].height or 13.5 for row in range(1, 116)}
@@ -102,8 +101,8 @@ def test_the_title_block_says_what_is_typed_on_setup():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_points_break_between_columns_that_fit_the_page(name, books):
-    sheet = books[name][1]["Points"]
+def test_points_break_between_columns_that_fit_the_page(name):
+    sheet = opened(name)["Points"]
     ends = [brk.id for brk in sheet.col_breaks.brk] + [printed_columns(sheet)[-1]]
     paper = (841.9 - 72 * 0.8) / scale_of(sheet)
     before = 1
@@ -115,8 +114,8 @@ def test_points_break_between_columns_that_fit_the_page(name, books):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_rows_to_fill_in_are_reachable_on_a_laptop(name, books):
-    for sheet in books[name][1]:
+def test_the_rows_to_fill_in_are_reachable_on_a_laptop(name):
+    for sheet in opened(name):
         if sheet.freeze_panes is None:
             continue
         frozen = openpyxl.utils.cell.coordinate_from_string(sheet.freeze_panes)[1] - 1
@@ -126,8 +125,8 @@ def test_the_rows_to_fill_in_are_reachable_on_a_laptop(name, books):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_steps_of_the_fit_are_folded_away_and_no_yellow_cell_is_without_a_word(name, books):
-    book = books[name][1]
+def test_steps_of_the_fit_are_folded_away_and_no_yellow_cell_is_without_a_word(name):
+    book = opened(name)
     sheet = book["Georeference"]
     shown = {"g_model", "g_auto", "g_used", "g_n", "g_k", "g_sigma0", "g_alpha"}
     shown |= {f"g_{axis}0" for axis in "XYZENH"} | {f"g_{i}{j}" for i in "123" for j in "123"}
@@ -144,9 +143,9 @@ def test_steps_of_the_fit_are_folded_away_and_no_yellow_cell_is_without_a_word(n
         assert not dimension(sheet, named(book, key).column).hidden, key
 
 
-def test_steps_of_the_fit_fit_their_columns_once_unfolded(books):
-    path, book = books["ideal"]
-    sheet, values = book["Georeference"], openpyxl.load_workbook(path, data_only=True)
+def test_steps_of_the_fit_fit_their_columns_once_unfolded():
+    book, values = opened("ideal"), opened("ideal", data_only=True)
+    sheet = book["Georeference"]
     seen = 0
     for row in sheet.iter_rows(max_row=11):
         for cell in row:
@@ -160,8 +159,8 @@ def test_steps_of_the_fit_fit_their_columns_once_unfolded(books):
     assert seen > 20
 
 
-def test_units_stand_apart_from_their_values(books):
-    sheet = books["survey-en"][1]["Setup"]
+def test_units_stand_apart_from_their_values():
+    sheet = opened("en")["Setup"]
     units = [cell for row in sheet.iter_rows(min_col=4, max_col=4) for cell in row if cell.value]
     assert len(units) > 5
     assert {(c.alignment.horizontal, c.alignment.indent) for c in units} == {("left", 1)}
@@ -182,9 +181,9 @@ def inputs(sheet):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_input_cell_says_what_it_wants(name, books):
+def test_every_input_cell_says_what_it_wants(name):
     count = 0
-    for sheet in books[name][1]:
+    for sheet in opened(name):
         cells, said = inputs(sheet)
         for cell in cells:
             rule = said.get((cell.row, cell.column))
@@ -196,10 +195,10 @@ def test_every_input_cell_says_what_it_wants(name, books):
     assert count > 200
 
 
-def test_prompts_are_in_the_language_of_the_workbook(books):
+def test_prompts_are_in_the_language_of_the_workbook():
     prompts = {}
     for code in LANGUAGES:
-        book = books[f"survey-{code}"][1]
+        book = opened(code)
         prompts[code] = {r.prompt for s in book for r in s.data_validations.dataValidation}
     assert any("numero" in p or "punto" in p.lower() for p in prompts["it"])
     assert len(prompts["en"] & prompts["de"]) < 8
@@ -241,8 +240,8 @@ def test_the_sheet_itself_finds_swapped_distances_and_unequal_scales(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["ideal", "pair"])
-def test_a_point_that_is_not_used_keeps_no_green_ok(name, books):
-    book = books[name][1]
+def test_a_point_that_is_not_used_keeps_no_green_ok(name):
+    book = opened(name)
     area = named_area(book, "points_use")
     for title in ("Points", "Results"):
         sheet = book[title]
@@ -333,9 +332,8 @@ def test_a_print_area_of_the_users_own_stays(filled):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_sheet_says_how_far_it_reaches(name, books):
-    path, book = books[name]
-    light = openpyxl.load_workbook(path, read_only=True)
+def test_every_sheet_says_how_far_it_reaches(name):
+    book, light = opened(name), opened(name, read_only=True)
     for sheet in book:
         assert light[sheet.title].max_row == sheet.max_row, sheet.title
         assert light[sheet.title].max_column == sheet.max_column, sheet.title
