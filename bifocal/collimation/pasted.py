@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from bifocal.collimation.records import Known, Pasted, Picks, Pixel
+from bifocal.model.photo import FARTHEST_WALL
 from bifocal.model.world_frame import WorldFrame
 from bifocal.orientation.control_lists import NoFrontError, in_plane_frame, without_unseen
 from bifocal.orientation.control_points import COLUMNS, metres_of
@@ -45,8 +46,9 @@ def pasted_control(
     text, notes = as_table(text.strip("\r\n"), "what was pasted")
     if not text.strip():
         raise InputError(remark("page.nothing_pasted"))
+    headed = _with_headings(text)
     with without_options():
-        table = read_table(CsvFile("what was pasted", _with_headings(text), notes), COLUMNS)
+        table = read_table(CsvFile("what was pasted", headed, notes), COLUMNS)
     count = len(table)
     if not count or count > MOST_ROWS:
         raise InputError(remark("page.pasted_many", count=count, most=MOST_ROWS))
@@ -54,6 +56,8 @@ def pasted_control(
     if "" in names:
         raise InputError(remark("page.pasted_nameless"))
     xyz = np.column_stack([metres_of(table, key, "") for key in ("X", "Y", "r")])
+    if headed != text and (np.nanmax(np.abs(xyz[:, :2]), axis=0, initial=0) > FARTHEST_WALL).all():
+        raise InputError(remark("page.pasted_far"))
     pixels = [
         np.column_stack([table.numbers(f"{axis}{photo}") for axis in ("col", "row")])
         for photo in "12"

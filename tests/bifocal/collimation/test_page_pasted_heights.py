@@ -73,3 +73,12 @@ def test_the_frame_goes_into_the_pair_that_is_aligned(tmp_path) -> None:
     options = AlignOptions(control=Path(task["control"]), world=WorldFrame.from_json(task["world"]))
     control = control_of(options, [(1536, 1024)] * 2, ("far.jpg", "near.jpg"))
     np.testing.assert_allclose(control.frame.to_world(control.xyz), WORLD, atol=2e-4)
+
+
+def test_numbers_of_a_grid_without_headings_are_asked_about(tmp_path) -> None:
+    with opened(sample_folder(tmp_path)) as session:
+        bare = listed(pixels=True).partition("\n")[2]
+        with pytest.raises(InputError, match="Write above the columns what they are: name E N H"):
+            session.command({"op": "control.paste", "text": bare})
+        session.command({"op": "control.paste", "text": "A\t652345,5\t12,25\nB\t652350\t14"})
+        assert session.state.control["A"].known == (652345.5, 12.25, None)
