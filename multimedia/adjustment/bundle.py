@@ -19,7 +19,8 @@ from multimedia.adjustment.plausibility import (
     wand_remarks,
     with_model_error,
 )
-from multimedia.adjustment.unknowns import AUTO, Adjustment, Unknowns, bars_of
+from multimedia.adjustment.start_poses import bars_for, with_poses
+from multimedia.adjustment.unknowns import AUTO, Adjustment, Unknowns
 from multimedia.media.camera import EXTERIOR, Camera
 from multimedia.orientation.calibration_covariance import with_covariance
 from multimedia.orientation.intersection import intersect
@@ -78,6 +79,10 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
     the cameras and plates (large ones, and where all points are on plates).
     """
     unknowns = unknowns or Unknowns()
+    if project.without_pose:
+        project, posed = with_poses(project, unknowns)
+        result = bundle_adjust(project, unknowns)
+        return replace(result, remarks=(*posed, *result.remarks))
     if unknowns.interior == AUTO:
         chosen = choose_interior(project, unknowns, bundle_adjust)
         result = bundle_adjust(project, with_interior(unknowns, chosen))
@@ -150,8 +155,7 @@ def _balanced(
 def prepare(project: Project, unknowns: Unknowns) -> tuple[Bundle, tuple[str, ...]]:
     """Return the equations of a project, and remarks about what was left out."""
     project = with_common_values(project, unknowns)
-    bars = bars_of(unknowns.scale_bars, project.image_points.names)
-    unknowns = replace(unknowns, scale_bars=bars)
+    unknowns = replace(unknowns, scale_bars=bars_for(project, unknowns))
     ids, rows, remarks = _used_points(project, unknowns)
     place = {name: row for row, name in enumerate(ids)}
     control = project.object_points

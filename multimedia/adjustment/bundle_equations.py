@@ -209,12 +209,28 @@ class Bundle:
         if linear.unknowns > LARGEST or not self.free.any():
             rows[:, stay:] = 0.0
             rows[:, self.columns.points[self.columns.points >= 0]] = 0.0
+            rows *= self._lengths_of_turns()
         else:
             rows[:, :stay] = 0.0
         # As heavy as the columns it holds, so that their scaling does not suffer.
         scale = np.sqrt(jacobian.power(2).sum(axis=0).A1)
         relative = np.linalg.norm(rows / np.where(scale > 0, scale, 1.0), axis=1, keepdims=True)
         return rows / np.where(relative > 0, relative, 1.0)
+
+    def _lengths_of_turns(self) -> FloatArray:
+        """Return what makes a turn of a camera or plate weigh as its way about the points would.
+
+        Two cameras turn about the line through both without moving: in radians beside lengths
+        their turns would weigh nothing.
+        """
+        weights, place = np.ones(len(self.columns.labels) + self.free.size), self.columns
+        middle = self.start.points.mean(axis=0)
+        poses = (*self.start.blocks["camera"].values(), *self.start.blocks["plate"].values())
+        for at, pose in zip((*place.cameras, *place.plates), poses, strict=True):
+            if EXTERIOR[0] in at:
+                arm = pose.centre - middle
+                weights[[at[name] for name in EXTERIOR[3:]]] = float(arm @ arm) or 1.0
+        return weights
 
     def _motions(self) -> FloatArray:
         """Return how shift, turn and scale of everything move every unknown, (u + 3 p, 7)."""

@@ -12,6 +12,7 @@ from scipy.stats import f as fisher
 from multimedia.adjustment.bundle import bundle_adjust, prepare
 from multimedia.adjustment.bundle_equations import Bundle
 from multimedia.adjustment.interior_choice import choose_interior, with_interior
+from multimedia.adjustment.start_poses import with_poses
 from multimedia.adjustment.unknowns import AUTO, Unknowns
 from multimedia.media.camera import Camera
 from multimedia.projects.model import Project
@@ -82,6 +83,7 @@ def diagnose(project: Project, unknowns: Unknowns | None = None) -> tuple[float,
     if unknowns.interior == AUTO:
         chosen = choose_interior(project, unknowns, bundle_adjust)
         unknowns = with_interior(unknowns, chosen)
+    project, _ = with_poses(project, unknowns)
     bundle, _ = prepare(project, unknowns)
     fitted = bundle.network.solve(bundle.start)
     cost = float(fitted.residuals @ fitted.residuals)

@@ -47,7 +47,7 @@ def adjust_project(
     check_all_writable(out, report, overwrite=overwrite)
     check_ending(out, "a project is written as .toml.", ".toml")
     check_report(report)
-    project = read_project(source)
+    project = read_project(source, posed=False)
     result = bundle_adjust(project, _with_all_plates(source, project, unknowns))
     if out is not None:
         write_project(out, result.project, overwrite=overwrite)
@@ -64,7 +64,7 @@ def adjust_project(
 
 def diagnose_project(source: Path, unknowns: Unknowns) -> tuple[float, list[Extension]]:
     """Return sigma0 of a project file and what would lower it most; see `diagnose`."""
-    project = read_project(source)
+    project = read_project(source, posed=False)
     return diagnose(project, _with_all_plates(source, project, unknowns))
 
 

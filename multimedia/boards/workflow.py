@@ -100,7 +100,7 @@ def find_boards(
     check_writable(out, overwrite=overwrite)
     checked_board(pattern, board)
     positive(square, "--square")
-    project = read_project(source)
+    project = read_project(source, posed=False)
     places = [_camera_and_pose(project, photo) for photo in photos]
     _refuse_repeated(places, photos)
     views: list[PosedView] = []

@@ -192,7 +192,7 @@ def resect_project(
     check_ending(out, "a project is written as .toml.", ".toml")
     check_not_input(residuals, *project_files(path))
     check_all_writable(out, residuals, overwrite=overwrite)
-    project = read_project(path)
+    project = read_project(path, posed=False)
     unknown = [name for name in cameras if name not in project.camera_names]
     if unknown:
         have = ", ".join(project.camera_names)
@@ -208,7 +208,8 @@ def resect_project(
             results[name], used[name], odd = _resected(project, k, estimate)
             remarks += [f"{name}: {text}" for text in odd]
     adjusted = [results[c.name].camera if c.name in results else c for c in project.cameras]
-    project = replace(project, cameras=tuple(adjusted))
+    rest = tuple(name for name in project.without_pose if name not in results)
+    project = replace(project, cameras=tuple(adjusted), without_pose=rest)
     if residuals is not None:
         _write(residuals, residual_columns(results, used), {"vx": "mm", "vy": "mm"}, overwrite)
     if out is not None:

@@ -136,6 +136,8 @@ class Project:
         Keys of the project file that this class does not use; kept.
     remarks : tuple of str
         What the user should be told.
+    without_pose : tuple of str
+        Cameras whose centre and rotation mean nothing yet: no file states them.
     """
 
     cameras: tuple[Camera, ...]
@@ -148,6 +150,7 @@ class Project:
     name: str = ""
     extra: Mapping[str, Any] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+    without_pose: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.cameras:

@@ -62,13 +62,15 @@ _HEAD = """\
 """
 
 
-def read_project(path: Path | str) -> Project:
+def read_project(path: Path | str, *, posed: bool = True) -> Project:
     """Read a project file and its tables.
 
     Parameters
     ----------
     path : path
         The project file (.toml).
+    posed : bool
+        Refuse cameras whose pose the file leaves out; otherwise they are `Project.without_pose`.
 
     Returns
     -------
@@ -85,7 +87,10 @@ def read_project(path: Path | str) -> Project:
     path = Path(path)
     data = _toml(path)
     try:
-        return _project(data, path.parent)
+        project = _project(data, path.parent)
+        if posed and project.without_pose:
+            raise InputError(remark("project.without_pose", names=", ".join(project.without_pose)))
+        return project
     except GeometryError as error:
         raise GeometryError(f"{path}: {error}") from None
     except InputError as error:
@@ -172,7 +177,7 @@ def project_data(project: Project, folder: Path) -> dict[str, Any]:
     data["sigma_image"] = float(project.sigma_image)
     data["media"] = {name: _media_data(media, folder) for name, media in project.media.items()}
     data["camera"] = [
-        _camera_data(camera, media)
+        _camera_data(camera, media, posed=camera.name not in project.without_pose)
         for camera, media in zip(project.cameras, project.media_of, strict=True)
     ]
     return data | {k: v for k, v in project.extra.items() if k not in data}
@@ -205,8 +210,8 @@ def _project(data: dict[str, Any], folder: Path) -> Project:
     sections = data.pop("camera", [])
     if not isinstance(sections, list) or not sections:
         raise InputError("there is no camera; add at least one section [[camera]].")
-    pairs = [_camera(value, number) for number, value in enumerate(sections, start=1)]
-    cameras = tuple(camera for camera, _ in pairs)
+    triples = [_camera(value, number) for number, value in enumerate(sections, start=1)]
+    cameras = tuple(camera for camera, *_ in triples)
     refuse_repeated([camera.name for camera in cameras], "cameras")
     remarks = [
         f"media.{label}: {remark}" for label, item in media.items() for remark in item.remarks
@@ -223,7 +228,7 @@ def _project(data: dict[str, Any], folder: Path) -> Project:
     return Project(
         cameras=cameras,
         media=media,
-        media_of=tuple(name for _, name in pairs),
+        media_of=tuple(name for _, name, _ in triples),
         object_points=objects,
         image_points=images,
         sigma_image=_sigma(data, cameras),
@@ -231,6 +236,7 @@ def _project(data: dict[str, Any], folder: Path) -> Project:
         name=str(data.pop("name", "")),
         extra=data,
         remarks=tuple(remarks),
+        without_pose=tuple(camera.name for camera, _, is_posed in triples if not is_posed),
     )
 
 
@@ -346,11 +352,13 @@ _FISHEYE = "fisheye"
 _CAMERA_KEYS = ("name", "media", *POSE_KEYS, "c", "principal_point", "distortion", "sensor")
 
 
-def _camera(value: Any, number: int) -> tuple[Camera, str]:
+def _camera(value: Any, number: int) -> tuple[Camera, str, bool]:
+    """Return a camera, its media, and whether its section states a pose."""
     section = FileSection(value, f"camera {number}", _CAMERA_KEYS)
     name = str(section.get("name", f"cam{number}"))
     where = section.where = f"camera {name}"
-    centre, rotation = read_pose(section)
+    is_posed = any(key in section for key in POSE_KEYS)
+    centre, rotation = read_pose(section) if is_posed else (np.zeros(3), np.eye(3))
     c = section.number("c")
     sensor = _sensor(section["sensor"], where) if "sensor" in section else None
     if sensor is not None and c > 100.0 * sensor.half_diagonal:
@@ -367,13 +375,14 @@ def _camera(value: Any, number: int) -> tuple[Camera, str]:
         sensor=sensor,
         name=name,
     )
-    return camera, str(value.get("media", ""))
+    return camera, str(value.get("media", "")), is_posed
 
 
-def _camera_data(camera: Camera, media: str) -> dict[str, Any]:
+def _camera_data(camera: Camera, media: str, *, posed: bool) -> dict[str, Any]:
     data: dict[str, Any] = {"name": camera.name} | ({"media": media} if media else {})
-    data["centre"] = camera.centre.tolist()
-    data |= dict(zip(EXTERIOR[3:], np.degrees(camera.angles).tolist(), strict=True))
+    if posed:
+        data["centre"] = camera.centre.tolist()
+        data |= dict(zip(EXTERIOR[3:], np.degrees(camera.angles).tolist(), strict=True))
     data["c"] = camera.principal_distance
     data["principal_point"] = camera.principal_point.tolist()
     lens = camera.distortion

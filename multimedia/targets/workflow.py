@@ -142,7 +142,7 @@ def _refuse_repeated(images: Sequence[Path], names: Sequence[str]) -> None:
 def _offset(project: Path) -> float:
     """Return how much more than from pixel centres the cameras of a project count. [px]"""
     offsets = set()
-    for camera in read_project(project).cameras:
+    for camera in read_project(project, posed=False).cameras:
         sensor = camera.described_sensor()
         middle = (np.array([sensor.width, sensor.height]) - 1) / 2
         more = np.unique(np.round(sensor.origin - middle, 3))
