@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -46,33 +47,39 @@ SCENES = {
     "ports": (tuple((eye, "port") for eye, _ in ABOVE), {"port": PORT}),
     "air": (tuple((eye, "") for eye, _ in ABOVE), {}),
 }
+#: Two cameras far off, apart by as much.
+FAR_PAIR = ((((465.0, 3.0, 796.0), "port"), ((-249.0, 75.0, 841.0), "port")), {"port": PORT})
 
 
-def taken(scene: str, xyz: np.ndarray, ids: tuple[str, ...]) -> tuple[list[Camera], Project]:
+def photographed(
+    scene: str, xyz: np.ndarray, ids: tuple[str, ...], c: float = 20.0, noise: float = NOISE
+) -> tuple[list[Camera], Project]:
     """Return the true cameras, each rolled at random, and a project that states no pose. [mm]"""
-    places, media = SCENES[scene]
+    places, media = SCENES.get(scene, FAR_PAIR)
     rng = np.random.default_rng(7)
     truth = []
     for k, (eye, _) in enumerate(places):
-        camera = Camera.looking_at(eye, MIDDLE, principal_distance=20.0)
+        camera = Camera.looking_at(eye, MIDDLE, principal_distance=c)
         roll = rotation_from_vector(np.array([0.0, 0.0, rng.uniform(-3, 3)]))
         truth.append(replace(camera, rotation=camera.rotation @ roll, sensor=SENSOR, name=f"c{k}"))
     image = np.concatenate(
         [project(c, xyz, media.get(of)) for c, (_, of) in zip(truth, places, strict=True)]
     )
-    image += NOISE * rng.standard_normal(image.shape)
+    image += noise * rng.standard_normal(image.shape)
     names = tuple(camera.name for camera in truth)
     blank = tuple(replace(c, centre=np.zeros(3), rotation=np.eye(3)) for c in truth)
     return truth, Project(
         cameras=blank, media=media, media_of=tuple(of for _, of in places), unit="mm",
-        sigma_image=NOISE, without_pose=names,
+        sigma_image=noise, without_pose=names,
         image_points=ImagePoints(
             cameras=tuple(np.repeat(names, len(ids)).tolist()), ids=ids * len(truth), image=image
         ),
     )  # fmt: skip
 
 
-def waved(scene: str = "glass", places: int = 12, particles: int = 12):
+def waved(
+    scene: str = "glass", places: int = 12, particles: int = 12, **lens: float
+) -> tuple[list[Camera], Project]:
     """Return the true cameras, and what they see of a wand and of particles."""
     rng = np.random.default_rng(3)
     middle = rng.uniform((-35, -30, -130), (35, 30, -60), (places, 3))
@@ -81,7 +88,13 @@ def waved(scene: str = "glass", places: int = 12, particles: int = 12):
     xyz = np.concatenate([middle - way, middle + way, control(particles)])
     ids = (*(f"{k}a" for k in range(places)), *(f"{k}b" for k in range(places)),
            *(f"p{k}" for k in range(particles)))  # fmt: skip
-    return taken(scene, xyz, ids)
+    return photographed(scene, xyz, ids, **lens)
+
+
+def apart_of(views) -> np.ndarray:
+    """Return the distances between neighbouring cameras, which no datum changes."""
+    centres = np.array([camera.centre for camera in views])
+    return np.linalg.norm(centres - np.roll(centres, 1, axis=0), axis=1)
 
 
 def without_rows(given: Project, keep) -> Project:
@@ -109,12 +122,6 @@ def test_a_wand_gives_poses_of_which_nothing_was_known(scene):
         np.testing.assert_allclose(heights, [eye[2] for eye, _ in ABOVE], rtol=0.01)
 
 
-def apart_of(views) -> np.ndarray:
-    """Return the distances between neighbouring cameras, which no datum changes."""
-    centres = np.array([camera.centre for camera in views])
-    return np.linalg.norm(centres - np.roll(centres, 1, axis=0), axis=1)
-
-
 def test_points_that_some_cameras_miss_and_wand_ends_seen_once_do_no_harm():
     truth, given = waved(places=16, particles=20)
     rng = np.random.default_rng(5)
@@ -136,7 +143,7 @@ def test_boards_seen_by_two_ports_need_neither_poses_nor_a_wand():
         xyz.append((board - 45.0) @ turn.T + MIDDLE + 20.0 * rng.standard_normal(3))
         ids += [f"{k}:{n}" for n in range(len(board))]
         plates += [f"board{k}"] * len(board)
-    truth, given = taken("ports", np.concatenate(xyz), tuple(ids))
+    truth, given = photographed("ports", np.concatenate(xyz), tuple(ids))
     boards = ObjectPoints(ids=tuple(ids), xyz=np.tile(board, (4, 1)), groups=tuple(plates))
     given = replace(given, object_points=boards)
     unknowns = Unknowns(control="free", plates=tuple(dict.fromkeys(plates)))
@@ -171,9 +178,9 @@ def refusals():
 
 def test_what_gives_no_poses_is_refused_with_the_reason():
     for what, (given, unknowns, text) in refusals().items():
-        with pytest.raises((InputError, GeometryError), match=text):
+        with pytest.raises((InputError, GeometryError)) as error:
             bundle_adjust(given, unknowns)
-            pytest.fail(what)
+        assert re.search(text, str(error.value)), (what, error.value)
 
 
 def test_a_project_file_without_poses_becomes_one_with_poses(tmp_path):
@@ -196,10 +203,17 @@ def test_a_project_file_without_poses_becomes_one_with_poses(tmp_path):
 
 def test_a_resection_needs_no_pose_to_begin_with(tmp_path):
     xyz, ids = control(20), tuple(f"p{k}" for k in range(20))
-    truth, given = taken("glass", xyz, ids)
+    truth, given = photographed("glass", xyz, ids)
     source, out = tmp_path / "tank.toml", tmp_path / "posed.toml"
     write_project(source, replace(given, object_points=ObjectPoints(ids=ids, xyz=xyz)))
     result = CliRunner().invoke(main, ["resect", str(source), "--out", str(out)])
     assert result.exit_code == 0, result.output
     for camera, true in zip(read_project(out).cameras, truth, strict=True):
         np.testing.assert_allclose(camera.centre, true.centre, atol=0.5)
+
+
+def test_a_large_free_network_of_two_cameras_may_turn_about_the_line_through_both():
+    """With more than 400 unknowns the datum is that of the cameras, whose turns have to count."""
+    truth, given = waved("far pair", places=20, particles=120, c=12.0, noise=0.003)
+    result = bundle_adjust(replace(given, cameras=tuple(truth), without_pose=()), FREE)
+    assert result.sigma0 == pytest.approx(0.003, rel=0.15)
