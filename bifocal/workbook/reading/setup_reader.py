@@ -223,7 +223,8 @@ def _media(book: SheetFile, values: NamedValues, errors: list[CellError]) -> Sur
             complaints[name] = f"found {z0:g} m, expected zero or more."
         elif z0 is None and any(index is not None for index in media.indices[1:]):
             complaints[name] = "is blank: type the way from the camera to the first interface [m]."
-    errors += [values.error(name, told) for name, told in complaints.items()]
+    faulty = {error.column for error in errors}
+    errors += [values.error(name, told) for name, told in complaints.items() if name not in faulty]
     return media
 
 

@@ -235,6 +235,10 @@ def test_media_cells_that_cannot_be_meant_are_named(tank, tmp_path):
         solve(tmp_path / "bad.xlsx")
     for said in ("13.37", "z0_1", "index_2", "-1 m"):
         assert said in str(caught.value)
+    fill_form(tmp_path / "unit.xlsx", (), {"thick_2": "10 mm"}, tank)
+    with pytest.raises(WorkbookError, match=r'found "10 mm", .* Write 0.01') as caught:
+        solve(tmp_path / "unit.xlsx")
+    assert len(caught.value.errors) == 1
     with pytest.raises(InputError, match="c_1 and c_2"):
         SurveySetup(taking=Taking(d1=3.7, d2=2.1), media=media_of_tank()).pair()
     with pytest.raises(GeometryError, match="scale-tolerance"):
