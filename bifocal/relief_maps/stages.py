@@ -108,7 +108,7 @@ def relief_map(
     values: dict[str, Any] = {
         "frame": frame, "matched": matched, "grid": grid, "backing": backing, "half": half,
         "distance": distance, "relief_range": relief_range or seed.usual_range(distance),
-        "side_face": np.False_, "swept": np.False_, "behind": np.False_,
+        "side_face": np.False_, "swept": np.zeros(matched.r.shape, bool), "behind": np.False_,
         "misfit": np.zeros_like(matched.r), "unpatched": np.float32(np.nan),
     }  # fmt: skip
     for stage in STAGES:
@@ -178,6 +178,8 @@ STAGES = (
           "frame matched sigma misfit measured backing", "measured"),
     Stage("falling relief doubted", evidence.without_falling,
           "frame relief misfit typical swept measured", "measured"),
+    Stage("small finds doubted", second_hypothesis.without_small,
+          "swept measured", "measured"),
     Stage("relief off its patch doubted", evidence.without_unpatched,
           "relief unpatched sigma measured", "measured"),
     Stage("pixels of photo 1", _of_photo_1,

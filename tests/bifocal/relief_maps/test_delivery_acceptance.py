@@ -2,7 +2,7 @@
 
 The constants were found on `facade` (seeds 11, 12, 61 and 62) and looked at on the church; these
 scenes are another façade, `loggia`, with other seeds, and a poorer plaster. One constant was found
-on `loggia` 201 since: `hypothesis.least_area`. Limits leave room for
+on `loggia` 201 and 202 since: `hypothesis.least_area`. Limits leave room for
 other processors, no more: `python benchmarks/bench_delivery.py` prints the figures.
 """
 

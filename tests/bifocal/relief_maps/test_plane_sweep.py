@@ -13,11 +13,12 @@ from bifocal import Foot, Grid, MapSurface, dense_relief
 from bifocal.model.image import as_grey
 from bifocal.orthophotos.visibility import hidden_from
 from bifocal.rays import zoom_factor
-from bifocal.relief_maps import plane_sweep, second_hypothesis
+from bifocal.relief_maps import evidence, plane_sweep, second_hypothesis
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import common_bounds, make_frame, working_grid
 from bifocal.relief_maps.second_hypothesis import HYPOTHESIS
 from bifocal.relief_maps.smoothing import straightened
+from bifocal.relief_maps.stages import STAGES
 from tests.scenes import RICH, CameraPair, Rendering, Scene, bifocal_cameras, render
 from tests.scenes.balconies import balconies
 
@@ -97,6 +98,62 @@ def test_only_an_even_part_that_both_photos_show_alike_is_backed():
     backed = second_hypothesis._backed(level, found, taken)
     assert backed[even].mean() > 0.9
     assert not any(backed[part].any() for part in (moved, rough, behind))
+
+
+def small_frame(*greys):
+    """Return a frame of 400 x 300 px of two grey photos."""
+    cameras = bifocal_cameras(size=(400, 300))
+    box = common_bounds(cameras.nominal, ((300, 400),) * 2)
+    work = working_grid(cameras.nominal, (300, 400), box, cameras.nominal.image1.gsd((400, 300)))
+    return make_frame(cameras.nominal, *greys, work, None)
+
+
+def test_pieces_of_a_rail_vouch_for_each_other_and_scatter_goes():
+    rng, grey = np.random.default_rng(1), np.zeros((300, 400), np.uint8)
+    frame = small_frame(grey, grey)
+    relief, taken = np.zeros(frame.grid.shape, np.float32), np.zeros(frame.grid.shape, bool)
+    rail, scatter, dense = np.s_[40:43, 20:120], np.s_[20:60, 200:240], np.s_[120:200, 200:300]
+    taken[rail] = taken[scatter][::3, ::3] = taken[dense] = True
+    taken[rail][:, ::7] = False  # in pieces of 12 px
+    relief[rail] = 0.8
+    relief[scatter] = rng.uniform(-3, 3, (40, 40))
+    relief[dense] = rng.uniform(-1, 1, (80, 100))  # 45 alike around each, but by chance
+    level = second_hypothesis._Level(frame, 0 * relief, ~taken, ~taken)
+    found = second_hypothesis._Found(relief, relief, relief)
+    kept = second_hypothesis._in_company(level, found, taken)
+    assert kept[rail][taken[rail]].mean() > 0.8
+    assert kept[scatter].sum() < 0.05 * taken[scatter].sum()
+    assert kept[dense].mean() < 0.1
+    assert not kept[~taken].any()
+    assert not second_hypothesis._in_company(level, found, kept & False).any()
+
+
+def test_what_fits_better_by_no_more_than_photos_differ_is_chance():
+    rng, grey = np.random.default_rng(2), np.full((300, 400), 90, np.uint8)
+    noisy = [rng.normal(90, 12, grey.shape).astype(np.uint8) for _ in range(2)]
+    for photos, share in ((noisy, 0), ((grey, grey), 1)):
+        frame = small_frame(*photos)
+        shape, part = frame.grid.shape, np.s_[20:60, 20:60]
+        relief, valid = np.zeros(shape, np.float32), np.ones(shape, bool)
+        swept = np.full(shape, np.nan, np.float32)
+        swept[part] = 1.0
+        level = second_hypothesis._Level(frame, relief, valid, valid)
+        better = np.full(shape, 1.5 * HYPOTHESIS.better, np.float32)
+        found = second_hypothesis._Found(swept, relief, better)
+        assert second_hypothesis._taken(level, found)[part].mean() == share
+
+
+def test_small_finds_are_never_called_measured():
+    stages = [stage.run for stage in STAGES]
+    # What comes back to itself is pardoned, and what is found is taken to.
+    assert stages.index(evidence.with_pardoned) < stages.index(second_hypothesis.without_small)
+    swept, measured = np.zeros((2, 60, 80), bool)
+    whole, piece = np.s_[10:15, 20:60], np.s_[30:33, 20:50]
+    swept[whole] = swept[piece] = measured[:, 10:] = True
+    kept = second_hypothesis.without_small(swept, measured)
+    assert not kept[piece].any()
+    assert np.array_equal(kept | (swept & (np.arange(60) >= 30)[:, None]), measured)
+    assert np.array_equal(second_hypothesis.without_small(swept & False, measured), measured)
 
 
 @pytest.mark.acceptance  # compiles
