@@ -34,6 +34,8 @@ class BundleCommand:
     multimedia adjust wand.toml --control free --scale-bar @a,@b,80,0.02 --out tank2.toml
     multimedia adjust tank.toml --media index3 --wavelength 520 --temperature 20 --depth 0.1
 
+    Cameras whose poses the project leaves out start from nothing but a wand, or boards.
+
     Unknowns of the media: offset, tilt1, tilt2, thickness1..., index1... counted from the camera;
     radius, centreX, centreY, centreZ of a dome; radius, shift1, shift2, tilt1, tilt2 of a tube;
     gradient of the index with depth; NAME:index3 for one media of several. Labels for --prior are
