@@ -91,14 +91,13 @@ def _misses(
     rays: Sequence[tuple[FloatArray, FloatArray]],
 ) -> FloatArray:
     """Return all misses of these rays."""
-    origins, along = (list(parts) for parts in zip(*rays, strict=True))
-    points = nearest_points(origins, along)
-    misses = np.empty((len(cameras), *points.shape))
-    for k, camera in enumerate(cameras):
-        way = points - origins[k]
-        depth = (way * along[k]).sum(axis=1, keepdims=True)
-        aside = way - np.maximum(depth, 0.0) * along[k]  # no point lies before the face
-        misses[k] = aside / np.linalg.norm(points - camera.centre, axis=1, keepdims=True)
+    origins, along = (np.array(parts) for parts in zip(*rays, strict=True))
+    points = nearest_points(list(origins), list(along))
+    way = points - origins
+    depth = np.einsum("mni,mni->mn", way, along)[..., None]
+    aside = way - np.maximum(depth, 0.0) * along  # no point lies before the face
+    apart = points - np.array([camera.centre for camera in cameras])[:, None]
+    misses = aside / np.sqrt(np.einsum("mni,mni->mn", apart, apart))[..., None]
     misses[np.isnan(misses)] = _LOST
     misses[np.isnan(images.image[..., 0])] = 0.0
     errors = _WEIGHT * (images.stretched(points) - 1)
