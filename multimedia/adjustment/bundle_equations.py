@@ -206,12 +206,14 @@ class Bundle:
         parts = abs(jacobian) @ abs(motion)
         _, values, right = np.linalg.svd(jacobian @ motion, full_matrices=False)
         rows = right[values <= _DEFECT * np.linalg.norm(parts)] @ motion.T
-        if linear.unknowns > LARGEST or not self.free.any():
-            rows[:, stay:] = 0.0
-            rows[:, self.columns.points[self.columns.points >= 0]] = 0.0
+        on_bars = self.columns.points[self.columns.points >= 0]  # points that are not eliminated
+        of_points = rows[:, on_bars]
+        if linear.unknowns > LARGEST or not (self.free.any() or len(on_bars)):
+            rows[:, stay:] = rows[:, on_bars] = 0.0
             rows *= self._lengths_of_turns()
         else:
             rows[:, :stay] = 0.0
+            rows[:, on_bars] = of_points
         # As heavy as the columns it holds, so that their scaling does not suffer.
         scale = np.sqrt(jacobian.power(2).sum(axis=0).A1)
         relative = np.linalg.norm(rows / np.where(scale > 0, scale, 1.0), axis=1, keepdims=True)

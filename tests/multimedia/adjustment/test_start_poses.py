@@ -218,3 +218,10 @@ def test_a_large_free_network_of_two_cameras_may_turn_about_the_line_through_bot
     truth, given = waved("far pair", places=20, particles=120, c=12.0, noise=0.003)
     result = bundle_adjust(replace(given, cameras=tuple(truth), without_pose=()), FREE)
     assert result.sigma0 == pytest.approx(0.003, rel=0.15)
+
+
+def test_points_on_scale_bars_hold_the_datum_where_hardly_any_other_point_is_left():
+    truth, given = waved("ports", places=10, particles=0)
+    lonely = without_rows(given, lambda camera, name: name != "0a" or camera == "c0")
+    result = bundle_adjust(replace(lonely, cameras=tuple(truth), without_pose=()), FREE)
+    assert result.sigma0 == pytest.approx(NOISE, rel=0.3)
