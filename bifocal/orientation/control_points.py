@@ -33,6 +33,7 @@ from photocore.tables.axes import (
     PHOTOS,
     ROWS_OF_PIXELS,
 )
+from photocore.tables.heading_words import bare
 from photocore.tables.numbers import METRES
 
 _ALONE = {"col1": ("col", *COLUMNS_OF_PIXELS), "row1": ("row", *ROWS_OF_PIXELS)}
@@ -259,7 +260,9 @@ def read_control(
             f"Each control point needs its pixel in {each}"
         )
     lone = [axis for axis in "XY" if axis not in table.present]
-    if len(lone) == 1 or (lone and {"r", "H"} & table.present):
+    # Relief alone is some control; a height alone has a plan whose headings are not understood.
+    is_height = "H" in table.present or bare(table.headings.get("r", "")).startswith("z")
+    if len(lone) == 1 or (lone and is_height):
         raise InputError(lacks_axis(table, path, ", ".join(lone)))
     if not len(table):
         raise InputError(f"{path}: no control points in the table.")
