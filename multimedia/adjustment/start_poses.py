@@ -9,8 +9,8 @@ import numpy as np
 
 from multimedia.adjustment.unknowns import ScaleBar, Unknowns, bars_of
 from multimedia.orientation.camera_chains import stands_still
-from multimedia.orientation.relative_orientation import relative_orientation
-from multimedia.projects.model import Project
+from multimedia.orientation.relative_orientation import relative_orientation, without_strays
+from multimedia.projects.model import SHOWN, Project
 from multimedia.remarks import remark
 from photocore.errors import InputError
 
@@ -41,9 +41,13 @@ def with_poses(project: Project, unknowns: Unknowns) -> tuple[Project, tuple[str
         return replace(project, without_pose=()), ()
     distances = [(bar.first, bar.second, bar.length) for bar in bars_for(project, unknowns)]
     distances += [each for plate in unknowns.plates if (each := _across(project, plate))]
-    posed = relative_orientation(project, distances)
+    posed, strays = without_strays(relative_orientation(project, distances))
     name = "bundle.posed_before_faces" if is_fixed else "bundle.posed_by_camera"
-    return posed, (remark(name, count=len(distances)),)
+    remarks = [remark(name, count=len(distances))]
+    if strays:
+        shown = ", ".join(strays[:SHOWN]) + (" ..." if len(strays) > SHOWN else "")
+        remarks.append(remark("bundle.strays", count=len(strays), names=shown))
+    return posed, tuple(remarks)
 
 
 def bars_for(project: Project, unknowns: Unknowns) -> tuple[ScaleBar, ...]:

@@ -225,3 +225,17 @@ def test_points_on_scale_bars_hold_the_datum_where_hardly_any_other_point_is_lef
     lonely = without_rows(given, lambda camera, name: name != "0a" or camera == "c0")
     result = bundle_adjust(replace(lonely, cameras=tuple(truth), without_pose=()), FREE)
     assert result.sigma0 == pytest.approx(NOISE, rel=0.3)
+
+
+def test_image_points_of_other_points_are_left_out_and_named():
+    truth, given = waved(places=15, particles=15)
+    images = given.image_points
+    rows = [3, 40, 71]
+    image = images.image.copy()
+    image[rows] += [[0.6, -0.4], [-0.5, 0.5], [0.3, 0.8]]
+    result = bundle_adjust(replace(given, image_points=replace(images, image=image)), FREE)
+    assert result.sigma0 == pytest.approx(NOISE, rel=0.25)
+    assert "3 image points left out" in result.remarks[1]
+    for row in rows:
+        assert f"{images.ids[row]} in {images.cameras[row]}" in result.remarks[1]
+    np.testing.assert_allclose(apart_of(result.project.cameras), apart_of(truth), rtol=0.01)
