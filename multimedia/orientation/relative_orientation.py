@@ -92,7 +92,7 @@ def relative_orientation(project: Project, distances: Sequence[tuple[str, str, f
     rays = np.array([straightened(*each) for each in zip(
         images.cameras, images.image, images.media, strict=True)])  # fmt: skip
     few = images.few()
-    unit = project.sigma_image / float(np.mean([c.principal_distance for c in project.cameras]))
+    unit = _noise_of(project)
     least, views, right = np.inf, project.cameras, 0
     for start in _starts(project, images, few, straight_chains(rays, images, project.camera_names)):
         miss, settled = _brought_together(few, start, unit)
@@ -108,6 +108,11 @@ def relative_orientation(project: Project, distances: Sequence[tuple[str, str, f
     return replace(project, cameras=_before_faces(few, views), without_pose=())
 
 
+def _noise_of(project: Project) -> float:
+    """Return the precision of an image coordinate as an angle. [rad]"""
+    return project.sigma_image / float(np.mean([c.principal_distance for c in project.cameras]))
+
+
 def without_strays(project: Project) -> tuple[Project, list[str]]:
     """Return a project without image points whose rays miss the others' by far, and their names.
 
@@ -119,13 +124,16 @@ def without_strays(project: Project) -> tuple[Project, list[str]]:
             zip(project.cameras, image, project.interfaces, strict=True)]  # fmt: skip
     origins, along = (np.array(parts) for parts in zip(*rays, strict=True))
     strays: set[tuple[str, str]] = set()
+    noise = _noise_of(project)
     for _ in project.cameras:
         way = nearest_points(list(origins), list(along)) - origins
         depth = np.einsum("mni,mni->mn", way, along)[..., None]
         misses = np.linalg.norm(way - depth * along, axis=2) / np.linalg.norm(way, axis=2)
         misses[np.isnan(misses)] = 0.0
         worst = misses.argmax(axis=0)
-        far = np.flatnonzero(misses.max(axis=0) > _STRAY * np.median(misses[misses > 0]))
+        # Where images are exact, what is typical is rounding and the start's own error.
+        typical = max(noise, float(np.median(misses[np.isfinite(image[..., 0])])))
+        far = np.flatnonzero(misses.max(axis=0) > _STRAY * typical)
         if not len(far):
             break
         along[worst[far], far] = np.nan

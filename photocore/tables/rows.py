@@ -148,11 +148,15 @@ def data_rows(
     data.remarks += sorter.remarks()
     named = match.columns.get("id", min(match.columns.values()))
     after = 0
+    gaps = [k for k, row in enumerate(data.rows) if k and row != data.rows[k - 1] + 1]
+    last = data.rows[gaps[-1] :] if gaps else []
+    # Below the last gap several notes may stand, one under the other.
+    notes = {row for row in last if is_summary(grid.rows[row], named, apart=True)}
+    apart = {data.rows[k] for k in gaps} | (notes if len(notes) == len(last) else set())
     for index in reversed(range(len(data.rows))):
         row = data.rows[index]
-        apart = index > 0 and data.rows[index - 1] != row - 1
         is_point = after == row + 1 or len(data.rows) == 1
-        if is_point or not is_summary(grid.rows[row], named, apart=apart):
+        if is_point or not is_summary(grid.rows[row], named, apart=row in apart):
             after = row
             continue
         del data.rows[index], data.blocks[index]

@@ -22,6 +22,7 @@ def points() -> Points:
 
 
 def test_solved_points_are_a_table_by_name(points):
+    pytest.importorskip("pandas")
     table = points.to_dataframe()
     assert list(table.index) == ["P1", "P2"]
     assert table.loc["P1", ["X", "Y", "r"]].tolist() == pytest.approx([2, 0, 1], abs=1e-9)

@@ -239,3 +239,10 @@ def test_image_points_of_other_points_are_left_out_and_named():
     for row in rows:
         assert f"{images.ids[row]} in {images.cameras[row]}" in result.remarks[1]
     np.testing.assert_allclose(apart_of(result.project.cameras), apart_of(truth), rtol=0.01)
+
+
+def test_of_exact_images_none_is_taken_for_that_of_another_point():
+    _, given = waved(noise=1e-9)
+    result = bundle_adjust(replace(given, sigma_image=NOISE), FREE)
+    assert not [text for text in result.remarks if "left out" in text]
+    assert result.sigma0 < 1e-7
