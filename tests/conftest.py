@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import random
 import signal
@@ -41,16 +42,15 @@ settings.load_profile("same")
 
 
 class Doctests:
-    """What of the packages is collected: the modules that hold examples.
+    """Doctests are looked for only where a module holds examples: the search costs seconds."""
 
-    To import all others and search them for examples takes longer than to collect the tests.
-    """
-
-    def pytest_ignore_collect(self, collection_path: Path) -> bool | None:
-        """Leave a module of the packages out that holds none."""
-        if collection_path.suffix != ".py" or TESTS in collection_path.parents:
-            return None
-        return True if b">>>" not in collection_path.read_bytes() else None
+    @pytest.hookimpl(wrapper=True)
+    def pytest_collect_file(self, file_path: Path) -> Iterator[None]:
+        """Leave out the doctests of a module that holds none."""
+        collectors = yield
+        if collectors and b">>>" not in file_path.read_bytes():
+            return [one for one in collectors if type(one) is pytest.Module]
+        return collectors
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -80,6 +80,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Skip what wants LibreOffice, Chromium or data where they are not (office, browser, data)."""
     equipment.check(item)
+
+
+def pytest_collection_finish() -> None:
+    """Let the collector of garbage pass by all that was imported and collected."""
+    gc.freeze()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -54,27 +54,27 @@ def schema_faults(data: bytes) -> list[str]:
 def _faults_of(data: bytes) -> list[str]:
     rows = data.split(b"<row ")
     kept = [*rows[:_ROWS], *rows[_ROWS:-1:_STEP], *rows[_ROWS:][-1:]]
-    faults: dict[str, None] = {}
-    root = ElementTree.fromstring(b"<row ".join(kept))
+    root, faults = ElementTree.fromstring(b"<row ".join(kept)), dict[str, None]()
     for element in root.iter() if not root.tag.endswith("}calcChain") else ():  # its c is another
-        space, _, name = element.tag.rpartition("}")
-        kind = space.removesuffix("/main").removesuffix("/2006").rpartition("/")[2]
-        if (kind, name) in _RULES:
-            children = (c.tag.rpartition("}") for c in element)
-            order = "".join(f"{child} " for of, _, child in children if of == space)
-            plain = (k for k in element.keys() if "}" not in k or k.endswith("}id"))  # noqa: SIM118
-            held = tuple((key.rpartition("}")[2], element.get(key, "")) for key in plain)
-            faults |= dict.fromkeys(_faults(kind, name, order, held))
+        children = tuple([child.tag for child in element])
+        faults |= dict.fromkeys(_faults(element.tag, children, tuple(element.items())))
     return [*faults]
 
 
 @lru_cache(maxsize=50_000)
-def _faults(space: str, name: str, children: str, held: tuple[tuple[str, str], ...]) -> list[str]:
-    order, types, needed = _RULES[space, name]
-    faults = [f"{name} lacks {key}" for key in sorted(needed - dict(held).keys())]
-    for key, value in held:
+def _faults(tag: str, children: tuple[str, ...], held: tuple[tuple[str, str], ...]) -> list[str]:
+    space, _, name = tag.rpartition("}")
+    kind = space.removesuffix("/main").removesuffix("/2006").rpartition("/")[2]
+    if (kind, name) not in _RULES:
+        return []
+    names = (child.rpartition("}") for child in children)
+    order = "".join(f"{child} " for of, _, child in names if of == space)
+    plain = {k.rpartition("}")[2]: v for k, v in held if "}" not in k or k.endswith("}id")}
+    rule, types, needed = _RULES[kind, name]
+    faults = [f"{name} lacks {key}" for key in sorted(needed - plain.keys())]
+    for key, value in plain.items():
         if key not in types or not types[key].fullmatch(value):
             faults.append(f'{name} {key}="{value}"')
-    if not order.fullmatch(children):
-        faults.append(f"{name} holds, in this order: {children}")
+    if not rule.fullmatch(order):
+        faults.append(f"{name} holds, in this order: {order}")
     return faults

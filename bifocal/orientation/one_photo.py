@@ -317,9 +317,13 @@ def _by_points(control: Control, interior: Interior, sigma_pick: float) -> Orien
         pixels = pinhole.project(camera, control.xyz) - control.pixels1
         return np.asarray(np.linalg.solve(root, pixels[..., None])).ravel()
 
-    photo = _adjusted(interior, start, misfit)
+    def by_camera(camera: Pinhole) -> FloatArray:
+        by = pinhole.project_with_jacobian(camera, control.xyz).by_camera
+        return np.asarray(np.linalg.solve(root, by).reshape(-1, len(PARAMETERS)))
+
+    photo = _adjusted(interior, start, misfit, by_camera)
     count, cofactor = len(control.ids), photo.covariance / photo.sigma0**2
-    by = _by_camera(misfit, photo.camera).reshape(count, 2, -1)
+    by = by_camera(photo.camera).reshape(count, 2, -1)
     spare = np.eye(2) - by @ cofactor @ np.swapaxes(by, 1, 2)
     determined = np.linalg.eigvalsh(spare)[:, 0] > 0.02  # else the point alone determines something
     loose = np.linalg.inv(np.where(determined[:, None, None], spare, np.nan))
@@ -378,16 +382,17 @@ def by_lines(
             out.append(along[[1 - axis, 2]] / along[axis] / line.sigma)
         return np.concatenate(out)
 
-    return _adjusted(interior, start, misfit)
+    return _adjusted(interior, start, misfit, lambda camera: _by_camera(misfit, camera))
 
 
 def _adjusted(
-    interior: Interior, start: Pinhole, misfit: Callable[[Pinhole], FloatArray]
-) -> OrientedPhoto:
+    interior: Interior, start: Pinhole, misfit: Callable[[Pinhole], FloatArray],
+    by_camera: Callable[[Pinhole], FloatArray],
+) -> OrientedPhoto:  # fmt: skip
     """Return the camera of least squares: misfits in standard deviations, and the lens as known."""
     prior = np.array([np.log(interior.focal), np.log(interior.aspect), *interior.centre])
     sigma = np.array([interior.sigma_focal, interior.sigma_aspect, *[interior.sigma_centre] * 2])
-    columns = np.arange(len(PARAMETERS))
+    columns, by_lens = np.arange(len(PARAMETERS)), np.eye(4, len(PARAMETERS)) / sigma[:, None]
 
     def values(camera: Pinhole) -> FloatArray:
         focals = np.log(np.diag(camera.matrix)[:2])
@@ -396,7 +401,8 @@ def _adjusted(
 
     def everything(state: NetworkState, rows: Rows) -> bool:
         camera = state.blocks["camera"][0]
-        rows.by_label(rows.add(values(camera))[:, None], columns, _by_camera(values, camera))
+        by = np.concatenate([by_lens, by_camera(camera)])
+        rows.by_label(rows.add(values(camera))[:, None], columns, by)
         return bool(np.isfinite(rows.residuals[-1]).all())
 
     network = Network(

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,15 +36,21 @@ def noise_tile(rng: np.random.Generator) -> NDArray[np.float32]:
     return np.pad(tile, 2, mode="wrap").astype(np.float32)
 
 
+@lru_cache(maxsize=4)  # to make one takes longer than to paint a small scene
+def _tile_of(seed: int) -> tuple[NDArray[np.float32], np.random.Generator]:
+    """Return the noise tile of a seed, and its generator as it is then."""
+    rng = np.random.default_rng(seed)
+    return noise_tile(rng), rng
+
+
 class Painter:
     """Gives every hit its colour."""
 
     def __init__(self, scene: Scene, tracer: Tracer) -> None:
         self.scene, self.tracer = scene, tracer
-        rng = np.random.default_rng(scene.seed)
-        self.tile = noise_tile(rng)
+        self.tile, rng = _tile_of(scene.seed)
         bodies = int(tracer.table.bodies.max()) + 2
-        self.offsets = rng.uniform(0, TILE, size=(bodies, 2))
+        self.offsets = deepcopy(rng).uniform(0, TILE, size=(bodies, 2))
         self.target_faces = self._faces_of_targets()
 
     def _faces_of_targets(self) -> Faces:

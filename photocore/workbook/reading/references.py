@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import zipfile
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 
 from photocore.errors import InputError
@@ -66,20 +67,27 @@ def _lost(path: Path, package: zipfile.ZipFile) -> Iterator[str]:
     for sheet in book.sheets:
         with package.open(sheet.part) as part:
             formulas = set(FORMULA.findall(part.read(_FORMS)))
-        for data in formulas:
-            text = _TEXT.sub('""', unescaped(data.decode("utf-8", "replace")))
-            if "_xl" in text or "LET(" in text:  # with names of their own
-                continue
-            for quoted, plain in _SHEET.findall(text):
-                title = quoted.replace("''", "'") or plain
+        for sheets, columns, plain in map(_references, formulas):
+            for title in sheets:
                 if title.casefold() not in titles | names:
                     yield f'{sheet.title} has a formula with the sheet "{title}", which is missing'
-            for table, column in _COLUMN.findall(text):
+            for table, column in columns:
                 if column.casefold() not in tables.get(table.casefold(), set()):
                     yield f"{sheet.title} has a formula with {table}[{column}], which is missing"
-            for name in _NAME.findall(_BRACKETS.sub("[]", _SHEET.sub("!", text))):
-                if name.casefold() not in names | tables.keys() and not _CELL.fullmatch(name):
+            for name in plain:
+                if name.casefold() not in names | tables.keys():
                     yield f'{sheet.title} has a formula with the name "{name}", which is missing'
+
+
+@lru_cache(maxsize=8192)  # a workbook is asked before and after, and most are alike
+def _references(formula: bytes) -> tuple[list[str], list[tuple[str, str]], list[str]]:
+    """Return the sheets, columns of tables and names in a formula as its part holds it."""
+    text = _TEXT.sub('""', unescaped(formula.decode("utf-8", "replace")))
+    if "_xl" in text or "LET(" in text:  # with names of their own
+        return [], [], []
+    sheets = [quoted.replace("''", "'") or plain for quoted, plain in _SHEET.findall(text)]
+    names = _NAME.findall(_BRACKETS.sub("[]", _SHEET.sub("!", text)))
+    return sheets, _COLUMN.findall(text), [name for name in names if not _CELL.fullmatch(name)]
 
 
 def _titles(book: bytes) -> Iterator[str]:
