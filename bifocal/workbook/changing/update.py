@@ -201,6 +201,7 @@ def _results_of(
     for sheet in built.book.worksheets:
         cells = (cell for row in sheet.iter_rows() for cell in row if cell.data_type == "f")
         ours |= {normal(str(cell.value)[1:]) for cell in cells}
+    columns_named = _column_names(editor)
     for name, content in built.tables.items():
         area = editor.table(name)
         if area is None:
@@ -213,7 +214,7 @@ def _results_of(
                 if not _lacks(editor, row_formula(name, column.formula)):
                     short = short_formula(name, column.formula, letters, area.area[0])
                     ours.add(normal(short(area.first)))
-                    ours.add(normal(named_columns(short(area.first), _column_names(editor))))
+                    ours.add(normal(named_columns(short(area.first), columns_named)))
                 own = (headings[column.key], area.first, area.area[2])
                 places.setdefault(area.sheet, []).append(own)
     if isinstance(editor, PlainEditor):

@@ -153,7 +153,9 @@ def spread(*cells: CellArray) -> list[CellArray]:
     """Return cells in one shape, single ones and rows repeated."""
     shape = np.broadcast_shapes(*(one.numbers.shape for one in cells))
     return [
-        CellArray(
+        one
+        if one.numbers.shape == shape
+        else CellArray(
             np.broadcast_to(one.numbers, shape), np.broadcast_to(one.kinds, shape),
             np.broadcast_to(one.texts, shape), one.size,
         )

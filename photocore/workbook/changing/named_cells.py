@@ -12,7 +12,9 @@ from photocore.workbook.reading.grid import Value, plain_title, split_cell
 
 def place_of(editor: WorkbookEditor, name: str) -> tuple[str, int, int] | None:
     """Return sheet, row and column of a named cell; None where the name leads to no single cell."""
-    place = next((v for k, v in editor.named.items() if k.casefold() == name.casefold()), "")
+    place = editor.named.get(name) or next(
+        (v for k, v in editor.named.items() if k.casefold() == name.casefold()), ""
+    )
     sheet, _, cell = place.rpartition("!")
     sheet = plain_title(sheet)
     if sheet not in editor.titles or ":" in cell or not cell:

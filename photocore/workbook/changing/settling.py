@@ -8,6 +8,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from zipfile import BadZipFile
 
@@ -38,6 +39,7 @@ _RELATIVE = re.compile(r"(?<![\w$!'.:\[])([A-Z]{1,3})\d+(?![\w(\]])")
 Column = tuple[int, int, int]
 
 
+@lru_cache(maxsize=8192)  # a workbook holds ours and the user's, which are mostly the same
 def normal(formula: str) -> str:
     """Return a formula as it reads in all rows, without blanks, quotes and case."""
     return re.sub(r"[\s$']", "", _RELATIVE.sub(r"\1#", formula)).casefold()

@@ -11,7 +11,7 @@ import tomllib
 from collections import ChainMap
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from importlib.resources import files
 from typing import Any
 
@@ -72,6 +72,7 @@ class LiveColumn:
         return "@" if self.kind == "input" and self.key in TEXT_KEYS else "General"
 
 
+@lru_cache(maxsize=1024)  # of every row the same
 def row_formula(table: str, text: str) -> str:
     """Return a formula with ``[@key]`` written as the file format wants it."""
     return "=" + re.sub(r"\[@(\w+)\]", rf"{table}[[#This Row],[\1]]", text)

@@ -74,46 +74,47 @@ LENSES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", LENSES)
-def test_the_page_bends_pixels_as_the_library_does(page: Driver, name: str) -> None:
-    model = name if name in ("fisheye", "radial") else "opencv"
+def test_the_page_bends_pixels_as_the_library_does(page: Driver) -> None:
     matrix = [[4100.0, 0, 2990.0], [0, 4090.0, 2010.0], [0, 0, 1]]
-    lens = Lens(
-        camera_matrix=matrix, model=model, coefficients=LENSES[name], image_size=(6000, 4000)
-    )
     pixels = [[2990.0, 2010.0], [10.0, 20.0], [5900.0, 3900.0], [3000.5, 100.25], [700.0, 2600.0]]
     script = """async ([description, pixels]) => {
         const { Lens } = await import(new URL("js/lens.js", document.baseURI));
         const lens = new Lens(description);
         return [pixels.map((one) => lens.distort(one)), pixels.map((one) => lens.undistort(one))];
     }"""
-    described = {"camera_matrix": matrix, "model": model, "coefficients": list(LENSES[name])}
-    bent, straight = page.tab.evaluate(script, [described, pixels])
-    np.testing.assert_allclose(bent, lens.distort(pixels), rtol=0, atol=1e-8)
-    # OpenCV stops its own iteration at about 1e-6 px; the way back is the sharper check.
-    np.testing.assert_allclose(lens.distort(straight), pixels, rtol=0, atol=1e-7)
+    for name, coefficients in LENSES.items():
+        described = {
+            "camera_matrix": matrix, "coefficients": list(coefficients),
+            "model": name if name in ("fisheye", "radial") else "opencv",
+        }  # fmt: skip
+        lens = Lens(**described, image_size=(6000, 4000))
+        bent, straight = page.tab.evaluate(script, [described, pixels])
+        np.testing.assert_allclose(bent, lens.distort(pixels), rtol=0, atol=1e-8, err_msg=name)
+        # OpenCV stops its own iteration at about 1e-6 px; the way back is the sharper check.
+        back = lens.distort(straight)
+        np.testing.assert_allclose(back, pixels, rtol=0, atol=1e-7, err_msg=name)
 
 
-@pytest.mark.parametrize("indices", [(1.0, 1.49, 1.337), (1.337, 1.49, 1.0)])
-def test_the_page_bends_rays_into_water_and_out_of_it(page: Driver, indices: Any) -> None:
+def test_the_page_bends_rays_into_water_and_out_of_it(page: Driver) -> None:
     z0, glass, distance = 0.05, 0.01, 2.0
     # Out of water rays are reflected from 48.4 degrees on; the last is 0.1 degrees short of that.
     angles = np.radians([0.0, 5.0, 30.0, 45.0, 48.3])
     heights = np.array([z0, glass, distance - z0 - glass])
-    bent = np.arcsin(np.sin(angles)[:, None] * indices[0] / np.array(indices))
-    radius = np.tan(bent) @ heights
     script = """async ([media, places]) => {
         const { Media } = await import(new URL("js/media.js", document.baseURI));
         const through = new Media(media);
         const apparent = places.map((one) => through.apparent(one));
         return [apparent, apparent.map((one) => through.onPlane(one))];
     }"""
-    media = {"indices": indices, "thicknesses": [glass], "z0": z0, "distance": distance}
-    places = np.stack([radius * 0.6 + 0.1, radius * 0.8 - 0.2], axis=-1)
-    shown, back = page.tab.evaluate(script, [media | {"nadir": [0.1, -0.2]}, places.tolist()])
-    seen = np.hypot(*(np.array(shown) - [0.1, -0.2]).T)
-    np.testing.assert_allclose(seen, distance * np.tan(angles), rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(back, places, rtol=1e-9, atol=1e-12)
+    for indices in ((1.0, 1.49, 1.337), (1.337, 1.49, 1.0)):
+        bent = np.arcsin(np.sin(angles)[:, None] * indices[0] / np.array(indices))
+        radius = np.tan(bent) @ heights
+        media = {"indices": indices, "thicknesses": [glass], "z0": z0, "distance": distance}
+        places = np.stack([radius * 0.6 + 0.1, radius * 0.8 - 0.2], axis=-1)
+        shown, back = page.tab.evaluate(script, [media | {"nadir": [0.1, -0.2]}, places.tolist()])
+        seen = np.hypot(*(np.array(shown) - [0.1, -0.2]).T)
+        np.testing.assert_allclose(seen, distance * np.tan(angles), rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(back, places, rtol=1e-9, atol=1e-12)
 
 
 def test_nothing_is_asked_of_anybody_else(page: Driver) -> None:
@@ -216,15 +217,14 @@ OUTSIDE = """() => [...document.querySelectorAll("header *, .layer-bar *, .hand 
   .map((node) => node.outerHTML.slice(0, 120))"""
 
 
-@pytest.mark.parametrize("size", [(390, 844), (640, 400), (1024, 768), (1280, 720), (3840, 2160)])
-def test_it_fits_small_screens_and_large(full: Driver, size: tuple[int, int]) -> None:
+def test_it_fits_small_screens_and_large(full: Driver) -> None:
     page = full
-    page.tab.set_viewport_size({"width": size[0], "height": size[1]})
-    for stage in STAGES:
-        page.click(f"mode-{stage}")
-        assert page.tab.evaluate(OUTSIDE) == [], stage
-        assert page.tab.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
-    page.tab.set_viewport_size({"width": 1280, "height": 720})
+    for size in ((390, 844), (640, 400), (1024, 768), (1280, 720), (3840, 2160)):
+        page.tab.set_viewport_size({"width": size[0], "height": size[1]})
+        for stage in STAGES:
+            page.click(f"mode-{stage}")
+            assert page.tab.evaluate(OUTSIDE) == [], (size, stage)
+            assert page.tab.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
 
 
 @pytest.mark.acceptance

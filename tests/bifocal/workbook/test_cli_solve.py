@@ -7,6 +7,7 @@ import functools
 import io
 import json
 import tempfile
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -46,16 +47,26 @@ def form(*options):
         return Path(folder, "form.xlsx").read_bytes()
 
 
+@functools.cache
+def loaded(*options):
+    return openpyxl.load_workbook(io.BytesIO(form(*options)))
+
+
 def fill(path, table=None, setup=SETUP, template=(), **sheets):
     """Fill in a template the way a user does, with openpyxl standing for Excel.
 
     The rows of a table are values from its first column on, or values by heading; the template is
-    a file, or the options of one.
+    a file, or the options of one, which is read once: what was written is then taken back.
     """
-    is_new = isinstance(template, tuple)
-    book = openpyxl.load_workbook(io.BytesIO(form(*template)) if is_new else template)
+    is_new, before = isinstance(template, tuple), []
+    book = loaded(*template) if is_new else openpyxl.load_workbook(template)
+
+    def write(cell, value):
+        before.append((cell, cell.value, copy(cell._style)))
+        cell.value = value
+
     for name, value in setup.items():
-        put(book, name, value)
+        write(named(book, name), value)
     points = rows(POINTS) if table is None else table
     for name, lines in {"Points": points, **sheets}.items():
         head = next(i for i in range(1, 60) if book[name].cell(i, 1).value == "id")
@@ -64,8 +75,10 @@ def fill(path, table=None, setup=SETUP, template=(), **sheets):
             keyed = values if isinstance(values, dict) else dict(zip(columns, values, strict=False))
             for key, value in keyed.items():
                 if value is not None:
-                    book[name].cell(row, columns[key], value)
+                    write(book[name].cell(row, columns[key]), value)
     book.save(path)
+    for cell, value, style in reversed(before):
+        cell.value, cell._style = value, style
     return path
 
 
