@@ -29,6 +29,8 @@ from photocore.workbook.making.look import GOOD, HEAD_FILL, HEAD_FONT, WRONG, co
 
 #: What a typed number of the set-up may be, where it need not be above zero.
 _NUMBERS = (-1e7, 1e7)
+#: More rows would be too small to read on one page.
+_ROWS_A_PAGE = 66
 #: Columns of the values: of the pair, then of further photos.
 _COLUMNS = "CEFGH"
 
@@ -41,7 +43,7 @@ def setup_sheet(builder: BookBuilder, content: SurveyContent) -> None:
         words["state_scale"] = builder.word("state_scale_media")
     line = state_formula(words, is_pair=content.is_pair)
     sheet.formula("A3", line, name="setup_state", font=HEAD_FONT)
-    sheet.headings(4, ("name", "description", "value", "unit"), (15, 61, 18, 9))
+    sheet.headings(4, ("name", "description", "value", "unit"), (15, 66, 18, 9))
     for letter, pair in zip(_COLUMNS, pair_names(content.others), strict=False):
         if content.others:
             sheet.text(f"{letter}4", pair, HEAD_FONT)
@@ -69,6 +71,8 @@ def setup_sheet(builder: BookBuilder, content: SurveyContent) -> None:
         area = f"{letter}5:{letter}{row}"
         colour_words(sheet.worksheet, area, {"OK": GOOD, "CHECK": WRONG}, bold=("CHECK",))
     sheet.finish(landscape=content.others > 1, freeze="A5", repeat="4:4")
+    if row <= _ROWS_A_PAGE:
+        sheet.worksheet.page_setup.fitToHeight = 1
 
 
 def _setup_cell(

@@ -356,14 +356,17 @@ class SheetBuilder:
         """Write label and key of a column, and set its width."""
         sheet, (head, number) = self.worksheet, at
         above, key = sheet.cell(head - 1, number), sheet.cell(head, number)
-        above.value = self.book.words.label(column.label or column.key, self.book.language)
+        label = self.book.words.label(column.label or column.key, self.book.language)
+        above.value = label.replace(" [", "\n[") if "|" in label else label
         above.font, above.alignment = LABEL_FONT, _LABEL_PLACE
         key.value, key.font, key.fill = column.key, HEAD_FONT, HEAD_FILL
         key.alignment = Alignment(horizontal="center")
         letter = get_column_letter(number)
         before = sheet.column_dimensions.get(letter)
         width = sheet.column_dimensions[letter]
-        width.width = max(before.width if before else 0, column.width)
+        # A letter of a label is hardly ever wider than a digit: no word is broken.
+        word = 0 if column.folded else max(map(len, label.split()))
+        width.width = max(before.width if before else 0, column.width, word)
         if column.folded:
             width.outlineLevel, width.hidden = 1, True
 

@@ -51,6 +51,21 @@ def test_all_sheets_have_one_face_and_one_scale_of_sizes(name):
     assert {cell.font.sz for cell in cells} == {9, 10, 14}
 
 
+@pytest.mark.parametrize("language", few_by_default(LANGUAGES, "de"))
+def test_no_word_of_a_heading_is_broken_and_no_description_is_cut(language):
+    book = openpyxl.load_workbook(io.BytesIO(form("--rows", 30, "--lang", language)))
+    for sheet, table in ((sheet, table) for sheet in book for table in sheet.tables.values()):
+        first, head, last, _ = range_boundaries(table.ref)
+        for column in range(first, last + 1):
+            above = sheet.cell(head - 1, column)
+            size = sheet.column_dimensions[above.column_letter]
+            assert size.hidden or size.width >= max(map(len, above.value.split())), above.value
+            assert "|" not in above.value or "\n[" in above.value
+    # Arial's letters are some 0.83 of a digit wide on average.
+    room = book["Setup"].column_dimensions["B"].width
+    assert max(len(cell.value or "") for cell in book["Setup"]["B"]) * 0.83 <= room
+
+
 def test_results_are_one_page_for_a_client():
     sheet = opened("ideal")["Results"]
     assert sheet.print_area == "'Results'!$A$1:$O$30"
