@@ -61,6 +61,9 @@ def read_points(path: Path, views: tuple[ForeignView, ...]) -> dict[str, FloatAr
         Naming every bad cell, or the point that cannot be intersected.
     """
     table = read_table(path, COLUMNS)
+    pixels = ("col", "row")
+    if {"photo", "x", "y"} <= table.present and not {*pixels, "z"} & table.present:
+        pixels = ("x", "y")  # as RealityCapture heads them
     if {"x", "y", "z"} <= table.present:
         xyz = np.column_stack([table.numbers(key) for key in ("x", "y", "z")])
         errors: list[CellError] = []
@@ -69,15 +72,17 @@ def read_points(path: Path, views: tuple[ForeignView, ...]) -> dict[str, FloatAr
             raise WorkbookError(errors)
         ids = table.texts("id")
         return {ids[row]: xyz[row] for row in rows if np.isfinite(xyz[row]).all()}
-    if not {"photo", "col", "row"} <= table.present:
+    if not {"photo", *pixels} <= table.present:
         raise InputError(remark("projects.point_columns", of=path))
-    return _intersected(table, views)
+    return _intersected(table, pixels, views)
 
 
-def _intersected(table: Table, views: tuple[ForeignView, ...]) -> dict[str, FloatArray]:
-    pixels = np.column_stack([table.numbers("col"), table.numbers("row")])
+def _intersected(
+    table: Table, keys: tuple[str, str], views: tuple[ForeignView, ...]
+) -> dict[str, FloatArray]:
+    errors: list[CellError] = []
+    pixels = np.column_stack([table.in_unit(key, {"px": 1.0}, errors) for key in keys])
     rays: dict[str, list[tuple[Pinhole, FloatArray]]] = {}
-    errors = []
     for row, (name, photo) in enumerate(zip(table.texts("id"), table.texts("photo"), strict=True)):
         shown = [views[k] for k in called(photo, [view.name for view in views])]
         if len(shown) != 1:

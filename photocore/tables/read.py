@@ -174,6 +174,11 @@ def read_table(
         table = _new_table(book, place, rows)
         _refuse_merged(table, place.grid, complaints)
         fill(table, columns, _cells(place, rows), decimal, complaints)
+    complaints += [
+        table.unit_error(key, table.units[key], "px")
+        for key in (column.key for column in columns if column.unit == "px")
+        if table.units.get(key, "px") != "px"
+    ]
     if not as_typed:
         _settle(table, columns)
     guessed = place.match.guessed

@@ -30,7 +30,12 @@ _AXES: dict[str, dict[str, tuple[str, ...]]] = {
 }
 #: Names of the tables of both sheets.
 _TABLES = {"Georeference": "tblGeo", "Check": "tblCheck"}
-_LONG = tuple(replace(column, required=True) for column in (Column("id", NAMES, "text"), *A_PHOTO))
+#: RealityCapture's control points are headed ``#image,name,x,y``.
+_PIXELS = {"col": ("x",), "row": ("y",)}
+_LONG = tuple(
+    replace(column, required=True, aliases=(*column.aliases, *_PIXELS.get(column.key, ())))
+    for column in (Column("id", NAMES, "text"), *A_PHOTO)
+)
 
 
 def with_list(

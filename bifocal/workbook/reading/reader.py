@@ -404,9 +404,10 @@ def _observations(
         angle = float(table.numbers("theta")[row])
         message = remark("survey.beyond_a_turn", angle=angle, turn=float(turn))
         errors.append(table.error(row, "theta", message))
-    units |= {key: {"px": 1.0} for key in (*PIXELS, *more)} | {"r_measured": TO_M}
+    units["r_measured"] = TO_M
     columns = {key: table.in_unit(key, factors, errors) for key, factors in units.items()}
     columns |= {key: table.numbers(key) * factor for key in XY}
+    columns |= {key: table.numbers(key) for key in (*PIXELS, *more)}
     texts = {"id": ids, "code": table.texts("code"), "note": table.texts("note")}
     used = np.isnan(use) | (use != 0)
     points = PointObservations.from_columns({**texts, "use": used, **columns})

@@ -102,12 +102,14 @@ CORNERS = {"A": (-1.5, -1, 0), "B": (1.5, -1, 0), "C": (1.4, 1.1, 0), "D": (-1.4
 @pytest.mark.parametrize("kind", ["colmap text", "metashape", "opensfm"])
 def test_each_project_gives_the_wall_itself_as_its_orthophoto(tmp_path: Path, kind: str) -> None:
     path, shots, xyz = project_of(tmp_path, kind)
-    cloud = tmp_path / "sparse.csv"
+    cloud, points = tmp_path / "sparse.csv", picks(tmp_path, shots, CORNERS)
     rows = "\n".join(",".join(f"{v:.9f}" for v in row) for row in xyz)
     cloud.write_text(f"X,Y,Z\n{rows}\n")
-    options = ProjectOptions(
-        cloud=cloud, points=picks(tmp_path, shots, CORNERS), length=("A", "B", "3.0")
-    )
+    if kind == "metashape":  # and the points by RealityCapture
+        points.write_text(
+            points.read_text().replace("id,photo,col [px],row [px]", "name,#image,x,y")
+        )
+    options = ProjectOptions(cloud=cloud, points=points, length=("A", "B", "3.0"))
     result = photos_from_project(path, tmp_path / "wall.photos.json", options)
     found = PhotoSet.read(tmp_path / "wall.photos.json")
     # The wall is found, not the ground before it; the photo of its back is left out.

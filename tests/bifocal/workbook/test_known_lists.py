@@ -148,6 +148,17 @@ def test_picks_in_a_row_a_photo_are_those_of_a_row_a_point(tmp_path):
     assert found.ids == ("A", "B")
 
 
+def test_control_points_of_realitycapture_are_pixels_and_millimetres_are_refused(tmp_path):
+    lines = [(photo, name, *pixel) for name, photo, *pixel in PICKS]
+    rows = listed(tmp_path / "rc.csv", ("#image", "name", "x", "y"), lines)
+    long = picked(tmp_path / "long.csv", PICKS)
+    found = [bifocal.solve(path, pair=a_pair()).table["r"] for path in (rows, long)]
+    np.testing.assert_array_equal(*found)
+    rows = listed(tmp_path / "mm.csv", ("image", "name", "x [mm]", "y [mm]"), lines)
+    with pytest.raises(WorkbookError, match=r"x \[mm\]. says \[mm\], expected \[px\]"):
+        bifocal.solve(rows, pair=a_pair())
+
+
 @pytest.mark.parametrize(
     ("line", "said"),
     [

@@ -54,11 +54,12 @@ def test_all_sheets_have_one_face_and_one_scale_of_sizes(name):
 @pytest.mark.parametrize("language", few_by_default(LANGUAGES, "de"))
 def test_no_word_of_a_heading_is_broken_and_no_description_is_cut(language):
     book = openpyxl.load_workbook(io.BytesIO(form("--rows", 30, "--lang", language)))
-    for sheet, table in ((sheet, table) for sheet in book for table in sheet.tables.values()):
-        first, head, last, _ = range_boundaries(table.ref)
+    tables = [(sheet, table.ref) for sheet in book for table in sheet.tables.values()]
+    for page, area in tables:
+        first, head, last, _ = range_boundaries(area)
         for column in range(first, last + 1):
-            above = sheet.cell(head - 1, column)
-            size = sheet.column_dimensions[above.column_letter]
+            above = page.cell(head - 1, column)
+            size = page.column_dimensions[above.column_letter]
             assert size.hidden or size.width >= max(map(len, above.value.split())), above.value
             assert "|" not in above.value or "\n[" in above.value
     # Arial's letters are some 0.83 of a digit wide on average.
