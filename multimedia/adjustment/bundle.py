@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from multimedia.adjustment.bundle_columns import place_columns, with_common_values
-from multimedia.adjustment.bundle_equations import Bundle, ImageObservations
+from multimedia.adjustment.bundle_equations import Bundle
+from multimedia.adjustment.bundle_start import prepare
+from multimedia.adjustment.contradictions import contradicting_rows
 from multimedia.adjustment.interior_choice import choose_interior, with_interior
 from multimedia.adjustment.media_unknowns import WITH_VALUE
 from multimedia.adjustment.plausibility import (
@@ -19,29 +18,26 @@ from multimedia.adjustment.plausibility import (
     wand_remarks,
     with_model_error,
 )
-from multimedia.adjustment.start_poses import bars_for, with_poses
+from multimedia.adjustment.start_poses import with_poses
 from multimedia.adjustment.unknowns import AUTO, Adjustment, Unknowns
 from multimedia.media.camera import EXTERIOR, Camera
+from multimedia.media.projection import project as project_points
 from multimedia.orientation.calibration_covariance import with_covariance
-from multimedia.orientation.intersection import intersect
-from multimedia.orientation.object_rays import image_rays, nearest_points
-from multimedia.orientation.plate_poses import FEWEST, plate_pose
-from multimedia.projects.model import ObjectPoints, Project
+from multimedia.orientation.stray_rays import names_of, without_rows
+from multimedia.projects.model import ImagePoints, ObjectPoints, Project
 from multimedia.remarks import remark
 from photocore.adjustment import Fit, huber_weights
 from photocore.adjustment.network import NetworkState
-from photocore.arrays import BoolArray, FloatArray, IntArray
+from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.rotation import skew
-from photocore.camera.similarity import fit_similarity
-from photocore.errors import ConvergenceError, GeometryError, InputError
+from photocore.errors import ConvergenceError, GeometryError, InputError, PhotogrammetryError
 
 #: Robust weights settle in a few rounds; more change nothing that matters.
 ROBUST_ROUNDS = 8
-#: Shares of the way from a camera to the surface: how close to it rays have to meet for their point
-#: to start beyond it, and how far beyond.
-_NEAR, _INSIDE = 0.1, 1e-3
 #: Rounds and relative change in which the weight of the image coordinates settles.
 BALANCE_ROUNDS, BALANCED = 5, 0.05
+#: A largest residual of so many times the typical one may come of another point.
+GROSS = 15.0
 
 
 def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustment:
@@ -83,11 +79,81 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
         project, posed = with_poses(project, unknowns)
         result = bundle_adjust(project, unknowns)
         return replace(result, remarks=(*posed, *result.remarks))
-    if unknowns.interior == AUTO:
-        chosen = choose_interior(project, unknowns, bundle_adjust)
-        result = bundle_adjust(project, with_interior(unknowns, chosen))
-        choice = remark("bundle.chosen", names=", ".join(chosen) or "none")
-        return replace(result, remarks=(choice, *result.remarks))
+    if unknowns.robust is None:
+        try:
+            return _with_doubts(_as_chosen(project, unknowns), unknowns)
+        except (ConvergenceError, GeometryError) as error:
+            for words in _contradictions(project, unknowns):
+                raise GeometryError(words) from error
+            raise
+    is_out = contradicting_rows(project, unknowns)
+    if not is_out.any():
+        return _as_chosen(project, unknowns)
+    result = _as_chosen(without_rows(project, is_out), unknowns)
+    left_out = remark("bundle.strays", **names_of(project.image_points, is_out))
+    return replace(
+        _with_rows(result, project.image_points, is_out), remarks=(left_out, *result.remarks)
+    )
+
+
+def _as_chosen(project: Project, unknowns: Unknowns) -> Adjustment:
+    """Return the adjustment, with the interior parameters that the data carry where so wanted."""
+    if unknowns.interior != AUTO:
+        return _adjusted(project, unknowns)
+    chosen = choose_interior(project, unknowns, _adjusted)
+    result = _adjusted(project, with_interior(unknowns, chosen))
+    choice = remark("bundle.chosen", names=", ".join(chosen) or "none")
+    return replace(result, remarks=(choice, *result.remarks))
+
+
+def _with_rows(result: Adjustment, points: ImagePoints, is_out: BoolArray) -> Adjustment:
+    """Return an adjustment with the image points that were left out: weight 0, and how far off."""
+    place = dict(zip(result.project.object_points.ids, result.project.object_points.xyz,
+                     strict=True))  # fmt: skip
+    off = np.full((len(is_out), 2), np.nan)
+    for row in np.flatnonzero(is_out).tolist():
+        k = result.project.camera_index(points.cameras[row])
+        if points.ids[row] in place:
+            camera, media = result.project.cameras[k], result.project.interface_of(k)
+            off[row] = points.image[row] - project_points(camera, place[points.ids[row]], media)
+
+    def filled(values: FloatArray, of_others: FloatArray) -> FloatArray:
+        of_others[~is_out] = values
+        return of_others
+
+    ones = np.ones_like(off)
+    return replace(
+        result, project=replace(result.project, image_points=points),
+        residuals=filled(result.residuals, off.copy()),
+        standardised=filled(result.standardised, off / result.sigma0),
+        redundancy_numbers=filled(result.redundancy_numbers, ones.copy()),
+        weights=filled(result.weights, np.zeros_like(off)),
+        sigma_image=filled(result.sigma_image, result.sigma0 * ones),
+    )  # fmt: skip
+
+
+def _with_doubts(result: Adjustment, unknowns: Unknowns) -> Adjustment:
+    """Return an adjustment with a remark on image points that contradict the others."""
+    size = np.abs(result.residuals[np.isfinite(result.residuals)])
+    if not size.max(initial=0.0) > GROSS * np.median(size):
+        return result
+    doubts = _contradictions(result.project, unknowns)
+    return replace(result, remarks=(*doubts, *result.remarks))
+
+
+def _contradictions(project: Project, unknowns: Unknowns) -> tuple[str, ...]:
+    """Return what to say of image points that contradict the others, if there are any."""
+    try:
+        is_wrong = contradicting_rows(project, unknowns)
+    except PhotogrammetryError:  # without them, too, something is amiss
+        return ()
+    if not is_wrong.any():
+        return ()
+    return (remark("bundle.contradict", **names_of(project.image_points, is_wrong)),)
+
+
+def _adjusted(project: Project, unknowns: Unknowns) -> Adjustment:
+    """Return the adjustment of image points and unknowns as they are."""
     bundle, remarks = prepare(project, unknowns)
     columns = bundle.columns
     if not columns.labels and not bundle.free.any():
@@ -101,7 +167,7 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
         if np.abs(new - weights).max() < 1e-3:
             break
         weights = new
-        fitted = _weighted(bundle, weights).network.solve(fitted.state)
+        fitted = bundle.weighted(weights).network.solve(fitted.state)
         bundle, fitted = _balanced(bundle, fitted, weights)
     result = _adjustment(bundle, fitted, weights, remarks)
     refuse_impossible_media(bundle.project, columns, result, unknowns.priors)
@@ -117,14 +183,6 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
     }
     project, lost = with_covariance(result.project, whose, result.covariance)
     return replace(result, project=project, remarks=(*result.remarks, *doubts, *lost))
-
-
-def _weighted(bundle: Bundle, weights: FloatArray) -> Bundle:
-    """Return the equations with robust weights of the image coordinates, shape (n, 2)."""
-    observations = bundle.observations
-    return replace(
-        bundle, observations=replace(observations, sigma=observations.sigma / np.sqrt(weights))
-    )
 
 
 def _balanced(
@@ -148,209 +206,8 @@ def _balanced(
         bundle = replace(
             bundle, observations=replace(observations, sigma=observations.sigma * worth)
         )
-        fitted = _weighted(bundle, weights).network.solve(fitted.state)
+        fitted = bundle.weighted(weights).network.solve(fitted.state)
     return bundle, fitted
-
-
-def prepare(project: Project, unknowns: Unknowns) -> tuple[Bundle, tuple[str, ...]]:
-    """Return the equations of a project, and remarks about what was left out."""
-    project = with_common_values(project, unknowns)
-    unknowns = replace(unknowns, scale_bars=bars_for(project, unknowns))
-    ids, rows, remarks = _used_points(project, unknowns)
-    place = {name: row for row, name in enumerate(ids)}
-    control = project.object_points
-    points = np.full((len(ids), 3), np.nan)
-    sigma = np.zeros((len(ids), 3))
-    plate_of = np.full(len(ids), -1, dtype=np.int64)
-    keep = [k for k, name in enumerate(control.ids) if name in place]
-    with_control = [place[control.ids[k]] for k in keep]
-    points[with_control], sigma[with_control] = control.xyz[keep], control.sigma[keep]
-    for plate, name in enumerate(unknowns.plates):
-        on = [place[control.ids[k]] for k in keep if control.groups[k] == name]
-        if len(on) < 3:
-            raise InputError(
-                f"plates: {name!r} has {len(on)} object points in the images, at least 3 needed."
-            )
-        plate_of[on] = plate
-    local = np.where(plate_of[:, None] >= 0, points, 0.0)
-    movable = _movable(unknowns, points, sigma, plate_of)
-    columns = place_columns(project, unknowns, ids, movable)
-    poses = _start_poses(project, unknowns.plates, ids, plate_of, local)
-    for plate, pose in enumerate(poses):
-        on = plate_of == plate
-        points[on] = local[on] @ pose.rotation.T + pose.centre
-    points = _start_points(project, ids, points)
-    weighted = movable & np.isfinite(sigma) & (sigma > 0) & (unknowns.control != "free")
-    cameras, plates = dict(enumerate(project.cameras)), dict(enumerate(poses))
-    start = NetworkState(
-        blocks={"camera": cameras, "media": project.media, "plate": plates}, points=points,
-        drift=np.zeros(len(columns.labels)),
-    )  # fmt: skip
-    bundle = Bundle(
-        project=project, unknowns=unknowns, ids=ids, start=start,
-        observations=_observations(project, rows, place), columns=columns, plate_of=plate_of,
-        local=local, free=movable & (columns.points < 0), known=points,
-        known_sigma=np.where(weighted, sigma, np.nan),
-    )  # fmt: skip
-    return replace(bundle, datum=bundle.datum_rows()), remarks
-
-
-def _used_points(
-    project: Project, unknowns: Unknowns
-) -> tuple[tuple[str, ...], list[int], tuple[str, ...]]:
-    """Return the points that can be used, the image rows that see them, and remarks."""
-    images, control = project.image_points, project.object_points
-    if not images.ids:
-        raise InputError("adjust: the project has no image points.")
-    rays = Counter(images.ids)
-    controls = set(control.ids)
-    alone = [name for name, count in rays.items() if name not in controls and count < 2]
-    if unknowns.control == "free":
-        plates = {
-            i for i, g in zip(control.ids, control.groups, strict=True) if g in unknowns.plates
-        }
-        alone += [name for name in controls - plates if 0 < rays[name] < 2]
-    unseen = [name for name in control.ids if rays[name] == 0]
-    remarks = []
-    for names, cameras in ((alone, "one camera only"), (unseen, "no camera")):
-        if names:
-            shown = ", ".join(names[:8]) + (" ..." if len(names) > 8 else "")
-            words = {"points": "point" if len(names) == 1 else "points", "cameras": cameras}
-            remarks.append(remark("bundle.left_out", count=len(names), names=shown, **words))
-    dropped = set(alone)
-    rows = [row for row, name in enumerate(images.ids) if name not in dropped]
-    on_bars = {end for bar in unknowns.scale_bars for end in (bar.first, bar.second)}
-    used = {images.ids[row] for row in rows} | (on_bars & controls)
-    ids = [name for name in control.ids if name in used]
-    ids += [name for name in images.names if name in used and name not in controls]
-    if not rows:
-        raise InputError("adjust: no point is measured in two cameras or is a control point.")
-    return tuple(ids), rows, tuple(remarks)
-
-
-def _movable(
-    unknowns: Unknowns, points: FloatArray, sigma: FloatArray, plate_of: IntArray
-) -> BoolArray:
-    """Return which coordinates are unknowns of their own."""
-    new: BoolArray = np.isnan(points)
-    if unknowns.control == "weighted" and np.isnan(sigma[~new[:, 0]]).any():
-        raise InputError(remark("adjust.control_sigmas"))
-    free = unknowns.control == "free"
-    return (new | (np.nan_to_num(sigma) > 0) | free) & (plate_of < 0)[:, None]
-
-
-def _observations(project: Project, rows: list[int], place: dict[str, int]) -> ImageObservations:
-    """Return the image points of the used rows."""
-    images = project.image_points
-    line = {name: k for k, name in enumerate(project.camera_names)}
-    camera = np.array([line[images.cameras[row]] for row in rows])
-    sigma = images.sigma[rows]
-    return ImageObservations(
-        source=np.array(rows),
-        rows=tuple(np.flatnonzero(camera == k) for k in range(len(project.cameras))),
-        point=np.array([place[images.ids[row]] for row in rows]),
-        image=images.image[rows],
-        sigma=np.where(np.isnan(sigma), project.sigma_image, sigma),
-    )
-
-
-def _start_points(project: Project, ids: Sequence[str], points: FloatArray) -> FloatArray:
-    """Return the points with unknown ones intersected from the cameras' start orientations.
-
-    Raises
-    ------
-    GeometryError
-        If the rays of a point meet neither beyond the interface from these starts nor close to it.
-    """
-    missing = np.flatnonzero(np.isnan(points).any(axis=1))
-    filled = points.copy()
-    filled[missing] = _intersected(project, ids, missing)
-    missing = missing[np.isnan(filled[missing]).any(axis=1)]
-    filled[missing] = _just_inside(project, ids, missing)
-    lost = [ids[j] for j in missing.tolist() if np.isnan(filled[j]).any()]
-    if lost:
-        raise GeometryError(remark("adjust.rays_lost", names=", ".join(lost[:8])))
-    return filled
-
-
-def _start_poses(
-    project: Project, plates: Sequence[str], ids: Sequence[str], plate_of: IntArray,
-    local: FloatArray,
-) -> tuple[Camera, ...]:  # fmt: skip
-    """Return the pose of each plate that fits its intersected points best.
-
-    Raises
-    ------
-    GeometryError
-        If neither three points of a plate can be intersected nor one camera sees enough of it, or
-        these lie on a line.
-    """
-    poses = []
-    for plate, label in enumerate(plates):
-        on = np.flatnonzero(plate_of == plate)
-        xyz = _intersected(project, ids, on)
-        good = np.isfinite(xyz).all(axis=1)
-        if good.sum() < 3:
-            poses.append(_pose_from_one(project, [ids[j] for j in on.tolist()], local[on], label))
-            continue
-        start = fit_similarity(local[on][good], xyz[good])
-        shift = start.target_centre - start.rotation @ start.source_centre
-        poses.append(Camera(centre=shift, rotation=start.rotation, principal_distance=1.0))
-    return tuple(poses)
-
-
-def _pose_from_one(project: Project, names: Sequence[str], local: FloatArray, label: str) -> Camera:
-    """Return the pose of a plate from the camera that sees most of it.
-
-    Raises
-    ------
-    GeometryError
-        If no camera sees enough of its points, or these give no pose.
-    """
-    image, _ = project.image_points.grid(project.camera_names, names)
-    finite: BoolArray = np.asarray(np.isfinite(image).all(axis=2))
-    k = int(finite.sum(axis=1).argmax())
-    if finite[k].sum() < FEWEST:
-        raise GeometryError(remark("adjust.plate_unseen", label=label, fewest=FEWEST))
-    try:
-        rotation, shift = plate_pose(
-            project.cameras[k], local[finite[k]], image[k, finite[k]], project.interface_of(k)
-        )
-        return Camera(centre=shift, rotation=rotation, principal_distance=1.0)
-    except (GeometryError, ConvergenceError, InputError) as error:
-        raise GeometryError(
-            f"adjust: plate {label}: camera {project.camera_names[k]} gives no start for its pose: "
-            f"{error}"
-        ) from None
-
-
-def _intersected(project: Project, ids: Sequence[str], which: IntArray) -> FloatArray:
-    """Return points intersected from the start orientations; NaN where that fails."""
-    if not which.size or len(project.cameras) < 2:
-        return np.full((which.size, 3), np.nan)
-    image, _ = project.image_points.grid(project.camera_names, [ids[j] for j in which.tolist()])
-    return intersect(project.cameras, image, project.interfaces).xyz
-
-
-def _just_inside(project: Project, ids: Sequence[str], which: IntArray) -> FloatArray:
-    """Return starts for points whose rays meet just before they enter the object's medium.
-
-    In the midst of where they enter, and a little on. NaN where they meet elsewhere.
-    """
-    cameras = project.cameras
-    image, _ = project.image_points.grid(project.camera_names, [ids[j] for j in which.tolist()])
-    rays = [image_rays(camera, points, project.interface_of(k))
-            for k, (camera, points) in enumerate(zip(cameras, image, strict=True))]  # fmt: skip
-    origins, directions = np.array(rays).transpose(1, 0, 2, 3)
-    centres = np.array([camera.centre for camera in cameras])
-    away = np.linalg.norm(origins - centres[:, None], axis=2)
-    meeting = nearest_points(list(origins), list(directions))
-    depth = ((meeting - origins) * directions).sum(axis=2)
-    count = np.isfinite(depth).sum(axis=0)
-    is_near = (np.abs(depth) <= _NEAR * away) | np.isnan(depth)
-    entries = np.nansum(origins + _INSIDE * away[..., None] * directions, axis=0)
-    entries[(count < 2) | ~is_near.all(axis=0)] = np.nan
-    return np.asarray(entries / np.maximum(count, 1)[:, None])
 
 
 def _adjustment(

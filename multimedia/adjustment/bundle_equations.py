@@ -113,6 +113,11 @@ class Bundle:
             hopeless=max(HOPELESS[0], HOPELESS[1] * nearest / finest), blame=self._worst,
         )  # fmt: skip
 
+    def weighted(self, weights: FloatArray) -> Bundle:
+        """Return the equations with robust weights of the image coordinates, shape (n, 2)."""
+        sigma = self.observations.sigma / np.sqrt(weights)
+        return replace(self, observations=replace(self.observations, sigma=sigma))
+
     def _worst(self, fitted: Fit[NetworkState]) -> str:
         """Return the camera, and the plate if any, whose image points fit worst."""
         observations = self.observations

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import f as fisher
 
-from multimedia.adjustment.bundle import bundle_adjust, prepare
+from multimedia.adjustment.bundle import bundle_adjust
 from multimedia.adjustment.bundle_equations import Bundle
+from multimedia.adjustment.bundle_start import prepare
 from multimedia.adjustment.interior_choice import choose_interior, with_interior
 from multimedia.adjustment.start_poses import with_poses
 from multimedia.adjustment.unknowns import AUTO, Unknowns

@@ -106,7 +106,7 @@ def _precision(result: Adjustment, say: Words) -> Iterator[Block]:
     )  # fmt: skip
     yield Paragraph(
         text=say(
-            "counts", images=int(np.isfinite(result.residuals[:, 0]).sum()),
+            "counts", images=int((result.weights[:, 0] > 0).sum()),
             cameras=len(project.cameras), unknowns=len(result.names), points=len(free),
             redundancy=result.redundancy, iterations=result.iterations,
         )

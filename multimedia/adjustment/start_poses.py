@@ -9,8 +9,9 @@ import numpy as np
 
 from multimedia.adjustment.unknowns import ScaleBar, Unknowns, bars_of
 from multimedia.orientation.camera_chains import stands_still
-from multimedia.orientation.relative_orientation import relative_orientation, without_strays
-from multimedia.projects.model import SHOWN, Project
+from multimedia.orientation.relative_orientation import relative_orientation
+from multimedia.orientation.stray_rays import names_of, stray_rows, without_rows
+from multimedia.projects.model import Project
 from multimedia.remarks import remark
 from photocore.errors import InputError
 
@@ -41,13 +42,13 @@ def with_poses(project: Project, unknowns: Unknowns) -> tuple[Project, tuple[str
         return replace(project, without_pose=()), ()
     distances = [(bar.first, bar.second, bar.length) for bar in bars_for(project, unknowns)]
     distances += [each for plate in unknowns.plates if (each := _across(project, plate))]
-    posed, strays = without_strays(relative_orientation(project, distances))
+    posed = relative_orientation(project, distances)
+    is_stray = stray_rows(posed, distances=distances)
     name = "bundle.posed_before_faces" if is_fixed else "bundle.posed_by_camera"
     remarks = [remark(name, count=len(distances))]
-    if strays:
-        shown = ", ".join(strays[:SHOWN]) + (" ..." if len(strays) > SHOWN else "")
-        remarks.append(remark("bundle.strays", count=len(strays), names=shown))
-    return posed, tuple(remarks)
+    if is_stray.any():
+        remarks.append(remark("bundle.strays", **names_of(posed.image_points, is_stray)))
+    return without_rows(posed, is_stray), tuple(remarks)
 
 
 def bars_for(project: Project, unknowns: Unknowns) -> tuple[ScaleBar, ...]:

@@ -82,8 +82,8 @@ class Unknowns:
         radius) and gradients (0.005 over the depth of the points) a prior where ``priors`` has
         none.
     robust : float or None
-        Huber's bound in standard deviations; observations beyond it lose weight. None: plain
-        least squares.
+        Huber's bound in standard deviations; observations beyond it lose weight, and image points
+        that contradict the others by far are left out and named. None: plain least squares.
     """
 
     fixed_cameras: tuple[str, ...] = ()

@@ -64,7 +64,8 @@ class BundleCommand:
     it.  [default: indices 0.005, thicknesses and radii a tenth, centres a tenth of the radius,
     gradients 0.005 over the depth of the points, others inf]"""
     robust: Annotated[float | None, Typed(POSITIVE, "K")] = None
-    """Huber weights beyond K standard deviations.  [default: plain least squares]"""
+    """Huber weights beyond K standard deviations; image points that contradict the others by far
+    are left out and named.  [default: plain least squares]"""
     diagnose: bool = False
     """Also try every extension of the model by one step and rank what would lower sigma0 most."""
     wavelength: Annotated[float | None, Typed(POSITIVE, "NM")] = None

@@ -104,6 +104,11 @@ def _misses(
     return np.concatenate([misses.ravel(), np.where(np.isfinite(errors), errors, _LOST)])
 
 
+def noise_as_angle(project: Project) -> float:
+    """Return the precision of an image coordinate as an angle. [rad]"""
+    return project.sigma_image / float(np.mean([c.principal_distance for c in project.cameras]))
+
+
 def all_misses(images: ImagesOfCameras, cameras: Sequence[Camera]) -> FloatArray:
     """Return the angles by which rays miss their points (m n 3), then errors of the distances."""
     return _misses(images, cameras, [object_rays(images, k, c) for k, c in enumerate(cameras)])

@@ -23,17 +23,18 @@ from multimedia.orientation.camera_chains import (
     straight_chains,
     straightened,
 )
-from multimedia.orientation.object_rays import image_rays, nearest_points
+from multimedia.orientation.object_rays import nearest_points
 from multimedia.orientation.ray_misses import (
     ImagesOfCameras,
     cost,
     images_with_distances,
+    noise_as_angle,
     object_rays,
     settled,
     typical_miss,
 )
 from multimedia.projects.camera_poses import FLIP
-from multimedia.projects.model import ImagePoints, Project
+from multimedia.projects.model import Project
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.camera.rotation import rotation_from_vector
@@ -48,8 +49,6 @@ _TRIED = 12
 #: Rays that miss the typical point by so many times what noise explains are right at once, and by
 #: so many sigmas of an image coordinate no start.
 _RIGHT, _WRONG = 1.5, 20.0
-#: Rays that miss their point by so many times what is typical are of other points.
-_STRAY = 15.0
 #: So many right starts of two cameras are compared.
 _OF_TWO = 4
 
@@ -92,7 +91,7 @@ def relative_orientation(project: Project, distances: Sequence[tuple[str, str, f
     rays = np.array([straightened(*each) for each in zip(
         images.cameras, images.image, images.media, strict=True)])  # fmt: skip
     few = images.few()
-    unit = _noise_of(project)
+    unit = noise_as_angle(project)
     least, views, right = np.inf, project.cameras, 0
     for start in _starts(project, images, few, straight_chains(rays, images, project.camera_names)):
         miss, settled = _brought_together(few, start, unit)
@@ -106,48 +105,6 @@ def relative_orientation(project: Project, distances: Sequence[tuple[str, str, f
         miss = least / unit * project.sigma_image
         raise GeometryError(remark("orient.no_poses", miss=miss, limit=_WRONG))
     return replace(project, cameras=_before_faces(few, views), without_pose=())
-
-
-def _noise_of(project: Project) -> float:
-    """Return the precision of an image coordinate as an angle. [rad]"""
-    return project.sigma_image / float(np.mean([c.principal_distance for c in project.cameras]))
-
-
-def without_strays(project: Project) -> tuple[Project, list[str]]:
-    """Return a project without image points whose rays miss the others' by far, and their names.
-
-    Of each point the ray that misses most goes first; the rest is looked at again.
-    """
-    points = project.image_points
-    image, _ = points.grid(project.camera_names, points.names)
-    rays = [image_rays(camera, measured, media) for camera, measured, media in
-            zip(project.cameras, image, project.interfaces, strict=True)]  # fmt: skip
-    origins, along = (np.array(parts) for parts in zip(*rays, strict=True))
-    strays: set[tuple[str, str]] = set()
-    noise = _noise_of(project)
-    for _ in project.cameras:
-        way = nearest_points(list(origins), list(along)) - origins
-        depth = np.einsum("mni,mni->mn", way, along)[..., None]
-        misses = np.linalg.norm(way - depth * along, axis=2) / np.linalg.norm(way, axis=2)
-        misses[np.isnan(misses)] = 0.0
-        worst = misses.argmax(axis=0)
-        # Where images are exact, what is typical is rounding and the start's own error.
-        typical = max(noise, float(np.median(misses[np.isfinite(image[..., 0])])))
-        far = np.flatnonzero(misses.max(axis=0) > _STRAY * typical)
-        if not len(far):
-            break
-        along[worst[far], far] = np.nan
-        strays |= {(project.camera_names[worst[n]], points.names[n]) for n in far.tolist()}
-    kept = [row for row, pair in enumerate(zip(points.cameras, points.ids, strict=True))
-            if pair not in strays]  # fmt: skip
-    rest = ImagePoints(
-        cameras=tuple(points.cameras[row] for row in kept),
-        ids=tuple(points.ids[row] for row in kept),
-        groups=tuple(points.groups[row] for row in kept),
-        image=points.image[kept], sigma=points.sigma[kept],
-    )  # fmt: skip
-    names = [f"{name} in {camera}" for camera, name in sorted(strays)]
-    return replace(project, image_points=rest), names
 
 
 def _starts(

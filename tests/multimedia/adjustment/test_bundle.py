@@ -26,7 +26,7 @@ from multimedia import (
     bundle_adjust,
     project,
 )
-from multimedia.adjustment.bundle import prepare
+from multimedia.adjustment.bundle_start import prepare
 
 INDICES = (1.0, 1.49, 1.3365)
 GLASS = 8.0
