@@ -148,10 +148,10 @@ def _start_points(project: Project, ids: Sequence[str], points: FloatArray) -> F
 
 
 def points_without_start(project: Project, fixed: Container[str]) -> set[str]:
-    """Return the names of new points whose rays meet nowhere from the start orientations."""
+    """Return the names of new points whose rays do not meet beyond the interface from the start."""
     rays = Counter(project.image_points.ids)
     names = [name for name, count in rays.items() if name not in fixed and count > 1]
-    places = _met(project, names)
+    places = _intersected(project, names)
     return {names[j] for j in np.flatnonzero(np.isnan(places[:, 0]))}
 
 

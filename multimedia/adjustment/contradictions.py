@@ -72,7 +72,7 @@ def contradicting_rows(project: Project, unknowns: Unknowns) -> BoolArray:
 
 
 def _startable(project: Project, fixed: set[str]) -> Project:
-    """Return a project without points whose rays meet nowhere from its cameras."""
+    """Return a project without points that would start at the surface and hold up all others."""
     lost = points_without_start(project, fixed)
     return without_rows(project, np.array([name in lost for name in project.image_points.ids]))
 
