@@ -166,11 +166,11 @@ def in_plane_frame(
     world = np.column_stack([xyz[:, :2], heights if has_height else xyz[:, 2]])
     notes: list[str] = []
     plain = [bare(table.headings.get(key, "")) for key in "XY"] == ["x", "y"]
-    if has_height and plain:
-        if table.columns["Y"] < table.columns["X"]:
-            world = world[:, [1, 0, 2]]
-        geodetic = table.columns["Y"] < table.columns["X"]
-        notes.append(remark(f"control.{'geodetic' if geodetic else 'x_is_east'}"))
+    is_geodetic = plain and table.columns["Y"] < table.columns["X"]
+    if is_geodetic:
+        world = world[:, [1, 0, 2]]
+    if is_geodetic or (has_height and plain):
+        notes.append(remark(f"control.{'geodetic' if is_geodetic else 'x_is_east'}"))
     whole = np.isfinite(world).all(axis=1)
     if frame is None:
         lies = lies_how(world[whole]) if whole.sum() > 2 else "line"

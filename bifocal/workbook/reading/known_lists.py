@@ -111,12 +111,10 @@ def _placed(
         if "H" not in have:
             world[:, 2], wall[:, 2] = wall[:, 2], np.nan
     elif "H" in have or np.nanmax(np.abs(wall), initial=0.0) > FARTHEST_WALL:
-        order = [0, 1]
-        if "H" in have:
-            is_geodetic = table.columns["Y_ref"] < table.columns["X_ref"]
-            order = [1, 0] if is_geodetic else order
+        is_geodetic = flat and table.columns["Y_ref"] < table.columns["X_ref"]
+        if is_geodetic or "H" in have:
             notes.append(remark(f"control.{'geodetic' if is_geodetic else 'x_is_east'}"))
-        world[:, :2] = wall[:, order]
+        world[:, :2] = wall[:, [1, 0] if is_geodetic else [0, 1]]
         world[:, 2] = np.where(np.isnan(world[:, 2]), wall[:, 2], world[:, 2])
         wall = np.full_like(wall, np.nan)
     return world, wall, notes

@@ -69,9 +69,10 @@ def test_a_frame_of_a_pair_reads_other_points_into_itself(tmp_path):
 
 def test_geodetic_order_and_x_y_z_of_an_upright_wall_are_understood(tmp_path):
     world = in_world(37.3)
-    control = read_control(written(tmp_path, world, "Punkt,Y,X,H"))
-    np.testing.assert_allclose(control.xyz, WALL, atol=2e-4)
-    assert any("Y is taken as east" in text for text in control.remarks)
+    for headings in ("Punkt,Y,X,H", "Punkt,Y,X,Z"):
+        control = read_control(written(tmp_path, world, headings))
+        np.testing.assert_allclose(control.xyz, WALL, atol=2e-4)
+        assert any("Y is taken as east" in text for text in control.remarks)
     control = read_control(written(tmp_path, world, "id,X,Y,Z"))
     np.testing.assert_allclose(control.xyz, WALL, atol=2e-4)
     places = read_control(written(tmp_path, world[:, [1, 0, 2]], "id,N,E,H"))

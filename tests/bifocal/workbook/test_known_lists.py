@@ -206,8 +206,11 @@ def test_heights_stay_beside_their_plan_whatever_both_are_called(tmp_path, headi
 def test_y_before_x_beside_a_height_is_geodetic_and_a_height_alone_no_place(tmp_path):
     lines = [(n, 1000 + x, 2000 - r, 50 + y) for n, x, y, r in WALL]
     path = fill(tmp_path / "s.xlsx", rows(WALL))
-    solved = bifocal.solve(path, control=listed(tmp_path / "g.csv", ("id", "Y", "X", "H"), lines))
-    np.testing.assert_allclose(solved.world, [line[1:] for line in lines], atol=1e-6)
+    for third in "HZ":
+        control = listed(tmp_path / "g.csv", ("id", "Y", "X", third), lines)
+        solved = bifocal.solve(path, control=control)
+        np.testing.assert_allclose(solved.world, [line[1:] for line in lines], atol=1e-6)
+        assert any("Y is taken as east" in text for text in solved.remarks)
     field = listed(tmp_path / "d.csv", ("Name", "Longitude", "Latitude", "Height"), lines)
     with pytest.raises(InputError, match=r'E, N is missing.*understood: "Longitude", "Latitude"'):
         bifocal.solve(path, control=field)
