@@ -9,6 +9,7 @@ from pathlib import Path, PurePath
 
 import numpy as np
 
+from bifocal.model.photo import FARTHEST_WALL
 from bifocal.model.world_frame import WorldFrame, frame_of, lies_how
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
@@ -162,7 +163,8 @@ def in_plane_frame(
     has_height = bool(np.isfinite(heights).any()) and not np.isfinite(xyz[:, 2]).any()
     is_space = bare(table.headings.get("r", "")).startswith("z") and not has_height
     if not (has_height or is_space):
-        return xyz, frame, strange_third(table)
+        is_far = np.nanmax(np.abs(xyz[:, :2]), initial=0.0) > FARTHEST_WALL
+        return xyz, frame, strange_third(table, in_plan=bool(is_far))
     world = np.column_stack([xyz[:, :2], heights if has_height else xyz[:, 2]])
     notes: list[str] = []
     plain = [bare(table.headings.get(key, "")) for key in "XY"] == ["x", "y"]
@@ -196,16 +198,21 @@ def lacks_axis(table: Table, path: Path | str, missing: str, option: str = "--co
 
 
 def strange_third(
-    table: Table, east: str = "X", thirds: Sequence[str] = ("r", "H"), option: str = "--columns"
+    table: Table,
+    east: str = "X",
+    thirds: Sequence[str] = ("r", "H"),
+    option: str = "--columns",
+    *,
+    in_plan: bool = False,
 ) -> list[str]:
     """Return a remark on a heading that is nearly one of heights or relief, where both are absent.
 
-    Beside E and N it is refused: without it all points would lie on one line or plane; whatever
-    numbers stand beside these are named.
+    Beside E and N, or X and Y `in_plan`, it is refused: without it all points would lie on one
+    line or plane; whatever numbers stand beside these are named.
     """
     if not table.present.isdisjoint(thirds):
         return []
-    in_plan = not bare(table.headings.get(east, "x")).startswith("x")
+    in_plan |= not bare(table.headings.get(east, "x")).startswith("x")
     strange = [text for text in table.strange if not _OF_TOOLS.search(text.casefold())]
     for heading in strange:
         parts = [bare(heading), *re.split(r"[\W\d_]+", heading.casefold())]

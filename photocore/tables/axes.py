@@ -1,4 +1,4 @@
-"""Words above coordinates and names, in English, Italian, German and French: one list for all.
+"""Words above coordinates and names, in fifteen languages of surveyors: one list for all.
 
 Case, blanks, punctuation and units do not matter (`photocore.tables.heading_words.bare`).
 """
@@ -12,11 +12,13 @@ NORTH = ("N", "north", "northing", "Nord", "Nordwert", "Hochwert", "ordonnée", 
 HEIGHT = ("H", "height", "elevation", "elev", "altitude", "alt", "Höhe", "Hoehe", "Kote", "quota",
           "altezza", "altitudine", "hauteur", "cote", "cota", "altura", "RL", "reduced level",
           "NHN", "orthometric height", "ortho height", "ortho hgt", "quota ortometrica", "hgt",
-          "el", "geo_z")  # fmt: skip
+          "el", "geo_z", "hoogte", "výška", "wysokość", "rzędna", "magasság", "höjd", "højde",
+          "høyde", "korkeus", "visina", "kota", "altitud", "înălțime")  # fmt: skip
 NAMES = ("point", "name", "punto", "punkt", "nr", "no", "number", "label", "marker", "gcp", "pt",
          "pnt", "point id", "point no", "point number", "Punktnummer", "Punkt-Nr", "Pkt", "nome",
          "nome punto", "numero punto", "matricule", "nom", "no de point", "GCP name", "GCP label",
-         "Bezeichnung")  # fmt: skip
+         "Bezeichnung", "číslo bodu", "bod", "nr punktu", "punt", "ponto", "pont", "pontszám",
+         "piste", "točka", "punktnummer")  # fmt: skip
 #: Of the photo in which a row's pixel lies.
 PHOTOS = (
     "image",

@@ -7,6 +7,7 @@ import unicodedata
 from collections.abc import Sequence
 from functools import lru_cache
 
+from photocore.tables.axes import EAST, HEIGHT, NORTH
 from photocore.tables.numbers import GRAD, UNITS, unit_symbol
 
 _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
@@ -25,6 +26,11 @@ _DATUM = re.compile(
 _PREFIX = re.compile(
     r"^\W*(?:coord(?:inat[ea])?|koordinate|grid|point|local)[\s_.]+(?=\w)", re.IGNORECASE
 )
+#: Begins a heading of what coordinates are worth.
+_PRECISION = re.compile(r"\W*(?:accuracy|precision|error|sigma|std|rms)", re.IGNORECASE)
+#: An axis named by its letter and, in round brackets, by its direction, which counts.
+_DIRECTED = re.compile(r"\s*[XYZ]\s*\(\s*(\w+)\s*\)\s*", re.IGNORECASE)
+_DIRECTIONS = frozenset(word.casefold() for word in (*EAST, *NORTH, *HEIGHT) if len(word) > 2)
 #: Units people measure in that no command takes.
 _FOREIGN = frozenset(
     (*GRAD, "in", "inch", "inches", "yd", "yard", "yards", "mi", "mile", "miles",
@@ -86,9 +92,16 @@ def numbered(text: str, digit: str) -> str:
 
 
 def forms_of(variants: Sequence[str]) -> list[str]:
-    """Return the bare forms a heading may be known by, the strictest first."""
+    """Return the bare forms a heading may be known by, the strictest first.
+
+    >>> forms_of(["x1 [mm]"]), forms_of(["X (North)"])
+    (['x1'], ['north'])
+    """
     forms = []
     for text in variants:
+        directed = _DIRECTED.fullmatch(text)
+        if directed and directed[1].casefold() in _DIRECTIONS:
+            text = directed[1]
         form = bare(text)
         if form and form not in forms:
             forms.append(form)
@@ -103,8 +116,10 @@ def parts_of(text: str) -> set[str]:
 
     >>> sorted(parts_of("X/Easting")), parts_of("Höhe m ü. NN"), parts_of("Point Elevation [m]")
     (['easting', 'x'], {'höhe'}, {'elevation'})
+    >>> parts_of("Accuracy_X/Y/Z_(m)")
+    set()
     """
     whole = _UNIT.sub("", text).strip()
-    sides = whole.split("/") if "/" in whole else []
+    sides = whole.split("/") if whole.count("/") == 1 and not _PRECISION.match(whole) else []
     plain = _PREFIX.sub("", _DATUM.sub("", whole))
     return {bare(part) for part in (*sides, plain)} - {"", bare(text)}

@@ -75,8 +75,11 @@ def test_geodetic_order_and_x_y_z_of_an_upright_wall_are_understood(tmp_path):
         assert any("Y is taken as east" in text for text in control.remarks)
     control = read_control(written(tmp_path, world, "id,X,Y,Z"))
     np.testing.assert_allclose(control.xyz, WALL, atol=2e-4)
-    places = read_control(written(tmp_path, world[:, [1, 0, 2]], "id,N,E,H"))
-    np.testing.assert_allclose(places.xyz, WALL, atol=2e-4)
+    for headings in ("id,N,E,H", "Pkt,X (North),Y (East),Hoogte"):
+        places = read_control(written(tmp_path, world[:, [1, 0, 2]], headings))
+        np.testing.assert_allclose(places.xyz, WALL, atol=2e-4)
+    with pytest.raises(InputError, match='"Hoogtemaat" is not understood'):
+        read_control(written(tmp_path, world, "id,X,Y,Hoogtemaat"))
 
 
 def test_x_y_r_and_e_n_alone_are_read_as_they_stand(tmp_path):
