@@ -11,6 +11,7 @@ from openpyxl.workbook.defined_name import DefinedName
 
 from bifocal.workbook.making import book as making
 from tests.bifocal.workbook.test_cli_solve import form, run
+from tests.bifocal.workbook.test_cli_solve import solved as answered
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached
 
 GIVEN = ("--d1", "17.5", "--d2", "9.5", "--c1", "35", "--c2", "19")
@@ -164,9 +165,8 @@ def test_what_stands_above_the_coordinates_tells_the_far_photo(
     heads, picks = ("Point", *("x [mm]", "y [mm]") * 2), FAR + NEAR if is_far else NEAR + FAR
     words = (None, above[0], None, above[1], None)
     path = own_book(tmp_path / "own.xlsx", words, heads=heads, picks=picks)
-    told = solved(path, *GIVEN)
-    sheet = openpyxl.load_workbook(path, data_only=True).active
-    assert sheet["F3"].value == pytest.approx(1)
+    answer, told = answered(path, *GIVEN)
+    assert answer["points"][0]["r"] == pytest.approx(1)
     assert ('"Anna" is taken for the far photo' in told) == (above[0] == "Anna")
     assert ("far photo (long lens)" in told) == (above[0] == "Anna")
 
