@@ -199,7 +199,10 @@ def rendered(shot, relief: ReliefMap) -> dict[str, float]:
     picture, photo, places, took = drawn(shot.pair, images, relief, shot.truth.grid)
     measured = relief.quality == 1
     figures = wrong(shot, picture, photo, places) | looks(picture, photo)
-    return figures | {"tears m": tears(photo, places, measured, picture.gsd), "CPU s": took}
+    figures["tears m"] = tears(photo, places, measured, picture.gsd)
+    far = cv2.cvtColor(shot.image1, cv2.COLOR_RGB2GRAY)
+    figures["bent %"] = bent_lines(shot.pair, far, picture, photo, places[0])
+    return figures | {"CPU s": took}
 
 
 def real(pair_file: Path, relief_file: Path, points: Path) -> dict[str, float]:
