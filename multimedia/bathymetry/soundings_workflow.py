@@ -125,6 +125,7 @@ def _other_datum(sounded: FloatArray, height: FloatArray, level: FloatArray) -> 
     readings = {
         "soundings.depths": level - sounded,
         "soundings.negative_depths": level + sounded,
+        "soundings.mirrored": 2.0 * level - sounded,
         "soundings.feet": 0.3048 * sounded,
     }
     misfit = float(np.nanmedian(np.abs(sounded - height)))
