@@ -215,7 +215,7 @@ def test_soundings_tell_a_wrong_index_from_a_wrong_level_by_depth(tmp_path: Path
     [
         (lambda z: 102.4 - z, "SOUNDINGS ARE DEPTHS"),
         (lambda z: z - 102.4, "SOUNDINGS COUNT FROM THE WATER"),
-        (lambda z: 2 * 102.4 - z, "DEPTHS WERE ADDED to the water level"),
+        (lambda z: 2 * 102.4 - z, "SOUNDINGS ARE WATER LEVEL PLUS DEPTH"),
         (lambda z: z / 0.3048, "SOUNDINGS LOOK LIKE FEET"),
         (lambda z: z, ""),
         (lambda z: z + 2.0, ""),
