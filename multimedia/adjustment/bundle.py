@@ -8,7 +8,7 @@ import numpy as np
 
 from multimedia.adjustment.bundle_equations import Bundle
 from multimedia.adjustment.bundle_start import prepare
-from multimedia.adjustment.contradictions import contradicting_rows
+from multimedia.adjustment.contradictions import SETTLED, contradicting_rows, with_weights
 from multimedia.adjustment.interior_choice import choose_interior, with_interior
 from multimedia.adjustment.media_unknowns import WITH_VALUE
 from multimedia.adjustment.plausibility import (
@@ -164,10 +164,10 @@ def _adjusted(project: Project, unknowns: Unknowns) -> Adjustment:
         assert unknowns.robust is not None
         plain = fitted.residuals[: weights.size].reshape(-1, 2) / np.sqrt(weights)
         new = huber_weights(plain, unknowns.robust)
-        if np.abs(new - weights).max() < 1e-3:
+        if np.abs(new - weights).max() < SETTLED:
             break
-        weights = new
-        fitted = bundle.weighted(weights).network.solve(fitted.state)
+        state, weights = with_weights(bundle, fitted.state, unknowns.robust)
+        fitted = bundle.weighted(weights).network.solve(state)
         bundle, fitted = _balanced(bundle, fitted, weights)
     result = _adjustment(bundle, fitted, weights, remarks)
     refuse_impossible_media(bundle.project, columns, result, unknowns.priors)

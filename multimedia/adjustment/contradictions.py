@@ -21,6 +21,8 @@ from photocore.arrays import BoolArray, FloatArray
 #: So many times image points are left out and the rest adjusted; so often, and for so many steps,
 #: are weights laid anew until that is done.
 _ROUNDS, _WEIGHTINGS, _STEPS = 6, 6, 20
+#: Weights that change less are settled.
+SETTLED = 1e-3
 #: Huber's bound on the way there, in standard deviations.
 _BOUND = 2.5
 #: Where more than this share contradicts, it is not single image points that are wrong.
@@ -62,7 +64,7 @@ def contradicting_rows(project: Project, unknowns: Unknowns) -> BoolArray:
             break
         is_stray = now
         bundle, _ = prepare(_startable(without_rows(project, is_stray), fixed), unknowns)
-        state = _robust_state(bundle)
+        state, _ = with_weights(bundle, bundle.start, _BOUND)
         posed = replace(
             project, cameras=tuple(state.blocks["camera"].values()), media=state.blocks["media"]
         )
@@ -101,21 +103,26 @@ def _equations(network: Network, state: NetworkState) -> Linear | None:
     return _NormalEquations(residuals=linear.residuals, jacobian=linear.jacobian, free=linear.free)
 
 
-def _robust_state(bundle: Bundle) -> NetworkState:
-    """Return where the weighted square sum is smallest when no image point may do much."""
-    state, count = bundle.start, bundle.observations.image.size
-    sigma = bundle.observations.sigma
+def with_weights(
+    bundle: Bundle, state: NetworkState, bound: float
+) -> tuple[NetworkState, FloatArray]:
+    """Return where the square sum with Huber's weights is smallest, and these weights, (n, 2)."""
+    count, sigma = bundle.observations.image.size, bundle.observations.sigma
+    weights = np.zeros_like(sigma)
     for _ in range(_WEIGHTINGS):
         linear = bundle.network.equations(state)
         if linear is None:
             break
-        weights = huber_weights(linear.residuals[:count].reshape(sigma.shape), _BOUND)
+        before = weights
+        weights = huber_weights(linear.residuals[:count].reshape(sigma.shape), bound)
+        if np.abs(weights - before).max() < SETTLED:
+            break
         network = bundle.weighted(weights).network
         state = minimise(
-            state, partial(_equations, network), network.advance, most=_STEPS, settle=1e-3,
+            state, partial(_equations, network), network.advance, most=_STEPS, settle=1e-4,
             rounding=network.rounding,
         ).state  # fmt: skip
-    return state
+    return state, weights
 
 
 def _in_order(places: dict[str, FloatArray], names: tuple[str, ...]) -> FloatArray:
