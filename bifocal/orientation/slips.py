@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
+from bifocal.files.exif_judge import is_odd
 from bifocal.model.hypotheses import COORDINATES, picks_meant
 from bifocal.model.interior_orientation import Cameras, Interiors
 from bifocal.orientation.control_points import Control, SiteMeasures
@@ -85,8 +86,10 @@ def slip_of(
     if not fits:
         tables += _of_control(typed, now) if by_control else _of_site(typed)
     explaining = _explaining([*lenses, *tables], fitted, now)
-    if not explaining and not fits:
+    if not explaining and (not fits or _may_be_parts(typed, now)):
         explaining = _explaining(_of_crops(typed, by_control=by_control), fitted, now)
+        if fits:
+            explaining = [one for one in explaining if one[0] < now.misfit]
     if not explaining and tables and by_control and len(typed.control.ids) > 5:
         # Two at once, of a lens and of the table.
         both = (
@@ -164,6 +167,12 @@ def _of_lenses(typed: TypedOrientation, *, free: bool) -> Iterator[Slip]:
         loose = replace(first, sigma_focal=0.5), replace(second, sigma_focal=0.5)
         words = remark("slips.focals_contradict", first=first.source, second=second.source)
         yield Slip(meant=replace(typed, interiors=loose), words=words, handicap=SLIPS.clearly)
+
+
+def _may_be_parts(typed: TypedOrientation, now: TrialOrientation | None) -> bool:
+    """Whether photos that seem to fit may be cropped: by their shapes, or as points miss a bit."""
+    sizes = {tuple(sorted(i.image_size)) for i in typed.interiors}
+    return len(sizes) > 1 or any(map(is_odd, sizes)) or (now is not None and now.misfit > 1)
 
 
 def _of_crops(typed: TypedOrientation, *, by_control: bool) -> Iterator[Slip]:

@@ -318,21 +318,32 @@ def test_what_the_photos_show_decides_between_slips_that_fit_alike(
     assert made.exchanged == near_first
 
 
-def test_photos_cropped_alike_are_taken_as_parts_of_larger_ones() -> None:
-    cut, size = np.array([220.0, 150.0]), (SIZE[0] - 220, SIZE[1] - 150)
+@pytest.mark.parametrize(
+    ("cuts", "said"),
+    [
+        (((220, 150), (220, 150)), "Both photos fit as parts cut out of larger ones"),
+        # So little misses by what control may, but no camera gives such a shape.
+        (((0, 0), (100, 0)), "cut out of"),
+        (((0, 0), (0, 0)), ""),
+    ],
+)
+def test_cropped_photos_are_taken_as_parts_of_larger_ones(cuts, said) -> None:
     points = control(xyz=np.concatenate([POINTS, POINTS * [0.7, 0.8, 1.0] + [0.2, 0.1, 0.12]]))
-    points = replace(points, pixels1=points.pixels1 - cut, pixels2=points.pixels2 - cut)
+    picks = [p - cut for p, cut in zip((points.pixels1, points.pixels2), cuts, strict=True)]
+    points = replace(points, pixels1=picks[0], pixels2=picks[1])
     typed = [
         replace(
             p, interior=Interior.from_focal(
-                cam.matrix[0, 0], image_size=size, sigma=0.02, source="EXIF",
-                pixel_size=SENSOR / SIZE[0],
+                cam.matrix[0, 0], image_size=(SIZE[0] - cut[0], SIZE[1] - cut[1]), sigma=0.02,
+                source="EXIF", pixel_size=SENSOR / SIZE[0],
             ),
         )
-        for p, cam in zip(photos(), OBLIQUE, strict=True)
+        for p, cam, cut in zip(photos(), OBLIQUE, cuts, strict=True)
     ]  # fmt: skip
     made = orient_pair((typed[0], typed[1]), control=points, site=SiteMeasures())
-    assert "Both photos fit as parts cut out of larger ones" in made.remarks[0]
+    parts = [text for text in made.remarks if "cut out of" in text]
+    assert bool(parts) == bool(said)
+    assert said in "".join(parts)
     assert made.observations.pick_used.all()
     assert off(made) < 0.02
 
