@@ -11,7 +11,12 @@ from bifocal.orientation.adjustment.pair_observations import PairObservations
 from bifocal.orientation.alignment import make_alignment
 from bifocal.orientation.approximate_orientation import Given
 from bifocal.orientation.orientation_remarks import hopeless_shape, model_remarks
-from bifocal.orientation.slips import slip_of
+from bifocal.orientation.slips import (
+    TrialOrientation,
+    TypedOrientation,
+    _may_be_parts,
+    slip_of,
+)
 from bifocal.orientation.validation import check_units
 from bifocal.orientation.walls.wall_shape import WallShape, shape_in_words
 from tests.bifocal.orientation.layered_wall import SIZE, camera
@@ -346,6 +351,26 @@ def test_cropped_photos_are_taken_as_parts_of_larger_ones(cuts, said) -> None:
     assert said in "".join(parts)
     assert made.observations.pick_used.all()
     assert off(made) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("size", "near", "misfit", "asked"),
+    [
+        (SIZE, SIZE, 0.5, False),
+        (SIZE, SIZE, 1.2, True),
+        (SIZE, (SIZE[0] // 2, SIZE[1] // 2), 0.5, True),
+        ((SIZE[0], SIZE[0] - 400), (SIZE[0], SIZE[0] - 400), 0.5, True),
+    ],
+)
+def test_shape_size_or_misfit_ask_whether_photos_were_cropped(size, near, misfit, asked) -> None:
+    interiors = tuple(
+        replace(p.interior, image_size=s)
+        for p, s in zip(photos(), (size, near), strict=True)
+        if p.interior
+    )
+    typed = TypedOrientation(interiors=interiors, control=control(), site=SiteMeasures())
+    trial = TrialOrientation(misfit=misfit, cameras=OBLIQUE, lost=np.zeros(9, bool))
+    assert _may_be_parts(typed, trial) == asked
 
 
 def test_a_tape_in_feet_is_named_where_lens_and_control_agree() -> None:

@@ -246,6 +246,12 @@ def test_named_values_are_found_by_name_and_by_label(book):
     assert str(values.error("d_2", "too near.")) == "survey.xlsx › Sheet1!D3 (d_2): too near."
 
 
+def test_what_stands_before_a_label_is_not_its_value(book):
+    wanted = [Column("project", kind="text"), Column("d_2")]
+    values = read_named_values(book([("north wall", "project"), ("d_2", 9.5)]), wanted)
+    assert values.text("project") == ""
+
+
 def test_a_missing_required_value_is_named(book):
     with pytest.raises(InputError, match=r"survey.xlsx › Setup: no value for c_1"):
         read_named_values(book([("x", 1)]), [Column("c_1", required=True)], sheet="Setup")
