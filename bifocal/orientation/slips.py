@@ -88,7 +88,7 @@ def slip_of(
     explaining = _explaining([*lenses, *tables], fitted, now)
     if not explaining and (not fits or _may_be_parts(typed, now)):
         explaining = _explaining(_of_crops(typed, by_control=by_control), fitted, now)
-        if fits:
+        if now is not None and fits:
             explaining = [one for one in explaining if one[0] < now.misfit]
     if not explaining and tables and by_control and len(typed.control.ids) > 5:
         # Two at once, of a lens and of the table.
@@ -171,8 +171,9 @@ def _of_lenses(typed: TypedOrientation, *, free: bool) -> Iterator[Slip]:
 
 def _may_be_parts(typed: TypedOrientation, now: TrialOrientation | None) -> bool:
     """Whether photos that seem to fit may be cropped: by their shapes, or as points miss a bit."""
-    sizes = {tuple(sorted(i.image_size)) for i in typed.interiors}
-    return len(sizes) > 1 or any(map(is_odd, sizes)) or (now is not None and now.misfit > 1)
+    sizes = [i.image_size for i in typed.interiors]
+    differ = sorted(sizes[0]) != sorted(sizes[1])
+    return differ or any(map(is_odd, sizes)) or (now is not None and now.misfit > 1)
 
 
 def _of_crops(typed: TypedOrientation, *, by_control: bool) -> Iterator[Slip]:
