@@ -6,11 +6,7 @@ import openpyxl
 import pytest
 from openpyxl.chart import BarChart, Reference
 
-from tests.bifocal.workbook.test_cli_solve import (
-    POINTS,
-    rows,
-    run,
-)
+from tests.bifocal.workbook.filled_forms import POINTS, rows, run
 from tests.bifocal.workbook.test_survey_workbook import parts
 
 TABLE = "\n".join(["id,x1,y1,x2,y2", *(",".join(map(str, row)) for row in rows(POINTS))])

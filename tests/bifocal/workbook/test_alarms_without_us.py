@@ -9,7 +9,7 @@ import numpy as np
 import openpyxl
 import pytest
 
-from tests.bifocal.workbook.test_cli_solve import fill, named, rows, run
+from tests.bifocal.workbook.filled_forms import fill, named, rows, run
 from tests.recalculate import recalculated, rows_of
 
 pytestmark = [pytest.mark.office, pytest.mark.acceptance]

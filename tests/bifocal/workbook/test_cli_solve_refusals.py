@@ -8,20 +8,19 @@ import numpy as np
 import openpyxl
 import pytest
 
-from tests.bifocal.workbook.test_cli_solve import (
+from tests.bifocal.workbook.filled_forms import (
     POINTS,
     SETUP,
     by_id,
     fill,
-    pixel_rows,
     put,
     refused,
     rows,
     run,
     solved,
     write_csv,
-    write_pair,
 )
+from tests.bifocal.workbook.test_cli_solve import pixel_rows, write_pair
 
 
 def edited(path, change):

@@ -7,9 +7,9 @@ from pathlib import Path
 import openpyxl
 import pytest
 
+from tests.bifocal.workbook.filled_forms import POINTS, run, write_csv
 from tests.bifocal.workbook.kept_workbook import DISTANCES, TABLE
 from tests.bifocal.workbook.test_cells_are_calculated import assert_stored_is_calculated
-from tests.bifocal.workbook.test_cli_solve import POINTS, run, write_csv
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached
 
 

@@ -14,7 +14,7 @@ from bifocal.equations import plane_coordinates, relief_displacement
 from bifocal.precision import sigma_relief
 from bifocal.workbook.formulas.columns import FUNCTIONS
 from bifocal.workbook.template_workflow import write_template
-from tests.bifocal.workbook.test_cli_solve import fill, run
+from tests.bifocal.workbook.filled_forms import fill, run
 from tests.recalculate import recalculated
 from tests.workbook_lint import lint
 

@@ -11,7 +11,7 @@ import pytest
 import bifocal
 from bifocal import Pair
 from multimedia import InputError, WorkbookError
-from tests.bifocal.workbook.test_cli_solve import POINTS, fill, rows, run
+from tests.bifocal.workbook.filled_forms import POINTS, fill, rows, run
 from tests.recalculate import rows_of
 
 WALL = [*POINTS, ("P5", 3, 2.5, 0.2), ("P6", -2, -2.2, 0.6)]

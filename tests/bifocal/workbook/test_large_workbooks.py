@@ -19,7 +19,7 @@ from bifocal.workbook.content import SPARE_ROWS
 from bifocal.workbook.making import book
 from bifocal.workbook.template_workflow import MOST_ROWS, write_survey, write_template
 from photocore.workbook.reading import package
-from tests.bifocal.workbook.test_cli_solve import POINTS, fill, rows, run
+from tests.bifocal.workbook.filled_forms import POINTS, fill, rows, run
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached
 
 

@@ -11,7 +11,7 @@ from bifocal import InputError, Measuring, SurveySetup, Taking, solve
 from bifocal.survey.survey_lens import SurveyLens
 from bifocal.workbook.output import write_result
 from bifocal.workbook.pair_workflow import read_pair
-from tests.bifocal.workbook.test_cli_solve import SETUP, fill, put
+from tests.bifocal.workbook.filled_forms import SETUP, fill, put
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached
 from tests.cases import few_by_default
 from tests.recalculate import recalculated, rows_of

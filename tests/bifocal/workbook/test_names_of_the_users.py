@@ -10,8 +10,8 @@ import pytest
 from openpyxl.workbook.defined_name import DefinedName
 
 from bifocal.workbook.making import book as making
-from tests.bifocal.workbook.test_cli_solve import form, run
-from tests.bifocal.workbook.test_cli_solve import solved as answered
+from tests.bifocal.workbook.filled_forms import form, run
+from tests.bifocal.workbook.filled_forms import solved as answered
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached
 
 GIVEN = ("--d1", "17.5", "--d2", "9.5", "--c1", "35", "--c2", "19")

@@ -12,7 +12,7 @@ from bifocal import InputError, Measuring, Photo, PhotoSet, PointObservations, T
 from bifocal.survey.other_photos import CHANCE, of_all_photos
 from bifocal.survey.setup import OtherPhoto, SurveySetup
 from bifocal.workbook.template_workflow import write_template
-from tests.bifocal.workbook.test_cli_solve import SETUP, fill, named, run
+from tests.bifocal.workbook.filled_forms import SETUP, fill, named, run
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached
 
 #: Principal distances [mm] and distances [m] of the photos, the last not quite to scale.

@@ -6,7 +6,8 @@ import openpyxl
 import pytest
 from openpyxl.worksheet.dimensions import ColumnDimension
 
-from tests.bifocal.workbook.test_cli_solve import DISTANCES, run
+from tests.bifocal.workbook.filled_forms import run
+from tests.bifocal.workbook.test_cli_solve import DISTANCES
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached
 from tests.workbook_lint import lint
 

@@ -14,8 +14,8 @@ from bifocal import Pair, Taking, solve
 from bifocal.workbook.pair_workflow import read_pair
 from bifocal.workbook.reading.pick_lists import read_picks
 from multimedia import InputError
-from tests.bifocal.workbook.test_cli_solve import fill as fill_form
-from tests.bifocal.workbook.test_cli_solve import put
+from tests.bifocal.workbook.filled_forms import fill as fill_form
+from tests.bifocal.workbook.filled_forms import put
 from tests.builders.commands import bifocal_command as main
 from tests.papers.test_midulla_layout import NADIR, SIZE, fill, pixels, truth
 

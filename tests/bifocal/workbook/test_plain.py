@@ -10,7 +10,7 @@ import openpyxl
 import pytest
 
 from bifocal.workbook.making.book import write_book
-from tests.bifocal.workbook.test_cli_solve import fill, rows, run
+from tests.bifocal.workbook.filled_forms import fill, rows, run
 from tests.bifocal.workbook.test_survey_workbook import (
     assert_recalculated_equals_cached,
     ideal_content,

@@ -6,7 +6,7 @@ import numpy as np
 import openpyxl
 import pytest
 
-from tests.bifocal.workbook.test_cli_solve import POINTS, by_id, fill, run, solved
+from tests.bifocal.workbook.filled_forms import POINTS, by_id, fill, run, solved
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached
 
 NAMES = tuple(name for name, *_ in POINTS)

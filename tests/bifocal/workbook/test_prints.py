@@ -19,8 +19,8 @@ from bifocal import (
 )
 from bifocal.collimation.workbook.setup import completed, typed_setup
 from bifocal.workbook.reading.reader import read_survey
+from tests.bifocal.workbook.filled_forms import POINTS, fill, refused, rows, run, write_csv
 from tests.bifocal.workbook.kept_workbook import DISTANCES
-from tests.bifocal.workbook.test_cli_solve import POINTS, fill, refused, rows, run, write_csv
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached
 from tests.cases import few_by_default
 

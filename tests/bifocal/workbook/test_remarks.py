@@ -6,16 +6,8 @@ import numpy as np
 import openpyxl
 import pytest
 
-from tests.bifocal.workbook.test_cli_solve import (
-    POINTS,
-    fill,
-    pixel_rows,
-    rows,
-    run,
-    solved,
-    write_csv,
-    write_pair,
-)
+from tests.bifocal.workbook.filled_forms import POINTS, fill, rows, run, solved, write_csv
+from tests.bifocal.workbook.test_cli_solve import pixel_rows, write_pair
 
 WORLD = [(name, 1000 + x, 2000 - r, 50 + y) for name, x, y, r in POINTS]
 

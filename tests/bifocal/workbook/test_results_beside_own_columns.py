@@ -9,6 +9,7 @@ import numpy as np
 import openpyxl
 import pytest
 
+from tests.bifocal.workbook.filled_forms import POINTS, fill, named, rows, run, write_csv
 from tests.bifocal.workbook.kept_workbook import (
     DISTANCES,
     TABLE,
@@ -17,16 +18,7 @@ from tests.bifocal.workbook.kept_workbook import (
     solved_in_place,
     with_own_chart,
 )
-from tests.bifocal.workbook.test_cli_solve import (
-    POINTS,
-    fill,
-    named,
-    pixel_rows,
-    rows,
-    run,
-    write_csv,
-    write_pair,
-)
+from tests.bifocal.workbook.test_cli_solve import pixel_rows, write_pair
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached, parts
 from tests.recalculate import recalculated
 

@@ -21,7 +21,7 @@ from PIL import Image as Picture
 
 from bifocal import Taking, solve
 from bifocal.workbook.output import write_result
-from tests.bifocal.workbook.test_cli_solve import POINTS, rows
+from tests.bifocal.workbook.filled_forms import POINTS, rows
 from tests.bifocal.workbook.test_survey_workbook import parts
 
 MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"

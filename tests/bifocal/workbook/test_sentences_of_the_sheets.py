@@ -11,8 +11,8 @@ import pytest
 from bifocal import KnownPoints, PointObservations
 from bifocal.survey.taped import TapedDistance
 from bifocal.workbook.making.book import build
+from tests.bifocal.workbook.filled_forms import SETUP, fill, rows, run
 from tests.bifocal.workbook.test_alarms_without_us import WALL, typed, world
-from tests.bifocal.workbook.test_cli_solve import SETUP, fill, rows, run
 from tests.bifocal.workbook.test_survey_workbook import ideal_content, named, pair_content
 from tests.recalculate import recalculated
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import openpyxl
 import pytest
 
-from tests.bifocal.workbook.test_cli_solve import POINTS, fill, run
+from tests.bifocal.workbook.filled_forms import POINTS, fill, run
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached
 
 ROW, COLUMN = 5, 17

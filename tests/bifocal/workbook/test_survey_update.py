@@ -14,7 +14,7 @@ from bifocal.workbook.formulas.columns import FORMULAS, results_columns
 from bifocal.workbook.making import book as making
 from bifocal.workbook.template_workflow import write_template
 from tests.bare_workbook import parts, with_parts
-from tests.bifocal.workbook.test_cli_solve import POINTS, SETUP, fill, put, rows, run, write_csv
+from tests.bifocal.workbook.filled_forms import POINTS, SETUP, fill, put, rows, run, write_csv
 from tests.bifocal.workbook.test_survey_workbook import (
     assert_recalculated_equals_cached,
     named,

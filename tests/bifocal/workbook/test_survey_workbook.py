@@ -39,7 +39,7 @@ from bifocal.workbook.making.book import write_book
 from bifocal.workbook.template_workflow import write_template
 from multimedia import InputError
 from tests.bare_workbook import parts
-from tests.bifocal.workbook.test_cli_solve import fill, named
+from tests.bifocal.workbook.filled_forms import fill, named
 from tests.recalculate import recalculated, rows_of
 from tests.workbook_lint import lint
 

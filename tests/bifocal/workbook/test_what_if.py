@@ -13,7 +13,7 @@ from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.formulas.columns import CHANGED
 from bifocal.workbook.making.book import build, write_book
 from bifocal.workbook.template_workflow import write_template
-from tests.bifocal.workbook.test_cli_solve import SETUP, fill, named, run
+from tests.bifocal.workbook.filled_forms import SETUP, fill, named, run
 from tests.bifocal.workbook.test_survey_workbook import (
     assert_recalculated_equals_cached,
     ideal_content,

@@ -15,7 +15,8 @@ from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.making.book import build
 from bifocal.workbook.template_workflow import write_template
 from bifocal.workbook.words import WORDS
-from tests.bifocal.workbook.test_cli_solve import DISTANCES, as_file, fill, form, named, rows, run
+from tests.bifocal.workbook.filled_forms import fill, form, named, rows, run
+from tests.bifocal.workbook.test_cli_solve import DISTANCES, as_file
 from tests.bifocal.workbook.test_survey_workbook import ideal_content, pair_content, parts, written
 from tests.cases import few_by_default
 from tests.recalculate import recalculated

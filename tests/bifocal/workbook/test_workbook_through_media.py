@@ -29,8 +29,8 @@ from bifocal.workbook.pair_workflow import read_pair
 from bifocal.workbook.template_workflow import write_survey, write_template
 from multimedia import GeometryError, InputError, WorkbookError
 from tests.bifocal.model.test_pair_through_media import AQUARIUM, POINTS, SURFACE, content
-from tests.bifocal.workbook.test_cli_solve import fill as fill_form
-from tests.bifocal.workbook.test_cli_solve import named
+from tests.bifocal.workbook.filled_forms import fill as fill_form
+from tests.bifocal.workbook.filled_forms import named
 from tests.bifocal.workbook.test_solve_through_media import measured
 from tests.bifocal.workbook.test_survey_workbook import (
     assert_recalculated_equals_cached,

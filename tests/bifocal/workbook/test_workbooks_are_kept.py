@@ -10,6 +10,7 @@ import numpy as np
 import openpyxl
 import pytest
 
+from tests.bifocal.workbook.filled_forms import SETUP, fill, named, rows, run, write_csv
 from tests.bifocal.workbook.kept_workbook import (
     DISTANCES,
     TABLE,
@@ -18,15 +19,7 @@ from tests.bifocal.workbook.kept_workbook import (
     solved_in_place,
     with_own_chart,
 )
-from tests.bifocal.workbook.test_cli_solve import (
-    SETUP,
-    fill,
-    named,
-    rows,
-    run,
-    write_csv,
-    write_pair,
-)
+from tests.bifocal.workbook.test_cli_solve import write_pair
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached, parts
 from tests.recalculate import recalculated
 
