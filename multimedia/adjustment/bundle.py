@@ -81,7 +81,7 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
         return replace(result, remarks=(*posed, *result.remarks))
     if unknowns.robust is None:
         try:
-            return _with_doubts(_as_chosen(project, unknowns), unknowns)
+            return _with_doubts(_as_chosen(project, unknowns), project, unknowns)
         except (ConvergenceError, GeometryError) as error:
             for words in _contradictions(project, unknowns):
                 raise GeometryError(words) from error
@@ -132,12 +132,15 @@ def _with_rows(result: Adjustment, points: ImagePoints, is_out: BoolArray) -> Ad
     )  # fmt: skip
 
 
-def _with_doubts(result: Adjustment, unknowns: Unknowns) -> Adjustment:
-    """Return an adjustment with a remark on image points that contradict the others."""
+def _with_doubts(result: Adjustment, start: Project, unknowns: Unknowns) -> Adjustment:
+    """Return an adjustment with a remark on image points that contradict the others.
+
+    They are looked for from the start, for the result may have followed them.
+    """
     size = np.abs(result.residuals[np.isfinite(result.residuals)])
     if not size.max(initial=0.0) > GROSS * np.median(size):
         return result
-    doubts = _contradictions(result.project, unknowns)
+    doubts = _contradictions(start, unknowns)
     return replace(result, remarks=(*doubts, *result.remarks))
 
 
