@@ -170,7 +170,7 @@ def _of_lenses(typed: TypedOrientation, *, free: bool) -> Iterator[Slip]:
 
 
 def _may_be_parts(typed: TypedOrientation, now: TrialOrientation | None) -> bool:
-    """Whether photos that seem to fit may be cropped: by their shapes, or as points miss a bit."""
+    """Whether photos that seem to fit may be cropped: their shapes differ, or points miss a bit."""
     sizes = [i.image_size for i in typed.interiors]
     differ = sorted(sizes[0]) != sorted(sizes[1])
     return differ or any(map(is_odd, sizes)) or (now is not None and now.misfit > 1)

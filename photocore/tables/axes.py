@@ -1,4 +1,4 @@
-"""Words above coordinates and names, in fifteen languages of surveyors: one list for all.
+"""Words above coordinates and names in the languages that surveyors write: one list for all.
 
 Case, blanks, punctuation and units do not matter (`photocore.tables.heading_words.bare`).
 """
@@ -18,7 +18,7 @@ NAMES = ("point", "name", "punto", "punkt", "nr", "no", "number", "label", "mark
          "pnt", "point id", "point no", "point number", "Punktnummer", "Punkt-Nr", "Pkt", "nome",
          "nome punto", "numero punto", "matricule", "nom", "no de point", "GCP name", "GCP label",
          "Bezeichnung", "číslo bodu", "bod", "nr punktu", "punt", "ponto", "pont", "pontszám",
-         "piste", "točka", "punktnummer")  # fmt: skip
+         "piste", "točka")  # fmt: skip
 #: Of the photo in which a row's pixel lies.
 PHOTOS = (
     "image",

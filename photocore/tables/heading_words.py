@@ -7,7 +7,7 @@ import unicodedata
 from collections.abc import Sequence
 from functools import lru_cache
 
-from photocore.tables.axes import EAST, HEIGHT, NORTH
+from photocore.tables.axes import EAST, NORTH
 from photocore.tables.numbers import GRAD, UNITS, unit_symbol
 
 _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
@@ -28,9 +28,10 @@ _PREFIX = re.compile(
 )
 #: Begins a heading of what coordinates are worth.
 _PRECISION = re.compile(r"\W*(?:accuracy|precision|error|sigma|std|rms)", re.IGNORECASE)
-#: An axis named by its letter and, in round brackets, by its direction, which counts.
-_DIRECTED = re.compile(r"\s*[XYZ]\s*\(\s*(\w+)\s*\)\s*", re.IGNORECASE)
-_DIRECTIONS = frozenset(word.casefold() for word in (*EAST, *NORTH, *HEIGHT) if len(word) > 2)
+#: An axis named by its letter and, in round brackets, by its direction, which counts; "(est)" is
+#: short for an estimate as well.
+_DIRECTED = re.compile(r"\s*[XY]\s*\(\s*(\w+)\s*\)\s*", re.IGNORECASE)
+_DIRECTIONS = frozenset(word.casefold() for word in (*EAST, *NORTH) if len(word) > 3)
 #: Units people measure in that no command takes.
 _FOREIGN = frozenset(
     (*GRAD, "in", "inch", "inches", "yd", "yard", "yards", "mi", "mile", "miles",
@@ -94,8 +95,8 @@ def numbered(text: str, digit: str) -> str:
 def forms_of(variants: Sequence[str]) -> list[str]:
     """Return the bare forms a heading may be known by, the strictest first.
 
-    >>> forms_of(["x1 [mm]"]), forms_of(["X (North)"])
-    (['x1'], ['north'])
+    >>> forms_of(["x1 [mm]"]), forms_of(["X (North)"]), forms_of(["Y (est)"])
+    (['x1'], ['north'], ['y'])
     """
     forms = []
     for text in variants:
