@@ -61,7 +61,7 @@ def georeference(builder: BookBuilder, content: SurveyContent) -> None:
     last = column_letters(len(columns))
     marked = f"A{CONTROL_HEAD + 1}:{last}{CONTROL_HEAD + rows}"
     colour_where(sheet.worksheet, marked, f'${last}{CONTROL_HEAD + 1}="CHECK"', WRONG, bold=True)
-    for letter, width in (("A", 25), ("G", 12.5), ("H", 12.5), ("I", 12.5)):
+    for letter, width in (("A", 23), ("G", 12.5), ("H", 12.5), ("I", 12.5)):
         sheet.worksheet.column_dimensions[letter].width = width
     repeat = f"{CONTROL_HEAD - 1}:{CONTROL_HEAD}"
     sheet.finish(landscape=True, freeze=f"B{CONTROL_HEAD + 1}", repeat=repeat)

@@ -57,7 +57,7 @@ def check(builder: BookBuilder, content: SurveyContent) -> None:
     _taped(sheet, content)
     columns, cells = check_columns(), check_cells(content)
     sheet.table("tblCheck", columns, at=(CHECK_HEAD, 1), rows=rows, cells=cells)
-    sheet.worksheet.column_dimensions["A"].width = 18
+    sheet.worksheet.column_dimensions["A"].width = 16.5
     for letter in ("R", "S"):
         sheet.worksheet.column_dimensions[letter].width = 1.5
     keys = [column.key for column in columns]

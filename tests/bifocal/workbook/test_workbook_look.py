@@ -56,6 +56,7 @@ def test_all_sheets_have_one_face_and_one_scale_of_sizes(name):
 def test_no_word_of_a_heading_is_broken_and_no_description_is_cut(language):
     book = openpyxl.load_workbook(io.BytesIO(form("--rows", 30, "--lang", language)))
     tables = [(sheet, table.ref) for sheet in book for table in sheet.tables.values()]
+    assert min(size for page in book for size in sizes_of(page)) >= 8
     for page, area in tables:
         first, head, last, _ = range_boundaries(area)
         for column in range(first, last + 1):
