@@ -18,6 +18,7 @@ from bifocal.workbook.changing.kinds import refuse_earlier
 from bifocal.workbook.changing.setup_update import add_sheets, write_corrections, write_options
 from bifocal.workbook.changing.update import (
     BookUpdate,
+    changed_results,
     saved,
     store_named_cells,
 )
@@ -133,7 +134,7 @@ def add_results(
     plain = PlainFormulas((), named)
     columns = [replace(column, formula=plain.plain(column.formula, "")) for column in columns]
     put_result_columns(editor, own, columns, mark=MARK)
-    return saved(editor, built, target, overwrite=overwrite)
+    return saved(editor, changed_results(editor, built), target, overwrite=overwrite)
 
 
 def _links(editor: WorkbookEditor, survey: SurveyInput, given: Mapping[str, Any]) -> dict[str, str]:

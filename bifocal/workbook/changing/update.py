@@ -162,7 +162,9 @@ def update_book(
     _verdict(editor, built, content, rules="rules" in given, words=other_words)
     _charts(editor, built, rows)
     _log(editor, content)
-    return replace(saved(editor, built, target, overwrite=overwrite), added=tuple(added))
+    changed = changed_results(editor, built)
+    del built  # a large sheet wants its memory
+    return replace(saved(editor, changed, target, overwrite=overwrite), added=tuple(added))
 
 
 def _type_list(
@@ -177,10 +179,9 @@ def _type_list(
 
 
 def saved(
-    editor: WorkbookEditor, built: BookBuilder, target: Path, *, overwrite: bool
+    editor: WorkbookEditor, changed: Sequence[str], target: Path, *, overwrite: bool
 ) -> BookUpdate:
     """Write a changed workbook; where formulas of ours were changed too, with what they give."""
-    changed = changed_formulas(editor, *_results_of(editor, built))
     settling, remarks = Settling(), list[str]()
     kept = editor.save(target, overwrite=overwrite, settle=settling if changed else None)
     if changed:
@@ -193,10 +194,9 @@ def saved(
     return BookUpdate(kept=kept, added=(), remarks=tuple(remarks))
 
 
-def _results_of(
-    editor: WorkbookEditor, built: BookBuilder
-) -> tuple[set[str], dict[str, list[tuple[int, int, int]]]]:
-    """Return our formulas in their normal form, and the columns and cells where results stand."""
+def changed_results(editor: WorkbookEditor, built: BookBuilder) -> list[str]:
+    """Return the cells of results that hold another formula than ours."""
+    # Formulas of ours in their normal form, and the columns and cells where results stand.
     ours, places = set[str](), dict[str, list[tuple[int, int, int]]]()
     for sheet in built.book.worksheets:
         cells = (cell for row in sheet.iter_rows() for cell in row if cell.data_type == "f")
@@ -218,7 +218,7 @@ def _results_of(
                 own = (headings[column.key], area.first, area.area[2])
                 places.setdefault(area.sheet, []).append(own)
     if isinstance(editor, PlainEditor):
-        return ours, {}  # its formulas are the cells' own, none like another
+        return []  # its formulas are the cells' own, none like another
     for name, defined in built.book.defined_names.items():
         if name.startswith("unprinted_") or name in SPEAKING:
             continue  # follows how many points there were, or the version that wrote it
@@ -226,7 +226,7 @@ def _results_of(
         place = place_of(editor, name)
         if place and ":" not in cell and built.book[plain_title(sheet)][cell].data_type == "f":
             places.setdefault(place[0], []).append((place[2], place[1], place[1]))
-    return ours, places
+    return changed_formulas(editor, ours, places)
 
 
 def _changes(editor: WorkbookEditor) -> dict[str, float] | None:

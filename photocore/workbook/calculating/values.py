@@ -83,6 +83,8 @@ class CellArray:
 
     def items(self) -> list[CellValue]:
         """Return what cells show: an empty text for a blank text, NaN for an error."""
+        if (self.kinds == NUMBER).all():
+            return list[CellValue](self.numbers.ravel().tolist())
         out: list[CellValue] = []
         parts = (part.ravel().tolist() for part in (self.numbers, self.kinds, self.texts))
         for number, kind, text in zip(*parts, strict=True):

@@ -125,6 +125,8 @@ class Spliced:
         """Write the sheet up to its last change so far; the changes are let go."""
         if self.file is None:
             self.file = _Written(SMALL)
+            if len(self.data) > SMALL:
+                self.file.rollover()  # it would only look after it has taken a write whole
         view = memoryview(self.data)
         for start, end, replacement in sorted(self.edits, key=itemgetter(0, 1)):
             self.file.write(view[self.position : start])
