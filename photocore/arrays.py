@@ -209,3 +209,37 @@ def contiguous_rows(
         buffersize=size,
     ) as rows:
         yield from rows
+
+
+def each_once(numbers: IntArray) -> IntArray:
+    """Return the rows, in their order, that share no number with a row taken before.
+
+    Parameters
+    ----------
+    numbers : ndarray of int, shape (n, k)
+        Of each column's things, from 0; -1 for none, which all may share.
+
+    Returns
+    -------
+    rows : ndarray of int, shape (p,)
+
+    Examples
+    --------
+    >>> each_once(np.array([[0, 5], [0, 6], [1, 6], [-1, 5], [-1, 7]])).tolist()
+    [0, 2, 4]
+    """
+    offsets = np.cumsum([1, *(numbers.max(axis=0, initial=-1) + 1)])
+    keys = np.where(numbers >= 0, numbers + offsets[:-1], 0)
+    used = np.zeros(offsets[-1], dtype=bool)
+    earliest = np.empty(offsets[-1], dtype=np.int64)
+    rest, rows = np.arange(len(numbers)), [np.empty(0, dtype=np.int64)]
+    while len(rest):
+        # Of rows that share a number the first counts: of all that is assigned, the last remains.
+        earliest[np.ravel(keys[::-1])] = np.repeat(rest[::-1], keys.shape[1])
+        first = ((earliest[keys] == rest[:, None]) | (keys == 0)).all(axis=1)
+        rows.append(rest[first])
+        used[keys[first]] = True
+        used[0] = False
+        free = ~used[keys].any(axis=1)
+        rest, keys = rest[free], keys[free]
+    return np.sort(np.concatenate(rows))

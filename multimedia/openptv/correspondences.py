@@ -4,20 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from multimedia.media.camera import Camera, Sensor
-from multimedia.media.projection import Media, project
+from multimedia.media.optical_media import OpticalMedia
+from multimedia.media.projection import Media, as_media, project
 from multimedia.openptv.ray_meetings import meeting_rays
-from multimedia.orientation.intersection import intersect_rays
-from multimedia.orientation.object_rays import image_rays, nearest_points
-from photocore.arrays import FloatArray, IntArray
+from multimedia.orientation.object_rays import image_rays, nearest_points, refuse_curved_rays
+from photocore.arrays import FloatArray, IntArray, each_once
 from photocore.errors import InputError
 
 #: Farthest that a target may lie from where its particle is seen. [px]
 TOLERANCE = 2.0
+#: Shares of it within which particles are sought, one after the other; of what is found within all
+#: but the last only what misses by half as much counts, for where two rays meet a third misses by
+#: up to twice its error.
+STAGES = (0.25, 1.0)
 #: Frames of targets that have nothing to do with each other, and how far they are displaced: so
 #: many pixels, or so many tolerances. Risk of calling chance particles.
 DECOYS, _DISPLACED, RISK = 2, (40.0, 10.0), 0.001
@@ -60,34 +65,30 @@ def correspondences(
     Any two targets whose rays meet within the tolerance, on epipolar curves of each other
     therefore, propose a particle; the other cameras look for it where they would see it. Of all
     proposals the ones seen by most cameras are taken, the best fitting first, each target once.
+    So those that all cameras see, and well, are sought first, within less than the tolerance:
+    what they leave is little.
     """
     sensors = [c.described_sensor("its sensor is not described; targets need it.") for c in cameras]
     if len(cameras) < 2 or not 2 <= fewest <= len(cameras):
         raise InputError(f"correspondences: {len(cameras)} cameras, at least {fewest} to agree.")
-    image = [s.image_from_pixel(t.reshape(-1, 2)) for s, t in zip(sensors, targets, strict=True)]
-    rays = [image_rays(c, i, m) for c, i, m in zip(cameras, image, media, strict=True)]
-    frame = _Exposure(cameras, targets, media, sensors, rays, tolerance, fewest)
-    few = proposing_pairs(len(cameras), fewest)
-    proposals = [np.empty((0, len(cameras)), dtype=np.int64)]
-    proposals += [frame.proposals(a, b, np.arange(len(targets[a])), np.arange(len(targets[b])))
-              for a, b in few]  # fmt: skip
-    # What they leave is sought from all pairs: rays of a poor calibration miss each other.
-    matched = np.concatenate(proposals)
-    unmatched = [np.setdiff1d(np.arange(len(t)), matched[:, k]) for k, t in enumerate(targets)]
-    others = combinations(range(len(cameras)), 2)
-    proposals += [
-        frame.proposals(a, b, unmatched[a], unmatched[b]) for a, b in others if (a, b) not in few
+    placed = [as_media(each) for each in media]
+    refuse_curved_rays(placed, "correspondences")
+    targets = [t.reshape(-1, 2) for t in targets]
+    image = [s.image_from_pixel(t) for s, t in zip(sensors, targets, strict=True)]
+    rays = [image_rays(c, i, m) for c, i, m in zip(cameras, image, placed, strict=True)]
+    frame = _Exposure(cameras, targets, placed, sensors, image, rays)
+    free = [np.arange(len(pixels)) for pixels in targets]
+    parts: list[tuple[FloatArray, IntArray, FloatArray]] = [
+        (np.empty((0, 3)), np.empty((0, len(cameras)), dtype=np.int64), np.empty(0))
     ]
-    numbers = np.unique(np.concatenate(proposals), axis=0)
-    # The row behind the last, -1, is that of no target.
-    padded = [np.vstack([i, [np.nan, np.nan]]) for i in image]
-    grid = np.stack([i[n] for i, n in zip(padded, numbers.T, strict=True)])
-    xyz = intersect_rays(cameras, grid, list(media)) if len(numbers) else np.empty((0, 3))
-    misfit = _misfits(cameras, media, sensors, xyz, grid)
-    good = misfit <= tolerance
-    xyz, numbers, misfit = xyz[good], numbers[good], misfit[good]
-    kept = _each_once(numbers, np.lexsort((misfit, -(numbers >= 0).sum(axis=1))))
-    return xyz[kept], numbers[kept], misfit[kept]
+    for agree, share in product(sorted({len(cameras), fewest}, reverse=True), STAGES):
+        is_last = (agree, share) == (fewest, STAGES[-1])
+        limit = tolerance * share * (1.0 if share == STAGES[-1] else 0.5)
+        parts.append(frame.particles(free, tolerance * share, limit, agree, every=is_last))
+        free = [np.setdiff1d(rows, used) for rows, used in zip(free, parts[-1][1].T, strict=True)]
+    xyz, numbers, misfit = (np.concatenate(part) for part in zip(*parts, strict=True))
+    order = np.lexsort((misfit, -(numbers >= 0).sum(axis=1)))
+    return xyz[order], numbers[order], misfit[order]
 
 
 def proposing_pairs(cameras: int, fewest: int) -> list[tuple[int, int]]:
@@ -156,75 +157,124 @@ class _Exposure:
 
     cameras: Sequence[Camera]
     targets: Sequence[FloatArray]
-    media: Sequence[Media]
+    media: Sequence[OpticalMedia]
     sensors: Sequence[Sensor]
+    image: Sequence[FloatArray]
     rays: Sequence[tuple[FloatArray, FloatArray]]
+
+    def particles(
+        self, free: Sequence[IntArray], tolerance: float, limit: float, agree: int, *, every: bool
+    ) -> tuple[FloatArray, IntArray, FloatArray]:
+        """Return particles of targets that are free, their targets and misfits.
+
+        Parameters
+        ----------
+        free : sequence of ndarray of int
+            Rows of the targets of each camera that belong to no particle.
+        tolerance, limit : float
+            How far targets are sought, and how far they may miss, root mean square. [px]
+        agree : int
+            Cameras that must have seen a particle.
+        every : bool
+            Whether what those pairs of cameras leave that suffice is sought from all pairs: rays
+            of a poor calibration miss each other.
+        """
+        count = len(self.cameras)
+        search = _Search(self, free, [cKDTree(t[f]) if len(f) else None
+                                  for t, f in zip(self.targets, free, strict=True)],
+                     tolerance, agree)  # fmt: skip
+        few = proposing_pairs(count, agree)
+        proposals = [np.empty((0, count), dtype=np.int64)]
+        proposals += [search.proposals(a, b, free[a], free[b]) for a, b in few]
+        if every:
+            matched = np.concatenate(proposals)
+            rest = [np.setdiff1d(f, m) for f, m in zip(free, matched.T, strict=True)]
+            pairs = [pair for pair in combinations(range(count), 2) if pair not in few]
+            proposals += [search.proposals(a, b, rest[a], rest[b]) for a, b in pairs]
+        numbers = np.unique(np.concatenate(proposals), axis=0)
+        xyz, misfit = self.fitted(numbers)
+        good = misfit <= limit
+        xyz, numbers, misfit = xyz[good], numbers[good], misfit[good]
+        order = np.lexsort((misfit, -(numbers >= 0).sum(axis=1)))
+        kept = order[each_once(numbers[order])]
+        return xyz[kept], numbers[kept], misfit[kept]
+
+    def fitted(self, numbers: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return the points nearest to the rays of targets, and the root mean square misfits."""
+        xyz = nearest_points(*(
+            [_rows(each[part], n) for each, n in zip(self.rays, numbers.T, strict=True)]
+            for part in (0, 1)
+        ))  # fmt: skip
+        squares = np.full((len(self.cameras), len(numbers)), np.nan)
+        for k, (camera, sensor) in enumerate(zip(self.cameras, self.sensors, strict=True)):
+            away = project(camera, xyz, self.media[k]) - _rows(self.image[k], numbers[:, k])
+            squares[k] = ((away / sensor.pixel_size) ** 2).sum(axis=-1)
+        with np.errstate(invalid="ignore"):  # a proposal that no camera sees has no misfit
+            return xyz, np.sqrt(np.nansum(squares, axis=0) / np.isfinite(squares).sum(axis=0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Search:
+    """Targets that are free, and how they are sought."""
+
+    frame: _Exposure
+    free: Sequence[IntArray]
+    trees: Sequence[cKDTree | None]
     tolerance: float
-    fewest: int
+    agree: int
 
     def width(self, camera: int, some: IntArray) -> tuple[FloatArray, float]:
         """Return how far rays may miss their particle: where they start, and more per length."""
         # On oblique rays what the tolerance moves at the face counts more than square to it.
-        pitch = float(self.sensors[camera].pixel_size.max())
-        per_length = 2.0 * self.tolerance * pitch / self.cameras[camera].principal_distance
-        away = self.rays[camera][0][some] - self.cameras[camera].centre
+        pitch = float(self.frame.sensors[camera].pixel_size.max())
+        per_length = 2.0 * self.tolerance * pitch / self.frame.cameras[camera].principal_distance
+        away = self.frame.rays[camera][0][some] - self.frame.cameras[camera].centre
         return per_length * np.sqrt(np.einsum("ni,ni->n", away, away)), per_length
 
     def proposals(self, a: int, b: int, some: IntArray, others: IntArray) -> IntArray:
         """Return the targets of all cameras of what some of camera a and of b propose, (p, m)."""
-        (o1, d1), (o2, d2) = self.rays[a], self.rays[b]
-        first, second = (o1[some], d1[some]), (o2[others], d2[others])
-        one, two = meeting_rays(first, second, self.width(a, some), self.width(b, others))
-        one, two = some[one], others[two]
-        points = nearest_points([o1[one], o2[two]], [d1[one], d2[two]])
-        numbers = np.full((len(points), len(self.cameras)), -1, dtype=np.int64)
-        for k in {*range(len(self.cameras))} - {a, b}:
+        (o1, d1), (o2, d2) = self.frame.rays[a], self.frame.rays[b]
+        meetings = meeting_rays(
+            (o1[some], d1[some]), (o2[others], d2[others]),
+            self.width(a, some), self.width(b, others),
+        )  # fmt: skip
+        parts = [np.empty((0, len(self.trees)), dtype=np.int64)]
+        parts += [
+            self._confirmed(a, b, some[one], others[two], points) for one, two, points in meetings
+        ]
+        return np.concatenate(parts)
+
+    def _confirmed(
+        self, a: int, b: int, one: IntArray, two: IntArray, points: FloatArray
+    ) -> IntArray:
+        """Return the targets of all cameras of those points that enough of them see."""
+        numbers = np.full((len(points), len(self.trees)), -1, dtype=np.int64)
+        numbers[:, a], numbers[:, b] = one, two
+        unseen = np.zeros(len(points), dtype=np.int64)
+        for k in sorted(set(range(len(self.trees))) - {a, b}):
             numbers[:, k] = self.seen(k, points)
-        enough = (numbers >= 0).sum(axis=1) >= self.fewest - 2
-        one, two, points, numbers = one[enough], two[enough], points[enough], numbers[enough]
-        for k, numbered in ((a, one), (b, two)):
-            numbers[:, k] = np.where(self.seen(k, points) == numbered, numbered, -1)
-        return numbers[(numbers[:, [a, b]] >= 0).all(axis=1)]
+            unseen += numbers[:, k] < 0
+            enough = unseen <= len(self.trees) - self.agree
+            numbers, points, unseen = numbers[enough], points[enough], unseen[enough]
+        for k in (a, b):
+            same = self.seen(k, points) == numbers[:, k]
+            numbers, points = numbers[same], points[same]
+        return numbers
 
     def seen(self, camera: int, points: FloatArray) -> IntArray:
         """Return the nearest target to where a camera sees each point, -1 where none is, (n,)."""
-        from scipy.spatial import cKDTree
-
-        numbers = np.full(len(points), -1, dtype=np.int64)
-        targets = self.targets[camera]
-        if not len(targets) or not len(points):
+        numbers, tree = np.full(len(points), -1, dtype=np.int64), self.trees[camera]
+        if tree is None or not len(points):
             return numbers
-        image = project(self.cameras[camera], points, self.media[camera])
-        places = self.sensors[camera].pixel_from_image(image)
+        image = project(self.frame.cameras[camera], points, self.frame.media[camera])
+        places = self.frame.sensors[camera].pixel_from_image(image)
         good = np.flatnonzero(np.isfinite(places).all(axis=1))
-        away, nearest = cKDTree(targets).query(places[good], distance_upper_bound=self.tolerance)
-        numbers[good] = np.where(np.isfinite(away), nearest, -1)
+        away, nearest = tree.query(places[good], distance_upper_bound=self.tolerance)
+        near = np.isfinite(away)
+        numbers[good[near]] = self.free[camera][nearest[near]]
         return numbers
 
 
-def _misfits(
-    cameras: Sequence[Camera],
-    media: Sequence[Media],
-    sensors: Sequence[Sensor],
-    xyz: FloatArray,
-    image: FloatArray,
-) -> FloatArray:
-    """Return the root mean square distance of targets from where their particles are seen. [px]"""
-    if not len(xyz):
-        return np.empty(0)
-    projected = np.stack([project(c, xyz, m) for c, m in zip(cameras, media, strict=True)])
-    pitch = np.array([sensor.pixel_size for sensor in sensors])[:, None]
-    squares = (((projected - image) / pitch) ** 2).sum(axis=-1)
-    with np.errstate(invalid="ignore"):  # a proposal that no camera sees has no misfit
-        return np.sqrt(np.nansum(squares, axis=0) / np.isfinite(squares).sum(axis=0))
-
-
-def _each_once(numbers: IntArray, order: IntArray) -> IntArray:
-    """Return the rows, in this order, whose targets no row before has used."""
-    used, kept = set[tuple[int, int]](), []
-    for row in order.tolist():
-        mine = [(k, n) for k, n in enumerate(numbers[row].tolist()) if n >= 0]
-        if used.isdisjoint(mine):
-            kept.append(row)
-            used.update(mine)
-    return np.array(kept, dtype=np.int64)
+def _rows(values: FloatArray, numbers: IntArray) -> FloatArray:
+    """Return rows by their numbers, NaN for those of -1."""
+    return np.vstack([values, np.full((1, values.shape[1]), np.nan)])[numbers]

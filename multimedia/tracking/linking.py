@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from multimedia.tracking.neighbours import BEYOND, Guide, neighbours_guide, unguided
-from photocore.arrays import BoolArray, FloatArray, IntArray
+from photocore.arrays import BoolArray, FloatArray, IntArray, each_once
 
 #: Nearest neighbours of particles anywhere are 0.554 times the cube root of the volume of each
 #: apart (Chandrasekhar 1943).
@@ -240,7 +240,8 @@ def _pairs_taken(
     cost[is_free & np.isnan(then[:, 0])] = np.inf
     order = np.argsort(cost, kind="stable")
     order = order[np.isfinite(cost[order])]
-    return _each_once(end[order], start[order])
+    order = order[each_once(np.stack([end, start], axis=1)[order])]
+    return end[order], start[order]
 
 
 def _nearest(
@@ -257,14 +258,3 @@ def _nearest(
         away[good] = distance[near] / reach[good]
         place[good] = np.asarray(tree.data)[number[near]]
     return away, place
-
-
-def _each_once(ends: IntArray, starts: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the pairs, in this order, of which neither was in a pair before."""
-    used_ends, used_starts, kept = set[int](), set[int](), []
-    for k, (end, start) in enumerate(zip(ends.tolist(), starts.tolist(), strict=True)):
-        if end not in used_ends and start not in used_starts:
-            used_ends.add(end)
-            used_starts.add(start)
-            kept.append(k)
-    return ends[kept], starts[kept]

@@ -19,6 +19,8 @@ from multimedia.openptv.openptv_files import (
     read_control,
     read_correspondences,
 )
+from multimedia.openptv.ray_meetings import meeting_rays
+from photocore.arrays import each_once
 from tests.builders.commands import multimedia_command as main
 from tests.multimedia.tank import LAYERS, SENSOR, cameras
 
@@ -70,6 +72,38 @@ def test_a_particle_that_a_camera_missed_is_found_by_the_others():
     assert len(tuples) == 40
     lonely = tuples[tuples[:, 2] < 0]
     assert lonely.tolist() == [[numbers[0, 0], numbers[0, 1], -1, numbers[0, 3]]]
+
+
+def test_meeting_rays_are_all_that_meet_and_each_row_is_taken_once():
+    rng = np.random.default_rng(14)
+    rays = []
+    for x in (-200.0, 200.0):
+        origins = rng.normal((x, 0.0, 1e4), (40.0, 40.0, 0.0), (120, 3))
+        along = rng.normal((-x, 0.0, 9.7e3), (60.0, 60.0, 60.0), (120, 3)) - origins
+        rays.append((origins, along / np.linalg.norm(along, axis=1)[:, None]))
+    wide = [(rng.uniform(0.0, 2.0, 120), 0.002), (rng.uniform(0.0, 2.0, 120), 0.001)]
+    one, two, _ = map(np.concatenate, zip(*meeting_rays(*rays, *wide), strict=True))
+    got = set(zip(one.tolist(), two.tolist(), strict=True))
+    (o1, d1), (o2, d2) = rays
+    expected = set()
+    for a in range(120):
+        both = np.stack([np.broadcast_to(d1[a], d2.shape), -d2], axis=2)
+        far = np.stack([np.linalg.lstsq(m, o - o1[a])[0] for m, o in zip(both, o2, strict=True)])
+        gap = np.linalg.norm(np.einsum("nij,nj->ni", both, far) - (o2 - o1[a]), axis=1)
+        limit = wide[0][0][a] + wide[1][0] + far @ (0.002, 0.001)
+        expected |= {
+            (a, b) for b in np.flatnonzero((far > 0).all(axis=1) & (gap <= limit)).tolist()
+        }
+    assert got == expected
+    assert len(expected) > 20
+    numbers = np.array([*expected])[rng.permutation(len(expected))]
+    rows, used = set(each_once(numbers).tolist()), (set(), set())
+    for row, pair in enumerate(numbers.tolist()):
+        is_used = any(n in one for n, one in zip(pair, used, strict=True))
+        assert (row in rows) != is_used
+        if not is_used:
+            for n, one in zip(pair, used, strict=True):
+                one.add(n)
 
 
 def test_no_targets_are_no_particles():
