@@ -10,7 +10,7 @@ from bifocal.options import LanguageOption
 from photocore.cli import print_result, progress_bar
 from photocore.option_types import POSITIVE
 from photocore.options import Argument, Typed, declared
-from photocore.shared_options import JsonOption, OverwriteOption
+from photocore.shared_options import ChangedPhotosOption, JsonOption, OverwriteOption
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +36,7 @@ class CompareCommand:
     smallest: Annotated[float, Typed(POSITIVE, "M2")] = 0.02
     """Area of the smallest patch that is tested [m2]."""
     language: LanguageOption = "en"
+    changed_photos: ChangedPhotosOption = False
     overwrite: OverwriteOption = False
     as_json: JsonOption = False
 
@@ -45,7 +46,8 @@ def command(options: CompareCommand) -> None:
     """Find what has changed on a wall between two dates.
 
     BEFORE and AFTER are relief maps of one wall, oriented on the same control, or files of pairs
-    and sets with their relief.tif beside them. The folder gets the difference as GeoTIFF, changed
+    and sets with their relief.tif beside them. Where the photos that a map is of are there too,
+    every change is held against them. The folder gets the difference as GeoTIFF, changed
     regions as DXF, CSV and XLSX, and a report.
     """
     from bifocal.comparison.workflow import compare_files

@@ -316,8 +316,9 @@ class _Outlined:
         numbered, changes = np.zeros_like(labels), list[ChangedRegion]()
         parts = [labels == number for number in range(1, int(labels.max()) + 1)]
         for part in sorted(parts, key=lambda one: -np.abs(averages[0][one]).max()):
-            inner, level = self._outline(part & (numbered == 0), averages, numbered == 0)
-            if inner is None or (one := self._region(part, inner, averages, level)) is None:
+            free = numbered == 0
+            inner, level = self._outline(part & free, averages, free)
+            if inner is None or (one := self._region(part, inner, averages, level, free)) is None:
                 continue
             numbered[inner & self.cells.known] = len(changes) + 1
             changes.append(replace(one, number=len(changes) + 1))
@@ -357,9 +358,13 @@ class _Outlined:
         return float(self.sigmas[level]) * float(np.median(self.cells.sigma[part]))
 
     def _region(
-        self, part: BoolArray, inner: BoolArray, averages: Sequence[FloatArray], level: int
-    ) -> ChangedRegion | None:
-        """Return a region, its number not yet given; None if its volume is within its sigma."""
+        self, part: BoolArray, inner: BoolArray, averages: Sequence[FloatArray], level: int,
+        free: BoolArray,
+    ) -> ChangedRegion | None:  # fmt: skip
+        """Return a region, its number not yet given; None if its volume is within its sigma.
+
+        What other regions hold already is not ``free``.
+        """
         cells, sigma, cell = self.cells, self._own(part, level), self.cells.grid.gsd**2
         way = float(np.sign(self.test[part][0]))
         change = averages[level] * way
@@ -367,7 +372,7 @@ class _Outlined:
         radius = max(1, round(2 * self.patches.radii[level]))
         disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1,) * 2)
         about = cv2.dilate(inner.astype(np.uint8), disc) > 0
-        about &= cells.known
+        about &= cells.known & free
         terms = trend_terms(cells.grid, cells.grid.bounds)
         common, weights = terms[about].sum(axis=0), np.where(about, cells.sigma, 0.0)
         variance = self.by_chance.variance_of_sum(weights) + common @ self.covariance @ common

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from bifocal.comparison.cells import on_grid
 from bifocal.comparison.tuning import EVIDENCE
+from bifocal.files.made_from import PAIR_TAG, MadeFrom, check_maps
+from bifocal.model.geotiff import RasterReader
 from bifocal.model.image import as_grey
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
@@ -73,6 +76,34 @@ def contradicted(
         if fits[:, 0].max() > EVIDENCE.fits or (fits[:, 1] - fits[:, 0]).min() < better:
             numbers.append(number)
     return numbers
+
+
+def photos_at_hand(path: Path, relief: Path) -> PhotoSet | None:
+    """Return the photos of a relief map, where they exist; its own file names theirs, or `path`.
+
+    Raises
+    ------
+    InputError
+        If ``path`` is the file of photos, and the map was made from another state of them.
+    """
+    if path != relief:
+        photos = PhotoSet.read(path)
+        check_maps(MadeFrom.of(photos.photos), relief=relief)
+    else:
+        with RasterReader(relief) as reader:
+            path = relief.parent / Path(reader.tags.get(PAIR_TAG, "")).name
+            made_from = MadeFrom.of_tags(reader.tags)
+        if not (holds_photos(path) and path.is_file()):
+            return None
+        photos = PhotoSet.read(path)
+        if {"pair", "photos"} & {*made_from.differences(MadeFrom.of(photos.photos))}:
+            return None
+    return photos if all(one.file and one.path.is_file() for one in photos.photos) else None
+
+
+def holds_photos(path: Path) -> bool:
+    """Whether a file holds a pair or a set, by its name."""
+    return path.name.endswith((".pair.json", ".photos.json"))
 
 
 def _parallax(

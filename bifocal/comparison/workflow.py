@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +11,9 @@ import numpy as np
 
 from bifocal.comparison.change import ChangedRegion, Comparison, compare
 from bifocal.comparison.change_report import change_document
-from bifocal.comparison.photo_evidence import PhotosOfDate
+from bifocal.comparison.photo_evidence import holds_photos, photos_at_hand
 from bifocal.files.dxf import add_text, new_drawing, save_drawing
 from bifocal.model.geotiff import create_raster
-from bifocal.model.photo_set import PhotoSet
 from bifocal.model.relief_map import ReliefMap
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray, as_floats
@@ -94,7 +93,8 @@ def compare_files(
     Parameters
     ----------
     before, after : Path
-        Relief maps, or files of pairs and sets with their ``relief.tif`` beside them.
+        Relief maps, or files of pairs and sets with their ``relief.tif`` beside them. The photos
+        that a map says it is of are asked where they are at hand.
     out : Path
         Folder: difference.tif, regions.csv, .xlsx and .dxf, report.html and .pdf.
     stable : Path, optional
@@ -103,7 +103,8 @@ def compare_files(
     Raises
     ------
     InputError
-        If a file is unusable, the maps have nothing in common, or the folder cannot be written.
+        If a file is unusable, the maps have nothing in common, a map was made from another state
+        of the pair that is named, or the folder cannot be written.
     """
     if stable is not None and fit:
         raise InputError(remark("compare.stable_and_fit"))
@@ -115,8 +116,11 @@ def compare_files(
         progress(0.1, 1, "reading")
         maps = [ReliefMap.read(path) for path in paths]
         progress(0.2, 1, "testing")
-        dates = _dates(before, after)
-        done = compare(maps[0], maps[1], stable=polygons, fit=fit, smallest=smallest, dates=dates)
+        one, other = map(photos_at_hand, (before, after), paths)
+        both = None if one is None or other is None else (one, other)
+        done = compare(maps[0], maps[1], stable=polygons, fit=fit, smallest=smallest, dates=both)
+        if done.regions and both is None:
+            done = replace(done, remarks=(*done.remarks, remark("compare.maps_alone")))
         progress(0.7, 1, "writing")
         _write_map(folder / "difference.tif", done)
         _write_tables(folder, done)
@@ -131,22 +135,9 @@ def compare_files(
     return ComparedFiles(comparison=done, folder=out, files=files)
 
 
-def _dates(*paths: Path) -> tuple[PhotosOfDate, PhotosOfDate] | None:
-    """Return the photos of both dates, where both are named by a pair or set whose photos exist."""
-    dates: list[PhotosOfDate] = []
-    for path in paths:
-        if not path.name.endswith((".pair.json", ".photos.json")):
-            return None
-        date = PhotoSet.read(path)
-        if not all(photo.file and photo.path.is_file() for photo in date.photos):
-            return None
-        dates.append(date)
-    return dates[0], dates[1]
-
-
 def _relief_of(path: Path) -> Path:
     """Return the relief map a file stands for."""
-    if not path.name.endswith((".pair.json", ".photos.json")):
+    if not holds_photos(path):
         return path
     stem = path.name.rsplit(".", 2)[0]
     places = [path.with_name(name) for name in (f"{stem}_relief.tif", f"{stem}.tif", "relief.tif")]

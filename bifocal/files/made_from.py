@@ -23,6 +23,8 @@ from photocore.provenance import changes_are_taken, known_hash
 
 #: Metadata of a raster that hold its causes, and what older versions tell of the cameras.
 TAG, DISTANCES = "BIFOCAL_MADE_FROM", ("BIFOCAL_D1", "BIFOCAL_D2")
+#: Names the file of the pair or set.
+PAIR_TAG = "BIFOCAL_PAIR"
 #: Distances were written with six digits.
 _ROUNDED = 2e-5
 _LETTERS = 16

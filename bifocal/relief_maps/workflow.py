@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from bifocal.faces.faces import Faces
 from bifocal.faces.faces_files import check_faces, given_faces
 from bifocal.faces.suggestions import suggest_faces
-from bifocal.files.made_from import MadeFrom, photos_of
+from bifocal.files.made_from import PAIR_TAG, MadeFrom, photos_of
 from bifocal.files.photos import photo_infos
 from bifocal.model.basis import rests_on
 from bifocal.model.doubts import unit_of
@@ -109,7 +109,7 @@ def relief_of_pair(
     tags = {
         "BIFOCAL_D1": f"{pair.image1.distance:.6g}",
         "BIFOCAL_D2": f"{pair.image2.distance:.6g}",
-        "BIFOCAL_PAIR": named or str(pair.extra.get("name", "")),
+        PAIR_TAG: named or str(pair.extra.get("name", "")),
         "BIFOCAL_UNIT": unit_of(pair.extra),
         **MadeFrom.of(of_set, faces=(faces or Faces()).digest).tags(),
     }

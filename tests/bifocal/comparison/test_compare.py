@@ -16,7 +16,10 @@ from click.testing import CliRunner
 from openpyxl import load_workbook
 
 from bifocal import Grid, InputError, Quality, ReliefMap, compare
+from bifocal.comparison import workflow
+from bifocal.comparison.photo_evidence import photos_at_hand
 from bifocal.comparison.workflow import compare_files
+from bifocal.files.made_from import PAIR_TAG, MadeFrom
 from photocore.images import write_image
 from tests.builders.commands import bifocal_command as bifocal
 from tests.scenes import bifocal_cameras, render
@@ -249,3 +252,55 @@ def test_the_folder_tells_the_same_in_every_file(tmp_path: Path, language: str):
     words = {"en": "Changed regions: 1", "it": "Regioni cambiate: 1", "de": "Bereiche: 1"}
     assert words[language] in page
     assert (out / "report.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_a_change_is_told_once_where_maps_differ_by_nothing_else():
+    """Larger patches about a change show it as well."""
+    before = measured(np.random.default_rng(3))
+    r = np.array(before.r)
+    r[PART] += 0.06
+    (one,) = compare(before, replace(before, r=r)).regions
+    assert one.volume == pytest.approx(0.06 * 121 * GRID.gsd**2, rel=0.01)
+
+
+def test_photos_beside_the_maps_are_asked_and_their_absence_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """The same photos at both dates, and a map with a block that none of them shows."""
+    monkeypatch.setattr(workflow, "write_document", lambda *_: None)  # half of the time
+    rng = np.random.default_rng(8)
+    taken = render(
+        Scene(wall=RICH.stone, texel=0.02, seed=3),
+        bifocal_cameras(size=(240, 160), pixel=0.03),
+        rng=rng,
+    )
+    paths = [tmp_path / date / "relief.tif" for date in ("before", "after")]
+    for path, depth in zip(paths, (0.0, 0.4), strict=True):
+        path.parent.mkdir()
+        images = []
+        for number, photo in enumerate((taken.pair.image1, taken.pair.image2), start=1):
+            file = path.with_name(f"{number}.png")
+            write_image(file, (taken.image1, taken.image2)[number - 1])
+            images.append(replace(photo, file=file.name, folder=path.parent))
+        pair = replace(taken.pair, image1=images[0], image2=images[1], folder=path.parent)
+        pair.write(path.with_name("wall.pair.json"))
+        r = taken.truth.r + rng.normal(0, 0.01, taken.truth.shape)
+        r[40:70, 40:70] += depth
+        flat = ReliefMap.from_relief(r, plane_from_pixel=taken.truth.plane_from_pixel)
+        tags = {PAIR_TAG: "wall.pair.json", **MadeFrom.of(images).tags()}
+        replace(flat, sigma=np.full(flat.shape, 0.01)).write(path, tags=tags)
+    names = [path.with_name("wall.pair.json") for path in paths]
+    for path, name in zip(paths, names, strict=True):
+        digests = [[p.digest for p in photos_at_hand(of, path).photos] for of in (path, name)]
+        assert digests[0] == digests[1]
+    done = compare_files(*paths, tmp_path / "out").comparison
+    assert done.regions == ()
+    assert "1 regions" in done.remarks[-1]
+    # Another orientation: the map named alone is taken by itself, the pair is refused.
+    moved = replace(pair, image2=replace(pair.image2, distance=1.01 * pair.image2.distance))
+    moved.write(names[1], overwrite=True)
+    with pytest.raises(InputError, match=r"relief\.tif: was made from another pair"):
+        photos_at_hand(names[1], paths[1])
+    done = compare_files(*paths, tmp_path / "out", overwrite=True).comparison
+    assert len(done.regions) == 1
+    assert "the maps alone" in done.remarks[-1]
