@@ -58,7 +58,12 @@ def _holds_truth(value: Any) -> bool:
 
 def floats_of_words(words: Sequence[str], path: Path, where: str) -> FloatArray:
     """Return words of a file as numbers; refuse the first that is none, {} being its place."""
-    values = np.empty(len(words))
+    try:
+        values = np.fromiter(map(float, words), dtype=np.float64, count=len(words))
+        if (np.abs(values) <= LARGEST).all():
+            return values
+    except ValueError:
+        values = np.empty(len(words))
     for k, word in enumerate(words):
         try:
             values[k] = float(word)

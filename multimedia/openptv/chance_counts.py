@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from multimedia.openptv.correspondences import correspondences, expected_by_chan
 from multimedia.projects.model import Project
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
+from photocore.machine import cores
 
 #: Share of all particles from which on chance is worth a smaller tolerance, and share of those
 #: beyond chance that this has to keep.
@@ -65,19 +67,20 @@ def chance_counts(
 ) -> ChanceCounts:
     """Return what is found in frames: targets of each camera [px]."""
     count = len(content.cameras) + 1
-    counted, chance = np.zeros(count), np.zeros(count)
-    misfits: list[FloatArray] = [np.empty(0)]
-    rays: list[FloatArray] = [np.empty(0)]
-    for targets in frames:
+
+    def tried(targets: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return misfits and rays of what is found in a frame, and how many come by chance."""
         scene = (content.cameras, targets, content.interfaces)
         _, numbers, misfit = correspondences(*scene, tolerance=tolerance, fewest=fewest)
-        rays.append((numbers >= 0).sum(axis=1).astype(float))
-        misfits.append(misfit)
-        counted += np.bincount(rays[-1].astype(int), minlength=count)
-        chance += expected_by_chance(*scene, tolerance=tolerance, fewest=fewest)
+        by_chance = expected_by_chance(*scene, tolerance=tolerance, fewest=fewest)
+        return misfit, (numbers >= 0).sum(axis=1), by_chance
+
+    with ThreadPoolExecutor(cores()) as pool:
+        parts = list(pool.map(tried, frames))
+    misfits, rays, chance = (np.concatenate(part) for part in zip(*parts, strict=True))
     return ChanceCounts(
-        tolerance=tolerance, found=counted, chance=chance, misfit=np.concatenate(misfits),
-        rays=np.concatenate(rays),
+        tolerance=tolerance, found=np.bincount(rays, minlength=count).astype(float),
+        chance=chance.reshape(-1, count).sum(axis=0), misfit=misfits, rays=rays.astype(float),
     )  # fmt: skip
 
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from itertools import combinations, product
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from multimedia.media.camera import Camera, Sensor
 from multimedia.media.optical_media import OpticalMedia
 from multimedia.media.projection import Media, as_media, project
 from multimedia.openptv.ray_meetings import meeting_rays
+from multimedia.openptv.target_map import TargetMap
 from multimedia.orientation.object_rays import image_rays, nearest_points, refuse_curved_rays
 from photocore.arrays import FloatArray, IntArray, each_once
 from photocore.errors import InputError
@@ -180,9 +180,9 @@ class _Exposure:
             of a poor calibration miss each other.
         """
         count = len(self.cameras)
-        search = _Search(self, free, [cKDTree(t[f]) if len(f) else None
-                                  for t, f in zip(self.targets, free, strict=True)],
-                     tolerance, agree)  # fmt: skip
+        maps = [TargetMap(t[f], tolerance) if len(f) else None
+                for t, f in zip(self.targets, free, strict=True)]  # fmt: skip
+        search = _Search(self, free, maps, tolerance, agree)
         few = proposing_pairs(count, agree)
         proposals = [np.empty((0, count), dtype=np.int64)]
         proposals += [search.proposals(a, b, free[a], free[b]) for a, b in few]
@@ -219,7 +219,7 @@ class _Search:
 
     frame: _Exposure
     free: Sequence[IntArray]
-    trees: Sequence[cKDTree | None]
+    maps: Sequence[TargetMap | None]
     tolerance: float
     agree: int
 
@@ -238,7 +238,7 @@ class _Search:
             (o1[some], d1[some]), (o2[others], d2[others]),
             self.width(a, some), self.width(b, others),
         )  # fmt: skip
-        parts = [np.empty((0, len(self.trees)), dtype=np.int64)]
+        parts = [np.empty((0, len(self.maps)), dtype=np.int64)]
         parts += [
             self._confirmed(a, b, some[one], others[two], points) for one, two, points in meetings
         ]
@@ -248,13 +248,13 @@ class _Search:
         self, a: int, b: int, one: IntArray, two: IntArray, points: FloatArray
     ) -> IntArray:
         """Return the targets of all cameras of those points that enough of them see."""
-        numbers = np.full((len(points), len(self.trees)), -1, dtype=np.int64)
+        numbers = np.full((len(points), len(self.maps)), -1, dtype=np.int64)
         numbers[:, a], numbers[:, b] = one, two
         unseen = np.zeros(len(points), dtype=np.int64)
-        for k in sorted(set(range(len(self.trees))) - {a, b}):
+        for k in sorted(set(range(len(self.maps))) - {a, b}):
             numbers[:, k] = self.seen(k, points)
             unseen += numbers[:, k] < 0
-            enough = unseen <= len(self.trees) - self.agree
+            enough = unseen <= len(self.maps) - self.agree
             numbers, points, unseen = numbers[enough], points[enough], unseen[enough]
         for k in (a, b):
             same = self.seen(k, points) == numbers[:, k]
@@ -263,16 +263,12 @@ class _Search:
 
     def seen(self, camera: int, points: FloatArray) -> IntArray:
         """Return the nearest target to where a camera sees each point, -1 where none is, (n,)."""
-        numbers, tree = np.full(len(points), -1, dtype=np.int64), self.trees[camera]
-        if tree is None or not len(points):
-            return numbers
+        targets = self.maps[camera]
+        if targets is None or not len(points):
+            return np.full(len(points), -1, dtype=np.int64)
         image = project(self.frame.cameras[camera], points, self.frame.media[camera])
-        places = self.frame.sensors[camera].pixel_from_image(image)
-        good = np.flatnonzero(np.isfinite(places).all(axis=1))
-        away, nearest = tree.query(places[good], distance_upper_bound=self.tolerance)
-        near = np.isfinite(away)
-        numbers[good[near]] = self.free[camera][nearest[near]]
-        return numbers
+        nearest = targets.nearest(self.frame.sensors[camera].pixel_from_image(image))
+        return np.where(nearest < 0, -1, self.free[camera][nearest])
 
 
 def _rows(values: FloatArray, numbers: IntArray) -> FloatArray:

@@ -315,11 +315,11 @@ def read_correspondences(path: Path) -> tuple[FloatArray, IntArray]:
 def rt_is_text(xyz: FloatArray, numbers: IntArray) -> str:
     """Return the content of an rt_is file: number from 1, X, Y, Z [mm], targets of four cameras."""
     blank = np.full((len(numbers), max(0, 4 - numbers.shape[1])), -1, dtype=np.int64)
-    text = f"{len(xyz)}\n"
-    for k, (place, row) in enumerate(zip(xyz, np.hstack([numbers, blank]), strict=True), start=1):
-        words = [f"{k:4d}", *(f"{v:9.3f}" for v in place), *(f"{n:4d}" for n in row)]
-        text += " ".join(words) + "\n"
-    return text
+    rows = np.hstack([numbers, blank])
+    line = "%4d %9.3f %9.3f %9.3f" + " %4d" * rows.shape[1] + "\n"
+    places = zip(xyz.tolist(), rows.tolist(), strict=True)
+    lines = [line % (k, *place, *row) for k, (place, row) in enumerate(places, start=1)]
+    return f"{len(xyz)}\n" + "".join(lines)
 
 
 def ori_text(camera: Camera, glass: FloatArray) -> str:

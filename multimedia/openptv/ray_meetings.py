@@ -53,17 +53,21 @@ def meeting_rays(
     away1, away2 = (np.linalg.norm(o, axis=1) for o in (o1, o2))
     per_length = width[1] + other[1]
     slack = _ROUNDING * sum(np.nan_to_num(away).max() for away in (away1, away2))
-    bound1 = (width[0] + per_length * away1 + slack).astype(np.float32)[:, None]
-    bound2 = (other[0] + per_length * away2).astype(np.float32)
+    bound1 = width[0] + per_length * away1 + slack
+    bound2 = other[0] + per_length * away2
+    # What all have of the first part goes to the second. A sum is then at most this multiple of
+    # its second part, by which the moments may be divided.
+    shared = np.nanmin(bound1)
+    bound2 += shared + np.finfo(float).tiny
+    bound1 = (1.0 + (bound1 - shared) / np.nanmin(bound2)).astype(np.float32)[:, None]
     lines = np.hstack([d1, np.cross(o1, d1)]).astype(np.float32)
-    moments = np.hstack([np.cross(o2, d2), d2]).astype(np.float32).T
+    moments = (np.hstack([np.cross(o2, d2), d2]) / bound2[:, None]).astype(np.float32).T
     ones: list[IntArray] = []
     twos: list[IntArray] = []
     step = max(1, _SIEVED // len(o2))
     for start in range(0, len(o1), step):
         side = lines[start : start + step] @ moments
         np.abs(side, out=side)
-        side -= bound2
         rows, columns = np.divmod(np.flatnonzero(side <= bound1[start : start + step]), len(o2))
         ones.append(rows + start)
         twos.append(columns)

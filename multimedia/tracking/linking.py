@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -24,6 +25,8 @@ _ROUNDS, _GUIDED, _GAIN = 2, 5, 0.03
 _STRAYS = 1e-4
 #: Share of the step within which neighbours have to predict to count where no velocity is known.
 _SURELY = 0.6
+#: Particles within reach that are looked for at once; where there are as many, all are.
+_NEAR = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -218,9 +221,7 @@ def _pairs_taken(
     steps = heads.age[head] + 1
     expected = heads.place[head] + way * steps[:, None]
     sought = np.where(is_free, reach, np.maximum(reach, rules.least))
-    near = trees[0].query_ball_point(expected, sought * steps)
-    row = np.repeat(np.arange(len(near)), list(map(len, near)))
-    start = np.array([k for some in near for k in some], dtype=np.int64)
+    row, start = _around(trees[0], expected, sought * steps)
     if not len(row):
         return none, none
     end, is_free, is_new = head[row], is_free[row], row >= len(known)
@@ -244,6 +245,25 @@ def _pairs_taken(
     return end[order], start[order]
 
 
+def _around(tree: cKDTree, places: FloatArray, reach: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return the numbers of places, and of what is within reach of each, one after the other."""
+    away, number = tree.query(places, k=_NEAR, distance_upper_bound=_over(reach))
+    near: BoolArray = away <= reach[:, None]
+    crowded = np.flatnonzero(near[:, -1])
+    near[crowded] = False
+    row, column = np.nonzero(near)
+    rest = tree.query_ball_point(places[crowded], reach[crowded])
+    rows = np.append(row, np.repeat(crowded, list(map(len, rest))))
+    numbers = np.append(number[row, column], np.fromiter(chain.from_iterable(rest), np.int64))
+    order = np.argsort(rows, kind="stable")
+    return rows[order], numbers[order]
+
+
+def _over(reach: FloatArray) -> float:
+    """Return what is above the largest reach by a rounding: bounds of searches are not reached."""
+    return float(np.nextafter(reach.max(initial=0.0), np.inf))
+
+
 def _nearest(
     trees: Sequence[cKDTree | None], ahead: int, expected: FloatArray, reach: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -252,7 +272,7 @@ def _nearest(
     tree = trees[ahead] if ahead < len(trees) else None
     good = np.flatnonzero(np.isfinite(expected[:, 0]))
     if tree is not None and len(good):
-        distance, number = tree.query(expected[good])
+        distance, number = tree.query(expected[good], distance_upper_bound=_over(reach[good]))
         near = distance < reach[good]
         good = good[near]
         away[good] = distance[near] / reach[good]

@@ -142,7 +142,7 @@ def _linear(away: FloatArray, ways: FloatArray, counts: BoolArray) -> FloatArray
     far = ((away / size) ** 2).sum(axis=2)
     near = counts * (1.0 - 0.9 * far / np.maximum(far.max(axis=1, keepdims=True), 1e-300))
     # From that with which most agree: a median is nobody's where streams cross.
-    between = np.linalg.norm(ways[:, :_MODELS, None] - ways[:, None], axis=3)
+    between = distances(ways[:, :_MODELS], ways)
     rank = int(_AGREE * _AROUND)
     model = np.partition(between, rank, axis=2)[:, :, rank].argmin(axis=1)
     residual = between[np.arange(len(ways)), model]
@@ -155,6 +155,17 @@ def _linear(away: FloatArray, ways: FloatArray, counts: BoolArray) -> FloatArray
         fitted = np.linalg.solve(normal, across @ ways)
         residual = np.linalg.norm(ways - design @ fitted, axis=2)
     return fitted[:, 0]
+
+
+def distances(some: FloatArray, others: FloatArray) -> FloatArray:
+    """Return the distances of all of some (n, a, 3) from all of others (n, b, 3), shape (n, a, b).
+
+    Axis by axis: without the differences in one array this takes a quarter of the time.
+    """
+    square = np.zeros((len(some), some.shape[1], others.shape[1]))
+    for k in range(3):
+        square += (some[:, :, None, k] - others[:, None, :, k]) ** 2
+    return np.sqrt(square)
 
 
 def _medians(residual: FloatArray, around: IntArray) -> FloatArray:

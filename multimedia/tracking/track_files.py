@@ -114,9 +114,9 @@ def openptv_files(
     written = {}
     for t, name in enumerate(frames):
         written[f"rt_is.{name}"] = rt_is_text(places[t], targets[t])
+        rows = zip(before[t].tolist(), after[t].tolist(), places[t].tolist(), strict=True)
         lines = [
-            f"{one:4d} {two:4d} {x:10.3f} {y:10.3f} {z:10.3f}\n"
-            for one, two, (x, y, z) in zip(before[t], after[t], places[t].tolist(), strict=True)
+            f"{one:4d} {two:4d} {x:10.3f} {y:10.3f} {z:10.3f}\n" for one, two, (x, y, z) in rows
         ]
         written[f"ptv_is.{name}"] = f"{len(lines)}\n" + "".join(lines)
     return written

@@ -7,12 +7,15 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import cKDTree
 
+from multimedia.tracking.neighbours import distances
 from photocore.arrays import BoolArray, FloatArray, IntArray
 
 #: Points of a track to which a parabola is fitted.
 WINDOW = 5
 #: Sigmas beyond which the cubics of all tracks differ from their parabolas by more than noise.
 _CERTAIN = 2.0
+#: Share of a variance below which a difference is rounding.
+_SAME = 1e-9
 #: Points of all tracks on the average that count beside those of one.
 _SHARED = 2 * WINDOW
 #: Neighbours among which a vector has a companion, and particles in all that tell anything; ratio
@@ -70,7 +73,8 @@ def _with_left_out(
     is shared out as the noise is.
     """
     noise = np.nan_to_num(np.diagonal(richer[1] - fitted[1], axis1=1, axis2=2))
-    known = noise > 0
+    # Of a short track both are one polynomial: what these differ by is rounding.
+    known = noise > _SAME * np.nan_to_num(np.diagonal(fitted[1], axis1=1, axis2=2))
     excess = np.divide((richer[0] - fitted[0]) ** 2, noise, out=np.ones_like(noise), where=known)
     excess -= 1.0
     count = np.maximum(known.sum(axis=0), 1)
@@ -102,7 +106,10 @@ def _slopes(
     for power in range(2, degree + 1):
         design[length < power + 2, :, power] = 0.0
     across = np.swapaxes(design, 1, 2)
-    weights = (np.linalg.pinv(across @ design, hermitian=True) @ across)[:, 1] / scale[:, None]
+    normal = across @ design
+    powers = np.arange(degree + 1)
+    normal[:, powers, powers] += normal[:, powers, powers] == 0.0  # of no effect, but regular
+    weights = np.linalg.solve(normal, across)[:, 1] / scale[:, None]
     weights[length < 2] = np.nan
     velocity = np.einsum("nk,nki->ni", weights, xyz[rows])
     return velocity, np.einsum("nk,nkij->nij", weights**2, covariance[rows])
@@ -133,7 +140,7 @@ def differs_from_neighbours(
     count = min(_COMPANIONS, len(good) - 1)
     near = good[cKDTree(xyz[good]).query(xyz[good], k=count + 1)[1][:, 1:]]
     around = velocity[near]
-    among = np.linalg.norm(around[:, :, None] - around[:, None], axis=3)
+    among = distances(around, around)
     among[:, np.arange(count), np.arange(count)] = np.inf
     usual = np.median(among.min(axis=2), axis=1)
     noise = np.sqrt(np.trace(covariance[good], axis1=1, axis2=2))

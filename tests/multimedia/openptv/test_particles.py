@@ -20,6 +20,7 @@ from multimedia.openptv.openptv_files import (
     read_correspondences,
 )
 from multimedia.openptv.ray_meetings import meeting_rays
+from multimedia.openptv.target_map import TargetMap
 from photocore.arrays import each_once
 from tests.builders.commands import multimedia_command as main
 from tests.multimedia.tank import LAYERS, SENSOR, cameras
@@ -104,6 +105,20 @@ def test_meeting_rays_are_all_that_meet_and_each_row_is_taken_once():
         if not is_used:
             for n, one in zip(pair, used, strict=True):
                 one.add(n)
+
+
+@pytest.mark.parametrize("reach", [0.03, 2.0, 30.0])
+def test_a_map_of_targets_returns_the_nearest_within_reach(reach: float):
+    rng = np.random.default_rng(15)
+    pixels, places = rng.uniform(0.0, 400.0, (500, 2)), rng.uniform(-50.0, 450.0, (4000, 2))
+    places[:500] = pixels + rng.normal(0.0, 0.7 * reach, (500, 2))
+    away = np.linalg.norm(places[:, None] - pixels, axis=2)
+    expected = np.where(away.min(axis=1) < reach, away.argmin(axis=1), -1)
+    assert (expected[:500] >= 0).sum() > 200
+    places[-1] = np.nan
+    expected[-1] = -1
+    assert TargetMap(pixels, reach).nearest(places).tolist() == expected.tolist()
+    assert TargetMap(pixels[:1], reach).nearest(pixels[:2]).tolist() == [0, -1]
 
 
 def test_no_targets_are_no_particles():
