@@ -27,12 +27,14 @@ from bifocal.collimation.session import Session
 from bifocal.collimation.shapes import met, places_of, relief_within
 from bifocal.collimation.starting import open_sample, recent, reopen
 from bifocal.collimation.uncertainty import precision_contours, uncertainty_picture
+from bifocal.collimation.workbook.profile_book import profile_book
 from bifocal.faces.faces_files import beside
 from photocore.arrays import FloatArray, as_points
 from photocore.jsonfile import plain
 from photocore.output import relative_name
 
 _FRESH = {"cache-control": "no-store"}
+_BOOK = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
 
 
 async def _photos(request: Request) -> Response:
@@ -211,6 +213,22 @@ async def _profile(request: Request) -> Response:
     return answer(await in_thread(session_of(request).products.profile, start, end))
 
 
+async def _profile_book(request: Request) -> Response:
+    query = dict(request.query_params)
+    ends = [number_of(query, key) for key in ("x0", "y0", "x1", "y1")]
+    if None in ends:
+        raise FieldError("x0, y0, x1, y1: the ends of the profile on the wall, in metres.")
+    start, end = np.array(ends, dtype=float).reshape(2, 2)
+    session = session_of(request)
+
+    def book() -> bytes:
+        title = session.files.stem
+        return profile_book(session.products.profile(start, end), start, end, title)
+
+    headers = _attachment(f"{session.files.stem}_profile.xlsx")
+    return Response(await in_thread(book), media_type=_BOOK, headers=headers)
+
+
 def _place(body: dict[str, Any], key: str) -> FloatArray:
     place = as_points(body.get(key) or [], key, dimension=2)
     if place.ndim != 1:
@@ -247,6 +265,7 @@ ROUTES = [
     Route("/relief/value", _value),
     Route("/relief/met", _met, methods=["POST"]),
     Route("/relief/profile", _profile, methods=["POST"]),
+    Route("/relief/profile.xlsx", _profile_book),
     Route("/uncertainty.png", _uncertainty),
     Route("/uncertainty.json", _contours),
 ]

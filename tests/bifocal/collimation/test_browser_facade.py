@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import openpyxl
 import pytest
 
 from tests.browser import (
@@ -93,6 +94,10 @@ def test_a_facade_from_two_photos_to_the_drawing_by_clicks_alone(
         along = [float(row.split(",")[0]) for row in rows]
         assert head == "distance [m],X [m],Y [m],r [m],sigma_r [m]"
         assert along[-1] == pytest.approx(6.0, abs=0.05)
+        with page.tab.expect_download() as got:
+            page.click("profile-xlsx")
+        sheet = openpyxl.load_workbook(got.value.path())["Profile"]
+        assert sheet.cell(sheet.max_row, 1).value == pytest.approx(along[-1], abs=1e-4)
         page.click("profile-keep")
         page.tab.get_by_test_id("ortho-swipe").fill("0")
         page.click("face")

@@ -10,6 +10,7 @@ from io import BytesIO
 
 import ezdxf
 import numpy as np
+import openpyxl
 import pytest
 from PIL import Image
 
@@ -19,6 +20,7 @@ from bifocal.collimation import job_process, job_tasks
 from bifocal.collimation.live_orientation import control_of, live_orientation
 from bifocal.collimation.project import find_files
 from bifocal.collimation.records import PickedControl, SurveyState
+from bifocal.collimation.workbook.profile_book import HEADINGS
 from bifocal.orientation.control_points import read_lengths
 from photocore.images import image_info
 from tests.page_session import (
@@ -280,6 +282,15 @@ def test_relief_is_read_on_the_page(tmp_path) -> None:
         assert profile["distance"][-1] == pytest.approx(2.0)
         slope = np.diff(profile["r"]) / np.diff(profile["distance"])
         np.testing.assert_allclose(slope, 0.25, atol=1e-5)
+        book = client.get("/relief/profile.xlsx?x0=-1&y0=0.5&x1=1&y1=0.95").content
+        rows = list(openpyxl.load_workbook(BytesIO(book))["Profile"].values)
+        profile = client.post("/relief/profile", json={"from": [-1, 0.5], "to": [1, 0.95]}).json()
+        assert rows[0] == HEADINGS
+        column = np.array([row[3] for row in rows[1:]], dtype=float)
+        np.testing.assert_allclose(column, np.array(profile["r"], dtype=float), rtol=1e-12)
+        assert np.isnan(column).any()
+        assert rows[-1][:3] == pytest.approx((profile["distance"][-1], 1, 0.95))
+        assert client.get("/relief/profile.xlsx?x0=-1&y0=0").status_code == 400
         assert client.get("/relief/overlay.png").content[:4] == b"\x89PNG"
         assert client.get("/uncertainty.png").content[:4] == b"\x89PNG"
         facts = client.get("/api/state").json()["products"]["relief"]

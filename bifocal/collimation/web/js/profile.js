@@ -28,9 +28,10 @@ export class Profile {
     this.chart = svg("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", class: "chart" });
     this.caption = h("p", { class: "hint", role: "status" });
     this.keep = button(t("profile.keep"), () => this.#keep(), { class: "quiet", testid: "profile-keep", "aria-pressed": "false" });
+    this.book = h("a", { class: "button quiet", download: "", testid: "profile-xlsx" }, "Excel");
     this.element = h("section", { class: "profile", hidden: true, "aria-label": t("profile.title") },
       h("div", { class: "row" }, this.caption, this.keep,
-        button("CSV", () => this.#save(), { class: "quiet", testid: "profile-csv" }),
+        button("CSV", () => this.#save(), { class: "quiet", testid: "profile-csv" }), this.book,
         button(t("profile.close"), () => this.close(), { class: "quiet" })),
       this.chart);
     this.chart.addEventListener("pointermove", (event) => this.#point(event));
@@ -145,6 +146,8 @@ export class Profile {
     this.element.hidden = false;
     this.shown();
     this.#tellKept();
+    const [[x0, y0], [x1, y1]] = this.ends;
+    this.book.href = `relief/profile.xlsx?${new URLSearchParams({ x0, y0, x1, y1 })}`;
     const times = (x(1) - x(0)) && (y(0) - y(1)) / (x(1) - x(0));
     setText(this.caption, `${t("profile.caption", { length: number(this.length, 3), low: number(low, 3), high: number(high, 3) })} · ${
       t("profile.times", { times: number(times, times < 10 ? 1 : 0) })}`);
