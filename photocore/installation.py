@@ -7,6 +7,7 @@ import os
 import re
 import sys
 from contextlib import suppress
+from functools import cache
 from importlib.metadata import PackageNotFoundError, requires
 from importlib.util import find_spec
 from pathlib import Path
@@ -64,27 +65,39 @@ def is_of_memory(error: BaseException) -> bool:
 
 def installed() -> dict[str, str]:
     """Return what is installed and its version; names of folders alone, for every start asks."""
-    found: dict[str, str] = {}
-    for folder in reversed(sys.path):
-        with suppress(OSError):
-            for name in os.listdir(folder or "."):  # noqa: PTH208
-                if name.endswith(".dist-info"):
-                    package, _, version = name.removesuffix(".dist-info").partition("-")
-                    found[package.lower().replace("_", "-")] = version
-    return found
+    return {name: version for folder in reversed(sys.path) for name, version in _held_by(folder)}
+
+
+@cache
+def _held_by(folder: str) -> list[tuple[str, str]]:
+    """Return what a folder of ``sys.path`` holds: names and versions of distributions."""
+    parts: list[tuple[str, str, str]] = []
+    with suppress(OSError):
+        parts = [
+            name.removesuffix(".dist-info").partition("-")
+            for name in os.listdir(folder or ".")  # noqa: PTH208
+            if name.endswith(".dist-info")
+        ]
+    return [(package.lower().replace("_", "-"), version) for package, _, version in parts]
+
+
+@cache
+def _bounds() -> list[tuple[str, str]]:
+    """Return the libraries that the program needs, each with the oldest version that will do."""
+    try:
+        lines = [line.replace(" ", "") for line in requires(DISTRIBUTION) or ()]
+    except PackageNotFoundError:
+        return []
+    return [(bound[1], bound[2]) for bound in map(_BOUND.match, lines) if bound]
 
 
 def too_old() -> list[str]:
     """Return which libraries are older than the program needs, and the command that mends each."""
-    try:
-        needed = [_BOUND.match(line.replace(" ", "")) for line in requires(DISTRIBUTION) or ()]
-    except PackageNotFoundError:
-        return []
     here, said = installed(), []
-    for name, bound in [found.groups() for found in needed if found]:
-        # Four distributions bring OpenCV, each into the same folder.
-        twins = [key for key in here if name.startswith("opencv") and key.startswith("opencv-")]
-        for twin in twins or [name]:
+    # Four distributions bring OpenCV, each into the same folder.
+    twins = [key for key in here if key.startswith("opencv-")]
+    for name, bound in _bounds():
+        for twin in (twins if name.startswith("opencv") else []) or [name]:
             if twin in here and _numbers(here[twin]) < _numbers(bound):
                 away = "" if twin == name else f'"{sys.executable}" -m pip uninstall -y {twin}; '
                 said.append(

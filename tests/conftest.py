@@ -124,6 +124,14 @@ def _observed_commands() -> Iterator[tuple[list[str], list[subprocess.Popen]]]:
 
 
 @pytest.fixture(scope="session", autouse=True)
+def _no_wait_for_the_disk() -> Iterator[None]:
+    """What a test writes need not outlast a power cut: a page's journal waits at every step."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda _: None)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
 def _books_by_the_schemas() -> Iterator[None]:
     """Hold every part of a workbook that is written against the schemas, but what was there."""
     check = package._refuse_damage

@@ -117,8 +117,11 @@ def find_columns(
     if rows:
         candidates = [row for row in candidates if rows[0] <= row <= rows[1]]
     best: Match | None = None
+    words = {word for c in wanted for word in (c.key, bare(c.key), *map(bare, c.aliases))}
     for row in candidates:
         for texts, header in _heading_texts(grid, row, span):
+            if words.isdisjoint(_words_of(texts)):
+                continue  # most rows: they hold values
             match = _assign(wanted, texts, fixed, header, column_map or {})
             match.score = (*match.score[:2], int(header == row))
             if match.score[0] > len(fixed) and (best is None or match.score > best.score):
@@ -220,6 +223,13 @@ def _heading_texts(
                 double[column] = [upper[column]]
         headings.append((double, row + 1))
     return headings
+
+
+def _words_of(texts: Mapping[int, list[str]]) -> set[str]:
+    """Return all by which the headings of a row may be known."""
+    forms = {form for variants in texts.values() for form in forms_of(variants)}
+    parts = {part for variants in texts.values() for part in parts_of(variants[-1])}
+    return forms | parts | {text.strip() for variants in texts.values() for text in variants}
 
 
 def _photo_digits(groups: Sequence[str]) -> dict[str, str]:

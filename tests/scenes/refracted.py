@@ -6,6 +6,8 @@ Newton's method on the direction of the ray until it passes through the point.
 
 from __future__ import annotations
 
+from functools import cache
+
 import mpmath as mp
 import numpy as np
 
@@ -29,11 +31,17 @@ def _shot(direction, camera, normal, z0, indices, thicknesses):
 
 
 def seen_at(point, *, nadir, distance, z0, indices, thicknesses, normal=(0, 0, 1)):
-    """Return the apparent position of a point on the reference plane, 2 mpf. [m]"""
+    """Return the apparent position of a point on the reference plane, shape (2,). [m]"""
+    lists = (point, (*nadir, distance), indices, thicknesses, normal)
+    return np.array(_seen_at(float(z0), *(tuple(map(float, values)) for values in lists)))
+
+
+@cache  # many tests ask for the same points
+def _seen_at(z0, point, centre, indices, thicknesses, normal):
     with mp.workdps(60):
-        camera = [mp.mpf(float(v)) for v in (*nadir, distance)]
-        target = mp.matrix([mp.mpf(float(v)) for v in point])
-        axis = mp.matrix([mp.mpf(float(v)) for v in normal])
+        camera = [mp.mpf(v) for v in centre]
+        target = mp.matrix([mp.mpf(v) for v in point])
+        axis = mp.matrix([mp.mpf(v) for v in normal])
         axis = axis / mp.norm(axis)
         media = (
             axis,
@@ -49,7 +57,7 @@ def seen_at(point, *, nadir, distance, z0, indices, thicknesses, normal=(0, 0, 1
 
         straight = [(target[k] - camera[k]) / (camera[2] - target[2]) for k in (0, 1)]
         way = mp.findroot(miss, straight, tol=1e-100, maxsteps=60)
-        return np.array([float(camera[k] + way[k] * camera[2]) for k in (0, 1)])
+        return [float(camera[k] + way[k] * camera[2]) for k in (0, 1)]
 
 
 def pixels_of(photo, points, layers):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import hashlib
+from functools import cache
 from pathlib import Path
 
 from starlette.exceptions import HTTPException
@@ -30,7 +31,6 @@ class Assets:
         self._tags = {
             name: f'"{hashlib.sha256(data).hexdigest()[:16]}"' for name, data in self._files.items()
         }
-        self._small = {name: gzip.compress(data, mtime=0) for name, data in self._files.items()}
 
     def page(self, language: str) -> bytes:
         """Return the page; it names all modules, so that the browser fetches them side by side.
@@ -59,5 +59,10 @@ class Assets:
         if request.headers.get("if-none-match") == headers["etag"]:
             return Response(status_code=304, headers=headers)
         if "gzip" in request.headers.get("accept-encoding", ""):
-            data, headers["content-encoding"] = self._small[name], "gzip"
+            data, headers["content-encoding"] = _compressed(data), "gzip"
         return Response(data, media_type=_TYPES[Path(name).suffix], headers=headers)
+
+
+@cache
+def _compressed(data: bytes) -> bytes:
+    return gzip.compress(data, mtime=0)

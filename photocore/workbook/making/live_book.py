@@ -7,6 +7,7 @@ from collections.abc import Hashable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from openpyxl import Workbook
 from openpyxl.cell import Cell
@@ -72,7 +73,7 @@ class BookBuilder:
     blocks: dict[str, RowBlock] = field(default_factory=dict)
     tables: dict[str, TableContent] = field(default_factory=dict)
     drawings: dict[str, bytes] = field(default_factory=dict)
-    looks: dict[Hashable, tuple[Font | None, StyleArray]] = field(default_factory=dict)
+    looks: dict[Hashable, tuple[dict[str, Any], StyleArray]] = field(default_factory=dict)
     _titles: list[tuple[str, str, StrVal]] = field(default_factory=list)
 
     def word(self, key: str) -> str:
@@ -264,20 +265,25 @@ class SheetBuilder:
         self, cell: Cell, *, font: Font | None = None, form: str = "", editable: bool = False
     ) -> None:
         """Give a cell its font, its number format, and the look of one that may be changed."""
-        # openpyxl looks every part of a style up by all its fields: half the time of a workbook.
-        key = None if cell.has_style else (id(font), form, editable)
-        if key in self.book.looks:
-            cell._style = copy(self.book.looks[key][1])
-            return
-        if font:
-            cell.font = font
+        parts: dict[str, Any] = {"font": font} if font else {}
         if editable:
-            cell.fill, cell.border = INPUT_FILL, INPUT_EDGE
-            cell.protection = Protection(locked=False)
+            parts |= {"fill": INPUT_FILL, "border": INPUT_EDGE, "protection": _FREE}
         if form:
-            cell.number_format = form
-        if key is not None:
-            self.book.looks[key] = font, copy(cell._style)
+            parts["number_format"] = form
+        self._dress(cell, None if cell.has_style else (id(font), form, editable), **parts)
+
+    def _dress(self, cell: Cell, key: Hashable | None, **parts: Any) -> None:
+        """Give a cell parts of a style; the key, if any, stands for all that make it.
+
+        openpyxl looks every part of a style up by all its fields: half the time of a workbook.
+        """
+        if key not in self.book.looks:
+            for name, part in parts.items():
+                setattr(cell, name, part)
+            if key is not None:
+                self.book.looks[key] = parts, copy(cell._style)
+        else:
+            cell._style = copy(self.book.looks[key][1])
 
     def _name(self, cell: str, name: str) -> None:
         if name:
@@ -358,9 +364,11 @@ class SheetBuilder:
         above, key = sheet.cell(head - 1, number), sheet.cell(head, number)
         label = self.book.words.label(column.label or column.key, self.book.language)
         above.value = label.replace(" [", "\n[") if "|" in label else label
-        above.font, above.alignment = LABEL_FONT, _LABEL_PLACE
-        key.value, key.font, key.fill = column.key, HEAD_FONT, HEAD_FILL
-        key.alignment = Alignment(horizontal="center")
+        key.value = column.key
+        look = None if above.has_style else "label of a column"
+        self._dress(above, look, font=LABEL_FONT, alignment=_LABEL_PLACE)
+        look = None if key.has_style else "key of a column"
+        self._dress(key, look, font=HEAD_FONT, fill=HEAD_FILL, alignment=_MIDDLE)
         letter = get_column_letter(number)
         before = sheet.column_dimensions.get(letter)
         width = sheet.column_dimensions[letter]
@@ -373,16 +381,20 @@ class SheetBuilder:
     def _cell(self, place: str, table: str, column: LiveColumn, value: CellValue) -> None:
         """Write one cell of a table."""
         form, cell = column.number_format, self.worksheet[place]
+        is_bare, parts = not cell.has_style, {}
         if column.kind == "formula":
             self.formula(place, row_formula(table, column.formula)[1:], value, form=form)
         else:
             self.input(place, value, form=form)
         if column.kind == "value":
-            cell.fill, cell.protection = PatternFill(), Protection(locked=True)
+            parts = {"fill": _NO_FILL, "protection": _LOCKED}
         if column.key in ("flag", "use", "verdict", "fit"):
-            cell.alignment = Alignment(horizontal="center")
+            parts["alignment"] = _MIDDLE
         elif column.key == "id":
-            cell.alignment = Alignment(horizontal="left")
+            parts["alignment"] = _LEFT
+        if parts:
+            key = (column.kind, form, *map(id, parts.values())) if is_bare else None
+            self._dress(cell, key, **parts)
 
     def _add_table(
         self, name: str, columns: Sequence[LiveColumn], at: tuple[int, int], rows: int
@@ -476,6 +488,8 @@ class SheetBuilder:
 
 
 # Programs indent nothing that has no side of its own.
+_MIDDLE, _LEFT = Alignment(horizontal="center"), Alignment(horizontal="left")
+_NO_FILL, _LOCKED, _FREE = PatternFill(), Protection(locked=True), Protection(locked=False)
 _UNIT_PLACE = Alignment(horizontal="left", indent=1)
 _LABEL_PLACE = Alignment(wrap_text=True, vertical="bottom", horizontal="center")
 

@@ -128,8 +128,8 @@ def test_snap_finds_the_centres_of_the_samples_targets(sample) -> None:
 
 
 def _drawn(kind: str, centre: tuple[float, float], size: float, rng) -> np.ndarray:
-    """Return a target drawn with 12 x 12 samples a pixel and blurred as by a lens, with noise."""
-    fine, side = 12, 64
+    """Return a target drawn with 8 x 8 samples a pixel and blurred as by a lens, with noise."""
+    fine, side = 8, 64
     at = (np.arange(side * fine) + 0.5) / fine - 0.5
     x, y = np.meshgrid(at - centre[0], at - centre[1])
     turn = 0.3

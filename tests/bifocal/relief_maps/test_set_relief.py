@@ -21,8 +21,9 @@ DARKER = Exposure(gain=0.75, gamma=1.1)
 
 
 @cache
-def shot() -> SetRendering:
-    cameras = bifocal_cameras(size=(768, 512), pixel=0.01476)
+def shot(width: int = 384) -> SetRendering:
+    """Return the photos of three cameras; the wider ones show more about the same middle."""
+    cameras = bifocal_cameras(size=(width, width * 2 // 3), pixel=0.01476)
     three = (cameras.far, cameras.near, aside(cameras.near, 1.5))
     exposures = (Exposure(), Exposure(), DARKER)
     return render_set(
@@ -32,13 +33,13 @@ def shot() -> SetRendering:
 
 @cache
 def of_three() -> ReliefMap:
-    taken = shot()
+    taken = shot(768)
     return dense_relief(taken.photos, *taken.images, gsd=taken.truth.gsd, bounds=taken.truth.bounds)
 
 
 @cache
 def of_two() -> ReliefMap:
-    taken = shot()
+    taken = shot(768)
     two = taken.photos.pair(0, 1)
     return dense_relief(two, *taken.images[:2], gsd=taken.truth.gsd, bounds=taken.truth.bounds)
 
@@ -49,7 +50,7 @@ def bands(relief: ReliefMap) -> list[np.ndarray]:
 
 @pytest.mark.acceptance
 def test_a_set_of_two_gives_what_the_pair_gives_in_any_order():
-    taken, part = shot(), {"gsd": shot().truth.gsd, "bounds": (-1.5, -1.0, 1.5, 1.0)}
+    taken, part = shot(768), {"gsd": shot(768).truth.gsd, "bounds": (-1.5, -1.0, 1.5, 1.0)}
     pair = dense_relief(taken.photos.pair(0, 1), *taken.images[:2], **part)
     for order in ((0, 1), (1, 0)):
         photos = PhotoSet(photos=tuple(taken.photos.photos[number] for number in order))
@@ -76,7 +77,7 @@ def test_a_third_photo_measures_the_nadir():
 
 @pytest.mark.acceptance
 def test_a_third_photo_measures_the_nadir_and_what_the_pair_cannot_see():
-    taken, three, two = shot(), of_three(), of_two()
+    taken, three, two = shot(768), of_three(), of_two()
     assert three.used == (("1", "2"), ("1", "3"), ("2", "3"))
     seen = taken.visible.sum(axis=0) >= 2
     places = taken.truth.plane_positions()
@@ -102,7 +103,7 @@ def test_a_third_photo_measures_the_nadir_and_what_the_pair_cannot_see():
 
 @pytest.mark.acceptance
 def test_a_photo_of_something_else_is_left_out_and_named():
-    taken = shot()
+    taken = shot(768)
     noise = np.random.default_rng(3).integers(0, 255, taken.images[2].shape).astype(np.uint8)
     found = dense_relief(
         taken.photos, *taken.images[:2], noise, gsd=taken.truth.gsd, bounds=taken.truth.bounds
@@ -122,7 +123,7 @@ GRID = Grid.from_bounds((-0.5, -0.5, 0.5, 0.5), gsd=0.02)
 
 def witnesses() -> list[Witness]:
     """Return photos of nothing at all, which cannot decide."""
-    grey = np.full((512, 768), 90, np.uint8)
+    grey = np.full((256, 384), 90, np.uint8)
     return [Witness.of(photo, grey, 0.02) for photo in shot().photos.photos]
 
 
@@ -189,7 +190,7 @@ def test_photos_decide_between_pairs_where_they_can():
     quality = np.full(truth.shape, Quality.MEASURED, np.uint8)
     weight = np.ones(truth.shape, np.float32)
     off = np.zeros(truth.shape, np.float32)
-    off[:, 500:] = 0.25
+    off[:, 250:] = 0.25
     right, wrong = (
         PairRelief(MapBands(truth.r + shift, sigma, quality), weight) for shift in (0 * off, off)
     )

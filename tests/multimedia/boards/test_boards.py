@@ -195,7 +195,8 @@ def _image(points: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("size", [(6, 4), (5, 5)], ids=str)
 @pytest.mark.parametrize("legacy", [False, True], ids=["new", "legacy"])
 @pytest.mark.parametrize(
-    ("dictionary", "side"), [("7X7_50", 0.6), ("APRILTAG_36h11", 0.75), ("4X4_100", 0.5)]
+    ("dictionary", "side"),
+    few_by_default([("7X7_50", 0.6), ("APRILTAG_36h11", 0.75), ("4X4_100", 0.5)], ("7X7_50", 0.6)),
 )
 def test_charuco_of_any_dictionary_and_layout_has_its_corners_in_place(
     dictionary, side, legacy, size
@@ -219,12 +220,12 @@ def test_markers_that_lie_otherwise_than_on_the_board_are_named(tmp_path, monkey
     Path("housing.toml").write_text(housing())
     for k in range(3):
         cv2.imwrite(f"b{k}.png", cv2.resize(np.round(255 * charuco(6, 4)), (480, 360)))
-    words = ["boards", "housing.toml", "b0.png", "b1.png", "b2.png", "--pattern", "charuco"]
-    words += ["--square", "24", "--out", "out.toml", "--board"]
-    result = CliRunner().invoke(main, [*words, "7x4"])
+    words = ["--pattern", "charuco", "--square", "24", "--out", "out.toml", "--board"]
+    result = CliRunner().invoke(main, ["boards", "housing.toml", "b0.png", *words, "7x4"])
     assert result.exit_code == 1
     assert "b0.png: shows 12 markers of 4X4_250, 0 to 11, but not as they lie" in result.stderr
-    result = CliRunner().invoke(main, [*words, "6x4"])
+    three = ["b0.png", "b1.png", "b2.png"]
+    result = CliRunner().invoke(main, ["boards", "housing.toml", *three, *words, "6x4"])
     assert "3 photos show ChArUco 4X4_250" in result.output
 
 
