@@ -177,7 +177,7 @@ def project_with_jacobian(camera: Pinhole, xyz: FloatArray) -> ProjectedPoints:
     offset = pixels - camera.matrix[:2, 2]
     by_camera[:, :, 0] = offset
     by_camera[:, 1, 1] = offset[:, 1]
-    by_camera[:, :, 2:4] = np.eye(2)
+    by_camera[:, 0, 2] = by_camera[:, 1, 3] = 1.0
     # Turned by a small v the camera sees R (P - C + v x (P - C)).
     by_camera[:, :, 4:7] = by_rotation(by_point, away)
     by_camera[:, :, 7:] = -by_point

@@ -114,7 +114,7 @@ def by_rotation(rows: FloatArray, arms: FloatArray) -> FloatArray:
     """
     x, y, z = arms.T
     turned: FloatArray = np.empty(rows.shape)
-    for row, out in zip(np.moveaxis(rows, 1, 0), np.moveaxis(turned, 1, 0), strict=True):
+    for row, out in zip(rows.transpose(1, 0, 2), turned.transpose(1, 0, 2), strict=True):
         a, b, c = row.T
         out[:, 0], out[:, 1], out[:, 2] = y * c - z * b, z * a - x * c, x * b - y * a
     return turned

@@ -51,7 +51,11 @@ def write_pdf(
     info: dict[str, Any] = {"Title": document.title, "Creator": document.subject}
     info |= {"Producer": "bifocal", "CreationDate": date, "ModDate": date}
     info["Subject"] = "; ".join(provenance().lines())
-    size = min(SIZES, key=lambda size: (_emptiest(document, size), -size))
+    emptiest: dict[float, float] = {}
+    for size in SIZES:
+        if 0.0 not in emptiest.values():
+            emptiest[size] = _emptiest(document, size)
+    size = min(emptiest, key=lambda size: (emptiest[size], -size))
     with atomic_path(path, overwrite=overwrite) as temporary:
         # Where the disk is full, matplotlib tries again as it closes the file, and zlib fails.
         written = BytesIO()

@@ -12,15 +12,35 @@ from click.testing import CliRunner
 from PIL import Image
 
 from bifocal import InputError, Interior, Lens, calibrate, read_image, write_image
-from bifocal.calibration.board_calibration import lens_of_views
+from bifocal.calibration.board_calibration import Calibration, lens_of_views
 from bifocal.calibration.lens_database import lens_from_database
 from bifocal.calibration.plumb_line import calibrate_from_lines, find_straight_edges
 from bifocal.calibration.workflow import undistorted
+from bifocal.cli.calibrate import _board_text
 from bifocal.model.interior_orientation import lens_of_photo
 from photocore.camera.boards import detect_board, find_board_size
 from photocore.camera.charuco import BoardView
 from tests.bifocal.calibration.known_lens import BROWN, GRID, MATRIX, brown_by_hand
 from tests.builders.commands import bifocal_command as main
+
+
+def test_a_calibration_is_told_with_the_sigma_of_each_value_that_was_estimated():
+    result = Calibration(
+        lens=replace(BROWN, sigma0=0.25, source="8 photos"), dropped=("c.jpg",),
+        standard_deviations={"fx": 0.5, "cy": 0.25, "k1": 0.002}, photo_rms={"a.jpg": 0.21},
+        suspicious=("b.jpg",), coverage=np.arange(48).reshape(6, 8), tried=(("k1", 0.25),),
+        verdict="good",
+    )  # fmt: skip
+    text = "\n".join(_board_text(result))
+    rows = [line.split() for line in text.splitlines()]
+    (fx, _), (_, cy) = MATRIX[0, [0, 2]], MATRIX[1, [1, 2]]
+    assert ["fx", f"{fx:.3f}", "0.500"] in rows
+    assert ["cy", f"{cy:.3f}", "0.250"] in rows
+    assert ["k1", f"{BROWN.coefficients[0]:.6f}", "0.002000"] in rows
+    assert not {row[0] for row in rows if row} & {"fy", "cx", "k2", "p1", "p2", "k3"}
+    for words in ("RMS 0.250 px; 8 photos", "k1 0.250 px", "a.jpg  0.210", "fit the others: c.jpg",
+                  "than the others: b.jpg", "  40   41", "Verdict: good"):  # fmt: skip
+        assert words in text
 
 
 def test_distortion_is_browns_and_its_inverse_exact():

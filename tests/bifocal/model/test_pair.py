@@ -73,6 +73,9 @@ def test_pixels_of_an_ideal_pair_are_counted_right_and_down_from_its_nadir_point
     # By hand: 0.0074 mm * 0.5 m/mm = 3.7 mm on the wall; 100 px right and 50 px up of the nadir.
     for photo, pixel in ((pair.image1, (1636, 974)), (pair.image2, (1600, 950))):
         np.testing.assert_allclose(photo.plane_from_pixels([pixel]), [[0.37, 0.185]], rtol=1e-12)
+    unstated = Pair.ideal(d1=17.5, d2=9.5, pixel_size=0.0074)
+    for photo in (unstated.image1, unstated.image2):
+        assert photo.plane_from_pixels([[0, 0]]).tolist() == [[0, 0]]
 
 
 @pytest.mark.parametrize(

@@ -30,6 +30,16 @@ def edited(path, change):
     return path
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_scales_that_differ_by_two_hundredths_are_of_no_bifocal_pair(tmp_path, sign):
+    path = write_csv(tmp_path / "s.csv", "id,x1,y1,x2,y2\nA,4,1,4.5,1.1\n")
+    for share, status in ((0.019, 0), (0.021, 1)):
+        options = ("--d1", 17.5, "--d2", 9.5, "--c1", 35, "--c2", 19 * (1 + sign * share))
+        done = run("solve", path, *options)
+        assert done.exit_code == status, done.stderr
+        assert "tolerance 2.0%" in done.stderr or not status
+
+
 def test_missing_sheet_points(tmp_path):
     path = edited(fill(tmp_path / "s.xlsx"), lambda book: book.remove(book["Points"]))
     refused(path, 'no sheet "Points"')

@@ -162,6 +162,16 @@ def test_ray_trace_and_radial_shift_agree_to_1e_12(
         assert actual == pytest.approx(expected, rel=1e-12, abs=4 * EPS)
 
 
+def test_what_a_camera_sees_of_a_point_leads_back_to_it() -> None:
+    glass = mm.Interfaces.parallel(TANK)
+    camera = mm.Camera.from_angles((10.0, 20.0, 300.0), 0.1, -0.2, 0.3, principal_distance=20.0)
+    points = grid_points(7, 20, [-100, -100, -200], [100, 100, -20])
+    vectors, labels = glass.seen(camera, points)
+    assert set(labels) == {""}
+    starts, ways = glass.object_rays(camera, vectors)
+    assert np.linalg.norm(np.cross(points - starts, ways), axis=-1).max() < 1e-9
+
+
 def test_a_ray_at_45_degrees_is_bent_as_computed_by_hand() -> None:
     # asin(sin 45 / 1.5) = 28.1255 degrees in glass: 10 mm thick, so 10 tan 28.1255 = 5.3452 mm on.
     glass = mm.Interfaces.parallel(mm.Layers(indices=(1.0, 1.5, 1.0), thicknesses=(10.0,)))
