@@ -24,6 +24,7 @@ from pkgutil import walk_packages
 from typing import Any
 
 import cv2
+from PIL import Image
 
 import bifocal
 import multimedia
@@ -122,7 +123,9 @@ def main() -> None:
         for module in walk_packages(package.__path__, f"{package.__name__}."):
             if not module.name.endswith("__main__"):
                 import_module(module.name)
-    import_module("tomli_w")  # which is loaded when a project is written
+    for name in ("tomli_w", "ezdxf", "statistics"):  # loaded when a file of theirs is written
+        import_module(name)
+    Image.init()
     with tempfile.TemporaryDirectory() as name:
         for line in sys.stdin:
             sys.__stdout__.write(json.dumps(run(json.loads(line), Path(name))) + "\n")

@@ -37,6 +37,7 @@ from tests.bifocal.workbook.test_survey_workbook import (
     ideal_content,
 )
 from tests.builders.commands import bifocal_command as main
+from tests.cases import few_by_default
 from tests.recalculate import recalculated, rows_of
 from tests.scenes.refracted import seen_at
 from tests.workbook_lint import lint
@@ -181,11 +182,7 @@ def test_a_workbook_of_raw_pixels_equals_the_library(name, tmp_path):
 
 @pytest.mark.parametrize(
     "name",
-    [
-        "oblique",
-        "leaning port",
-        *(pytest.param(n, marks=pytest.mark.acceptance) for n in ("port", "surface", "diver")),
-    ],
+    few_by_default(["oblique", "leaning port", "port", "surface", "diver"], "leaning port"),
 )
 def test_the_set_up_of_a_pair_comes_back_from_its_workbook(name, tmp_path):
     """Written beside its pair file and without it: media stand in the cells of `Setup`."""

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import rasterio
 
+from tests.cases import few_by_default
 from tests.multimedia.bathymetry.test_cli_bathymetry import (
     CENTRES,
     LEVEL,
@@ -177,7 +178,11 @@ def test_tables_that_do_not_fit_each_other_are_named(tmp_path: Path) -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="file size limits are POSIX")
 @pytest.mark.parametrize(
     ("width", "height", "limit"),
-    [(30, 20, 0), (30, 20, 1_000), (500, 400, 5_000), (500, 400, 400_000)],
+    few_by_default(
+        [(30, 20, 0), (30, 20, 1_000), (500, 400, 5_000), (500, 400, 400_000)],
+        (30, 20, 0),
+        (500, 400, 400_000),
+    ),
 )
 def test_a_full_disk_leaves_the_old_model_as_it_was(
     tmp_path: Path, width: int, height: int, limit: int

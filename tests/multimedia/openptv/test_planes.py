@@ -21,6 +21,7 @@ from multimedia import (
     read_project,
     write_experiment,
 )
+from multimedia.openptv.plane_files import labels_of
 from multimedia.openptv.workflow import import_openptv
 from tests.builders.commands import multimedia_command as main
 from tests.multimedia.tank import SENSOR
@@ -127,6 +128,18 @@ def test_a_multi_plane_experiment_is_resected_to_its_pixel_noise(folder, tmp_pat
         at = found.object_points.rows([table.ids[row] for row in rows])
         image = project(camera, found.object_points.xyz[at], WALL)
         assert np.abs(table.image[rows] - image).max() < 6 * NOISE * 0.012
+
+
+@pytest.mark.parametrize(
+    ("stems", "labels"),
+    [
+        (["cal/plane1_cam", "cal/low/Camera"], ["plane1", "low"]),
+        (["cam", "cal/low_cam"], ["plane1", "low"]),
+        (["day1/body_cam", "day2/body_cam"], ["plane1", "plane2"]),
+    ],
+)
+def test_positions_are_called_as_their_files_and_counted_where_two_are_called_alike(stems, labels):
+    assert labels_of(stems) == labels
 
 
 @pytest.mark.acceptance
