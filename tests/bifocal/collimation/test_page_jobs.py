@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from bifocal.collimation import jobs
+from bifocal.collimation import job_process, jobs
 from bifocal.collimation.background import in_background
 from bifocal.collimation.jobs import JobRunner, PageJob
 from tests.conftest import Unforeseen
@@ -127,3 +127,14 @@ def test_stopping_kills_a_worker_that_does_not_hear(
         thread.join(timeout=20)
     assert not any(thread.is_alive() for thread in runner.threads)
     assert job.state == "cancelled"
+
+
+def test_what_is_offered_as_targets_is_no_feature(monkeypatch: pytest.MonkeyPatch) -> None:
+    points = [{"name": name, "code": code} for name, code in (("A", "target"), ("B", "feature"))]
+
+    def matched(task: dict[str, Any], _progress: object) -> dict[str, Any]:
+        assert not task["features"]
+        return {"points": points}
+
+    monkeypatch.setattr(job_process, "_match", matched)
+    assert job_process._targets({"pair": "a.json"}, print)["points"] == points[:1]
