@@ -9,6 +9,7 @@ import pytest
 
 from bifocal import SAMPLE, InputError, Pair
 from bifocal.collimation.job_tasks import task_of
+from bifocal.collimation.pasted import _with_headings
 from bifocal.model.world_frame import WorldFrame
 from bifocal.orientation.align_workflow import AlignOptions, control_of
 from tests.page_session import client_of, opened, sample_folder
@@ -49,6 +50,14 @@ def test_pasted_with_pixels_they_become_x_along_the_wall_y_and_r(tmp_path) -> No
         session.command({"op": "undo"})
         assert not session.state.control
         assert not session.state.pasted.get("control")
+
+
+@pytest.mark.parametrize(
+    ("text", "heading"),
+    [("P1;2,5", "id;X"), ("P1\t2\t3", "id\tX\tY"), ("id;X\nP1;2", "id;X"), ("P1", "P1")],
+)
+def test_numbers_pasted_without_headings_are_a_name_x_y_and_so_on(text, heading) -> None:
+    assert _with_headings(text).splitlines()[0] == heading
 
 
 def test_picks_of_the_page_tell_the_front_and_without_them_it_is_asked(tmp_path) -> None:

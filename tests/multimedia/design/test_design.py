@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+import math
+from dataclasses import fields, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -30,6 +31,7 @@ from multimedia import (
     study_setup,
     write_project,
 )
+from multimedia.cli.design import DesignCommand
 from multimedia.design.design_files import write_design_plot
 from tests.builders.commands import multimedia_command as main
 
@@ -266,3 +268,10 @@ def test_precision_is_told_for_at_most_twelve_depths(tmp_path, depths, told):
     done = CliRunner().invoke(main, ["design", str(tmp_path / "tank.toml"), "--json"])
     found = [100 * row["depth"] - 2 for row in json.loads(done.stdout)["by_depth"]]
     np.testing.assert_allclose(found, told, atol=1e-9)
+
+
+def test_the_cone_opens_by_as_much_in_python_as_on_the_command_line():
+    defaults = {field.name: field.default for field in fields(DesignCommand)}
+    assert math.degrees(defaults["half_angle"]) == pytest.approx(30.0)
+    help_text = CliRunner().invoke(main, ["design", "--help"]).output
+    assert "[default: 30.0" in " ".join(help_text.split())
