@@ -24,7 +24,7 @@ from multimedia.media.camera import EXTERIOR, Camera
 from multimedia.media.projection import project as project_points
 from multimedia.orientation.calibration_covariance import with_covariance
 from multimedia.orientation.stray_rays import names_of, without_rows
-from multimedia.projects.model import ImagePoints, ObjectPoints, Project
+from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints, Project
 from multimedia.remarks import remark
 from photocore.adjustment import Fit, huber_weights
 from photocore.adjustment.network import NetworkState
@@ -36,6 +36,8 @@ from photocore.errors import ConvergenceError, GeometryError, InputError, Photog
 ROBUST_ROUNDS = 8
 #: Rounds and relative change in which the weight of the image coordinates settles.
 BALANCE_ROUNDS, BALANCED = 5, 0.05
+#: Standard deviations by which a new point may come out before the last face.
+BEFORE_FACE = 3.0
 #: A largest residual of so many times the typical one may come of another point.
 GROSS = 15.0
 
@@ -173,6 +175,17 @@ def _adjusted(project: Project, unknowns: Unknowns) -> Adjustment:
         fitted = bundle.weighted(weights).network.solve(state)
         bundle, fitted = _balanced(bundle, fitted, weights)
     result = _adjustment(bundle, fitted, weights, remarks)
+    distance, normals = bundle.before_faces(fitted.state)
+    spread = result.point_covariance[: len(distance)]
+    sigma = np.sqrt(np.einsum("ni,nij,nj->n", normals, spread, normals))
+    if (distance > BEFORE_FACE * sigma).any():
+        return _without_points(bundle, unknowns, distance > BEFORE_FACE * sigma)
+    if distance.any():
+        names = [bundle.ids[j] for j in np.flatnonzero(distance).tolist()]
+        shown = ", ".join(names[:SHOWN]) + (" ..." if len(names) > SHOWN else "")
+        most = f"{distance.max():.2g} {project.unit}"
+        within = remark("bundle.before_face", count=len(names), most=most, names=shown)
+        result = replace(result, remarks=(*result.remarks, within))
     refuse_impossible_media(bundle.project, columns, result, unknowns.priors)
     observations = bundle.observations
     order = tuple(observations.source[rows] for rows in observations.rows)
@@ -186,6 +199,28 @@ def _adjusted(project: Project, unknowns: Unknowns) -> Adjustment:
     }
     project, lost = with_covariance(result.project, whose, result.covariance)
     return replace(result, project=project, remarks=(*result.remarks, *doubts, *lost))
+
+
+def _without_points(bundle: Bundle, unknowns: Unknowns, is_before: BoolArray) -> Adjustment:
+    """Return the adjustment without new points that came to lie far before the last face.
+
+    Raises
+    ------
+    GeometryError
+        If others lie there.
+    """
+    is_new: BoolArray = np.asarray((bundle.free | (bundle.columns.points >= 0)).all(axis=1))
+    bars = {end for bar in unknowns.scale_bars for end in (bar.first, bar.second)}
+    needed = [bundle.ids[j] for j in np.flatnonzero(is_before).tolist()
+              if not is_new[j] or bundle.ids[j] in bars]  # fmt: skip
+    if needed:
+        raise GeometryError(remark("adjust.before_face", names=", ".join(needed[:8])))
+    project, images = bundle.project, bundle.project.image_points
+    lost = {bundle.ids[j] for j in np.flatnonzero(is_before).tolist()}
+    is_out = np.array([name in lost for name in images.ids])
+    result = _adjusted(without_rows(project, is_out), unknowns)
+    left_out = remark("bundle.left_before_face", **names_of(images, is_out))
+    return replace(_with_rows(result, images, is_out), remarks=(left_out, *result.remarks))
 
 
 def _balanced(

@@ -10,7 +10,8 @@ from scipy.sparse import hstack
 from multimedia.adjustment.bundle_columns import BundleColumns
 from multimedia.adjustment.unknowns import Unknowns
 from multimedia.media.camera import EXTERIOR
-from multimedia.media.projection import project_with_jacobian
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.projection import as_media, project_with_jacobian
 from multimedia.projects.model import Project
 from photocore.adjustment import BlockEquations, Fit
 from photocore.adjustment.network import LARGEST, Network, NetworkState, Rows
@@ -21,6 +22,9 @@ from photocore.errors import GeometryError
 #: A motion of everything is a datum defect if it moves image points by less than this share of
 #: what its parts would move them on their own.
 _DEFECT = 1e-9
+#: Share of a camera's height above the faces by which points may lie before the last one on the
+#: way: a point that may not go there holds all others up.
+BEFORE = 0.2
 #: Residuals that no adjustment is right with, once they fall no more: so many of their standard
 #: deviations, and such a share of the principal distance.
 HOPELESS = (20.0, 1e-3)
@@ -76,6 +80,8 @@ class Bundle:
         Their standard deviations, NaN where not weighted.
     datum : ndarray, shape (d, u + 3 p)
         Directions that only the datum of a free network holds.
+    before : float
+        As for `project_with_jacobian`.
     """
 
     project: Project
@@ -90,6 +96,7 @@ class Bundle:
     known: FloatArray
     known_sigma: FloatArray
     datum: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    before: float = BEFORE
 
     @property
     def network(self) -> Network:
@@ -117,6 +124,25 @@ class Bundle:
         """Return the equations with robust weights of the image coordinates, shape (n, 2)."""
         sigma = self.observations.sigma / np.sqrt(weights)
         return replace(self, observations=replace(self.observations, sigma=sigma))
+
+    def before_faces(self, state: NetworkState) -> tuple[FloatArray, FloatArray]:
+        """Return how far points lie before flat faces they are seen through, and the normals.
+
+        Shapes (p,) and (p, 3); 0 for points beyond them.
+        """
+        distance, normals = np.zeros(len(self.ids)), np.zeros((len(self.ids), 3))
+        for k, rows in enumerate(self.observations.rows):
+            which, medium = self.observations.point[rows], self.project.media_of[k]
+            media = as_media(state.blocks["media"][medium] if medium else None)
+            if not isinstance(media, FlatInterface):
+                continue
+            camera, point, normal = state.blocks["camera"][k], media.point, media.normal
+            if media.moves_with_camera:
+                point, normal = camera.centre + camera.rotation @ point, camera.rotation @ normal
+            away = (state.points[which] - point) @ normal
+            further = away > distance[which]
+            distance[which[further]], normals[which[further]] = away[further], normal
+        return distance, normals
 
     def _worst(self, fitted: Fit[NetworkState]) -> str:
         """Return the camera, and the plate if any, whose image points fit worst."""
@@ -152,6 +178,7 @@ class Bundle:
                 view = project_with_jacobian(
                     state.blocks["camera"][k], points, media[medium] if medium else None,
                     camera_names=tuple(of_camera), interface_names=tuple(through),
+                    before=self.before,
                 )  # fmt: skip
             except GeometryError:
                 return False

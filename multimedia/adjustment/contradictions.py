@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property, partial
 
 import numpy as np
 
-from multimedia.adjustment.bundle_equations import Bundle
+from multimedia.adjustment.bundle_equations import BEFORE, Bundle
 from multimedia.adjustment.bundle_start import points_without_start, prepare
 from multimedia.adjustment.start_poses import bars_for
 from multimedia.adjustment.unknowns import AUTO, Unknowns
@@ -17,6 +18,7 @@ from photocore.adjustment import DenseEquations, huber_weights
 from photocore.adjustment.iteration import Linear, minimise
 from photocore.adjustment.network import Network, NetworkState
 from photocore.arrays import BoolArray, FloatArray
+from photocore.errors import PhotogrammetryError
 
 #: So many times image points are left out and the rest adjusted; so often, and for so many steps,
 #: are weights laid anew until that is done.
@@ -27,6 +29,8 @@ SETTLED = 1e-3
 _BOUND = 2.5
 #: Where more than this share contradicts, it is not single image points that are wrong.
 _MOST = 0.1
+#: Median of weighted residuals, .67 of honest ones, above which cameras and points do not fit.
+_FITS = 2.0
 #: Of the normal equations, so that directions without information stay where they are.
 _LEAST_DAMPING = 1e-10
 
@@ -43,11 +47,26 @@ def contradicting_rows(project: Project, unknowns: Unknowns) -> BoolArray:
     project : Project
         Its cameras have poses.
     unknowns : Unknowns
+
+    Notes
+    -----
+    At first no point may go before the last face: that holds cameras which gross errors draw
+    away. Where it holds up the others, too, it is done again as in an adjustment, and what fits
+    better counts.
     """
     if unknowns.interior == AUTO:
         unknowns = replace(unknowns, interior=())
-    images = project.image_points
-    control = project.object_points
+    is_stray, misfit = _strays(project, unknowns, 0.0)
+    if misfit > _FITS:
+        with suppress(PhotogrammetryError):
+            again, fit = _strays(project, unknowns, BEFORE)
+            is_stray = again if fit < misfit else is_stray
+    return is_stray if is_stray.mean() <= _MOST else np.zeros_like(is_stray)
+
+
+def _strays(project: Project, unknowns: Unknowns, before: float) -> tuple[BoolArray, float]:
+    """Return which image points contradict, and the median of the weighted residuals at last."""
+    images, control = project.image_points, project.object_points
     is_free = unknowns.control == "free"
     fixed = {name for name, group in zip(control.ids, control.groups, strict=True)
              if group in unknowns.plates or not is_free}  # fmt: skip
@@ -64,17 +83,21 @@ def contradicting_rows(project: Project, unknowns: Unknowns) -> BoolArray:
             break
         is_stray = now
         bundle, _ = prepare(_startable(without_rows(project, is_stray), fixed), unknowns)
+        bundle = replace(bundle, before=before)
         state, _ = with_weights(bundle, bundle.start, _BOUND)
         posed = replace(
             project, cameras=tuple(state.blocks["camera"].values()), media=state.blocks["media"]
         )
         places = {name: xyz for name, xyz in zip(bundle.ids, state.points, strict=True)
                   if name in fixed}  # fmt: skip
-    return is_stray if is_stray.mean() <= _MOST else np.zeros_like(is_stray)
+    linear = bundle.network.equations(state)
+    count = bundle.observations.image.size
+    misfit = np.inf if linear is None else float(np.median(np.abs(linear.residuals[:count])))
+    return is_stray, misfit
 
 
 def _startable(project: Project, fixed: set[str]) -> Project:
-    """Return a project without points that would start at the surface and hold up all others."""
+    """Return a project without points that have no start."""
     lost = points_without_start(project, fixed)
     return without_rows(project, np.array([name in lost for name in project.image_points.ids]))
 

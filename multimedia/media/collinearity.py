@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from multimedia.refraction.layers import Layers
-from multimedia.refraction.shift import ratio_of, shift_ratio
+from multimedia.refraction.shift import ratio_of
 from photocore.arrays import FloatArray
 from photocore.compiled import inlined
 
@@ -112,7 +112,9 @@ def image_vectors(vectors: FloatArray, medium: Medium) -> FloatArray:
     return vectors + g[:, None] * medium.normal
 
 
-def shifts(vectors: FloatArray, medium: Medium, *, media: bool = True) -> Shifts:
+def shifts(
+    vectors: FloatArray, medium: Medium, *, media: bool = True, before: float = 0.0
+) -> Shifts:
     """Return g of every point with its derivatives; see the head of the module.
 
     Parameters
@@ -121,9 +123,12 @@ def shifts(vectors: FloatArray, medium: Medium, *, media: bool = True) -> Shifts
         As for `image_vectors`.
     media : bool
         Whether the derivatives by thicknesses and indices are wanted; empty otherwise.
+    before : float
+        Share of the centre's height by which points may lie before the last face; none where the
+        last medium has a lower index than the first, for there rays might go back for ever.
     """
     w = vectors @ medium.normal
-    rho2, q, heights = _inverse_ratio(vectors, w, medium)
+    rho2, q, heights = _inverse_ratio(vectors, w, medium, before)
     whole = -w
     n = medium.layers.indices
     with np.errstate(all="ignore"):
@@ -247,13 +252,14 @@ def rays_in_object_space(directions: FloatArray, medium: Medium) -> tuple[FloatA
 
 
 def _inverse_ratio(
-    vectors: FloatArray, w: FloatArray, medium: Medium
+    vectors: FloatArray, w: FloatArray, medium: Medium, before: float = 0.0
 ) -> tuple[FloatArray, FloatArray, list[FloatArray | float]]:
     """Return rho^2, q = R / R_bar, and the heights of the layers under each point."""
     x, y, z = vectors.T
     rho2 = np.maximum(x * x + y * y + z * z - w * w, 0.0)
     depth = -(w + medium.height)
-    below = depth >= 0
+    rising = medium.layers.indices[0] <= min(medium.layers.indices)
+    below = depth >= -(before if rising else 0.0) * medium.first_height
     if not below.all():
         depth = np.where(below, depth, np.nan)
     indices = medium.layers.indices
@@ -262,6 +268,6 @@ def _inverse_ratio(
         layers = [np.asarray(height) for height in heights]
         return rho2, 1.0 / ratio_of(np.sqrt(rho2), layers, indices), heights
     q = np.full_like(w, np.nan)
-    inside = [h[below] if isinstance(h, np.ndarray) else h for h in heights]
-    q[below] = 1.0 / shift_ratio(np.sqrt(rho2[below]), inside, indices)
+    inside = [np.asarray(h[below] if isinstance(h, np.ndarray) else h) for h in heights]
+    q[below] = 1.0 / ratio_of(np.sqrt(rho2[below]), inside, indices)
     return rho2, q, heights

@@ -179,12 +179,13 @@ class FlatInterface(OpticalMedia):
         return origins @ camera.rotation.T + camera.centre, rays @ camera.rotation.T
 
     def sight(
-        self, camera: Camera, points: FloatArray, *, exterior: bool, names: Sequence[str] = ()
-    ) -> Sight:
+        self, camera: Camera, points: FloatArray, *, exterior: bool, names: Sequence[str] = (),
+        before: float = 0.0,
+    ) -> Sight:  # fmt: skip
         """Return the vectors of `apparent_vectors` with analytic derivatives."""
         medium = self.medium(camera)
         vectors = camera.vectors_to(points)
-        shift = shifts(vectors, medium, media=bool(names))
+        shift = shifts(vectors, medium, media=bool(names), before=before)
         apparent = vectors + shift.g[:, None] * medium.normal
 
         def derivatives(by_seen: FloatArray) -> SightDerivatives:

@@ -204,8 +204,9 @@ class Interfaces(SurfaceSequence, OpticalMedia):
         return replace(self, surfaces=moved, indices=tuple(indices), gradient=gradient)
 
     def sight(
-        self, camera: Camera, points: FloatArray, *, exterior: bool, names: Sequence[str] = ()
-    ) -> Sight:
+        self, camera: Camera, points: FloatArray, *, exterior: bool, names: Sequence[str] = (),
+        before: float = 0.0,  # noqa: ARG002
+    ) -> Sight:  # fmt: skip
         """Return directions with derivatives, all of them analytic."""
         self._refuse_unknown(names)
         fixed = self.seen_from(camera.centre, camera.rotation)

@@ -95,8 +95,9 @@ class OpticalMedia(ABC):
 
     @abstractmethod
     def sight(
-        self, camera: Camera, points: FloatArray, *, exterior: bool, names: Sequence[str] = ()
-    ) -> Sight:
+        self, camera: Camera, points: FloatArray, *, exterior: bool, names: Sequence[str] = (),
+        before: float = 0.0,
+    ) -> Sight:  # fmt: skip
         """Return the directions with derivatives.
 
         Parameters
@@ -109,6 +110,10 @@ class OpticalMedia(ABC):
             Whether the derivatives by the exterior orientation are wanted.
         names : sequence of str
             Parameters of the media by which to differentiate.
+        before : float
+            Share of the camera's height above flat faces by which points may lie before the last
+            one, as on the way of an adjustment: as if their rays went back from it in the
+            object's medium. Other media have nothing there (NaN).
         """
 
     @abstractmethod
@@ -141,8 +146,9 @@ class StraightRays(OpticalMedia):
         return self.apparent_vectors(camera, points), np.full(len(points), "", dtype=object)
 
     def sight(
-        self, camera: Camera, points: FloatArray, *, exterior: bool, names: Sequence[str] = ()
-    ) -> Sight:
+        self, camera: Camera, points: FloatArray, *, exterior: bool, names: Sequence[str] = (),
+        before: float = 0.0,  # noqa: ARG002
+    ) -> Sight:  # fmt: skip
         """Return the vectors with derivatives.
 
         Raises

@@ -165,6 +165,7 @@ def project_with_jacobian(
     *,
     camera_names: Sequence[str] = (),
     interface_names: Sequence[str] = (),
+    before: float = 0.0,
 ) -> Projection:
     """Project points and differentiate by points, camera and interface.
 
@@ -178,6 +179,8 @@ def project_with_jacobian(
         Of `EXTERIOR` (omega, phi, kappa together) and `ANY_INTERIOR`, in any order.
     interface_names : sequence of str
         Of `FlatInterface.parameter_names`.
+    before : float
+        As for `OpticalMedia.sight`.
 
     Returns
     -------
@@ -186,7 +189,7 @@ def project_with_jacobian(
     exterior = any(name in EXTERIOR for name in camera_names)
     # Faces of layers that an adjustment may change are there, whatever their indices are now.
     between = media if interface_names and isinstance(media, FlatInterface) else as_media(media)
-    sight = between.sight(camera, points, exterior=exterior, names=interface_names)
+    sight = between.sight(camera, points, exterior=exterior, names=interface_names, before=before)
     image, by_seen, by_interior = _through_lens(camera, sight.vectors, camera_names)
     by_point, by_exterior, by_interface = sight.derivatives(by_seen)
     by_camera = np.empty((len(points), 2, len(camera_names)))

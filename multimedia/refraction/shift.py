@@ -142,7 +142,7 @@ def ratio_of(radius: FloatArray, layers: list[FloatArray], indices: Sequence[flo
     if (radius > 1e-9 * whole).all():
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(radius_bar / radius)
-    limit = axis_ratio(layers, indices)
+    limit = _axis_limit(layers, indices)
     # The ratio leaves its limit with (R / whole)², which is beyond the last digit here.
     # "Not far" rather than "near", so that an unknown radius or height (NaN) gets no limit.
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -151,7 +151,11 @@ def ratio_of(radius: FloatArray, layers: list[FloatArray], indices: Sequence[flo
 
 def axis_ratio(heights: Sequence[ArrayLike], indices: Sequence[float]) -> FloatArray:
     r"""Limit of :math:`\bar R / R` for R to 0; 1 where all heights are zero."""
-    layers = as_layers(heights, indices)
+    return _axis_limit(as_layers(heights, indices), indices)
+
+
+def _axis_limit(layers: list[FloatArray], indices: Sequence[float]) -> FloatArray:
+    """Return `axis_ratio` of what is known to be possible."""
     whole = np.asarray(sum(layers))
     reduced = np.asarray(sum(h * (indices[0] / n) for h, n in zip(layers, indices, strict=True)))
     with np.errstate(divide="ignore", invalid="ignore"):
