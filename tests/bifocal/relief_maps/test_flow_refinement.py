@@ -1,9 +1,13 @@
-"""A last step of flow at twice its resolution."""
+"""Flow between the photos, in bands where they are large; its last step at twice the resolution."""
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
 
+import numpy as np
+import pytest
+
+from bifocal.relief_maps import flow
 from bifocal.relief_maps.flow_refinement import REFINEMENT, STRIP, refined
 
 #: Displacement of the pixels of the first photo in the second. [px of the photo]
@@ -49,3 +53,16 @@ def test_no_pixel_moves_farther_than_the_photos_are_linear():
     moved = refined(np.zeros((48, 48, 2), np.float32), first, second)
     assert np.isfinite(moved).all()
     assert np.abs(moved).max() <= REFINEMENT.farthest / 2
+
+
+def test_bands_of_a_large_photo_show_no_seam(monkeypatch: pytest.MonkeyPatch):
+    """Seven bands, the photo moved down by more than a band is high."""
+    height, width, down = 700, 160, 120
+    x, y = np.arange(width)[None, :], np.arange(height)[:, None]
+    first, second = waves(x, y), waves(x - 1.3, y - down - 0.6)
+    seed = np.tile(np.array([0.0, down], np.float32), (height, width, 1))
+    monkeypatch.setattr(flow, "FLOW", replace(flow.FLOW, most=height * width // 7))
+    moved = flow.seeded_flow(first, second, seed, finest=0)
+    assert moved.shape == seed.shape
+    away = np.linalg.norm(moved - (1.3, down + 0.6), axis=-1)[30 : height - down - 30, 30:-30]
+    assert away.max() < 0.2
