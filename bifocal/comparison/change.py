@@ -44,6 +44,8 @@ class ChangedRegion:
         Their standard deviations.
     measured : float
         Share of the area that both maps have measured.
+    open_rim : float
+        Share of its rim beyond which a map has measured nothing: the change may go on there.
     probability : float
         That chance alone makes so large an average anywhere on the wall; never below 0.0001.
     """
@@ -60,6 +62,7 @@ class ChangedRegion:
     largest: float
     sigma_largest: float
     measured: float
+    open_rim: float
     probability: float
 
 
@@ -224,6 +227,8 @@ def compare(
         area = float(np.isin(whole, wrong).sum()) * difference.gsd**2
         remarks.append(remark("compare.photos_contradict", count=len(wrong), area=area))
         regions, whole = _without(regions, whole, wrong)
+    if numbers := [one.number for one in regions if one.open_rim > CHANGE.open]:
+        remarks.append(remark("compare.goes_on", numbers=", ".join(map(str, numbers))))
     return Comparison(
         difference=difference,
         region=np.where(two_surfaces & (whole == 0), -1, whole),
@@ -257,9 +262,9 @@ def _three(values: FloatArray) -> tuple[float, float, float]:
     return one, two, three
 
 
-def _wider(cells: BoolArray) -> BoolArray:
-    """Return cells and the two about each."""
-    return cv2.dilate(cells.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+def _wider(cells: BoolArray, side: int = 5) -> BoolArray:
+    """Return cells and those in a square about each."""
+    return cv2.dilate(cells.astype(np.uint8), np.ones((side, side), np.uint8)) > 0
 
 
 def _tested(
@@ -390,7 +395,7 @@ class _Outlined:
         fading = int((inner & cells.known & (change < 2 * edge)).sum())
         moved = np.maximum(averages[0] * way, 1e-9)[inner]
         y, x = (float(np.average(index, weights=moved)) for index in np.nonzero(inner))
-        area = int(inner.sum()) * cell
+        area, rim = int(inner.sum()) * cell, _wider(inner, 3) & ~inner
         return ChangedRegion(
             number=0,
             X=cells.grid.x0 + x * cells.grid.gsd, Y=cells.grid.y0 - y * cells.grid.gsd,
@@ -399,5 +404,6 @@ class _Outlined:
             volume=volume, sigma_volume=spread, mean=volume / area, sigma_mean=spread / area,
             largest=peak * way, sigma_largest=sigma,
             measured=float(cells.known[inner].mean()),
+            open_rim=float(np.mean(~cells.known[rim])) if rim.any() else 0.0,
             probability=self.by_chance.probability(float(np.abs(self.test[part]).max())),
         )  # fmt: skip

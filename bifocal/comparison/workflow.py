@@ -181,7 +181,8 @@ def _write_tables(folder: Path, done: Comparison) -> None:
     """Write the regions as CSV and as a plain table of values in a workbook."""
     from openpyxl import Workbook
 
-    units = {"area": "m2", "volume": "m3", "number": "", "probability": "", "measured": ""}
+    units = dict.fromkeys(("number", "probability", "measured", "open_rim"), "")
+    units |= {"area": "m2", "volume": "m3"}
     keys = [field.name for field in fields(ChangedRegion)]
     headings = [
         f"{key} [{unit}]" if (unit := units.get(key.removeprefix("sigma_"), "m")) else key

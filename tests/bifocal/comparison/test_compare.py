@@ -100,6 +100,22 @@ def test_holes_of_a_region_count_and_its_measured_share_is_told():
     assert bulge.measured == pytest.approx(1 - 25 / 121, abs=0.05)
 
 
+def test_a_change_that_may_go_on_where_nothing_was_measured_is_told_so():
+    rng = np.random.default_rng(3)
+    before, after = measured(rng), measured(rng, moved=0.03)
+    done = compare(before, after)
+    assert done.regions[0].open_rim == 0
+    assert not done.remarks
+    quality = after.quality.copy()
+    quality[20:, 36:60] = Quality.INTERPOLATED
+    done = compare(before, replace(after, quality=quality))
+    (half,) = done.regions
+    # 6 of 11 columns are left: one of four sides is open, and corners.
+    assert half.open_rim == pytest.approx(11 / 34, abs=0.1)
+    assert half.volume == pytest.approx(66 * GRID.gsd**2 * 0.03, abs=3 * half.sigma_volume)
+    assert "region 1: much of the rim" in done.remarks[-1]
+
+
 def test_two_surfaces_that_both_stand_there_are_no_change_and_what_was_taken_away_is_one():
     """A column 0.3 m wide and 2 m before the wall: one date shows its edge, the other the wall."""
     rng = np.random.default_rng(4)
