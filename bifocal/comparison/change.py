@@ -192,14 +192,11 @@ def compare(
     rng = np.random.default_rng(seed)
     trend: FloatArray = np.zeros(3)
     covariance: FloatArray = np.zeros((3, 3))
-    patches, bounds = Patches(cells.known, radii), cells.grid.bounds
+    patches = Patches(cells.known, radii)
     if stable or fit:
         still = cells.known & inside(stable, cells.grid) if stable else cells.known
-        trend, _ = trend_of(cells, still, 1.0)
-        cells = Cells.of(without_trend(difference, bounds, trend, covariance), pixels)
-        correlated = chance(cells.z, still, patches, cells.least, rng).cells
-        covariance = trend_of(cells, still, correlated)[1]
-        difference = without_trend(difference, bounds, trend, covariance)
+        trend, covariance = _common(difference, cells, still, patches, rng)
+        difference = without_trend(difference, cells.grid.bounds, trend, covariance)
         cells = Cells.of(difference, pixels)
     # Chance is learned without what looks like a change, then without what is proven to be one.
     unchanged = cells.known & ~_wider(np.abs(_tested(cells.z, cells.known, patches)[0]) > 3)
@@ -245,6 +242,19 @@ def compare(
         compared=float(cells.known.sum() * cells.grid.gsd**2),
         remarks=tuple(remarks),
     )
+
+
+def _common(
+    difference: ReliefMap, cells: Cells, still: BoolArray, patches: Patches,
+    rng: np.random.Generator,
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    """Return offset and slopes of cells that did not move, and their covariance."""
+    trend, _ = trend_of(cells, still, 1.0)
+    pixels = round(cells.grid.gsd / difference.gsd)
+    flat = without_trend(difference, cells.grid.bounds, trend, np.zeros((3, 3)))
+    cells = Cells.of(flat, pixels)
+    correlated = chance(cells.z, still, patches, cells.least, rng).cells
+    return trend, trend_of(cells, still, correlated)[1]
 
 
 def _without(

@@ -18,6 +18,7 @@ from bifocal.model.photo_set import PhotoSet
 from bifocal.model.relief_map import ReliefMap
 from bifocal.relief_maps.photo_evidence import Witness, exposed_alike, misfit, shown_by
 from photocore.arrays import Float32Array, FloatArray, IntArray
+from photocore.errors import PhotogrammetryError
 
 #: Where the photos of a date come from.
 PhotosOfDate = Pair | PhotoSet
@@ -84,7 +85,8 @@ def photos_at_hand(path: Path, relief: Path) -> PhotoSet | None:
     Raises
     ------
     InputError
-        If ``path`` is the file of photos, and the map was made from another state of them.
+        If ``path`` is the file of photos, and is unusable or the map was made from another state
+        of them. What only lies beside a map is then not asked.
     """
     if path != relief:
         photos = PhotoSet.read(path)
@@ -95,7 +97,10 @@ def photos_at_hand(path: Path, relief: Path) -> PhotoSet | None:
             made_from = MadeFrom.of_tags(reader.tags)
         if not (holds_photos(path) and path.is_file()):
             return None
-        photos = PhotoSet.read(path)
+        try:
+            photos = PhotoSet.read(path)
+        except PhotogrammetryError:
+            return None
         if {"pair", "photos"} & {*made_from.differences(MadeFrom.of(photos.photos))}:
             return None
     return photos if all(one.file and one.path.is_file() for one in photos.photos) else None

@@ -196,6 +196,8 @@ def saved(
 
 def changed_results(editor: WorkbookEditor, built: BookBuilder) -> list[str]:
     """Return the cells of results that hold another formula than ours."""
+    if isinstance(editor, PlainEditor):
+        return []  # its formulas are the cells' own, none like another
     # Formulas of ours in their normal form, and the columns and cells where results stand.
     ours, places = set[str](), dict[str, list[tuple[int, int, int]]]()
     for sheet in built.book.worksheets:
@@ -217,8 +219,6 @@ def changed_results(editor: WorkbookEditor, built: BookBuilder) -> list[str]:
                     ours.add(normal(named_columns(short(area.first), columns_named)))
                 own = (headings[column.key], area.first, area.area[2])
                 places.setdefault(area.sheet, []).append(own)
-    if isinstance(editor, PlainEditor):
-        return []  # its formulas are the cells' own, none like another
     for name, defined in built.book.defined_names.items():
         if name.startswith("unprinted_") or name in SPEAKING:
             continue  # follows how many points there were, or the version that wrote it

@@ -317,6 +317,8 @@ def test_photos_beside_the_maps_are_asked_and_their_absence_is_told(
     moved.write(names[1], overwrite=True)
     with pytest.raises(InputError, match=r"relief\.tif: was made from another pair"):
         photos_at_hand(names[1], paths[1])
+    names[0].write_text("{")
+    assert photos_at_hand(paths[0], paths[0]) is None
     done = compare_files(*paths, tmp_path / "out", overwrite=True).comparison
     assert len(done.regions) == 1
     assert "the maps alone" in done.remarks[-1]
