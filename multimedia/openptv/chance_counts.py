@@ -5,10 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from multimedia.openptv.correspondences import correspondences, expected_by_chance
+from multimedia.openptv.correspondences import (
+    DECOYS,
+    correspondences,
+    expected_by_chance,
+    is_chance,
+)
 from multimedia.projects.model import Project
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
@@ -21,6 +27,9 @@ WORTH_LESS, KEPT = 0.1, 0.98
 #: least so many times: where two rays meet, a third misses by up to twice its own error (scenes:
 #: 100 to 1500 particles of four cameras, .05 to .3 px).
 _PROPOSED, _SIGMAS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0), 5.0
+#: Targets of a camera, in all frames, from which on one displacement of each frame tells enough:
+#: of so many a hundred particles by chance vary by a tenth.
+_MANY = 3000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -36,6 +45,8 @@ class ChanceCounts:
     misfit, rays : ndarray, shape (p,)
         Of all particles: root mean square distance of their targets from where they are seen
         [px], and how many these are.
+    decoys : float
+        Displacements of a frame by which chance was counted.
     """
 
     tolerance: float
@@ -43,6 +54,12 @@ class ChanceCounts:
     chance: FloatArray
     misfit: FloatArray
     rays: FloatArray
+    decoys: float
+
+    @property
+    def is_chance(self) -> bool:
+        """Whether no number of cameras agrees on more particles than chance makes them."""
+        return is_chance(self.found, self.chance, self.decoys)
 
     @property
     def true(self) -> float:
@@ -67,20 +84,34 @@ def chance_counts(
 ) -> ChanceCounts:
     """Return what is found in frames: targets of each camera [px]."""
     count = len(content.cameras) + 1
+    # Of many targets one displacement a frame, each in its turn, tells as much as two of few.
+    decoys = (
+        1
+        if len(frames) >= DECOYS
+        and min(sum(map(len, targets)) for targets in zip(*frames, strict=True)) > _MANY
+        else DECOYS
+    )
 
-    def tried(targets: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return misfits and rays of what is found in a frame, and how many come by chance."""
+    def tried(task: tuple[Sequence[FloatArray], int | None]) -> tuple[FloatArray, ...]:
+        """Return misfits and rays of what is in a frame, or how many come by a displacement."""
+        targets, turn = task
         scene = (content.cameras, targets, content.interfaces)
-        _, numbers, misfit = correspondences(*scene, tolerance=tolerance, fewest=fewest)
-        by_chance = expected_by_chance(*scene, tolerance=tolerance, fewest=fewest)
-        return misfit, (numbers >= 0).sum(axis=1), by_chance
+        if turn is None:
+            _, numbers, misfit = correspondences(*scene, tolerance=tolerance, fewest=fewest)
+            return misfit, (numbers >= 0).sum(axis=1)
+        options: Any = {"tolerance": tolerance, "fewest": fewest, "turns": (turn,)}
+        return (expected_by_chance(*scene, **options),)
 
+    # What takes longest comes first.
+    tasks = [(targets, (k + turn) % DECOYS) for k, targets in enumerate(frames)
+             for turn in range(decoys)]  # fmt: skip
     with ThreadPoolExecutor(cores()) as pool:
-        parts = list(pool.map(tried, frames))
-    misfits, rays, chance = (np.concatenate(part) for part in zip(*parts, strict=True))
+        parts = list(pool.map(tried, [*tasks, *((targets, None) for targets in frames)]))
+    chance = np.sum([counts for (counts,) in parts[: len(tasks)]], axis=0) / decoys
+    misfits, rays = (np.concatenate(part) for part in zip(*parts[len(tasks) :], strict=True))
     return ChanceCounts(
         tolerance=tolerance, found=np.bincount(rays, minlength=count).astype(float),
-        chance=chance.reshape(-1, count).sum(axis=0), misfit=misfits, rays=rays.astype(float),
+        chance=chance, misfit=misfits, rays=rays.astype(float), decoys=decoys,
     )  # fmt: skip
 
 

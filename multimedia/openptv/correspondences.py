@@ -110,6 +110,7 @@ def expected_by_chance(
     *,
     tolerance: float = TOLERANCE,
     fewest: int = 3,
+    turns: Sequence[int] = range(DECOYS),
 ) -> FloatArray:
     """Return how many "particles" seen by 0, 1, 2 ... cameras come by chance, at most.
 
@@ -117,6 +118,8 @@ def expected_by_chance(
     ----------
     cameras, targets, media, tolerance, fewest
         As for `correspondences`.
+    turns : sequence of int
+        Which of the displacements are tried.
 
     Notes
     -----
@@ -125,7 +128,7 @@ def expected_by_chance(
     them in the same clusters. True particles leave fewer targets to chance than there are here.
     """
     away, counts = max(_DISPLACED[0], _DISPLACED[1] * tolerance), np.zeros(len(cameras) + 1)
-    for turn in range(DECOYS):
+    for turn in turns:
         # Golden angles: no shift or turn of the object moves the images like this, and for two
         # cameras, whose one condition a displacement may keep, the other frame breaks it.
         angles = 2.4 * np.arange(len(cameras)) + turn * np.pi / 2
@@ -133,21 +136,23 @@ def expected_by_chance(
         moved = [t.reshape(-1, 2) + shift for t, shift in zip(targets, shifts, strict=True)]
         _, numbers, _ = correspondences(cameras, moved, media, tolerance=tolerance, fewest=fewest)
         counts += np.bincount((numbers >= 0).sum(axis=1), minlength=len(counts))
-    return counts / DECOYS
+    return counts / len(turns)
 
 
-def is_chance(found: FloatArray, chance: FloatArray) -> bool:
+def is_chance(found: FloatArray, chance: FloatArray, decoys: float = DECOYS) -> bool:
     """Whether no number of cameras agrees on more particles than chance makes them.
 
     Parameters
     ----------
     found, chance : ndarray, shape (cameras + 1,)
         Particles by the number of cameras that saw them, and those of `expected_by_chance`.
+    decoys : float
+        Displacements of a frame that these are the mean of.
     """
     from scipy.stats import binom
 
-    ours, theirs = (np.cumsum(counts[::-1]) for counts in (found, DECOYS * chance))
-    by_chance = binom.sf(ours - 1, ours + theirs, 1 / (1 + DECOYS)) > RISK
+    ours, theirs = (np.cumsum(counts[::-1]) for counts in (found, decoys * chance))
+    by_chance = binom.sf(ours - 1, ours + theirs, 1 / (1 + decoys)) > RISK
     return bool((by_chance | (ours == 0)).all() and theirs[-1] > 0)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from multimedia.openptv.chance_counts import chance_counts, tolerance_remarks
-from multimedia.openptv.correspondences import TOLERANCE, correspondences, is_chance
+from multimedia.openptv.correspondences import TOLERANCE, correspondences
 from multimedia.openptv.openptv_files import read_targets, rt_is_text
 from multimedia.projects.model import Project
 from multimedia.projects.point_tables import METRES, write_columns
@@ -100,7 +100,7 @@ def find_particles(
     xyz, numbers, misfit = correspondences(*frame, tolerance=tolerance, fewest=fewest)
     counted = chance_counts(content, [places], tolerance, fewest)
     chance = counted.chance
-    if is_chance(counted.found, chance):
+    if counted.is_chance:
         raise InputError(
             f"{project}: {len(xyz)} particles would be found, and {chance.sum():.0f} where the "
             "targets of the cameras have nothing to do with each other: these are chance. Are the "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ from multimedia.tracking.linking import LinkRules, in_tracks, linked, usual_step
 from multimedia.tracking.velocities import differs_from_neighbours, track_velocities
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points, positive
 from photocore.errors import InputError
+from photocore.machine import cores
 
 #: Frames for which a particle may be missing, and points of the shortest track.
 GAP, SHORTEST = 2, 4
@@ -163,24 +165,28 @@ def track_particles(
         rules = LinkRules(step=widest, change=positive(change, "change"), gap=gap)
     else:
         rules = widened(clouds, rules, shortest) if step is None else fitted(clouds, rules)
-    previous = linked(clouds, rules)
-    sizes = [len(xyz) for xyz in clouds]
-    order, track = in_tracks(previous, shortest)
-    chance = points_by_chance(clouds, rules, shortest)
+    names_of = np.repeat(names, [len(xyz) for xyz in clouds])
+    number = np.concatenate([np.arange(len(xyz)) for xyz in clouds])
+    unknown = np.full((len(number), 3, 3), np.nan)
+    covariance = unknown if covariances is None else np.concatenate(list(covariances))
+    with ThreadPoolExecutor(cores()) as pool:
+        counting = pool.submit(points_by_chance, clouds, rules, shortest)
+        previous = linked(clouds, rules)
+        order, track = in_tracks(previous, shortest)
+        frame, xyz, covariance = names_of[order], np.concatenate(clouds)[order], covariance[order]
+        velocity, own = track_velocities(xyz, covariance, frame / rate, track)
+        precision, moments = np.nan_to_num(own), [np.flatnonzero(frame == n) for n in names]
+        differ = pool.map(
+            lambda now: differs_from_neighbours(xyz[now], velocity[now], precision[now]), moments
+        )
+        outlier: BoolArray = np.zeros(len(xyz), dtype=bool)
+        for now, odd in zip(moments, differ, strict=True):
+            outlier[now] = odd
+        chance = counting.result()
     if chance > max(CHANCE * len(order), FEW * shortest):
         raise InputError(remark("tracks.chance", points=len(order), chance=chance, step=rules.step))
-    frame = np.repeat(names, sizes)[order]
-    number = np.concatenate([np.arange(size) for size in sizes])[order]
-    xyz = np.concatenate(clouds)[order]
-    unknown = np.full((len(previous), 3, 3), np.nan)
-    covariance = (unknown if covariances is None else np.concatenate(list(covariances)))[order]
-    velocity, own = track_velocities(xyz, covariance, frame / rate, track)
-    outlier: BoolArray = np.zeros(len(xyz), dtype=bool)
-    for name in np.unique(frame):
-        now = np.flatnonzero(frame == name)
-        outlier[now] = differs_from_neighbours(xyz[now], velocity[now], np.nan_to_num(own[now]))
     return Tracks(
-        track=track, frame=frame, number=number, xyz=xyz, covariance=covariance,
+        track=track, frame=frame, number=number[order], xyz=xyz, covariance=covariance,
         velocity=velocity, velocity_covariance=own, outlier=outlier, step=rules.step,
         change=rules.change, drift=np.array(rules.drift), particles=len(previous), by_chance=chance,
     )  # fmt: skip

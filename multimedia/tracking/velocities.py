@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from multimedia.tracking.neighbours import distances
 from photocore.arrays import BoolArray, FloatArray, IntArray
+from photocore.machine import cores
 
 #: Points of a track to which a parabola is fitted.
 WINDOW = 5
@@ -52,7 +54,10 @@ def track_velocities(
     of the track. A cubic is held against a quartic in the same way, and counts where that makes
     the smaller variance. A polynomial has two points more than its degree, or is a line.
     """
-    slopes = [_slopes(xyz, covariance, times, track, degree) for degree in (2, 3, 4)]
+    with ThreadPoolExecutor(cores()) as pool:
+        slopes = list(pool.map(
+            lambda degree: _slopes(xyz, covariance, times, track, degree), (2, 3, 4)
+        ))  # fmt: skip
     worth = [_with_left_out(*pair, track) for pair in pairwise(slopes)]
     velocity, own = slopes[0][0], worth[0]
     means = [np.bincount(track, np.nan_to_num(np.trace(c, axis1=1, axis2=2))) for c in worth]
@@ -112,7 +117,10 @@ def _slopes(
     weights = np.linalg.solve(normal, across)[:, 1] / scale[:, None]
     weights[length < 2] = np.nan
     velocity = np.einsum("nk,nki->ni", weights, xyz[rows])
-    return velocity, np.einsum("nk,nkij->nij", weights**2, covariance[rows])
+    own = np.zeros_like(covariance)
+    for weight, row in zip(weights.T, rows.T, strict=True):
+        own += (weight**2)[:, None, None] * covariance[row]
+    return velocity, own
 
 
 def differs_from_neighbours(

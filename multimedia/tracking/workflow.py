@@ -11,7 +11,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from multimedia.openptv.chance_counts import ChanceCounts, chance_counts, tolerance_remarks
-from multimedia.openptv.correspondences import TOLERANCE, correspondences, is_chance
+from multimedia.openptv.correspondences import TOLERANCE, correspondences
 from multimedia.openptv.openptv_files import read_blobs, read_targets
 from multimedia.orientation.intersection import intersect
 from multimedia.projects.model import SIGMA_PIXEL, Project
@@ -144,12 +144,16 @@ def find_tracks(
     if folder is not None and folder.is_dir():
         written = [folder / f"{kind}.{frame}" for frame in frames for kind in ("rt_is", "ptv_is")]
         check_all_writable(*written, overwrite=overwrite)
-    places = {frame: [_places(sequence.get(frame)) for sequence in sequences] for frame in frames}
-    tried = _tried_frames(places)
+
+    def places(frame: int) -> list[FloatArray]:
+        """Return the targets of each camera in a frame."""
+        return [_places(sequence.get(frame)) for sequence in sequences]
+
+    tried = [places(frames[k]) for k in _tried_frames(len(frames))]
     counted = _beyond_chance(project, content, tried, tolerance, fewest)
     with ThreadPoolExecutor(cores()) as pool:
         particles = list(
-            pool.map(lambda frame: _particles(content, places[frame], tolerance, fewest), frames)
+            pool.map(lambda frame: _particles(content, places(frame), tolerance, fewest), frames)
         )
     factor = _median_factor([one.factor for one in particles])
     tracks = track_particles(
@@ -224,12 +228,9 @@ def _lost_files(names: Sequence[str]) -> list[str]:
     return [remark("tracks.lost", count=len(names), names=shown)] if names else []
 
 
-def _tried_frames(places: dict[int, list[FloatArray]]) -> list[list[FloatArray]]:
-    """Return the targets of some frames from the first to the last."""
-    frames = sorted(places)
-    return [
-        places[frames[k]] for k in np.unique(np.linspace(0, len(frames) - 1, TESTED).astype(int))
-    ]
+def _tried_frames(count: int) -> list[int]:
+    """Return the numbers of some frames of so many, from the first to the last."""
+    return np.unique(np.linspace(0, count - 1, TESTED).astype(int)).tolist()
 
 
 def _beyond_chance(
@@ -238,7 +239,7 @@ def _beyond_chance(
     """Return what is found in some frames, and how much by chance; refuse what is chance."""
     counted = chance_counts(content, tried, tolerance, fewest)
     found, chance = counted.found, counted.chance
-    if is_chance(found, chance):
+    if counted.is_chance:
         raise InputError(
             f"{project}: {found.sum():.0f} particles would be found in {TESTED} frames, and "
             f"{chance.sum():.0f} where the targets of the cameras have nothing to do with each "
