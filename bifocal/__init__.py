@@ -13,6 +13,7 @@ The pair
     PhotoSet                  two or more photos of one wall; a pair is the set of two
     photos_from_project, write_colmap   a set from another program's project, and one for COLMAP
     read_image, write_image   photos as arrays, upright as seen
+    open_photo, LargePhoto    the same, of a large TIFF read window by window
     Lens                      principal distance, principal point and distortion of a lens
     calibrate, Calibration    a lens from photos of a board
     align, align_set, length_check   a pair, or a set of photos, from them and lengths taped on site

@@ -13,6 +13,7 @@ from photocore.errors import (
     WorkbookError,
 )
 from photocore.images import read_image, write_image
+from photocore.large_photos import LargePhoto, open_photo
 
 from .calibration.board_calibration import Calibration
 from .calibration.board_photos import calibrate
@@ -108,6 +109,7 @@ __all__ = [
     "Interior",
     "Intersection",
     "KnownPoints",
+    "LargePhoto",
     "Layers",
     "LengthCheck",
     "Lens",
@@ -175,6 +177,7 @@ __all__ = [
     "length_check",
     "match",
     "mosaic",
+    "open_photo",
     "orthophoto",
     "page_server",
     "photos_from_project",

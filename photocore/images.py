@@ -39,14 +39,17 @@ from photocore.textfile import check_file
 
 ImageArray = NDArray[np.uint8] | NDArray[np.uint16]
 
-#: Larger photos are refused: 400 MP is twice the largest camera, and 1.2 GB in memory.
+#: Larger photos are not held in memory: 400 MP is twice the largest camera, and 1.2 GB.
 MAX_PIXELS = 400_000_000
+#: Larger TIFFs are refused, though windows of them could be read: no stitched photo has as many.
+MAX_TIFF_PIXELS = 4_000_000_000
 #: Larger photos are decoded some rows at a time, to hold them in memory once only.
 _BY_STRIPS = 60_000_000
 #: A 16-bit photo of no larger number holds 14 bits or fewer: industrial cameras, developed raw.
 _SHALLOW = 1 << 14
 #: Endings of the images that are written.
 WRITTEN = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
+TIFF_ENDINGS = frozenset({".tif", ".tiff"})
 #: What Pillow may take a file for (MPO as JPEG), whatever it is called: no other reader of its own.
 FORMATS = ("JPEG", "PNG", "TIFF", "BMP", "WEBP", "AVIF")
 #: Endings of photos that are read.
@@ -113,13 +116,14 @@ def image_info(path: Path | str) -> ImageInfo:
     Raises
     ------
     InputError
-        If it is missing, CMYK, not an image, or larger than `MAX_PIXELS`; of HEIC and camera raw,
-        if their libraries (extra ``photos``) are not installed.
+        If it is missing, CMYK, not an image, or larger than `MAX_PIXELS` (TIFF:
+        `MAX_TIFF_PIXELS`); of HEIC and camera raw, if their libraries (extra ``photos``) are not
+        installed.
     """
     path = Path(path)
     _refuse_early(path)
     note(path)
-    if path.suffix.lower() in {".tif", ".tiff"}:
+    if path.suffix.lower() in TIFF_ENDINGS:
         return _tiff_info(path)
     if path.suffix.lower() in RAW_ENDINGS:
         size, exif = raw_info(path)
@@ -134,7 +138,7 @@ def image_info(path: Path | str) -> ImageInfo:
         with _pillow_without_size_limit(), Image.open(path, formats=formats) as image:
             _check_mode(path, image.mode)
             bits = 16 if image.mode.startswith("I") else 8
-            _check_size(path, image.size)  # Pillow decodes a PNG to look for its EXIF data
+            check_size(path, image.size)  # Pillow decodes a PNG to look for its EXIF data
             return _info_from_exif(path, image.size, bits, image.getexif())
     except UnidentifiedImageError:
         raise InputError(f"{path}: is not an image (JPEG, PNG or TIFF).") from None
@@ -168,16 +172,18 @@ def read_image(path: Path | str, *, grey: bool = False) -> ImageArray:
     Raises
     ------
     InputError
-        As `image_info`, and if the pixels cannot be decoded or are cut off.
+        As `image_info`, and if the pixels cannot be decoded, are cut off, or more than
+        `MAX_PIXELS`.
     """
     info = image_info(path)
+    check_size(info.path, info.size)
     ending = info.path.suffix.lower()
     if ending in RAW_ENDINGS | HEIF_ENDINGS | AVIF_ENDINGS:
         stored = raw_pixels(info.path) if ending in RAW_ENDINGS else pillow_pixels(info.path)
         stored = in_srgb(info.path, stored)
         image = cv2.cvtColor(stored, cv2.COLOR_RGB2GRAY) if grey and stored.ndim == 3 else stored
         return turn_upright(image, info.orientation)
-    tiff = ending in {".tif", ".tiff"}
+    tiff = ending in TIFF_ENDINGS
     of_bands = tiff and _is_of_bands(info.path)
     if of_bands or (info.size[0] * info.size[1] > _BY_STRIPS and not grey):
         refuse_damaged_jpeg(info.path)
@@ -207,11 +213,18 @@ def read_image(path: Path | str, *, grey: bool = False) -> ImageArray:
 
 def _full_range(path: Path, image: ImageArray) -> ImageArray:
     """Multiply 10, 12 or 14 bits in 16 by a power of two: eight bits of them would be few greys."""
-    if image.dtype == np.uint16 and 0 < (top := int(image.max(initial=0))) < _SHALLOW:
-        bits = max(top.bit_length() + top.bit_length() % 2, 10)
-        image <<= np.uint16(16 - bits)
-        note_remark(remark("photo.stretched", of=path.name, bits=bits, times=1 << (16 - bits)))
+    if image.dtype == np.uint16 and (unused := unused_bits(path, int(image.max(initial=0)))):
+        image <<= np.uint16(unused)
     return image
+
+
+def unused_bits(path: Path, most: int) -> int:
+    """Return how many of 16 bits a photo leaves unused whose largest number is this; noted."""
+    if not 0 < most < _SHALLOW:
+        return 0
+    bits = max(most.bit_length() + most.bit_length() % 2, 10)
+    note_remark(remark("photo.stretched", of=path.name, bits=bits, times=1 << (16 - bits)))
+    return 16 - bits
 
 
 def _is_of_bands(path: Path) -> bool:
@@ -339,7 +352,8 @@ def _named_exif(tag: Any) -> dict[int, Any]:
 def _info_from_exif(path: Path, size: tuple[int, int], bits: int, exif: Any) -> ImageInfo:
     """Return the facts given the stored size and a mapping of EXIF tags."""
     width, height = size
-    _check_size(path, size)
+    tiff = path.suffix.lower() in TIFF_ENDINGS
+    check_size(path, size, MAX_TIFF_PIXELS if tiff else MAX_PIXELS)
     tags = dict(exif)
     if hasattr(exif, "get_ifd"):
         tags |= dict(exif.get_ifd(34665))
@@ -363,15 +377,16 @@ def _info_from_exif(path: Path, size: tuple[int, int], bits: int, exif: Any) -> 
     )
 
 
-def _check_size(path: Path, size: tuple[int, int]) -> None:
-    """Refuse what is larger than any photo."""
+def check_size(path: Path, size: tuple[int, int], most: int = MAX_PIXELS) -> None:
+    """Refuse photos of more pixels than these."""
     width, height = size
-    if width * height > MAX_PIXELS:
+    if width * height > most:
         raise InputError(
-            f"{path}: claims {width} x {height} px; more than {MAX_PIXELS // 10**6} MP is refused. "
-            f"Halve it first, e.g. gdal_translate -r average -outsize 50% 0 {path.name} half.tif: "
-            "--sensor-width stays as it is, --pixel-size doubles."
-        )
+            remark(
+                "photo.too_large", of=path, width=width, height=height, most=most // 10**6,
+                name=path.name,
+            )
+        )  # fmt: skip
 
 
 def _text(value: Any) -> str:

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from bifocal.faces.face_planes import robust_plane
 from bifocal.faces.faces import Face, Faces
@@ -16,14 +15,13 @@ from bifocal.model.image import as_grey
 from bifocal.model.photo import Photo
 from bifocal.model.relief_map import TOLD, Quality, ReliefMap
 from photocore.arrays import BoolArray, ByteArray, Float32Array
+from photocore.large_photos import Pixels
 
 #: Left, top, right, bottom in pixels of the map, right and bottom excluded.
 Box = tuple[int, int, int, int]
 
 
-def suggest_faces(
-    relief: ReliefMap, photos: Sequence[Photo], images: Sequence[NDArray[np.generic]]
-) -> Faces:
+def suggest_faces(relief: ReliefMap, photos: Sequence[Photo], images: Sequence[Pixels]) -> Faces:
     """Return upright rectangles that look like planes where a map is not measured.
 
     Parameters

@@ -19,6 +19,7 @@ from bifocal.model.image import as_grey, as_photo, local_contrast, noise
 from bifocal.model.pair import Pair
 from photocore.arrays import ByteArray, Float32Array
 from photocore.images import read_grey, read_image
+from photocore.large_photos import Pixels
 
 #: Grey values that all but these percentiles are stretched to.
 DARKEST, BRIGHTEST, TAILS = 18.0, 238.0, (0.5, 99.5)
@@ -70,9 +71,7 @@ def greys_through_water(
     return _stretched(np.asarray(first)), _stretched(np.asarray(second))
 
 
-def greys_of_pair(
-    pair: Pair, image1: NDArray[np.generic], image2: NDArray[np.generic]
-) -> tuple[ByteArray, ByteArray]:
+def greys_of_pair(pair: Pair, image1: Pixels, image2: Pixels) -> tuple[ByteArray, ByteArray]:
     """Return both photos of a pair in grey, for matching, in air or through its media.
 
     Raises
@@ -83,7 +82,9 @@ def greys_of_pair(
     greys = as_grey(image1, "image1"), as_grey(image2, "image2")
     for number, grey in enumerate(greys, start=1):
         pair.photo(number).check_size(grey.shape[::-1], f"image{number}")
-    return greys if not pair.refracted else greys_through_water(image1, image2)
+    if not pair.refracted:
+        return greys
+    return greys_through_water(np.asarray(image1), np.asarray(image2))
 
 
 def read_greys(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from photocore.arrays import BoolArray, ByteArray, Float32Array
 from photocore.errors import InputError
+from photocore.large_photos import ROWS, LargePhoto, Pixels
 
 #: Contrast is looked for in a photo blurred by so much, within a window of so many pixels. [px]
 QUIET_BLUR, CONTRAST_WINDOW = 1.0, (15, 15)
@@ -56,16 +57,25 @@ def as_photo(
     return np.ascontiguousarray(array)
 
 
-def as_grey(image: NDArray[np.generic], name: str) -> ByteArray:
-    """Return a photo as 8-bit grey values, shape (height, width).
+def as_grey(image: Pixels, name: str) -> ByteArray:
+    """Return a photo as 8-bit grey values, shape (height, width); a large one is read by windows.
 
     Raises
     ------
     InputError
         If it is not an image of 8 or 16 bits, or smaller than 16 pixels a side.
     """
+    if isinstance(image, LargePhoto):
+        grey = np.empty(image.shape[:2], np.uint8)
+        for top in range(0, len(grey), ROWS):
+            grey[top : top + ROWS] = _grey(image[top : top + ROWS, :])
+        return grey
     small = "is too small; at least 16 px a side are needed."
-    array = as_photo(image, name, smallest=16, fault=small)
+    return _grey(as_photo(image, name, smallest=16, fault=small))
+
+
+def _grey(array: ImageArray) -> ByteArray:
+    """Return the mean of the channels in 8 bits."""
     if array.dtype == np.uint16:
         # Cut, not rounded: grey values of 8 bits come back exact whether 256 or 257 widened them.
         array = (array >> 8).astype(np.uint8)

@@ -31,6 +31,7 @@ from bifocal.orthophotos.whole_picture import CompletedSurface, completed
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, ByteArray, Float32Array
 from photocore.errors import InputError
+from photocore.large_photos import LargePhoto, Pixels
 
 
 class Tile(NamedTuple):
@@ -53,7 +54,7 @@ class _Look(NamedTuple):
 
 def orthophoto(
     pair: Pair | PhotoSet,
-    image: ImageArray | Sequence[ImageArray],
+    image: Pixels | Sequence[Pixels],
     relief: ReliefMap | Surface | ArrayLike | None = None,
     *,
     faces: Faces | None = None,
@@ -71,7 +72,7 @@ def orthophoto(
     Parameters
     ----------
     pair : Pair or PhotoSet
-    image : ndarray, shape (h, w, 3) or (h, w), uint8 or uint16
+    image : ndarray, shape (h, w, 3) or (h, w), uint8 or uint16; or LargePhoto
         The photo, RGB. A sequence (image 1, image 2) renders from both: from the far photo
         wherever it sees the wall; the near one closes gaps beside which relief was measured and
         both photos agree. Of a set all its photos, in its order: each pixel from the one that
@@ -123,20 +124,23 @@ def orthophoto(
     surface = as_surface(relief)
     if faces:
         surface = FacedSurface(surface, faces)
+    alone = isinstance(image, np.ndarray | LargePhoto)
+    photos: Sequence[Pixels] = [image] if isinstance(image, np.ndarray | LargePhoto) else image
     if isinstance(pair, PhotoSet):
-        pair, image = _of_set(pair, image)
+        pair, photos = _of_set(pair, photos)
+        alone &= not isinstance(pair, PhotosOfSet)
     count = len(pair.photos) if isinstance(pair, PhotosOfSet) else 2
-    if isinstance(image, np.ndarray):
+    if alone:
         if source not in (1, 2):
             raise InputError(f"source: must be 1 or 2, got {source}.")
-        images = {source: image}
+        images = {source: photos[0]}
     else:
-        images = dict(enumerate(image, start=1))
+        images = dict(enumerate(photos, start=1))
         if len(images) != count:
             expected = "one photo or two" if count == 2 else f"{count} photos"
             raise InputError(f"image: expected {expected}, got {len(images)}.")
     for number, pixels in images.items():
-        pair.photo(number).check_size(pixels.shape[1::-1], f"image {number}")
+        pair.photo(number).check_size((pixels.shape[1], pixels.shape[0]), f"image {number}")
     first = min(images)
     height, width = images[first].shape[:2]
     grid = choose_grid(pair, first, (width, height), surface, gsd=gsd, bounds=bounds)
@@ -157,15 +161,13 @@ def orthophoto(
     )
 
 
-def _of_set(
-    photos: PhotoSet, image: ImageArray | Sequence[ImageArray]
-) -> tuple[Pair, ImageArray | Sequence[ImageArray]]:
+def _of_set(photos: PhotoSet, images: Sequence[Pixels]) -> tuple[Pair, Sequence[Pixels]]:
     """Return what renders a set, a set of two as its pair, and the images in its order."""
     if len(photos) > 2:
-        return PhotosOfSet.of_set(photos), [image] if isinstance(image, np.ndarray) else image
+        return PhotosOfSet.of_set(photos), images
     pair = photos.pair(0, 1)
     swapped = photos.photos[0].distance < photos.photos[1].distance
-    return pair, image[::-1] if swapped and not isinstance(image, np.ndarray) else image
+    return pair, images[::-1] if swapped else images
 
 
 def as_surface(relief: ReliefMap | Surface | ArrayLike | None) -> Surface:

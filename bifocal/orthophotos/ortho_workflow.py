@@ -45,7 +45,8 @@ from bifocal.remarks import remark
 from photocore.arrays import ByteArray, IntArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
-from photocore.images import ImageArray, read_image
+from photocore.images import ImageArray
+from photocore.large_photos import Pixels, open_photo
 from photocore.output import check_ending, check_not_input, check_writable
 from photocore.reports.words import words_of
 
@@ -147,16 +148,16 @@ def make_ortho(
         check_scale(pair.extra, pair_path if isinstance(pair_path, Path) else "")
     check_not_input(out, task.relief, *pair.photo_files)
     check_writable(out, overwrite=overwrite)
-    with open_surface(task, pair) as (surface, _, remarks):
+    with open_surface(task, pair) as (surface, _, remarks), ExitStack() as stack:
         faces, _ = given_faces(task.faces)
         drawn = (faces or Faces()).digest
         made_from = MadeFrom.of(photos_of(pair), faces=drawn, relief=task.relief)
-        images, notes_of_photos = _images(pair, task)
+        images, notes_of_photos = _images(pair, task, stack, progress)
         remarks += notes_of_photos
         numbers = tuple(images)
         height, width = images[numbers[0]].shape[:2]
         grid = _grid(pair, numbers[0], (width, height), surface, task)
-        photos, notes = _sources(pair, images, surface, grid, task)
+        photos, notes = _sources(pair, images, surface, grid, task, progress)
         hidden, moved = 0, list[MovedThing]()
 
         def tiles() -> Iterator[tuple[int, int, ImageArray, ByteArray]]:
@@ -223,22 +224,28 @@ def _basis(counts: IntArray, *, flat: bool) -> dict[str, float]:
     return {"measured": rest, **shares}
 
 
-def _images(pair: Pair, task: OrthoTask) -> tuple[dict[int, ImageArray], tuple[str, ...]]:
-    """Return the photos that give the colours by their numbers, and remarks.
+def _images(
+    pair: Pair, task: OrthoTask, stack: ExitStack, progress: Progress
+) -> tuple[dict[int, Pixels], tuple[str, ...]]:
+    """Return the photos that give the colours by their numbers, open in a stack, and remarks.
 
     A near photo that nobody asked for, and that cannot be used beside the far one, is left out.
     """
+
+    def pixels(number: int) -> Pixels:
+        return stack.enter_context(open_photo(photo_info(pair, number).path, progress))
+
     if isinstance(pair, PhotosOfSet):
         if task.image:
             raise InputError(remark("ortho.image_of_set"))
         numbers = range(1, len(pair.photos) + 1)
-        return {number: read_image(photo_info(pair, number).path) for number in numbers}, ()
+        return {number: pixels(number) for number in numbers}, ()
     words = "1" if isinstance(pair, PhotoAlone) else task.photo_words
     chosen: tuple[int, ...] = {"1": (1,), "2": (2,), "both": (1, 2)}[words]
-    images = {chosen[0]: read_image(photo_info(pair, chosen[0]).path)}
+    images = {chosen[0]: pixels(chosen[0])}
     for number in chosen[1:]:
         try:
-            images[number] = read_image(photo_info(pair, number).path)
+            images[number] = pixels(number)
             first, second = images[1], images[number]
             if first.dtype != second.dtype or first.ndim != second.ndim:
                 raise InputError(remark("ortho.photos_differ"))
@@ -373,7 +380,12 @@ def _grid(pair: Pair, first: int, size: tuple[int, int], surface: Surface, task:
 
 
 def _sources(
-    pair: Pair, images: dict[int, ImageArray], surface: Surface, grid: Grid, task: OrthoTask
+    pair: Pair,
+    images: dict[int, Pixels],
+    surface: Surface,
+    grid: Grid,
+    task: OrthoTask,
+    progress: Progress,
 ) -> tuple[list[SourcePhoto], list[str]]:
     """Return the photos ready to be rendered, corrected as asked for, and what was done."""
     photos: list[SourcePhoto] = []
@@ -386,7 +398,9 @@ def _sources(
         )
         remarks += [remark("ortho.of_image", number=number, note=note) for note in notes]
         photos.append(
-            SourcePhoto.prepare(photo, image, number=number, gsd=grid.gsd, chromatic=chromatic)
+            SourcePhoto.prepare(
+                photo, image, number=number, gsd=grid.gsd, chromatic=chromatic, progress=progress
+            )
         )
     for place in range(1, len(photos)):
         first, second = photos[0].image, photos[place].image

@@ -25,16 +25,18 @@ from bifocal.orthophotos.visibility import hidden_from
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, Float32Array, FloatArray
 from photocore.errors import InputError
+from photocore.large_photos import LargePhoto, Pixels
 
 
 def corrected_photo(
-    image: ImageArray, photo: Photo, *, vignetting: str = "", chromatic: bool = False
-) -> tuple[ImageArray, ChromaticShift | None, tuple[str, ...]]:
+    image: Pixels, photo: Photo, *, vignetting: str = "", chromatic: bool = False
+) -> tuple[Pixels, ChromaticShift | None, tuple[str, ...]]:
     """Return a photo freed of vignetting, its colour shift, and what was done.
 
     Parameters
     ----------
-    image : ndarray, shape (h, w, 3) or (h, w)
+    image : ndarray or LargePhoto, shape (h, w, 3) or (h, w)
+        A large one is read whole where the colour shift is measured.
     photo : Photo
         Its geometry.
     vignetting : str
@@ -44,7 +46,8 @@ def corrected_photo(
         Measure the radial shift of red and blue against green.
     """
     notes = []
-    image = as_photo(image)
+    if chromatic or not isinstance(image, LargePhoto):
+        image = as_photo(np.asarray(image))
     if vignetting:
         image = devignetted(image, photo, vignetting)
         notes.append(remark("ortho.vignetting", law=vignetting))
@@ -52,14 +55,14 @@ def corrected_photo(
     if chromatic:
         if image.ndim == 2:
             notes.append(remark("ortho.grey"))
-        else:
+        elif not isinstance(image, LargePhoto):
             shift = chromatic_shift(image)
             corner = [sum(terms) * shift.radius for terms in (shift.red, shift.blue)]
             notes.append(remark("ortho.colour_shift", red=corner[0], blue=corner[1]))
     return image, shift, tuple(notes)
 
 
-def devignetted(image: ImageArray, photo: Photo, model: str) -> ImageArray:
+def devignetted(image: Pixels, photo: Photo, model: str) -> Pixels:
     """Return a photo with the fall-off of light towards its corners undone.
 
     Raises
@@ -186,7 +189,7 @@ def _fit(log1: FloatArray, log2: FloatArray, square: FloatArray) -> FloatArray:
     return solution
 
 
-def _recoloured(image: ImageArray, fits: list[FloatArray], limit: float) -> ImageArray:
+def _recoloured(image: Pixels, fits: list[FloatArray], limit: float) -> Pixels:
     """Return the image with every band's fit applied."""
     levels = np.arange(int(limit) + 1) / limit
     tables = [(limit * np.exp(a) * levels**g).astype(np.float32) for a, g, _, _ in fits]
@@ -202,30 +205,33 @@ def _recoloured(image: ImageArray, fits: list[FloatArray], limit: float) -> Imag
     return _by_rows(image, recolour)
 
 
-def _scaled(image: ImageArray, gain: Callable[[Float32Array], Float32Array]) -> ImageArray:
+def _scaled(image: Pixels, gain: Callable[[Float32Array], Float32Array]) -> Pixels:
     """Return the image times a gain that depends on (rho / R)^2."""
     bands = (1,) * (image.ndim - 2)
     return _by_rows(image, lambda part, square: part * gain(square).reshape(*square.shape, *bands))
 
 
-def _by_rows(
-    image: ImageArray, change: Callable[[ImageArray, Float32Array], Float32Array]
-) -> ImageArray:
+def _by_rows(image: Pixels, change: Callable[[ImageArray, Float32Array], Float32Array]) -> Pixels:
     """Return the image as changed by a function of its pixels and (rho / R)^2, in small parts.
 
     A photo reduced in size has the same middle and corner, so the same (rho / R)^2.
     """
-    out = np.empty_like(image)
     height, width = image.shape[:2]
     centre, radius = _middle((width, height))
     limit = np.iinfo(image.dtype).max
     x = ((np.arange(width) - centre[0]) ** 2).astype(np.float32)
     y = ((np.arange(height) - centre[1]) ** 2).astype(np.float32)
+
+    def changed(part: ImageArray, rows: slice, columns: slice) -> ImageArray:
+        square = (x[None, columns] + y[rows, None]) / np.float32(radius**2)
+        return np.rint(change(part, square).clip(0, limit)).astype(part.dtype)
+
+    if isinstance(image, LargePhoto):
+        return image.changed(changed)
+    out = np.empty_like(image)
     for top in range(0, height, COLOURS.rows):
         rows = slice(top, top + COLOURS.rows)
-        square = (x[None, :] + y[rows, None]) / np.float32(radius**2)
-        value = change(image[rows], square)
-        out[rows] = np.rint(value.clip(0, limit)).astype(image.dtype)
+        out[rows] = changed(image[rows], rows, np.s_[:])
     return out
 
 

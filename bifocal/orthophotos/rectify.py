@@ -17,10 +17,14 @@ from bifocal.orthophotos.tuning import RECTIFICATION
 from bifocal.rays import apparent_magnification, plane_position
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, Float32Array, FloatArray
+from photocore.cli import Progress, no_progress
 from photocore.errors import GeometryError, InputError
+from photocore.large_photos import ROWS, LargePhoto, Pixels
 
 #: cv2.remap addresses pixels with 16 bits.
 _REMAP_LIMIT = 32_000
+#: Of a photo read by windows no more than this is held at once. [px]
+_WINDOW = 16_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +54,7 @@ class SourcePhoto:
     Attributes
     ----------
     photo : Photo
-    image : ndarray, shape (h, w, 3) or (h, w)
+    image : ndarray or LargePhoto, shape (h, w, 3) or (h, w)
         Its pixels, reduced by ``factor``.
     factor : int
         Original pixels per pixel of ``image`` along a side.
@@ -63,7 +67,7 @@ class SourcePhoto:
     """
 
     photo: Photo
-    image: ImageArray
+    image: Pixels
     factor: int
     size: tuple[int, int]
     number: int
@@ -74,11 +78,12 @@ class SourcePhoto:
     def prepare(
         cls,
         photo: Photo,
-        image: ImageArray,
+        image: Pixels,
         *,
         number: int,
         gsd: float | None = None,
         chromatic: ChromaticShift | None = None,
+        progress: Progress = no_progress,
     ) -> SourcePhoto:
         """Return it; a photo much finer than ``gsd`` is reduced first, against aliasing.
 
@@ -87,14 +92,14 @@ class SourcePhoto:
         InputError
             If the image is not a photo of 8 or 16 bits per channel.
         """
-        image = as_photo(image)
+        image = image if isinstance(image, LargePhoto) else as_photo(image)
         size = (image.shape[1], image.shape[0])
         factor = 1
         if gsd is not None:
             factor = max(1, math.floor(gsd / photo.gsd(size) + 0.25))
         factor = min(factor, max(1, min(size) // 2))
         if factor > 1:
-            image = _reduced(image, factor)
+            image = _reduced(image, factor, progress)
         lens = LensTable.of_photo(photo, size) if photo.lens is not None else None
         return cls(
             photo=photo, image=image, factor=factor, size=size, number=number, lens=lens,
@@ -120,7 +125,7 @@ class SourcePhoto:
         self, column: Float32Array, row: Float32Array, interpolation: Interpolation
     ) -> ImageArray:
         """Return the photo's colours at positions, shape (h, w, 3) or (h, w)."""
-        if self.chromatic is None or self.image.ndim == 2:
+        if self.chromatic is None or self.image.ndim == 2 or isinstance(self.image, LargePhoto):
             return self._remap(self.image, column, row, interpolation)
         shift = self.chromatic
         x, y = column - np.float32(shift.centre[0]), row - np.float32(shift.centre[1])
@@ -135,7 +140,7 @@ class SourcePhoto:
 
     def _remap(
         self,
-        image: ImageArray,
+        image: Pixels,
         column: Float32Array,
         row: Float32Array,
         interpolation: Interpolation,
@@ -152,9 +157,22 @@ class SourcePhoto:
                 (c + np.float32(0.5)) / np.float32(self.factor) - np.float32(0.5)
                 for c in (column, row)
             )
-        if max(image.shape[:2]) > _REMAP_LIMIT:
-            image, column, row = _part(image, column, row)
-        return cv2.remap(image, column, row, flag, borderMode=cv2.BORDER_REPLICATE)
+        return _remapped(image, column, row, flag=flag)
+
+
+def _remapped(image: Pixels, column: Float32Array, row: Float32Array, *, flag: int) -> ImageArray:
+    """Return the colours of a photo at positions, of a large one by as many windows as it takes."""
+    if isinstance(image, LargePhoto):
+        rows, columns = _limits(image.shape, column, row)
+        area = (rows.stop - rows.start) * (columns.stop - columns.start)
+        axis = 0 if len(column) > 1 else 1
+        if area > _WINDOW and column.size > 1:  # rows first: they lie together in the file
+            halves = (np.array_split(positions, 2, axis) for positions in (column, row))
+            parts = [_remapped(image, *half, flag=flag) for half in zip(*halves, strict=True)]
+            return np.concatenate(parts, axis)
+    if isinstance(image, LargePhoto) or max(image.shape[:2]) > _REMAP_LIMIT:
+        image, column, row = _part(image, column, row)
+    return cv2.remap(image, column, row, flag, borderMode=cv2.BORDER_REPLICATE)
 
 
 def footprint(photo: Photo, size: tuple[int, int]) -> Bounds:
@@ -238,33 +256,43 @@ def _project_leaning(
     return homogeneous[..., 0] * scale, homogeneous[..., 1] * scale
 
 
-def _reduced(image: ImageArray, factor: int) -> ImageArray:
+def _reduced(image: Pixels, factor: int, progress: Progress = no_progress) -> ImageArray:
     """Return an image averaged over squares of ``factor`` pixels; incomplete squares at the end."""
     height, width = image.shape[:2]
+    if isinstance(image, LargePhoto):
+        band = factor * max(1, ROWS // factor)
+        parts = []
+        for top in range(0, height, band):
+            parts.append(_reduced(image[top : top + band, :], factor))
+            progress(min(top + band, height), height, "photo reduced")
+        return np.concatenate(parts)
     high, wide = -(-height // factor) * factor, -(-width // factor) * factor
     padded = cv2.copyMakeBorder(image, 0, high - height, 0, wide - width, cv2.BORDER_REPLICATE)
     return cv2.resize(padded, (wide // factor, high // factor), interpolation=cv2.INTER_AREA)
 
 
-def _part(
-    image: ImageArray, column: Float32Array, row: Float32Array
-) -> tuple[ImageArray, Float32Array, Float32Array]:
-    """Cut out of a very large photo what a window needs."""
-    height, width = image.shape[:2]
+def _limits(shape: tuple[int, ...], column: Float32Array, row: Float32Array) -> tuple[slice, slice]:
+    """Return the rows and columns of a very large photo that positions need."""
     margin = 8
 
-    def limits(positions: Float32Array, length: int) -> tuple[int, int]:
+    def limits(positions: Float32Array, length: int) -> slice:
         low, high = (f.reduce(positions, axis=None) for f in (np.fmin, np.fmax))
         if np.isnan(low):
-            return 0, 1
+            return slice(0, 1)
         first = int(np.clip(math.floor(low) - margin, 0, length - 1))
-        return first, int(np.clip(math.ceil(high) + margin, first + 1, length))
+        return slice(first, int(np.clip(math.ceil(high) + margin, first + 1, length)))
 
-    c0, c1 = limits(column, width)
-    r0, r1 = limits(row, height)
-    if max(c1 - c0, r1 - r0) > _REMAP_LIMIT:
+    return limits(row, shape[0]), limits(column, shape[1])
+
+
+def _part(
+    image: Pixels, column: Float32Array, row: Float32Array
+) -> tuple[ImageArray, Float32Array, Float32Array]:
+    """Cut out of a very large photo what a window needs."""
+    rows, columns = _limits(image.shape, column, row)
+    if max(columns.stop - columns.start, rows.stop - rows.start) > _REMAP_LIMIT:
         raise InputError("the orthophoto is too coarse for this photo; choose a finer --gsd.")
-    return image[r0:r1, c0:c1], column - np.float32(c0), row - np.float32(r0)
+    return image[rows, columns], column - np.float32(columns.start), row - np.float32(rows.start)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

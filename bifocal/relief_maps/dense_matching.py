@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from bifocal.files.haze import greys_of_pair
 from bifocal.model.grid import Bounds, Grid, bounds_of
@@ -32,6 +31,7 @@ from bifocal.remarks import remark
 from photocore.arrays import ByteArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
+from photocore.large_photos import Pixels
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,8 +97,8 @@ class DenseRelief(ReliefMap):
 
 def pair_relief(
     pair: Pair,
-    image1: NDArray[np.generic],
-    image2: NDArray[np.generic],
+    image1: Pixels,
+    image2: Pixels,
     *,
     gsd: float | None = None,
     bounds: Bounds | None = None,

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from bifocal.faces.faced_surface import faced
 from bifocal.faces.faces import Faces
@@ -30,6 +29,7 @@ from bifocal.remarks import remark
 from photocore.arrays import ByteArray, Float32Array, FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import GeometryError, InputError
+from photocore.large_photos import Pixels
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,16 +57,15 @@ class PairingTuning:
 PAIRING = PairingTuning()
 
 
-Image = NDArray[np.generic]
 #: Cameras whose base rises less from the plane, per length along it, stand beside each other.
 _SIDEWAYS = 0.05
 
 
 def dense_relief(
     pair: Pair | PhotoSet,
-    image1: NDArray[np.generic],
-    image2: NDArray[np.generic],
-    *others: NDArray[np.generic],
+    image1: Pixels,
+    image2: Pixels,
+    *others: Pixels,
     gsd: float | None = None,
     bounds: Bounds | None = None,
     quality: str = "standard",
@@ -149,7 +148,7 @@ def dense_relief(
 
 
 def _measured_relief(
-    pair: Pair | PhotoSet, images: Sequence[Image], wishes: _Wishes, progress: Progress
+    pair: Pair | PhotoSet, images: Sequence[Pixels], wishes: _Wishes, progress: Progress
 ) -> DenseRelief:
     """Return the relief as it is measured, before anything that was drawn."""
     if isinstance(pair, Pair) and len(images) == 2:
@@ -174,7 +173,7 @@ class _Wishes(NamedTuple):
     of_set: bool = False
 
     def fulfilled(
-        self, pair: Pair, image1: Image, image2: Image, progress: Progress
+        self, pair: Pair, image1: Pixels, image2: Pixels, progress: Progress
     ) -> DenseRelief:
         """Return the relief of a pair."""
         return pair_relief(pair, image1, image2, progress=progress, **self._asdict())
@@ -188,7 +187,7 @@ class _Part(NamedTuple):
 
 
 def _of_set(
-    photos: PhotoSet, images: Sequence[Image], wishes: _Wishes, progress: Progress
+    photos: PhotoSet, images: Sequence[Pixels], wishes: _Wishes, progress: Progress
 ) -> DenseRelief:
     """Return the relief of three photos or more, window by window of the wall.
 
@@ -345,7 +344,7 @@ def _parallax(photos: PhotoSet, one: int, other: int, xy: FloatArray) -> FloatAr
 
 
 def _measured(
-    photos: PhotoSet, images: Sequence[Image], numbers: tuple[int, int], part: Grid,
+    photos: PhotoSet, images: Sequence[Pixels], numbers: tuple[int, int], part: Grid,
     wishes: _Wishes, progress: Progress,
 ) -> tuple[DenseRelief, PairRelief]:  # fmt: skip
     """Return what a pair measures of a window, and that on the window's grid with its weight."""

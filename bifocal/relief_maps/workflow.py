@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from bifocal.model.photo import Photo
 from bifocal.model.photo_set import PhotoSet, pair_or_set
 from bifocal.model.relief_map import ReliefMap
 from bifocal.relief_maps import dense_relief
+from bifocal.relief_maps.dense_matching import DenseRelief
 from bifocal.relief_maps.frame import values_at
 from bifocal.relief_maps.relief_files import write_preview
 from bifocal.remarks import remark
@@ -30,7 +32,8 @@ from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.cloud import write_cloud
 from photocore.errors import GeometryError
-from photocore.images import ImageArray, read_image, to_eight_bit
+from photocore.images import to_eight_bit
+from photocore.large_photos import Pixels, open_photo
 from photocore.output import all_or_none, check_all_writable, check_ending, check_not_input
 
 _ROWS = 256
@@ -96,13 +99,6 @@ def relief_of_pair(
     _check_outputs(job, *(info.path for info in infos))
     faces, notes = given_faces(job.faces)
     notes += check_faces(faces, photos_of(photos))
-    images = tuple(read_image(info.path) for info in infos)
-    result = dense_relief(
-        photos, *images, gsd=job.gsd, bounds=job.bounds, quality=job.quality,
-        relief_range=job.relief_range, faces=faces, progress=progress,
-    )  # fmt: skip
-    if not result.known.any():
-        raise GeometryError(remark("relief.none_within_bounds"))
     of_set = (photos.image1, photos.image2) if isinstance(photos, Pair) else photos.photos
     pair = photos if isinstance(photos, Pair) else photos.pair(*photos.pairs()[0][:2])
     named = Path(source).name if isinstance(source, Path | str) else ""
@@ -113,21 +109,15 @@ def relief_of_pair(
         "BIFOCAL_UNIT": unit_of(pair.extra),
         **MadeFrom.of(of_set, faces=(faces or Faces()).digest).tags(),
     }
-    result.write(job.out, overwrite=job.overwrite, tags=tags)
-    written = [job.out]
-    if job.preview is not None:
-        write_preview(job.preview, result, overwrite=job.overwrite)
-        written.append(job.preview)
-    if job.cloud is not None:
-        xyz, attributes = coloured_cloud(result, of_set, images)
-        write_cloud(
-            job.cloud, xyz, attributes, comment="metres, plane frame",
-            descriptions={"sigma": "sigma of relief, m"}, overwrite=job.overwrite,
+    with ExitStack() as stack:
+        images = [stack.enter_context(open_photo(info.path, progress)) for info in infos]
+        result = dense_relief(
+            photos, *images, gsd=job.gsd, bounds=job.bounds, quality=job.quality,
+            relief_range=job.relief_range, faces=faces, progress=progress,
         )  # fmt: skip
-        written.append(job.cloud)
-    if job.suggested is not None:
-        suggest_faces(result, of_set, images).write(job.suggested, overwrite=job.overwrite)
-        written.append(job.suggested)
+        if not result.known.any():
+            raise GeometryError(remark("relief.none_within_bounds"))
+        written = _written(result, job, of_set, images, tags)
     basis = rests_on(
         pair, setup="the pair as given", picks="the photos' own misfit across the radius, measured"
     )
@@ -135,8 +125,31 @@ def relief_of_pair(
     return summary, (*photos.remarks, *notes, *result.notes, *result.registration.remarks)
 
 
+def _written(
+    result: DenseRelief, job: ReliefJob, photos: Sequence[Photo], images: Sequence[Pixels],
+    tags: Mapping[str, str],
+) -> list[Path]:  # fmt: skip
+    """Write the files asked for and return them."""
+    result.write(job.out, overwrite=job.overwrite, tags=tags)
+    written = [job.out]
+    if job.preview is not None:
+        write_preview(job.preview, result, overwrite=job.overwrite)
+        written.append(job.preview)
+    if job.cloud is not None:
+        xyz, attributes = coloured_cloud(result, photos, images)
+        write_cloud(
+            job.cloud, xyz, attributes, comment="metres, plane frame",
+            descriptions={"sigma": "sigma of relief, m"}, overwrite=job.overwrite,
+        )  # fmt: skip
+        written.append(job.cloud)
+    if job.suggested is not None:
+        suggest_faces(result, photos, images).write(job.suggested, overwrite=job.overwrite)
+        written.append(job.suggested)
+    return written
+
+
 def coloured_cloud(
-    relief: ReliefMap, photos: Sequence[Photo], images: Sequence[ImageArray]
+    relief: ReliefMap, photos: Sequence[Photo], images: Sequence[Pixels]
 ) -> tuple[FloatArray, dict[str, NDArray[Any]]]:
     """Return the known points of a relief map, coloured by the first photo that has each in frame.
 
@@ -147,7 +160,7 @@ def coloured_cloud(
     attributes : dict of str to ndarray, shape (n,)
         ``red``, ``green``, ``blue`` (8 bits), ``sigma`` of the relief [m], ``quality``.
     """
-    pictures = [to_eight_bit(image) for image in images]
+    pictures = [to_eight_bit(np.asarray(image)) for image in images]
     pictures = [np.repeat(p[..., None], 3, axis=2) if p.ndim == 2 else p for p in pictures]
     positions, colours = [], []
     for row in range(0, relief.shape[0], _ROWS):
@@ -168,7 +181,7 @@ def coloured_cloud(
 
 
 def _colours(
-    xyz: FloatArray, photos: Sequence[Photo], pictures: Sequence[ImageArray]
+    xyz: FloatArray, photos: Sequence[Photo], pictures: Sequence[NDArray[Any]]
 ) -> NDArray[Any]:
     """Return the colours of points in the first photo that has each in frame, (n, 3)."""
     pixels = photos[0].project(xyz)
