@@ -12,8 +12,7 @@ The pair
     Pair, Photo               both cameras; read and write pair files, intersect and project points
     PhotoSet                  two or more photos of one wall; a pair is the set of two
     photos_from_project, write_colmap   a set from another program's project, and one for COLMAP
-    read_image, write_image   photos as arrays, upright as seen
-    open_photo, LargePhoto    the same, of a large TIFF read window by window
+    read_image, write_image, open_photo   photos as arrays, upright as seen; a large one by windows
     Lens                      principal distance, principal point and distortion of a lens
     calibrate, Calibration    a lens from photos of a board
     align, align_set, length_check   a pair, or a set of photos, from them and lengths taped on site
@@ -37,8 +36,8 @@ The page
 Sample pairs                  SAMPLE, WATER_SAMPLE: folders of photos with exact truth
 
 What they take and give: Alignment, Bounds, BreakLine, ChangedRegion, CheckResult, Comparison, Face,
-Faces, FlagLimits, FlatSurface, Foot, Grid, Intersection, KnownPoints, Layers, LengthCheck,
-MapSurface, MediaPath, NamedPoints, Occluder, OrientationCheck, Pinhole, PlanePicks,
+Faces, FlagLimits, FlatSurface, Foot, Grid, Intersection, KnownPoints, LargePhoto, Layers,
+LengthCheck, MapSurface, MediaPath, NamedPoints, Occluder, OrientationCheck, Pinhole, PlanePicks,
 PointObservations, Progress, ProjectedPoints, ProjectOptions, ProjectPhotos, RadialDivision,
 RankedPair, Rectification, Registration, ReliefTable, SetAlignment, SetIntersection, Similarity,
 suggest_faces, Surface, SurveyInput, SurveyMedia, SurveySetup, TapedCheck, TapedDistance,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -42,38 +43,33 @@ class LargePhoto:
 
     Attributes
     ----------
-    info : ImageInfo
-    file : RasterFile
-        Open while pixels are read.
-    bands : tuple of int
-        Numbers of those with colours.
+    path : Path
+    shape : tuple of int
+        Height and width [px], and 3 of colours.
+    dtype : numpy dtype
+        8 or 16 bits, unsigned.
+    orientation : int
+        EXIF orientation 1..8 of the stored pixels.
+    stored : callable
+        Returns those of a column, row, width and height, shape (height, width, bands).
     unused : int
         Bits of 16 that no pixel uses; they are filled as `read_image` does.
     changes : tuple of callable
         What is done to the pixels of each window, in this order.
     """
 
-    info: ImageInfo
-    file: RasterFile
-    bands: tuple[int, ...]
+    path: Path
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    orientation: int
+    stored: Callable[[int, int, int, int], NDArray[Any]]
     unused: int = 0
     changes: tuple[Change, ...] = ()
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Height and width [px], and 3 of colours."""
-        width, height = self.info.size
-        return (height, width) if len(self.bands) == 1 else (height, width, 3)
 
     @property
     def ndim(self) -> int:
         """Number of dimensions of ``shape``."""
         return len(self.shape)
-
-    @property
-    def dtype(self) -> np.dtype[Any]:
-        """8 or 16 bits, unsigned."""
-        return self.file.dtype
 
     def changed(self, change: Change) -> LargePhoto:
         """Return the photo with one more change to its pixels, made when they are read."""
@@ -85,22 +81,22 @@ class LargePhoto:
             range(size)[part] for size, part in zip(self.shape[:2], window, strict=True)
         ]  # rows, columns
         rows, columns = (slice(part.start, part.stop) for part in ranges)
-        image = turn_upright(self._stored(*ranges), self.info.orientation)
+        image = turn_upright(self._stored(*ranges), self.orientation)
         for change in self.changes:
             image = change(image, rows, columns)
         return image
 
     def _stored(self, rows: range, columns: range) -> ImageArray:
         """Return the stored pixels that upright rows and columns show; see `turn_upright`."""
-        turn, (height, width) = self.info.orientation, self.shape[:2]
+        turn, (height, width) = self.orientation, self.shape[:2]
         if turn in (3, 4, 7, 8):
             rows = range(height - rows.stop, height - rows.start)
         if turn in (2, 3, 6, 7):
             columns = range(width - columns.stop, width - columns.start)
         if turn >= 5:
             rows, columns = columns, rows
-        part = self.file.read(columns.start, rows.start, len(columns), len(rows), bands=self.bands)
-        image = part[:, :, 0] if len(self.bands) == 1 else in_srgb(self.info.path, part)
+        part = self.stored(columns.start, rows.start, len(columns), len(rows))
+        image = part[:, :, 0] if self.ndim == 2 else in_srgb(self.path, part)
         return image << np.uint16(self.unused) if self.unused else image
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> ImageArray:
@@ -111,7 +107,7 @@ class LargePhoto:
         InputError
             If they are more than `MAX_PIXELS`.
         """
-        check_size(self.info.path, self.info.size)
+        check_size(self.path, (self.shape[1], self.shape[0]))
         image = np.empty(self.shape, self.dtype)
         for top in range(0, len(image), ROWS):
             image[top : top + ROWS] = self[top : top + ROWS, :]
@@ -126,6 +122,17 @@ Pixels = NDArray[Any] | LargePhoto
 def open_photo(path: Path | str, progress: Progress = no_progress) -> Iterator[Pixels]:
     """Yield a photo's pixels as `read_image` returns them, those of a large TIFF unread.
 
+    Parameters
+    ----------
+    path : path
+        Above 100 megapixels a TIFF, grey or RGB, is read where pixels are asked for.
+    progress : callable
+        Told how far a large photo of 16 bits is looked through for what it uses of them.
+
+    Yields
+    ------
+    ndarray or LargePhoto, shape (h, w, 3) or (h, w)
+
     Raises
     ------
     InputError
@@ -137,14 +144,17 @@ def open_photo(path: Path | str, progress: Progress = no_progress) -> Iterator[P
         yield read_image(path)
         return
     with RasterFile(info.path) as file:
-        photo = LargePhoto(info=info, file=file, bands=bands)
         most = 0
         if info.bits == 16:  # how many of them are used, only all pixels tell
             for top in range(0, file.height, ROWS):
                 part = file.read(0, top, file.width, min(ROWS, file.height - top), bands=bands)
                 most = max(most, int(part.max()))
                 progress(min(top + ROWS, file.height), file.height, info.path.name)
-        yield replace(photo, unused=unused_bits(info.path, most))
+        yield LargePhoto(
+            path=info.path, shape=(*info.size[::-1], *(3,) * (len(bands) > 1)), dtype=file.dtype,
+            orientation=info.orientation, stored=partial(file.read, bands=bands),
+            unused=unused_bits(info.path, most),
+        )  # fmt: skip
 
 
 def _plain_bands(info: ImageInfo) -> tuple[int, ...]:
