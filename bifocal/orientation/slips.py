@@ -90,6 +90,8 @@ def slip_of(
         explaining = _explaining(_of_crops(typed, by_control=by_control), fitted, now)
         if now is not None and fits:
             explaining = [one for one in explaining if one[0] < now.misfit]
+        if not explaining and by_control and now is not None:
+            explaining = _perhaps_crops(typed, now, fitted)
     if not explaining and tables and by_control and len(typed.control.ids) > 5:
         # Two at once, of a lens and of the table.
         both = (
@@ -194,6 +196,30 @@ def _of_crops(typed: TypedOrientation, *, by_control: bool) -> Iterator[Slip]:
         meant = replace(typed, interiors=(loose[0], loose[1]))
         words = remark(f"slips.{'cropped' if by_control else 'part'}_{key}")
         yield Slip(meant=meant, words=words, handicap=SLIPS.clearly)
+
+
+def _perhaps_crops(
+    typed: TypedOrientation,
+    now: TrialOrientation,
+    fitted: Callable[[TypedOrientation], TrialOrientation | None],
+) -> list[tuple[float, Slip]]:
+    """Return the doubt, nothing mended, where points fit as well if photos are parts.
+
+    Control fits uncropped photos less well, or with a point left out, and cameras elsewhere. Lenses
+    that are known do not leave that open.
+    """
+    if not all(i.is_assumed for i in typed.interiors):
+        return []
+    doubts: list[tuple[float, Slip]] = []
+    for slip in _of_crops(typed, by_control=True):
+        tried = fitted(slip.meant)
+        if tried is None or tried.lost.any() or tried.misfit > now.misfit:
+            continue
+        places = [[float(c.centre[2]) for c in one.cameras] for one in (now, tried)]
+        if np.ptp(np.log(places), axis=0).max() > SLIPS.elsewhere:
+            words = remark("slips.perhaps_cropped", far=places[1][0], near=places[1][1])
+            doubts.append((tried.misfit, Slip(meant=typed, words=words)))
+    return doubts
 
 
 def _of_site(typed: TypedOrientation) -> Iterator[Slip]:

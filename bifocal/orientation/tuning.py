@@ -252,6 +252,8 @@ class SlipTuning:
     certain: float = 4.0
     #: A point that misses by more says no more. [sigma]
     most: float = 10.0
+    #: A distance that changes by more (logarithm) if photos were cropped is worth a doubt.
+    elsewhere: float = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

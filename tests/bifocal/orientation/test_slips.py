@@ -354,6 +354,30 @@ def test_cropped_photos_are_taken_as_parts_of_larger_ones(cuts, said) -> None:
 
 
 @pytest.mark.parametrize(
+    ("sigma", "far", "doubted"), [(0.5, 13.0, True), (0.5, 16.5, False), (0.02, 13.0, False)]
+)
+def test_that_photos_may_be_cropped_is_a_doubt_where_points_cannot_tell(sigma, far, doubted):
+    """All points fit if so, though not better by much; as whole photos one does not."""
+    lenses = tuple(replace(p.interior, sigma_focal=sigma) for p in photos() if p.interior)
+    typed = TypedOrientation(interiors=lenses, control=control(), site=SiteMeasures())
+
+    def fitted(one: TypedOrientation) -> TrialOrientation | None:
+        cropped = any(i.sigma_centre > 100 for i in one.interiors)
+        if one.control is not typed.control or one.interiors[0].sigma_focal != sigma:
+            return None
+        lost = np.arange(9) == (9 if cropped else 4)
+        cameras = (camera(far), OBLIQUE[1]) if cropped else OBLIQUE
+        return TrialOrientation(misfit=1.1 if cropped else 2.2, cameras=cameras, lost=lost)
+
+    slip = slip_of(typed, fitted, by_control=True)
+    assert (slip is not None) == doubted
+    if slip is not None:
+        assert slip.meant is typed
+        assert "WERE THE PHOTOS CROPPED?" in slip.words
+        assert "13 and 9 m" in slip.words
+
+
+@pytest.mark.parametrize(
     ("size", "near", "misfit", "asked"),
     [
         (SIZE, SIZE, 0.5, False),
