@@ -71,14 +71,13 @@ def command(pair_file: Path, as_json: bool, **wishes: Any) -> None:
     """
     from bifocal.faces.faces_files import faces_path, keep_faces
     from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
-    from bifocal.workbook.pair_workflow import read_photos
+    from bifocal.workbook.pair_workflow import is_workbook, read_pair
 
     faces = wishes["faces"]
     wishes["faces"] = faces_path(faces, pair_file)
     with progress_bar("Relief", quiet=as_json) as progress:
-        summary, remarks = relief_of_pair(
-            read_photos(pair_file), ReliefJob(**wishes), progress=progress
-        )
+        source = read_pair(pair_file) if is_workbook(pair_file) else pair_file
+        summary, remarks = relief_of_pair(source, ReliefJob(**wishes), progress=progress)
     remarks = (*remarks, *keep_faces(faces, pair_file))
     data = summary | {"remarks": list(remarks)}
     print_result(data, _lines(summary), as_json=as_json, remarks=remarks)

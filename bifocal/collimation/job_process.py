@@ -44,7 +44,7 @@ from bifocal.reports.handover import HandoverTask, write_handover
 from bifocal.reports.view_workflow import view_relief
 from bifocal.reports.workflow import report_of
 from bifocal.workbook.match_workflow import match_pair_file
-from bifocal.workbook.pair_workflow import read_pair
+from bifocal.workbook.pair_workflow import is_workbook, read_pair
 from photocore.cli import Progress
 from photocore.errors import GeometryError, PhotogrammetryError
 from photocore.images import image_info, read_grey
@@ -223,7 +223,9 @@ def _relief(task: Task, progress: Progress) -> dict[str, Any]:
         out=Path(task["out"]), overwrite=task["overwrite"], faces=faces_path(None, task["pair"]),
         **task["options"],
     )  # fmt: skip
-    summary, remarks = relief_of_pair(_source(task), job, progress=progress)
+    named = Path(task.get("set") or task["pair"])  # the map tells by its name which photos it is of
+    source = read_pair(named) if is_workbook(named) else named
+    summary, remarks = relief_of_pair(source, job, progress=progress)
     return {"summary": summary, "remarks": remarks}
 
 

@@ -18,7 +18,7 @@ from bifocal.comparison.cells import (
     without_trend,
 )
 from bifocal.comparison.chance import Chance, Patches, chance
-from bifocal.comparison.photo_evidence import PhotosOfDate, contradicted
+from bifocal.comparison.photo_evidence import PhotosOfDate, contradicted, parallax_of
 from bifocal.comparison.tuning import CHANGE
 from bifocal.model.relief_map import ReliefMap
 from bifocal.remarks import remark
@@ -41,7 +41,8 @@ class ChangedRegion:
         mean over the outline, the largest as an average over the smallest patch that proves it.
         [m², m³, m, m]
     sigma_area, sigma_volume, sigma_mean, sigma_largest : float
-        Their standard deviations.
+        Their standard deviations; of area and volume with the unmeasured ground beside the rim,
+        where the change may go on.
     measured : float
         Share of the area that both maps have measured.
     open_rim : float
@@ -86,8 +87,9 @@ class Comparison:
     trend, sigma_trend : tuple of float
         What was taken off as common to the whole wall: offset [m] at the middle of the map and
         slopes along X and Y; zeros where the maps were taken as they stand.
-    patches : tuple of (float, float)
-        Area of a patch [m²], and the mean change over it that would be found [m].
+    patches : tuple of (float, float, float)
+        Area of a patch [m²], and the mean change that would be found where it fills such a patch,
+        over half and over nine tenths of the wall; infinite where none would [m].
     correlation_length : float
         Distance at which the correlation of the errors has fallen to 1/e. [m]
     compared : float
@@ -102,7 +104,7 @@ class Comparison:
     level: float
     trend: tuple[float, float, float]
     sigma_trend: tuple[float, float, float]
-    patches: tuple[tuple[float, float], ...]
+    patches: tuple[tuple[float, float, float], ...]
     correlation_length: float
     compared: float
     remarks: tuple[str, ...]
@@ -210,7 +212,6 @@ def compare(
             break
     outlined = _Outlined(cells, test, sizes, by_chance, patches, sigmas, covariance)
     regions, labels = outlined.regions(labels)
-    usual = float(np.median(cells.sigma[unchanged]))
     # What errs as one over most of the wall tells no offset either.
     if not (stable or fit) and unchanged.sum() >= CHANGE.least * max(by_chance.cells, 1.0):
         common, variance = trend_of(cells, unchanged, by_chance.cells)
@@ -219,11 +220,20 @@ def compare(
     smooth = np.nan_to_num(patches.averages(cells.difference)[0])
     height, width = difference.shape
     whole = labels.repeat(pixels, axis=0).repeat(pixels, axis=1)[:height, :width]
-    if dates is not None and (wrong := contradicted(whole, difference, (before, after), dates)):
+    if dates is not None and regions:
+        wrong = contradicted(whole, difference, (before, after), dates)
         two_surfaces |= np.isin(whole, wrong)
-        area = float(np.isin(whole, wrong).sum()) * difference.gsd**2
-        remarks.append(remark("compare.photos_contradict", count=len(wrong), area=area))
-        regions, whole = _without(regions, whole, wrong)
+        one = np.ones_like(difference.sigma)
+        field = difference.r * parallax_of(difference, (before, after), dates)
+        moved = Cells.of(replace(difference, r=np.asarray(field, np.float32), sigma=one), pixels)
+        weak = [
+            n for n in without_parallax(moved.z, cells.known, labels, patches) if n not in wrong
+        ]
+        for key, numbers in (("photos_contradict", wrong), ("little_parallax", weak)):
+            area = float(np.isin(whole, numbers).sum()) * difference.gsd**2
+            if numbers:
+                remarks.append(remark(f"compare.{key}", count=len(numbers), area=area))
+        regions, whole = _without(regions, whole, [*wrong, *weak])
     if numbers := [one.number for one in regions if one.open_rim > CHANGE.open]:
         remarks.append(remark("compare.goes_on", numbers=", ".join(map(str, numbers))))
     return Comparison(
@@ -234,10 +244,7 @@ def compare(
         level=level,
         trend=_three(trend),
         sigma_trend=_three(np.sqrt(np.diag(covariance))),
-        patches=tuple(
-            (float(4 * np.pi * (radius * cells.grid.gsd) ** 2), limit * float(sigma) * usual)
-            for radius, sigma in zip(radii, sigmas, strict=True)
-        ),
+        patches=_provable(cells, patches, by_chance, sigmas, limit),
         correlation_length=by_chance.length * cells.grid.gsd,
         compared=float(cells.known.sum() * cells.grid.gsd**2),
         remarks=tuple(remarks),
@@ -257,6 +264,27 @@ def _common(
     return trend, trend_of(cells, still, correlated)[1]
 
 
+def without_parallax(
+    moved: FloatArray, measured: BoolArray, labels: IntArray, patches: Patches
+) -> list[int]:
+    """Return the numbers of regions that move photos no more than errors of the wall about them.
+
+    Parameters
+    ----------
+    moved : ndarray
+        By how much the difference of each cell moves the photos. [px]
+    labels : ndarray of int64
+        Numbers of the regions, cell by cell.
+    """
+    sizes = [np.nan_to_num(np.abs(part)) for part in patches.averages(moved)]
+    still = measured & ~_wider(labels > 0)
+    return [
+        number
+        for number in range(1, int(labels.max()) + 1)
+        if all(part[labels == number].max() <= part[still].max(initial=0.0) for part in sizes)
+    ]
+
+
 def _without(
     regions: Sequence[ChangedRegion], labels: IntArray, wrong: Sequence[int]
 ) -> tuple[tuple[ChangedRegion, ...], IntArray]:
@@ -265,6 +293,28 @@ def _without(
     ranks = np.zeros(len(regions) + 1, np.int64)
     ranks[[one.number for one in kept]] = np.arange(1, len(kept) + 1)
     return tuple(replace(one, number=int(ranks[one.number])) for one in kept), ranks[labels]
+
+
+def _provable(
+    cells: Cells, patches: Patches, by_chance: Chance, sigmas: FloatArray, limit: float
+) -> tuple[tuple[float, float, float], ...]:
+    """Return areas of patches, and what change of one of them shows over half and most of a wall.
+
+    A disc of the area of a Gaussian patch, 4 pi radius^2, holds 1 - exp(-2) of its weight.
+    """
+    held, weights = 1 - np.exp(-2.0), patches.averages(1 / np.maximum(cells.sigma, 1e-9))
+    rows = []
+    for radius, sigma, of_size, weight in zip(
+        patches.radii, sigmas, by_chance.sigmas, weights, strict=True
+    ):
+        needed = limit * float(sigma) / np.nanmedian(of_size) * of_size / held
+        change = np.where(needed < CHANGE.clip, needed / weight, np.inf)[cells.known]
+        half, most = np.quantile(
+            np.where(np.isnan(change), np.inf, change), CHANGE.shares, method="higher"
+        )
+        area = 4 * np.pi * (radius * cells.grid.gsd) ** 2
+        rows.append((float(area), float(half), float(most)))
+    return tuple(rows)
 
 
 def _three(values: FloatArray) -> tuple[float, float, float]:
@@ -372,6 +422,21 @@ class _Outlined:
         """Return the standard deviation of an average over patches of a size. [m]"""
         return float(self.sigmas[level]) * float(np.median(self.cells.sigma[part]))
 
+    def _beyond(self, inner: BoolArray, way: float) -> tuple[float, float]:
+        """Return over how many cells a region may go on where nothing is measured, and how high.
+
+        As far as it is wide, through unmeasured ground alone, as high as it is beside that. What
+        is uniform between nothing and the whole has a root mean square of the whole / sqrt(3).
+        """
+        measured, grown = self.cells.known, inner.copy()
+        for _ in range(max(1, round(float(np.sqrt(inner.sum() / np.pi))))):
+            grown |= _wider(grown, 3) & ~measured
+        beside = inner & measured & _wider(grown & ~inner)
+        height = (
+            max(0.0, way * float(self.cells.difference[beside].mean())) if beside.any() else 0.0
+        )
+        return float((grown & ~inner).sum()) / np.sqrt(3), height
+
     def _region(
         self, part: BoolArray, inner: BoolArray, averages: Sequence[FloatArray], level: int,
         free: BoolArray,
@@ -406,12 +471,15 @@ class _Outlined:
         moved = np.maximum(averages[0] * way, 1e-9)[inner]
         y, x = (float(np.average(index, weights=moved)) for index in np.nonzero(inner))
         area, rim = int(inner.sum()) * cell, _wider(inner, 3) & ~inner
+        beyond, height = self._beyond(inner, way)
         return ChangedRegion(
             number=0,
             X=cells.grid.x0 + x * cells.grid.gsd, Y=cells.grid.y0 - y * cells.grid.gsd,
             area=area,
-            sigma_area=max(cell, float(np.hypot((wide - narrow) / 2, fading / 2)) * cell),
-            volume=volume, sigma_volume=spread, mean=volume / area, sigma_mean=spread / area,
+            sigma_area=cell
+            * max(1.0, float(np.linalg.norm([(wide - narrow) / 2, fading / 2, beyond]))),
+            volume=volume, sigma_volume=float(np.hypot(spread, cell * beyond * height)),
+            mean=volume / area, sigma_mean=spread / area,
             largest=peak * way, sigma_largest=sigma,
             measured=float(cells.known[inner].mean()),
             open_rim=float(np.mean(~cells.known[rim])) if rim.any() else 0.0,

@@ -56,8 +56,12 @@ def _blocks(done: Comparison, say: Words, language: str) -> Iterator[Block]:
     yield Picture(draw=partial(_draw_histogram, done=done, say=say), ratio=0.35,
                   caption=say("histogram"))  # fmt: skip
     yield Heading(text=say("found"))
-    rows = [[f"{area:.3g}", f"{1000 * change:.2g}"] for area, change in done.patches]
-    yield TextTable(headings=[say("area"), say("least")], rows=rows, caption=say("found_table"))
+    rows = [
+        [f"{area:.3g}", *(f"{1000 * one:.2g}" if np.isfinite(one) else "-" for one in least)]
+        for area, *least in done.patches
+    ]
+    headings = [say("area"), say("least"), say("least_most")]
+    yield TextTable(headings=headings, rows=rows, caption=say("found_table"))
     yield Heading(text=say("how"))
     yield Paragraph(text=say("method", length=done.correlation_length))
     offset, x, y = (1000 * value for value in done.trend)

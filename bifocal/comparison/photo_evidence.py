@@ -17,7 +17,7 @@ from bifocal.model.photo import Photo
 from bifocal.model.photo_set import PhotoSet
 from bifocal.model.relief_map import ReliefMap
 from bifocal.relief_maps.photo_evidence import Witness, exposed_alike, misfit, shown_by
-from photocore.arrays import Float32Array, FloatArray, IntArray
+from photocore.arrays import FloatArray, IntArray
 from photocore.errors import PhotogrammetryError
 
 #: Where the photos of a date come from.
@@ -33,7 +33,8 @@ def contradicted(
     """Return the numbers of regions that the photos do not show to have changed.
 
     A change is shown where the photos of each date fit its own relief, and not that of the other
-    date; of what moves nothing in any photo by `EVIDENCE.parallax` pixels the first alone is asked.
+    date: by so much worse as it moves the photos, of less than `EVIDENCE.parallax` pixels worse at
+    all.
 
     Parameters
     ----------
@@ -51,7 +52,7 @@ def contradicted(
         return []
     misfits, parallax = [], np.zeros(grid.shape)
     for k, date in enumerate(dates):
-        photos = date.photos if isinstance(date, PhotoSet) else (date.photo1, date.photo2)
+        photos = _photos_of(date)
         witnesses = [Witness.of(one, as_grey(one.image, one.file), grid.gsd) for one in photos]
         witnesses, usual = exposed_alike(witnesses, reliefs[k], grid)
         # First a date's own relief, then the other date's.
@@ -71,12 +72,31 @@ def contradicted(
             numbers.append(number)
             continue
         fits = np.reshape([one[visible].mean() for one in misfits], (2, 2))
-        better = -np.inf
+        better = 0.0
         if apart > EVIDENCE.parallax:
             better = min(EVIDENCE.better * apart, EVIDENCE.most)
         if fits[:, 0].max() > EVIDENCE.fits or (fits[:, 1] - fits[:, 0]).min() < better:
             numbers.append(number)
     return numbers
+
+
+def parallax_of(
+    difference: ReliefMap, maps: Sequence[ReliefMap], dates: Sequence[PhotosOfDate]
+) -> FloatArray:
+    """Return by how many pixels of the map a metre of relief moves photos apart, at both dates.
+
+    That of the date that shows it less; the difference errs as much as this one.
+    """
+    apart = []
+    for one, date in zip(maps, dates, strict=True):
+        relief = np.asarray(on_grid(one, difference.grid).r, np.float64)
+        moved = (relief, relief + EVIDENCE.step)
+        apart.append(_parallax(_photos_of(date), moved, difference) / EVIDENCE.step)
+    return np.asarray(np.minimum(*apart))
+
+
+def _photos_of(date: PhotosOfDate) -> tuple[Photo, ...]:
+    return date.photos if isinstance(date, PhotoSet) else (date.photo1, date.photo2)
 
 
 def photos_at_hand(path: Path, relief: Path) -> PhotoSet | None:
@@ -112,7 +132,7 @@ def holds_photos(path: Path) -> bool:
 
 
 def _parallax(
-    photos: Sequence[Photo], reliefs: Sequence[Float32Array], difference: ReliefMap
+    photos: Sequence[Photo], reliefs: Sequence[FloatArray], difference: ReliefMap
 ) -> FloatArray:
     """Return by how many pixels of the map the change moves any two photos' pictures apart."""
     places = difference.plane_positions()

@@ -13,6 +13,10 @@ class ChanceTuning:
     reach: float = 0.25
     #: Walls without change that are drawn to learn what chance does.
     draws: int = 100
+    #: Steps in which the spread of a wall's differences is told.
+    steps: int = 2001
+    #: Half width of that: beyond lie seven in a million. [standard deviations]
+    widest: float = 4.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +52,8 @@ class ChangeTuning:
     #: Share of a region's rim beside unmeasured ground from which on it may be larger, as is told.
     #: Evidence: façade 7002, a boss a quarter of which was not measured: 0.65, and 36 % too small.
     open: float = 0.25
+    #: Shares of the wall of which is said what change they would show.
+    shares: tuple[float, float] = (0.5, 0.9)
     #: Cells that must be known, and independent parts that must be stable, to compare at all.
     least: int = 10
 
@@ -56,8 +62,10 @@ class ChangeTuning:
 class PhotoVerdictTuning:
     """What the photos of both dates say of a change."""
 
-    #: A change that moves no photo against another by so many pixels of the map shows in none.
+    #: No gain is asked of what moves no photo against another by so many pixels of the map.
     parallax: float = 0.75
+    #: By so much relief the parallax of a metre is found. [m]
+    step: float = 0.001
     #: A date's photos show its own relief better than the other date's by so much for every pixel
     #: that the change moves them. [times what they usually differ by]
     #: Evidence: rendered walls taken twice under other suns: true changes that move photos by 0.8
@@ -66,8 +74,8 @@ class PhotoVerdictTuning:
     #: That gain is asked for up to here. [times what they usually differ by]
     most: float = 0.3
     #: A date's photos differ by so much of what they usually do where its relief is right.
-    #: Evidence: the same: true changes 0.6 to 0.9, grilles and railings taken for walls 1.3 to 2.2.
-    fits: float = 1.25
+    #: Evidence: the same: true changes 0.6 to 0.9, grilles and railings taken for walls 1.2 to 2.2.
+    fits: float = 1.1
 
 
 CHANCE = ChanceTuning()

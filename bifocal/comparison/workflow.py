@@ -51,8 +51,11 @@ class ComparedFiles:
                 f"{done.correlation_length:.2f} m"]  # fmt: skip
         if any(done.sigma_trend):
             sentences.append(f"Common    {1000 * done.trend[0]:+.2f} mm, taken off")
-        area, least = done.patches[1]
-        sentences.append(f"Proven    from {1000 * least:.1f} mm over {area:.2g} m2")
+        sentences += [
+            f"Proven    from {1000 * half:.1f} mm over {area:.2g} m2 on half of the wall, "
+            f"{1000 * most:.1f} mm on nine tenths"
+            for area, half, most in done.patches[1:3]
+        ]
         sentences.append(f"Regions   {len(done.regions) or 'none: no change is proven'}")
         sentences += [
             f"  {one.number}  X {one.X:.2f}  Y {one.Y:.2f}  {one.area:.3f} m2  "
@@ -71,7 +74,10 @@ class ComparedFiles:
             "compared": done.compared, "level": done.level,
             "correlation_length": done.correlation_length,
             "trend": done.trend, "sigma_trend": done.sigma_trend,
-            "patches": [{"area": area, "change": change} for area, change in done.patches],
+            "patches": [
+                {"area": area, "change": _finite(half), "change_most": _finite(most)}
+                for area, half, most in done.patches
+            ],
             "folder": str(self.folder), "files": self.files, "remarks": done.remarks,
         }  # fmt: skip
 
@@ -133,6 +139,10 @@ def compare_files(
             write_document(folder / name, document)
         files = tuple(sorted(path.name for path in folder.iterdir()))
     return ComparedFiles(comparison=done, folder=out, files=files)
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
 
 
 def _relief_of(path: Path) -> Path:

@@ -17,6 +17,8 @@ from openpyxl import load_workbook
 
 from bifocal import Grid, InputError, Quality, ReliefMap, compare
 from bifocal.comparison import workflow
+from bifocal.comparison.chance import Patches, chance
+from bifocal.comparison.change import without_parallax
 from bifocal.comparison.photo_evidence import photos_at_hand
 from bifocal.comparison.workflow import compare_files
 from bifocal.files.made_from import PAIR_TAG, MadeFrom
@@ -113,7 +115,48 @@ def test_a_change_that_may_go_on_where_nothing_was_measured_is_told_so():
     # 6 of 11 columns are left: one of four sides is open, and corners.
     assert half.open_rim == pytest.approx(11 / 34, abs=0.1)
     assert half.volume == pytest.approx(66 * GRID.gsd**2 * 0.03, abs=3 * half.sigma_volume)
+    # Five columns go on where nothing was measured: the whole lies within its sigmas as well.
+    assert 0.1936 * 0.03 - half.volume == pytest.approx(0, abs=2 * half.sigma_volume)
+    assert 0.1936 - half.area == pytest.approx(0, abs=2 * half.sigma_area)
+    assert half.sigma_mean < 0.2 * half.mean
     assert "region 1: much of the rim" in done.remarks[-1]
+
+
+def test_what_would_have_been_found_is_found_where_the_wall_is_as_sure_as_it_says():
+    """Half of the wall is measured to 3 mm, half of it to 9: two changes that tell these apart."""
+    rng = np.random.default_rng(6)
+    before, after = measured(rng), measured(rng)
+    coarse = np.where(np.arange(GRID.width) < 45, 3.0, 1.0)
+    maps = [replace(one, r=one.r * coarse, sigma=one.sigma * coarse) for one in (before, after)]
+    area, half, most = compare(*maps).patches[2]
+    assert 2 * half < most < 4 * half
+    x, y = np.meshgrid(GRID.columns_x, GRID.rows_y)
+    discs = [np.hypot(x - middle, y - 1.5) ** 2 < area / np.pi for middle in (0.9, 2.9)]
+    moved = replace(maps[1], r=maps[1].r + 1.4 * half * np.any(discs, axis=0))
+    (fine,) = compare(maps[0], moved).regions
+    assert pytest.approx(2.9, abs=0.1) == fine.X
+
+
+def test_a_few_places_that_err_by_far_more_than_most_raise_the_limit():
+    """Two walls of one variance and much the same correlation, one of them with long tails."""
+    z = noise(np.random.default_rng(2))
+    patches = Patches(np.ones(GRID.shape, bool), (1.0, 2.0))
+    limits = []
+    for field in (z, z**3):
+        field = field / field.std()
+        limits.append(
+            chance(field, field == field, patches, 1.0, np.random.default_rng(1)).limit(0.01)
+        )
+    assert limits[1] > 1.2 * limits[0]
+
+
+def test_a_region_that_moves_the_photos_no_more_than_errors_elsewhere_is_none():
+    labels = np.zeros((40, 60), np.int64)
+    labels[5:15, 5:15], labels[5:15, 25:35] = 1, 2
+    moved = np.where(labels == 1, 0.3, np.where(labels == 2, 0.7, 0.05))
+    moved[25:35, 40:50] = -0.5
+    wall = np.ones(labels.shape, bool)
+    assert without_parallax(moved, wall, labels, Patches(wall, (1.0, 2.0))) == [1]
 
 
 def test_two_surfaces_that_both_stand_there_are_no_change_and_what_was_taken_away_is_one():

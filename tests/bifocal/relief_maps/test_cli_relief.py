@@ -50,6 +50,7 @@ def test_relief_writes_three_bands_and_says_what_guarantees_the_scale(folder, tm
     )
     with rasterio.open(out) as file:
         assert file.count == 3
+        assert file.tags()["BIFOCAL_PAIR"] == "wall.pair.json"  # by which others find the photos
         assert file.dtypes == ("float32",) * 3
         assert file.shape == (256, 384)
         # Corner of the corner pixel: half a frame of 384 x 256 px of 29.6 mm.
