@@ -19,8 +19,7 @@ Radial shift
 Surfaces and rays
     FlatInterface, Interfaces what lies between camera and object
     Plane, Sphere, Cylinder, RasterSurface, MeshSurface, WaveSurface   of any shape
-    trace_rays, aim_rays      rays from the camera, and to a given point
-    RayPaths, RayStatus       their way, and why one has none
+    trace_rays, aim_rays, RayPaths, RayStatus   from the camera, or to a point; why there is none
 Cameras
     Camera, Sensor            exterior and interior orientation
     Brown, Fisheye            distortion of a lens, or the law of a fisheye
@@ -30,6 +29,7 @@ Cameras
     intersect_rays, intersect_pairs, PointStatus   fast ways; why a point is missing, doubtful
     epipolar_curve, EpipolarCurves, epipolar_candidates, Candidates   a ray in another image
     find_targets, TargetImages, correspondences, track_particles, Tracks   particles, over time
+    calibrated_on_particles, SelfCalibration   cameras adjusted on the particles that they see
     bundle_adjust, Adjustment, Unknowns, ScaleBar, diagnose, Extension    all of these together
 Bathymetry
     correct_bathymetry, CorrectedPoints   points from above the water

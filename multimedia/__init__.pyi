@@ -100,6 +100,7 @@ from .refraction.water import (
     water_refractive_index,
 )
 from .targets.target_images import TargetImages, find_targets
+from .tracking.self_calibration import SelfCalibration, calibrated_on_particles
 from .tracking.tracks import Tracks, track_particles
 
 __version__: str
@@ -166,6 +167,7 @@ __all__ = [
     "RefractingSurface",
     "Resection",
     "ScaleBar",
+    "SelfCalibration",
     "Sensor",
     "ShiftDerivatives",
     "ShiftIteration",
@@ -191,6 +193,7 @@ __all__ = [
     "air_refractive_index",
     "best_over_compensation",
     "bundle_adjust",
+    "calibrated_on_particles",
     "calibration_costs",
     "colour_positions",
     "compare_placements",

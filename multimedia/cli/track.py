@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import click
 import numpy as np
 
 from multimedia.cli.tables import ProjectOption
-from photocore.cli import print_result, text_table
+from photocore.cli import print_result, tell_written, text_table
 from photocore.option_types import POSITIVE
 from photocore.options import Typed, declared
 from photocore.shared_options import JsonOption, OverwriteOption
+
+if TYPE_CHECKING:
+    from multimedia.tracking.self_calibration import SelfCalibration
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,6 +29,8 @@ class TrackCommand:
     multimedia track tank.toml --targets img/cam1. --targets img/cam2. \
       --targets img/cam3. --targets img/cam4. --first 10001 \
       --out tracks.h5 --folder res
+    multimedia track tank.toml --targets img/cam1. --targets img/cam2. \
+      --targets img/cam3. --calibrate tank2.toml --out tracks.csv
     """
 
     project: ProjectOption
@@ -54,6 +59,11 @@ class TrackCommand:
     """Frames for which a particle may be missing."""
     shortest: Annotated[int, Typed(click.IntRange(min=3))] = 4
     """Points of the shortest track."""
+    calibrate: Path | None = None
+    """Adjust the cameras on the particles first, write the project there (.toml), and track
+    with it (three cameras or more)."""
+    cameras_off: Annotated[float, Typed(POSITIVE, "PX")] = 8.0
+    """For --calibrate: how far cameras may be off [px]."""
     out: Path | None = None
     """Write the points of all tracks: .csv, .xlsx, or .h5 (extra hdf)."""
     folder: Path | None = None
@@ -73,9 +83,15 @@ def command(options: TrackCommand) -> None:
     by chance only. It may be missing in some frames. How many points would be in tracks by chance
     is counted, too.
 
+    Cameras that moved a little since they were calibrated are put right by --calibrate: what all of
+    them see within --cameras-off are tie points of a bundle adjustment through the media, again and
+    again until they agree (volume self-calibration). The media are kept; place and scale of the
+    whole stay as sure as the cameras were.
+
     Velocities are slopes of parabolas through five points of a track, with their standard
     deviations; vectors that go with none of those around are marked, not dropped.
     """
+    from multimedia.tracking.self_calibration import FIGURES
     from multimedia.tracking.workflow import find_tracks
 
     result = find_tracks(
@@ -90,6 +106,8 @@ def command(options: TrackCommand) -> None:
         change=options.change,
         gap=options.gap,
         shortest=options.shortest,
+        calibrate=options.calibrate,
+        cameras_off=options.cameras_off,
         out=options.out,
         folder=options.folder,
         overwrite=options.overwrite,
@@ -132,6 +150,25 @@ def command(options: TrackCommand) -> None:
                                   + ", ".join(f"{v:.2g}" for v in velocity_sigma)),
         ("differ from those around", f"{int(tracks.outlier.sum())} vectors"),
     ]  # fmt: skip
-    print_result(
-        data, [text_table(("", ""), rows)], as_json=options.as_json, remarks=result.remarks
-    )
+    lines = [text_table(("", ""), rows)]
+    if result.calibration is not None:
+        data["calibration"] = {
+            "project": options.calibrate,
+            **{name: getattr(result.calibration, name) for name in FIGURES},
+        }
+        lines = [_moved(result.calibration, length), *lines]
+    print_result(data, lines, as_json=options.as_json, remarks=result.remarks)
+    tell_written(options.calibrate)
+
+
+def _moved(calibration: SelfCalibration, unit: str) -> str:
+    """Return how cameras fitted the particles before and after, and how far they moved."""
+    columns = (calibration.before, calibration.after, calibration.moved, calibration.sigma)
+    rows = [
+        (name, f"{before:.2f}", f"{after:.2f}", f"{moved:.3g}", f"{sigma:.2g}")
+        for name, before, after, moved, sigma in zip(
+            calibration.project.camera_names, *columns, strict=True
+        )
+    ]
+    heads = ("camera", "disparity before [px]", "after", f"moved [{unit}]", "sigma")
+    return f"{calibration.particles} particles adjusted\n{text_table(heads, rows)}\n"

@@ -2,5 +2,6 @@
 
 `linking` joins the particles of consecutive frames, `neighbours` says where those around lead,
 `chance` counts the links that would come about by chance, `tracks` makes tracks of many frames,
-`velocities` says how fast and how surely; `track_files` writes them, `workflow` is the command.
+`velocities` says how fast and how surely; `self_calibration` puts cameras right that have moved,
+`track_files` writes tracks, `workflow` is the command.
 """

@@ -16,19 +16,32 @@ from multimedia.openptv.openptv_files import read_blobs, read_targets
 from multimedia.orientation.intersection import intersect
 from multimedia.projects.model import SIGMA_PIXEL, Project
 from multimedia.projects.point_tables import METRES
-from multimedia.projects.project_file import read_project
+from multimedia.projects.project_file import read_project, write_project
 from multimedia.remarks import remark
+from multimedia.tracking.self_calibration import (
+    CAMERAS_OFF,
+    SelfCalibration,
+    calibrated_on_particles,
+)
 from multimedia.tracking.track_files import check_tracks_path, openptv_files, write_tracks
 from multimedia.tracking.tracks import GAP, SHORTEST, Tracks, track_particles
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import InputError
 from photocore.machine import cores
-from photocore.output import all_or_none, atomic_folder, check_all_writable, check_not_input
+from photocore.output import (
+    all_or_none,
+    atomic_folder,
+    check_all_writable,
+    check_ending,
+    check_not_input,
+)
 
 #: What OpenPTV calls the targets of a frame: base, number of the frame, this.
 ENDING = "_targets"
 #: Frames whose correspondences are held against chance: the first, the middle, the last.
 TESTED = 3
+#: Frames on which cameras are adjusted, at most: their targets suffice where they are few.
+CALIBRATED = 12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,6 +63,8 @@ class TrackedParticles:
         Particles of the frames that were held against chance, and how many come by it at most.
     remarks : tuple of str
         What to look at: those of the tracks, files that are lost, a tolerance that would do.
+    calibration : SelfCalibration or None
+        What the particles made of the cameras, if they were adjusted on them.
     """
 
     project: Project
@@ -61,6 +76,7 @@ class TrackedParticles:
     found: float
     chance: float
     remarks: tuple[str, ...] = ()
+    calibration: SelfCalibration | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,6 +102,8 @@ def find_tracks(
     change: float | None = None,
     gap: int = GAP,
     shortest: int = SHORTEST,
+    calibrate: Path | None = None,
+    cameras_off: float = CAMERAS_OFF,
     out: Path | None = None,
     folder: Path | None = None,
     overwrite: bool = False,
@@ -108,6 +126,11 @@ def find_tracks(
         As for `multimedia.openptv.correspondences.correspondences`.
     step, change, gap, shortest
         As for `track_particles`; lengths in the unit of the project.
+    calibrate : path, optional
+        Where to write the project with its cameras adjusted on the particles first; the tracks are
+        then those of these cameras.
+    cameras_off : float
+        How far they may be off before. [px]
     out : path, optional
         Table of all points of all tracks, .csv or .xlsx, or HDF5 (.h5).
     folder : path, optional
@@ -122,7 +145,9 @@ def find_tracks(
     """
     if out is not None:
         check_tracks_path(out)
-    check_all_writable(out, overwrite=overwrite)
+    check_not_input(calibrate, project)
+    check_all_writable(out, calibrate, overwrite=overwrite)
+    check_ending(calibrate, "a project is written as .toml.", ".toml")
     content = read_project(project)
     names = content.camera_names
     if len(targets) != len(names):
@@ -149,6 +174,11 @@ def find_tracks(
         """Return the targets of each camera in a frame."""
         return [_places(sequence.get(frame)) for sequence in sequences]
 
+    calibration = None
+    if calibrate is not None:
+        some = [places(frames[k]) for k in _tried_frames(len(frames), CALIBRATED)]
+        calibration = calibrated_on_particles(content, some, tolerance=cameras_off)
+        content = calibration.project
     tried = [places(frames[k]) for k in _tried_frames(len(frames))]
     counted = _beyond_chance(project, content, tried, tolerance, fewest)
     with ThreadPoolExecutor(cores()) as pool:
@@ -174,9 +204,9 @@ def find_tracks(
         tuple(frames), SIGMA_PIXEL * float(np.sqrt(factor)),
         float(counted.found.sum()), float(counted.chance.sum()),
         (*_lost_files(lost), *tracks.remarks,
-         *tolerance_remarks(content, tried, counted, fewest)),
+         *tolerance_remarks(content, tried, counted, fewest)), calibration,
     )  # fmt: skip
-    _write(result, particles, out, folder, overwrite=overwrite)
+    _write(result, particles, out, folder, calibrate, overwrite=overwrite)
     return result
 
 
@@ -228,9 +258,9 @@ def _lost_files(names: Sequence[str]) -> list[str]:
     return [remark("tracks.lost", count=len(names), names=shown)] if names else []
 
 
-def _tried_frames(count: int) -> list[int]:
+def _tried_frames(count: int, most: int = TESTED) -> list[int]:
     """Return the numbers of some frames of so many, from the first to the last."""
-    return np.unique(np.linspace(0, count - 1, TESTED).astype(int)).tolist()
+    return np.unique(np.linspace(0, count - 1, most).astype(int)).tolist()
 
 
 def _beyond_chance(
@@ -278,10 +308,12 @@ def _median_factor(factors: Sequence[FloatArray]) -> float:
 
 def _write(
     result: TrackedParticles, particles: Sequence[_ParticlesOfFrame], out: Path | None,
-    folder: Path | None, *, overwrite: bool,
+    folder: Path | None, calibrate: Path | None, *, overwrite: bool,
 ) -> None:  # fmt: skip
     content = result.project
     with all_or_none():
+        if calibrate is not None:
+            write_project(calibrate, content, overwrite=overwrite)
         if out is not None:
             write_tracks(
                 out, result.tracks, result.targets, content.camera_names, result.units,

@@ -12,8 +12,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from multimedia import Brown, FlatInterface, Layers, Project, write_project
+from multimedia import Brown, FlatInterface, Layers, Project, intersect, project, write_project
+from multimedia.media.camera import EXTERIOR
 from multimedia.openptv.openptv_files import read_blobs, read_correspondences, read_targets
+from multimedia.projects.project_file import read_project
+from multimedia.tracking.self_calibration import calibrated_on_particles
+from photocore.camera.similarity import fit_similarity
+from photocore.errors import InputError
 from tests.builders.commands import multimedia_command as main
 from tests.multimedia.tank import SENSOR, cameras
 from tests.multimedia.tracking.flows import seen_through_water
@@ -186,3 +191,51 @@ def test_a_file_that_is_none_of_blobs_is_named(sequence):
     done = CliRunner().invoke(main, ["track", str(folder / "tank.toml"), *words])
     assert done.exit_code == 1
     assert "cam1.10001_targets: line 1: 1 values, expected row, column" in done.output
+
+
+def test_cameras_that_moved_are_put_right_by_the_particles(sequence, tmp_path):
+    folder, _ = sequence
+    truth, rng = read_project(folder / "tank.toml"), np.random.default_rng(12)
+    steps = rng.standard_normal((4, 6)) * [0.4, 0.4, 0.4, 1e-3, 1e-3, 1e-3]
+    moved = [c.stepped(EXTERIOR, step) for c, step in zip(truth.cameras, steps, strict=True)]
+    shutil.copytree(folder, tmp_path / "moved")
+    write_project(
+        tmp_path / "moved" / "tank.toml", replace(truth, cameras=tuple(moved)), overwrite=True
+    )
+    last = str(FIRST + 3)
+    words = ("--calibrate", str(tmp_path / "tank2.toml"), "--last", last, "--json")
+    got = run(tmp_path / "moved", *words)
+    assert got.exit_code == 0, got.output
+    result = json.loads(got.stdout)
+    calibration = result["calibration"]
+    assert min(calibration["before"]) > 1.0
+    # Four rays of 0.1 px have eight coordinates and three unknowns.
+    assert max(calibration["after"]) < 0.15
+    assert calibration["sigma_px"] == pytest.approx(0.1, rel=0.15)
+    assert result["tracks"] == COUNT
+    cameras_after = read_project(tmp_path / "tank2.toml").cameras
+    xyz = place(3)
+    image = [project(c, xyz, WATER) for c in truth.cameras]
+    off = [misses(views, image, xyz) for views in (moved, cameras_after)]
+    assert off[1] < 0.8 * off[0], off
+    for camera, before, sigma in zip(
+        cameras_after, truth.cameras, calibration["sigma"], strict=True
+    ):
+        assert np.linalg.norm(camera.centre - before.centre) < 3.0 * sigma
+
+
+def misses(views, image, xyz):
+    """Return how far points are off, but for place, turn and scale of all. [mm]"""
+    got = intersect(views, image, WATER).xyz
+    similarity = fit_similarity(got, xyz)
+    back = similarity(got) - xyz
+    return float(np.sqrt((back**2).mean()))
+
+
+def test_two_cameras_are_not_calibrated_on_particles(sequence):
+    folder, _ = sequence
+    truth = read_project(folder / "tank.toml")
+    with pytest.raises(InputError, match="three are needed"):
+        calibrated_on_particles(
+            replace(truth, cameras=truth.cameras[:2], media_of=("w",) * 2), [[np.zeros((9, 2))] * 2]
+        )
