@@ -68,13 +68,16 @@ def linear_lens(
     ndarray, shape (..., 2, 3, n)
         As for `multimedia.orientation.pose_kernel.point_equations`.
     """
-    by_ideal: FloatArray = np.broadcast_to(np.eye(2), (*ideal.shape, 2))
-    rest = camera.principal_point - image
-    if not camera.distortion.is_identity:
-        measured, by_ideal, _ = camera.distortion.measured_with_jacobian(
-            ideal, camera.principal_point, (), camera.principal_distance
-        )
-        rest = measured - image - (by_ideal @ ideal[..., None])[..., 0]
+    if camera.distortion.is_identity:
+        lens = np.zeros((*ideal.shape[:-2], 2, 3, ideal.shape[-2]))
+        weight = np.swapaxes(1.0 / sigma, -2, -1)
+        lens[..., 0, 0, :], lens[..., 1, 1, :] = weight[..., 0, :], weight[..., 1, :]
+        lens[..., 2, :] = np.swapaxes(camera.principal_point - image, -2, -1) * weight
+        return lens
+    measured, by_ideal, _ = camera.distortion.measured_with_jacobian(
+        ideal, camera.principal_point, (), camera.principal_distance
+    )
+    rest = measured - image - (by_ideal @ ideal[..., None])[..., 0]
     parts = np.concatenate([by_ideal, rest[..., None]], axis=-1) / sigma[..., None]
     return np.ascontiguousarray(np.moveaxis(parts, -3, -1))
 

@@ -146,21 +146,21 @@ def resect(
     [0.1, 0.2, 0.6]
     """
     names = _checked_names(camera, estimate)
-    control, image, sigmas, used = _checked_points(
+    control, image, sigmas, used, is_deep = _checked_points(
         camera, object_points, image_points, sigma, len(names)
     )
     what = f"resection of camera {camera.name}" if camera.name else "resection"
     observations = CameraObservations(
         points=control, image=image, media=as_media(media), sigma=sigmas, what=what
     )
-    result = _fitted(camera, observations, names)
-    adjusted = camera_of(result.state)
-    _refuse_mirrored(adjusted, result.sigma0, observations)
+    result = _fitted(camera, observations, names, is_deep)
+    adjusted, sigma0 = camera_of(result.state), result.sigma0
+    _refuse_mirrored(adjusted, sigma0, observations, is_deep)
     shape = (len(used), 2)
     residuals, normed = np.full(shape, np.nan), np.full(shape, np.nan)
     residuals[used] = -result.residuals.reshape(-1, 2) * sigmas
     normed[used] = -result.standardised.reshape(-1, 2)
-    covariance = result.linear.cofactor * result.sigma0**2
+    covariance = result.linear.cofactor * sigma0**2
     _refuse_flat(adjusted, names, covariance, what)
     return Resection(
         camera=adjusted,
@@ -168,17 +168,19 @@ def resect(
         covariance=_angle_covariance(adjusted, names, covariance),
         residuals=residuals,
         standardised=normed,
-        sigma0=result.sigma0,
+        sigma0=sigma0,
         redundancy=result.redundancy,
         iterations=result.iterations,
     )
 
 
-def _fitted(camera: Camera, seen: CameraObservations, names: tuple[str, ...]) -> Fit[NetworkState]:
+def _fitted(
+    camera: Camera, seen: CameraObservations, names: tuple[str, ...], is_deep: bool
+) -> Fit[NetworkState]:
     """Return the camera of the smallest square sum."""
     pose = quick_pose(camera, seen)
-    if pose is None or not _is_beyond_doubt(seen, pose):
-        pose = _best_start(camera, seen)
+    if pose is None or not (is_deep and _is_beyond_doubt(seen, pose)):
+        pose = _best_start(camera, seen, is_deep)
     elif names == EXTERIOR:
         refuse_undetermined(pose, names, seen.what)
         return pose
@@ -186,21 +188,18 @@ def _fitted(camera: Camera, seen: CameraObservations, names: tuple[str, ...]) ->
 
 
 def _is_beyond_doubt(seen: CameraObservations, pose: Fit[NetworkState]) -> bool:
-    """Whether a pose fits so well that no other can: a body with depth, tiny residuals."""
-    spread = _spread(seen.points)
-    deep = spread[2] > DEEP * spread[0]
-    return bool(deep and _cost(pose) < (FITS**2) * float((seen.image**2).sum()))
+    """Whether a pose fits a body with depth so well that no other can: tiny residuals."""
+    return _cost(pose) < (FITS**2) * float((seen.image**2).sum())
 
 
 def _spread(points: FloatArray) -> FloatArray:
-    """Return how far points reach along their three main directions, the longest first."""
+    """Return how far points reach along their three main directions, the shortest first."""
     away = points - points.mean(axis=0)
-    triangle = np.linalg.qr(away, mode="r") if len(away) > 3 else away
-    spread: FloatArray = np.linalg.svd(triangle, compute_uv=False)
-    return spread
+    # Shares down to 1e-8 are lengths, not rounding: enough for a line and for a plane.
+    return np.sqrt(np.maximum(np.linalg.eigvalsh(away.T @ away), 0.0))
 
 
-def _best_start(camera: Camera, seen: CameraObservations) -> Fit[NetworkState]:
+def _best_start(camera: Camera, seen: CameraObservations, is_deep: bool) -> Fit[NetworkState]:
     """Return the pose of the smallest square sum that any start leads to."""
     poses: list[Fit[NetworkState]] = []
     network, count = seen.network(), 1
@@ -210,7 +209,7 @@ def _best_start(camera: Camera, seen: CameraObservations) -> Fit[NetworkState]:
             poses.append(network.minimise(start_at(start), most=60, settle=1e-4))
         except GeometryError:  # from there the camera does not see all points
             continue
-        if _is_beyond_doubt(seen, poses[-1]):
+        if is_deep and _is_beyond_doubt(seen, poses[-1]):
             break
     if not poses:
         raise ConvergenceError(
@@ -244,8 +243,8 @@ def _checked_points(
     image_points: ArrayLike,
     sigma: ArrayLike | None,
     unknowns: int,
-) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Return control, image points, relative sigmas, and which rows they are."""
+) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray, bool]:
+    """Return control, image points, relative sigmas, which rows they are, whether deep."""
     who = f"camera {camera.name}: " if camera.name else ""
     control = as_points(object_points, "object_points", dimension=3).reshape(-1, 3)
     image = as_points(image_points, "image_points", dimension=2).reshape(-1, 2)
@@ -270,15 +269,17 @@ def _checked_points(
         sigmas = sigma_xy / np.sqrt(np.mean(sigma_xy**2))
     refuse_pixels(camera, image)
     spread = _spread(control)
-    if spread[1] < 1e-6 * spread[0] or spread[0] == 0:
+    if spread[1] < 1e-6 * spread[2] or spread[2] == 0:
         raise GeometryError(
             f"{who}all control points lie on one line; a camera can turn about it freely. Use "
             "points spread over an area, better over a volume."
         )
-    return control, image, sigmas, used
+    return control, image, sigmas, used, bool(spread[0] > DEEP * spread[2])
 
 
-def _refuse_mirrored(camera: Camera, sigma0: float, seen: CameraObservations) -> None:
+def _refuse_mirrored(
+    camera: Camera, sigma0: float, seen: CameraObservations, is_deep: bool
+) -> None:
     """Refuse a bad fit that becomes a good one when the control is mirrored."""
     size = float(np.sqrt(np.mean(seen.image**2)))
     if not sigma0 > 0.005 * size:
@@ -287,7 +288,7 @@ def _refuse_mirrored(camera: Camera, sigma0: float, seen: CameraObservations) ->
     offset = (seen.points - seen.points.mean(axis=0)) @ normal
     mirrored = replace(seen, points=seen.points - 2.0 * offset[:, None] * normal)
     try:
-        mirror = _best_start(camera, mirrored)
+        mirror = _best_start(camera, mirrored, is_deep)
     except ConvergenceError:
         return
     if mirror.sigma0 < 0.2 * sigma0:
