@@ -1,17 +1,26 @@
-"""What an empty page offers: the sample, and surveys that were open before."""
+"""What an empty page offers: the sample, a project's walls, surveys that were open before."""
 
 from __future__ import annotations
 
+import base64
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
+
 from bifocal.collimation.project import SurveyFiles
 from bifocal.collimation.session import Session
+from bifocal.collimation.wording import without_options
 from bifocal.demo import SAMPLE
+from bifocal.files.photos import photo_infos
+from bifocal.model.doubts import NO_UNIT, unit_of
+from bifocal.projects.photos_workflow import ProjectOptions, photos_from_project, project_walls
 from bifocal.remarks import remark
+from bifocal.survey.set_survey import best_pair
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.jsonfile import read_object, write_object
 from photocore.output import free_path
@@ -46,6 +55,63 @@ def open_sample(session: Session) -> None:
         session.give_photos(copies)
         session.note_made("pair", [pair.name])
         session.use_pair(pair)
+        session.changed()
+
+
+def walls_at_hand(session: Session) -> list[dict[str, Any]]:
+    """Return the walls of another program's project in the survey's folder: words and picture.
+
+    None where it holds no project, or one without walls.
+    """
+    try:
+        walls = project_walls(session.files.folder)
+    except PhotogrammetryError:
+        return []
+    return [
+        {
+            "number": number,
+            "words": without_options(words, session.spoken),
+            "picture": "data:image/jpeg;base64,"
+            + base64.b64encode(cv2.imencode(".jpg", picture)[1].tobytes()).decode(),
+        }
+        for number, (words, picture) in enumerate(walls, start=1)
+    ]
+
+
+def open_wall(session: Session, number: int) -> None:
+    """Begin with the photos of one of these walls, oriented as the project has them.
+
+    The best pair of them is shown, the others lie beside it as a set. Where the project has no
+    scale the pair waits for one, as after two photos alone.
+
+    Raises
+    ------
+    InputError, GeometryError
+        If picks were made already, there is no such wall, or its photos are not there.
+    """
+    with session.lock:
+        session.check_new_photos()
+        folder, products = session.files.folder, session.products
+        file = products.place("set", "-set.photos.json")
+        project = photos_from_project(
+            folder, file, ProjectOptions(wall=(str(max(number, 1)),)),
+            overwrite=products.is_own(file),
+        )  # fmt: skip
+        photo_infos(project.photos)
+        pair = best_pair(project.photos)
+        two = [pair.photo_file(1), pair.photo_file(2)]
+        session.give_photos([*two, *(p.path for p in project.photos.photos if p.path not in two)])
+        if unit_of(pair.extra) != NO_UNIT:
+            path = products.place("pair", ".pair.json")
+            pair.write(path, overwrite=products.is_own(path))
+            session.note_made("pair", [path.name])
+            session.note_made("set", [file.name])
+            session.use_pair(path)
+        else:
+            path = free_path(folder.resolve(), f"{products.stem}.proposed", ".pair.json")
+            doubts = pair.extra["setup"]["doubts"][1:]  # the first is of the scale: it is asked for
+            replace(pair, extra={"setup": {"doubts": doubts}}).write(path)
+            session.propose(path, {"free_scale": True, "remarks": doubts, "planes": []})
         session.changed()
 
 

@@ -24,9 +24,9 @@ from bifocal.projects.wall_frame import (
     turned_by_lines,
     walls_of,
 )
-from bifocal.projects.wall_pictures import write_wall_pictures
+from bifocal.projects.wall_pictures import squared, write_wall_pictures
 from bifocal.remarks import remark
-from photocore.arrays import FloatArray
+from photocore.arrays import ByteArray, FloatArray
 from photocore.camera.lensdata import LensData
 from photocore.camera.pinhole import Pinhole, plane_from_pixel, project
 from photocore.camera.similarity import Similarity
@@ -214,7 +214,7 @@ def photos_from_project(
                 raise InputError(f"{out}: no two photos of the wall tell its relief; write a set.")
             written = made.pair(ranked[0].far, ranked[0].near)
         written.write(out, overwrite=overwrite)
-        listed = _listed(walls, frame.scale, "m" if not unit else "")
+        listed = _listed(walls, frame.scale, " m" if not unit else "")
         if len(walls) > 1:
             picture = out.with_name(f"{_stem(out)}.walls.jpg")
             write_wall_pictures(picture, walls, listed, read.views, files, overwrite=overwrite)
@@ -222,6 +222,26 @@ def photos_from_project(
         photos=made, program=read.program, scale=scale, walls=listed,
         remarks=(*read.remarks, *said, *doubts),
     )  # fmt: skip
+
+
+def project_walls(project: Path) -> list[tuple[str, ByteArray]]:
+    """Return the façades of another program's project in words, and their pictures square on.
+
+    Their order is that of `ProjectOptions.number`, from 1.
+
+    Raises
+    ------
+    InputError
+        If it is no project known here, cannot be used, or has no points or façade.
+    """
+    finder = PhotoFinder(project)
+    read = read_foreign_project(project, finder)
+    walls = walls_of(read, sparse_points(read, None))
+    files = {view.name: finder.find(view.name) for view in read.views}
+    words = _listed(walls, 1.0, " m" if read.metres else "")
+    return [
+        (text, squared(wall, read.views, files)) for text, wall in zip(words, walls, strict=True)
+    ]
 
 
 def _listed(walls: Sequence[ProjectWall], scale: float, unit: str) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ def write_wall_pictures(
     files: Mapping[str, Path | None], *, overwrite: bool = False,
 ) -> None:  # fmt: skip
     """Write one picture of all walls, below each other, each under its words."""
-    pictures = [_squared(wall, views, files) for wall in walls]
+    pictures = [squared(wall, views, files) for wall in walls]
     sheet = np.zeros((sum(len(p) + LINE for p in pictures), SIDE), np.uint8)
     top = 0
     for text, picture in zip(words, pictures, strict=True):
@@ -37,7 +37,7 @@ def write_wall_pictures(
     write_image(path, sheet, overwrite=overwrite)
 
 
-def _squared(
+def squared(
     wall: ProjectWall, views: Sequence[ForeignView], files: Mapping[str, Path | None]
 ) -> ByteArray:
     """Return the wall square on, by the photo that shows most of it, of such the squarest."""

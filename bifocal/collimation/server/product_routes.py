@@ -25,7 +25,7 @@ from bifocal.collimation.server.streamed_zip import streamed_zip
 from bifocal.collimation.server.uploads import MOST, take_photos
 from bifocal.collimation.session import Session
 from bifocal.collimation.shapes import met, places_of, relief_within
-from bifocal.collimation.starting import open_sample, recent, reopen
+from bifocal.collimation.starting import open_sample, open_wall, recent, reopen, walls_at_hand
 from bifocal.collimation.uncertainty import precision_contours, uncertainty_picture
 from bifocal.collimation.workbook.profile_book import profile_book
 from bifocal.faces.faces_files import beside
@@ -72,6 +72,16 @@ async def _take_away(request: Request) -> Response:
 async def _sample(request: Request) -> Response:
     session = session_of(request)
     await in_thread(open_sample, session)
+    return answer(await in_thread(state_of, session))
+
+
+async def _walls(request: Request) -> Response:
+    return answer({"walls": await in_thread(walls_at_hand, session_of(request))})
+
+
+async def _wall(request: Request) -> Response:
+    session, number = session_of(request), number_of(await json_body(request), "number")
+    await in_thread(open_wall, session, 0 if number is None else int(number))
     return answer(await in_thread(state_of, session))
 
 
@@ -255,6 +265,8 @@ ROUTES = [
     Route("/api/photos", _photos, methods=["POST"]),
     Route("/api/photos/{number:int}", _take_away, methods=["DELETE"]),
     Route("/api/sample", _sample, methods=["POST"]),
+    Route("/api/walls", _walls),
+    Route("/api/walls", _wall, methods=["POST"]),
     Route("/api/recent", _recent),
     Route("/api/recent", _reopen, methods=["POST"]),
     Route("/api/jobs", _start, methods=["POST"]),

@@ -39,9 +39,10 @@ export class PhotosStage {
       h("summary", {}, h("h2", {}, t("photos.media"))), this.through,
       h("p", { class: "hint" }, t("photos.mediaHint")), fields(MEDIA));
     this.recent = h("ul", { class: "recent" });
-    this.beginning = h("section", { class: "beginning" },
+    this.walls = h("div", { class: "card walls", hidden: true });
+    this.beginning = h("section", { class: "beginning" }, this.walls,
       h("div", { class: "card" }, h("h2", {}, t("start.sample")), h("p", { class: "hint" }, t("start.sampleHint")),
-        h("div", { class: "row" }, button(t("start.try"), () => this.#sample(), { testid: "sample" }))),
+        h("div", { class: "row" }, button(t("start.try"), () => this.#begin("api/sample", {}), { testid: "sample" }))),
       h("div", { class: "card checklist" }, h("h2", {}, t("start.bring")),
         h("ul", {}, [1, 2, 3, 4, 5, 6].map((number) => h("li", {}, t(`start.bring.${number}`)))),
         h("div", { class: "row" }, button(t("start.print"), () => window.print(), { class: "quiet", testid: "print" }))),
@@ -87,14 +88,26 @@ export class PhotosStage {
     });
   }
 
-  async #sample() {
+  /** Begin with what the server has: the sample, or a wall of a project. */
+  async #begin(route, body) {
+    this.beginning.classList.add("busy");
     try {
-      await this.app.connection.ask("api/sample", {});
+      await this.app.connection.ask(route, body);
       await this.app.connection.refresh();
-      this.app.open("points");
+      this.app.open(this.app.state.pair?.accepted ? "points" : "orientation");
     } catch (error) {
       this.app.refuse(error);
     }
+    this.beginning.classList.remove("busy");
+  }
+
+  /** The walls of another program's project that lies in the folder. */
+  async #tellWalls() {
+    const { walls } = await this.app.connection.get("api/walls").catch(() => ({ walls: [] }));
+    this.walls.hidden = !walls.length;
+    this.walls.replaceChildren(h("h2", {}, t("start.project")), h("p", { class: "hint" }, t("start.projectHint")),
+      ...walls.map(({ number: wall, words, picture }) => h("button", { type: "button", testid: `wall-${wall}`,
+        onclick: () => this.#begin("api/walls", { number: wall }) }, h("img", { src: picture, alt: "" }), words)));
   }
 
   /** Surveys that were open before; another page opens beside this one. */
@@ -134,6 +147,7 @@ export class PhotosStage {
     if (!this.beginning.hidden && !this.asked) {
       this.asked = true;
       this.#tellRecent();
+      this.#tellWalls();
     }
     this.zone.classList.toggle("small", state.photos.length > 0);
     this.zone.classList.toggle("further", ready);

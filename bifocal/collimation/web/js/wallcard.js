@@ -161,12 +161,12 @@ export class WallCard {
     this.element.hidden = !found && !mended && !looking && !refused;
     const ties = pair?.report?.common_points;
     const grid = found && pair.scaled ? t("wall.grid", { step: decimal(String(gridStep(pair))) }) : "";
-    const words = found ? `${t("wall.found", { share: Math.round((100 * ties.on_wall) / ties.count), count: ties.count })} ${grid}`.trim()
+    const words = found ? `${ties ? t("wall.found", { share: Math.round((100 * ties.on_wall) / ties.count), count: ties.count }) : t("wall.ofProject")} ${grid}`.trim()
       : mended ? t("wall.mend") : looking ? t("wall.looking") : t("wall.refused", { why: refused });
     setText(this.state, words);
     this.state.dataset.level = found || mended ? "good" : looking ? "busy" : "fair";
     this.form.hidden = !found && !mended;
-    this.faceButton.hidden = this.faces.hidden = !found;
+    this.faceButton.hidden = this.faces.hidden = !ties || !found;
     if (scale && ![this.length, this.sigma].includes(document.activeElement) && this.ends.length < 2) {
       this.length.value = number(scale.length, 3);
       this.sigma.value = scale.sigma ? number(1000 * scale.sigma, 1) : "";
