@@ -97,9 +97,13 @@ def forms_of(variants: Sequence[str]) -> list[str]:
 
     >>> forms_of(["x1 [mm]"]), forms_of(["X (North)"]), forms_of(["Y (est)"])
     (['x1'], ['north'], ['y'])
+    >>> forms_of(["x [px]"])  # no coordinate on the wall
+    ['pixelx']
     """
     forms = []
     for text in variants:
+        if bare(text) in ("x", "y") and unit_of(text) == "px":
+            text = f"pixel {bare(text)}"
         directed = _DIRECTED.fullmatch(text)
         if directed and directed[1].casefold() in _DIRECTIONS:
             text = directed[1]

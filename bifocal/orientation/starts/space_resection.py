@@ -96,8 +96,6 @@ def _seeming(camera: Pinhole, media: PairMedia, number: int, xyz: FloatArray) ->
 
 def _in_air(xyz: FloatArray, pixels: FloatArray, interior: Interior) -> tuple[Pinhole, BoolArray]:
     """Return `resect` of a camera that looks through no media."""
-    if len(xyz) < 4:
-        raise GeometryError(remark("resection.few_points", count=len(xyz)))
     refuse_line(xyz)
     generator = np.random.default_rng(7)
     width = max(interior.image_size)
@@ -144,7 +142,9 @@ def _solve(xyz: FloatArray, pixels: FloatArray, matrix: FloatArray) -> list[Pinh
 
 
 def refuse_line(xyz: FloatArray) -> None:
-    """Refuse points that lie (almost) on one line."""
+    """Refuse fewer than four points, and such that lie (almost) on one line."""
+    if len(xyz) < 4:
+        raise GeometryError(remark("resection.few_points", count=len(xyz)))
     singular = np.linalg.svd(xyz - xyz.mean(axis=0), compute_uv=False)
     if singular[1] <= 0.02 * singular[0]:
         raise GeometryError(remark("resection.one_line"))

@@ -183,6 +183,22 @@ def test_what_stands_beside_e_and_n_is_asked_about_or_named_unless_it_is_of_a_to
     assert not control.remarks
 
 
+def test_x_and_y_in_pixels_beside_x_and_y_in_metres_are_where_the_point_is_seen(tmp_path):
+    path = tmp_path / "c.csv"
+    path.write_text("Point,Image,x [px],y [px],X [m],Y [m]\nA,f.jpg,10,20,1,2\n")
+    control = read_control(path, photos=1, names=("f.jpg",))
+    assert control.pixels1.tolist() == [[10, 20]]
+    assert control.xyz[:, :2].tolist() == [[1, 2]]
+
+
+def test_pixels_alone_are_control_only_where_a_rectangle_gives_the_places(tmp_path):
+    path = tmp_path / "c.csv"
+    path.write_text("id,X Ort,Y Ort,col,row\nA,1,2,10,20\n")
+    assert read_control(path, photos=1).pixels1.tolist() == [[10, 20]]
+    with pytest.raises(InputError, match='X, Y is missing.*not understood: "X Ort", "Y Ort"'):
+        read_control(path, photos=1, placed=True)
+
+
 def test_heights_without_x_and_y_name_the_headings_that_are_not_understood(tmp_path):
     with pytest.raises(InputError, match=r'X, Y is missing.*not understood: "Droite", "Haut"'):
         read_control(written(tmp_path, in_world(70.0), headings="id,Droite,Haut,H"))
