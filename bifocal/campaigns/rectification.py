@@ -185,7 +185,7 @@ def rectify_photo(
         control = read_control(
             given["control"], sigma=given["sigma_control"], sigma_plane=CONTROL.sigma_on_wall,
             unit=given["unit"] or "", columns=given["columns"], photos=1,
-            names=(str(path),), placed=given["rectangle"] is None,
+            names=(str(path),), with_places=given["rectangle"] is None,
         )  # fmt: skip
         check_inside(control.ids, control.pixels1, info.size, path.name)
     reading = () if control is None else control.remarks

@@ -204,7 +204,7 @@ def read_control(
     photos: int = 2,
     names: Sequence[str] = (),
     frame: WorldFrame | None = None,
-    placed: bool = False,
+    with_places: bool = False,
 ) -> Control:
     """Read control points: id, X, Y, r and their pixels col1, row1, col2, row2.
 
@@ -231,7 +231,7 @@ def read_control(
         The photos' files, for tables with a row for each photo: id, photo, col, row.
     frame : WorldFrame, optional
         Of the pair, for E, N, H; by default that of these points.
-    placed : bool
+    with_places : bool
         Whether a table without X and Y is refused.
 
     Returns
@@ -265,7 +265,7 @@ def read_control(
     lone = [axis for axis in "XY" if axis not in table.present]
     # Relief alone is some control; a height alone has a plan whose headings are not understood.
     is_height = "H" in table.present or bare(table.headings.get("r", "")).startswith("z")
-    if len(lone) == 1 or (lone and (is_height or placed)):
+    if len(lone) == 1 or (lone and (is_height or with_places)):
         raise InputError(lacks_axis(table, path, ", ".join(lone)))
     if not len(table):
         raise InputError(f"{path}: no control points in the table.")

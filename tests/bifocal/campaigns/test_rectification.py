@@ -179,7 +179,7 @@ def test_points_on_one_line_are_refused_and_three_of_four_doubted() -> None:
     done = rectify(image, gsd=0.1, control=control(line))
     assert any("no three of four on one line" in note for note in done.remarks)
     for count in (3, 1):
-        with pytest.raises(GeometryError, match=f"{count} control points .* a camera needs four"):
+        with pytest.raises(GeometryError, match=rf"{count} control points .* a camera needs four"):
             rectify(image, gsd=0.1, control=control(CORNERS[:count]))
     with pytest.raises(InputError, match="one of control, rectangle and length"):
         rectify(image, gsd=0.1, control=control(), length=([[0, 0], [9, 9]], 1.0))

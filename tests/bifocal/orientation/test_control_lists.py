@@ -195,8 +195,8 @@ def test_pixels_alone_are_control_only_where_a_rectangle_gives_the_places(tmp_pa
     path = tmp_path / "c.csv"
     path.write_text("id,X Ort,Y Ort,col,row\nA,1,2,10,20\n")
     assert read_control(path, photos=1).pixels1.tolist() == [[10, 20]]
-    with pytest.raises(InputError, match='X, Y is missing.*not understood: "X Ort", "Y Ort"'):
-        read_control(path, photos=1, placed=True)
+    with pytest.raises(InputError, match=r'X, Y is missing.*not understood: "X Ort", "Y Ort"'):
+        read_control(path, photos=1, with_places=True)
 
 
 def test_heights_without_x_and_y_name_the_headings_that_are_not_understood(tmp_path):
