@@ -15,6 +15,7 @@ from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
 from bifocal.orientation.starts.space_resection import resect
+from bifocal.orientation.tuning import VALIDATION
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.camera.pinhole import Pinhole, camera_matrix, homogeneous, ray_on_plane
@@ -187,7 +188,7 @@ def _promising(
             or (control.lengths and one == 0)
         )
         if enough or ((scaled or picked.positioned.sum() >= 2) and (site.wall is None or not one)):
-            promise = _promise(photos[one].interior, photos[second].interior, *ties)
+            promise = promise_of(photos[one].interior, photos[second].interior, *ties)
             ranked.append((enough, abs(promise), pair if promise >= 0 or site.wall else pair[::-1]))
     return [pair for *_, pair in sorted(ranked, reverse=True)]
 
@@ -205,10 +206,11 @@ def _common(
             yield (one, second), (pixels[one, both], pixels[second, both])
 
 
-def _promise(first: Interior, second: Interior, x1: FloatArray, x2: FloatArray) -> float:
+def promise_of(first: Interior, second: Interior, x1: FloatArray, x2: FloatArray) -> float:
     """Return how well rays of common points meet: their angles' square sum, up to `WIDE`.
 
-    Negative where the second camera stands farther from them.
+    Less where both cameras stand at nearly one distance: two such photos are no pair. Negative
+    where the second camera stands farther from them.
     """
     y1, y2 = (homogeneous(x) @ np.linalg.inv(i.matrix).T for i, x in ((first, x1), (second, x2)))
     cv2.setRNGSeed(7)
@@ -225,12 +227,12 @@ def _promise(first: Interior, second: Interior, x1: FloatArray, x2: FloatArray) 
         return 0.0
     points = (xyz[:3] / xyz[3]).T[good]
     depth2 = (points @ turn.T + shift.T)[:, 2]
-    farther = np.median(points[:, 2]) >= np.median(depth2)
+    change = float(np.log(np.median(points[:, 2]) / np.median(depth2)))
     d1, d2 = y1[good], y2[good] @ turn
     sine = np.linalg.norm(np.cross(d1, d2), axis=1)
     sine /= np.linalg.norm(d1, axis=1) * np.linalg.norm(d2, axis=1)
     promise = float((np.minimum(sine, WIDE) ** 2).sum())
-    return promise if farther else -promise
+    return float(np.clip(change / (2 * VALIDATION.least_change), -1, 1)) * promise
 
 
 def _lenses(interiors: Sequence[Interior]) -> tuple[int, ...]:

@@ -30,6 +30,7 @@ from bifocal.networks.joint_adjustment import JointUnknowns, adjust_jointly
 from bifocal.networks.joint_observations import JointObservations
 from bifocal.networks.photo_influence import dragging_photo
 from bifocal.networks.set_orientation import turned_set
+from bifocal.networks.set_start import promise_of
 from bifocal.orientation.adjustment.frame_turn import line_equations
 from bifocal.orientation.facade_lines import FacadeDirection
 from tests.bifocal.campaigns.sample_tables import write_tables
@@ -41,6 +42,21 @@ from tests.scenes.make_sample import PIXEL
 SIZE = (3072, 2048)
 #: 35, 28 and 19 mm at one scale, and 19 mm from a step aside.
 STANDS = ((35, 0.0, 17.5), (28, 0.0, 14.0), (19, 0.0, 9.5), (19, 1.5, 9.5))
+
+
+def test_a_set_begins_with_two_distances_and_not_with_the_widest_base():
+    """Two photos 4 m apart at one distance meet at wider angles than far and near, and are none."""
+    rng = np.random.default_rng(4)
+    xyz = rng.uniform((-3, -2, -0.4), (3, 2, 0.4), (200, 3))
+    rays = []
+    for x, z, mm in ((0.0, 17.5, 35), (-2.0, 9.5, 19), (2.05, 9.6, 19)):
+        interior = Interior.from_focal(226.0 * mm, image_size=SIZE, sigma=0.005, source=f"{mm} mm")
+        turn = np.diag([1.0, -1, -1]) @ rotation_from_vector([0, -np.arctan(x / z), 0])
+        camera = Pinhole(interior.matrix, turn, np.array([x, 0.0, z]))
+        rays.append((interior, project(camera, xyz) + rng.normal(0, 0.3, (200, 2))))
+    (far, f), (near, n), (beside, b) = rays
+    assert promise_of(far, near, f, n) > 2 * abs(promise_of(near, beside, n, b)) > 0
+    assert promise_of(near, far, n, f) < 0
 
 
 def simulated(rng: np.random.Generator, *, by_wall: bool):
