@@ -43,8 +43,9 @@ class TrackCommand:
     """Last frame.  [default: the last of all cameras]"""
     rate: Annotated[float | None, Typed(POSITIVE, "HZ")] = None
     """Frames per second [1/s]; without it velocities are per frame."""
-    tolerance: Annotated[float, Typed(POSITIVE, "PX")] = 2.0
-    """Farthest a target may lie from where its particle is seen [px]."""
+    tolerance: Annotated[float | None, Typed(POSITIVE, "PX")] = None
+    """Farthest a target may lie from where its particle is seen [px].  [default: 2, or less where
+    that keeps the particles and leaves half as much to chance]"""
     fewest: Annotated[int, Typed(click.IntRange(min=2))] = 3
     """Cameras that must have seen a particle; with 2, many are by chance."""
     step: Annotated[float | None, Typed(POSITIVE)] = None

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from multimedia.openptv.chance_counts import chance_counts, tolerance_remarks
+from multimedia.openptv.chance_counts import chance_counts, narrower_counts, tolerance_remarks
 from multimedia.openptv.correspondences import TOLERANCE, correspondences
 from multimedia.openptv.openptv_files import read_targets, rt_is_text
 from multimedia.projects.model import Project
@@ -108,7 +108,7 @@ def find_particles(
             "(`multimedia adjust`)? Fewer come by chance with a smaller --tolerance"
             + (f" or --fewest {len(names)}." if fewest < len(names) else ".")
         )
-    notes = tolerance_remarks(content, [places], counted, fewest)
+    notes = tolerance_remarks(counted, narrower_counts(content, [places], counted, fewest))
     counts = tuple(map(len, places))
     particles = Particles(content, xyz, numbers, misfit, counts, counted.found, chance, notes)
     if out is not None:

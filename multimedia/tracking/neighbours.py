@@ -128,9 +128,10 @@ def neighbours_guide(
     residuals = (bend, bend - way[starts] + guess[starts], ways - way[starts])
     medians = np.stack([_medians(np.linalg.norm(each, axis=1), around) for each in residuals])
     medians[:, np.isnan(way[:, 0])] = np.inf
-    alone, _, reach = np.minimum(BEYOND * medians, widest)
     # What is exact, too, is sought within something.
-    change = np.clip(BEYOND * medians.min(axis=0), 1e-6 * widest, widest)
+    reaches = np.clip(BEYOND * medians, 1e-6 * widest, widest)
+    alone, _, reach = reaches
+    change = reaches.min(axis=0)
     return Guide(way=way, kind=medians.argmin(axis=0), reach=reach, change=change,
                  alone=np.maximum(alone, change))  # fmt: skip
 

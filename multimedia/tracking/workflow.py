@@ -10,7 +10,12 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import chi2
 
-from multimedia.openptv.chance_counts import ChanceCounts, chance_counts, tolerance_remarks
+from multimedia.openptv.chance_counts import (
+    ChanceCounts,
+    chance_counts,
+    narrower_counts,
+    tolerance_remarks,
+)
 from multimedia.openptv.correspondences import TOLERANCE, correspondences
 from multimedia.openptv.openptv_files import read_blobs, read_targets
 from multimedia.orientation.intersection import intersect
@@ -96,7 +101,7 @@ def find_tracks(
     first: int | None = None,
     last: int | None = None,
     rate: float | None = None,
-    tolerance: float = TOLERANCE,
+    tolerance: float | None = None,
     fewest: int = 3,
     step: float | None = None,
     change: float | None = None,
@@ -122,7 +127,10 @@ def find_tracks(
         Frames; by default all that every camera has.
     rate : float, optional
         Frames per second; without it velocities are per frame.
-    tolerance, fewest
+    tolerance : float, optional
+        Farthest that a target may lie from where its particle is seen; by default 2, or less where
+        that keeps the particles and leaves half as much to chance. [px]
+    fewest : int
         As for `multimedia.openptv.correspondences.correspondences`.
     step, change, gap, shortest
         As for `track_particles`; lengths in the unit of the project.
@@ -180,10 +188,16 @@ def find_tracks(
         calibration = calibrated_on_particles(content, some, tolerance=cameras_off)
         content = calibration.project
     tried = [places(frames[k]) for k in _tried_frames(len(frames))]
-    counted = _beyond_chance(project, content, tried, tolerance, fewest)
+    first_count = _beyond_chance(project, content, tried, tolerance or TOLERANCE, fewest)
+    fewer = narrower_counts(content, tried, first_count, fewest)
+    # A tolerance that is stated is kept.
+    counted = first_count if tolerance is not None or fewer is None else fewer
+    key = "targets.tolerance" if tolerance is not None else "tracks.tolerance"
     with ThreadPoolExecutor(cores()) as pool:
         particles = list(
-            pool.map(lambda frame: _particles(content, places(frame), tolerance, fewest), frames)
+            pool.map(
+                lambda frame: _particles(content, places(frame), counted.tolerance, fewest), frames
+            )
         )
     factor = _median_factor([one.factor for one in particles])
     tracks = track_particles(
@@ -204,7 +218,7 @@ def find_tracks(
         tuple(frames), SIGMA_PIXEL * float(np.sqrt(factor)),
         float(counted.found.sum()), float(counted.chance.sum()),
         (*_lost_files(lost), *tracks.remarks,
-         *tolerance_remarks(content, tried, counted, fewest)), calibration,
+         *tolerance_remarks(first_count, fewer, key)), calibration,
     )  # fmt: skip
     _write(result, particles, out, folder, calibrate, overwrite=overwrite)
     return result

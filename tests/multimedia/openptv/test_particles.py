@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import json
 import re
+import shutil
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -189,6 +191,12 @@ def test_a_tolerance_that_fits_the_targets_is_proposed_and_holds(tmp_path: Path)
     assert found["by_chance_at_most"] < 0.1 * wide
     tuples = {tuple(one["targets"]) for one in found["particles"]}
     assert len(tuples & {tuple(row) for row in numbers.tolist()}) >= 245
+    # `track` takes it unless another is stated.
+    for k, number in product(range(4), (2, 3, 4)):
+        shutil.copy(tmp_path / f"cam{k}.1_targets", tmp_path / f"cam{k}.{number}_targets")
+    bases = [word for k in range(4) for word in ("--targets", str(tmp_path / f"cam{k}."))]
+    tracked = CliRunner().invoke(main, ["track", str(tmp_path / "tank.toml"), *bases])
+    assert f"particles were sought within {float(said[1]):g} px" in tracked.stderr
 
 
 @pytest.mark.acceptance
