@@ -443,6 +443,8 @@ class _Outlined:
     ) -> ChangedRegion | None:  # fmt: skip
         """Return a region, its number not yet given; None if its volume is within its sigma.
 
+        That is two standard deviations of what is measured, one with what is not.
+
         What other regions hold already is not ``free``.
         """
         cells, sigma, cell = self.cells, self._own(part, level), self.cells.grid.gsd**2
@@ -460,7 +462,9 @@ class _Outlined:
         total = float(cells.difference[about].sum()) + holes * float(values.mean())
         variance += (holes * float(values.std())) ** 2
         volume, spread = cell * total, cell * float(variance**0.5)
-        if way * volume < 2 * spread:
+        beyond, height = self._beyond(inner, way)
+        sigma_volume = float(np.hypot(spread, cell * beyond * height))
+        if way * volume < max(2 * spread, sigma_volume):
             return None
         peak = float(change[part].max())
         near = _wider(inner) & cells.known
@@ -471,14 +475,13 @@ class _Outlined:
         moved = np.maximum(averages[0] * way, 1e-9)[inner]
         y, x = (float(np.average(index, weights=moved)) for index in np.nonzero(inner))
         area, rim = int(inner.sum()) * cell, _wider(inner, 3) & ~inner
-        beyond, height = self._beyond(inner, way)
         return ChangedRegion(
             number=0,
             X=cells.grid.x0 + x * cells.grid.gsd, Y=cells.grid.y0 - y * cells.grid.gsd,
             area=area,
             sigma_area=cell
             * max(1.0, float(np.linalg.norm([(wide - narrow) / 2, fading / 2, beyond]))),
-            volume=volume, sigma_volume=float(np.hypot(spread, cell * beyond * height)),
+            volume=volume, sigma_volume=sigma_volume,
             mean=volume / area, sigma_mean=spread / area,
             largest=peak * way, sigma_largest=sigma,
             measured=float(cells.known[inner].mean()),

@@ -179,11 +179,12 @@ def by_rectangle(
             if free.sigma0 < SLIPS.doubted:
                 times = float(free.camera.matrix[0, 0]) / interior.focal
                 focal = remark("rectify.other_focal", times=times)
-        if rest.min() > SLIPS.doubted:
-            return focal
-        best = float(close[rest == rest.min()].mean())
-        about = {"width": width * best, "height": height / best, "at": height, "by": width}
-        return " ".join(text for text in (remark("rectify.proportions", **about), focal) if text)
+        texts = [focal, _by_one_corner(cornered(width, height), interior, sigma_pick)]
+        if rest.min() <= SLIPS.doubted:
+            best = float(close[rest == rest.min()].mean())
+            about = {"width": width * best, "height": height / best, "at": height, "by": width}
+            texts.insert(0, remark("rectify.proportions", **about))
+        return " ".join(text for text in texts if text)
 
     try:
         photo = fitted(width, height)
@@ -199,6 +200,20 @@ def by_rectangle(
         start = remark("rectify.begun_below")
     remarks = [text for text in (start, words) if text]
     return replace(photo, remarks=(*remarks, *photo.remarks)) if remarks else photo
+
+
+def _by_one_corner(control: Control, interior: Interior, sigma_pick: float) -> str:
+    """Return by how many pixels each corner would be off, were it the one that is wrong."""
+    control, moves = replace(control, pixels1=interior.ideal(control.pixels1)), list[str]()
+    for k in range(len(control.ids)):
+        sigma = control.sigma.copy()
+        sigma[k] = np.ptp(control.xyz, axis=0).max()  # it may lie anywhere on the wall
+        with suppress(GeometryError, ConvergenceError):
+            photo = _by_points(replace(control, sigma=sigma), interior, sigma_pick)
+            if photo.sigma0 < SLIPS.doubted:
+                off = pinhole.project(photo.camera, control.xyz[[k]]) - control.pixels1[[k]]
+                moves.append(f"{k + 1}: {float(np.linalg.norm(off)):.0f} px")
+    return remark("rectify.one_corner", moves=", ".join(moves)) if moves else ""
 
 
 def _begun_at(corners: FloatArray) -> int:

@@ -89,7 +89,7 @@ class DenseRelief(ReliefMap):
             "bounds": list(self.bounds),
             "shares": {q.name.lower(): float((self.quality == q).mean()) for q in Quality},
             "relief": dict(zip(figures, values, strict=True)),
-            "sigma_median": float(np.median(sigma)) if sigma.size else None,
+            "sigma_median": float(np.nanmedian(sigma)) if np.isfinite(sigma).any() else None,
             "registration": asdict(self.registration) | {"remarks": self.registration.remarks},
             **({"pairs": [list(names) for names in self.used]} if self.used else {}),
         }

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -311,6 +313,15 @@ def test_a_side_that_was_measured_wrongly_is_no_crop() -> None:
     assert width == pytest.approx(5.0, rel=0.02)
     assert not any("was taken so" in note for note in done.remarks)
     assert done.photo.sigma_at(CORNERS).max() > 0.03  # 0.2 m off in the width
+
+
+def test_how_far_each_corner_would_be_off_stands_beside_what_else_would_fit() -> None:
+    """The second corner is picked 25 px too far to the right; the photo is nearly square on."""
+    picks = seen(CORNERS)
+    picks[1, 0] += 25
+    image, lens = np.zeros(SIZE[::-1], np.uint8), replace(LENS, sigma_focal=1e-4)
+    words = " ".join(rectify(image, rectangle=((5.0, 4.0), picks), interior=lens).remarks)
+    assert re.search(r"one corner alone is picked wrong.*\b2: 2[456] px, 3: ", words)
 
 
 def test_a_focal_length_that_would_fit_stands_beside_the_sides_that_would() -> None:
