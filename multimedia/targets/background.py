@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from photocore.arrays import FloatArray
+from photocore.arrays import Float32Array, FloatArray
 
 #: Rounds in which particles are cut off before the light is smoothed again.
 _ROUNDS = 4
@@ -34,24 +34,32 @@ def without_background(grey: FloatArray, scale: float) -> tuple[FloatArray, Floa
         Standard deviation of the grey values of the light, from those darker than it, among which
         are no particles.
     """
-    light = _smooth(grey, scale)
-    noise = np.full_like(grey, np.sqrt(np.mean((grey - light) ** 2)))
+    # Single precision, in place: most of the time goes to fetching memory.
+    image = grey.astype(np.float32)
+    light = _smooth(image, scale)
+    bright = image - light
+    noise = np.full_like(image, np.sqrt(np.mean(bright**2)))
     for _ in range(_ROUNDS):
         # What smoothing took off slopes, at the border above all, comes back turn by turn.
-        light = light + _smooth(np.minimum(grey - light, _CUT * noise), scale)
-        darker = np.minimum(grey - light, 0.0)
-        share = _smooth((darker < 0).astype(float), scale)
-        noise = np.sqrt(_smooth(darker**2, scale) / np.maximum(share, 0.05))
-        noise = np.maximum(noise, _ROUNDING)
-    return grey - light, noise
+        noise *= _CUT
+        light += _smooth(np.minimum(bright, noise, out=bright), scale)
+        np.subtract(image, light, out=bright)
+        darker = np.minimum(bright, 0.0)
+        share = _smooth((darker < 0).astype(np.float32), scale)
+        np.multiply(darker, darker, out=darker)
+        noise = _smooth(darker, scale)
+        noise /= np.maximum(share, 0.05, out=share)
+        np.sqrt(noise, out=noise)
+        np.maximum(noise, _ROUNDING, out=noise)
+    return grey - light, noise.astype(np.float64)
 
 
-def _smooth(image: FloatArray, scale: float) -> FloatArray:
+def _smooth(image: Float32Array, scale: float) -> Float32Array:
     """Return an image smoothed by a Gaussian, in a smaller copy where the Gaussian is wide."""
     height, width = image.shape
     step = max(1, int(scale / _STEPS))
     size = -(-width // step), -(-height // step)
     small = cv2.resize(image, size, interpolation=cv2.INTER_AREA) if step > 1 else image
     small = cv2.GaussianBlur(small, (0, 0), scale / step, borderType=cv2.BORDER_REFLECT_101)
-    smoothed: FloatArray = cv2.resize(small, (width, height)) if step > 1 else small
+    smoothed: Float32Array = cv2.resize(small, (width, height)) if step > 1 else small
     return smoothed

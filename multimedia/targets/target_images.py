@@ -194,8 +194,8 @@ class _Gaussians:
         first[:, :2], first[:, 3] = places[:, ::-1], heights / _middle(first[:, 2])
         return first
 
-    def drawn(self) -> _Drawn:
-        """Return the particles' images, each in its window and all together."""
+    def drawn(self, whole: FloatArray | None = None) -> _Drawn:
+        """Return the particles' images, each in its window and all together, on an empty image."""
         height, width = self.bright.shape
         beside = np.arange(-HALF, HALF + 1)
         middle = np.clip(np.rint(self.terms[:, :2]), 0, (width - 1, height - 1)).astype(int)
@@ -205,16 +205,18 @@ class _Gaussians:
         columns, rows = np.clip(columns, 0, width - 1), np.clip(rows, 0, height - 1)
         shape, slopes = _shapes(self.terms, columns, rows)
         single = np.where(inside, self.terms[:, 3, None, None] * shape, 0.0)
-        whole, where = np.zeros_like(self.bright), (rows[:, :, None], columns[:, None, :])
+        whole = np.zeros_like(self.bright) if whole is None else whole
+        where = rows[:, :, None], columns[:, None, :]
         np.add.at(whole, where, single)
         return _Drawn(columns, rows, where, inside, shape, slopes, single, whole)
 
     def settled(self) -> _Gaussians:
         """Return the fit that least squares lead to, each beside what the others show."""
-        fit = self
+        fit, whole = self, np.zeros_like(self.bright)
         for turn in range(_TURNS if len(self.terms) else 0):
-            drawn, count = fit.drawn(), len(fit.terms)
+            drawn, count = fit.drawn(whole), len(fit.terms)
             miss = (fit.bright - drawn.whole)[drawn.where] - fit.terms[:, 4, None, None]
+            whole[drawn.where] = 0.0
             weighed = (drawn.slopes * drawn.weight[..., None]).reshape(count, -1, 5).swapaxes(1, 2)
             normal = weighed @ drawn.slopes.reshape(count, -1, 5)
             right = (weighed @ miss.reshape(count, -1, 1))[..., 0]

@@ -77,7 +77,8 @@ def _with_left_out(
     the ends of a track, and so is the root of its noise: what is more than noise over the track
     is shared out as the noise is.
     """
-    noise = np.nan_to_num(np.diagonal(richer[1] - fitted[1], axis1=1, axis2=2))
+    # Of points of unequal precision the richer may even be the surer.
+    noise = np.maximum(np.nan_to_num(np.diagonal(richer[1] - fitted[1], axis1=1, axis2=2)), 0.0)
     # Of a short track both are one polynomial: what these differ by is rounding.
     known = noise > _SAME * np.nan_to_num(np.diagonal(fitted[1], axis1=1, axis2=2))
     excess = np.divide((richer[0] - fitted[0]) ** 2, noise, out=np.ones_like(noise), where=known)

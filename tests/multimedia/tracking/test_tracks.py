@@ -264,3 +264,13 @@ def test_what_cannot_be_followed_is_refused():
     with pytest.raises(InputError, match="shortest 2"):
         track_particles(some, shortest=2)
     assert track_particles([np.empty((0, 3))] * 4).count == 0
+
+
+def test_variances_of_velocities_are_none_below_zero_where_points_are_of_unequal_precision():
+    rng = np.random.default_rng(3)
+    track = np.repeat(np.arange(40), 8)
+    times = np.tile(np.arange(8.0), 40)
+    xyz = np.stack([times**3 * rng.uniform(0, 1, 320), times, 0 * times], axis=1)
+    covariance = 10.0 ** rng.uniform(-4, 0, (320, 1, 1)) * np.eye(3)
+    _, variances = track_velocities(xyz, covariance, times, track)
+    assert (np.diagonal(variances, axis1=1, axis2=2) > 0).all()
