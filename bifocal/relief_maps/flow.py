@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -64,10 +65,16 @@ class FlowTuning:
     #: Evidence: half / twice, beyond 3 cm [%]: facade -0.09 / +0.39, plaster facade -0.03 / +0.09,
     #: church -0.03 / +0.09.
     floor: float = 0.02
-    #: Larger photos are matched in bands of no more pixels: each pixel takes 0.22 kB.
-    #: Evidence: church_1, best, 14 MP: 2.2 in place of 3.2 GB, beyond 10 cm or missing 9.1 % and
-    #: beyond 3 cm 14.5 % as before; in standard, 9 MP, two bands cost 8.8 in place of 8.5 %.
-    most: int = 9_500_000
+    #: Larger photos are matched in bands of about so many pixels: each pixel takes 0.22 kB.
+    #: Evidence: standard, whole and in two bands, each on two grids: church_1 2.0 and 1.4 GB,
+    #: median 4.6 and 4.5 mm, beyond 10 cm or missing 8.55 and 8.74 %, beyond 3 cm 14.6 both;
+    #: church_2 7.5 and 7.3 mm, 1.0 and 1.1, 7.1 and 6.9 %; castle_B, in bands it does not need,
+    #: 5.5 and 5.7 mm, .6 and .4, 4.1 and 4.2 %.
+    most: int = 5_000_000
+    #: Bands begin at multiples of this: the pyramid's pixels and the patches are then those of the
+    #: whole photo. [px]
+    #: Evidence: church_1 in two bands that begin anywhere: 9.2 in place of 8.7 % beyond 10 cm.
+    lattice: int = 48
     #: Rows that a band is matched with beyond its own, and beyond how far they move there. [px]
     #: Evidence: church_1, standard in two bands: 30 and 400 px are no better.
     beyond: int = 96
@@ -154,11 +161,12 @@ def _bands(seed: Float32Array) -> Iterator[tuple[int, int, int, int]]:
     """
     height, width = seed.shape[:2]
     count = -(-height * width // FLOW.most)
-    edges = [round(height * k / count) for k in range(count + 1)]
+    inner = (round(height * k / count / FLOW.lattice) * FLOW.lattice for k in range(1, count))
+    edges = [0, *inner, height]
     reach = [0]
     for row in edges[1:-1]:
         near = seed[max(0, row - 4 * FLOW.beyond) : row + 4 * FLOW.beyond, :, 1]
-        reach.append(FLOW.beyond + int(np.ceil(np.abs(near).max())))
+        reach.append(FLOW.lattice * math.ceil((FLOW.beyond + np.abs(near).max()) / FLOW.lattice))
     reach.append(0)
     for (start, above), (stop, below) in pairwise(zip(edges, reach, strict=True)):
         yield max(0, start - above), start, stop, min(height, stop + below)
