@@ -9,7 +9,7 @@ text put together from several, by what was made and never by how it reads.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from numbers import Integral
 from string import Formatter
@@ -110,6 +110,17 @@ def level_of(text: str) -> str:
     'doubt'
     """
     return min((told.level for _, told in _within(text)), key=LEVELS.index, default="hint")
+
+
+def alarms_in(texts: Iterable[str]) -> list[str]:
+    """Return the texts that say that what was made is wrong: what a file carries on of its making.
+
+    Examples
+    --------
+    >>> alarms_in([Remarks("bifocal")("orientation.no_wall"), "a note"])[0][:10]
+    'NO WALL FO'
+    """
+    return [text for text in texts if level_of(text) in LEVELS[:2]]
 
 
 def with_keys(value: dict[str, Any]) -> dict[str, Any]:

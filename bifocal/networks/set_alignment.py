@@ -25,6 +25,7 @@ from bifocal.remarks import remark
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
+from photocore.remarks import alarms_in
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -163,7 +164,7 @@ def set_alignment(
             {"id": name, "off": off, "used": name not in wrong, "test": wrong.get(name)}
             for name, off in zip(oriented.control.ids, adjusted.control.tolist(), strict=False)
         ],
-        "doubts": [text for text in remarks if text.partition(":")[0].isupper()],
+        "doubts": alarms_in(remarks),
         "words": list(words),
     }  # fmt: skip
     return SetAlignment(

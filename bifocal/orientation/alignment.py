@@ -32,6 +32,7 @@ from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera.distortion import RadialDivision
 from photocore.camera.pinhole import Pinhole, camera_matrix, plane_from_pixel
+from photocore.remarks import alarms_in
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -316,7 +317,7 @@ def _diagnostics(
         "wall_bend_px": oriented.shape.px if np.isfinite(oriented.shape.px) else None,
         "wall_bend_sigma_px": oriented.shape.sigma if np.isfinite(oriented.shape.px) else None,
         "focal_given_px": [interior.focal for interior in observations.interiors],
-        "doubts": [text for text in oriented.remarks if text.partition(":")[0].isupper()],
+        "doubts": alarms_in(oriented.remarks),
         "wall_relief_mm": wall_relief(oriented),
         "assumed": oriented.assumed,
         "words": list(words),
