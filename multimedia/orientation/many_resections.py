@@ -158,6 +158,8 @@ def _checked(
     sigma: ArrayLike | None,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return control (m or 1, n, 3), image points and their standard deviations (m, n, 2)."""
+    if isinstance(cameras, Camera):
+        raise InputError("cameras: give one for each row of image_points, e.g. [camera] * 1000.")
     image = as_points(image_points, "image_points", dimension=2)
     control = as_points(object_points, "object_points", dimension=3)
     control = control[None] if control.ndim == 2 else control

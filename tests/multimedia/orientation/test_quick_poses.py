@@ -163,5 +163,7 @@ def test_shapes_that_do_not_fit_are_refused(frames):
     start, images = frames
     with pytest.raises(InputError, match="9 cameras, object_points"):
         resect_many(start, control()[:4], images, LAYERS)
+    with pytest.raises(InputError, match="one for each row"):
+        resect_many(start[0], control(), images, LAYERS)
     with pytest.raises(InputError, match="sigma"):
         resect_many(start, control(), images, LAYERS, sigma=np.ones(7))
