@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -221,19 +221,13 @@ def compare(
     height, width = difference.shape
     whole = labels.repeat(pixels, axis=0).repeat(pixels, axis=1)[:height, :width]
     if dates is not None and regions:
-        wrong = contradicted(whole, difference, (before, after), dates)
-        two_surfaces |= np.isin(whole, wrong)
-        one = np.ones_like(difference.sigma)
-        field = difference.r * parallax_of(difference, (before, after), dates)
-        moved = Cells.of(replace(difference, r=np.asarray(field, np.float32), sigma=one), pixels)
-        weak = [
-            n for n in without_parallax(moved.z, cells.known, labels, patches) if n not in wrong
-        ]
-        for key, numbers in (("photos_contradict", wrong), ("little_parallax", weak)):
-            area = float(np.isin(whole, numbers).sum()) * difference.gsd**2
-            if numbers:
-                remarks.append(remark(f"compare.{key}", count=len(numbers), area=area))
-        regions, whole = _without(regions, whole, [*wrong, *weak])
+        moved = _moved_by(difference, parallax_of(difference, (before, after), dates))
+        refuted = {"photos_contradict": contradicted(whole, difference, (before, after), dates)}
+        two_surfaces |= np.isin(whole, refuted["photos_contradict"])
+        weak = without_parallax(Cells.of(moved, pixels).z, cells.known, labels, patches)
+        refuted["little_parallax"] = [n for n in weak if n not in refuted["photos_contradict"]]
+        remarks += _refutations(whole, difference.gsd, refuted)
+        regions, whole = _without(regions, whole, [n for each in refuted.values() for n in each])
     if numbers := [one.number for one in regions if one.open_rim > CHANGE.open]:
         remarks.append(remark("compare.goes_on", numbers=", ".join(map(str, numbers))))
     return Comparison(
@@ -282,6 +276,22 @@ def without_parallax(
         number
         for number in range(1, int(labels.max()) + 1)
         if all(part[labels == number].max() <= part[still].max(initial=0.0) for part in sizes)
+    ]
+
+
+def _moved_by(difference: ReliefMap, parallax: FloatArray) -> ReliefMap:
+    """Return differences in pixels of the photos, given the pixels of a metre; sigma is one."""
+    field = (difference.r * parallax).astype(np.float32)
+    return replace(difference, r=field, sigma=np.ones_like(difference.sigma))
+
+
+def _refutations(whole: IntArray, gsd: float, refuted: Mapping[str, Sequence[int]]) -> list[str]:
+    """Return what is said of regions that the photos refute, by the key of what says so."""
+    areas = {key: float(np.isin(whole, numbers).sum()) * gsd**2 for key, numbers in refuted.items()}
+    return [
+        remark(f"compare.{key}", count=len(numbers), area=areas[key])
+        for key, numbers in refuted.items()
+        if numbers
     ]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -157,21 +157,8 @@ def find_tracks(
     check_all_writable(out, calibrate, overwrite=overwrite)
     check_ending(calibrate, "a project is written as .toml.", ".toml")
     content = read_project(project)
-    names = content.camera_names
-    if len(targets) != len(names):
-        raise InputError(
-            f"{len(targets)} sequence(s) of targets for {len(names)} cameras: give --targets once "
-            f"per camera, in the order {', '.join(names)}."
-        )
-    sequences = [_sequence(base) for base in targets]
+    sequences = _sequences(targets, content.camera_names)
     frames = _frames(targets, sequences, first, last)
-    # A file of blobs has no line for a frame without any: that is no loss.
-    lost = [
-        f"{base.name}{frame}{ENDING}"
-        for frame in frames
-        for base, sequence in zip(targets, sequences, strict=True)
-        if frame not in sequence and not base.is_file()
-    ]
     files = [path for each in sequences for path in each.values() if isinstance(path, Path)]
     check_not_input(out, project, *targets, *files)
     if folder is not None and folder.is_dir():
@@ -217,11 +204,21 @@ def find_tracks(
         content, tracks, rows, (content.unit, f"{content.unit}/{'s' if rate else 'frame'}"),
         tuple(frames), SIGMA_PIXEL * float(np.sqrt(factor)),
         float(counted.found.sum()), float(counted.chance.sum()),
-        (*_lost_files(lost), *tracks.remarks,
+        (*_lost_files(targets, sequences, frames), *tracks.remarks,
          *tolerance_remarks(first_count, fewer, key)), calibration,
     )  # fmt: skip
     _write(result, particles, out, folder, calibrate, overwrite=overwrite)
     return result
+
+
+def _sequences(targets: Sequence[Path], names: Sequence[str]) -> list[dict[int, Path | FloatArray]]:
+    """Return the `_sequence` of every camera, or refuse another number of them."""
+    if len(targets) != len(names):
+        raise InputError(
+            f"{len(targets)} sequence(s) of targets for {len(names)} cameras: give --targets once "
+            f"per camera, in the order {', '.join(names)}."
+        )
+    return [_sequence(base) for base in targets]
 
 
 def _sequence(base: Path) -> dict[int, Path | FloatArray]:
@@ -266,8 +263,19 @@ def _frames(
     return range(begin, end + 1)
 
 
-def _lost_files(names: Sequence[str]) -> list[str]:
-    """Say which files are taken for frames without targets."""
+def _lost_files(
+    targets: Sequence[Path], sequences: Sequence[Container[int]], frames: Sequence[int]
+) -> list[str]:
+    """Say which files are taken for frames without targets.
+
+    A file of blobs has no line for a frame without any: that is no loss.
+    """
+    names = [
+        f"{base.name}{frame}{ENDING}"
+        for frame in frames
+        for base, sequence in zip(targets, sequences, strict=True)
+        if frame not in sequence and not base.is_file()
+    ]
     shown = ", ".join(names[:3]) + (" ..." if len(names) > 3 else "")
     return [remark("tracks.lost", count=len(names), names=shown)] if names else []
 
