@@ -19,6 +19,7 @@ from bifocal.collimation.server.measuring_routes import ROUTES as MEASURING
 from bifocal.collimation.server.product_routes import ROUTES as PRODUCTS
 from bifocal.collimation.server.requests import answer, in_thread, json_body, session_of
 from bifocal.collimation.server.security import COOKIE, Guard, TooLarge, place_of
+from bifocal.collimation.server.state_changes import HELD, StateEditions
 from bifocal.collimation.server.state_view import state_of
 from bifocal.collimation.session import Session
 from bifocal.remarks import in_language
@@ -57,6 +58,7 @@ def application(session: Session, token: str) -> Guard:
         },
     )  # fmt: skip
     app.state.session, app.state.token, app.state.assets = session, token, Assets()
+    app.state.editions = StateEditions()
     return Guard(app, token)  # outside of all: what fails is answered under its rules too
 
 
@@ -97,16 +99,22 @@ async def _asset(request: Request) -> Response:
 
 
 async def _state(request: Request) -> Response:
-    return answer(await in_thread(state_of, session_of(request)))
+    def edition() -> dict[str, Any]:
+        editions: StateEditions = request.app.state.editions
+        return editions.next(state_of(session_of(request)), request.headers.get(HELD))
+
+    return answer(await in_thread(edition))
 
 
 async def _command(request: Request) -> Response:
     session, body = session_of(request), fields_of(await json_body(request), COMMANDS)
+    editions: StateEditions = request.app.state.editions
 
     def carry_out() -> dict[str, Any]:
         with session.lock:
             result = session.command(body)
-            return {"revision": session.revision, "result": result, "state": state_of(session)}
+            state = editions.next(state_of(session), request.headers.get(HELD))
+            return {"revision": session.revision, "result": result, "state": state}
 
     return answer(await in_thread(carry_out))
 

@@ -34,6 +34,15 @@ async function call(path, options) {
   throw new Refusal(body.error ?? `${answer.status} ${answer.statusText}`);
 }
 
+/** A state with what changed since: values by key, and rows of lists by their names. */
+function changed(state, { edition, values, rows }) {
+  const lists = Object.entries(rows).map(([key, { order, rows: other }]) => {
+    const known = new Map([...state[key], ...other].map((row) => [row.name, row]));
+    return [key, order.map((name) => known.get(name))];
+  });
+  return { ...state, ...values, ...Object.fromEntries(lists), edition };
+}
+
 export class Connection extends EventTarget {
   constructor() {
     super();
@@ -65,8 +74,13 @@ export class Connection extends EventTarget {
   }
 
   async refresh() {
-    const answer = await call("api/state", { cache: "no-store" });
-    this.#adopt(await answer.json());
+    const answer = await call("api/state", { cache: "no-store", headers: this.#held() });
+    if (!this.#adopt(await answer.json())) this.#adopt(await (await call("api/state", { cache: "no-store" })).json());
+  }
+
+  /** Which edition of the state is here: the server then sends what changed since. */
+  #held() {
+    return this.state?.edition ? { "X-Edition": this.state.edition } : {};
   }
 
   /** Send one command; resolves to its result, rejects with a Refusal in words. */
@@ -156,12 +170,12 @@ export class Connection extends EventTarget {
         command.sent = true;
         return call("api/command", {
           method: "POST",
-          headers: { "Content-Type": "application/json" },
+          headers: { "Content-Type": "application/json", ...this.#held() },
           body: JSON.stringify({ id: command.id, op: command.op, ...command.args }),
         });
       });
       const { state, result } = await answer.json();
-      this.#adopt(state);
+      if (!this.#adopt(state)) await this.#retry(() => this.refresh());
       command.resolve(result);
     } catch (error) {
       command.reject(error);
@@ -186,13 +200,19 @@ export class Connection extends EventTarget {
     }
   }
 
-  /** Take a state unless it is older than what is shown; a restarted server counts anew. */
-  #adopt(state) {
+  /**
+   * Take a state unless it is older than what is shown; a restarted server counts anew. False if it
+   * is what changed since a state that another answer has replaced meanwhile.
+   */
+  #adopt(told) {
+    if (told.since && told.since !== this.state?.edition) return false;
+    const state = told.since ? changed(this.state, told) : told;
     const same = this.state?.serving === state.serving;
-    if (same && state.revision < this.state.revision) return;
+    if (same && state.revision < this.state.revision) return true;
     if (!same) this.heard = state.revision;
     this.state = state;
     this.dispatchEvent(new Event("state"));
+    return true;
   }
 
   #reach(online, locked) {
