@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import secrets
 from collections import OrderedDict
 from collections.abc import Mapping
 from threading import Lock
@@ -26,29 +27,32 @@ class StateEditions:
 
     def __init__(self) -> None:
         self._kept: OrderedDict[str, _Words] = OrderedDict()
-        self._count, self._lock = 0, Lock()
+        # A page outlives its server: the next one's editions must not be taken for these.
+        self._server, self._count, self._lock = secrets.token_hex(4), 0, Lock()
 
     def next(self, state: Mapping[str, Any], held: str | None) -> dict[str, Any]:
-        """Return a state as it is sent, with its ``edition``.
+        """Return a state as it is sent, with its ``edition`` for who asks for it.
 
         Parameters
         ----------
         state : mapping
             As `state_of` returns it.
         held : str or None
-            Edition that the page holds.
+            Edition that the page holds; None of who does not ask for editions.
 
         Returns
         -------
         dict
-            The whole state; where the edition is known what changed ``since`` it: ``values`` by
-            key, and of lists the ``rows`` that differ and the names of all in ``order``.
+            The whole state; where the edition held is known what changed ``since`` it: ``values``
+            by key, and of lists the ``rows`` that differ and the names of all in ``order``.
         """
+        if held is None:
+            return dict(state)
         words = _words(state)
         with self._lock:
-            before = self._kept.get(held or "")
+            before = self._kept.get(held)
             self._count += 1
-            edition = str(self._count)
+            edition = f"{self._server}.{self._count}"
             self._kept[edition] = words
             while len(self._kept) > _KEPT:
                 self._kept.popitem(last=False)

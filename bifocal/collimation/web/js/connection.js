@@ -75,12 +75,12 @@ export class Connection extends EventTarget {
 
   async refresh() {
     const answer = await call("api/state", { cache: "no-store", headers: this.#held() });
-    if (!this.#adopt(await answer.json())) this.#adopt(await (await call("api/state", { cache: "no-store" })).json());
+    if (!this.#adopt(await answer.json())) this.#adopt(await (await call("api/state", { cache: "no-store", headers: { "X-Edition": "none" } })).json());
   }
 
   /** Which edition of the state is here: the server then sends what changed since. */
   #held() {
-    return this.state?.edition ? { "X-Edition": this.state.edition } : {};
+    return { "X-Edition": this.state?.edition ?? "none" };
   }
 
   /** Send one command; resolves to its result, rejects with a Refusal in words. */
