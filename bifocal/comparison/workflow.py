@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -52,8 +53,8 @@ class ComparedFiles:
         if any(done.sigma_trend):
             sentences.append(f"Common    {1000 * done.trend[0]:+.2f} mm, taken off")
         sentences += [
-            f"Proven    from {1000 * half:.1f} mm over {area:.2g} m2 on half of the wall, "
-            f"{1000 * most:.1f} mm on nine tenths"
+            f"Proven    over {area:.2g} m2: {_least(half)} on half of the wall, "
+            f"{_least(most)} on nine tenths"
             for area, half, most in done.patches[1:3]
         ]
         sentences.append(f"Regions   {len(done.regions) or 'none: no change is proven'}")
@@ -80,6 +81,11 @@ class ComparedFiles:
             ],
             "folder": str(self.folder), "files": self.files, "remarks": done.remarks,
         }  # fmt: skip
+
+
+def _least(change: float) -> str:
+    """Say from which change on, or that none would be proven. [m]"""
+    return f"from {1000 * change:.1f} mm" if math.isfinite(change) else "none"
 
 
 def compare_files(

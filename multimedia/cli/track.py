@@ -30,7 +30,8 @@ class TrackCommand:
       --targets img/cam3. --targets img/cam4. --first 10001 \
       --out tracks.h5 --folder res
     multimedia track tank.toml --targets img/cam1. --targets img/cam2. \
-      --targets img/cam3. --calibrate tank2.toml --out tracks.csv
+      --targets img/cam3. --targets img/cam4. --first 10001 \
+      --calibrate tank2.toml --out tracks2.csv
     """
 
     project: ProjectOption

@@ -130,6 +130,8 @@ def test_what_would_have_been_found_is_found_where_the_wall_is_as_sure_as_it_say
     maps = [replace(one, r=one.r * coarse, sigma=one.sigma * coarse) for one in (before, after)]
     area, half, most = compare(*maps).patches[2]
     assert 2 * half < most < 4 * half
+    assert workflow._least(half) == f"from {1000 * half:.1f} mm"
+    assert workflow._least(np.inf) == "none"
     x, y = np.meshgrid(GRID.columns_x, GRID.rows_y)
     discs = [np.hypot(x - middle, y - 1.5) ** 2 < area / np.pi for middle in (0.9, 2.9)]
     moved = replace(maps[1], r=maps[1].r + 1.4 * half * np.any(discs, axis=0))
