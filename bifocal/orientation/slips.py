@@ -85,13 +85,14 @@ def slip_of(
     lenses, tables = [*_of_lenses(typed, free=by_control and not fits)], list[Slip]()
     if not fits:
         tables += _of_control(typed, now) if by_control else _of_site(typed)
-    explaining = _explaining([*lenses, *tables], fitted, now)
+    explaining = _explaining([(slip, fitted(slip.meant)) for slip in (*lenses, *tables)], now)
     if not explaining and (not fits or _may_be_parts(typed, now)):
-        explaining = _explaining(_of_crops(typed, by_control=by_control), fitted, now)
+        crops = [(slip, fitted(slip.meant)) for slip in _of_crops(typed, by_control=by_control)]
+        explaining = _explaining(crops, now)
         if now is not None and fits:
             explaining = [one for one in explaining if one[0] < now.misfit]
         if not explaining and by_control and now is not None:
-            explaining = _perhaps_crops(typed, now, fitted)
+            explaining = _perhaps_crops(typed, now, crops)
     if not explaining and tables and by_control and len(typed.control.ids) > 5:
         # Two at once, of a lens and of the table.
         both = (
@@ -99,7 +100,7 @@ def slip_of(
             for one in lenses
             for two in _of_control(one.meant, now or fitted(one.meant))
         )
-        explaining = _explaining(both, fitted, now)
+        explaining = _explaining([(slip, fitted(slip.meant)) for slip in both], now)
     if not explaining:
         return None
     least, best = min(explaining, key=lambda one: one[0])
@@ -108,14 +109,11 @@ def slip_of(
 
 
 def _explaining(
-    slips: Iterable[Slip],
-    fitted: Callable[[TypedOrientation], TrialOrientation | None],
-    now: TrialOrientation | None,
+    trials: Iterable[tuple[Slip, TrialOrientation | None]], now: TrialOrientation | None
 ) -> list[tuple[float, Slip]]:
     """Return the slips that explain a misfit, each with what is left of it."""
     explaining: list[tuple[float, Slip]] = []
-    for slip in slips:
-        tried = fitted(slip.meant)
+    for slip, tried in trials:
         if tried is not None and tried.explains(now):
             lying = sum(camera.rotation[0, 0] for camera in tried.cameras) < 0.7
             tilts = [np.rad2deg(np.arccos(-c.rotation[2, 2])) for c in tried.cameras]
@@ -201,7 +199,7 @@ def _of_crops(typed: TypedOrientation, *, by_control: bool) -> Iterator[Slip]:
 def _perhaps_crops(
     typed: TypedOrientation,
     now: TrialOrientation,
-    fitted: Callable[[TypedOrientation], TrialOrientation | None],
+    crops: Iterable[tuple[Slip, TrialOrientation | None]],
 ) -> list[tuple[float, Slip]]:
     """Return the doubt, nothing mended, where points fit as well if photos are parts.
 
@@ -211,8 +209,7 @@ def _perhaps_crops(
     if not all(i.is_assumed for i in typed.interiors):
         return []
     doubts: list[tuple[float, Slip]] = []
-    for slip in _of_crops(typed, by_control=True):
-        tried = fitted(slip.meant)
+    for _, tried in crops:
         if tried is None or tried.lost.any() or tried.misfit > now.misfit:
             continue
         places = [[float(c.centre[2]) for c in one.cameras] for one in (now, tried)]

@@ -136,7 +136,10 @@ def pose_steps(rows: FloatArray, damping: float) -> tuple[FloatArray, float]:
     scaled = of_pose * scale[:, None] * scale
     scaled.flat[::7] += damping + 1e-15
     # LAPACK itself: numpy's checks take longer than six unknowns.
-    step = -scale * dposv(scaled, scale * right)[1]
+    _, solution, failed = dposv(scaled, scale * right)
+    if failed:  # not positive by a rounding
+        solution = np.linalg.solve(scaled, scale * right)
+    step = -scale * solution
     return step, float(step @ of_pose @ step)
 
 
