@@ -37,8 +37,11 @@ class Assets:
 
         Otherwise it learns of each one only from the module that imports it, four deep.
         """
-        names = [name for name in self._files if name.startswith("js/") and name.count("/") == 1]
-        names += ["js/words/words.js", f"js/words/{language}.js"]
+        words = ("words", language)
+        names = [
+            name for name in self._files
+            if name.endswith(".js") and (not name.startswith("js/words/") or Path(name).stem in words)
+        ]  # fmt: skip
         links = "".join(f'<link rel="modulepreload" href="{name}">\n' for name in names)
         return self._files["index.html"].replace(_MODULES, links.encode())
 

@@ -1,4 +1,8 @@
-/** Build DOM nodes without markup strings: nothing a user types is ever parsed as HTML. */
+/**
+ * Markup and numbers. A view is a template of lit-html, rendered anew whenever something changes: only
+ * what differs is touched, so focus and typed text stay. Nothing a user types is ever parsed as HTML.
+ */
+export { Directive, directive, html, live, noChange, nothing, render, repeat, svg } from "./vendor/lit-html.js";
 
 /** `h("button", {class: "quiet", onclick: f, testid: "pick"}, "Pick")` */
 export function h(tag, attributes = {}, ...children) {

@@ -2,7 +2,7 @@
  * Fields that a person types into: a command is sent when the value has changed. What is refused
  * stays as it was typed, marked, until it is mended.
  */
-import { decimal, h, parseNumber } from "./dom.js";
+import { decimal, Directive, directive, h, html, live, noChange, nothing, parseNumber } from "./dom.js";
 import { t } from "./words/words.js";
 
 let count = 0;
@@ -77,3 +77,40 @@ export function choice({ label, options, value, save, ...attributes }) {
 export function button(text, onclick, attributes = {}) {
   return h("button", { type: "button", onclick, ...attributes }, text);
 }
+
+const filled = directive(class extends Directive {
+  update({ element }, [value, subject]) {
+    // What was refused for one is not another's.
+    if (subject !== this.subject) afresh([element]);
+    this.subject = subject;
+    fill(element, value);
+    return noChange;
+  }
+});
+
+function changed({ target: input }, numeric, save) {
+  const value = numeric ? parseNumber(input.value) : input.value.trim();
+  input.setCustomValidity(Number.isNaN(value) ? t("field.number") : "");
+  if (input.reportValidity() && input.value.trim() !== input.dataset.known) hand(input, value, save);
+}
+
+const field = (numeric) => ({ value, save = () => {}, subject, id, label, size, testid, placeholder, hidden = false }) => html`<input
+  type="text" inputmode=${numeric ? "decimal" : "text"} autocomplete="off" ${filled(value, subject)} id=${id ?? nothing}
+  aria-label=${label ?? nothing} size=${size ?? nothing} data-testid=${testid ?? nothing} placeholder=${placeholder ?? nothing} ?hidden=${hidden}
+  @change=${(event) => changed(event, numeric, save)} @input=${({ target }) => afresh([target])}>`;
+
+/** Fields for a text and for a number, `save(number or null)`; `subject`: whose value it is. */
+export const textField = field(false);
+export const numberField = field(true);
+
+/** A field of an id under its visible label, with its unit. */
+export const named = (text, id, input, unit = "") => html`<div class="field"><label for=${id}>${text}</label><span
+  class="with-unit">${input}${unit ? html`<span class="unit">${unit}</span>` : ""}</span></div>`;
+
+/** One of some: `options` are their words by key. */
+export const select = ({ options, value, save, id, label, testid }) => html`<select id=${id ?? nothing} aria-label=${label ?? nothing}
+  data-testid=${testid ?? nothing} @change=${({ target }) => save(target.value)}>${Object.entries(options).map(([key, text]) => html`<option
+  value=${key} .selected=${live(key === value)}>${text}</option>`)}</select>`;
+
+/** What deletes a row. */
+export const cross = (name, onclick) => html`<button type="button" class="icon" aria-label=${t("list.deleteOf", { name })} @click=${onclick}>×</button>`;

@@ -1,25 +1,14 @@
 /** Polylines with layers, and distances, heights and angles between points in space. */
-import { h, keyedRows, number, setText } from "./dom.js";
-import { button, fill, textInput } from "./fields.js";
+import { h, html, number, render, repeat } from "./dom.js";
+import { cross, textField } from "./fields.js";
 import { t } from "./words/words.js";
 
 const LAYERS = ["windows", "cornices", "doors", "edges"];
 
 export class Lines {
   constructor(app, picker) {
-    this.app = app;
-    this.picker = picker;
-    this.current = null;
-    this.first = null;
-    this.body = h("tbody");
-    this.state = h("p", { class: "hint", role: "status" });
-    this.layer = h("input", { type: "text", value: LAYERS[0], list: "layer-names", id: "line-layer" });
-    this.element = h("section", { class: "card" }, h("h2", {}, t("line.title")),
-      h("datalist", { id: "layer-names" }, LAYERS.map((name) => h("option", { value: name }))),
-      h("div", { class: "row" }, h("label", { for: "line-layer" }, t("line.layer")), this.layer,
-        button(t("line.new"), () => this.begin(), { class: "quiet", testid: "line-new" }),
-        button(t("line.add"), () => this.add(), { class: "quiet", testid: "line-add" })),
-      this.state, h("table", { class: "grid" }, this.body));
+    Object.assign(this, { app, picker, current: null, first: null });
+    this.element = h("section", { class: "card" });
   }
 
   get #line() {
@@ -43,7 +32,7 @@ export class Lines {
     if (!this.current) this.begin();
     const line = this.#line;
     const { points = this.first ? [this.first] : [], closed = false } = line ?? {};
-    const layer = line?.layer ?? (this.layer.value || LAYERS[0]);
+    const layer = line?.layer ?? (this.element.querySelector("#line-layer").value || LAYERS[0]);
     if (points.at(-1) === selected) return undefined;
     if (points.length > 2 && points[0] === selected) return this.#set({ layer, points, closed: true });
     this.first = points.length ? null : selected;
@@ -62,26 +51,23 @@ export class Lines {
   }
 
   update() {
-    const { lines } = this.app.state;
-    setText(this.state, this.current ? t("line.inHand", { name: this.current,
-      corners: this.#line?.points.join(" – ") ?? this.first ?? "" }) : t("line.hint"));
-    keyedRows(this.body, lines, { key: ({ name }) => name,
-      signature: (line) => JSON.stringify([line, line.name === this.current]),
-      build: (line) => this.#row(line) });
+    const inHand = this.#line?.points.join(" – ") ?? this.first ?? "";
+    render(html`<h2>${t("line.title")}</h2><datalist id="layer-names">${LAYERS.map((name) => html`<option value=${name}></option>`)}</datalist>
+      <div class="row"><label for="line-layer">${t("line.layer")}</label><input type="text" value=${LAYERS[0]} list="layer-names" id="line-layer">
+        <button type="button" class="quiet" data-testid="line-new" @click=${() => this.begin()}>${t("line.new")}</button>
+        <button type="button" class="quiet" data-testid="line-add" @click=${() => this.add()}>${t("line.add")}</button></div>
+      <p class="hint" role="status">${this.current ? t("line.inHand", { name: this.current, corners: inHand }) : t("line.hint")}</p>
+      <table class="grid"><tbody>${repeat(this.app.state.lines, ({ name }) => name, (line) => this.#row(line))}</tbody></table>`, this.element);
   }
 
-  #row(line) {
-    const { name, points, closed } = line;
-    const layer = textInput({ label: t("line.layerOf", { name }), size: "9",
-      save: (text) => this.app.send("line.set", { name, layer: text }) });
-    fill(layer, line.layer);
-    const close = h("input", { type: "checkbox", checked: closed, "aria-label": t("line.closed", { name }),
-      onchange: () => this.app.send("line.set", { name, closed: close.checked }) });
-    return h("tr", { "aria-selected": String(name === this.current) },
-      h("th", { scope: "row" }, button(name, () => { this.current = name; this.update(); }, { class: "link" })),
-      h("td", {}, layer), h("td", {}, points.join(" – ")), h("td", {}, close),
-      h("td", {}, button("×", () => this.app.send("line.delete", { name }),
-        { class: "icon", "aria-label": t("list.deleteOf", { name }) })));
+  #row({ name, points, closed, layer }) {
+    const set = (changes) => this.app.send("line.set", { name, ...changes });
+    return html`<tr aria-selected=${name === this.current}>
+      <th scope="row"><button type="button" class="link" @click=${() => { this.current = name; this.update(); }}>${name}</button></th>
+      <td>${textField({ label: t("line.layerOf", { name }), size: 9, value: layer, save: (text) => set({ layer: text }) })}</td>
+      <td>${points.join(" – ")}</td>
+      <td><input type="checkbox" .checked=${closed} aria-label=${t("line.closed", { name })} @change=${({ target }) => set({ closed: target.checked })}></td>
+      <td>${cross(name, () => this.app.send("line.delete", { name }))}</td></tr>`;
   }
 }
 
@@ -89,16 +75,8 @@ const MEASURES = [["distance", "m", 4, "sigma"], ["horizontal", "m", 4], ["verti
 
 export class Measure {
   constructor(app, picker) {
-    this.app = app;
-    this.picker = picker;
-    this.names = [];
-    this.chosen = h("p", { class: "hint", role: "status" });
-    this.values = h("dl", { class: "values", testid: "measures" });
-    this.element = h("section", { class: "card" }, h("h2", {}, t("measure.title")),
-      h("div", { class: "row" },
-        button(t("measure.add"), () => this.add(), { class: "quiet", testid: "measure-add" }),
-        button(t("measure.clear"), () => this.clear(), { class: "quiet" })),
-      this.chosen, this.values);
+    Object.assign(this, { app, picker, names: [] });
+    this.element = h("section", { class: "card" });
     this.show(null);
   }
 
@@ -135,10 +113,12 @@ export class Measure {
   }
 
   show(result) {
-    setText(this.chosen, this.names.length ? this.names.join(" → ") : t("measure.hint"));
-    this.values.replaceChildren(...MEASURES.filter(([key]) => Number.isFinite(result?.[key])).map(
-      ([key, unit, digits, sigma]) => h("div", {}, h("dt", {}, t(`measure.${key}`)), h("dd", {},
-        `${number(result[key], digits)}${sigma && Number.isFinite(result[sigma])
-          ? ` ± ${number(result[sigma], digits)}` : ""} ${unit}`))));
+    const spread = (key, digits) => (key && Number.isFinite(result[key]) ? ` ± ${number(result[key], digits)}` : "");
+    render(html`<h2>${t("measure.title")}</h2><div class="row">
+        <button type="button" class="quiet" data-testid="measure-add" @click=${() => this.add()}>${t("measure.add")}</button>
+        <button type="button" class="quiet" @click=${() => this.clear()}>${t("measure.clear")}</button></div>
+      <p class="hint" role="status">${this.names.join(" → ") || t("measure.hint")}</p>
+      <dl class="values" data-testid="measures">${MEASURES.filter(([key]) => Number.isFinite(result?.[key])).map(([key, unit, digits, sigma]) => html`<div>
+        <dt>${t(`measure.${key}`)}</dt><dd>${number(result[key], digits)}${spread(sigma, digits)} ${unit}</dd></div>`)}</dl>`, this.element);
   }
 }

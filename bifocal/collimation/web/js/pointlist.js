@@ -1,6 +1,5 @@
 /** All points: sorted by any column, named, found, deleted. */
-import { h, keyedRows, number, setText } from "./dom.js";
-import { button } from "./fields.js";
+import { h, html, number, render, repeat } from "./dom.js";
 import { isWarning } from "./readout.js";
 import { t } from "./words/words.js";
 
@@ -27,29 +26,13 @@ function compare(a, b, down) {
 export class PointList {
   /** `tools`: what stands beside the heading; `progress`: below it. */
   constructor(app, picker, tools, progress) {
-    this.app = app;
-    this.picker = picker;
-    this.sort = { column: null, down: false };
-    this.body = h("tbody");
-    this.heads = COLUMNS.map(([key]) => h("th", { scope: "col", "aria-sort": "none" },
-      h("button", { type: "button", class: "sort", onclick: () => this.#sortBy(key) }, t(`list.${key}`))));
-    this.count = h("span", { class: "count" });
-    this.table = h("table", { class: "grid points", testid: "point-list" },
-      h("caption", { class: "unseen" }, t("list.title")),
-      h("thead", {}, h("tr", {}, this.heads)), this.body);
-    this.doubts = button("", () => this.step(1, this.doubtful), { class: "quiet warn", testid: "next-doubtful",
-      title: `${t("key.doubtful")} (Y)` });
-    this.element = h("section", { class: "card list" },
-      h("div", { class: "row between" }, h("h2", {}, t("list.title"), " ", this.count),
-        h("span", { class: "row" }, this.doubts, tools)), progress, h("div", { class: "scroll" }, this.table));
-    this.table.addEventListener("keydown", (event) => this.#key(event));
+    Object.assign(this, { app, picker, tools, progress, sort: { column: null, down: false } });
+    this.element = h("section", { class: "card list" });
   }
 
   #sortBy(column) {
     const down = this.sort.column === column ? !this.sort.down : false;
     this.sort = { column, down };
-    this.heads.forEach((head, index) => head.setAttribute("aria-sort",
-      COLUMNS[index][0] === column ? (down ? "descending" : "ascending") : "none"));
     this.update();
   }
 
@@ -67,30 +50,36 @@ export class PointList {
   }
 
   update() {
-    const { doubtful, order } = this;
-    setText(this.count, String(order.length));
-    this.doubts.hidden = !doubtful.length;
-    setText(this.doubts, t("list.doubtful", { count: doubtful.length }));
-    keyedRows(this.body, order, { key: ({ name }) => name,
-      signature: (item) => COLUMNS.map(([, value]) => value(item)).join("\t"),
-      build: (item) => this.#row(item) });
-    this.mark();
+    const { doubtful, order, sort } = this;
+    this.marked = this.picker.selected;
+    const sorted = (key) => (key !== sort.column ? "none" : sort.down ? "descending" : "ascending");
+    render(html`<div class="row between"><h2>${t("list.title")} <span class="count">${order.length}</span></h2><span class="row">
+        <button type="button" class="quiet warn" data-testid="next-doubtful" title="${t("key.doubtful")} (Y)" ?hidden=${!doubtful.length}
+          @click=${() => this.step(1, this.doubtful)}>${t("list.doubtful", { count: doubtful.length })}</button>${this.tools}</span></div>
+      ${this.progress}
+      <div class="scroll"><table class="grid points" data-testid="point-list" @keydown=${(event) => this.#key(event)}>
+        <caption class="unseen">${t("list.title")}</caption>
+        <thead><tr>${COLUMNS.map(([key]) => html`<th scope="col" aria-sort=${sorted(key)}><button type="button" class="sort"
+          @click=${() => this.#sortBy(key)}>${t(`list.${key}`)}</button></th>`)}</tr></thead>
+        <tbody>${repeat(order, ({ name }) => name, (item) => this.#row(item))}</tbody></table></div>`, this.element);
   }
 
+  /** Mark the point in hand, and scroll to it. */
   mark() {
-    const { selected } = this.picker;
-    if (this.marked?.dataset.key !== selected || !this.marked?.isConnected) {
-      this.marked?.setAttribute("aria-selected", "false");
-      this.marked = selected && [...this.body.children].find((row) => row.dataset.key === selected);
-      this.marked?.setAttribute("aria-selected", "true");
-      if (this.marked) this.#show(this.marked);
-    }
+    if (this.marked === this.picker.selected) return;
+    this.update();
+    if (this.row) this.#show(this.row);
+  }
+
+  get row() {
+    return this.element.querySelector("tr[aria-selected=true]");
   }
 
   /** Scroll the list, never the page, until a row is seen. */
   #show(row) {
-    const { parentElement: box } = this.table;
-    const head = this.table.tHead.offsetHeight;
+    const table = row.closest("table");
+    const { parentElement: box } = table;
+    const head = table.tHead.offsetHeight;
     const above = row.offsetTop - head - box.scrollTop;
     const below = row.offsetTop + row.offsetHeight - box.scrollTop - box.clientHeight;
     if (above < 0) box.scrollTop += above;
@@ -99,19 +88,16 @@ export class PointList {
 
   #row(item) {
     const { name } = item;
-    const cells = COLUMNS.map(([key, value]) => {
-      if (key === "name") {
-        return h("th", { scope: "row" }, h("button", { type: "button", class: "link",
-          "aria-label": t("list.flyTo", { name }), title: name, onclick: () => this.#take(name) }, name));
-      }
+    const cells = COLUMNS.slice(1).map(([key, value]) => {
       const content = value(item);
-      if (key in DIGITS) return h("td", { class: "number" }, number(content, DIGITS[key]));
-      const text = key === "type" ? t(`type.${content}`) : content;
-      return h("td", { class: key === "flag" && content !== "…" && isWarning(content) ? "warn" : "" }, text);
+      if (key in DIGITS) return html`<td class="number">${number(content, DIGITS[key])}</td>`;
+      if (key === "type") return html`<td>${t(`type.${content}`)}</td>`;
+      return html`<td class=${content !== "…" && isWarning(content) ? "warn" : ""}>${content}</td>`;
     });
-    return h("tr", { "aria-selected": "false", onclick: ({ target }) => {
-      if (target.tagName !== "BUTTON") this.picker.select(name);
-    }, ondblclick: () => this.#take(name) }, cells);
+    return html`<tr data-key=${name} aria-selected=${name === this.picker.selected} @dblclick=${() => this.#take(name)}
+      @click=${({ target }) => { if (target.tagName !== "BUTTON") this.picker.select(name); }}>
+      <th scope="row"><button type="button" class="link" aria-label=${t("list.flyTo", { name })} title=${name}
+        @click=${() => this.#take(name)}>${name}</button></th>${cells}</tr>`;
   }
 
   #take(name) {
@@ -125,7 +111,7 @@ export class PointList {
     event.preventDefault();
     event.stopPropagation();
     this.step(step);
-    this.marked?.querySelector("button").focus();
+    this.row?.querySelector("button").focus();
   }
 
   /** The next or previous point of some, in the order shown. */

@@ -161,8 +161,9 @@ export class PointsStage {
   }
 
   rename() {
-    this.readout.name.focus();
-    this.readout.name.select();
+    const field = this.readout.element.querySelector("[data-testid=point-name]");
+    field?.focus();
+    field?.select();
   }
 
   #draw(context, pane) {

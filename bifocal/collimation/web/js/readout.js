@@ -1,7 +1,7 @@
 /** The point in hand: its name, type, reference and everything that follows from its picks. */
-import { h, number, setText } from "./dom.js";
-import { afresh, button, choice, fill, labelled, numberInput, textInput } from "./fields.js";
-import { sketched } from "./sketches.js";
+import { h, html, number, render } from "./dom.js";
+import { named, numberField, select, textField } from "./fields.js";
+import { sketch } from "./sketches.js";
 import { t } from "./words/words.js";
 
 /** Standard deviation from which millimetres are enough. [m] */
@@ -14,29 +14,8 @@ const VALUES = [
 
 export class Readout {
   constructor(app, picker) {
-    this.app = app;
-    this.picker = picker;
-    const { send } = app;
-    this.name = textInput({ label: t("point.name"), testid: "point-name",
-      save: (text) => text && this.#rename(text) });
-    this.type = choice({ label: t("point.type"), testid: "point-type",
-      options: Object.fromEntries([...TYPES, "doubtful"].map((type) => [type, t(`type.${type}`)])),
-      save: (type) => send("point.type", { name: picker.selected, type }) });
-    this.reference = Object.fromEntries(["X", "Y", "r"].map((key) => [key, numberInput({
-      label: t("point.reference", { key }), size: "7", save: (value) => this.#refer(key, value) })]));
-    this.cells = Object.fromEntries(VALUES.map(([key]) => [key, h("dd", { testid: `value-${key}` })]));
-    this.flag = h("p", { class: "flag", testid: "value-flag" });
-    this.fields = h("div", { class: "fields" }, labelled(t("point.name"), this.name),
-      labelled(t("point.type"), this.type));
-    this.references = h("div", { class: "fields three" }, Object.entries(this.reference)
-      .map(([key, input]) => labelled(t("point.reference", { key }), input, "m")));
-    this.values = h("dl", { class: "values" }, VALUES.map(([key]) =>
-      h("div", { class: key === "r" ? "main" : "" }, sketched(h("dt", {}, t(`value.${key}`)), key), this.cells[key])));
-    this.empty = h("p", { class: "hint" }, t("point.none"));
-    this.remove = button(t("pick.delete"), () => app.stages.points.remove(), { class: "quiet", testid: "point-delete" });
-    this.foot = h("div", { class: "row between" }, this.flag, this.remove);
-    this.element = h("section", { class: "card readout", "aria-label": t("point.inHand") },
-      this.empty, this.fields, this.values, this.references, this.foot);
+    Object.assign(this, { app, picker });
+    this.element = h("section", { class: "card readout", "aria-label": t("point.inHand") });
   }
 
   /** The point stays in hand under its new name. */
@@ -51,35 +30,34 @@ export class Readout {
     }
   }
 
-  #refer(key, value) {
-    const { item } = this.picker;
-    return this.app.send("point.reference", { name: item.name, [key]: value });
-  }
-
   update() {
     const { item } = this.picker;
-    this.empty.hidden = Boolean(item);
-    for (const part of [this.fields, this.values, this.foot]) part.hidden = !item;
-    this.references.hidden = !item || !["check", "control"].includes(item.type);
-    // What was refused for one point is not another's.
-    if (item?.name !== this.shown) afresh([this.name, ...Object.values(this.reference)]);
-    this.shown = item?.name;
-    if (!item) return;
-    fill(this.name, item.name);
-    this.type.value = item.type;
-    for (const [key, input] of Object.entries(this.reference)) fill(input, item.reference?.[key]);
-    const result = item.result ?? {};
-    for (const [key, unit, most, sigma] of VALUES) {
-      // Tenths of a millimetre only where they mean something.
-      const digits = result[sigma] > COARSE ? 3 : most;
-      const value = number(result[key], digits);
-      const shown = unit === "mm" ? this.app.state.length_unit ?? unit : unit;
-      const spread = sigma && Number.isFinite(result[sigma]) ? ` ± ${number(result[sigma], digits)}` : "";
-      setText(this.cells[key], value === "–" ? value : `${value}${spread} ${shown}`);
-    }
-    const flag = result.flag ?? null;
-    setText(this.flag, item.result ? flagWords(flag, result.uncertain_area) : t("flag.incomplete"));
-    this.flag.dataset.level = !item.result ? "open" : isWarning(flag) ? "warn" : "good";
+    render(item ? this.#point(item) : html`<p class="hint">${t("point.none")}</p>`, this.element);
+  }
+
+  #point({ name, type, reference, result }) {
+    const { send, stages } = this.app;
+    const options = Object.fromEntries([...TYPES, "doubtful"].map((key) => [key, t(`type.${key}`)]));
+    return html`<div class="fields">${named(t("point.name"), "point-name", textField({ id: "point-name", testid: "point-name", value: name,
+        subject: name, save: (text) => text && this.#rename(text) }))}
+      ${named(t("point.type"), "point-type", select({ id: "point-type", testid: "point-type", options, value: type,
+        save: (key) => send("point.type", { name, type: key }) }))}</div>
+      <dl class="values">${VALUES.map((row) => html`<div class=${row[0] === "r" ? "main" : ""}><dt ${sketch(row[0])}>${t(`value.${row[0]}`)}</dt>
+        <dd data-testid="value-${row[0]}">${this.#value(result ?? {}, ...row)}</dd></div>`)}</dl>
+      ${["check", "control"].includes(type) ? html`<div class="fields three">${["X", "Y", "r"].map((key) => named(t("point.reference", { key }),
+        `reference-${key}`, numberField({ id: `reference-${key}`, size: 7, value: reference?.[key], subject: name,
+          save: (value) => send("point.reference", { name, [key]: value }) }), "m"))}</div>` : ""}
+      <div class="row between"><p class="flag" data-testid="value-flag" data-level=${!result ? "open" : isWarning(result.flag) ? "warn" : "good"}>${
+        result ? flagWords(result.flag, result.uncertain_area) : t("flag.incomplete")}</p>
+        <button type="button" class="quiet" data-testid="point-delete" @click=${() => stages.points.remove()}>${t("pick.delete")}</button></div>`;
+  }
+
+  #value(result, key, unit, most, sigma) {
+    // Tenths of a millimetre only where they mean something.
+    const digits = result[sigma] > COARSE ? 3 : most;
+    const value = number(result[key], digits);
+    const spread = sigma && Number.isFinite(result[sigma]) ? ` ± ${number(result[sigma], digits)}` : "";
+    return value === "–" ? value : `${value}${spread} ${unit === "mm" ? this.app.state.length_unit ?? unit : unit}`;
   }
 }
 

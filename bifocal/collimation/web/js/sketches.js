@@ -1,5 +1,5 @@
 /** Words of the trade as small pictures: on hover and focus, beside what they name. */
-import { h } from "./dom.js";
+import { Directive, directive, h, noChange } from "./dom.js";
 import { t } from "./words/words.js";
 
 const SPACE = "http://www.w3.org/2000/svg";
@@ -39,6 +39,15 @@ export function sketched(node, name) {
   }
   return node;
 }
+
+/** The same in a template: `<dt ${sketch("r")}>`. */
+export const sketch = directive(class extends Directive {
+  update({ element }, [name]) {
+    if (!this.done) sketched(element, name);
+    this.done = true;
+    return noChange;
+  }
+});
 
 function drawn(name) {
   const [paths, letter, [x, y]] = SKETCHES[name];
