@@ -83,7 +83,7 @@ const filled = directive(class extends Directive {
     // What was refused for one is not another's.
     if (subject !== this.subject) afresh([element]);
     this.subject = subject;
-    fill(element, value);
+    if (value !== noChange) fill(element, value);
     return noChange;
   }
 });

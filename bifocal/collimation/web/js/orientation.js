@@ -2,22 +2,30 @@
  * Stage 2: control points and tape distances beside the two photos, what they say of the pair, and
  * what would help most next.
  */
-import { h, keyedRows, number, parseNumber, setText } from "./dom.js";
+import { h, html, nothing, number, parseNumber, render, repeat } from "./dom.js";
 import * as drawing from "./drawing.js";
-import { button, fill, numberInput, textInput } from "./fields.js";
+import { cross, numberField, textField } from "./fields.js";
 import { asTaken } from "./geometry.js";
 import { Loupe } from "./loupe.js";
 import { mediaWords } from "./media.js";
 import { Picker } from "./picker.js";
-import { sketched } from "./sketches.js";
+import { sketch } from "./sketches.js";
 import { photoMark } from "./tiles.js";
 import { Pane, pixelView, spread, tileLayer } from "./viewer.js";
 import { WallCard } from "./wallcard.js";
 import { t } from "./words/words.js";
 
 const COORDINATES = ["X", "Y", "r"];
+const CONTROL = ["control.name", "control.X", "control.Y", "control.r", "control.seen", "control.residual"];
+const TAPE = ["tape.from", "tape.to", "tape.length", "tape.sigma"];
 /** Residuals are drawn so many times as long as they are. */
 const STRETCHED = 40;
+
+const heads = (keys) => html`<thead><tr>${keys.map((key) => html`<th scope="col">${t(key)}</th>`)}<th><span
+  class="unseen">${t("list.delete")}</span></th></tr></thead>`;
+
+const levelled = (kind, lines, levels) => html`<ul class=${kind}>${lines.map((text) => html`<li
+  data-level=${levels[text] ?? nothing}>${text}</li>`)}</ul>`;
 
 export class OrientationStage {
   constructor(app) {
@@ -28,35 +36,24 @@ export class OrientationStage {
       items: () => app.state.control, panes: () => this.panes });
     app.listen(this.picker, () => this.refresh(), () => this.#look());
     this.wallCard = new WallCard(this);
-    this.actions = { align: () => this.align.click(), accept: () => this.accept(), control: () => this.#fresh(),
+    this.actions = { align: () => app.job("align"), accept: () => this.accept(), control: () => this.#fresh(),
       length: () => this.wallCard.arm("length") };
-    this.targets = button(t("control.targets"), () => app.job("targets"), { class: "quiet", testid: "targets" });
+    this.jobs = Object.fromEntries(["targets", "align"].map((kind) => [kind, app.jobBox(kind)]));
     this.photos = h("div", { class: "viewer two" });
-    this.body = h("tbody");
-    this.tapes = h("tbody");
-    this.advice = h("ul", { class: "advice" });
-    this.further = h("ul", { class: "advice" });
-    this.furtherCount = h("summary", {});
-    this.furtherFold = h("details", { testid: "further" }, this.furtherCount, this.further);
-    this.remarks = h("ul", { class: "remarks" });
-    this.known = h("dl", { class: "values one", testid: "orientation-values" });
-    this.align = button(t("align.run"), () => app.job("align"), { class: "primary", testid: "align" });
-    this.acceptAlign = button(t("align.accept"), () => this.accept(), { testid: "align-accept" });
-    this.good = h("p", { class: "good", role: "status", testid: "how-good" });
-    this.target = h("p", { class: "target", role: "status" });
     this.exchangePlace = h("div", { class: "row" });
-    this.element = h("div", { class: "stage work", id: "stage-orientation" }, this.photos,
-      h("aside", { class: "side" }, h("div", { class: "panel" }, this.target, this.wallCard.element, this.wallCard.checkCard, this.loupe.element,
-        this.#controlTable(), this.#tapeTable(), this.#tellResult(), this.exchangePlace), this.#result()));
+    this.side = h("aside", { class: "side" });
+    this.element = h("div", { class: "stage work", id: "stage-orientation" }, this.photos, this.side);
   }
 
-  #controlButtons() {
-    const { picker } = this;
-    return h("div", { class: "buttons" },
-      button(t("control.new"), () => this.#fresh(), { class: "quiet", testid: "control-new" }),
-      button(t("pick.snap"), () => picker.snap(), { class: "quiet", testid: "control-snap" }),
-      button(t("control.paste"), () => this.#paste(), { class: "quiet", testid: "control-paste" }),
-      this.targets);
+  #side(state) {
+    const { target, picking } = this.picker;
+    const { asks } = this.wallCard;
+    // What the program is about asks for no click.
+    const busy = Boolean(state.looking) && !state.pair && !state.control.length;
+    const words = { name: target.name ?? t("control.newName"), image: target.image };
+    return html`<div class="panel"><p class="target ${asks ? "asked" : ""}" role="status" ?hidden=${busy}>${asks || (picking ? t("pick.next", words) : t("pick.off"))}</p>
+      ${this.wallCard.element}${this.wallCard.checkCard}${this.loupe.element}
+      ${this.#control(state)}${this.#tapes(state)}${this.#known(state)}${this.exchangePlace}</div>${this.#next(state, busy)}`;
   }
 
   #fresh() {
@@ -64,48 +61,51 @@ export class OrientationStage {
     this.picker.fresh(1);
   }
 
-  #controlTable() {
-    const heads = ["control.name", "control.X", "control.Y", "control.r", "control.seen", "control.residual"];
-    this.table = h("table", { class: "grid", testid: "control-table" },
-      h("thead", {}, h("tr", {}, heads.map((key) => h("th", { scope: "col" }, t(key))),
-        h("th", {}, h("span", { class: "unseen" }, t("list.delete"))))), this.body);
-    return h("section", { class: "card", onpaste: (event) => this.#pasted(event) }, h("h2", {}, t("control.title")),
-      this.#controlButtons(), this.app.jobBox("targets"), h("p", { class: "hint" }, t("control.hint")), this.table);
+  #control({ control, pair }) {
+    return html`<section class="card" @paste=${(event) => this.#pasted(event)}><h2>${t("control.title")}</h2><div class="buttons">
+        <button type="button" class="quiet" data-testid="control-new" @click=${() => this.#fresh()}>${t("control.new")}</button>
+        <button type="button" class="quiet" data-testid="control-snap" @click=${() => this.picker.snap()}>${t("pick.snap")}</button>
+        <button type="button" class="quiet" data-testid="control-paste" @click=${() => this.#paste()}>${t("control.paste")}</button>
+        <button type="button" class="quiet" data-testid="targets" ?disabled=${!pair} @click=${() => this.app.job("targets")}>${t("control.targets")}</button></div>
+      ${this.jobs.targets}<p class="hint">${t("control.hint")}</p>
+      <table class="grid" data-testid="control-table" ?hidden=${!control.length}>${heads(CONTROL)}<tbody>${
+        repeat(control, ({ name }) => name, (item) => this.#controlRow(item))}</tbody></table></section>`;
   }
 
-  #tapeTable() {
-    const heads = ["tape.from", "tape.to", "tape.length", "tape.sigma"];
-    const inputs = heads.map((key, index) => h("input", { type: "text", "aria-label": t(key),
-      placeholder: t(key).replace(/ ?\[.*/, ""), inputmode: index > 1 ? "decimal" : "text", testid: `tape-${index}` }));
-    const add = async () => {
-      const typed = inputs.map(({ value }) => value);
-      const [from, to, ...numbers] = typed.map((value) => value.trim());
-      const length = parseNumber(numbers[0]);
-      if (!from || !to || !(length > 0)) return this.app.say(t("tape.incomplete"), "warning");
-      const accepted = await this.app.send("tape.set", { from, to, length, sigma: numbers[1] || null });
-      // A refused tape stays to be mended; so does one typed meanwhile.
-      if (!accepted || inputs.some(({ value }, index) => value !== typed[index])) return undefined;
-      for (const input of inputs) input.value = "";
-      return inputs[0].focus();
-    };
-    this.tapeTable = h("table", { class: "grid" }, h("thead", {}, h("tr", {},
-      heads.map((key) => h("th", { scope: "col" }, t(key))), h("th", {}, h("span", { class: "unseen" }, t("list.delete"))))), this.tapes);
-    return h("section", { class: "card" }, h("h2", {}, t("tape.title")), this.tapeTable,
-      h("form", { class: "row add", onsubmit: (event) => { event.preventDefault(); add(); } },
-        inputs, h("button", { type: "submit", class: "quiet", testid: "tape-add" }, t("tape.add"))));
+  #tapes({ tapes }) {
+    return html`<section class="card"><h2>${t("tape.title")}</h2>
+      <table class="grid" ?hidden=${!tapes.length}>${heads(TAPE)}<tbody>${repeat(tapes, ({ from, to }) => `${from}\t${to}`, (tape) => this.#tapeRow(tape))}</tbody></table>
+      <form class="row add" @submit=${(event) => { event.preventDefault(); this.#addTape(event.target); }}>${TAPE.map((key, index) => html`<input type="text"
+        aria-label=${t(key)} placeholder=${t(key).replace(/ ?\[.*/, "")} inputmode=${index > 1 ? "decimal" : "text"} data-testid="tape-${index}">`)}
+        <button type="submit" class="quiet" data-testid="tape-add">${t("tape.add")}</button></form></section>`;
   }
 
-  #tellResult() {
-    this.remarkCount = h("summary", {});
-    this.fold = h("details", { testid: "align-remarks" }, this.remarkCount, this.remarks);
-    this.tell = h("section", { class: "card" }, h("h2", {}, t("known.title")), this.known, this.fold);
-    return this.tell;
+  async #addTape(form) {
+    const inputs = [...form.querySelectorAll("input")];
+    const typed = inputs.map(({ value }) => value);
+    const [from, to, ...numbers] = typed.map((value) => value.trim());
+    const length = parseNumber(numbers[0]);
+    if (!from || !to || !(length > 0)) return this.app.say(t("tape.incomplete"), "warning");
+    const accepted = await this.app.send("tape.set", { from, to, length, sigma: numbers[1] || null });
+    // A refused tape stays to be mended; so does one typed meanwhile.
+    if (!accepted || inputs.some(({ value }, index) => value !== typed[index])) return undefined;
+    form.reset();
+    return inputs[0].focus();
   }
 
-  /** What is to be done next stays in sight below the panel, however long the table. */
-  #result() {
-    return h("section", { class: "card next" }, h("h2", {}, t("align.title")), this.advice, this.good,
-      h("div", { class: "row" }, this.align, this.acceptAlign), this.app.jobBox("align"), this.furtherFold);
+  /** What is to be done next stays in sight below the panel, however long the table; the rest is folded. */
+  #next({ pair, steps, advice, levels, good }, busy) {
+    const proposed = pair?.accepted === false;
+    const ahead = advice.filter((text, index) => text === steps.orientation.text || (!index && levels[text]));
+    const further = advice.filter((text) => !ahead.includes(text));
+    return html`<section class="card next"><h2>${t("align.title")}</h2>${levelled("advice", ahead, levels)}
+      <p class="good" role="status" data-testid="how-good" ?hidden=${!good}>${good}</p>
+      <div class="row"><button type="button" class=${pair?.current ? "" : "primary"} data-testid="align" ?hidden=${busy}
+          @click=${this.actions.align}>${t(pair?.report?.free_scale ? "align.refine" : "align.run")}</button>
+        <button type="button" class=${proposed && pair.scaled && pair.current ? "primary" : ""} data-testid="align-accept" ?hidden=${!proposed}
+          ?disabled=${!pair?.scaled} @click=${this.actions.accept}>${t("align.accept")}</button></div>${this.jobs.align}
+      <details data-testid="further" ?hidden=${!further.length}><summary>${t("advice.further", { count: further.length })}</summary>${
+        levelled("advice", further, levels)}</details></section>`;
   }
 
   /** What is accepted is done: the points come next. */
@@ -197,103 +197,49 @@ export class OrientationStage {
     this.prepare(state).catch((error) => this.app.refuse(error));
     this.picker.settle();
     this.wallCard.update(state);
-    this.targets.disabled = !state.pair;
-    setText(this.good, state.good ?? "");
-    this.good.hidden = !state.good;
-    keyedRows(this.body, state.control, { key: ({ name }) => name,
-      signature: (item) => JSON.stringify([item, item.name === this.picker.selected]),
-      build: (item) => this.#controlRow(item) });
-    keyedRows(this.tapes, state.tapes, { key: ({ from, to }) => `${from}\t${to}`,
-      signature: JSON.stringify, build: (tape) => this.#tapeRow(tape) });
-    // What is grave and what comes next stand there; the rest is folded.
-    const { text: sentence } = state.steps.orientation;
-    const ahead = state.advice.filter((text, index) => text === sentence || (!index && state.levels[text]));
-    const further = state.advice.filter((text) => !ahead.includes(text));
-    setText(this.furtherCount, t("advice.further", { count: further.length }));
-    this.furtherFold.hidden = !further.length;
-    for (const [list, lines] of [[this.advice, ahead], [this.further, further], [this.remarks, state.pair?.remarks ?? []]]) {
-      keyedRows(list, lines, { key: (text) => text, signature: (text) => `${state.levels[text]} ${text}`,
-        build: (text) => h("li", { "data-level": state.levels[text] }, text) });
-    }
-    const remarks = state.pair?.remarks?.length ?? 0;
-    this.fold.hidden = !remarks;
-    setText(this.remarkCount, t("known.remarks", { count: remarks }));
-    this.#tellKnown(state);
-    this.tell.hidden = !remarks && !this.known.children.length;
-    this.table.hidden = !state.control.length;
-    this.tapeTable.hidden = !state.tapes.length;
-    this.acceptAlign.hidden = !state.pair || state.pair.accepted !== false;
-    this.acceptAlign.disabled = !state.pair || state.pair.accepted !== false || !state.pair.scaled;
-    setText(this.align, t(state.pair?.report?.free_scale ? "align.refine" : "align.run"));
-    this.align.classList.toggle("primary", !state.pair?.current);
-    // What the program is about asks for no click.
-    const busy = Boolean(state.looking) && !state.pair && !state.control.length;
-    this.align.hidden = this.target.hidden = busy;
-    // The next step stands out.
-    const current = !this.acceptAlign.disabled && state.pair.current;
-    this.acceptAlign.classList.toggle("primary", current);
     this.refresh();
   }
 
-  /** Distances and nadirs with their sigmas: of the proposal, else of the control points alone. */
-  #tellKnown({ pair, live }) {
-    const facts = JSON.stringify([pair?.images.map(({ distance, media }) => [distance, media]), pair?.report?.standard_deviations, live]);
-    if (facts === this.facts) return;
-    this.facts = facts;
+  /** Distances, nadirs and media with their sigmas: of the proposal, else of the control points alone. */
+  #known({ pair, live, levels }) {
+    const remarks = pair?.remarks ?? [];
     const distances = pair?.images.map(({ distance }) => distance) ?? live?.distances ?? [];
     const sigmas = pair?.report?.standard_deviations ?? live?.deviations ?? {};
+    const media = pair?.images.map((image) => image.media) ?? [];
+    const spread = (sigma) => (Number.isFinite(sigma) ? `± ${number(sigma, 3)}` : "");
     const rows = distances.flatMap((distance, index) => [
-      [t("known.distance", { image: index + 1 }), distance, sigmas[`distance${index + 1}`]],
-      [t("known.nadir", { image: index + 1 }), null, sigmas[`nadir${index + 1}`]]]);
-    this.known.replaceChildren(...rows.filter(([, value, sigma]) => value !== null || Number.isFinite(sigma))
-      .map(([name, value, sigma]) => h("div", {}, value === null ? sketched(h("dt", {}, name), "nadir") : h("dt", {}, name), h("dd", {},
-        `${value === null ? "" : number(value, 3)}${Number.isFinite(sigma) ? ` ± ${number(sigma, 3)}` : ""} m`.trim()))));
-    this.#tellMedia(pair?.images.map(({ media }) => media) ?? [], sigmas);
-  }
-
-  /** What the pair looks through, and where that begins. */
-  #tellMedia(seen, sigmas) {
-    if (!seen[0]) return;
-    const rows = [[t("known.media"), mediaWords(seen[0], sigmas)],
-      ...seen.map(({ z0 }, index) => [t("known.interface", { image: index + 1 }), `${number(z0, 3)} m`])];
-    this.known.append(...rows.map(([name, text]) => h("div", {}, h("dt", {}, name), h("dd", {}, text))));
+      [t("known.distance", { image: index + 1 }), `${number(distance, 3)} ${spread(sigmas[`distance${index + 1}`])} m`],
+      [t("known.nadir", { image: index + 1 }), spread(sigmas[`nadir${index + 1}`]) && `${spread(sigmas[`nadir${index + 1}`])} m`, "nadir"]]);
+    if (media[0]) {
+      rows.push([t("known.media"), mediaWords(media[0], sigmas)],
+        ...media.map(({ z0 }, index) => [t("known.interface", { image: index + 1 }), `${number(z0, 3)} m`]));
+    }
+    return html`<section class="card" ?hidden=${!remarks.length && !rows.length}><h2>${t("known.title")}</h2>
+      <dl class="values one" data-testid="orientation-values">${rows.filter(([, text]) => text).map(([name, text, picture]) => html`<div>${
+        picture ? html`<dt ${sketch(picture)}>${name}</dt>` : html`<dt>${name}</dt>`}<dd>${text}</dd></div>`)}</dl>
+      <details data-testid="align-remarks" ?hidden=${!remarks.length}><summary>${t("known.remarks", { count: remarks.length })}</summary>${
+        levelled("remarks", remarks, levels)}</details></section>`;
   }
 
   #controlRow(item) {
-    const { name } = item;
-    const save = (key) => (value) => this.app.send("control.set", { name, [key]: value });
-    const inputs = COORDINATES.map((key) => {
-      const input = numberInput({ label: `${key} ${name}`, save: save(key), size: "6" });
-      fill(input, item[key]);
-      return h("td", {}, input);
-    });
-    const label = textInput({ label: t("control.name"), size: "5",
-      save: (text) => this.app.send("control.rename", { name, new: text }) });
-    fill(label, name);
-    const seen = [1, 2].map((image) => h("button", { type: "button",
-      class: `chip ink-${image}${item.picks[image] ? " on" : ""}`,
-      "aria-label": t(item.picks[image] ? "control.again" : "control.pickIn", { name, image }),
-      onclick: () => { this.wallCard.dismiss(); this.picker.select(name); this.picker.aim(image); this.#fly(item, image); } },
-    item.picks[image] ? `${image} ✓` : `${image}`));
-    const worst = Math.max(...[1, 2].map((image) => Math.hypot(...(item.residual?.[image] ?? [NaN]))).filter(Number.isFinite), -1);
-    const use = h("input", { type: "checkbox", checked: item.use, "aria-label": t("control.use", { name }),
-      title: t("control.use", { name }), onchange: () => this.app.send("control.use", { name, use: use.checked }) });
-    const remove = button("×", () => this.app.send("control.delete", { name }),
-      { class: "icon", "aria-label": t("list.deleteOf", { name }) });
-    const row = h("tr", { "aria-selected": String(name === this.picker.selected),
-      onfocusin: () => { if (this.picker.selected !== name) this.picker.select(name); } },
-    h("td", {}, label), inputs, h("td", { class: "seen" }, seen),
-    h("td", { class: "number" }, worst < 0 ? "–" : number(worst, 2)), h("td", { class: "seen" }, use, remove));
-    return row;
+    const { name, picks, residual, use } = item;
+    const send = (op, values) => this.app.send(`control.${op}`, { name, ...values });
+    const worst = Math.max(...[1, 2].map((image) => Math.hypot(...(residual?.[image] ?? [NaN]))).filter(Number.isFinite), -1);
+    const aim = (image) => { this.wallCard.dismiss(); this.picker.select(name); this.picker.aim(image); this.#fly(item, image); };
+    return html`<tr data-key=${name} aria-selected=${name === this.picker.selected}
+      @focusin=${() => { if (this.picker.selected !== name) this.picker.select(name); }}>
+      <td>${textField({ label: t("control.name"), size: 5, value: name, save: (text) => send("rename", { new: text }) })}</td>
+      ${COORDINATES.map((key) => html`<td>${numberField({ label: `${key} ${name}`, size: 6, value: item[key], save: (value) => send("set", { [key]: value }) })}</td>`)}
+      <td class="seen">${[1, 2].map((image) => html`<button type="button" class="chip ink-${image} ${picks[image] ? "on" : ""}" @click=${() => aim(image)}
+        aria-label=${t(picks[image] ? "control.again" : "control.pickIn", { name, image })}>${image}${picks[image] ? " ✓" : ""}</button>`)}</td>
+      <td class="number">${worst < 0 ? "–" : number(worst, 2)}</td>
+      <td class="seen"><input type="checkbox" .checked=${use} aria-label=${t("control.use", { name })} title=${t("control.use", { name })}
+        @change=${({ target }) => send("use", { use: target.checked })}>${cross(name, () => send("delete"))}</td></tr>`;
   }
 
-  #tapeRow(tape) {
-    const { from, to } = tape;
-    return h("tr", {}, h("td", {}, from), h("td", {}, to),
-      h("td", { class: "number" }, number(tape.length, 3)),
-      h("td", { class: "number" }, number(tape.sigma, 3)),
-      h("td", {}, button("×", () => this.app.send("tape.delete", { from, to }),
-        { class: "icon", "aria-label": t("list.deleteOf", { name: `${from}–${to}` }) })));
+  #tapeRow({ from, to, length, sigma }) {
+    return html`<tr><td>${from}</td><td>${to}</td><td class="number">${number(length, 3)}</td><td class="number">${number(sigma, 3)}</td>
+      <td>${cross(`${from}–${to}`, () => this.app.send("tape.delete", { from, to }))}</td></tr>`;
   }
 
   #fly(item, image) {
@@ -315,13 +261,7 @@ export class OrientationStage {
   }
 
   refresh() {
-    const { target, picking } = this.picker;
-    const words = { name: target.name ?? t("control.newName"), image: target.image };
-    setText(this.target, this.wallCard.asks || (picking ? t("pick.next", words) : t("pick.off")));
-    this.target.classList.toggle("asked", Boolean(this.wallCard.asks));
-    for (const row of this.body.children) {
-      row.setAttribute("aria-selected", String(row.dataset.key === this.picker.selected));
-    }
+    render(this.#side(this.app.state), this.side);
     for (const pane of this.panes) pane.paint();
     this.#look();
   }

@@ -2,9 +2,9 @@
  * The orientation that the program found by itself: the wall as a sheet in both photos, the one
  * length that gives its scale, and another face where the wall is none.
  */
-import { decimal, h, keyedRows, number, parseNumber, setText } from "./dom.js";
+import { decimal, h, html, noChange, number, parseNumber, render, repeat } from "./dom.js";
 import * as drawing from "./drawing.js";
-import { button } from "./fields.js";
+import { cross, numberField } from "./fields.js";
 import { gridLines, gridStep, Wall } from "./geometry.js";
 import { t } from "./words/words.js";
 
@@ -13,38 +13,23 @@ const LENGTH_INK = "#ffe14d";
 const CHECK_INK = "#b9f27c";
 
 /** A length and what it is good to; nothing typed: what is taken everywhere. */
-const lengthInputs = (id, ...testids) => testids.map((testid, index) => h("input", { type: "text", inputmode: "decimal",
-  autocomplete: "off", testid, size: index ? "4" : "7", ...(index ? { placeholder: "3", "aria-label": t("wall.sigma") } : { id }) }));
+const taped = (kind, length, sigma, drawn) => html`<span class="taped"><label for="${kind}-length">${t("wall.length")}</label>
+  <span class="with-unit">${numberField({ id: `${kind}-length`, size: 7, testid: length, value: drawn.length })}<span class="unit">m</span></span>±
+  <span class="with-unit" title=${t("wall.sigma")}>${numberField({ label: t("wall.sigma"), size: 4, testid: sigma, placeholder: 3, value: drawn.sigma })}<span
+    class="unit">mm</span></span></span>`;
 
-const lengthFields = (length, sigma) => h("span", { class: "taped" }, h("label", { for: length.id }, t("wall.length")),
-  h("span", { class: "with-unit" }, length, h("span", { class: "unit" }, "m")), "±",
-  h("span", { class: "with-unit", title: t("wall.sigma") }, sigma, h("span", { class: "unit" }, "mm")));
-
-const sigmaOf = ({ value }) => (parseNumber(value) > 0 ? { sigma: parseNumber(value) / 1000 } : {});
+/** What is typed into such a form: the length, and its sigma if any. [m] */
+function typed(form) {
+  const [length, sigma] = [...form.querySelectorAll("input")].map(({ value }) => parseNumber(value));
+  return { length, ...(sigma > 0 ? { sigma: sigma / 1000 } : {}) };
+}
 
 export class WallCard {
   /** `stage`: the orientation, whose panes and picker it shares. */
   constructor(stage) {
     Object.assign(this, { stage, app: stage.app, tool: null, ends: [], image: 1, dismissed: false, checking: false });
-    this.state = h("p", { class: "wall-state", role: "status", testid: "wall-state" });
-    [this.length, this.sigma] = lengthInputs("wall-length", "length-value", "length-sigma");
-    this.drawButton = button(t("wall.draw"), () => this.arm("length"), { class: "quiet", testid: "length-draw" });
-    this.faceButton = button(t("wall.other"), () => this.arm("wall"), { class: "quiet", testid: "wall-pick" });
-    this.faces = h("ul", { class: "faces" });
-    this.form = h("form", { class: "row", onsubmit: (event) => { event.preventDefault(); this.#send(); } },
-      this.drawButton, lengthFields(this.length, this.sigma),
-      h("button", { type: "submit", class: "quiet", testid: "length-set" }, t("wall.set")));
-    [this.checkLength, this.checkSigma] = lengthInputs("check-length", "check-value", "check-sigma");
-    this.agreement = h("p", { class: "hint", role: "status", testid: "check-agreement" });
-    this.checks = h("tbody");
-    this.checkCard = h("section", { class: "card", hidden: true, testid: "checks" }, h("h2", {}, t("check.title")), this.agreement,
-      h("table", { class: "grid" }, this.checks),
-      h("form", { class: "row", onsubmit: (event) => { event.preventDefault(); this.#check(); } },
-        button(t("check.draw"), () => this.arm("check"), { class: "quiet", testid: "check-draw" }),
-        lengthFields(this.checkLength, this.checkSigma),
-        h("button", { type: "submit", class: "quiet", testid: "check-set" }, t("check.set"))));
-    this.element = h("section", { class: "card wall-card", hidden: true }, h("h2", {}, t("wall.title")), this.state,
-      this.form, h("div", { class: "row" }, this.faceButton, this.faces));
+    this.checkCard = h("section", { class: "card", hidden: true, testid: "checks" });
+    this.element = h("section", { class: "card wall-card", hidden: true });
   }
 
   /** The next clicks are the ends of the length, or a spot on the wall. */
@@ -90,7 +75,7 @@ export class WallCard {
     if (ends.length === 2) {
       // What is typed next is the length.
       this.tool = null;
-      const input = this.checking ? this.checkLength : this.length;
+      const input = (this.checking ? this.checkCard : this.element).querySelector("input");
       input.value = "";
       input.focus();
     }
@@ -103,8 +88,8 @@ export class WallCard {
     this.stage.refresh();
   }
 
-  async #send() {
-    const length = parseNumber(this.length.value);
+  async #send(form) {
+    const { length, ...sigma } = typed(form);
     const drawn = this.app.state.scale;
     // The ends of a length that checks give no scale.
     const anew = this.ends.length === 2 && !this.checking;
@@ -112,46 +97,55 @@ export class WallCard {
     if (!ends) return this.arm("length");
     if (!(length > 0)) return this.app.say(t("wall.number"), "warning");
     const image = anew ? this.image : drawn.image;
-    if (await this.app.send("length.set", { image, ends, length, ...sigmaOf(this.sigma) })) {
+    if (await this.app.send("length.set", { image, ends, length, ...sigma })) {
       this.ends = [];
-      this.length.blur();
-      this.sigma.blur();
+      document.activeElement.blur();
       this.app.say(t("wall.scaled"));
     }
     return undefined;
   }
 
   /** A length that gives no scale, and so checks it. */
-  async #check() {
-    const length = parseNumber(this.checkLength.value);
+  async #check(form) {
+    const { length, ...sigma } = typed(form);
     if (!this.checking || this.ends.length < 2) return this.arm("check");
     if (!(length > 0)) return this.app.say(t("wall.number"), "warning");
-    if (await this.app.send("length.check", { image: this.image, ends: this.ends, length, ...sigmaOf(this.checkSigma) })) {
+    if (await this.app.send("length.check", { image: this.image, ends: this.ends, length, ...sigma })) {
       Object.assign(this, { ends: [], checking: false });
-      this.checkLength.value = "";
-      this.checkLength.blur();
+      form.querySelector("input").value = "";
+      document.activeElement.blur();
       this.stage.refresh();
     }
     return undefined;
   }
 
-  #tellChecks({ pair, check_lengths: checks }) {
+  #form(tool, words, length, act, drawn = { length: noChange, sigma: noChange }) {
+    const submit = (event) => { event.preventDefault(); act(event.target); };
+    return html`<form class="row" novalidate @submit=${submit}>
+      <button type="button" class="quiet" data-testid="${tool}-draw" @click=${() => this.arm(tool)}>${t(`${words}.draw`)}</button>
+      ${taped(words, length, `${tool}-sigma`, drawn)}<button type="submit" class="quiet" data-testid="${tool}-set">${t(`${words}.set`)}</button></form>`;
+  }
+
+  #checks({ pair, check_lengths: checks }) {
     this.checkCard.hidden = !pair?.scaled;
-    const told = checks.filter(({ measured }) => Number.isFinite(measured));
-    const most = Math.max(...told.map(({ difference }) => 1000 * Math.abs(difference)), 0);
-    setText(this.agreement, told.length ? t("check.agreement", { agree: told.filter(({ agrees }) => agrees).length,
-      count: told.length, most: number(most, 0) }) : t("check.hint"));
-    keyedRows(this.checks, checks, { key: ({ name }) => name, signature: JSON.stringify,
-      build: ({ name, length, difference, sigma_difference: sigma, agrees }) => h("tr", {}, h("th", { scope: "row" }, name),
-        h("td", { class: "number" }, `${number(length, 3)} m`),
-        h("td", { class: agrees || !Number.isFinite(difference) ? "number" : "number warn" },
-          Number.isFinite(difference) ? `${difference > 0 ? "+" : ""}${number(1000 * difference, 0)} ± ${number(1000 * sigma, 0)} mm` : ""),
-        h("td", {}, button("×", () => this.app.send("length.delete", { name }),
-          { class: "icon", "aria-label": t("list.deleteOf", { name }) }))) });
+    const compared = checks.filter(({ measured }) => Number.isFinite(measured));
+    const most = Math.max(...compared.map(({ difference }) => 1000 * Math.abs(difference)), 0);
+    render(html`<h2>${t("check.title")}</h2><p class="hint" role="status" data-testid="check-agreement">${compared.length
+        ? t("check.agreement", { agree: compared.filter(({ agrees }) => agrees).length, count: compared.length, most: number(most, 0) }) : t("check.hint")}</p>
+      <table class="grid"><tbody>${repeat(checks, ({ name }) => name, (check) => this.#checkRow(check))}</tbody></table>
+      ${this.#form("check", "check", "check-value", (form) => this.#check(form))}`, this.checkCard);
+  }
+
+  #checkRow({ name, length, difference, sigma_difference: sigma, agrees }) {
+    const compared = Number.isFinite(difference);
+    return html`<tr><th scope="row">${name}</th><td class="number">${number(length, 3)} m</td>
+      <td class=${agrees || !compared ? "number" : "number warn"}>${compared
+        ? `${difference > 0 ? "+" : ""}${number(1000 * difference, 0)} ± ${number(1000 * sigma, 0)} mm` : ""}</td>
+      <td>${cross(name, () => this.app.send("length.delete", { name }))}</td></tr>`;
   }
 
   update(state) {
-    this.#tellChecks(state);
+    this.#checks(state);
     const { pair, scale, looking } = state;
     const found = pair && pair.accepted === false && pair.report?.free_scale;
     // What gave the scale can be mended as long as the photos alone gave the rest.
@@ -163,27 +157,26 @@ export class WallCard {
     const grid = found && pair.scaled ? t("wall.grid", { step: decimal(String(gridStep(pair))) }) : "";
     const words = found ? `${ties ? t("wall.found", { share: Math.round((100 * ties.on_wall) / ties.count), count: ties.count }) : t("wall.ofProject")} ${grid}`.trim()
       : mended ? t("wall.mend") : looking ? t("wall.looking") : t("wall.refused", { why: refused });
-    setText(this.state, words);
-    this.state.dataset.level = found || mended ? "good" : looking ? "busy" : "fair";
-    this.form.hidden = !found && !mended;
-    this.faceButton.hidden = this.faces.hidden = !ties || !found;
-    if (scale && ![this.length, this.sigma].includes(document.activeElement) && this.ends.length < 2) {
-      this.length.value = number(scale.length, 3);
-      this.sigma.value = scale.sigma ? number(1000 * scale.sigma, 1) : "";
-    }
     // The one thing that is asked is asked at once.
     if (found && !pair.scaled && !state.control.length && !this.tool && !this.ends.length && !this.dismissed) {
       Object.assign(this, { tool: "length", unasked: true });
     }
     if (this.unasked && this.tool && !this.ends.length && pair?.scaled) Object.assign(this, { tool: null, unasked: false });
     if (!found && !mended && !this.checking) Object.assign(this, { tool: null, ends: [] });
-    const others = found ? pair.report.planes.slice(1, 4) : [];
-    keyedRows(this.faces, others, { key: ({ pixel }) => String(pixel), signature: JSON.stringify,
-      build: ({ offset, share, pixel: [column, row] }) => h("li", {}, button(
-        t("wall.face", { offset: `${offset > 0 ? "+" : ""}${number(1000 * offset, 0)}`, share: Math.round(100 * share) }),
-        () => this.app.send("wall.set", { column, row }), { class: "quiet",
-          onpointerenter: () => { this.spot = [column, row]; this.stage.refresh(); },
-          onpointerleave: () => { this.spot = null; this.stage.refresh(); } })) });
+    const drawn = scale && this.ends.length < 2 && !this.element.contains(document.activeElement)
+      ? { length: number(scale.length, 3), sigma: scale.sigma ? number(1000 * scale.sigma, 1) : "" } : undefined;
+    render(html`<h2>${t("wall.title")}</h2><p class="wall-state" role="status" data-testid="wall-state"
+        data-level=${found || mended ? "good" : looking ? "busy" : "fair"}>${words}</p>
+      ${found || mended ? this.#form("length", "wall", "length-value", (form) => this.#send(form), drawn) : ""}
+      ${ties && found ? html`<div class="row"><button type="button" class="quiet" data-testid="wall-pick"
+        @click=${() => this.arm("wall")}>${t("wall.other")}</button><ul class="faces">${pair.report.planes.slice(1, 4).map((face) => this.#face(face))}</ul></div>` : ""}`, this.element);
+  }
+
+  #face({ offset, share, pixel: [column, row] }) {
+    const show = (spot) => { this.spot = spot; this.stage.refresh(); };
+    return html`<li><button type="button" class="quiet" @click=${() => this.app.send("wall.set", { column, row })}
+      @pointerenter=${() => show([column, row])} @pointerleave=${() => show(null)}>${
+      t("wall.face", { offset: `${offset > 0 ? "+" : ""}${number(1000 * offset, 0)}`, share: Math.round(100 * share) })}</button></li>`;
   }
 
   /** Lines of a grid on the wall, as each photo shows them; kept until the pair is another one. */
