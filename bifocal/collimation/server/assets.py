@@ -37,11 +37,9 @@ class Assets:
 
         Otherwise it learns of each one only from the module that imports it, four deep.
         """
-        words = ("words", language)
-        names = [
-            name for name in self._files
-            if name.endswith(".js") and (not name.startswith("js/words/") or Path(name).stem in words)
-        ]  # fmt: skip
+        words = {f"js/words/{name}.js" for name in ("words", language)}
+        scripts = {name for name in self._files if name.endswith(".js")}
+        names = sorted(name for name in scripts if "/words/" not in name or name in words)
         links = "".join(f'<link rel="modulepreload" href="{name}">\n' for name in names)
         return self._files["index.html"].replace(_MODULES, links.encode())
 
