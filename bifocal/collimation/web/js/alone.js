@@ -1,7 +1,7 @@
 /** One photo alone: the four corners of a rectangle on a flat wall and its size bring it to scale. */
-import { h, number, parseNumber, setText } from "./dom.js";
+import { h, html, noChange, nothing, number, parseNumber, render } from "./dom.js";
 import * as drawing from "./drawing.js";
-import { button, labelled, numberInput } from "./fields.js";
+import { named, numberField } from "./fields.js";
 import { asTaken } from "./geometry.js";
 import { photoMark } from "./tiles.js";
 import { Pane, pixelView, tileLayer } from "./viewer.js";
@@ -17,26 +17,13 @@ const LONGEST = 60;
 
 export class Alone {
   constructor(app) {
-    Object.assign(this, { app, corners: [], cursor: null });
+    Object.assign(this, { app, corners: [], cursor: null, misfits: [] });
     this.viewer = h("div", { class: "viewer alone-viewer" });
-    this.asks = h("p", { class: "target", role: "status", testid: "alone-asks" });
-    this.width = numberInput({ label: t("alone.width"), save: () => {}, testid: "alone-width" });
-    this.height = numberInput({ label: t("alone.height"), save: () => {}, testid: "alone-height" });
-    this.run = button(t("alone.run"), () => this.#run(), { class: "primary", testid: "run-rectify" });
-    this.again = button(t("alone.again"), () => { this.corners = []; this.#tell(); }, { class: "quiet" });
-    this.picture = h("img", { class: "preview large", alt: t("alone.alt"), hidden: true });
-    this.told = h("p", { testid: "alone-told" });
-    this.download = h("a", { class: "button", href: "download/all.zip", download: "", testid: "alone-download" }, t("deliver.download"));
-    this.element = h("section", { class: "card alone", testid: "alone" }, h("h2", {}, t("alone.title")),
-      h("p", { class: "hint" }, t("alone.hint")),
-      h("div", { class: "alone-body" }, this.viewer, h("div", { class: "card-body" }, this.asks,
-        h("div", { class: "fields" }, labelled(t("alone.width"), this.width, "m"), labelled(t("alone.height"), this.height, "m")),
-        h("div", { class: "row" }, this.run, this.again), app.jobBox("rectify"), this.told, this.picture,
-        h("div", { class: "row" }, this.download))));
+    this.element = h("section", { class: "card alone", hidden: true, testid: "alone" });
   }
 
   #run() {
-    const [width, height] = [this.width, this.height].map(({ value }) => parseNumber(value));
+    const [width, height] = [...this.element.querySelectorAll("input")].map(({ value }) => parseNumber(value));
     if (!(width > 0) || !(height > 0)) return this.app.say(t("alone.size"), "warning");
     this.judged = this.corners;
     return this.app.job("rectify", { corners: this.corners, width, height });
@@ -45,17 +32,27 @@ export class Alone {
   update(state) {
     this.element.hidden = state.photos.length !== 1;
     if (this.element.hidden) return;
-    this.#show(state).catch((error) => this.app.refuse(error));
-    const { rectified } = state.products;
-    this.picture.hidden = this.download.hidden = !rectified;
-    const done = state.jobs.findLast(({ kind, state: how }) => kind === "rectify" && how === "done");
     this.misfits = state.misfits;
     this.worst = Math.max(0, ...state.misfits.map((off) => Math.hypot(...off)));
-    setText(this.told, done ? `${done.message} ${t("alone.misfit", { worst: number(this.worst, 1) })}` : "");
-    const mark = rectified && `${done?.id}-${state.revision}`;
-    if (rectified && this.seen !== mark) this.picture.src = `preview/rectified?v=${mark}`;
-    this.seen = mark;
     this.#tell();
+    this.#show(state).catch((error) => this.app.refuse(error));
+  }
+
+  #tell() {
+    const { jobs, products: { rectified }, revision } = this.app.state;
+    const { length } = this.corners;
+    const done = jobs.findLast(({ kind, state }) => kind === "rectify" && state === "done");
+    const asks = length < CORNERS ? t("alone.asks", { corner: t(`alone.corner.${length}`) }) : t("alone.asksSize");
+    const size = (side) => named(t(`alone.${side}`), `alone-${side}`, numberField({ id: `alone-${side}`, testid: `alone-${side}`, value: noChange }), "m");
+    render(html`<h2>${t("alone.title")}</h2><p class="hint">${t("alone.hint")}</p><div class="alone-body">${this.viewer}<div class="card-body">
+        <p class="target" role="status" data-testid="alone-asks">${asks}</p><div class="fields">${["width", "height"].map(size)}</div>
+        <div class="row"><button type="button" class="primary" data-testid="run-rectify" ?disabled=${length < CORNERS} @click=${() => this.#run()}>${t("alone.run")}</button>
+          <button type="button" class="quiet" ?disabled=${!length} @click=${() => { this.corners = []; this.#tell(); }}>${t("alone.again")}</button></div>
+        ${this.app.jobBox("rectify")}<p data-testid="alone-told">${done ? `${done.message} ${t("alone.misfit", { worst: number(this.worst, 1) })}` : ""}</p>
+        <img class="preview large" alt=${t("alone.alt")} ?hidden=${!rectified} src=${rectified ? `preview/rectified?v=${done?.id}-${revision}` : nothing}>
+        <div class="row"><a class="button" href="download/all.zip" download data-testid="alone-download" ?hidden=${!rectified}>${t("deliver.download")}</a></div></div></div>`,
+    this.element);
+    this.pane?.paint();
   }
 
   async #show(state) {
@@ -97,16 +94,8 @@ export class Alone {
     this.#tell();
     const found = await this.app.connection.ask("api/snap", { image: 1, column, row, radius: REACH }).catch(() => null);
     if (found && found.kind !== "none") [corner[0], corner[1]] = [found.column, found.row];
-    if (this.corners.length === CORNERS) this.width.focus();
+    if (this.corners.length === CORNERS) this.element.querySelector("input").focus();
     this.#tell();
-  }
-
-  #tell() {
-    const { length } = this.corners;
-    setText(this.asks, length < CORNERS ? t("alone.asks", { corner: t(`alone.corner.${length}`) }) : t("alone.asksSize"));
-    this.run.disabled = length < CORNERS;
-    this.again.disabled = !length;
-    this.pane?.paint();
   }
 
   #draw(context) {

@@ -18,11 +18,6 @@ export function h(tag, attributes = {}, ...children) {
   return node;
 }
 
-/** Write text only where it differs: no layout, no announcement for nothing. */
-export function setText(node, text) {
-  if (node.textContent !== text) node.textContent = text;
-}
-
 /** The digits of a number as the page's language writes them. */
 export function decimal(digits) {
   return ["it", "de"].includes(document.documentElement.lang) ? digits.replace(".", ",") : digits;
@@ -39,38 +34,4 @@ export function parseNumber(text) {
   if (tidy === "") return null;
   const value = Number(/^-?\d*,\d+$/.test(tidy) ? tidy.replace(",", ".") : tidy);
   return Number.isFinite(value) ? value : NaN;
-}
-
-/** Keep keyed rows of a table body: rebuild only those whose signature changed, in the new order. */
-export function keyedRows(body, items, { key, signature, build }) {
-  const old = new Map([...body.children].map((row) => [row.dataset.key, row]));
-  let place = body.firstElementChild;
-  for (const item of items) {
-    const name = key(item);
-    const mark = signature(item);
-    let row = old.get(name);
-    // A row somebody types in, waits for an answer to, or has still to mend, stays as it is, and
-    // keeps its old mark, so that its turn comes later.
-    if (row?.querySelector("input:focus, select:focus, input:invalid, input[data-sent]")) {
-      old.delete(name);
-      if (row === place) place = place.nextElementSibling;
-      else body.insertBefore(row, place);
-      continue;
-    }
-    if (row && row.dataset.mark !== mark) {
-      const fresh = build(item);
-      if (place === row) place = fresh;
-      const focused = row.contains(document.activeElement);
-      row.replaceWith(fresh);
-      if (focused) fresh.querySelector("button, input, select")?.focus();
-      row = fresh;
-    }
-    old.delete(name);
-    row ??= build(item);
-    row.dataset.key = name;
-    row.dataset.mark = mark;
-    if (row === place) place = place.nextElementSibling;
-    else body.insertBefore(row, place);
-  }
-  for (const row of old.values()) row.remove();
 }

@@ -1,6 +1,5 @@
 /** The two photos over each other: opacity, blink, swipe, side by side, contrast of each. */
-import { h, setText } from "./dom.js";
-import { button } from "./fields.js";
+import { h, html, live, render } from "./dom.js";
 import { t } from "./words/words.js";
 
 export const MODES = ["overlay", "blink", "swipe", "split"];
@@ -9,17 +8,13 @@ const BLINK_MS = 400;
 const LEAN = 0.28;
 
 export class Superposition extends EventTarget {
-  /** `stage`: the element that holds the panes; `layers(image)`: the layer of an image. */
-  constructor(viewer) {
+  /** `viewer`: the element that holds the panes; `tools`: what stands beside the sliders. */
+  constructor(viewer, tools) {
     super();
-    this.viewer = viewer;
-    this.mode = "overlay";
-    this.opacity = 0.5;
-    this.swipe = 0.5;
+    Object.assign(this, { viewer, tools, mode: "overlay", opacity: 0.5, swipe: 0.5, front: 2 });
     this.contrast = { 1: 1, 2: 1 };
     this.layers = { 1: null, 2: null };
-    this.front = 2;
-    this.element = this.#bar();
+    this.element = h("div", { class: "layer-bar", role: "toolbar", "aria-label": t("layer.bar") });
     this.handle = h("div", { class: "swipe-handle", hidden: true, role: "slider", tabindex: "0",
       "aria-label": t("layer.swipe"), "aria-valuemin": "0", "aria-valuemax": "100" });
     this.handle.addEventListener("pointerdown", (event) => this.#drag(event));
@@ -32,25 +27,19 @@ export class Superposition extends EventTarget {
     });
   }
 
-  #bar() {
-    this.modes = Object.fromEntries(MODES.map((mode) => [mode, button(t(`layer.${mode}`),
-      () => this.setMode(mode), { testid: `layer-${mode}`, title: t(`layer.${mode}Hint`) })]));
-    this.slider = h("input", { type: "range", min: "0", max: "100", step: "1", id: "layer-opacity",
-      testid: "layer-opacity", oninput: () => this.setOpacity(this.slider.value / 100) });
-    this.percent = h("output", { for: "layer-opacity" });
-    const contrasts = [1, 2].map((image) => {
-      const input = h("input", { type: "range", min: "50", max: "250", step: "5", value: "100",
-        id: `contrast-${image}`, testid: `contrast-${image}`, class: `range-${image}`,
-        oninput: () => this.setContrast(image, input.value / 100) });
-      return h("span", { class: "slider small" }, h("label", { for: `contrast-${image}` },
-        t("layer.contrast", { image })), input);
-    });
-    return h("div", { class: "layer-bar", role: "toolbar", "aria-label": t("layer.bar") },
-      h("div", { class: "segments", role: "group", "aria-label": t("layer.mode") },
-        Object.values(this.modes)),
-      h("span", { class: "slider" }, h("span", { class: "ink-1", "aria-hidden": "true" }, "1"),
-        h("label", { for: "layer-opacity", class: "unseen" }, t("layer.opacity")), this.slider,
-        h("span", { class: "ink-2", "aria-hidden": "true" }, "2"), this.percent), contrasts);
+  /** Paint the bar. */
+  paint() {
+    const percent = Math.round(100 * this.opacity);
+    render(html`<div class="segments" role="group" aria-label=${t("layer.mode")}>${MODES.map((mode) => html`<button type="button" data-testid="layer-${mode}"
+        title=${t(`layer.${mode}Hint`)} aria-pressed=${mode === this.mode} @click=${() => this.setMode(mode)}>${t(`layer.${mode}`)}</button>`)}</div>
+      <span class="slider"><span class="ink-1" aria-hidden="true">1</span><label for="layer-opacity" class="unseen">${t("layer.opacity")}</label>
+        <input type="range" min="0" max="100" step="1" id="layer-opacity" data-testid="layer-opacity" .value=${live(String(percent))}
+          aria-valuetext=${t("layer.opacityValue", { percent })} @input=${({ target }) => this.setOpacity(target.value / 100)}>
+        <span class="ink-2" aria-hidden="true">2</span><output for="layer-opacity">${percent} %</output></span>
+      ${[1, 2].map((image) => html`<span class="slider small"><label for="contrast-${image}">${t("layer.contrast", { image })}</label>
+        <input type="range" min="50" max="250" step="5" id="contrast-${image}" data-testid="contrast-${image}" class="range-${image}"
+          .value=${live(String(Math.round(100 * this.contrast[image])))} @input=${({ target }) => this.setContrast(image, target.value / 100)}></span>`)}
+      ${this.tools()}`, this.element);
   }
 
   /** Give it the layers of photo 1 and 2 once they exist. */
@@ -89,13 +78,7 @@ export class Superposition extends EventTarget {
   }
 
   #apply() {
-    for (const [mode, control] of Object.entries(this.modes)) {
-      control.setAttribute("aria-pressed", String(mode === this.mode));
-    }
-    const percent = Math.round(100 * this.opacity);
-    this.slider.value = percent;
-    setText(this.percent, `${percent} %`);
-    this.slider.setAttribute("aria-valuetext", t("layer.opacityValue", { percent }));
+    this.paint();
     this.handle.hidden = this.mode !== "swipe";
     this.handle.setAttribute("aria-valuenow", String(Math.round(100 * this.swipe)));
     const { style } = this.viewer;

@@ -2,7 +2,7 @@
  * Two windows of the original photos, pixel by pixel, each around its own place: what is picked,
  * not what the screen makes of it.
  */
-import { h, setText } from "./dom.js";
+import { h } from "./dom.js";
 import { INK } from "./drawing.js";
 import { TileStore } from "./tiles.js";
 import { t } from "./words/words.js";
@@ -11,31 +11,19 @@ const POWERS = [4, 6, 8, 12, 16];
 
 export class Loupe {
   constructor() {
-    this.power = 8;
-    this.places = { 1: null, 2: null };
-    this.lines = { 1: null, 2: null };
-    this.tiles = {};
-    this.glasses = {};
-    this.captions = {};
-    const panes = [1, 2].map((image) => {
-      this.glasses[image] = h("canvas", { class: "glass", role: "img" });
-      this.captions[image] = h("figcaption", { class: `ink-${image}` });
-      return h("figure", {}, this.glasses[image], this.captions[image]);
-    });
+    Object.assign(this, { power: 8, places: { 1: null, 2: null }, lines: { 1: null, 2: null }, tiles: {}, glasses: {}, captions: {} });
+    const panes = [1, 2].map((image) => h("figure", {},
+      this.glasses[image] = h("canvas", { class: "glass", role: "img", "aria-label": t("loupe.photo", { image }) }),
+      this.captions[image] = h("figcaption", { class: `ink-${image}` })));
     this.powerButton = h("button", { class: "quiet", type: "button", onclick: () => this.next() });
-    this.hint = h("p", { class: "hint" });
     this.element = h("section", { class: "loupe" }, h("div", { class: "glasses" }, panes),
-      h("div", { class: "row" }, this.hint, this.powerButton));
-    this.speak();
+      h("div", { class: "row" }, h("p", { class: "hint" }, t("loupe.hint")), this.powerButton));
+    this.#tell();
   }
 
-  speak() {
-    setText(this.hint, t("loupe.hint"));
-    setText(this.powerButton, `${this.power}×`);
+  #tell() {
+    this.powerButton.textContent = `${this.power}×`;
     this.powerButton.setAttribute("aria-label", `${t("loupe.power")} ${this.power}`);
-    for (const image of [1, 2]) {
-      this.glasses[image].setAttribute("aria-label", t("loupe.photo", { image }));
-    }
   }
 
   /** Tiles of the photos: `info` of both, once known or when they change. */
@@ -46,7 +34,7 @@ export class Loupe {
 
   next() {
     this.power = POWERS[(POWERS.indexOf(this.power) + 1) % POWERS.length];
-    this.speak();
+    this.#tell();
     this.paint();
   }
 
@@ -78,7 +66,7 @@ export class Loupe {
     context.clearRect(0, 0, side, side);
     const place = this.places[image];
     const digits = place ? place.map((value) => value.toFixed(2)).join(", ") : "–";
-    setText(this.captions[image], `${image} · ${digits}`);
+    this.captions[image].textContent = `${image} · ${digits}`;
     if (!place || !this.tiles[image]) return;
     this.#photo(context, image, side);
     this.#cross(context, image, side);

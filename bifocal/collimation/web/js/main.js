@@ -1,8 +1,8 @@
 /** The page: its four stages, what they share, and what outsiders may ask of it. */
 import { Connection, Refusal } from "./connection.js";
-import { h, setText } from "./dom.js";
+import { h, html, render } from "./dom.js";
 import { draggable } from "./dragging.js";
-import { button, choice } from "./fields.js";
+import { button, select } from "./fields.js";
 import { KEYS, listen } from "./keys.js";
 import { OrientationStage } from "./orientation.js";
 import { PhotosStage } from "./photos.js";
@@ -21,7 +21,6 @@ class App {
   constructor(connection) {
     this.connection = connection;
     this.pyramids = new Pyramids(connection);
-    this.boxes = [];
     /** Send a command; false where it was refused, which is said. */
     this.send = (op, args) => connection.send(op, args).then(() => true, (error) => this.refuse(error));
   }
@@ -37,56 +36,59 @@ class App {
 
   build() {
     this.stages = Object.fromEntries(Object.entries(STAGES).map(([key, Stage]) => [key, new Stage(this)]));
-    this.tabs = Object.fromEntries(Object.keys(STAGES).map((key, index) => [key, this.#tab(key, index)]));
-    this.title = h("h1", {}, "bifocal");
-    this.undoButton = button("↶", () => this.undo(), { class: "icon", testid: "undo", "aria-label": t("top.undo"), title: `${t("top.undo")} (Ctrl+Z)` });
-    this.redoButton = button("↷", () => this.redo(), { class: "icon", testid: "redo", "aria-label": t("top.redo"), title: `${t("top.redo")} (Ctrl+Y)` });
     this.exchangeButton = button(`⇄ ${t("photos.exchange")}`, () => this.exchange(), { class: "quiet", testid: "exchange" });
-    this.nextButton = button("", () => this.next(), { class: "primary next-step", testid: "next" });
-    this.themeButton = button("◐", () => { useTheme(theme() === "light" ? "dark" : "light"); this.#tellTheme(); },
-      { class: "icon", testid: "theme" });
-    this.#tellTheme();
-    this.link = h("p", { class: "link-state", role: "status", testid: "link" });
-    const language = choice({ label: t("top.language"), options: LANGUAGES, value: document.documentElement.lang,
-      testid: "language", save: (code) => this.send("language.set", { language: code }) });
     this.toast = h("div", { class: "toast", role: "status", "aria-live": "polite", testid: "toast" });
-    document.body.replaceChildren(
-      h("a", { class: "skip", href: "#stage" }, t("top.skip")),
-      h("header", { class: "top" }, this.title,
-        h("nav", { role: "tablist", "aria-label": t("top.stages") }, Object.values(this.tabs)),
-        h("div", { class: "tools" }, this.link, this.nextButton, this.undoButton, this.redoButton,
-          this.themeButton, language,
-          button("?", () => this.help(), { class: "icon", "aria-label": t("top.help"), testid: "help" }))),
-      h("main", { id: "stage", tabindex: "-1" }, Object.values(this.stages).map(({ element }) => element)),
-      this.toast);
-    const wanted = location.hash.slice(1);
-    this.open(wanted in STAGES ? wanted : this.state.stage, false);
+    document.body.replaceChildren();
+    const stage = location.hash.slice(1);
+    this.open(stage in STAGES ? stage : this.state.stage, false);
     history.replaceState({ stage: this.current }, "", `#${this.current}`);
     window.addEventListener("popstate", ({ state }) => state?.stage && this.open(state.stage, true, false));
+    window.addEventListener("theme", () => this.paint());
     listen(this);
   }
 
-  #tellTheme() {
-    const words = t(`top.theme.${theme() === "light" ? "dark" : "light"}`);
-    this.themeButton.title = words;
-    this.themeButton.setAttribute("aria-label", words);
+  /** The page's frame: the stages, the next step, whether the server is there and everything written. */
+  paint() {
+    const { state, step } = this;
+    const shade = theme() === "light" ? "dark" : "light";
+    const tool = (key, sign, able, act, hint = "") => html`<button type="button" class="icon" data-testid=${key.split(".")[1]} aria-label=${t(key)}
+      title="${t(key)}${hint}" ?disabled=${!able} @click=${act}>${sign}</button>`;
+    render(html`<a class="skip" href="#stage">${t("top.skip")}</a><header class="top"><h1>bifocal</h1>
+        <nav role="tablist" aria-label=${t("top.stages")} @keydown=${(event) => this.#key(event)}>${Object.keys(STAGES).map((key, index) => this.#tab(key, index))}</nav>
+        <div class="tools">${this.#link()}
+          <button type="button" class="primary next-step" data-testid="next" ?disabled=${!step.ready} @click=${() => this.next()}>${t(`next.${step.action}`)}</button>
+          ${tool("top.undo", "↶", state.undo, () => this.undo(), " (Ctrl+Z)")}${tool("top.redo", "↷", state.redo, () => this.redo(), " (Ctrl+Y)")}
+          <button type="button" class="icon" data-testid="theme" aria-label=${t(`top.theme.${shade}`)} title=${t(`top.theme.${shade}`)}
+            @click=${() => useTheme(shade)}>◐</button>
+          ${select({ label: t("top.language"), options: LANGUAGES, value: document.documentElement.lang, testid: "language",
+            save: (code) => this.send("language.set", { language: code }) })}${tool("top.help", "?", true, () => this.help())}</div></header>
+      <main id="stage" tabindex="-1">${Object.values(this.stages).map(({ element }) => element)}</main>${this.toast}`, document.body);
   }
 
   #tab(key, index) {
-    const status = h("span", { class: "missing" });
-    const tab = h("button", { type: "button", role: "tab", id: `tab-${key}`, testid: `mode-${key}`,
-      "aria-controls": `stage-${key}`, onclick: () => this.open(key) },
-    h("span", { class: "step", "aria-hidden": "true" }, String(index + 1)),
-    h("span", { class: "words" }, h("span", { class: "name" }, t(`stage.${key}`)), status));
-    tab.addEventListener("keydown", (event) => {
-      const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-      if (!by) return;
-      event.preventDefault();
-      this.turn(by);
-      this.tabs[this.current].focus();
-    });
-    tab.status = status;
-    return tab;
+    const { status, count, done } = this.state.steps[key];
+    const text = t(`status.${status}`, { count });
+    const shown = key === this.current;
+    return html`<button type="button" role="tab" id="tab-${key}" data-testid="mode-${key}" aria-controls="stage-${key}" aria-selected=${shown}
+      tabindex=${shown ? 0 : -1} class=${done ? "done" : ""} title=${text} @click=${() => this.open(key)}><span class="step" aria-hidden="true">${index + 1}</span>
+      <span class="words"><span class="name">${t(`stage.${key}`)}</span><span class="missing">${text}</span></span></button>`;
+  }
+
+  #key(event) {
+    const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    if (!by) return;
+    event.preventDefault();
+    this.turn(by);
+    document.getElementById(`tab-${this.current}`).focus();
+  }
+
+  #link() {
+    const { online, locked, unsent } = this.connection;
+    const { workbook_waiting: waiting } = this.state;
+    const key = locked ? "link.locked" : !online ? "link.away" : unsent.length ? "link.sending" : waiting ? "link.waiting" : "link.saved";
+    const words = t(key, { count: unsent.length });
+    return html`<p class="link-state" role="status" data-testid="link" title=${waiting ?? words}
+      data-level=${locked || !online ? "warn" : waiting || unsent.length ? "fair" : "good"}>${words}</p>`;
   }
 
   /**
@@ -99,8 +101,6 @@ class App {
     for (const [name, stage] of Object.entries(this.stages)) {
       stage.element.hidden = name !== key;
       if (name === key) stage.exchangePlace?.append(this.exchangeButton);
-      this.tabs[name].setAttribute("aria-selected", String(name === key));
-      this.tabs[name].tabIndex = name === key ? 0 : -1;
       stage.element.setAttribute("role", "tabpanel");
       stage.element.setAttribute("aria-labelledby", `tab-${name}`);
     }
@@ -138,32 +138,9 @@ class App {
   update() {
     const { state } = this;
     document.title = `${state.title || t("title.untitled")} · bifocal`;
-    for (const key of Object.keys(this.stages)) {
-      const { status, count, done } = state.steps[key];
-      const text = t(`status.${status}`, { count });
-      setText(this.tabs[key].status, text);
-      this.tabs[key].title = text;
-      this.tabs[key].classList.toggle("done", Boolean(done));
-    }
-    this.undoButton.disabled = !state.undo;
     this.exchangeButton.hidden = state.photos.length < 2;
-    this.redoButton.disabled = !state.redo;
-    setText(this.nextButton, t(`next.${this.step.action}`));
-    this.nextButton.disabled = !this.step.ready;
-    for (const paint of this.boxes) paint(state);
-    this.reach();
+    this.paint();
     this.stage.update(state);
-  }
-
-  /** Say whether the server is there and everything written. */
-  reach() {
-    const { online, locked, unsent } = this.connection;
-    const { workbook_waiting: waiting } = this.state;
-    const key = locked ? "link.locked" : !online ? "link.away" : unsent.length ? "link.sending" : waiting ? "link.waiting" : "link.saved";
-    const words = t(key, { count: unsent.length });
-    setText(this.link, words);
-    this.link.title = waiting ?? words;
-    this.link.dataset.level = locked || !online ? "warn" : waiting || unsent.length ? "fair" : "good";
   }
 
   /** Far and near the other way round: what is picked goes along, an orientation has to be made anew. */
@@ -236,38 +213,24 @@ class App {
 
   /** Progress of the latest job of a kind, with cancel. */
   jobBox(kind) {
-    const bar = h("progress", { max: "1", "aria-label": t(`job.${kind}`) });
-    const words = h("p", { class: "hint", role: "status" });
-    const told = h("p", { class: "hint" });
-    const fold = h("details", { hidden: true }, h("summary", {}, t("job.remarks")), told);
-    const cancel = button(t("job.cancel"), () => {
-      this.connection.remove(`api/jobs/${cancel.dataset.job}`).catch((error) => this.refuse(error));
-    }, { class: "quiet", testid: `cancel-${kind}` });
-    const box = h("div", { class: "job", hidden: true, testid: `job-${kind}` }, h("div", { class: "row" }, bar, cancel), words, fold);
-    this.boxes.push((state) => {
-      const job = state.jobs.filter((one) => one.kind === kind).at(-1);
-      // What the program tries by itself, and failures that were mended, are nobody's concern.
-      box.hidden = !job || job.quiet || job.cured;
-      if (box.hidden) return;
-      const running = job.state === "running";
-      bar.value = job.state === "done" ? 1 : job.progress ?? 0;
-      bar.hidden = cancel.hidden = !running;
-      cancel.dataset.job = job.id;
-      box.dataset.state = job.state;
-      const percent = Math.round(100 * (job.progress ?? 0));
-      const doing = running ? `${percent} %` : t(`job.state.${job.state}`);
-      const long = job.state === "done" && Boolean(job.message);
-      fold.hidden = !long;
-      setText(told, long ? job.message : "");
-      setText(words, [doing, long ? "" : job.message].filter(Boolean).join(" · "));
-    });
-    return box;
+    const job = this.state.jobs.findLast((one) => one.kind === kind);
+    // What the program tries by itself, and failures that were mended, are nobody's concern.
+    if (!job || job.quiet || job.cured) return "";
+    const running = job.state === "running";
+    const doing = running ? `${Math.round(100 * (job.progress ?? 0))} %` : t(`job.state.${job.state}`);
+    const long = job.state === "done" && job.message;
+    const cancel = () => this.connection.remove(`api/jobs/${job.id}`).catch((error) => this.refuse(error));
+    return html`<div class="job" data-testid="job-${kind}" data-state=${job.state}><div class="row" ?hidden=${!running}>
+        <progress max="1" aria-label=${t(`job.${kind}`)} .value=${job.progress ?? 0}></progress>
+        <button type="button" class="quiet" data-testid="cancel-${kind}" @click=${cancel}>${t("job.cancel")}</button></div>
+      <p class="hint" role="status">${[doing, long ? "" : job.message].filter(Boolean).join(" · ")}</p>
+      <details ?hidden=${!long}><summary>${t("job.remarks")}</summary><p class="hint">${long || ""}</p></details></div>`;
   }
 
   say(text, level = "info") {
     this.toast.dataset.level = level;
     this.toast.classList.add("on");
-    setText(this.toast, text);
+    this.toast.textContent = text;
     clearTimeout(this.quiet);
     this.quiet = setTimeout(() => this.toast.classList.remove("on"), TOAST_MS);
   }
@@ -293,7 +256,7 @@ class App {
         await act();
         box.close();
       } catch (error) {
-        setText(fault, error.message);
+        fault.textContent = error.message;
         fault.hidden = false;
       }
     });
@@ -352,7 +315,7 @@ async function start() {
       else if (!connection.unsent.length) location.reload();
     });
   });
-  connection.addEventListener("reach", () => app.reach());
+  connection.addEventListener("reach", () => app.paint());
   connection.addEventListener("refused", ({ detail }) => app.refuse(detail));
   window.bifocal = outside(app);
 }

@@ -38,7 +38,6 @@ export class OrientationStage {
     this.wallCard = new WallCard(this);
     this.actions = { align: () => app.job("align"), accept: () => this.accept(), control: () => this.#fresh(),
       length: () => this.wallCard.arm("length") };
-    this.jobs = Object.fromEntries(["targets", "align"].map((kind) => [kind, app.jobBox(kind)]));
     this.photos = h("div", { class: "viewer two" });
     this.exchangePlace = h("div", { class: "row" });
     this.side = h("aside", { class: "side" });
@@ -67,7 +66,7 @@ export class OrientationStage {
         <button type="button" class="quiet" data-testid="control-snap" @click=${() => this.picker.snap()}>${t("pick.snap")}</button>
         <button type="button" class="quiet" data-testid="control-paste" @click=${() => this.#paste()}>${t("control.paste")}</button>
         <button type="button" class="quiet" data-testid="targets" ?disabled=${!pair} @click=${() => this.app.job("targets")}>${t("control.targets")}</button></div>
-      ${this.jobs.targets}<p class="hint">${t("control.hint")}</p>
+      ${this.app.jobBox("targets")}<p class="hint">${t("control.hint")}</p>
       <table class="grid" data-testid="control-table" ?hidden=${!control.length}>${heads(CONTROL)}<tbody>${
         repeat(control, ({ name }) => name, (item) => this.#controlRow(item))}</tbody></table></section>`;
   }
@@ -103,7 +102,7 @@ export class OrientationStage {
       <div class="row"><button type="button" class=${pair?.current ? "" : "primary"} data-testid="align" ?hidden=${busy}
           @click=${this.actions.align}>${t(pair?.report?.free_scale ? "align.refine" : "align.run")}</button>
         <button type="button" class=${proposed && pair.scaled && pair.current ? "primary" : ""} data-testid="align-accept" ?hidden=${!proposed}
-          ?disabled=${!pair?.scaled} @click=${this.actions.accept}>${t("align.accept")}</button></div>${this.jobs.align}
+          ?disabled=${!pair?.scaled} @click=${this.actions.accept}>${t("align.accept")}</button></div>${this.app.jobBox("align")}
       <details data-testid="further" ?hidden=${!further.length}><summary>${t("advice.further", { count: further.length })}</summary>${
         levelled("advice", further, levels)}</details></section>`;
   }

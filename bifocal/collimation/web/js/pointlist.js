@@ -24,9 +24,8 @@ function compare(a, b, down) {
 }
 
 export class PointList {
-  /** `tools`: what stands beside the heading; `progress`: below it. */
-  constructor(app, picker, tools, progress) {
-    Object.assign(this, { app, picker, tools, progress, sort: { column: null, down: false } });
+  constructor(app, picker) {
+    Object.assign(this, { app, picker, sort: { column: null, down: false } });
     this.element = h("section", { class: "card list" });
   }
 
@@ -55,8 +54,10 @@ export class PointList {
     const sorted = (key) => (key !== sort.column ? "none" : sort.down ? "descending" : "ascending");
     render(html`<div class="row between"><h2>${t("list.title")} <span class="count">${order.length}</span></h2><span class="row">
         <button type="button" class="quiet warn" data-testid="next-doubtful" title="${t("key.doubtful")} (Y)" ?hidden=${!doubtful.length}
-          @click=${() => this.step(1, this.doubtful)}>${t("list.doubtful", { count: doubtful.length })}</button>${this.tools}</span></div>
-      ${this.progress}
+          @click=${() => this.step(1, this.doubtful)}>${t("list.doubtful", { count: doubtful.length })}</button>
+        <button type="button" class="quiet" data-testid="match" @click=${() => this.app.job("match")}>${t("pick.match")}</button>
+        <a class="button quiet" href="download/points.dxf" download>DXF</a></span></div>
+      ${this.app.jobBox("match")}
       <div class="scroll"><table class="grid points" data-testid="point-list" @keydown=${(event) => this.#key(event)}>
         <caption class="unseen">${t("list.title")}</caption>
         <thead><tr>${COLUMNS.map(([key]) => html`<th scope="col" aria-sort=${sorted(key)}><button type="button" class="sort"

@@ -1,7 +1,6 @@
 /** Stage 3: both photos on the wall's grid, superimposed; homologous points and what they give. */
-import { h, setText } from "./dom.js";
+import { h, html, nothing, render } from "./dom.js";
 import * as drawing from "./drawing.js";
-import { button } from "./fields.js";
 import { Wall } from "./geometry.js";
 import { Superposition } from "./layers.js";
 import { Lines, Measure } from "./lines.js";
@@ -9,7 +8,7 @@ import { Loupe } from "./loupe.js";
 import { Picker, trust } from "./picker.js";
 import { PointList } from "./pointlist.js";
 import { isWarning, Readout, TYPES } from "./readout.js";
-import { sketched } from "./sketches.js";
+import { sketch } from "./sketches.js";
 import { photoMark, wallMark } from "./tiles.js";
 import { Pane, pictureLayer, pixelView, spread, tileLayer } from "./viewer.js";
 import { t } from "./words/words.js";
@@ -23,49 +22,25 @@ export class PointsStage {
     this.picker = new Picker({ connection: app.connection, kind: "point", partner: true,
       items: () => app.points(), panes: () => this.panes });
     app.listen(this.picker, () => this.#refresh(), () => this.#look());
-    this.loupe = new Loupe();
-    this.buttons = this.#buttons();
-    this.readout = new Readout(app, this.picker);
-    this.list = new PointList(app, this.picker,
-      [this.buttons.match, h("a", { class: "button quiet", href: "download/points.dxf", download: "" }, "DXF")],
-      app.jobBox("match"));
-    this.lines = new Lines(app, this.picker);
-    this.measure = new Measure(app, this.picker);
+    Object.assign(this, { loupe: new Loupe(), readout: new Readout(app, this.picker), list: new PointList(app, this.picker),
+      lines: new Lines(app, this.picker), measure: new Measure(app, this.picker), area: null, contours: [], measures: "" });
     this.photos = h("div", { class: "viewer" });
-    this.layers = new Superposition(this.photos);
+    this.layers = new Superposition(this.photos, () => this.#tools());
     this.layers.addEventListener("mode", () => this.#arrange());
-    new ResizeObserver(() => this.wall && spread(this.photos, this.wall.width, this.wall.height))
-      .observe(this.photos);
     this.layers.addEventListener("blink", () => this.#paint());
-    this.target = h("p", { class: "target", role: "status", testid: "target" });
-    this.quality = h("p", { class: "quality", testid: "quality" });
-    this.areaButton = button(t("pick.area"), () => this.toggleArea(), { class: "quiet",
-      testid: "uncertainty", "aria-pressed": "false" });
-    sketched(this.areaButton, "sigma");
-    this.contours = [];
-    this.fitButton = button(h("span", { class: "whole", "aria-hidden": "true" }), () => this.activePane?.fit(), { class: "icon", testid: "fit",
-      "aria-label": t("key.fit"), title: `${t("key.fit")} (0)` });
-    this.layers.element.append(this.areaButton, this.fitButton);
-    const hand = h("section", { class: "hand" }, this.target, h("div", { class: "row" },
-      this.buttons.pick, this.buttons.suggest, this.buttons.accept, this.buttons.snap, this.buttons.fresh),
-    this.quality);
+    new ResizeObserver(() => this.wall && spread(this.photos, this.wall.width, this.wall.height)).observe(this.photos);
+    this.whose = h("span", { testid: "whose" });
+    this.hand = h("section", { class: "hand" });
     this.element = h("div", { class: "stage work", id: "stage-points" },
       h("div", { class: "table-top" }, this.layers.element, this.photos),
-      h("aside", { class: "panel" }, hand, this.loupe.element, this.readout.element,
-        this.list.element, this.lines.element, this.measure.element));
-    this.measures = "";
+      h("aside", { class: "panel" }, this.hand, ...["loupe", "readout", "list", "lines", "measure"].map((key) => this[key].element)));
   }
 
-  #buttons() {
-    const { picker } = this;
-    return {
-      pick: button(t("pick.pick"), () => picker.begin(), { testid: "pick" }),
-      suggest: button(t("pick.suggest"), () => picker.suggest(), { class: "quiet", testid: "suggest" }),
-      accept: button(t("pick.accept"), () => picker.accept(), { class: "primary", testid: "accept" }),
-      snap: button(t("pick.snap"), () => picker.snap(), { class: "quiet", testid: "snap" }),
-      match: button(t("pick.match"), () => this.app.job("match"), { class: "quiet", testid: "match" }),
-      fresh: button(t("pick.new"), () => picker.fresh(), { class: "quiet", testid: "point-new" }),
-    };
+  #tools() {
+    return html`<button type="button" class="quiet" data-testid="uncertainty" aria-pressed=${Boolean(this.area)} ${sketch("sigma")}
+        @click=${() => this.toggleArea()}>${t("pick.area")}</button>
+      <button type="button" class="icon" data-testid="fit" aria-label=${t("key.fit")} title="${t("key.fit")} (0)"
+        @click=${() => this.activePane?.fit()}><span class="whole" aria-hidden="true"></span></button>`;
   }
 
   /** Panes at once, so that pixels have their place; tiles as soon as the server tells of them. */
@@ -78,7 +53,6 @@ export class PointsStage {
     this.tileLayers = null;
     this.area = null;
     this.contours = [];
-    this.areaButton.setAttribute("aria-pressed", "false");
     this.#makePanes();
     const [walls, photos] = await Promise.all([this.app.pyramids.both("wall", mark),
       this.app.pyramids.both("photo", photoMark(state))]);
@@ -133,7 +107,7 @@ export class PointsStage {
     if (!this.view) return;
     this.area = this.area ? null : pictureLayer("layer-area", `uncertainty.png?v=${Date.now()}`,
       [-0.5, -0.5, width - 0.5, height - 0.5]);
-    this.areaButton.setAttribute("aria-pressed", String(Boolean(this.area)));
+    this.layers.paint();
     this.contours = [];
     this.#arrange();
     const { area } = this;
@@ -227,35 +201,41 @@ export class PointsStage {
   }
 
   #refresh() {
-    const { target, picking, proposal, selected } = this.picker;
-    const next = { name: target.name ?? t("point.newName"), image: target.image };
-    setText(this.target, picking ? t("pick.next", next) : t("pick.off"));
-    this.target.dataset.image = target.image;
+    const { target, picking } = this.picker;
     this.layers.lean(picking ? target.image : null);
     this.#tellPhoto(picking ? target.image : null);
-    this.buttons.pick.setAttribute("aria-pressed", String(picking));
-    for (const key of ["suggest", "snap"]) this.buttons[key].disabled = !selected;
-    this.buttons.accept.disabled = !proposal && !this.picker.lacking;
-    // How sure another place is that fits as well, nobody knows.
-    const { level, values } = trust(proposal);
-    const words = level && t(`quality.${level}`, values);
-    const others = proposal?.others?.length ?? 0;
-    setText(this.quality, [words, others && t("quality.others", { count: others })].filter(Boolean).join(" "));
-    this.quality.dataset.level = level;
+    render(this.#inHand(), this.hand);
     this.readout.update();
     this.list.mark();
     this.#paint();
     this.#look();
   }
 
+  /** What the next click picks, what can be done with the point in hand, how sure its other pick is. */
+  #inHand() {
+    const { picker } = this;
+    const { target, picking, proposal, selected } = picker;
+    // How sure another place is that fits as well, nobody knows.
+    const { level, values } = trust(proposal);
+    const others = proposal?.others?.length ?? 0;
+    const words = [level && t(`quality.${level}`, values), others && t("quality.others", { count: others })].filter(Boolean).join(" ");
+    return html`<p class="target" role="status" data-testid="target" data-image=${target.image}>${picking
+        ? t("pick.next", { name: target.name ?? t("point.newName"), image: target.image }) : t("pick.off")}</p>
+      <div class="row"><button type="button" data-testid="pick" aria-pressed=${picking} @click=${() => picker.begin()}>${t("pick.pick")}</button>
+        <button type="button" class="quiet" data-testid="suggest" ?disabled=${!selected} @click=${() => picker.suggest()}>${t("pick.suggest")}</button>
+        <button type="button" class="primary" data-testid="accept" ?disabled=${!proposal && !picker.lacking} @click=${() => picker.accept()}>${t("pick.accept")}</button>
+        <button type="button" class="quiet" data-testid="snap" ?disabled=${!selected} @click=${() => picker.snap()}>${t("pick.snap")}</button>
+        <button type="button" class="quiet" data-testid="point-new" @click=${() => picker.fresh()}>${t("pick.new")}</button></div>
+      <p class="quality" data-testid="quality" data-level=${level ?? nothing}>${words}</p>`;
+  }
+
   /** Over the picture stands which photo the next click belongs to. */
   #tellPhoto(image) {
     if (!this.main) return;
-    this.whose ??= h("span", { testid: "whose" });
     if (this.whose.parentElement !== this.main.element) this.main.element.append(this.whose);
     this.whose.hidden = !image || this.layers.mode === "split";
     this.whose.className = `badge ink-${image ?? 1}`;
-    setText(this.whose, image ? t("pane.whose", { image, role: t(image === 1 ? "photo.far" : "photo.near") }) : "");
+    this.whose.textContent = image ? t("pane.whose", { image, role: t(image === 1 ? "photo.far" : "photo.near") }) : "";
   }
 
   #paint() {

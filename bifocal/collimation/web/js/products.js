@@ -1,8 +1,8 @@
 /** Stage 4: relief and orthophoto run, looked at, delivered. */
-import { h, keyedRows, number, parseNumber, setText } from "./dom.js";
+import { h, html, noChange, nothing, number, parseNumber, render } from "./dom.js";
 import { draggable } from "./dragging.js";
 import * as drawing from "./drawing.js";
-import { button, choice, labelled, numberInput } from "./fields.js";
+import { named, numberField, select } from "./fields.js";
 import { Wall } from "./geometry.js";
 import { Loupe } from "./loupe.js";
 import { Profile } from "./profile.js";
@@ -17,8 +17,6 @@ const SHEETS = ["A4", "A3", "A2", "A1", "A0"];
 const GRADES = ["fast", "standard", "best"];
 const ASK_MS = 80;
 
-/** What is looked at, one at a time. */
-const VIEWS = ["ortho", "relief", "photo"];
 const frameOf = ([left, top, right, bottom]) => [[left, top], [right, bottom]];
 
 /** Bytes of a file, in the unit that leaves digits to read. */
@@ -26,52 +24,46 @@ const size = (bytes) => (bytes < 1e5 ? `${number(bytes / 1e3, 1)} kB` : `${numbe
 
 export class ProductsStage {
   constructor(app) {
-    this.app = app;
-    this.swipe = 1;
-    this.shown = "photo";
-    this.made = new Set();
+    Object.assign(this, { app, swipe: 1, opacity: 1, shown: "photo", made: new Set(), previews: {}, grade: "standard", source: "both", sheet: "auto" });
     this.photos = h("div", { class: "viewer" });
     this.value = h("p", { class: "value", role: "status", testid: "relief-value" });
     this.range = new Range((low, high) => { this.limits = [low, high]; this.#showRelief(); });
     this.shapes = new Shapes(app, this);
-    const make = () => this.deliver.click();
-    this.actions = { make, again: make, download: () => this.download.click() };
+    const make = () => this.#deliver();
+    this.actions = { make, again: make, download: () => this.#at("[data-testid=download]").click() };
     this.loupe = new Loupe();
     this.profile = new Profile(app, () => this.pane?.paint(), () => {
       this.pane?.mounted();
       this.pane?.fit();
     });
+    this.bar = h("div", { class: "layer-bar", role: "toolbar", "aria-label": t("layer.bar") });
+    this.panel = h("aside", { class: "panel" });
     this.element = h("div", { class: "stage work", id: "stage-products" },
-      h("div", { class: "table-top" }, this.#bar(), this.photos, this.range.element, this.profile.element),
-      h("aside", { class: "panel" }, this.#deliverBox(), this.#reliefBox(), this.#orthoBox(),
-        this.shapes.element, this.loupe.element));
+      h("div", { class: "table-top" }, this.bar, this.photos, this.range.element, this.profile.element), this.panel);
   }
 
-  #bar() {
-    const range = (id, value, changed) => {
-      const input = h("input", { type: "range", min: "0", max: "100", value, id, testid: id,
-        oninput: () => changed(input.value / 100) });
-      return h("span", { class: "slider" }, h("label", { for: id }, t(`products.${id}`)), input);
-    };
-    this.opacity = 1;
-    this.views = Object.fromEntries(VIEWS.map((view) => [view, button(t(`products.${view}`), () => this.look(view),
-      { testid: `view-${view}` })]));
-    const toggle = (key, testid, changed) => {
-      const made = button(t(key), () => {
-        const on = made.getAttribute("aria-pressed") !== "true";
-        made.setAttribute("aria-pressed", String(on));
-        changed(on);
-      }, { class: "quiet", testid, "aria-pressed": "false" });
-      return made;
-    };
-    return h("div", { class: "layer-bar", role: "toolbar", "aria-label": t("layer.bar") },
-      h("div", { class: "segments", role: "group", "aria-label": t("products.view") }, Object.values(this.views)),
-      this.veil = range("relief-opacity", "100", (value) => { this.opacity = value; this.#apply(); }),
-      this.curtain = range("ortho-swipe", "100", (value) => { this.swipe = value; this.#apply(); }),
-      this.hatch = toggle("relief.hatch", "relief-hatch", (on) => { this.hatched = on; this.#showRelief(); }),
-      toggle("relief.points", "relief-points", (on) => { this.picks = on; }),
-      button(t("profile.draw"), () => this.profile.begin(), { class: "quiet", testid: "profile" }),
-      this.value);
+  #at(selector) {
+    return this.panel.querySelector(selector);
+  }
+
+  /** What may be looked at: its layer, or nothing. */
+  get #layers() {
+    return { ortho: this.ortho, relief: this.relief, photo: this.wallLayer };
+  }
+
+  #paintBar() {
+    const { shown } = this;
+    const slider = (id, hidden, changed) => html`<span class="slider" ?hidden=${hidden}><label for=${id}>${t(`products.${id}`)}</label>
+      <input type="range" min="0" max="100" value="100" id=${id} data-testid=${id} @input=${({ target }) => { changed(target.value / 100); this.#apply(); }}></span>`;
+    render(html`<div class="segments" role="group" aria-label=${t("products.view")}>${Object.entries(this.#layers).map(([view, layer]) => html`<button
+        type="button" data-testid="view-${view}" aria-pressed=${view === shown} ?disabled=${!layer} @click=${() => this.look(view)}>${t(`products.${view}`)}</button>`)}</div>
+      ${slider("relief-opacity", shown !== "relief", (value) => { this.opacity = value; })}
+      ${slider("ortho-swipe", shown === "photo", (value) => { this.swipe = value; })}
+      <button type="button" class="quiet" data-testid="relief-hatch" ?hidden=${shown !== "relief"} aria-pressed=${Boolean(this.hatched)}
+        @click=${() => { this.hatched = !this.hatched; this.#showRelief(); }}>${t("relief.hatch")}</button>
+      <button type="button" class="quiet" data-testid="relief-points" aria-pressed=${Boolean(this.picks)}
+        @click=${() => { this.picks = !this.picks; this.#paintBar(); }}>${t("relief.points")}</button>
+      <button type="button" class="quiet" data-testid="profile" @click=${() => this.profile.begin()}>${t("profile.draw")}</button>${this.value}`, this.bar);
   }
 
   /** Show one product, or the far photo on the wall; the others only as far as it is drawn aside. */
@@ -81,60 +73,52 @@ export class ProductsStage {
   }
 
   /** A product: its picture, what it is good for, its size, what makes it. */
-  #product(kind, ...rest) {
-    const picture = h("img", { class: "preview", alt: "", hidden: true });
-    const state = h("p", { class: "hint" });
-    this[`${kind}Picture`] = picture;
-    this[`${kind}State`] = state;
-    return h("section", { class: "card product" }, h("h2", {}, t(`${kind}.title`)),
-      h("div", { class: "product-body" }, picture, h("div", {}, h("p", { class: "hint" }, t(`${kind}.hint`)), state)),
-      ...rest, this.app.jobBox(kind));
+  #product(kind, controls) {
+    const { products, jobs, revision, pair } = this.app.state;
+    const product = products[kind];
+    const mark = JSON.stringify([product, jobs.filter((job) => job.state === "done").length]);
+    if (this.previews[kind]?.mark !== mark) this.previews[kind] = { mark, src: product ? `preview/${kind}?v=${jobs.length}-${revision}` : nothing };
+    const pixels = product?.cols ? `${product.cols} × ${product.rows} px` : "";
+    const ready = product && t(`${kind}.ready`, { size: `${pixels}, ${number(1000 * product.gsd, 1)} mm` });
+    return html`<section class="card product"><h2>${t(`${kind}.title`)}</h2>
+      <div class="product-body"><img class="preview" alt="" ?hidden=${!product} src=${this.previews[kind].src}><div><p class="hint">${t(`${kind}.hint`)}</p>
+        <p class="hint">${products.stale[kind] ?? [ready, products.made_from[kind]].filter(Boolean).join(" · ")}</p></div></div>
+      ${controls(!pair || this.app.running(kind))}${this.app.jobBox(kind)}</section>`;
   }
 
-  #reliefBox() {
-    this.grade = choice({ label: t("relief.quality"), value: "standard", testid: "relief-quality",
-      options: Object.fromEntries(GRADES.map((grade) => [grade, t(`relief.${grade}`)])), save: () => {} });
-    this.runRelief = button(t("relief.run"), () => this.app.job("relief", { quality: this.grade.value }),
-      { testid: "run-relief" });
-    return this.#product("relief", h("div", { class: "row" }, this.grade, this.runRelief));
+  #runOrtho() {
+    const input = this.#at("#ortho-gsd");
+    const gsd = parseNumber(input.value);
+    // What is no number is told at the field, and is not the same as an empty one.
+    if (Number.isNaN(gsd)) return input.reportValidity();
+    return this.app.job("ortho", { gsd: gsd === null ? null : gsd / 1000, image: this.source });
   }
 
-  #orthoBox() {
-    this.gsd = numberInput({ label: t("ortho.gsd"), save: () => {}, placeholder: t("ortho.auto") });
-    this.source = choice({ label: t("ortho.source"), value: "both",
-      options: { both: t("ortho.both"), 1: t("photo.far"), 2: t("photo.near") }, save: () => {} });
-    const run = () => {
-      const gsd = parseNumber(this.gsd.value);
-      // What is no number is told at the field, and is not the same as an empty one.
-      if (Number.isNaN(gsd)) return this.gsd.reportValidity();
-      return this.app.job("ortho", { gsd: gsd === null ? null : gsd / 1000, image: this.source.value });
-    };
-    this.runOrtho = button(t("ortho.run"), run, { testid: "run-ortho" });
-    return this.#product("ortho", h("div", { class: "fields" }, labelled(t("ortho.gsd"), this.gsd, "mm"),
-      labelled(t("ortho.source"), this.source)), h("div", { class: "row" }, this.runOrtho));
+  /** The finest scale that holds, unless another was chosen. */
+  get scale() {
+    return this.chosen ?? `1:${this.finest ?? 50}`;
   }
 
-  #deliverBox() {
-    const same = (names) => Object.fromEntries(names.map((name) => [name, name]));
-    this.scale = choice({ label: t("deliver.scale"), options: same(SCALES.map((scale) => `1:${scale}`)), value: "1:50",
-      save: () => { this.chosen = true; }, testid: "deliver-scale" });
-    this.sheet = choice({ label: t("deliver.sheet"), options: { auto: t("deliver.auto"), ...same(SHEETS) },
-      save: () => {}, testid: "deliver-sheet" });
-    this.title = h("input", { type: "text", maxlength: "120", autocomplete: "off", placeholder: t("deliver.titleHint"), testid: "deliver-title" });
-    this.deliver = button(t("deliver.run"), () => this.app.job("deliver", { scale: this.scale.value, quality: this.grade.value,
-      image: this.source.value, sheet: this.sheet.value === "auto" ? null : this.sheet.value, title: this.title.value.trim(),
-      sections: this.profile.kept }), { testid: "deliver" });
-    this.deliverState = h("p", { class: "hint", testid: "deliver-state" });
-    this.files = h("ul", { class: "files" });
-    this.count = h("summary", {});
-    this.download = h("a", { class: "button", href: "download/all.zip", download: "", testid: "download" },
-      t("deliver.download"));
-    return h("section", { class: "card" }, h("h2", {}, t("deliver.title")),
-      h("p", { class: "hint" }, t("deliver.hint")), h("div", { class: "fields" },
-        labelled(t("deliver.scale"), this.scale), labelled(t("deliver.sheet"), this.sheet)),
-      labelled(t("deliver.heading"), this.title),
-      h("div", { class: "row" }, this.deliver, this.download), this.deliverState, this.app.jobBox("deliver"),
-      h("details", { testid: "files" }, this.count, this.files));
+  #deliver() {
+    return this.app.job("deliver", { scale: this.scale, quality: this.grade, image: this.source, title: this.#at("#deliver-title").value.trim(),
+      sheet: this.sheet === "auto" ? null : this.sheet, sections: this.profile.kept });
+  }
+
+  #package({ pair, products: { files, stale, made_from: causes } }) {
+    const scales = Object.fromEntries(SCALES.map((scale) => [`1:${scale}`, scale < this.finest ? t("deliver.fine", { scale }) : `1:${scale}`]));
+    const sheets = { auto: t("deliver.auto"), ...Object.fromEntries(SHEETS.map((name) => [name, name])) };
+    const choose = (key, options, save) => named(t(`deliver.${key}`), `deliver-${key}`,
+      select({ id: `deliver-${key}`, testid: `deliver-${key}`, options, value: this[key], save }));
+    return html`<section class="card"><h2>${t("deliver.title")}</h2><p class="hint">${t("deliver.hint")}</p>
+      <div class="fields">${choose("scale", scales, (scale) => { this.chosen = scale; })}${choose("sheet", sheets, (sheet) => { this.sheet = sheet; })}</div>
+      ${named(t("deliver.heading"), "deliver-title", html`<input type="text" maxlength="120" autocomplete="off" id="deliver-title"
+        placeholder=${t("deliver.titleHint")} data-testid="deliver-title">`)}
+      <div class="row"><button type="button" data-testid="deliver" ?disabled=${!pair || this.app.running("deliver")} @click=${() => this.#deliver()}>${t("deliver.run")}</button>
+        <a class="button" href="download/all.zip" download data-testid="download" ?hidden=${!files.length}>${t("deliver.download")}</a></div>
+      <p class="hint" data-testid="deliver-state">${stale.deliver ?? causes.deliver}</p>${this.app.jobBox("deliver")}
+      <details data-testid="files"><summary>${t("deliver.files", { count: files.length, size: size(files.reduce((sum, { bytes }) => sum + bytes, 0)) })}</summary>
+        <ul class="files">${files.map(({ name, bytes }) => html`<li><a href="download/${encodeURIComponent(name)}" download>${name}</a>
+          <span class="hint">${size(bytes)}</span></li>`)}</ul></details></section>`;
   }
 
   async prepare(state) {
@@ -250,17 +234,13 @@ export class ProductsStage {
   }
 
   #apply() {
-    const there = { photo: this.wallLayer, ortho: this.ortho, relief: this.relief };
+    const layers = this.#layers;
     // What is no longer there gives way to what is.
-    if (!there[this.shown]) this.shown = "photo";
+    if (!layers[this.shown]) this.shown = "photo";
     const whole = this.swipe === 1 && (this.shown !== "relief" || this.opacity === 1);
-    for (const [view, layer] of Object.entries(there)) {
-      this.views[view].setAttribute("aria-pressed", String(view === this.shown));
-      this.views[view].disabled = !layer;
-      layer?.setVisible(view === this.shown || (view === "photo" && !whole));
-    }
-    this.curtain.hidden = this.shown === "photo";
-    this.veil.hidden = this.hatch.hidden = this.range.element.hidden = this.shown !== "relief";
+    for (const [view, layer] of Object.entries(layers)) layer?.setVisible(view === this.shown || (view === "photo" && !whole));
+    this.range.element.hidden = this.shown !== "relief";
+    this.#paintBar();
     this.relief?.setOpacity(this.opacity);
     this.photos.style.setProperty("--ortho-cut", `${100 * (1 - this.swipe)}%`);
     this.pane?.mounted();
@@ -282,7 +262,7 @@ export class ProductsStage {
     const { r, sigma, picks } = await this.app.connection.get(`relief/value?X=${X}&Y=${Y}`).catch(() => ({}));
     const relief = Number.isFinite(r) ? `r ${number(r, 3)} ± ${number(sigma, 3)} m` : t("relief.unknown");
     for (const image of [1, 2]) this.loupe.look(image, picks?.[image - 1] ?? (image === 1 ? this.wall.toPhoto(1, spot) : null));
-    setText(this.value, `X ${number(X, 3)} · Y ${number(Y, 3)} · ${relief}`);
+    this.value.textContent = `X ${number(X, 3)} · Y ${number(Y, 3)} · ${relief}`;
   }
 
   /** The relief under the pointer, asked at most a dozen times a second. */
@@ -299,44 +279,24 @@ export class ProductsStage {
 
   update(state) {
     this.prepare(state).catch((error) => this.app.refuse(error));
-    const { relief, ortho, files, stale, made_from: causes } = state.products;
-    setText(this.deliverState, stale.deliver ?? causes.deliver ?? "");
-    this.#tellScale(state.drawing_scale);
+    const { relief } = state.products;
+    this.finest = state.drawing_scale ?? this.finest;
     this.picks &&= Boolean(relief);
-    const pixels = (product) => (product.cols ? `${product.cols} × ${product.rows} px` : "");
     this.range.show(relief);
     this.loupe.element.hidden = !relief;
-    for (const [kind, product] of [["relief", relief], ["ortho", ortho]]) {
-      const size = product && t(`${kind}.ready`, { size: `${pixels(product)}, ${number(1000 * product.gsd, 1)} mm` });
-      setText(this[`${kind}State`], stale[kind] ?? [size, causes[kind]].filter(Boolean).join(" · "));
-      const picture = this[`${kind}Picture`];
-      const mark = product && JSON.stringify(product).length + state.jobs.filter((job) => job.state === "done").length;
-      picture.hidden = !product;
-      if (product && picture.dataset.mark !== String(mark)) {
-        picture.dataset.mark = String(mark);
-        picture.src = `preview/${kind}?v=${mark}-${state.revision}`;
-      }
-    }
     this.shapes.update(state);
-    for (const [kind, one] of [["relief", this.runRelief], ["ortho", this.runOrtho], ["deliver", this.deliver]]) {
-      one.disabled = !state.pair || this.app.running(kind);
-    }
-    this.download.hidden = !files.length;
-    const bytes = files.reduce((sum, file) => sum + file.bytes, 0);
-    setText(this.count, t("deliver.files", { count: files.length, size: size(bytes) }));
-    keyedRows(this.files, files, { key: ({ name }) => name, signature: JSON.stringify,
-      build: ({ name, bytes: own }) => h("li", {}, h("a", { href: `download/${encodeURIComponent(name)}`, download: "" }, name),
-        h("span", { class: "hint" }, ` ${size(own)}`)) });
-  }
-
-  /** The finest scale that holds is chosen; finer ones say that they are too fine. */
-  #tellScale(finest) {
-    if (!finest || this.finest === finest) return;
-    this.finest = finest;
-    SCALES.forEach((scale, index) => {
-      setText(this.scale.options[index], scale < finest ? t("deliver.fine", { scale }) : `1:${scale}`);
-    });
-    if (!this.chosen) this.scale.value = `1:${finest}`;
+    this.#paintBar();
+    const grades = Object.fromEntries(GRADES.map((grade) => [grade, t(`relief.${grade}`)]));
+    const sources = { both: t("ortho.both"), 1: t("photo.far"), 2: t("photo.near") };
+    render(html`${this.#package(state)}
+      ${this.#product("relief", (off) => html`<div class="row">${select({ label: t("relief.quality"), value: this.grade, testid: "relief-quality",
+        options: grades, save: (grade) => { this.grade = grade; } })}<button type="button" data-testid="run-relief" ?disabled=${off}
+        @click=${() => this.app.job("relief", { quality: this.grade })}>${t("relief.run")}</button></div>`)}
+      ${this.#product("ortho", (off) => html`<div class="fields">${named(t("ortho.gsd"), "ortho-gsd",
+        numberField({ id: "ortho-gsd", value: noChange, placeholder: t("ortho.auto") }), "mm")}${named(t("ortho.source"), "ortho-source",
+        select({ id: "ortho-source", value: this.source, options: sources, save: (source) => { this.source = source; } }))}</div>
+        <div class="row"><button type="button" data-testid="run-ortho" ?disabled=${off} @click=${() => this.#runOrtho()}>${t("ortho.run")}</button></div>`)}
+      ${this.shapes.element}${this.loupe.element}`, this.panel);
   }
 
   get activePane() {

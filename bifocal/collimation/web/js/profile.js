@@ -1,15 +1,8 @@
 /** The relief along a line drawn on the wall, as a small chart with its sigma. */
-import { decimal, h, number, setText } from "./dom.js";
-import { button } from "./fields.js";
+import { decimal, h, html, number, render, svg } from "./dom.js";
 import { t } from "./words/words.js";
 
 const [WIDTH, HEIGHT, LEFT, BOTTOM, PAD] = [900, 180, 66, 26, 12];
-
-const svg = (tag, attributes) => {
-  const node = document.createElementNS("http://www.w3.org/2000/svg", tag);
-  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
-  return node;
-};
 
 /** About `count` round numbers between two values. */
 function ticks(low, high, count) {
@@ -25,17 +18,7 @@ export class Profile {
   /** `paint`: draw the line on the wall; `shown`: the chart has taken its room. */
   constructor(app, paint, shown) {
     Object.assign(this, { app, paint, shown, ends: [], drawing: false, data: null, at: null, kept: [] });
-    this.chart = svg("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", class: "chart" });
-    this.caption = h("p", { class: "hint", role: "status" });
-    this.keep = button(t("profile.keep"), () => this.#keep(), { class: "quiet", testid: "profile-keep", "aria-pressed": "false" });
-    this.book = h("a", { class: "button quiet", download: "", testid: "profile-xlsx" }, "Excel");
-    this.element = h("section", { class: "profile", hidden: true, "aria-label": t("profile.title") },
-      h("div", { class: "row" }, this.caption, this.keep,
-        button("CSV", () => this.#save(), { class: "quiet", testid: "profile-csv" }), this.book,
-        button(t("profile.close"), () => this.close(), { class: "quiet" })),
-      this.chart);
-    this.chart.addEventListener("pointermove", (event) => this.#point(event));
-    this.chart.addEventListener("pointerleave", () => { this.at = null; this.paint(); });
+    this.element = h("section", { class: "profile", hidden: true, "aria-label": t("profile.title") });
   }
 
   /** The line as the drawing's sections are named: the corners, in metres. */
@@ -48,12 +31,8 @@ export class Profile {
     const { kept } = this;
     const corners = this.#corners;
     this.kept = kept.includes(corners) ? kept.filter((one) => one !== corners) : [...kept, corners];
-    this.#tellKept();
+    this.#paint();
     this.app.say(t("profile.kept", { count: this.kept.length }));
-  }
-
-  #tellKept() {
-    this.keep.setAttribute("aria-pressed", String(this.kept.includes(this.#corners)));
   }
 
   /** The profile as a table, in metres. */
@@ -132,50 +111,52 @@ export class Profile {
     const y = (value) => PAD + ((high + slack - value) / (high - low + 2 * slack)) * (HEIGHT - PAD - BOTTOM);
     const band = [];
     const line = [];
-    let open = false;
     r.forEach((value, i) => {
-      if (!Number.isFinite(value)) { open = false; return; }
-      line.push(`${open ? "L" : "M"}${x(distance[i]).toFixed(1)} ${y(value).toFixed(1)}`);
+      if (!Number.isFinite(value)) return;
+      const at = x(distance[i]).toFixed(1);
+      line.push(`${Number.isFinite(r[i - 1]) ? "L" : "M"}${at} ${y(value).toFixed(1)}`);
       const spread = sigma[i] ?? 0;
-      band.push(`M${x(distance[i]).toFixed(1)} ${y(value - spread).toFixed(1)}V${y(value + spread).toFixed(1)}`);
-      open = true;
+      band.push(`M${at} ${y(value - spread).toFixed(1)}V${y(value + spread).toFixed(1)}`);
     });
-    this.chart.replaceChildren(...this.#axes(x, y, low - slack, high + slack),
-      svg("path", { d: band.join(""), class: "band" }), svg("path", { d: line.join(""), class: "curve" }));
-    this.chart.setAttribute("aria-label", t("profile.alt", { low: number(low, 3), high: number(high, 3) }));
-    this.element.hidden = false;
-    this.shown();
-    this.#tellKept();
-    const [[x0, y0], [x1, y1]] = this.ends;
-    this.book.href = `relief/profile.xlsx?${new URLSearchParams({ x0, y0, x1, y1 })}`;
     const times = (x(1) - x(0)) && (y(0) - y(1)) / (x(1) - x(0));
-    setText(this.caption, `${t("profile.caption", { length: number(this.length, 3), low: number(low, 3), high: number(high, 3) })} · ${
-      t("profile.times", { times: number(times, times < 10 ? 1 : 0) })}`);
+    const range = { low: number(low, 3), high: number(high, 3) };
+    this.words = `${t("profile.caption", { length: number(this.length, 3), ...range })} · ${t("profile.times", { times: number(times, times < 10 ? 1 : 0) })}`;
+    this.element.hidden = false;
+    this.#paint(svg`${this.#axes(x, y, low - slack, high + slack)}<path d=${band.join("")} class="band"></path><path d=${line.join("")} class="curve"></path>`,
+      t("profile.alt", range));
+    this.shown();
     return undefined;
   }
 
+  #paint(drawn = this.drawn, alt = this.alt) {
+    Object.assign(this, { drawn, alt });
+    const [[x0, y0], [x1, y1]] = this.ends;
+    render(html`<div class="row"><p class="hint" role="status">${this.words}</p><button type="button" class="quiet" data-testid="profile-keep"
+        aria-pressed=${this.kept.includes(this.#corners)} @click=${() => this.#keep()}>${t("profile.keep")}</button>
+        <button type="button" class="quiet" data-testid="profile-csv" @click=${() => this.#save()}>CSV</button>
+        <a class="button quiet" download data-testid="profile-xlsx" href="relief/profile.xlsx?${new URLSearchParams({ x0, y0, x1, y1 })}">Excel</a>
+        <button type="button" class="quiet" @click=${() => this.close()}>${t("profile.close")}</button></div>
+      <svg viewBox="0 0 ${WIDTH} ${HEIGHT}" role="img" class="chart" aria-label=${alt} @pointermove=${(event) => this.#point(event)}
+        @pointerleave=${() => { this.at = null; this.paint(); }}>${drawn}</svg>`, this.element);
+  }
+
   #axes(x, y, low, high) {
-    const text = (value, attributes) => {
-      const node = svg("text", attributes);
-      node.textContent = `${decimal(String(+value.toPrecision(4)))} m`;
-      return node;
-    };
+    const text = (value, left, base, anchor) => svg`<text x=${left} y=${base} text-anchor=${anchor}>${decimal(String(+value.toPrecision(4)))} m</text>`;
     return [
-      ...ticks(low, high, 4).flatMap((value) => [
-        svg("line", { x1: LEFT, x2: WIDTH - PAD, y1: y(value), y2: y(value), class: "rule" }),
-        text(value, { x: LEFT - 6, y: y(value) + 4, "text-anchor": "end" })]),
-      ...ticks(0, this.length, 8).map((value) =>
-        text(value, { x: x(value), y: HEIGHT - 8, "text-anchor": "middle" })),
+      ...ticks(low, high, 4).map((value) => svg`<line x1=${LEFT} x2=${WIDTH - PAD} y1=${y(value)} y2=${y(value)} class="rule"></line>${
+        text(value, LEFT - 6, y(value) + 4, "end")}`),
+      ...ticks(0, this.length, 8).map((value) => text(value, x(value), HEIGHT - 8, "middle")),
     ];
   }
 
   #point(event) {
-    const { left, width } = this.chart.getBoundingClientRect();
+    const { left, width } = event.currentTarget.getBoundingClientRect();
     const along = (((event.clientX - left) / width) * WIDTH - LEFT) / (WIDTH - LEFT - PAD);
     this.at = Math.min(Math.max(along, 0), 1);
     const { distance, r, sigma } = this.data;
     const index = Math.round(this.at * (distance.length - 1));
-    setText(this.caption, `${number(distance[index], 3)} m: r ${number(r[index] ?? NaN, 3)} ± ${number(sigma[index] ?? NaN, 3)} m`);
+    this.words = `${number(distance[index], 3)} m: r ${number(r[index] ?? NaN, 3)} ± ${number(sigma[index] ?? NaN, 3)} m`;
+    this.#paint();
     this.paint();
   }
 }

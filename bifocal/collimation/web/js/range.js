@@ -1,5 +1,5 @@
 /** The colours of the relief: its histogram, and two handles that say which relief they span. */
-import { h, number, setText } from "./dom.js";
+import { h, number } from "./dom.js";
 import { t } from "./words/words.js";
 
 const STEPS = 200;
@@ -45,8 +45,8 @@ export class Range {
 
   #tell() {
     const [low, high] = this.limits;
-    setText(this.low, number(low, 2));
-    setText(this.high, `${number(high, 2)} m`);
+    this.low.textContent = number(low, 2);
+    this.high.textContent = `${number(high, 2)} m`;
     this.element.querySelector(".ends").setAttribute("aria-label", t("relief.legend", { low: number(low, 2), high: number(high, 2) }));
     const { counts, from, to } = this.facts.histogram;
     const { colours } = this.facts;

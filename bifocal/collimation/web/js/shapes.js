@@ -2,10 +2,10 @@
  * What is drawn on the wall in the last stage: faces, break lines and occluders that relief and
  * orthophoto obey, outlines that are measured. Corners snap, and are kept as pixels of photo 1.
  */
-import { h, keyedRows, number, parseNumber, setText } from "./dom.js";
+import { h, html, number, parseNumber, render, repeat } from "./dom.js";
 import * as drawing from "./drawing.js";
 import { nearest } from "./dragging.js";
-import { button, choice, fill, numberInput, textInput } from "./fields.js";
+import { cross, numberField, select, textField } from "./fields.js";
 import { t } from "./words/words.js";
 
 const KINDS = ["face", "break", "occluder", "outline"];
@@ -17,42 +17,32 @@ const GRIP = 8;
 export class Shapes {
   /** `stage`: the products, whose pane and wall it draws on. */
   constructor(app, stage) {
-    Object.assign(this, { app, stage, corners: null, hot: null, snapping: true, dragged: null, latest: Promise.resolve() });
-    this.kind = choice({ label: t("shape.kind"), testid: "face-kind", save: () => {},
-      options: Object.fromEntries(KINDS.map((kind) => [kind, t(`shape.${kind}`)])) });
-    this.begin = button(t("shape.draw"), () => this.arm(), { class: "quiet", testid: "face", "aria-pressed": "false" });
-    this.close = button(t("shape.close"), () => this.finish(), { class: "quiet", testid: "face-close", hidden: true });
-    this.suggest = button(t("shape.suggest"), () => app.job("suggest"), { class: "quiet", testid: "face-suggest" });
-    this.snap = button(t("shape.snap"), () => this.toggleSnap(), { class: "quiet", testid: "face-snap", "aria-pressed": "true" });
-    this.typed = textInput({ label: t("shape.typed"), placeholder: "X; Y [m]", size: "12", testid: "face-typed", hidden: true,
-      save: (text) => this.#type(text) });
-    this.hint = h("p", { class: "hint", role: "status" });
-    this.body = h("tbody");
-    this.offers = h("ul", { class: "offers" });
-    this.element = h("section", { class: "card" }, h("h2", {}, t("shape.title")),
-      h("div", { class: "row" }, this.kind, this.begin, this.close, this.typed, this.snap, this.suggest), app.jobBox("suggest"), this.hint,
-      this.offers, h("table", { class: "grid", testid: "shape-table" }, this.body));
+    Object.assign(this, { app, stage, kind: "face", corners: null, hot: null, snapping: true, dragged: null, latest: Promise.resolve() });
+    this.element = h("section", { class: "card" });
+  }
+
+  #again() {
+    this.update(this.app.state);
+    this.stage.pane?.paint();
   }
 
   /** The next clicks are corners. */
   arm() {
     this.corners = this.corners ? null : [];
-    this.update(this.app.state);
-    this.stage.pane?.paint();
+    this.#again();
   }
 
   /** Whether corners go to the corner of the photo that lies there. */
   toggleSnap() {
     this.snapping = !this.snapping;
-    this.snap.setAttribute("aria-pressed", String(this.snapping));
+    this.update(this.app.state);
     this.app.say(t(this.snapping ? "shape.snaps" : "shape.snapsNot"));
   }
 
   /** Take back the last corner of the shape in hand. */
   back() {
     this.corners?.pop();
-    this.update(this.app.state);
-    this.stage.pane?.paint();
+    this.#again();
   }
 
   /** The corner that is drawn at a CSS pixel of the pane, or null: of the shape in hand, or of a kept one. */
@@ -85,8 +75,7 @@ export class Shapes {
       if (kind !== "outline" && kind !== "break") corner[2] = shape.corners[index][2];
       await this.app.send("shape.set", { name, kind, corners: shape.corners.with(index, corner) });
     }
-    this.update(this.app.state);
-    this.stage.pane.paint();
+    this.#again();
   }
 
   leave() {
@@ -111,10 +100,10 @@ export class Shapes {
   }
 
   /** A corner by its coordinates on the wall: "4.20; 1.35". */
-  async #type(text) {
+  async #type(text, input) {
     const place = text.split(/[;\s]+/).map(parseNumber);
     if (place.length !== 2 || !place.every(Number.isFinite)) return this.app.say(t("shape.typedHow"), "warning");
-    this.typed.value = this.typed.dataset.known = "";
+    input.value = input.dataset.known = "";
     return this.#next(() => this.#add(this.stage.wall.fromPlane(place), { typed: true }));
   }
 
@@ -132,8 +121,7 @@ export class Shapes {
     const corner = await this.#corner(spot, how).catch((error) => this.app.refuse(error));
     if (!corner || !corners || this.corners !== corners) return undefined;
     corners.push(corner);
-    this.update(this.app.state);
-    return this.stage.pane.paint();
+    return this.#again();
   }
 
   /** The photo's pixel under a place, on the corner there unless it was typed, with its relief. */
@@ -155,8 +143,7 @@ export class Shapes {
 
   /** Corners -> a shape of the survey: a face has one relief, that which lies most within. */
   async #keep() {
-    const { corners } = this;
-    const kind = this.kind.value;
+    const { corners, kind } = this;
     if (!corners || corners.length < (kind === "break" ? 2 : 3)) return this.app.say(t("shape.few"), "warning");
     this.corners = null;
     let shape = corners;
@@ -185,38 +172,42 @@ export class Shapes {
     }
     for (const { corners } of suggested) line(corners, null, "#ffffff", { closed: true, width: 1.5, dash: [5, 5] }, "suggested");
     if (!this.corners?.length) return;
-    line(this.corners, null, INK[this.kind.value], { width: 2.5 });
+    line(this.corners, null, INK[this.kind], { width: 2.5 });
     this.corners.forEach((corner, index) => drawing.marker(context, 1,
       pane.place(dragged && !dragged.shape && dragged.index === index ? dragged.spot : this.#shown(corner))));
   }
 
-  update(state) {
-    this.begin.setAttribute("aria-pressed", String(Boolean(this.corners)));
-    this.begin.disabled = !state.pair;
-    this.close.hidden = !this.corners?.length;
-    this.typed.hidden = !this.corners;
-    this.suggest.disabled = !state.products.relief;
-    setText(this.hint, this.corners ? t("shape.corners", { count: this.corners.length }) : t(state.shapes.length ? "shape.again" : "shape.hint"));
-    keyedRows(this.offers, state.suggested.filter(({ corners }) => !state.shapes.some((one) => String(one.corners) === String(corners))),
-      { key: ({ name }) => name, signature: JSON.stringify, build: (offer) => this.#offer(offer) });
-    keyedRows(this.body, state.shapes, { key: ({ name }) => name, signature: JSON.stringify, build: (shape) => this.#row(shape) });
+  update({ pair, products, shapes, suggested }) {
+    const { corners, kind } = this;
+    const offers = suggested.filter((offer) => !shapes.some((one) => String(one.corners) === String(offer.corners)));
+    render(html`<h2>${t("shape.title")}</h2><div class="row">
+        ${select({ label: t("shape.kind"), testid: "face-kind", value: kind, save: (key) => { this.kind = key; },
+          options: Object.fromEntries(KINDS.map((key) => [key, t(`shape.${key}`)])) })}
+        <button type="button" class="quiet" data-testid="face" aria-pressed=${Boolean(corners)} ?disabled=${!pair} @click=${() => this.arm()}>${t("shape.draw")}</button>
+        <button type="button" class="quiet" data-testid="face-close" ?hidden=${!corners?.length} @click=${() => this.finish()}>${t("shape.close")}</button>
+        ${textField({ label: t("shape.typed"), placeholder: "X; Y [m]", size: 12, testid: "face-typed", hidden: !corners, save: (...typed) => this.#type(...typed) })}
+        <button type="button" class="quiet" data-testid="face-snap" aria-pressed=${this.snapping} @click=${() => this.toggleSnap()}>${t("shape.snap")}</button>
+        <button type="button" class="quiet" data-testid="face-suggest" ?disabled=${!products.relief} @click=${() => this.app.job("suggest")}>${t("shape.suggest")}</button></div>
+      ${this.app.jobBox("suggest")}
+      <p class="hint" role="status">${corners ? t("shape.corners", { count: corners.length }) : t(shapes.length ? "shape.again" : "shape.hint")}</p>
+      <ul class="offers">${repeat(offers, ({ name }) => name, (offer) => this.#offer(offer))}</ul>
+      <table class="grid" data-testid="shape-table"><tbody>${repeat(shapes, ({ name }) => name, (shape) => this.#row(shape))}</tbody></table>`, this.element);
   }
 
   #offer({ name, kind, corners, mends }) {
-    const words = t("shape.offer", { name, relief: number(corners[0][2], 2), share: number(100 * (mends ?? 0), 1) });
-    return h("li", { class: "row between" }, words, button(t("shape.accept"),
-      () => this.app.send("shape.set", { kind, corners }), { testid: "face-accept" }));
+    return html`<li class="row between">${t("shape.offer", { name, relief: number(corners[0][2], 2), share: number(100 * (mends ?? 0), 1) })}
+      <button type="button" data-testid="face-accept" @click=${() => this.app.send("shape.set", { kind, corners })}>${t("shape.accept")}</button></li>`;
   }
 
   #row({ name, kind, corners, relief, width, height, area, length }) {
-    const level = numberInput({ label: t("shape.relief", { name }), size: "6", save: (r) =>
-      this.app.send("shape.set", { name, kind, corners: corners.map(([c, row]) => [c, row, r ?? 0]) }) });
-    fill(level, relief === undefined ? null : Math.round(1000 * relief) / 1000);
+    const save = (r) => this.app.send("shape.set", { name, kind, corners: corners.map(([c, row]) => [c, row, r ?? 0]) });
     const size = [width && `${number(width, 3)} × ${number(height, 3)} m`, area && `${number(area, 3)} m²`,
       kind === "break" && length && `${number(length, 3)} m`].filter(Boolean).join(" · ");
-    return h("tr", { onpointerenter: () => { this.hot = name; this.stage.pane?.paint(); }, onpointerleave: () => { this.hot = null; this.stage.pane?.paint(); } },
-      h("th", { scope: "row" }, h("span", { class: `swatch ${kind}` }), name), h("td", {}, t(`shape.${kind}`)),
-      h("td", {}, h("span", { class: "with-unit" }, level, h("span", { class: "unit" }, "m"))), h("td", { class: "number" }, size),
-      h("td", {}, button("×", () => this.app.send("shape.delete", { name }), { class: "icon", "aria-label": t("list.deleteOf", { name }) })));
+    const heat = (hot) => { this.hot = hot; this.stage.pane?.paint(); };
+    return html`<tr data-key=${name} @pointerenter=${() => heat(name)} @pointerleave=${() => heat(null)}>
+      <th scope="row"><span class="swatch ${kind}"></span>${name}</th><td>${t(`shape.${kind}`)}</td>
+      <td><span class="with-unit">${numberField({ label: t("shape.relief", { name }), size: 6, save,
+        value: relief === undefined ? null : Math.round(1000 * relief) / 1000 })}<span class="unit">m</span></span></td>
+      <td class="number">${size}</td><td>${cross(name, () => this.app.send("shape.delete", { name }))}</td></tr>`;
   }
 }

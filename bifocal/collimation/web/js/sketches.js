@@ -1,8 +1,7 @@
 /** Words of the trade as small pictures: on hover and focus, beside what they name. */
-import { Directive, directive, h, noChange } from "./dom.js";
+import { Directive, directive, h, html, noChange, render, svg } from "./dom.js";
 import { t } from "./words/words.js";
 
-const SPACE = "http://www.w3.org/2000/svg";
 /** Lines as [class, path]: w wall, c camera, r ray, m what is meant; and where its letter stands. */
 const WALL = ["w", "M150 8V112"];
 const STEP = ["w", "M150 8V40H128V62H150V112"];
@@ -18,14 +17,13 @@ const SKETCHES = {
   sigma: [[WALL, CAMERAS, ["r", "M24 50L150 34M24 62L150 46M72 50L150 30M72 62L150 52"], ["m", "M128 40L150 30L172 40L150 52Z"]], "σ", [176, 44]],
 };
 
-/** Give a node its sketch: shown while it is pointed at or has the focus. */
-export function sketched(node, name) {
-  if (!(name in SKETCHES)) return node;
+function sketched(node, name) {
   let shown = null;
   const hide = () => { shown?.remove(); shown = null; };
   const show = () => {
     if (shown) return;
-    shown = h("div", { class: "sketch", role: "tooltip" }, drawn(name), h("p", {}, t(`sketch.${name}`)));
+    shown = h("div", { class: "sketch", role: "tooltip" });
+    render(drawn(name), shown);
     document.body.append(shown);
     const { left, top, height } = node.getBoundingClientRect();
     const { offsetWidth: width, offsetHeight: tall } = shown;
@@ -37,13 +35,12 @@ export function sketched(node, name) {
   for (const [event, action] of [["pointerenter", show], ["focus", show], ["pointerleave", hide], ["blur", hide]]) {
     node.addEventListener(event, action);
   }
-  return node;
 }
 
-/** The same in a template: `<dt ${sketch("r")}>`. */
+/** Its sketch for an element of a template, where there is one: shown while it is pointed at or has the focus. */
 export const sketch = directive(class extends Directive {
   update({ element }, [name]) {
-    if (!this.done) sketched(element, name);
+    if (!this.done && name in SKETCHES) sketched(element, name);
     this.done = true;
     return noChange;
   }
@@ -51,19 +48,6 @@ export const sketch = directive(class extends Directive {
 
 function drawn(name) {
   const [paths, letter, [x, y]] = SKETCHES[name];
-  const svg = document.createElementNS(SPACE, "svg");
-  svg.setAttribute("viewBox", "0 0 200 120");
-  svg.setAttribute("aria-hidden", "true");
-  for (const [kind, d] of paths) {
-    const path = document.createElementNS(SPACE, "path");
-    path.setAttribute("class", `sketch-${kind}`);
-    path.setAttribute("d", d);
-    svg.append(path);
-  }
-  const text = document.createElementNS(SPACE, "text");
-  text.setAttribute("x", x);
-  text.setAttribute("y", y);
-  text.textContent = letter;
-  svg.append(text);
-  return svg;
+  return html`<svg viewBox="0 0 200 120" aria-hidden="true">${paths.map(([kind, d]) => svg`<path class="sketch-${kind}" d=${d}></path>`)}<text x=${x}
+    y=${y}>${letter}</text></svg><p>${t(`sketch.${name}`)}</p>`;
 }
