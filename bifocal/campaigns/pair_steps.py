@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -350,12 +351,14 @@ def _drawing_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver
+        from bifocal.reports.accuracy import wall_in_words
 
         drawing = {key: options[key] for key in (*DRAWING, "language") if key in options}
         wish = DeliverTask(
             title=job.name, **drawing, mark=job.files.get("mark"),
             cad=_points_to_draw(job, solved="points" in earlier),
             checked=_checked(job) if "points" in earlier else None,
+            expected=partial(wall_in_words, language=drawing.get("language", "en")),
         )  # fmt: skip
         task = _ortho_task(job, options)
         return deliver(job.pair_path, place, task, wish, progress=progress).ortho.remarks

@@ -14,7 +14,6 @@ from bifocal.options import ColumnsOption, SetUpOptions
 from photocore.cli import print_result, progress_bar, remark
 from photocore.option_types import TABLE
 from photocore.options import Argument, Typed, declared
-from photocore.reports.words import words_of
 from photocore.shared_options import JsonOption, OverwriteOption
 
 if TYPE_CHECKING:
@@ -168,6 +167,7 @@ def _align_workbook(
 def _lines(alignment: Alignment) -> Iterator[str]:
     """Yield the set-up for people."""
     from bifocal.orientation.align_workflow import basis
+    from bifocal.reports.accuracy import wall_in_words
 
     yield from alignment.words
     ties = alignment.setup["common_points"]
@@ -185,20 +185,9 @@ def _lines(alignment: Alignment) -> Iterator[str]:
             mark = "" if alignment.control_used[index] else "   LEFT OUT"
             yield f"  {name:>12}  {values}  {alignment.control_test[index]:6.1f}{mark}"
     yield basis(alignment)
-    yield from _precision(alignment)
+    yield from wall_in_words(alignment.pair, language="en")
     for text in alignment.setup["assumed"]:
         yield f"Assumed: {text}."
-
-
-def _precision(alignment: Alignment) -> Iterator[str]:
-    """Yield how precisely the wall is known, as the page and the report say it."""
-    from bifocal.reports.accuracy import precision_in_words
-    from bifocal.survey.wall_precision import wall_precision
-
-    pair = alignment.pair
-    sizes = (pair.image1.image_size, pair.image2.image_size)
-    if sizes[0] and sizes[1] and (precision := wall_precision(pair, (sizes[0], sizes[1]))):
-        yield precision_in_words(precision, words_of("bifocal.reports", "en"))
 
 
 def _taped(setup: Mapping[str, Any]) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -98,6 +99,7 @@ def command(
     from bifocal.files.pair_names import default_title
     from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver
     from bifocal.orthophotos.ortho_workflow import OrthoTask, basis_in_words, make_ortho
+    from bifocal.reports.accuracy import wall_in_words
     from bifocal.workbook.pair_workflow import is_workbook, points_of, read_photos
 
     if out is None and folder is None:
@@ -136,7 +138,10 @@ def command(
     with progress_bar("orthophoto", quiet=as_json) as progress:
         if folder is not None and scale is not None:
             title = title or default_title(source, pair)
-            wish = DeliverTask(title=title, hashes=True, **drawing)
+            wish = DeliverTask(
+                title=title, hashes=True, **drawing,
+                expected=partial(wall_in_words, language=drawing["language"]),
+            )  # fmt: skip
             done = deliver(
                 source, folder, task, wish, out=out, world_file=tfw, overwrite=overwrite,
                 progress=progress,

@@ -6,6 +6,7 @@ import json
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -39,6 +40,7 @@ from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orthophotos.deliver_workflow import DPI, DeliverTask, deliver
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
 from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
+from bifocal.reports.accuracy import wall_in_words
 from bifocal.reports.content import ReportTask
 from bifocal.reports.handover import HandoverTask, write_handover
 from bifocal.reports.view_workflow import view_relief
@@ -261,6 +263,7 @@ def _deliver(task: Task, progress: Progress) -> dict[str, Any]:
     title = task["title"] or default_title(pair, path)
     wish = DeliverTask(
         title=title, mark=_path(task["mark"]), lengths=tuple(_lengths(task).values()),
+        expected=partial(wall_in_words, language=task["drawing"].get("language", "en")),
         **{"scale": 50.0, **task["drawing"]},
     )  # fmt: skip
     done = deliver(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -52,7 +52,7 @@ from bifocal.orthophotos.sections import section, section_letter
 from bifocal.orthophotos.shading import colour_limits, shaded, tints, unmeasured
 from bifocal.orthophotos.spot_heights import spot_heights
 from bifocal.orthophotos.tiles import RasterResult
-from bifocal.orthophotos.tuning import COMPOSE, CONTOURS, PIXELS, SHEET
+from bifocal.orthophotos.tuning import COMPOSE, CONTOURS, PIXELS
 from bifocal.remarks import remark
 from photocore.arrays import Float32Array, FloatArray, positive
 from photocore.cli import Progress, no_progress
@@ -110,6 +110,9 @@ class DeliverTask:
         sheet in place of the standard deviations.
     lengths : sequence of LengthCheck
         Lengths taped on site that check the scale; the sheet tells how they agree.
+    expected : callable
+        Tells in lines what the sigmas of a pair let expect: said of measured relief that no check
+        points tell of.
     hashes : bool
         List the files' SHA-256 in ``SHA256SUMS``, for ``bifocal verify``.
     """
@@ -129,6 +132,7 @@ class DeliverTask:
     camera: str = ""
     checked: tuple[int, float, float] | None = None
     lengths: Sequence[LengthCheck] = ()
+    expected: Callable[[Pair], Sequence[str]] = lambda _: ()
     hashes: bool = False
 
 
@@ -430,34 +434,12 @@ def _points(source: Path | Points | None) -> tuple[Points | None, tuple[str, ...
     return points, tuple(remarks)
 
 
-def _accuracy(pair: Pair, grid: Grid, task: OrthoTask, reader: RasterReader | None) -> list[float]:
-    """Return photo pixel, and of what was measured the typical sigma of position and relief. [mm]
-
-    A point is off by what its relief is off times the slope of its ray, s / (d - r), and by the
-    pick of a photo pixel.
-    """
-    pixel = photo_pixel(pair, task)
-    if reader is None or reader.bands < 3:
-        return [1000 * pixel]
-    coarse = Grid.from_bounds(grid.bounds, gsd=max(grid.shape) * grid.gsd / SHEET.looked_at)
-    r, sigma, quality = np.moveaxis(reader.nearest(coarse, bands=[1, 2, 3]), -1, 0)
-    measured = np.isfinite(r) & np.isfinite(sigma) & (quality == Quality.MEASURED)
-    if not measured.any():
-        return [1000 * pixel]
-    photo = pair.photo(2 if task.image == "2" else 1)
-    x, y = np.meshgrid(coarse.columns_x - photo.nadir[0], coarse.rows_y - photo.nadir[1])
-    slope = np.hypot(x, y)[measured] / (photo.distance - r[measured])
-    place = np.hypot(slope * sigma[measured], photo.precision() * pixel)
-    return [1000 * pixel, 1000 * float(np.median(place)), 1000 * float(np.median(sigma[measured]))]
-
-
 def _notes(
     pair: Pair, grid: Grid, wish: DeliverTask, task: OrthoTask, reader: RasterReader | None
 ) -> tuple[str, ...]:
     """Return the lines of the title block."""
-    precise = _accuracy(pair, grid, task, reader)
-    lengths = dict(zip(("own", "place", "relief"), precise, strict=False))
-    words = "accuracy" if len(lengths) > 1 else "photo_pixel"
+    words, lengths = "photo_pixel", {"own": 1000 * photo_pixel(pair, task)}
+    expected: Sequence[str] = ()
     misfit = bool(doubts_of(MISFITS, pair.remarks))
     checks = [*checks_of(pair.extra.get("setup")).values(), *wish.lengths]
     if wish.checked is not None:
@@ -465,8 +447,8 @@ def _notes(
         words, lengths = "accuracy_checked", lengths | {
             "count": count, "place": 1000 * place, "relief": 1000 * deep
         }  # fmt: skip
-    elif misfit:
-        words = "photo_pixel"
+    elif reader is not None and not misfit:
+        expected = wish.expected(pair)
     relief, say = task.relief or task.points, words_of("bifocal.orthophotos", wish.language)
     if isinstance(pair, PhotosOfSet):
         distances = ", ".join(f"{photo.distance:.3f} m" for photo in pair.photos)
@@ -477,6 +459,7 @@ def _notes(
     return (
         say("pixel", size=grid.gsd * 1000, dpi=dpi_at_scale(grid.gsd, wish.scale)),
         say(words, **lengths),
+        *expected,
         *((say("lengths_checked", **agreement(checks)),) if checks else ()),
         *((say("misfit"),) if misfit else ()),
         wish.camera or cameras,

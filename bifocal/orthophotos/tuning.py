@@ -149,8 +149,6 @@ class ContoursTuning:
 class SheetTuning:
     """The print sheet."""
 
-    #: Places a side at which the precision that a sheet states is looked up.
-    looked_at: int = 400
     #: White to the left of the frame, for binding. [mm]
     left: float = 20.0
     #: White around the frame elsewhere. [mm]

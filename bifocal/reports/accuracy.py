@@ -8,6 +8,8 @@ import numpy as np
 
 from bifocal.model.doubts import MISFITS, doubts_of
 from bifocal.model.length_checks import LengthCheck, agreement, checks_of
+from bifocal.model.pair import Pair
+from bifocal.model.photos_of_set import PhotosOfSet
 from bifocal.remarks import in_language
 from bifocal.reports.content import PairContent
 from bifocal.survey.reference import CheckResult
@@ -40,7 +42,9 @@ def accuracy_blocks(content: PairContent, say: Words) -> Iterator[Block]:
     check = None if solution is None else solution.check
     if check is None or not np.isfinite(check.accuracy):
         if not _lengths_of(content):
-            yield Banner(text=say("verdict_none"), details=_expected(content, say))
+            yield Banner(
+                text=say("verdict_none"), details=_expected(content, content.task.language)
+            )
         return
     yield _banner(content, check, say)
     yield _verdict_table(check, say)
@@ -80,7 +84,7 @@ def verdict_in_words(content: PairContent) -> list[str]:
     say = words_of("bifocal.reports", "en")
     solution = content.solution
     if solution is None or not np.isfinite(solution.check.accuracy):
-        return [say("verdict_none"), *_expected(content, say)]
+        return [say("verdict_none"), *_expected(content, "en")]
     banner = _banner(content, solution.check, say)
     misfit = bool(doubts_of(MISFITS, content.pair.remarks))
     parts, (_, *expected) = banner.details[: len(_PARTS)], banner.details[len(_PARTS) :]
@@ -94,13 +98,20 @@ def precision_in_words(precision: WallPrecision, say: Words) -> str:
     return say("known_to", **lengths, verdict=say(holds, scale=precision.scale))
 
 
-def _expected(content: PairContent, say: Words) -> tuple[str, ...]:
-    """Return what the sigmas of the pair alone let expect; nothing of a set of photos."""
-    sizes = (content.pair.image1.image_size, content.pair.image2.image_size)
-    if content.of_set is not None or sizes[0] is None or sizes[1] is None:
+def wall_in_words(pair: Pair, *, language: str) -> tuple[str, ...]:
+    """Return the same of a pair, as terminal, report and sheet say it; nothing of a set."""
+    sizes = (pair.image1.image_size, pair.image2.image_size)
+    if isinstance(pair, PhotosOfSet) or sizes[0] is None or sizes[1] is None:
         return ()
-    precision = wall_precision(content.pair, (sizes[0], sizes[1]))
-    return () if precision is None else (precision_in_words(precision, say),)
+    precision = wall_precision(pair, (sizes[0], sizes[1]))
+    if precision is None:
+        return ()
+    return (precision_in_words(precision, words_of("bifocal.reports", language)),)
+
+
+def _expected(content: PairContent, language: str) -> tuple[str, ...]:
+    """Return what the sigmas of the pair alone let expect; nothing of a set of photos."""
+    return () if content.of_set is not None else wall_in_words(content.pair, language=language)
 
 
 def _map_in_words(content: PairContent, say: Words) -> Iterator[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import ezdxf
@@ -23,7 +24,8 @@ from bifocal.orthophotos.dxf_canvas import DxfCanvas
 from bifocal.orthophotos.ortho_workflow import OrthoTask
 from bifocal.orthophotos.pdf_sheet import _PdfCanvas
 from bifocal.remarks import remark
-from tests.bifocal.orthophotos.ortho_command import GSD, page_of, run, write_wall
+from bifocal.reports.accuracy import wall_in_words
+from tests.bifocal.orthophotos.ortho_command import GSD, SIZE, page_of, run, write_wall
 
 #: The pixel of the photos at 1:50, 10 mm: finer ones show no more, and cost four times as much.
 COARSE = ("--scale", "1:50", "--dpi", "127")
@@ -241,7 +243,7 @@ def test_the_sheet_of_a_whole_picture_says_what_was_not_measured(wall: Path) -> 
     bound = ", smoothed by up to half a photo pixel"
     (told,) = re.findall(rf"\((\S+ % on interpolated relief{bound})\)", page)
     assert told in done.stdout
-    (own,) = re.findall(r"\(photo pixel (\S+) mm on the wall;.* in position", page)
+    (own,) = re.findall(r"\(photo pixel (\S+) mm on the wall", page)
     assert own == "10"
     assert "(not measured" not in page
     plain = run(wall, *part, "--deliver", "e", "--no-hatch")
@@ -396,19 +398,25 @@ def test_the_title_block_states_no_sigma_that_the_check_points_or_the_model_gain
     wall: Path, fits: bool
 ) -> None:
     pair = Pair.read(wall / "wall.pair.json")
+    far, near = (replace(photo, image_size=SIZE) for photo in (pair.image1, pair.image2))
+    pair = replace(pair, image1=far, image2=near)
     if not fits:
         setup = {"doubts": [remark("pair.bent", bend=0.7, most=0.2)]}
         pair = replace(pair, extra={**pair.extra, "setup": setup})
     task = OrthoTask(relief=wall / "relief.tif")
     with RasterReader(wall / "relief.tif") as reader:
-        grid, wish = reader.grid, DeliverTask(scale=50)
+        in_words = partial(wall_in_words, language="en")
+        grid, wish = reader.grid, DeliverTask(scale=50, expected=in_words)
         plain = "\n".join(_notes(pair, grid, wish, task, reader))
         checked = replace(wish, checked=(20, 0.0204, 0.0671), language="de")
         proven = "\n".join(_notes(pair, grid, checked, task, reader))
-    assert ("one sigma" in plain) == fits
+    # In the words of page, terminal and report.
+    (expected,) = in_words(pair)
+    assert "places to" in expected
+    assert (expected in plain) == fits
     assert ("THE MODEL DOES NOT FIT" in plain) != fits
     assert "20 Kontrollpunkte weichen um 20 mm in der Lage, 67 mm im Relief ab" in proven
-    assert "Sigma" not in proven
+    assert expected not in proven
 
 
 def test_words_in_the_middle_of_a_place_stay_there_when_they_are_turned() -> None:
