@@ -397,6 +397,34 @@ def test_rims_stay_where_they_are_measured_and_where_the_photo_shows_no_edge():
     np.testing.assert_array_equal(bands.r, fat)
 
 
+@pytest.mark.parametrize("upright", [False, True])
+def test_the_farthest_rim_of_a_map_that_is_not_square_is_seen(upright):
+    """A slab's rim 378 px from the nadir, which lies on the short edge of 400 x 120 px.
+
+    It hides 378 x 47 mm / (17.5 - 0.047) = 1.02 px from camera 1. Were the map taken for one of
+    120 x 400 px, nothing of it were farther than 361 px: there it would hide less than a pixel.
+    """
+    photos = [replace(photo, nadir=(0.0, 0.0)) for photo in (FAR, NEAR)]
+    grid = Grid.from_bounds((0.0, -0.6, 4.0, 0.6), gsd=0.01)
+    r = np.zeros(grid.shape, np.float32)
+    r[:, 300:378] = 0.047
+    quality = np.full(r.shape, Quality.MEASURED, np.uint8)
+    quality[:, 370:390] = Quality.INTERPOLATED
+    if upright:  # the same, turned to the left about the nadir
+        grid = Grid.from_bounds((-0.6, 0.0, 0.6, 4.0), gsd=0.01)
+        r, quality = (np.ascontiguousarray(np.rot90(part)) for part in (r, quality))
+    grey, all_of_it = np.zeros(grid.shape, np.uint8), np.ones(grid.shape, bool)
+    frame = Frame(grid=grid, image1=grey, image2=grey, seen1=all_of_it, seen2=all_of_it,
+                  pair=Pair(image1=photos[0], image2=photos[1]))  # fmt: skip
+    rims = occluding_edges._falling(frame, MapBands(r, np.full_like(r, 0.001), quality), grid)
+    nadir = grid.pixel_of(np.zeros(2))
+    away = np.hypot(rims.column - nadir[0], rims.row - nadir[1])
+    # Of 120 rows those 18 px from the borders are not looked at.
+    assert len(away) == 120 - 2 * 18
+    assert 377 < away.min() <= away.max() < 380
+    np.testing.assert_allclose(rims.behind, 0, atol=1e-7)
+
+
 def looping(loop: np.ndarray) -> flow.Measurement:
     return flow.Measurement(r=loop, across=loop, loop=loop, sigma_px=loop)
 
