@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -12,7 +13,7 @@ from click.testing import CliRunner
 from PIL import Image
 
 from bifocal import InputError, Interior, Lens, calibrate, read_image, write_image
-from bifocal.calibration.board_calibration import Calibration, lens_of_views
+from bifocal.calibration.board_calibration import Calibration, _verdict, lens_of_views
 from bifocal.calibration.lens_database import lens_from_database
 from bifocal.calibration.plumb_line import calibrate_from_lines, find_straight_edges
 from bifocal.calibration.workflow import undistorted
@@ -41,6 +42,25 @@ def test_a_calibration_is_told_with_the_sigma_of_each_value_that_was_estimated()
     for words in ("RMS 0.250 px; 8 photos", "k1 0.250 px", "a.jpg  0.210", "fit the others: c.jpg",
                   "than the others: b.jpg", "  40   41", "Verdict: good"):  # fmt: skip
         assert words in text
+
+
+def judged(*, sigma: float = 1.0, rms: float = 0.3, photos: int = 12, empty: int = 0) -> str:
+    """Return the verdict on a fit of focal length 3000 px in 4000 px, so many of 48 cells empty."""
+    lens = SimpleNamespace(camera_matrix=np.diag([3000.0, 3000.0, 1.0]), image_size=(4000, 3000))
+    coverage = np.ones(48, dtype=np.int64)
+    coverage[:empty] = 0
+    best = SimpleNamespace(deviations={"fx": sigma}, lens=lens, rms=rms)
+    return _verdict(best, coverage.reshape(6, 8), photos)
+
+
+def test_the_verdict_on_a_calibration_names_each_weakness_with_its_number():
+    assert judged() == judged(sigma=5.9, rms=0.99, photos=8) == "good"
+    # 9 of 3000 px are 0.3 %.
+    assert "usable: the principal distance is known to 0.3% only" in judged(sigma=9.0)
+    assert judged(photos=7) == "usable: only 7 photos: take ten or more"
+    assert judged(rms=1.5).startswith("poor: residuals of 1.50 px")
+    assert "reaches only 58% of the photo and 2 of 4 corners" in judged(empty=20)
+    assert judged(empty=36).startswith("poor: the board reaches only 25%")
 
 
 def test_distortion_is_browns_and_its_inverse_exact():

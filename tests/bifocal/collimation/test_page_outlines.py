@@ -9,6 +9,7 @@ import openpyxl
 import pytest
 
 import bifocal
+from bifocal.collimation.wording import say
 from tests.browser import true_pixel
 from tests.page_session import opened, pick_both, sample_folder, sample_picks
 
@@ -54,3 +55,6 @@ def test_outlines_alone_make_a_workbook(tmp_path: Path) -> None:
         session.sync.step()
         assert session.sync.waiting is None
         assert list(rows_of(session.files.workbook)) == ["W1"]
+        sheet = openpyxl.load_workbook(session.files.workbook)["Outlines"]
+        assert sheet["A1"].value == say("outline", "note", "en")
+        assert [sheet["A3"].value, sheet["A4"].value] == [say("outline", "id", "en"), "id"]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bifocal import Measuring, Pair, Photo, Taking, solve
-from bifocal.survey.orientation_check import check_orientation
+from bifocal.survey.orientation_check import OrientationParameter, check_orientation
 from multimedia import GeometryError, InputError
 from tests.scenes import SetupErrors, bifocal_cameras
 
@@ -151,3 +151,9 @@ def test_an_ideal_survey_in_millimetres_finds_the_same_centre():
     assert any("in mm at the scale of image 1." in remark for remark in map(str, survey.remarks))
     away = np.hypot(xyz[:, 0], xyz[:, 1]) > 1.5
     np.testing.assert_allclose(survey.table["r"][away], xyz[away, 2], atol=2e-4)
+
+
+@pytest.mark.parametrize(("value", "says_something"), [(-0.2, True), (0.14, False)])
+def test_a_difference_says_something_from_three_of_its_sigmas_on(value, says_something):
+    about = {"name": "shift X", "unit": "mm", "false_relief": 0.0}
+    assert OrientationParameter(value=value, sigma=0.05, **about).is_significant == says_something
