@@ -68,6 +68,7 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark what fixtures want, take turns; order as ``TEST_ORDER`` says: reversed, or a seed."""
     equipment.mark(items)
+    turns.mark(items)
     turns.leave_out(config, items)
     order = os.environ.get("TEST_ORDER")
     if order == "reversed":

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from tests.turns import THIRDS, is_in_turn, turn_of
+import ast
+from functools import cache
+
+from tests.planted_faults import ROOT
+from tests.turns import LATER, THIRDS, is_in_turn, turn_of
 
 NAMES = [f"tests/test_wall.py::test_a_wall[{number}]" for number in range(300)]
 
@@ -17,3 +21,17 @@ def test_the_commit_chooses_the_turn_and_all_run_without_one():
     assert [turn_of(commit) for commit in ("f0", "f1", "f2")] == ["0", "1", "2"]
     assert turn_of("") == "all"
     assert all(is_in_turn(name, "all") for name in NAMES)
+
+
+@cache
+def names_in(file: str) -> set[str]:
+    """Return the names of a file's tests, those of classes too."""
+    tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
+    return {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+
+
+def test_what_waits_is_a_test_and_so_is_the_one_that_holds_its_promise_and_does_not_wait():
+    for name in (*LATER, *LATER.values()):
+        file, _, test = name.partition("::")
+        assert test.partition("[")[0].rpartition("::")[2] in names_in(file), name
+    assert not LATER.keys() & set(LATER.values())

@@ -4,10 +4,14 @@ Which third, the commit's hash says, so that landings take them all by and by, a
 red again at the same commit. All run where files are named on the command line, where no commit is
 known, and with `TEST_TURN=all`, as before a release (`.ci/check long`); `TEST_TURN=0`, `1` or `2`
 names a third.
+
+Some tests are slow only because another one, which is run by default, holds their promise already:
+`tests/later.json` names both, and they too are marked `acceptance`.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import zlib
@@ -16,6 +20,8 @@ from pathlib import Path
 import pytest
 
 THIRDS = 3
+#: Of every test that waits for its turn though it is not marked, the one that holds its promise.
+LATER: dict[str, str] = json.loads(Path(__file__).with_name("later.json").read_text("utf-8"))
 #: Where the turn is kept for the processes of the run.
 TURN = "TEST_TURN"
 
@@ -42,6 +48,13 @@ def _commit() -> str:
         return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
     except OSError:
         return ""
+
+
+def mark(items: list[pytest.Item]) -> None:
+    """Mark what waits because another test holds its promise by default."""
+    for item in items:
+        if item.nodeid in LATER:
+            item.add_marker("acceptance")
 
 
 def leave_out(config: pytest.Config, items: list[pytest.Item]) -> None:
