@@ -339,7 +339,7 @@ def _tiff_info(path: Path) -> ImageInfo:
         raise InputError(f"{path}: is not a readable TIFF ({error}).") from error
 
 
-def _named_exif(tag: Any) -> dict[int, Any]:
+def _named_exif(tag: Any) -> dict[int, object]:
     """Return a TIFF's EXIF values under their numbers."""
     if tag is None or not isinstance(tag.value, dict):
         return {}
@@ -403,16 +403,16 @@ def _number(value: Any) -> float | None:
     return float(number) if np.isfinite(number) and number > 0 else None
 
 
-def _recorded(tags: dict[int, Any]) -> tuple[int, int] | None:
+def _recorded(tags: dict[int, object]) -> tuple[int, int] | None:
     """Return the size in pixels that the EXIF data state; None where they state none."""
     width, height = _number(tags.get(40962)), _number(tags.get(40963))
     return (round(width), round(height)) if width and height else None
 
 
-def _pitch(tags: dict[int, Any]) -> float | None:
+def _pitch(tags: dict[int, object]) -> float | None:
     """Return the pixel size in mm from the focal-plane resolution."""
     resolution = _number(tags.get(41486))
-    unit = {2: 25.4, 3: 10.0, 4: 1.0}.get(tags.get(41488, 2))
+    unit = {2: 25.4, 3: 10.0, 4: 1.0}.get(int(_number(tags.get(41488, 2)) or 0))
     return unit / resolution if resolution and unit else None
 
 

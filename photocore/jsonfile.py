@@ -55,7 +55,7 @@ def read_json(path: Path | str, *, what: str) -> Any:
 
 
 def write_object(
-    path: Path | str, value: dict[str, Any], *, overwrite: bool = False, as_is: bool = False
+    path: Path | str, value: dict[str, object], *, overwrite: bool = False, as_is: bool = False
 ) -> None:
     """Write an object as indented JSON, whole or not at all; NaN and infinity become null.
 

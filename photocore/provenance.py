@@ -65,7 +65,7 @@ class Provenance:
     command: str = ""
     inputs: tuple[tuple[str, str], ...] = ()
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return it as plain data, without what is empty."""
         inputs = [{"file": name, "sha256": digest} for name, digest in self.inputs]
         more = {"command": self.command, "inputs": inputs}

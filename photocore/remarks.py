@@ -45,7 +45,7 @@ class Remark(str):
     """
 
     key: str
-    values: Mapping[str, Any]
+    values: Mapping[str, object]
     level: str
 
     def stop(self) -> None:
@@ -62,7 +62,7 @@ class Remark(str):
 _MADE: dict[str, Remark] = {}
 
 
-def _remembered(text: str, key: str, values: Mapping[str, Any], level: str) -> Remark:
+def _remembered(text: str, key: str, values: Mapping[str, object], level: str) -> Remark:
     told = Remark(text)
     told.key, told.values, told.level = key, values, level
     if len(text) >= _SHORTEST:
@@ -123,9 +123,9 @@ def alarms_in(texts: Iterable[str]) -> list[str]:
     return [text for text in texts if level_of(text) in LEVELS[:2]]
 
 
-def with_keys(value: dict[str, Any]) -> dict[str, Any]:
+def with_keys(value: dict[str, object]) -> dict[str, object]:
     """Return an object for JSON with keys, values and levels of all remarks that its texts hold."""
-    held: dict[str, Any] = {}
+    held: dict[str, object] = {}
 
     def collect(part: Any) -> None:
         if isinstance(part, str):

@@ -12,7 +12,7 @@ from photocore.arrays import FloatArray, is_finite_number
 from photocore.errors import InputError
 
 
-class FileSection(Mapping[str, Any]):
+class FileSection(Mapping[str, object]):
     """A section, and where it stands; a key that is not there is named when it is asked for.
 
     Parameters

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from bifocal.campaigns.pair_steps import PairJob, steps_of
 from bifocal.campaigns.step_store import (
@@ -58,7 +57,7 @@ class PairOutcome:
     remarks: tuple[str, ...] = ()
     seconds: float = 0.0
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return it as plain data."""
         return asdict(self)
 

@@ -67,7 +67,7 @@ class Rectification:
     remarks: tuple[str, ...]
     delivery: Delivery | None = None
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return it for ``--json``."""
         photo, points = self.photo, ("id", "error", "sigma", "test")
         left_out = zip(photo.ids, photo.left_out, photo.sigma_left_out, photo.test, strict=True)

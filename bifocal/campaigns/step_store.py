@@ -66,7 +66,7 @@ class Step:
     name: str
     files: Mapping[str, Path]
     after: tuple[str, ...] = ()
-    options: Mapping[str, Any] = field(default_factory=dict)
+    options: Mapping[str, object] = field(default_factory=dict)
     make: Callable[[Path, Progress], tuple[str, ...]]
     command: str = ""
 
@@ -119,7 +119,7 @@ def step_key(step: Step, earlier: Mapping[str, StepRecord], hashes: FileHashes) 
     return record_key(content, {name: earlier[name].outputs for name in step.after})
 
 
-def record_key(made: Mapping[str, Any], after: Mapping[str, Mapping[str, str]]) -> str:
+def record_key(made: Mapping[str, object], after: Mapping[str, Mapping[str, str]]) -> str:
     """Return the key of a record, given as plain data, that follows steps with these outputs."""
     content = {
         "format": FORMAT, "program": made["program"], "step": made["step"],

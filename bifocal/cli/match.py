@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import click
 
@@ -13,6 +13,9 @@ from photocore.cli import print_result, remark
 from photocore.option_types import NEW_TABLE
 from photocore.options import Argument, Typed, declared
 from photocore.shared_options import ChangedPhotosOption, JsonOption, OverwriteOption
+
+if TYPE_CHECKING:
+    from bifocal.workbook.match_workflow import MatchSummary, SetSummary
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,7 +118,7 @@ def _remarks(kinds: dict[str, int], what: str) -> Iterator[str]:
         )
 
 
-def _set_lines(summary: dict[str, Any]) -> Iterator[str]:
+def _set_lines(summary: SetSummary) -> Iterator[str]:
     """Yield what was found in a set."""
     picks = ", ".join(f"{name} {number}" for name, number in summary["photos"].items())
     low, high = summary["relief_range"]
@@ -126,7 +129,7 @@ def _set_lines(summary: dict[str, Any]) -> Iterator[str]:
     )
 
 
-def _lines(summary: dict[str, Any]) -> Iterator[str]:
+def _lines(summary: MatchSummary) -> Iterator[str]:
     """Yield what was found."""
     kinds = ", ".join(f"{number} {kind}" for kind, number in summary["kinds"].items())
     low, high = summary["relief_range"]
@@ -144,7 +147,7 @@ def _lines(summary: dict[str, Any]) -> Iterator[str]:
         yield _empty_in_words(summary)
 
 
-def _empty_in_words(summary: dict[str, Any]) -> str:
+def _empty_in_words(summary: MatchSummary) -> str:
     """Return in which parts of the far photo there are no points, or hardly any."""
     parts, least = summary["empty"], summary["fewest_in_part"]
     named = "; ".join(

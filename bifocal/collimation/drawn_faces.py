@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from bifocal.collimation.records import SurveyState
 from bifocal.collimation.shapes import commands_for, keep_faces
@@ -25,11 +24,11 @@ class DrawnFaces:
     """
 
     def __init__(
-        self, state: Callable[[], SurveyState], carry_out: Callable[[dict[str, Any]], object]
+        self, state: Callable[[], SurveyState], carry_out: Callable[[dict[str, object]], object]
     ) -> None:
         self._state = state
         self._carry_out = carry_out
-        self._kept: tuple[dict[str, Any], Pair] | None = None
+        self._kept: tuple[dict[str, object], Pair] | None = None
 
     def keep(self, pair: Pair | None, file: Path | None) -> None:
         """Write what was drawn beside the file of a pair, where it is another now."""

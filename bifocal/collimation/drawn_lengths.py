@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from bifocal.collimation.records import GIVES_SCALE, ScaleLength, SurveyState
@@ -28,12 +26,12 @@ def check_lengths(state: SurveyState, pair: Pair) -> dict[str, LengthCheck]:
     return checks
 
 
-def lengths_shown(state: SurveyState, pair: Pair | None) -> list[dict[str, Any]]:
+def lengths_shown(state: SurveyState, pair: Pair | None) -> list[dict[str, object]]:
     """Return the checking lengths as the page shows them; without a pair as drawn alone."""
     checks = {} if pair is None else check_lengths(state, pair)
     shown = []
     for name, drawn in _checking(state).items():
-        entry: dict[str, Any] = {
+        entry: dict[str, object] = {
             "name": name, "image": drawn.image, "ends": drawn.ends, "length": drawn.length,
             "sigma": drawn.sigma,
         }  # fmt: skip

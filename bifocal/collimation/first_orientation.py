@@ -48,11 +48,11 @@ class FirstOrientation:
         watch = partial(self._watch, events)
         in_background("the first orientation", watch, logging.getLogger(__name__).error).start()
 
-    def _watch(self, events: queue.SimpleQueue[dict[str, Any] | None]) -> None:
+    def _watch(self, events: queue.SimpleQueue[dict[str, object] | None]) -> None:
         while True:
             self.look()
             self.hold_picks()
-            event: dict[str, Any] | None = events.get()
+            event: dict[str, object] | None = events.get()
             while event is not None:
                 try:
                     event = events.get(timeout=PAUSE)

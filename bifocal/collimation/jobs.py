@@ -56,7 +56,7 @@ class PageJob:
     quiet: bool = False
     ended_at: int = 0
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return what the page shows of it."""
         return {
             "id": self.number,
@@ -88,7 +88,7 @@ class JobRunner:
     def __init__(
         self,
         lock: threading.RLock,
-        tell: Callable[[dict[str, Any]], None],
+        tell: Callable[[dict[str, object]], None],
         changed: Callable[[], None],
         language: Callable[[], str],
         revision: Callable[[], int] = lambda: 0,

@@ -79,7 +79,7 @@ class Journal:
         """Take a last line that a crash cut off from the file, once all others are understood."""
         self._file.truncate(self._whole)
 
-    def append(self, record: Mapping[str, Any]) -> None:
+    def append(self, record: Mapping[str, object]) -> None:
         """Add a command; on return it is on the disk.
 
         Raises

@@ -147,7 +147,7 @@ class Pictures:
             raise InputError(remark("page.align_first"))
         return self.pair
 
-    def suggest(self, image: int, pixel: Pixel) -> dict[str, Any]:
+    def suggest(self, image: int, pixel: Pixel) -> dict[str, object]:
         """Return where the other photo shows a pick, with the line on which it must lie."""
         suggestion = suggest(self.needed_pair(), self.photos(), image, np.array(pixel))
         return plain(
@@ -169,7 +169,7 @@ class Pictures:
         size = self.infos[2 - image].size
         return radial_line(self.needed_pair(), image, np.array(pixel), size).tolist()
 
-    def snap(self, image: int, pixel: Pixel, radius: float) -> dict[str, Any]:
+    def snap(self, image: int, pixel: Pixel, radius: float) -> dict[str, object]:
         """Return the target's centre or the corner next to a pick."""
         if image > len(self.pyramids):
             raise InputError(remark("page.give_photos"))

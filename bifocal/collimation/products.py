@@ -52,7 +52,7 @@ class Products:
         self._relief: tuple[tuple[str, int], ReliefMap] | None = None
         self._overlay: tuple[object, bytes] | None = None
         self._reading, self._shading = threading.Lock(), threading.Lock()
-        self._facts: dict[str, tuple[tuple[str, int], dict[str, Any]]] = {}
+        self._facts: dict[str, tuple[tuple[str, int], dict[str, object]]] = {}
 
     def note(
         self, kind: str, names: Sequence[str], causes: Mapping[str, str] | None = None
@@ -137,7 +137,7 @@ class Products:
         picture, _ = ortho_thumbnail(path)
         return _png(_small(picture[0][..., ::-1]))
 
-    def facts(self, kind: str) -> dict[str, Any] | None:
+    def facts(self, kind: str) -> dict[str, object] | None:
         """Return size and place of the relief or the orthophoto; None where there is none.
 
         Of the relief also the ``range`` that its colours span. [m]
@@ -221,7 +221,7 @@ def _version(path: Path) -> tuple[str, int]:
     return path.name, path.stat().st_mtime_ns
 
 
-def _grid_facts(path: Path) -> dict[str, Any]:
+def _grid_facts(path: Path) -> dict[str, object]:
     """Return name, size and place of a raster."""
     with RasterReader(path) as file:
         grid = file.grid
@@ -272,7 +272,7 @@ def colours() -> list[str]:
     return [f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in rgb]
 
 
-def _histogram(relief: ReliefMap) -> dict[str, Any]:
+def _histogram(relief: ReliefMap) -> dict[str, object]:
     """Return how often which relief occurs: ``from``, ``to`` [m] and ``counts``."""
     finite = relief.r[np.isfinite(relief.r)]
     if not len(finite):

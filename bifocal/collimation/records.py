@@ -247,7 +247,7 @@ class SurveyState:
                 for name, value in cast("dict[str, Any]", change.after).items():
                     setattr(self, name, value)
                 continue
-            records: dict[str, Any] = getattr(self, change.kind)
+            records: dict[str, object] = getattr(self, change.kind)
             if change.after is None:
                 records.pop(change.key, None)
             else:

@@ -68,7 +68,7 @@ def _of_pair(pair: Pair) -> PairMedia:
     return replace(media, normals=normals, turning=(False, False))
 
 
-def media_as_dict(media: PairMedia) -> dict[str, Any] | None:
+def media_as_dict(media: PairMedia) -> dict[str, object] | None:
     """Return media as plain data, for the process of a job."""
     if not media:
         return None

@@ -11,7 +11,7 @@ import tempfile
 import threading
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import cv2
 
@@ -65,7 +65,7 @@ class TileStore:
         """Take a picture away."""
         self._sources.pop(name, None)
 
-    def info(self, name: str) -> dict[str, Any] | None:
+    def info(self, name: str) -> dict[str, object] | None:
         """Return what a viewer needs to know of a picture; None where there is none."""
         entry = self._sources.get(name)
         if entry is None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import cv2
 import numpy as np
 
@@ -62,7 +60,7 @@ def uncertainty_picture(pictures: Pictures, results: LiveResults) -> bytes:
     return cv2.imencode(".png", picture)[1].tobytes()
 
 
-def precision_contours(pictures: Pictures, results: LiveResults) -> list[dict[str, Any]]:
+def precision_contours(pictures: Pictures, results: LiveResults) -> list[dict[str, object]]:
     """Return lines of equal sigma of r: ``sigma_mm`` and ``line``, pixels of the wall, (n, 2)."""
     from contourpy import contour_generator
 

@@ -67,7 +67,7 @@ class ComparedFiles:
         ]
         return [*sentences, f"Written   {self.folder}: {', '.join(self.files)}"]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return it for ``--json``."""
         done = self.comparison
         return {

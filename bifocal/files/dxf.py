@@ -75,7 +75,7 @@ def _show_all(drawing: Any) -> None:
     drawing.set_modelspace_vport(height=height, center=(box.center.x, box.center.y))
 
 
-def add_line(model: Any, points: FloatArray | Sequence[Any], style: Mapping[str, Any]) -> None:
+def add_line(model: Any, points: FloatArray | Sequence[Any], style: Mapping[str, object]) -> None:
     """Draw a line through points; one that ends where it begins is closed."""
     places = [tuple(point) for point in points]
     is_closed = len(places) > 3 and places[0] == places[-1]

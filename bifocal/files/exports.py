@@ -20,6 +20,7 @@ from photocore.cloud import write_cloud
 from photocore.errors import GeometryError, InputError
 from photocore.output import atomic_path
 from photocore.tables import write_csv
+from photocore.tables.csvwrite import Columns
 from photocore.workbook.changing.cells import CellValue
 from photocore.workbook.making.newbook import finish_book, new_workbook, plain_cell
 
@@ -203,7 +204,7 @@ def _write_csv(
         raise InputError(f"order: {order!r} is not one of {', '.join(ORDERS)}.")
     axes = {"E": coordinates[:, 0], "N": coordinates[:, 1], "Z": coordinates[:, 2]}
     notes = zip(points.flags, points.notes, strict=True)
-    columns: dict[str, object] = {
+    columns: Columns = {
         "P": list(points.ids),
         **{letter: axes[letter] for letter in order if letter in axes},
         "D": [f"{flag} {note}".strip() for flag, note in notes],

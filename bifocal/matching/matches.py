@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from photocore.arrays import FloatArray
 from photocore.tables import Column, read_table, write_csv
+from photocore.tables.csvwrite import Columns
 
 _PIXELS = ("col1 [px]", "row1 [px]", "col2 [px]", "row2 [px]")
 _QUALITY = ("sigma [px]", "misfit [px]", "agreement")
@@ -73,7 +73,7 @@ class Matches:
         )
 
     @property
-    def columns(self) -> dict[str, Any]:
+    def columns(self) -> Columns:
         """Names and raw pixels by the keys that `bifocal.solve` takes. [px]"""
         keys = (heading.split(" ")[0] for heading in _PIXELS)
         pixels = dict(zip(keys, np.hstack([self.pixels1, self.pixels2]).T, strict=True))

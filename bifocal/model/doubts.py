@@ -64,7 +64,7 @@ def _keys(text: str) -> set[str]:
     return keys_in(text) | {key for words, key in _WITHOUT_KEYS.items() if text.startswith(words)}
 
 
-def check_scale(extra: Mapping[str, Any], name: object) -> None:
+def check_scale(extra: Mapping[str, object], name: object) -> None:
     """Refuse a drawing scale of a pair or set whose lengths are no metres.
 
     Parameters
@@ -83,7 +83,7 @@ def check_scale(extra: Mapping[str, Any], name: object) -> None:
         raise InputError(remark("projects.no_drawing_scale", of=name))
 
 
-def unit_of(extra: Mapping[str, Any]) -> str:
+def unit_of(extra: Mapping[str, object]) -> str:
     """Return the unit of a pair's or set's lengths: ``m``, or ``none`` where nothing gave a scale.
 
     Examples

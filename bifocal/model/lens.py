@@ -121,7 +121,7 @@ class Lens:
                 raise InputError(f"sigma0: expected one number, found {sigma0!r:.40}.")
             return cls(**stated, extra=data)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return what `read` understands."""
         return {
             "format": FORMAT,

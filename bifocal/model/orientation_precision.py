@@ -271,7 +271,9 @@ def moved(covariance: FloatArray, axes: FloatArray, count: int = 2) -> FloatArra
     return turn @ covariance @ turn.T
 
 
-def as_dict(covariance: FloatArray, layers: Layers | None = None, count: int = 2) -> dict[str, Any]:
+def as_dict(
+    covariance: FloatArray, layers: Layers | None = None, count: int = 2
+) -> dict[str, object]:
     """Return what the file of a pair, or of ``count`` photos, holds under ``orientation``."""
     cameras, each = count * len(CAMERA), "either" if count == 2 else "each"
     names = names_of(layers if len(covariance) > cameras else None, count)

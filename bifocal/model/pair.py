@@ -205,7 +205,7 @@ class Pair:
         return source if isinstance(source, Pair) else cls.read(source)
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any], *, folder: Path = Path()) -> Pair:
+    def from_dict(cls, data: Mapping[str, object], *, folder: Path = Path()) -> Pair:
         """Return the pair described by the content of a pair file, or of a set of two photos."""
         photos, precision, extra = photo_entries(data, folder, PAIR_FORMAT, SET_FORMAT)
         if len(photos) > 2:
@@ -214,7 +214,7 @@ class Pair:
         far, near = photos
         return cls(image1=far, image2=near, folder=folder, extra=extra, orientation=precision)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the content of a pair file."""
         photos = (self.image1, self.image2)
         head = {"image1": self.image1.to_dict(), "image2": self.image2.to_dict()}

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import atan2
-from typing import Any
 
 import numpy as np
 
@@ -25,7 +24,7 @@ from bifocal.model.orientation_precision import (
     rates_of,
 )
 from bifocal.model.pair import Pair
-from bifocal.model.photo import AXIS
+from bifocal.model.photo import AXIS, MediaOfPhoto
 from bifocal.rays import Foot, foot_of, straight
 from bifocal.remarks import remark
 from multimedia import Layers
@@ -382,7 +381,7 @@ class PairMedia:
         rate = self.layers.indices[-1] / self.layers.indices[0] if stays else 1.0
         return straight(self.foot(number, camera)).distance, rate
 
-    def of_photo(self, number: int, camera: Pinhole) -> dict[str, Any]:
+    def of_photo(self, number: int, camera: Pinhole) -> MediaOfPhoto:
         """Return what the photo of camera 0 or 1 states of them; nothing in air."""
         if not self:
             return {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,6 +38,14 @@ LEAST_COSINE = 0.1
 AXIS = "axis"
 #: What else it holds where the pair file has `layers`.
 _MEDIA = ("z0", "interface_normal")
+
+
+class MediaOfPhoto(TypedDict, total=False):
+    """What a photo states of the media before its camera; nothing in air."""
+
+    layers: Layers | None
+    z0: float | None
+    interface_normal: FloatArray | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -442,10 +450,10 @@ class Photo:
                 folder=folder,
             )
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the photo's part of the pair file."""
         stated = {"name": self.name, "file": self.file, "sha256": self.sha256}
-        data: dict[str, Any] = {key: text for key, text in stated.items() if text}
+        data: dict[str, object] = {key: text for key, text in stated.items() if text}
         data |= {
             "plane_from_pixel": self.plane_from_pixel,
             "nadir": self.nadir,

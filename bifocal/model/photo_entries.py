@@ -29,7 +29,7 @@ class PhotoEntries(NamedTuple):
 
     photos: tuple[Photo, ...]
     orientation: FloatArray | None
-    extra: dict[str, Any]
+    extra: dict[str, object]
 
 
 def photo_entries(data: Mapping[str, Any], folder: Path, *formats: str) -> PhotoEntries:
@@ -75,11 +75,11 @@ def photo_entries(data: Mapping[str, Any], folder: Path, *formats: str) -> Photo
 
 
 def file_content(
-    head: Mapping[str, Any],
+    head: Mapping[str, object],
     photos: Sequence[Photo],
-    extra: Mapping[str, Any],
+    extra: Mapping[str, object],
     orientation: FloatArray | None,
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Return the content of a file: format and photos, media, other keys, covariance."""
     layers = photos[0].layers
     data = {**head, **({"layers": layers.as_dict()} if layers else {}), **extra}

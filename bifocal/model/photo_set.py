@@ -141,12 +141,12 @@ class PhotoSet:
         )  # fmt: skip
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any], *, folder: Path = Path()) -> PhotoSet:
+    def from_dict(cls, data: Mapping[str, object], *, folder: Path = Path()) -> PhotoSet:
         """Return the set described by the content of its file, or of a pair file."""
         photos, orientation, extra = photo_entries(data, folder, SET_FORMAT, PAIR_FORMAT)
         return cls(photos=photos, folder=folder, extra=extra, orientation=orientation)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the content of the set's file."""
         head = {"format": SET_FORMAT, "photos": [photo.to_dict() for photo in self.photos]}
         return file_content(head, self.photos, self.extra, self.orientation)

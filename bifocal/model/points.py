@@ -11,6 +11,7 @@ import numpy as np
 from photocore.arrays import BoolArray, FloatArray, as_floats
 from photocore.errors import InputError
 from photocore.plots import Drawable
+from photocore.tables.csvwrite import Columns
 
 #: Columns of each array of a set of points; 0 for one number per point.
 _WIDTHS = {
@@ -129,14 +130,14 @@ class Points(Drawable):
             import pandas
         except ImportError:
             raise InputError("pandas is not installed: pip install pandas") from None
-        columns: dict[str, Any] = dict(zip(("X", "Y", "r"), self.xyz.T, strict=True))
+        columns: Columns = dict(zip(("X", "Y", "r"), self.xyz.T, strict=True))
         if self.world is not None:
             columns |= dict(zip("ENH", self.world.T, strict=True))
         columns |= {key: values for key, values in self.sigmas.items() if np.isfinite(values).any()}
         columns |= {"flag": self.flags, "note": self.notes}
         return pandas.DataFrame(columns, index=pandas.Index(self.ids, name="id"))
 
-    def to_geojson(self, *, world: bool = False) -> dict[str, Any]:
+    def to_geojson(self, *, world: bool = False) -> dict[str, object]:
         """Return a GeoJSON FeatureCollection in metres (a local frame, not longitudes).
 
         Parameters

@@ -70,7 +70,7 @@ class WorldFrame:
         """Return E, N, H of X, Y, r, shape (n, 3). [m]"""
         return np.asarray(plane @ self.axes + self.origin)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Return what a pair file holds of it."""
         return {
             "E": self.east, "N": self.north, "H": self.height,
@@ -78,7 +78,7 @@ class WorldFrame:
         }  # fmt: skip
 
     @classmethod
-    def of(cls, extra: Mapping[str, Any]) -> WorldFrame | None:
+    def of(cls, extra: Mapping[str, object]) -> WorldFrame | None:
         """Return the frame of a pair or set by the keys of its file; None where it has none.
 
         Raises
@@ -86,16 +86,18 @@ class WorldFrame:
         InputError
             If it is damaged.
         """
-        held = extra.get(IN_PAIR)
-        if held is None:
+        stated = extra.get(IN_PAIR)
+        if stated is None:
             return None
+        if not isinstance(stated, Mapping):
+            raise InputError(remark("pair.damaged_world", error=repr(stated)))
         try:
-            return cls.from_json(held)
+            return cls.from_json(stated)
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(remark("pair.damaged_world", error=repr(error))) from None
 
     @classmethod
-    def from_json(cls, held: Mapping[str, Any]) -> WorldFrame:
+    def from_json(cls, stated: Mapping[str, Any]) -> WorldFrame:
         """Return what a pair file holds.
 
         Raises
@@ -103,14 +105,14 @@ class WorldFrame:
         KeyError, TypeError, ValueError
             If a number is missing or none.
         """
-        east, north, height, azimuth = (float(held[k]) for k in ("E", "N", "H", "azimuth_deg"))
+        east, north, height, azimuth = (float(stated[k]) for k in ("E", "N", "H", "azimuth_deg"))
         return cls(
             east=east, north=north, height=height, azimuth=float(np.deg2rad(azimuth)),
-            is_upright=bool(held["upright"]),
+            is_upright=bool(stated["upright"]),
         )  # fmt: skip
 
 
-def world_entry(frame: WorldFrame | None) -> dict[str, Any]:
+def world_entry(frame: WorldFrame | None) -> dict[str, object]:
     """Return what a pair file or set holds of a frame, nothing where there is none."""
     return {} if frame is None else {IN_PAIR: frame.to_json()}
 

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -75,6 +75,24 @@ class JointTask:
     columns: str | None = None
 
 
+class AdjustedPoint(TypedDict):
+    """A named point as plain data: its place, its sigmas, and how far it lies from before. [m]"""
+
+    id: str
+    kind: str
+    rays: int
+    X: float
+    Y: float
+    r: float
+    sigma_X: float
+    sigma_Y: float
+    sigma_r: float
+    dX: float
+    dY: float
+    dr: float
+    flag: str
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointResult:
     """Adjusted pairs.
@@ -86,7 +104,7 @@ class JointResult:
     names : tuple of str
         Of the pairs.
     adjustment : JointAdjustment
-    points : tuple of dict
+    points : tuple of AdjustedPoint
         Named points: id, kind (control, check, tie), X, Y, r, their sigmas, rays, and how far they
         lie from what was known. [m]
     remarks : tuple of str
@@ -96,7 +114,7 @@ class JointResult:
     pairs: tuple[Pair, ...]
     names: tuple[str, ...]
     adjustment: JointAdjustment
-    points: tuple[dict[str, Any], ...]
+    points: tuple[AdjustedPoint, ...]
     remarks: tuple[str, ...] = ()
 
     def check_rms(self, kind: str) -> tuple[int, FloatArray]:
@@ -104,7 +122,7 @@ class JointResult:
 
         NaN for a coordinate that none of them has.
         """
-        rows = [[p[f"d{axis}"] for axis in "XYr"] for p in self.points if p["kind"] == kind]
+        rows = [(p["dX"], p["dY"], p["dr"]) for p in self.points if p["kind"] == kind]
         away = np.array([row for row in rows if np.isfinite(row).any()], float).reshape(-1, 3)
         with np.errstate(invalid="ignore"):
             rms = np.sqrt(np.nansum(away**2, axis=0) / np.isfinite(away).sum(axis=0))
@@ -133,7 +151,7 @@ class JointResult:
         lines += [f"gross error LEFT IN: {_told(b)}" for b in a.left_in[:NAMED]]
         return [*lines, *self.remarks]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return it as plain data."""
         a = self.adjustment
         return {
@@ -201,8 +219,10 @@ def adjust_pairs(
     if out.is_dir():
         check_all_writable(*outputs, overwrite=overwrite)
     result = joint_adjustment(pairs, names, tables, task, progress=progress)
-    columns = list(result.points[0]) if result.points else ["id"]
-    table = {name: [point[name] for point in result.points] for name in columns}
+    table: dict[str, Any] = {"id": []}
+    if result.points:
+        cells = zip(*(point.values() for point in result.points), strict=True)
+        table = dict(zip(result.points[0], map(list, cells), strict=True))
     with atomic_folder(out, overwrite=overwrite) as folder:
         for path, name, pair in zip(paths, names, result.pairs, strict=True):
             _write_pair(pair, folder / path.name, name, out)
@@ -394,21 +414,26 @@ def _adjusted_photo(photo: Photo, camera: Pinhole, media: PairMedia, side: int) 
     )  # fmt: skip
 
 
-def _points(named: NamedPositions, adjusted: JointAdjustment) -> tuple[dict[str, Any], ...]:
+def _points(named: NamedPositions, adjusted: JointAdjustment) -> tuple[AdjustedPoint, ...]:
     """Return the named points with their precision and what they are compared with."""
     rays = np.bincount(adjusted.observations.point, minlength=len(named.ids))
-    out = []
+    out: list[AdjustedPoint] = []
     wrong = {b.point for b in adjusted.blunders if b.where == "control"}
     for k, name in enumerate(named.ids):
         is_control = np.isfinite(named.xyz[k]).any()
         kind = "check" if named.is_check[k] else "control" if is_control else "tie"
         sigma = np.sqrt(np.diagonal(adjusted.covariance[k]))
         away = adjusted.xyz[k] - named.xyz[k]
-        row: dict[str, Any] = {"id": name, "kind": kind, "rays": int(rays[k])}
-        row |= dict(zip(("X", "Y", "r"), adjusted.xyz[k].tolist(), strict=True))
-        row |= dict(zip(("sigma_X", "sigma_Y", "sigma_r"), sigma.tolist(), strict=True))
-        row |= dict(zip(("dX", "dY", "dr"), away.tolist(), strict=True))
-        out.append({**row, "flag": "GROSS" if name in wrong else "OK"})
+        x, y, r = adjusted.xyz[k].tolist()
+        sigma_x, sigma_y, sigma_r = sigma.tolist()
+        dx, dy, dr = away.tolist()
+        out.append(
+            AdjustedPoint(
+                id=name, kind=kind, rays=int(rays[k]), X=x, Y=y, r=r, sigma_X=sigma_x,
+                sigma_Y=sigma_y, sigma_r=sigma_r, dX=dx, dY=dy, dr=dr,
+                flag="GROSS" if name in wrong else "OK",
+            )
+        )  # fmt: skip
     return tuple(out)
 
 

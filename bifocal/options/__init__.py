@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import click
 
@@ -424,14 +424,14 @@ OF_STEP = {
 }
 
 
-def typed(options: Mapping[str, Any], *, in_file: bool = False) -> Iterator[str]:
+def typed(options: Mapping[str, object], *, in_file: bool = False) -> Iterator[str]:
     """Yield options as they are typed on the command line, or as keys of a survey file."""
     for name, value in options.items():
         if name in OF_PAIR:
             yield from OF_PAIR[name].typed_as(value, in_file=in_file)
 
 
-def defaults_of(step: str, options: Mapping[str, Any]) -> dict[str, Any]:
+def defaults_of(step: str, options: Mapping[str, object]) -> dict[str, object]:
     """Return the values a step takes where nothing was said; what depends on the photos is none.
 
     Examples

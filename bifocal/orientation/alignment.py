@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -281,11 +281,11 @@ def _diagnostics(
     way: str,
     words: tuple[str, ...],
     sigma_tie: float,
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Return the free diagnostics of the pair file."""
     observations, adjusted = oriented.observations, oriented.adjusted
     control = observations.control
-    out: dict[str, Any] = {
+    out: dict[str, object] = {
         "way": way,
         "standard_deviations": dict(deviations),
         "sigma0": adjusted.sigma0,
@@ -340,7 +340,16 @@ def _diagnostics(
     return out
 
 
-def wall_relief(oriented: OrientedPair) -> list[dict[str, Any]]:
+class WallZone(TypedDict):
+    """Relief of a ninth of the far photo: how many points of the wall, median, spread. [mm]"""
+
+    zone: str
+    points: int
+    median: float
+    spread: float
+
+
+def wall_relief(oriented: OrientedPair) -> list[WallZone]:
     """Return the relief of the wall's own points by zone of the far photo.
 
     Nine zones; those with fewer than five points of the wall are left out. [mm]
@@ -352,19 +361,19 @@ def wall_relief(oriented: OrientedPair) -> list[dict[str, Any]]:
     height = 1000 * tie_positions(observations, oriented.adjusted)[wall, 2]
     size = np.array(observations.interiors[0].image_size)
     place = np.clip(observations.interiors[0].raw(observations.tie1[wall]) * 3 // size, 0, 2)
-    out = []
+    out: list[WallZone] = []
     for row, line in enumerate(("top", "middle", "bottom")):
         for column, side in enumerate(("left", "centre", "right")):
             inside = height[(place[:, 0] == column) & (place[:, 1] == row)]
             if len(inside) >= 5:
                 spread = 1.4826 * float(np.median(np.abs(inside - np.median(inside))))
                 out.append(
-                    {
-                        "zone": f"{line} {side}",
-                        "points": len(inside),
-                        "median": float(np.median(inside)),
-                        "spread": spread,
-                    }
+                    WallZone(
+                        zone=f"{line} {side}",
+                        points=len(inside),
+                        median=float(np.median(inside)),
+                        spread=spread,
+                    )
                 )
     return out
 

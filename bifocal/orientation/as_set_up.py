@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from bifocal.model.hypotheses import SCALE_TOLERANCE
@@ -93,7 +91,7 @@ def check_room(media: PairMedia, cameras: Cameras) -> None:
         path = media.path(number, camera)
         if not path:
             return
-        about: dict[str, Any] = {"number": number + 1, "distance": path.distance}
+        about: dict[str, object] = {"number": number + 1, "distance": path.distance}
         if path.z0 < 0:
             about |= {"depth": media.depth, "thick": media.layers.thickness}
             raise InputError(remark("refused.depth_room", **about))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import chain
-from typing import Any
 
 import numpy as np
 
@@ -136,7 +135,7 @@ def _scale(ratio: float, base: float, sigma: float) -> Iterator[Remark]:
 def _zone(d1: float, pixel: float, base: float, sigma_px: float, relief_scale: float) -> Remark:
     """Say what precision to expect where, for pixels of a size on the wall. [m]"""
     sigma_m, at = sigma_px * pixel, 0.25 * d1
-    about: dict[str, Any] = {"sigma": sigma_px, "good": 1000 * sigma_m * base / at, "at": at}
+    about: dict[str, object] = {"sigma": sigma_px, "good": 1000 * sigma_m * base / at, "at": at}
     about["radius"] = _cm(sigma_m * base / 0.01)
     if relief_scale < 5e-5:
         return remark("orientation.zone", **about)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from bifocal.model.interior_orientation import Interior
@@ -15,7 +13,7 @@ from photocore.arrays import FloatArray
 CELLS = 16
 
 
-def tie_statistics(observations: PairObservations, adjusted: AdjustedPair) -> dict[str, Any]:
+def tie_statistics(observations: PairObservations, adjusted: AdjustedPair) -> dict[str, object]:
     """Return the misfits of the ties used, over all and by cells of either photo.
 
     Returns
@@ -41,7 +39,7 @@ def tie_statistics(observations: PairObservations, adjusted: AdjustedPair) -> di
     }
 
 
-def _cells(pixels: FloatArray, misfit: FloatArray, interior: Interior) -> dict[str, Any]:
+def _cells(pixels: FloatArray, misfit: FloatArray, interior: Interior) -> dict[str, object]:
     side = max(interior.image_size) / CELLS
     cells, place = np.unique(np.floor(pixels / side).astype(int), axis=0, return_inverse=True)
     place = place.ravel()

@@ -88,7 +88,7 @@ def name_layers(document: Any, manner: str, language: str) -> None:
 def _contours(model: Any, drawing: Drawing, paper: float) -> None:
     for contour in drawing.contours:
         layer = "BIFOCAL_CONTOURS_INDEX" if contour.index else "BIFOCAL_CONTOURS"
-        style: dict[str, Any] = {"layer": layer, "elevation": contour.level}
+        style: dict[str, object] = {"layer": layer, "elevation": contour.level}
         style["lineweight"] = 25 if contour.index else 9
         add_line(model, contour.line.tolist(), style)
     for label in contour_labels(drawing.contours, drawing.scale):

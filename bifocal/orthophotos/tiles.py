@@ -38,7 +38,7 @@ class RasterResult:
     remarks: tuple[str, ...]
     basis: Mapping[str, float] = field(default_factory=dict)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the result for ``--json``."""
         return {
             "file": str(self.path),

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from bifocal.planning.camera_plan import Plan
 
 _WORDS = "bifocal.planning"
+#: What the formulas of a sheet give, by cell.
+Results = dict[str, float | int | str]
 #: Cells of the first station.
 _FIRST = {"pair": "$A$5", "width": "$I$5", "height": "$J$5", "sigma_1m": "$L$5"}
 
@@ -37,7 +39,7 @@ def write_plan(
     book, package = Workbook(), io.BytesIO()
     say = words_of(_WORDS, language)
     first, second = say("tab"), say("tab_grid")
-    results: dict[str, dict[str, Any]] = {first: {}, second: {}}
+    results: dict[str, Results] = {first: {}, second: {}}
     _stations_sheet(book.active, plan, language, results[first])
     _grid_sheet(book.create_sheet(second), plan, say, results[second])
     if not plan.media:
@@ -66,7 +68,7 @@ def _inputs(book: Any, plan: Plan, say: Words) -> None:
         book.defined_names[key] = DefinedName(key, attr_text=f"{sheet.title}!$F${row}")
 
 
-def _stations_sheet(sheet: Any, plan: Plan, language: str, results: dict[str, Any]) -> None:
+def _stations_sheet(sheet: Any, plan: Plan, language: str, results: Results) -> None:
     """Fill the table of stations and the bar chart of expected precision."""
     from openpyxl.chart import BarChart, Reference
     from openpyxl.styles import Alignment, Font, PatternFill
@@ -144,7 +146,7 @@ def _stations_sheet(sheet: Any, plan: Plan, language: str, results: dict[str, An
     _fit_to_width(sheet)
 
 
-def _grid_sheet(sheet: Any, plan: Plan, say: Words, results: dict[str, Any]) -> None:
+def _grid_sheet(sheet: Any, plan: Plan, say: Words, results: Results) -> None:
     """Fill sigma of r over the frame of the best pair, coloured by size."""
     from openpyxl.formatting.rule import ColorScaleRule
     from openpyxl.styles import Font

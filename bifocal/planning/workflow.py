@@ -36,7 +36,7 @@ def make_plan(
     return plan
 
 
-def plan_as_dict(plan: Plan) -> dict[str, Any]:
+def plan_as_dict(plan: Plan) -> dict[str, object]:
     """Return a plan as plain data for ``--json``."""
     x, y, sigma = plan.sigma_grid(plan.best)
     return {

@@ -79,7 +79,7 @@ class ReliefJob:
 @all_or_none()
 def relief_of_pair(
     source: Pair | PhotoSet | Path, job: ReliefJob, *, progress: Progress = no_progress
-) -> tuple[dict[str, Any], tuple[str, ...]]:
+) -> tuple[dict[str, object], tuple[str, ...]]:
     """Make the relief map of a pair, a pair file or a set.
 
     Returns

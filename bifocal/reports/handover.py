@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from string import Template
-from typing import Any
+from typing import Any, TypedDict
 
 import cv2
 import numpy as np
@@ -64,9 +64,17 @@ class HandoverTask:
     language: str = "en"
 
 
+class HandedOver(TypedDict):
+    """What was written: bytes, pixels of the orthophoto in the file, and remarks."""
+
+    bytes: int
+    pixels: list[int] | None
+    remarks: tuple[str, ...]
+
+
 def write_handover(
     source: Path, out: Path, task: HandoverTask, *, overwrite: bool = False
-) -> dict[str, Any]:
+) -> HandedOver:
     """Write one HTML file that shows a wall and measures on it, without network or program.
 
     Parameters
@@ -80,8 +88,7 @@ def write_handover(
 
     Returns
     -------
-    dict
-        ``bytes``, ``pixels`` of the orthophoto in the file, and ``remarks``.
+    HandedOver
 
     Raises
     ------
@@ -194,7 +201,7 @@ def _relief(relief: ReliefMap, factor: float) -> tuple[dict[str, Any], ByteArray
     return numbers, picture
 
 
-def _points(shown: _Shown) -> list[dict[str, Any]]:
+def _points(shown: _Shown) -> list[dict[str, object]]:
     """Return the points with their places in both photos."""
     points = shown.points
     if points is None:

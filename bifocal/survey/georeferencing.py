@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,8 +49,8 @@ MODELS: Mapping[str, TransformationModel] = {
 
 
 def georeference(
-    points: NamedPoints | Mapping[str, Any],
-    control: KnownPoints | Mapping[str, Any],
+    points: NamedPoints | Mapping[str, Sequence[Any] | FloatArray],
+    control: KnownPoints | Mapping[str, Sequence[Any] | FloatArray],
     *,
     model: str = "auto",
     covariance: FloatArray | None = None,
@@ -157,8 +157,8 @@ class _MeasuredControl:
 
 
 def _measured_control(
-    points: NamedPoints | Mapping[str, Any],
-    control: KnownPoints | Mapping[str, Any],
+    points: NamedPoints | Mapping[str, Sequence[Any] | FloatArray],
+    control: KnownPoints | Mapping[str, Sequence[Any] | FloatArray],
     covariance: FloatArray | None,
 ) -> _MeasuredControl:
     """Return what was measured and what is known of the same names."""

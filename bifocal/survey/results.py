@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from bifocal.survey.solved_survey import SolvedSurvey
 from bifocal.survey.tolerances import FEW, sentence
 from photocore.arrays import FloatArray
 from photocore.jsonfile import to_text
+from photocore.tables.csvwrite import Columns
 
 _NUMBERS = ("r", "e1", "e2", "s_c", "X", "Y", "Z", "q", "sigma_X", "sigma_Y", "sigma_r")
 
@@ -23,10 +23,10 @@ _NUMBERS = ("r", "e1", "e2", "s_c", "X", "Y", "Z", "q", "sigma_X", "sigma_Y", "s
 SHOWN = ("r", "e1", "e2", "X", "Y", "sigma_X", "sigma_Y", "sigma_r")
 
 
-def csv_columns(solution: SolvedSurvey) -> dict[str, Any]:
+def csv_columns(solution: SolvedSurvey) -> Columns:
     """Return the columns of the text table, headings with units."""
     table, world = solution.table, solution.world
-    columns: dict[str, Any] = {"id": list(table.ids)}
+    columns: Columns = {"id": list(table.ids)}
     units = dict.fromkeys(("e1", "e2", "s_c", "q"), length_unit(solution))
     for key in ("X", "Y", "Z"):
         columns[f"{key} [m]"] = table[key]
@@ -95,7 +95,7 @@ def _records(solution: SolvedSurvey) -> list[str]:
     return [template.format(*row) for row in zip(names, *numbers, *texts, strict=True)]
 
 
-def _head(solution: SolvedSurvey) -> dict[str, Any]:
+def _head(solution: SolvedSurvey) -> dict[str, object]:
     """Return all but the points."""
     axes = solution.check.axes
     return {
@@ -145,7 +145,7 @@ def length_unit(solution: SolvedSurvey) -> str:
     return "mm" if on_photo else "m"
 
 
-def _georeference(solution: SolvedSurvey) -> dict[str, Any] | None:
+def _georeference(solution: SolvedSurvey) -> dict[str, object] | None:
     geo = solution.georeference
     if geo is None:
         return None
@@ -166,12 +166,12 @@ def _georeference(solution: SolvedSurvey) -> dict[str, Any] | None:
     }
 
 
-def _taped(solution: SolvedSurvey) -> dict[str, Any] | None:
+def _taped(solution: SolvedSurvey) -> dict[str, object] | None:
     taped = solution.taped
     return None if taped is None else {**asdict(taped), "scale": taped.scale}
 
 
-def _orientation_check(solution: SolvedSurvey) -> dict[str, Any] | None:
+def _orientation_check(solution: SolvedSurvey) -> dict[str, object] | None:
     check = solution.orientation_check
     if check is None:
         return None

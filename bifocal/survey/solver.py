@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -174,7 +173,7 @@ def solve_survey_of_set(
 
 
 def _placed(
-    control: KnownPoints, table: ReliefTable, model: str, extra: Mapping[str, Any]
+    control: KnownPoints, table: ReliefTable, model: str, extra: Mapping[str, object]
 ) -> tuple[Georeference | None, list[str]]:
     """Return the wall in the world, and remarks on it: by control points, or as the pair's were."""
     if not control.used.any() or np.isnan(control.xyz).all():

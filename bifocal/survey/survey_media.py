@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from bifocal.model.photo import Photo
+import numpy as np
+
+from bifocal.model.photo import MediaOfPhoto, Photo
 from bifocal.remarks import remark
 from multimedia import Layers
 from photocore.errors import InputError
@@ -156,7 +158,7 @@ class SurveyMedia:
         names = media_names(self.media, leaning=self.normals is not None)
         return dict(zip(names, values, strict=True))
 
-    def through(self, number: int) -> dict[str, Any]:
+    def through(self, number: int) -> MediaOfPhoto:
         """Return `Photo`'s layers, z0 and interface_normal; blank cells bend no light.
 
         Raises
@@ -169,7 +171,11 @@ class SurveyMedia:
             layers, z0 = AIR, 0.0
         if z0 is None:
             raise InputError(remark("survey.blank_z0", number=number))
-        return {"layers": layers, "z0": z0, "interface_normal": self.normal(number)}
+        normal = self.normal(number)
+        return {
+            "layers": layers, "z0": z0,
+            "interface_normal": None if normal is None else np.asarray(normal),
+        }  # fmt: skip
 
     def normal(self, number: int) -> tuple[float, ...] | None:
         """Return the normal of photo 1 or 2 as used, blanks filled in; None without such cells."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
@@ -78,9 +78,35 @@ def match_pair_file(pair_path: Pair | Path, settings: MatchSettings) -> tuple[Pa
     return pair, match_pair(pair, images, settings)
 
 
+class SetSummary(TypedDict):
+    """What `match` reports of a set."""
+
+    count: int
+    photos: dict[str, int]
+    in_three: int
+    kinds: dict[str, int]
+    sigma_px: float
+    relief_range: tuple[float, float]
+    sigma_r_median: float
+
+
+class MatchSummary(TypedDict):
+    """What `match` reports of a pair."""
+
+    count: int
+    kinds: dict[str, int]
+    sigma_px: float
+    misfit_px: float
+    relief_range: tuple[float, float]
+    sigma_r_median: float
+    rests_on: str
+    fewest_in_part: int
+    empty: list[dict[str, list[int]]]
+
+
 def match_set_file(
     photos: PhotoSet, out: Path, settings: MatchSettings, *, overwrite: bool = False
-) -> dict[str, Any]:
+) -> SetSummary:
     """Find homologous points in three photos and more, write them as a table, return a summary.
 
     Raises
@@ -107,7 +133,7 @@ def match_set_file(
         "in_three": int((picked.sum(axis=0) > 2).sum()),
         "kinds": {kind: found.kinds.count(kind) for kind in sorted(set(found.kinds))},
         "sigma_px": found.sigma_px,
-        "relief_range": [low, high],
+        "relief_range": (float(low), float(high)),
         "sigma_r_median": float(np.nanmedian(found.points.sigma[:, 2])),
     }
 
@@ -118,17 +144,18 @@ FEWEST_IN_PART = 3
 PARTS = (6, 4)
 
 
-def match_summary(pair: Pair, matches: Matches) -> dict[str, Any]:
+def match_summary(pair: Pair, matches: Matches) -> MatchSummary:
     """Return what `match` reports."""
     solved = pair.intersect(matches.pixels1, matches.pixels2, sigma_px=precision(matches))
     kinds = {kind: matches.kinds.count(kind) for kind in sorted(set(matches.kinds))}
     least = fewest_in_part(matches)
+    low, high = np.nanpercentile(solved.xyz[:, 2], [1, 99])
     return {
         "count": len(matches.ids),
         "kinds": kinds,
         "sigma_px": float(np.median(matches.sigma)),
         "misfit_px": float(np.median(np.abs(matches.misfit)) * 1.4826),
-        "relief_range": np.nanpercentile(solved.xyz[:, 2], [1, 99]),
+        "relief_range": (float(low), float(high)),
         "sigma_r_median": float(np.nanmedian(solved.sigma[:, 2])),
         "rests_on": rests_on(
             pair,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -128,7 +127,7 @@ def _update(path: Path, solution: SolvedSurvey, content: SurveyContent, *, overw
     return " ".join([kept, *done.remarks]).strip()
 
 
-def _options(solution: SolvedSurvey) -> dict[str, Any]:
+def _options(solution: SolvedSurvey) -> dict[str, object]:
     """Return all that options put in the place of what a workbook says."""
     given = dict(solution.given)
     if solution.rules != RULES:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from bifocal.matching.matches import Matches
 from bifocal.model.lens import Lens
 from bifocal.model.pair import Pair
-from bifocal.model.photo import Photo
+from bifocal.model.photo import MediaOfPhoto, Photo
 from bifocal.model.photo_entries import SET_FORMAT
 from bifocal.model.photo_set import PhotoSet
 from bifocal.remarks import remark
@@ -25,7 +24,7 @@ from photocore.errors import GeometryError, InputError, WorkbookError
 from photocore.jsonfile import read_object
 
 Lists = tuple[Path | str, Path | str]
-Source = Path | str | PointObservations | SurveyInput | Matches | Mapping[str, Any] | Lists
+Source = Path | str | PointObservations | SurveyInput | Matches | Mapping[str, object] | Lists
 #: Files that are workbooks, and so no pair files.
 BOOKS = (".xlsx", ".xlsm", ".ods")
 
@@ -108,7 +107,7 @@ def set_or_pair(
 def set_up(
     survey: SurveyInput,
     pair: Pair | Path | str | None,
-    given: Mapping[str, Any],
+    given: Mapping[str, object],
     options: ReadOptions,
 ) -> tuple[SurveyInput, Pair | Path | str | None]:
     """Return the points with the set-up that holds for them, and the pair where it is not that."""
@@ -173,8 +172,8 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
         return None
     lenses: list[Lens | None] = [None, None]
     sizes: list[tuple[int, int] | None] = [None, None]
-    orientation, remarks, extra = None, list[str](), {"setup": None}
-    media: list[dict[str, Any]] = [{}, {}]
+    orientation, remarks, extra = None, list[str](), dict[str, object](setup=None)
+    media: list[MediaOfPhoto] = [{}, {}]
     if setup.media:
         media = [setup.media.through(number) for number in (1, 2)]
     if setup.pair_file and file is None:
@@ -189,8 +188,8 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
                 orientation = given.orientation  # it may count the media too
             if not setup.media:
                 media = [
-                    {name: getattr(photo, name) for name in ("layers", "z0", "interface_normal")}
-                    for photo in (given.image1, given.image2)
+                    MediaOfPhoto(layers=p.layers, z0=p.z0, interface_normal=p.interface_normal)
+                    for p in (given.image1, given.image2)
                 ]
         except (InputError, GeometryError) as error:
             remarks.append(remark("survey.lens_unusable", file=setup.pair_file, why=error))

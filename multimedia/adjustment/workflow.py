@@ -108,15 +108,18 @@ def salinity_of(
     names = [name for name in result.names if name.rpartition(":")[2] == last]
     if not names:
         return None
-    water: dict[str, Any] = {"wavelength_nm": wavelength_nm, "temperature_c": temperature_c}
-    water["depth"] = depth
+    water: dict[str, Any] = {
+        "wavelength_nm": wavelength_nm,
+        "temperature_c": temperature_c,
+        "depth": depth,
+    }
     salinity = float(salinity_from_index(result.value(names[0]), **water))
     # Within the error of the index fresh water may come out slightly below zero.
     rates = water_index_derivatives(**water, salinity_percent=min(max(salinity, 0.0), 30.0))
     return salinity, result.sigma(names[0]) / abs(float(rates.d_salinity))
 
 
-def as_dict(result: Adjustment) -> dict[str, Any]:
+def as_dict(result: Adjustment) -> dict[str, object]:
     """Return an adjustment as plain data for ``--json``."""
     points = result.project.object_points
     sigma = np.asarray(points.sigma)

@@ -89,7 +89,7 @@ def read_bounds(area: Path | None, classes: Sequence[int]) -> Bounds:
     return Bounds(rings=tuple(rings), classes=tuple(classes), path=area)
 
 
-def _geometries(path: Path) -> Iterator[Mapping[str, Any]]:
+def _geometries(path: Path) -> Iterator[Mapping[str, object]]:
     """Yield the geometries of a file as GeoJSON has them."""
     suffix = path.suffix.lower()
     if suffix in GEOJSON:
@@ -110,7 +110,7 @@ def _geometries(path: Path) -> Iterator[Mapping[str, Any]]:
         raise InputError(remark("bathymetry.bad_shapes", of=path, error=error)) from None
 
 
-def _geometries_of(part: Any) -> Iterator[Mapping[str, Any]]:
+def _geometries_of(part: Any) -> Iterator[Mapping[str, object]]:
     """Yield the geometries of a collection, a feature or a geometry."""
     if not isinstance(part, Mapping):
         return
@@ -122,7 +122,7 @@ def _geometries_of(part: Any) -> Iterator[Mapping[str, Any]]:
         yield part
 
 
-def _rings(geometry: Mapping[str, Any], path: Path) -> list[FloatArray]:
+def _rings(geometry: Mapping[str, object], path: Path) -> list[FloatArray]:
     """Return the rings of a polygon or several; none of other geometries."""
     kind, coordinates = geometry.get("type"), geometry.get("coordinates")
     polygons: Any = {"Polygon": [coordinates], "MultiPolygon": coordinates}.get(str(kind), [])

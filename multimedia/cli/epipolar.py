@@ -103,7 +103,12 @@ def _lines(result: EpipolarResult) -> Iterator[str]:
     else:
         yield f"{len(result.curves)} curves; --out writes their vertices."
     rows = [
-        (c["id"], c["target"], f"{c['distance'] * 1000:.2f}", *(f"{c[k]:.4f}" for k in "XYZ"))
+        (
+            c["id"],
+            c["target"],
+            f"{c['distance'] * 1000:.2f}",
+            *(f"{v:.4f}" for v in (c["X"], c["Y"], c["Z"])),
+        )
         for c in result.candidates
     ]
     yield f"\n{len(rows)} candidates"

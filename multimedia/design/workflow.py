@@ -223,7 +223,7 @@ def write_design(design: Design, *, out: Path | None, plot: Path | None, overwri
         write_design_plot(plot, design, overwrite=overwrite)
 
 
-def as_dict(design: Design) -> dict[str, Any]:
+def as_dict(design: Design) -> dict[str, object]:
     """Return a design as plain data for ``--json``."""
     x, y, z = design.study.rms_sigma.tolist()
     costs = design.costs

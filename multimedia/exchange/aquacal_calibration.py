@@ -120,7 +120,8 @@ def write_aquacal(path: Path, project: Project, *, overwrite: bool = False) -> t
         for (name, view), surface in zip(views.items(), surfaces, strict=True)
     }  # fmt: skip
     n_air, n_water = first.indices
-    kept = project.extra.get("aquacal", {})
+    kept = project.extra.get("aquacal")
+    kept = kept if isinstance(kept, Mapping) else {}
     content = {
         "version": VERSION,
         "cameras": cameras,

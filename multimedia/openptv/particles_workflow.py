@@ -16,6 +16,7 @@ from multimedia.projects.project_file import read_project
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_all_writable, check_not_input
+from photocore.tables.csvwrite import Columns
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,7 +124,7 @@ def _write(out: Path, found: Particles, *, overwrite: bool) -> None:
             factor = METRES[unit] / METRES["mm"]
             temporary.write_text(rt_is_text(found.xyz * factor, found.numbers), encoding="utf-8")
         return
-    columns: dict[str, Any] = {"id": [str(k) for k in range(1, len(found.xyz) + 1)]}
+    columns: Columns = {"id": [str(k) for k in range(1, len(found.xyz) + 1)]}
     columns |= {f"{axis} [{unit}]": found.xyz[:, k] for k, axis in enumerate("XYZ")}
     columns |= {
         f"{name} target": [str(n) if n >= 0 else "" for n in found.numbers[:, k].tolist()]

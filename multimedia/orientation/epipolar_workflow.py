@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import NotRequired, TypedDict
 
 import numpy as np
 
@@ -19,9 +19,30 @@ from multimedia.projects.project_file import project_files, read_project
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
 from photocore.output import all_or_none, check_all_writable, check_not_input
+from photocore.tables.csvwrite import Columns
 
 #: The depth range without --z-range: that of the object points, this share of it wider.
 _MARGIN = 0.25
+
+
+class Curve(TypedDict):
+    """A curve as plain data: its vertices in the image [mm], in the object and in pixels."""
+
+    id: str
+    image: FloatArray
+    points: FloatArray
+    pixels: NotRequired[FloatArray]
+
+
+class Candidate(TypedDict):
+    """An image point near a curve, and the object point that both would give."""
+
+    id: str
+    target: str
+    distance: float
+    X: float
+    Y: float
+    Z: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,8 +63,8 @@ class EpipolarResult:
         What the user should know.
     """
 
-    curves: list[dict[str, Any]]
-    candidates: list[dict[str, Any]]
+    curves: list[Curve]
+    candidates: list[Candidate]
     z_range: tuple[float, float]
     unit: str
     remarks: tuple[str, ...]
@@ -110,9 +131,7 @@ def epipolar_project(
     near = epipolar_candidates(polygons, targets, tolerance=tolerance)
     parts = zip(names, polygons.image, polygons.points, polygons.counts, strict=True)
     curves = [
-        {"id": name, "image": vertex[:count], "points": point[:count]}
-        | _pixels(second, vertex[:count])
-        for name, vertex, point, count in parts
+        _curve(name, second, vertex[:count], point[:count]) for name, vertex, point, count in parts
     ]
     lost = [c["id"] for c in curves if not np.isfinite(c["image"]).all()]
     if not any(np.isfinite(c["image"]).any() for c in curves):
@@ -129,12 +148,14 @@ def epipolar_project(
     image_pairs = np.stack([image[near.curves], targets[near.targets]])
     exact = intersect_pairs((first, second), image_pairs, media)[0]
     candidates = [
-        {
-            "id": names[curve],
-            "target": project.image_points.ids[rows[target]],
-            "distance": distance,
-            **dict(zip("XYZ", point, strict=True)),
-        }
+        Candidate(
+            id=names[curve],
+            target=project.image_points.ids[rows[target]],
+            distance=distance,
+            X=point[0],
+            Y=point[1],
+            Z=point[2],
+        )
         for curve, target, distance, point in zip(
             near.curves, near.targets, near.distance, exact, strict=True
         )
@@ -157,11 +178,11 @@ def epipolar_project(
     )  # fmt: skip
 
 
-def _columns(curves: Sequence[dict[str, Any]], unit: str) -> dict[str, Any]:
+def _columns(curves: Sequence[Curve], unit: str) -> Columns:
     """Return the vertices of all curves as columns."""
     image = np.concatenate([c["image"] for c in curves])
     points = np.concatenate([c["points"] for c in curves])
-    columns: dict[str, Any] = {
+    columns: Columns = {
         "id": [c["id"] for c in curves for _ in c["image"]],
         "vertex": [k for c in curves for k in range(1, len(c["image"]) + 1)],
     }
@@ -172,10 +193,11 @@ def _columns(curves: Sequence[dict[str, Any]], unit: str) -> dict[str, Any]:
     return columns | {f"{axis} [{unit}]": points[:, k] for k, axis in enumerate("XYZ")}
 
 
-def _pixels(camera: Camera, image: FloatArray) -> dict[str, FloatArray]:
-    if camera.sensor is None:
-        return {}
-    return {"pixels": camera.sensor.pixel_from_image(image)}
+def _curve(name: str, camera: Camera, image: FloatArray, points: FloatArray) -> Curve:
+    curve = Curve(id=name, image=image, points=points)
+    if camera.sensor is not None:
+        curve["pixels"] = camera.sensor.pixel_from_image(image)
+    return curve
 
 
 def _points(

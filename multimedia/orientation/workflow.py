@@ -28,6 +28,7 @@ from multimedia.remarks import remark
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import InputError
 from photocore.output import all_or_none, check_all_writable, check_ending, check_not_input
+from photocore.tables.csvwrite import Columns
 from photocore.workbook.making.newbook import check_new_workbook
 
 METHODS = ("rigorous", "rays", "pairs")
@@ -37,11 +38,11 @@ METHODS = ("rigorous", "rays", "pairs")
 class PointTable:
     """Columns to print or write, with what to say about them."""
 
-    columns: dict[str, Any]
+    columns: Columns
     remarks: tuple[str, ...] = ()
     summary: tuple[str, ...] = ()
 
-    def records(self) -> list[dict[str, Any]]:
+    def records(self) -> list[dict[str, object]]:
         """Return one mapping per row."""
         names = list(self.columns)
         return [
@@ -65,7 +66,7 @@ def project_project(
         for camera, image in zip(project.cameras, images, strict=True)
         if camera.sensor is not None
     ]
-    columns: dict[str, Any] = {
+    columns: Columns = {
         "camera": np.repeat(project.camera_names, len(objects.ids)).tolist(),
         "id": list(objects.ids) * len(views),
     }
@@ -105,9 +106,10 @@ def intersect_project(
         solved, odd = with_calibration(project, solved, sigma)
         remarks = [*remarks, *odd]
         columns, units, summary = _intersection_columns(project, solved, u)
+        status = _labels(solved)
         xyz = solved.xyz
     else:
-        extra: dict[str, Any] = {}
+        extra: Columns = {}
         if method == "rays":
             xyz = intersect_rays(project.cameras, image, project.interfaces)
         else:
@@ -125,17 +127,22 @@ def intersect_project(
         ]
     columns = {"id": list(ids), **columns}
     summary += known_misses(project, ids, xyz)
-    remarks = [*remarks, *_suspicious(project, columns["status"])]
+    remarks = [*remarks, *_suspicious(project, status)]
     _write(out, columns, units, overwrite)
     return PointTable(columns=columns, remarks=(*project.remarks, *remarks), summary=tuple(summary))
 
 
+def _labels(solved: IntersectedPoints) -> list[str]:
+    """Return the status of every point in words."""
+    return [PointStatus(code).label for code in solved.status.tolist()]
+
+
 def _intersection_columns(
     project: Project, solved: IntersectedPoints, unit: str
-) -> tuple[dict[str, Any], dict[str, str], list[str]]:
+) -> tuple[Columns, dict[str, str], list[str]]:
     """Return the columns of a rigorous intersection, their units, and a summary."""
     doubtful = solved.status == PointStatus.GROSS_ERROR
-    columns: dict[str, Any] = {
+    columns: Columns = {
         **dict(zip("XYZ", solved.xyz.T, strict=True)),
         **dict(zip(("sigma_X", "sigma_Y", "sigma_Z"), solved.sigma.T, strict=True)),
         "rays": solved.rays,
@@ -145,7 +152,7 @@ def _intersection_columns(
             project.cameras[camera].name if bad and camera >= 0 else ""
             for camera, bad in zip(solved.worst_camera.tolist(), doubtful.tolist(), strict=True)
         ],
-        "status": [PointStatus(code).label for code in solved.status.tolist()],
+        "status": _labels(solved),
     }
     units = dict.fromkeys(("X", "Y", "Z", "sigma_X", "sigma_Y", "sigma_Z"), unit) | {"angle": "deg"}
     good = np.isfinite(solved.xyz[:, 0])
@@ -245,9 +252,7 @@ def _resected(
     return result, names, remarks
 
 
-def residual_columns(
-    results: dict[str, Resection], used: dict[str, tuple[str, ...]]
-) -> dict[str, Any]:
+def residual_columns(results: dict[str, Resection], used: dict[str, tuple[str, ...]]) -> Columns:
     """Return the residuals of all cameras as columns."""
     names = list(results)
     if not names:
@@ -350,9 +355,7 @@ def known_misses(project: Project, ids: Sequence[str], xyz: FloatArray) -> list[
     ]
 
 
-def _write(
-    out: Path | None, columns: dict[str, Any], units: dict[str, str], overwrite: bool
-) -> None:
+def _write(out: Path | None, columns: Columns, units: dict[str, str], overwrite: bool) -> None:
     """Write columns with their units in the headings."""
     if out is None:
         return

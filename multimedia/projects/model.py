@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -148,7 +147,7 @@ class Project:
     sigma_image: float = SIGMA_IMAGE
     unit: str = "m"
     name: str = ""
-    extra: Mapping[str, Any] = field(default_factory=dict)
+    extra: Mapping[str, object] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
     without_pose: tuple[str, ...] = ()
 

@@ -23,6 +23,7 @@ from photocore.tables.axes import (
     PHOTOS,
     ROWS_OF_PIXELS,
 )
+from photocore.tables.csvwrite import Cells, Columns
 
 #: Metres per unit of length that a heading may name.
 METRES: Mapping[str, float] = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "km": 1e3}
@@ -166,18 +167,16 @@ def read_image_points(path: Path, cameras: Sequence[Camera]) -> tuple[ImagePoint
     return points, list(table.remarks)
 
 
-def object_columns(points: ObjectPoints, unit: str) -> dict[str, FloatArray | tuple[str, ...]]:
+def object_columns(points: ObjectPoints, unit: str) -> Columns:
     """Return the columns of a table of object points."""
-    columns: dict[str, FloatArray | tuple[str, ...]] = {"id": points.ids}
+    columns: Columns = {"id": points.ids}
     columns |= {f"{axis} [{unit}]": points.xyz[:, k] for k, axis in enumerate("XYZ")}
     return columns | _sigma_and_group(points, "XYZ", unit)
 
 
-def image_columns(
-    points: ImagePoints, cameras: Sequence[Camera]
-) -> dict[str, FloatArray | tuple[str, ...]]:
+def image_columns(points: ImagePoints, cameras: Sequence[Camera]) -> Columns:
     """Return the columns of a table of image points, in pixels where every sensor is known."""
-    columns: dict[str, FloatArray | tuple[str, ...]] = {"camera": points.cameras, "id": points.ids}
+    columns: Columns = {"camera": points.cameras, "id": points.ids}
     sensors = {camera.name: camera.sensor for camera in cameras if camera.sensor is not None}
     if sensors.keys() >= set(points.cameras):
         pixels = np.array(points.image)
@@ -190,17 +189,15 @@ def image_columns(
     return columns | _sigma_and_group(points, "xy", "mm")
 
 
-def _sigma_and_group(points: ObjectPoints | ImagePoints, axes: str, unit: str) -> dict[str, Any]:
+def _sigma_and_group(points: ObjectPoints | ImagePoints, axes: str, unit: str) -> Columns:
     """Return the columns that are written only where points have them."""
-    columns: dict[str, Any] = {}
+    columns: Columns = {}
     if np.isfinite(points.sigma).any():
         columns |= {f"sigma_{axis} [{unit}]": points.sigma[:, k] for k, axis in enumerate(axes)}
     return columns | ({"group": points.groups} if any(points.groups) else {})
 
 
-def write_columns(
-    path: Path, columns: Mapping[str, FloatArray | Sequence[str]], *, overwrite: bool
-) -> None:
+def write_columns(path: Path, columns: Mapping[str, Cells], *, overwrite: bool) -> None:
     """Write columns as .csv or .xlsx, by the ending; NaN becomes an empty cell."""
     if path.suffix.lower() == ".csv":
         write_csv(path, columns, overwrite=overwrite)

@@ -41,6 +41,7 @@ from photocore.camera.fisheye import Fisheye
 from photocore.errors import GeometryError, InputError, located
 from photocore.output import all_or_none, atomic_path, check_all_writable, relative_name
 from photocore.sections import FileSection
+from photocore.tables.csvwrite import Columns
 from photocore.textfile import check_name, read_toml
 
 FORMAT = "multimedia-project/1"
@@ -147,15 +148,15 @@ def write_project(path: Path | str, project: Project, *, overwrite: bool = False
 
     path = Path(path)
     data = project_data(project, path.parent)
-    tables: dict[Path, dict[str, Any]] = {}
+    tables: dict[Path, Columns] = {}
     if project.object_points.ids:
         table = path.with_name(f"{path.stem}_object_points.csv")
         data["object_points"] = table.name
-        tables[table] = dict(object_columns(project.object_points, project.unit))
+        tables[table] = object_columns(project.object_points, project.unit)
     if project.image_points.ids:
         table = path.with_name(f"{path.stem}_image_points.csv")
         data["image_points"] = table.name
-        tables[table] = dict(image_columns(project.image_points, project.cameras))
+        tables[table] = image_columns(project.image_points, project.cameras)
     # Tables (arrays of them too) must follow the plain keys.
     order = sorted(data, key=lambda key: isinstance(data[key], dict | list))
     check_all_writable(path, *tables, overwrite=overwrite)

@@ -23,6 +23,7 @@ from photocore.output import (
     check_not_input,
     check_writable,
 )
+from photocore.tables.csvwrite import Columns
 
 #: Share of targets that may be several before that is said.
 _MANY = 0.05
@@ -163,7 +164,7 @@ def _text(targets: TargetImages, offset: float) -> str:
     )
 
 
-def _columns(made: Sequence[ImageTargets]) -> dict[str, Any]:
+def _columns(made: Sequence[ImageTargets]) -> Columns:
     def joined(name: str, axis: int | None = None) -> Any:
         parts = [getattr(one.targets, name) for one in made]
         return np.concatenate([part if axis is None else part[:, axis] for part in parts])

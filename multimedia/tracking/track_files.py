@@ -15,13 +15,14 @@ from photocore.arrays import FloatArray, IntArray
 from photocore.errors import InputError, MissingExtraError
 from photocore.output import atomic_path
 from photocore.provenance import program
+from photocore.tables.csvwrite import Columns
 
 #: Endings of tables and of HDF5.
 TABLES, HDF5 = (".csv", ".xlsx"), (".h5", ".hdf5")
 
 
 def columns_of(tracks: Tracks, targets: IntArray, cameras: Sequence[str], units: tuple[str, str]
-               ) -> dict[str, Any]:  # fmt: skip
+               ) -> Columns:  # fmt: skip
     """Return the columns of a table of tracks, points after each other.
 
     Parameters
@@ -33,7 +34,7 @@ def columns_of(tracks: Tracks, targets: IntArray, cameras: Sequence[str], units:
     units : tuple of str
         Of lengths and of velocities.
     """
-    columns: dict[str, Any] = {
+    columns: Columns = {
         "track": (tracks.track + 1).astype(str).tolist(),
         "frame": tracks.frame.astype(str).tolist(),
     }

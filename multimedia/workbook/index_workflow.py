@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import hypot
-from typing import Any
 
 from multimedia.refraction.water import (
     WATER_FORMULAS,
@@ -53,7 +52,7 @@ class WaterAnswer:
         """The number as text: 8 decimals of an index, 4 of a salinity or temperature."""
         return f"{self.value:.8f}" if self.key == "refractive_index" else f"{self.value:.4f}"
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return everything as plain data for ``--json``."""
         return {
             self.key: self.value,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from multimedia.refraction.layers import Layers
 from multimedia.remarks import remark
@@ -35,7 +34,7 @@ class ShiftReport:
     result: ShiftResult
     remarks: tuple[str, ...]
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return everything as plain data for ``--json``."""
         columns = self.result.columns(self.points, every=True)
         rows = zip(*columns.values(), strict=True)

@@ -18,6 +18,7 @@ from photocore.cloud.model import (
     Cloud,
     CloudPiece,
     NewAttributes,
+    NewValues,
     PieceWriter,
     checked_positions,
 )
@@ -139,7 +140,7 @@ class LasCloud(Cloud):
             laspy.open(path, mode="w", header=header, do_compress=compressed) as out,
         ):
 
-            def write(piece: CloudPiece, xyz: FloatArray, values: Mapping[str, Any]) -> None:
+            def write(piece: CloudPiece, xyz: FloatArray, values: NewValues) -> None:
                 points = laspy.ScaleAwarePointRecord.zeros(len(xyz), header=header)
                 for name in piece.raw.point_format.dimension_names:
                     points[name] = piece.raw[name]

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from photocore.arrays import FloatArray
+from photocore.arrays import FloatArray, IntArray
 from photocore.errors import LARGEST, InputError
 from photocore.output import atomic_path
 from photocore.provenance import note
@@ -55,9 +55,11 @@ def checked_positions(path: Path, xyz: FloatArray) -> FloatArray:
     return xyz
 
 
+#: Values of the new attributes by name.
+NewValues = Mapping[str, FloatArray | IntArray | list[str]]
 #: Writes a piece with new positions and the values of the new attributes, by name; rows whose
 #: position is unchanged stay bit for bit.
-PieceWriter = Callable[[CloudPiece, FloatArray, Mapping[str, Any]], None]
+PieceWriter = Callable[[CloudPiece, FloatArray, NewValues], None]
 #: New attributes of a copy: name to numpy type without byte order, and a description.
 NewAttributes = Mapping[str, tuple[str, str]]
 

@@ -21,6 +21,7 @@ from photocore.cloud.model import (
     Cloud,
     CloudPiece,
     NewAttributes,
+    NewValues,
     PieceWriter,
     checked_positions,
 )
@@ -138,7 +139,7 @@ class PlyCloud(Cloud):
         with path.open("wb") as out, self.path.open("rb") as source:
             out.write(_heading(lines))
 
-            def write(piece: CloudPiece, xyz: FloatArray, values: Mapping[str, Any]) -> None:
+            def write(piece: CloudPiece, xyz: FloatArray, values: NewValues) -> None:
                 rows: Any = np.empty(len(xyz), dtype)
                 for name in piece.raw.dtype.names:
                     rows[name] = piece.raw[name]

@@ -8,16 +8,16 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from itertools import islice
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TextIO
 
 import numpy as np
 
-from photocore.arrays import FloatArray
-from photocore.cloud.model import PIECE, Cloud, CloudPiece, NewAttributes, PieceWriter
+from photocore.arrays import FloatArray, IntArray
+from photocore.cloud.model import PIECE, Cloud, CloudPiece, NewAttributes, NewValues, PieceWriter
 from photocore.errors import LARGEST, CellError, InputError, WorkbookError
 from photocore.tables.axes import EAST, HEIGHT, NAMES, NORTH
 from photocore.tables.heading_words import bare, parts_of, unit_of
@@ -188,7 +188,7 @@ class TextCloud(Cloud):
             if self._headed:
                 writer.writerow([*self._names, *extra])
 
-            def write(piece: CloudPiece, xyz: FloatArray, values: Mapping[str, Any]) -> None:
+            def write(piece: CloudPiece, xyz: FloatArray, values: NewValues) -> None:
                 rows = [list(cells) for cells in piece.raw]
                 for axis, place in enumerate(places):
                     moved = np.flatnonzero(xyz[:, axis] != piece.xyz[:, axis])
@@ -201,7 +201,7 @@ class TextCloud(Cloud):
 
             yield write
 
-    def _texts(self, values: FloatArray | list[str]) -> list[str]:
+    def _texts(self, values: FloatArray | IntArray | list[str]) -> list[str]:
         """Return the cells of a column; unknown numbers are blank."""
         if isinstance(values, list):
             return values

@@ -36,7 +36,7 @@ _CELL = 8.0
 #: be made smaller to fit on the page begun; height of its caption. [mm]
 SIZES, SMALLEST, CAPTION = tuple(round(1.0 - 0.04 * k, 2) for k in range(11)), 0.65, 12.0
 #: A grid over the whole page, without gaps.
-_WHOLE: dict[str, Any] = {"left": 0, "right": 1, "bottom": 0, "top": 1, "wspace": 0, "hspace": 0}
+_WHOLE: dict[str, object] = {"left": 0, "right": 1, "bottom": 0, "top": 1, "wspace": 0, "hspace": 0}
 
 
 def write_pdf(
@@ -48,7 +48,7 @@ def write_pdf(
     from photocore.reports.tagged_pdf import TaggedPdf
 
     date = datetime.fromisoformat(today()).replace(tzinfo=UTC)
-    info: dict[str, Any] = {"Title": document.title, "Creator": document.subject}
+    info: dict[str, object] = {"Title": document.title, "Creator": document.subject}
     info |= {"Producer": "bifocal", "CreationDate": date, "ModDate": date}
     info["Subject"] = "; ".join(provenance().lines())
     emptiest: dict[float, float] = {}

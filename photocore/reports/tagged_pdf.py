@@ -53,7 +53,7 @@ class TaggedPdf(PdfFile):  # type: ignore[misc,unused-ignore]
         Of its texts.
     """
 
-    def __init__(self, file: Any, metadata: dict[str, Any], language: str) -> None:
+    def __init__(self, file: Any, metadata: dict[str, object], language: str) -> None:
         self.language, self.tree = language, Element("Document")
         self._marked: list[list[Element]] = []
         self._tree_object: Any = None
@@ -97,7 +97,7 @@ class TaggedPdf(PdfFile):  # type: ignore[misc,unused-ignore]
 
     def finalize(self) -> None:
         """Write the structure tree and the end of the file."""
-        objects: dict[Element, Any] = {}
+        objects: dict[Element, object] = {}
         self._write_element(self.tree, self._tree_object, objects)
         parents = []
         for page, marked in enumerate(self._marked):
@@ -109,7 +109,7 @@ class TaggedPdf(PdfFile):  # type: ignore[misc,unused-ignore]
         super().writeObject(self._tree_object, root)
         super().finalize()
 
-    def _write_element(self, element: Element, parent: Any, objects: dict[Element, Any]) -> None:
+    def _write_element(self, element: Element, parent: Any, objects: dict[Element, object]) -> None:
         number = objects[element] = self.reserveObject("structure element")
         content = {
             "Type": Name("StructElem"), "S": Name(element.tag), "P": parent,
@@ -121,7 +121,7 @@ class TaggedPdf(PdfFile):  # type: ignore[misc,unused-ignore]
             content["A"] = {"O": Name("Table"), "Scope": Name("Column")}
         super().writeObject(number, content)
 
-    def _kids(self, element: Element, own: Any, objects: dict[Element, Any]) -> Iterator[Any]:
+    def _kids(self, element: Element, own: Any, objects: dict[Element, object]) -> Iterator[Any]:
         for kid in element.kids:
             if isinstance(kid, Element):
                 self._write_element(kid, own, objects)

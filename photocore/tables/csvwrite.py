@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,9 @@ import numpy as np
 from photocore.errors import InputError
 from photocore.output import atomic_path
 
+#: The cells of a column: an array of numbers, or a text or number a row.
+Cells = np.ndarray[Any, Any] | Sequence[str] | Sequence[int] | Sequence[float]
+Columns = dict[str, Cells]
 #: Flavour -> (delimiter, decimal separator, encoding, line end). Excel in Italy and Germany reads a
 #: CSV file as its own language writes it, and needs the byte-order mark to see UTF-8.
 FLAVOURS: dict[str, tuple[str, str, str, str]] = {
@@ -27,7 +30,7 @@ _DANGEROUS = re.compile(r"(?:^|(?<=[;\r\n]))(?='*[=+\-@\t\r])")
 
 def write_csv(
     path: Path | str,
-    columns: Mapping[str, Any],
+    columns: Mapping[str, Cells],
     *,
     flavour: str = "plain",
     formats: Mapping[str, str] | None = None,
@@ -92,7 +95,7 @@ def guarded(text: str) -> str:
     return text  # a number, however it begins, is harmless
 
 
-def _fields(values: Any, decimal: str, form: str) -> Iterable[str]:
+def _fields(values: Cells, decimal: str, form: str) -> Iterable[str]:
     """Return the fields of one column."""
     if isinstance(values, np.ndarray) and values.dtype.kind in "fiub":
         return _number_fields(values, decimal, form)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import AsyncIterator
-from typing import Any
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
@@ -99,7 +98,7 @@ async def _asset(request: Request) -> Response:
 
 
 async def _state(request: Request) -> Response:
-    def edition() -> dict[str, Any]:
+    def edition() -> dict[str, object]:
         editions: StateEditions = request.app.state.editions
         return editions.next(state_of(session_of(request)), request.headers.get(HELD))
 
@@ -110,7 +109,7 @@ async def _command(request: Request) -> Response:
     session, body = session_of(request), fields_of(await json_body(request), COMMANDS)
     editions: StateEditions = request.app.state.editions
 
-    def carry_out() -> dict[str, Any]:
+    def carry_out() -> dict[str, object]:
         with session.lock:
             result = session.command(body)
             state = editions.next(state_of(session), request.headers.get(HELD))

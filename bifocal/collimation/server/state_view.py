@@ -32,7 +32,7 @@ from photocore.remarks import LEVELS, level_of
 from photocore.reports.words import words_of
 
 
-def state_of(session: Session) -> dict[str, Any]:
+def state_of(session: Session) -> dict[str, object]:
     """Return everything the page shows, as plain data; see docs/picking.md."""
     with session.lock:
         state, live = session.state, None
@@ -169,7 +169,7 @@ def _photos(session: Session) -> list[dict[str, Any]]:
     return shown
 
 
-def _others(session: Session) -> list[dict[str, Any]]:
+def _others(session: Session) -> list[dict[str, object]]:
     """Return the photos beside far and near, and whether they are oriented with the pair."""
     joined, distances = session.photo_set, {}
     if joined is not None and session.pictures.others:
@@ -209,7 +209,7 @@ def _focal_said(session: Session, number: int, info: ImageInfo) -> str:
     return say("focal", key, language, focal=interior.focal, share=100 * interior.sigma_focal)
 
 
-def _shapes(session: Session) -> list[dict[str, Any]]:
+def _shapes(session: Session) -> list[dict[str, object]]:
     pair = session.pictures.pair
     return [
         {**asdict(shape), **({} if pair is None else plain(measures_of(shape, pair)))}
@@ -217,7 +217,7 @@ def _shapes(session: Session) -> list[dict[str, Any]]:
     ]
 
 
-def _drawn_length(session: Session) -> dict[str, Any] | None:
+def _drawn_length(session: Session) -> dict[str, object] | None:
     drawn = session.state.scale.get(GIVES_SCALE)
     return None if drawn is None else asdict(drawn)
 
@@ -246,7 +246,7 @@ def _missing(info: ImageInfo, typed: Mapping[str, float | None], language: str) 
     return [] if info.focal_pixels else [say("ask", "focal", language, name=name)]
 
 
-def _pair(session: Session, pair: Pair) -> dict[str, Any]:
+def _pair(session: Session, pair: Pair) -> dict[str, object]:
     grid = session.pictures.grid
     assert grid is not None
     images = []
@@ -317,7 +317,7 @@ def _levels(session: Session) -> dict[str, str]:
     return {words: level for words, level in weights.items() if level != "hint"}
 
 
-def _control(session: Session, live: LiveOrientation | None) -> list[dict[str, Any]]:
+def _control(session: Session, live: LiveOrientation | None) -> list[dict[str, object]]:
     residuals = _residuals(session, live)
     return [
         {
@@ -348,13 +348,13 @@ def _both(values: Any) -> list[float] | None:
     return shown if len(shown) == 2 else None
 
 
-def _live(live: LiveOrientation | None) -> dict[str, Any] | None:
+def _live(live: LiveOrientation | None) -> dict[str, object] | None:
     if live is None:
         return None
     return plain({"error": live.error, "deviations": live.deviations, "distances": live.distances})
 
 
-def _points(session: Session) -> list[dict[str, Any]]:
+def _points(session: Session) -> list[dict[str, object]]:
     points = session.state.sorted_points()
     results = session.results
     if results is not None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
-from typing import Any
 
 from openpyxl.utils import get_column_letter
 
@@ -15,7 +14,7 @@ from photocore.workbook.making.look import HEAD_FILL, HEAD_FONT, LABEL_FONT, add
 from photocore.workbook.making.newbook import finished_parts
 
 #: Of an outline by its name: what it is called on drawings, and its measures. [m, m2]
-Outlines = Mapping[str, Mapping[str, Any]]
+Outlines = Mapping[str, Mapping[str, CellValue]]
 TABLE = "tblOutlines"
 #: Columns of the table, and their widths.
 KEYS = {

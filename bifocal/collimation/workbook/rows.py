@@ -356,7 +356,7 @@ def _outlines(editor: WorkbookEditor, outlines: Outlines, language: str) -> None
 
 def _set(
     editor: WorkbookEditor, sheet: str, row: int, column: int, value: CellValue,
-    cells: Mapping[int, Mapping[int, Any]],
+    cells: Mapping[int, Mapping[int, object]],
 ) -> None:  # fmt: skip
     """Type a value where another one stands."""
     stands = cells.get(row, {}).get(column)

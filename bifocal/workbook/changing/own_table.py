@@ -6,7 +6,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -64,7 +63,7 @@ def add_results(
     survey: SurveyInput,
     content: SurveyContent,
     *,
-    given: Mapping[str, Any],
+    given: Mapping[str, object],
     overwrite: bool,
 ) -> BookUpdate:
     """Copy a workbook with the results in new columns of its own table; all else as it was.
@@ -137,7 +136,9 @@ def add_results(
     return saved(editor, changed_results(editor, built), target, overwrite=overwrite)
 
 
-def _links(editor: WorkbookEditor, survey: SurveyInput, given: Mapping[str, Any]) -> dict[str, str]:
+def _links(
+    editor: WorkbookEditor, survey: SurveyInput, given: Mapping[str, object]
+) -> dict[str, str]:
     """Return where values of `Setup` stand in sheets of the user's own, to refer to them."""
     replaced = cells_of(given)
     links = {}

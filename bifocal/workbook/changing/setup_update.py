@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any
 
 from openpyxl import load_workbook
 
@@ -83,7 +82,9 @@ def store_functions(editor: WorkbookEditor) -> None:
             editor.set_result(state[0], row, column, value)
 
 
-def write_options(editor: WorkbookEditor, content: SurveyContent, given: Mapping[str, Any]) -> None:
+def write_options(
+    editor: WorkbookEditor, content: SurveyContent, given: Mapping[str, object]
+) -> None:
     """Write options into their cells, in place of the formula of a default too.
 
     Raises

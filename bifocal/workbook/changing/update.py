@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from bifocal.remarks import remark
 from bifocal.survey.survey_input import SurveyInput
@@ -85,7 +84,7 @@ def update_book(
     survey: SurveyInput,
     content: SurveyContent,
     *,
-    given: Mapping[str, Any],
+    given: Mapping[str, object],
     overwrite: bool = False,
 ) -> BookUpdate:
     """Copy a survey workbook with fresh results in its formula cells; all else byte for byte.

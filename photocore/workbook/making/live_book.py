@@ -73,7 +73,7 @@ class BookBuilder:
     blocks: dict[str, RowBlock] = field(default_factory=dict)
     tables: dict[str, TableContent] = field(default_factory=dict)
     drawings: dict[str, bytes] = field(default_factory=dict)
-    looks: dict[Hashable, tuple[dict[str, Any], StyleArray]] = field(default_factory=dict)
+    looks: dict[Hashable, tuple[dict[str, object], StyleArray]] = field(default_factory=dict)
     _titles: list[tuple[str, str, StrVal]] = field(default_factory=list)
 
     def word(self, key: str) -> str:
@@ -265,7 +265,7 @@ class SheetBuilder:
         self, cell: Cell, *, font: Font | None = None, form: str = "", editable: bool = False
     ) -> None:
         """Give a cell its font, its number format, and the look of one that may be changed."""
-        parts: dict[str, Any] = {"font": font} if font else {}
+        parts: dict[str, object] = {"font": font} if font else {}
         if editable:
             parts |= {"fill": INPUT_FILL, "border": INPUT_EDGE, "protection": _FREE}
         if form:
